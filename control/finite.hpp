@@ -1,0 +1,29 @@
+#pragma once
+
+#include <limits>
+
+namespace kmax::control {
+
+/// True if `value` is neither an infinity nor a NaN. Without libm: infinity minus infinity and any
+/// arithmetic on a NaN give a NaN, which differs from everything, zero included. Two instructions on a
+/// Cortex-M4F. Relies on IEEE 754 arithmetic; the build never uses -ffast-math.
+template <typename Scalar>
+constexpr bool is_finite(Scalar value) {
+  return value - value == Scalar(0);
+}
+
+/// `value` bounded to [-limit, limit]. A NaN stays a NaN so that a later is_finite() sees it.
+template <typename Scalar>
+constexpr Scalar clamp_magnitude(Scalar value, Scalar limit) {
+  if (value > limit) return limit;
+  if (value < -limit) return -limit;
+  return value;
+}
+
+/// `value` with an overflow to infinity brought back to the largest finite number; NaN stays a NaN.
+template <typename Scalar>
+constexpr Scalar saturate(Scalar value) {
+  return clamp_magnitude(value, std::numeric_limits<Scalar>::max());
+}
+
+}  // namespace kmax::control

@@ -1,0 +1,193 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "control/finite.hpp"
+#include "control/force_limiter.hpp"
+#include "control/interference.hpp"
+#include "control/resampler.hpp"
+#include "control/velocity_estimator.hpp"
+#include "control/wall_law.hpp"
+
+namespace kmax::control {
+
+/// All that one axis' haptic rendering is set by, in SI units. Positions are double: this struct is made
+/// and read outside the interrupt only, and a surface 10 m away must keep its place to the count.
+template <typename Scalar>
+struct HapticLoopConfig {
+  double count_length = 1e-6;        ///< m per encoder count, > 0
+  double wall_position = 0.0;        ///< m
+  std::int32_t wall_side = 1;        ///< +1 or -1: free space is on this side, the wall pushes towards it
+  double position_resolution = 0.0;  ///< m, 0: the encoder's own
+  Rounding position_rounding = Rounding::nearest;
+  VelocityEstimatorConfig<Scalar> velocity;
+  WallLawConfig<Scalar> wall;
+  InterferenceConfig<Scalar> interference;
+  ForceLimiterConfig<Scalar> force;
+  Scalar velocity_limit = Scalar(0);  ///< m/s, trip level; 0: none
+  double tick_rate = 20000.0;         ///< Hz, calls of tick() per second
+  std::uint32_t divider = 1;          ///< ticks per haptic sample, >= 1
+};
+
+/// From encoder count to force: the heart of the house, one axis.
+///
+///   count -> Resampler -> position, VelocityEstimator -> WallLaw + Interference -> ForceLimiter -> force
+///
+/// Called at every tick; the haptic part runs on every divider-th one and its force is held in between
+/// (a zero-order hold, as in both papers). The position stays an integer until the distance to the wall
+/// has been taken: the surface is held as a whole count and a fraction below one, so the penetration is
+/// exact to the count wherever the wall is.
+///
+/// A value that is not finite anywhere gives zero force and `not_finite`; a velocity beyond the limit
+/// gives zero force and `over_speed`. Both are reported on every tick until the next haptic sample; to
+/// latch them is the axis' business. While not enabled, everything is still estimated and evaluated, so
+/// that arming starts from a settled estimator, but the force is zero and the soft start is wound back.
+///
+/// No heap, no libm, no virtual call, no loop beyond the velocity estimator's window.
+template <typename Scalar>
+class HapticLoop {
+ public:
+  struct Coefficients {
+    std::int64_t wall_count = 0;  ///< whole counts of the surface, rounded down
+    Scalar wall_fraction{};       ///< counts, 0 <= fraction < 1
+    Scalar count_length{};        ///< m
+    Scalar side{};                ///< +1 or -1
+    Scalar velocity_limit{};      ///< m/s; the largest number: none
+    std::uint32_t divider = 1;
+    Resampler::Coefficients resampler{};
+    typename VelocityEstimator<Scalar>::Coefficients velocity{};
+    typename WallLaw<Scalar>::Coefficients wall{};
+    typename Interference<Scalar>::Coefficients interference{};
+    typename ForceLimiter<Scalar>::Coefficients force{};
+  };
+
+  struct Output {
+    Scalar force{};             ///< N along +x, what the device is asked for
+    Scalar tangential_force{};  ///< N along the surface (parallel interference), for another axis
+    std::int64_t position{};    ///< counts, re-sampled
+    Scalar outside_distance{};  ///< m, > 0 in free space
+    Scalar velocity{};          ///< m/s along +x
+    Scalar magnetic_force{};    ///< N, outwards
+    Scalar magnetic_coefficient{};  ///< N
+    bool inside = false;
+    bool limited = false;       ///< force.limit took something away
+    bool slew_limited = false;
+    bool ramping = false;       ///< soft start under way
+    bool not_finite = false;    ///< fault
+    bool over_speed = false;    ///< fault
+    bool new_sample = false;    ///< this tick computed; false: the previous sample is held
+  };
+
+  /// Outside the interrupt path. `count_near`: a recent count, the resampler's anchor.
+  static Coefficients prepare(const HapticLoopConfig<Scalar>& config, std::int64_t count_near);
+
+  /// Start afresh, as after power-up: no velocity, no held force, soft start wound back. Needed when the
+  /// scale or the origin of the counts has changed.
+  void reset() {
+    resampler_.reset();
+    settled_ = false;
+    wall_.reset();
+    interference_.reset();
+    limiter_.reset();
+    ticks_until_sample_ = 0;
+    held_ = Output{};
+  }
+
+  /// One tick. `external_force`: N along +x, added before the limiter (another axis' tangential force).
+  const Output& tick(const Coefficients& c, std::int64_t count, bool enabled, Scalar external_force = Scalar(0)) {
+    if (ticks_until_sample_ != 0) {
+      --ticks_until_sample_;
+      held_.new_sample = false;
+      if (!enabled) disable();
+      return held_;
+    }
+    ticks_until_sample_ = c.divider - 1;
+
+    Output out;
+    out.new_sample = true;
+    out.position = resampler_.update(c.resampler, count);
+    if (!settled_) {
+      velocity_.reset(out.position);
+      settled_ = true;
+    }
+    out.velocity = velocity_.update(c.velocity, out.position);
+    out.outside_distance = outside_distance(c, out.position);
+
+    const auto wall = wall_.update(c.wall, out.outside_distance, c.side * out.velocity);
+    const auto disturbance = interference_.update(c.interference, wall.inside);
+    out.inside = wall.inside;
+    out.magnetic_force = wall.magnetic_force;
+    out.magnetic_coefficient = wall.magnetic_coefficient;
+    out.tangential_force = disturbance.tangential;
+
+    const Scalar requested = saturate(c.side * saturate(wall.force + disturbance.normal) + external_force);
+    out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
+    out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
+
+    if (enabled && !out.over_speed && !out.not_finite) {
+      const auto limited = limiter_.update(c.force, requested);
+      out.force = limited.force;
+      out.limited = limited.limited;
+      out.slew_limited = limited.slew_limited;
+      out.ramping = limited.ramping;
+    } else {
+      limiter_.reset();
+      out.tangential_force = Scalar(0);
+    }
+    held_ = out;
+    return held_;
+  }
+
+  /// Distance of a count from the surface, m, > 0 in free space.
+  static Scalar outside_distance(const Coefficients& c, std::int64_t position) {
+    std::int64_t difference = position - c.wall_count;
+    if (difference > INT32_MAX) difference = INT32_MAX;
+    if (difference < INT32_MIN) difference = INT32_MIN;
+    const Scalar counts = static_cast<Scalar>(static_cast<std::int32_t>(difference)) - c.wall_fraction;
+    return c.side * (counts * c.count_length);
+  }
+
+ private:
+  void disable() {
+    limiter_.reset();
+    held_.force = Scalar(0);
+    held_.tangential_force = Scalar(0);
+    held_.limited = held_.slew_limited = held_.ramping = false;
+  }
+
+  Resampler resampler_;
+  VelocityEstimator<Scalar> velocity_;
+  WallLaw<Scalar> wall_;
+  Interference<Scalar> interference_;
+  ForceLimiter<Scalar> limiter_;
+  std::uint32_t ticks_until_sample_ = 0;
+  bool settled_ = false;  // the velocity estimator has seen a position
+  Output held_;
+};
+
+template <typename Scalar>
+typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const HapticLoopConfig<Scalar>& config,
+                                                                      std::int64_t count_near) {
+  Coefficients c;
+  const auto period = static_cast<Scalar>(static_cast<double>(config.divider) / config.tick_rate);
+  const double surface = config.wall_position / config.count_length;
+  c.wall_count = static_cast<std::int64_t>(surface);
+  if (static_cast<double>(c.wall_count) > surface) --c.wall_count;
+  c.wall_fraction = static_cast<Scalar>(surface - static_cast<double>(c.wall_count));
+  c.count_length = static_cast<Scalar>(config.count_length);
+  c.side = config.wall_side < 0 ? Scalar(-1) : Scalar(1);
+  c.velocity_limit =
+      config.velocity_limit > Scalar(0) ? config.velocity_limit : std::numeric_limits<Scalar>::max();
+  c.divider = config.divider < 1 ? 1 : config.divider;
+
+  const std::int32_t step = resampler_step(config.position_resolution, config.count_length);
+  c.resampler = Resampler::prepare({step, config.position_rounding}, count_near);
+  c.velocity = VelocityEstimator<Scalar>::prepare(config.velocity, period, c.count_length, step);
+  c.wall = WallLaw<Scalar>::prepare(config.wall, period);
+  c.interference = Interference<Scalar>::prepare(config.interference, period);
+  c.force = ForceLimiter<Scalar>::prepare(config.force, period);
+  return c;
+}
+
+}  // namespace kmax::control

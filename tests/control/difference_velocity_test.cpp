@@ -1,0 +1,53 @@
+#include "control/difference_velocity.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace kmax::control {
+namespace {
+
+TEST(DifferenceVelocity, OneCountIsOneQuantumPerPeriod) {
+  const auto coefficients = DifferenceVelocity<double>::prepare(2e-3, 55e-6);
+  DifferenceVelocity<double> velocity;
+  velocity.reset(7);
+  EXPECT_DOUBLE_EQ(velocity.update(coefficients, 8), 27.5e-3);
+  EXPECT_DOUBLE_EQ(velocity.update(coefficients, 8), 0.0);
+  EXPECT_DOUBLE_EQ(velocity.update(coefficients, 6), -55e-3);
+}
+
+TEST(DifferenceVelocity, FloatKeepsASingleCountAtAnyDistanceFromZero) {
+  const auto coefficients = DifferenceVelocity<float>::prepare(5e-5F, 1e-7F);
+  for (const std::int64_t origin : {0LL, 100'000'000LL, -100'000'000LL, 864'000'000'000LL}) {
+    DifferenceVelocity<float> velocity;
+    velocity.reset(origin);
+    EXPECT_EQ(velocity.update(coefficients, origin + 1), coefficients.scale);
+    EXPECT_EQ(velocity.update(coefficients, origin), -coefficients.scale);
+  }
+}
+
+// One count in 10,000 ticks: 0.2 um/s. Any single sample is 0 or 2 mm/s; the sum is the path travelled.
+TEST(DifferenceVelocity, SumsToThePathAtVeryLowSpeed) {
+  const auto coefficients = DifferenceVelocity<double>::prepare(5e-5, 1e-7);
+  DifferenceVelocity<double> velocity;
+  velocity.reset(0);
+  double path = 0.0;
+  for (int k = 1; k <= 200'000; ++k) path += 5e-5 * velocity.update(coefficients, k / 10'000);
+  EXPECT_NEAR(path, 20e-7, 1e-15);
+}
+
+RC_GTEST_PROP(DifferenceVelocity, EveryPairOfCountsGivesAFiniteValue,
+              (std::int64_t first, std::int64_t second)) {
+  const auto coefficients = DifferenceVelocity<float>::prepare(5e-5F, 1e-7F);
+  DifferenceVelocity<float> velocity;
+  velocity.reset(first);
+  const float value = velocity.update(coefficients, second);
+  RC_ASSERT(std::isfinite(value));
+  RC_ASSERT(value == 0.0F || (value > 0.0F) == (second > first));
+}
+
+}  // namespace
+}  // namespace kmax::control
