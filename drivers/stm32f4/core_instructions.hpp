@@ -1,0 +1,37 @@
+#pragma once
+
+#include <atomic>
+
+// The core instructions that C++ has no word for. On any other architecture (unit tests) they only keep the
+// compiler from moving memory accesses across them.
+
+namespace kmax::drivers::stm32f4 {
+
+/// Completes all earlier memory accesses before the next instruction (PM0214, DSB).
+inline void data_synchronization_barrier() {
+#if defined(__arm__)
+  asm volatile("dsb" ::: "memory");
+#else
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+#endif
+}
+
+/// Makes earlier changes to the core's configuration visible to the instructions that follow (PM0214, ISB).
+inline void instruction_synchronization_barrier() {
+#if defined(__arm__)
+  asm volatile("isb" ::: "memory");
+#else
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+#endif
+}
+
+/// Sleeps until an interrupt is pending. Returns at once when one already is.
+inline void wait_for_interrupt() {
+#if defined(__arm__)
+  asm volatile("dsb\n\twfi" ::: "memory");
+#else
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+#endif
+}
+
+}  // namespace kmax::drivers::stm32f4

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/stm32f4/registers/field.hpp"
+
+// SysTick, the core's own 24-bit down-counter: PM0214, system timer.
+
+namespace kmax::drivers::stm32f4 {
+
+struct SystemTickRegisters {
+  volatile std::uint32_t ctrl;
+  volatile std::uint32_t load;
+  volatile std::uint32_t val;
+  volatile std::uint32_t calib;
+};
+static_assert(offsetof(SystemTickRegisters, ctrl) == 0x00);
+static_assert(offsetof(SystemTickRegisters, load) == 0x04);
+static_assert(offsetof(SystemTickRegisters, val) == 0x08);
+
+inline SystemTickRegisters& system_tick() {
+  return peripheral_at<SystemTickRegisters>(0xE000'E010);
+}
+
+namespace system_tick_ctrl {
+using Enable = Field<0>;
+using TickInterrupt = Field<1>;
+using ProcessorClock = Field<2>;
+}  // namespace system_tick_ctrl
+
+namespace system_tick_load {
+using Reload = Field<0, 24>;
+}  // namespace system_tick_load
+
+}  // namespace kmax::drivers::stm32f4

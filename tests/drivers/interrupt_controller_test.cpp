@@ -1,0 +1,75 @@
+#include "drivers/stm32f4/interrupt_controller.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+struct Blocks {
+  NvicRegisters nvic{};
+  ScbRegisters scb{};
+  InterruptController<> controller{nvic, scb};
+};
+
+TEST(InterruptController, Usart2IsBit6OfTheSecondWord) {
+  Blocks b;
+  b.controller.enable(Interrupt::usart2);
+  EXPECT_EQ(b.nvic.iser[1], 1U << 6);
+  EXPECT_EQ(b.nvic.iser[0], 0U);
+  b.controller.disable(Interrupt::usart2);
+  EXPECT_EQ(b.nvic.icer[1], 1U << 6);
+  b.controller.pend(Interrupt::usart2);
+  EXPECT_EQ(b.nvic.ispr[1], 1U << 6);
+  b.controller.clear_pending(Interrupt::usart2);
+  EXPECT_EQ(b.nvic.icpr[1], 1U << 6);
+}
+
+TEST(InterruptController, StoresOnlyTheOneBit) {
+  // A read-modify-write of ICER or ISPR would disable or pend all the others: these registers read back their
+  // state.
+  Blocks b;
+  for (auto* word : {&b.nvic.icer[1], &b.nvic.ispr[1], &b.nvic.iser[1], &b.nvic.icpr[1]}) *word = 0xFFFF'FFFF;
+  b.controller.disable(Interrupt::usart2);
+  b.controller.pend(Interrupt::usart2);
+  b.controller.enable(Interrupt::usart2);
+  b.controller.clear_pending(Interrupt::usart2);
+  EXPECT_EQ(b.nvic.icer[1], 1U << 6);
+  EXPECT_EQ(b.nvic.ispr[1], 1U << 6);
+  EXPECT_EQ(b.nvic.iser[1], 1U << 6);
+  EXPECT_EQ(b.nvic.icpr[1], 1U << 6);
+}
+
+TEST(InterruptController, PriorityLivesInTheUpperFourBits) {
+  Blocks b;
+  b.controller.set_priority(Interrupt::usart2, 8);  // byte 38 = word 9, byte 2
+  EXPECT_EQ(b.nvic.ipr[9], 0x0080'0000U);
+  b.controller.set_priority(Interrupt::usart2, 255);
+  EXPECT_EQ(b.nvic.ipr[9], 0x00F0'0000U) << "too large means least urgent, never most urgent";
+}
+
+TEST(InterruptController, SystemTickIsTheTopByteOfTheThirdWord) {
+  Blocks b;
+  b.controller.set_priority(SystemException::system_tick, 1);
+  EXPECT_EQ(b.scb.shpr[2], 0x1000'0000U);
+  b.controller.set_priority(SystemException::memory_management, 2);
+  EXPECT_EQ(b.scb.shpr[0], 0x0000'0020U);
+  b.controller.set_priority(SystemException::supervisor_call, 3);
+  EXPECT_EQ(b.scb.shpr[1], 0x3000'0000U);
+}
+
+RC_GTEST_PROP(InterruptController, PriorityLeavesItsNeighboursAlone,
+              (std::uint32_t before, std::uint8_t priority)) {
+  Blocks b;
+  const auto interrupt = *rc::gen::element(Interrupt::exti2, Interrupt::adc, Interrupt::can1_tx,
+                                           Interrupt::usart2, Interrupt::tim8_up_tim13, Interrupt::uart4);
+  const auto number = static_cast<unsigned>(interrupt);
+  b.nvic.ipr[number / 4] = before;
+  b.controller.set_priority(interrupt, priority);
+  const std::uint32_t mask = 0xFFU << (8 * (number % 4));
+  RC_ASSERT((b.nvic.ipr[number / 4] & ~mask) == (before & ~mask));
+  RC_ASSERT(((b.nvic.ipr[number / 4] & mask) >> (8 * (number % 4))) == std::min<unsigned>(priority, 15) * 16);
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4
