@@ -1,0 +1,161 @@
+// The main-loop side of the application.
+#include "firmware/application.hpp"
+
+#include "firmware/haptic_configuration.hpp"
+
+namespace kmax::firmware {
+
+namespace {
+modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
+  modbus::RtuPortConfig config;
+  config.unit = static_cast<std::uint8_t>(values.whole<"modbus.unit">());
+  config.baud_rate = static_cast<std::uint32_t>(values.whole<"modbus.baud_rate">());
+  config.half_duplex = false;  // separate wires for both directions
+  return config;
+}
+}  // namespace
+
+Application::Application(const BoardIdentity& board)
+    : board_(board),
+      bank_(*this),
+      port_(bank_, port_configuration(registers_.values())),
+      settings_(make_settings()),
+      handover_(settings_) {
+  for (AxisStateMachine& machine : machines_) machine.initialised();
+  refresh_readings();
+}
+
+bool Application::any_armed() const {
+  for (const AxisStateMachine& machine : machines_) {
+    if (machine.armed()) return true;
+  }
+  return false;
+}
+
+Application::Settings Application::make_settings() const {
+  Settings settings;
+  const ParameterValues& values = registers_.values();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    settings[axis].encoder_offset = values.whole<"encoder.offset">(axis);
+    settings[axis].encoder_direction = values.whole<"encoder.direction">(axis);
+    settings[axis].generation = generation_;
+    // Near the position by the new origin: the resampler starts from there.
+    const std::int64_t position = Axis::position_of(report_.axis[axis].counted, settings[axis]);
+    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
+  }
+  return settings;
+}
+
+void Application::offer_settings_if_changed() {
+  if (registers_.changes() == offered_changes_) return;
+  offered_changes_ = registers_.changes();
+  if (registers_.restarting_changes() != offered_restarts_) {
+    offered_restarts_ = registers_.restarting_changes();
+    ++generation_;
+  }
+  settings_ = make_settings();
+  handover_.offer(settings_);
+  port_.configure(port_configuration(registers_.values()));
+  trace_axis_.store(static_cast<std::uint8_t>(registers_.values().whole<"trace.axis">()), std::memory_order_relaxed);
+  trace_interval_.store(static_cast<std::uint32_t>(registers_.values().whole<"trace.interval">()),
+                        std::memory_order_relaxed);
+}
+
+/// The tick works by the present settings, and knows of the axis' last disarming.
+bool Application::settled(std::size_t of_axis) const {
+  if (!handover_.taken() || report_.axis[of_axis].enabled) return false;
+  for (const AxisReport& axis : report_.axis) {
+    if (axis.generation != generation_) return false;
+  }
+  return true;
+}
+
+Refusal Application::obstacle_to_arming(std::size_t axis) const {
+  if (!report_.axis[axis].count_valid) return Refusal::encoder_invalid;
+  const auto& haptic = report_.axis[axis].haptic;
+  const bool has_wall = settings_[axis].haptic.wall.kind != control::WallKind::none;
+  if (has_wall && haptic.inside) return Refusal::handle_inside_wall;
+  return Refusal::none;
+}
+
+void Application::trip(std::size_t axis, Fault fault, float value, float bound) {
+  machines_[axis].trip(fault);
+  if (machines_[axis].fault() != fault || machines_[axis].state() != DriveState::fault_reaction_active) return;
+  fault_value_[axis] = value;
+  fault_bound_[axis] = bound;
+}
+
+void Application::supervise(std::size_t axis) {
+  AxisStateMachine& machine = machines_[axis];
+  const AxisReport& report = report_.axis[axis];
+  const ParameterValues& values = registers_.values();
+
+  // Before the commands: a fault is reported even if the host disarms in the same moment.
+  if (machine.armed()) {
+    if (report.fault != Fault::none && enable_[axis].load(std::memory_order_relaxed)) {
+      const float bound = report.fault == Fault::over_speed ? values.real<"velocity.limit">(axis) : 0.0f;
+      trip(axis, report.fault, report.fault_value, bound);
+    }
+    const float timeout = values.real<"link.timeout">();
+    const auto last = port_.last_valid_request_time();
+    if (timeout > 0.0f && last.has_value()) {
+      const auto silent_us = modbus::elapsed_us(now_us_, *last);
+      if (static_cast<float>(silent_us) > timeout * 1e6f)
+        trip(axis, Fault::link_silent, static_cast<float>(silent_us) * 1e-6f, timeout);
+    }
+  }
+
+  std::uint16_t word = 0;
+  if (registers_.fetch_controlword(axis, word)) {
+    // The latest command counts: one that still waits for the settings to arrive is superseded.
+    pending_command_[axis] = word;
+    command_pending_[axis] = true;
+  }
+  if (command_pending_[axis]) {
+    const std::uint16_t pending = pending_command_[axis];
+    if (!machine.asks_to_enable(pending) || settled(axis)) {
+      command_pending_[axis] = false;
+      const bool cause_remains = machine.fault() == Fault::encoder && !report.count_valid;
+      machine.command(pending, obstacle_to_arming(axis), cause_remains);
+    }
+  }
+  enable_[axis].store(machine.armed(), std::memory_order_relaxed);
+  machine.reaction_done();
+}
+
+void Application::act() {
+  offer_settings_if_changed();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
+}
+
+void Application::poll(std::uint32_t now_us) {
+  if (!started_) {
+    started_ = true;
+    uptime_second_us_ = now_us;
+  }
+  now_us_ = now_us;
+  while (now_us - uptime_second_us_ >= 1'000'000) {
+    uptime_second_us_ += 1'000'000;
+    ++uptime_s_;
+  }
+  report_ = snapshot_.read();
+  registers_.poll(now_us);
+
+  SerialByte received;
+  while (serial_queue_.pop(received)) port_.receive(received.byte, received.line_error, received.time_us);
+  port_.poll(now_us);
+  act();
+}
+
+DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {
+  if (!descriptors[entry].writable) return {Refusal::read_only, register_address(entry, axis)};
+  if (const Refusal refusal = check_value(descriptors[entry], raw); refusal != Refusal::none)
+    return {refusal, register_address(entry, axis)};
+  std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
+  const auto needed = words_of(descriptors[entry].type);
+  const auto result = registers_.write(register_address(entry, axis), std::span(words).last(needed), any_armed(), now_us_);
+  offer_settings_if_changed();
+  return result;
+}
+
+}  // namespace kmax::firmware

@@ -1,0 +1,151 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "firmware/axis.hpp"
+#include "firmware/axis_state_machine.hpp"
+#include "firmware/device_registers.hpp"
+#include "firmware/handover.hpp"
+#include "firmware/interrupt_queue.hpp"
+#include "firmware/modbus/rtu_port.hpp"
+#include "firmware/snapshot.hpp"
+#include "firmware/trace.hpp"
+
+namespace kmax::firmware {
+
+/// What a board tells the application about itself.
+struct BoardIdentity {
+  std::string_view board_name = "unnamed";
+  std::uint32_t serial_number = 0;
+  std::uint32_t core_clock_hz = 0;
+  std::uint8_t clock_source = 0;  ///< as info.clock_source says
+};
+
+inline constexpr std::uint32_t firmware_version = 0x000100;  ///< 0.1.0
+inline constexpr std::string_view firmware_version_text = "0.1.0";
+inline constexpr std::uint32_t product_code = 1;
+
+using AxisInput = Axis::Input;
+using AxisOutput = Axis::Output;
+struct TickInput {
+  std::array<AxisInput, axis_count> axis;
+};
+struct TickOutput {
+  std::array<AxisOutput, axis_count> axis;
+};
+
+struct SerialSettings {
+  std::uint32_t baud_rate;
+  friend constexpr bool operator==(const SerialSettings&, const SerialSettings&) = default;
+};
+
+/// The whole firmware, free of any chip. A board owns one, calls ISR_tick() from its 20 kHz interrupt,
+/// ISR_serial_byte() from its serial receive interrupt, and everything else from its main loop.
+///
+/// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
+/// What crosses: settings and enables main -> tick (Handover, atomics), reports and the trace tick -> main
+/// (Snapshot, Trace), bytes serial -> main (InterruptQueue). Nothing else is shared.
+///
+/// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
+/// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
+/// or a counter, all of which a host can read. Memory: about 14 KiB, no heap.
+class Application {
+ public:
+  explicit Application(const BoardIdentity& board);
+  Application(const Application&) = delete;
+  Application& operator=(const Application&) = delete;
+
+  TickOutput ISR_tick(const TickInput& input);
+  void ISR_serial_byte(std::uint8_t byte, bool line_error, std::uint32_t time_us);
+
+  void poll(std::uint32_t now_us);
+
+  /// A reply that may be sent now, once; the bytes stay valid until serial_reply_sent().
+  std::span<const std::uint8_t> serial_reply_due(std::uint32_t now_us) { return port_.reply_due(now_us); }
+  /// The reply's last stop bit has left.
+  void serial_reply_sent(std::uint32_t now_us) { port_.reply_sent(now_us); }
+  /// What the line must be set to; changes only while no reply is under way.
+  SerialSettings serial_settings() const { return {port_.config().baud_rate}; }
+
+  /// Parameters a board or a scene starts with, before the first tick. Refused like a host's write, and
+  /// then nothing changes.
+  DeviceRegisters::WriteResult preset(std::size_t entry, std::size_t axis, std::uint32_t raw);
+
+  const ParameterValues& values() const { return registers_.values(); }
+  DriveState state(std::size_t axis) const { return machines_[axis].state(); }
+  Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
+  Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
+  /// Of the last tick; for interrupt context, or where nothing interrupts.
+  const AxisReport& ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
+
+ private:
+  /// The registers as the Modbus server sees them.
+  class Bank {
+   public:
+    explicit Bank(Application& application) : app_(application) {}
+    modbus::Exception read_holding(std::uint16_t address, std::span<std::uint16_t> out);
+    modbus::Exception read_input(std::uint16_t address, std::span<std::uint16_t> out);
+    modbus::Exception write_holding(std::uint16_t address, std::span<const std::uint16_t> in);
+    bool has_holding(std::uint16_t address, std::uint16_t count) const;
+    std::string_view identification(std::uint8_t object_id) const;
+
+   private:
+    Application& app_;
+  };
+
+  using Settings = std::array<AxisSetting, axis_count>;
+  struct TickState {
+    std::array<AxisReport, axis_count> axis;
+    std::uint32_t tick = 0;
+  };
+  struct SerialByte {
+    std::uint32_t time_us;
+    std::uint8_t byte;
+    bool line_error;
+  };
+
+  bool any_armed() const;
+  bool settled(std::size_t axis) const;
+  Settings make_settings() const;
+  void offer_settings_if_changed();
+  void act();
+  void supervise(std::size_t axis);
+  Refusal obstacle_to_arming(std::size_t axis) const;
+  void trip(std::size_t axis, Fault fault, float value, float bound);
+  void refresh_readings();
+
+  BoardIdentity board_;
+  DeviceRegisters registers_;
+  Bank bank_;
+  modbus::RtuPort<Bank> port_;
+  std::array<AxisStateMachine, axis_count> machines_;
+  std::array<bool, axis_count> command_pending_{};
+  std::array<std::uint16_t, axis_count> pending_command_{};
+  std::array<float, axis_count> fault_value_{}, fault_bound_{};
+  // Before settings_, which is made from them.
+  TickState report_;  ///< main loop's copy
+  std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
+  Settings settings_;
+  std::uint32_t now_us_ = 0, uptime_second_us_ = 0, uptime_s_ = 0;
+  bool started_ = false;
+
+  Handover<Settings> handover_;
+  Snapshot<TickState> snapshot_;
+  InterruptQueue<SerialByte, 512> serial_queue_;
+  Trace trace_;
+  std::array<std::atomic<bool>, axis_count> enable_{};
+  std::atomic<std::uint8_t> trace_axis_{0};
+  std::atomic<std::uint32_t> trace_interval_{0};
+
+  // Interrupt context only.
+  std::array<Axis, axis_count> axes_;
+  std::array<float, axis_count> tangential_{};
+  TickState ISR_state_;
+  std::uint32_t ISR_trace_countdown_ = 0;
+};
+
+}  // namespace kmax::firmware

@@ -1,0 +1,133 @@
+// What a host can read and write: the bank behind the Modbus server.
+#include "firmware/application.hpp"
+#include "firmware/haptic_configuration.hpp"
+
+namespace kmax::firmware {
+
+using modbus::Exception;
+
+namespace {
+Exception exception_for(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::none:
+      return Exception::none;
+    case Refusal::unknown_register:
+    case Refusal::read_only:
+    case Refusal::value_cut_in_two:
+      return Exception::illegal_data_address;
+    case Refusal::while_armed:
+    case Refusal::no_transaction:
+      return Exception::server_device_failure;
+    case Refusal::transaction_open:
+      return Exception::server_device_busy;
+    default:
+      return Exception::illegal_data_value;
+  }
+}
+}  // namespace
+
+bool Application::Bank::has_holding(std::uint16_t address, std::uint16_t count) const {
+  return app_.registers_.readable(true, address, count);
+}
+
+Exception Application::Bank::read_holding(std::uint16_t address, std::span<std::uint16_t> out) {
+  if (!app_.registers_.readable(true, address, out.size())) return Exception::illegal_data_address;
+  app_.registers_.read(true, address, out);
+  return Exception::none;
+}
+
+Exception Application::Bank::read_input(std::uint16_t address, std::span<std::uint16_t> out) {
+  const auto last = static_cast<std::uint32_t>(address + out.size() - 1);
+  if (Trace::contains(address) && Trace::contains(last)) {
+    for (std::size_t i = 0; i < out.size(); ++i)
+      out[i] = app_.trace_.word_at(static_cast<std::uint16_t>(address + i));
+    return Exception::none;
+  }
+  if (!app_.registers_.readable(false, address, out.size())) return Exception::illegal_data_address;
+  app_.refresh_readings();
+  app_.registers_.read(false, address, out);
+  return Exception::none;
+}
+
+Exception Application::Bank::write_holding(std::uint16_t address, std::span<const std::uint16_t> in) {
+  const auto result = app_.registers_.write(address, in, app_.any_armed(), app_.now_us_);
+  // At once: a poll that comes late finds several requests, and each must act as if it had come alone.
+  app_.act();
+  return exception_for(result.refusal);
+}
+
+std::string_view Application::Bank::identification(std::uint8_t object_id) const {
+  switch (object_id) {
+    case 0: return "Kmax";
+    case 1: return "kmax-haptic-controller";
+    case 2: return firmware_version_text;
+    case 4: return "Kmax haptic device controller";
+    case 5: return app_.board_.board_name;
+    default: return {};
+  }
+}
+
+void Application::refresh_readings() {
+  ParameterValues& v = registers_.values();
+  report_ = snapshot_.read();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const AxisReport& report = report_.axis[axis];
+    const auto& haptic = report.haptic;
+    const AxisStateMachine& machine = machines_[axis];
+    std::uint16_t status = statusword::base_of(machine.state()) | statusword::remote;
+    if (machine.armed()) status |= statusword::voltage_enabled;
+    if (haptic.limited || haptic.slew_limited) status |= statusword::internal_limit_active;
+    v.set_whole<"drive.statusword">(status, axis);
+    v.set_whole<"drive.error_code">(text_of(machine.fault()).error_code, axis);
+    v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
+    const bool faulty = machine.fault() != Fault::none;
+    v.set_real<"drive.fault_value">(faulty ? fault_value_[axis] : 0.0f, axis);
+    v.set_real<"drive.fault_bound">(faulty ? fault_bound_[axis] : 0.0f, axis);
+
+    const double length = count_length(v, axis);
+    v.set_whole<"measured.tick">(report.tick, axis);
+    v.set_real<"measured.position">(static_cast<float>(static_cast<double>(haptic.position) * length), axis);
+    v.set_real<"measured.velocity">(haptic.velocity, axis);
+    v.set_real<"measured.force">(haptic.force, axis);
+    v.set_real<"measured.distance">(haptic.outside_distance, axis);
+    v.set_real<"measured.magnetic_force">(haptic.magnetic_force, axis);
+    v.set_real<"measured.magnetic_coefficient">(haptic.magnetic_coefficient, axis);
+    v.set_whole<"measured.count">(static_cast<std::uint32_t>(haptic.position), axis);
+    const unsigned flags = (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) | (haptic.slew_limited ? 4u : 0u) |
+                           (haptic.ramping ? 8u : 0u) | (machine.armed() ? 16u : 0u);
+    v.set_whole<"measured.flags">(flags, axis);
+    v.set_real<"measured.count_length">(static_cast<float>(length), axis);
+    const double step = control::resampler_step(static_cast<double>(v.real<"position.resolution">(axis)), length);
+    v.set_real<"measured.resolution">(static_cast<float>(step * length), axis);
+    v.set_whole<"measured.limited_samples">(report.limited_samples, axis);
+    v.set_whole<"measured.armed_samples">(report.armed_samples, axis);
+  }
+  v.set_whole<"info.vendor_id">(0);
+  v.set_whole<"info.product_code">(product_code);
+  v.set_whole<"info.firmware_version">(firmware_version);
+  v.set_whole<"info.serial_number">(board_.serial_number);
+  v.set_whole<"info.dictionary_checksum">(dictionary_checksum);
+  v.set_whole<"info.tick_rate">(tick_rate_hz);
+  v.set_whole<"info.core_clock">(board_.core_clock_hz);
+  v.set_whole<"info.clock_source">(board_.clock_source);
+  v.set_whole<"info.uptime">(uptime_s_);
+  v.set_whole<"info.tick">(report_.tick);
+
+  const modbus::RtuPortCounters& port = port_.counters();
+  const modbus::RtuReceiverCounters& line = port_.receiver_counters();
+  v.set_whole<"counters.frames_received">(line.frames_received);
+  v.set_whole<"counters.replies_sent">(port.replies);
+  v.set_whole<"counters.exceptions_sent">(port.exceptions);
+  v.set_whole<"counters.crc_errors">(line.crc_errors);
+  v.set_whole<"counters.line_errors">(line.line_errors);
+  v.set_whole<"counters.gap_errors">(line.gap_errors);
+  v.set_whole<"counters.length_errors">(line.undersize + line.oversize);
+  v.set_whole<"counters.other_units">(port.other_units);
+  v.set_whole<"counters.queue_overflows">(serial_queue_.overflows());
+
+  v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers_.last_refusal().refusal));
+  v.set_whole<"refusal.register">(registers_.last_refusal().address);
+  v.set_whole<"trace.next">(trace_.next());
+}
+
+}  // namespace kmax::firmware

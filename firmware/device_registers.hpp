@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "firmware/parameter_rules.hpp"
+#include "firmware/parameter_values.hpp"
+
+namespace kmax::firmware {
+
+/// The Modbus view of the dictionary: sorted places of all values, made when compiled.
+struct RegisterPlace {
+  std::uint16_t address;
+  std::uint8_t words;
+  std::uint8_t slot;
+};
+static_assert(slot_count <= 256);
+
+template <bool writable>
+inline constexpr std::size_t register_place_count = [] {
+  std::size_t count = 0;
+  for (std::size_t slot = 0; slot < slot_count; ++slot)
+    count += descriptors[owner_of(slot).entry].writable == writable ? 1 : 0;
+  return count;
+}();
+
+template <bool writable>
+inline constexpr auto register_places = [] {
+  std::array<RegisterPlace, register_place_count<writable>> places{};
+  std::size_t next = 0;
+  for (std::size_t slot = 0; slot < slot_count; ++slot) {
+    const auto [entry, axis] = owner_of(slot);
+    if (descriptors[entry].writable != writable) continue;
+    places[next++] = {modbus_address(entry, axis), static_cast<std::uint8_t>(words_of(descriptors[entry].type)),
+                      static_cast<std::uint8_t>(slot)};
+  }
+  std::sort(places.begin(), places.end(),
+            [](const RegisterPlace& a, const RegisterPlace& b) { return a.address < b.address; });
+  return places;
+}();
+
+/// Parameters as registers: reading, checked writing, and transactions.
+///
+/// A write is whole or nothing: every value in the range is checked, then the rules between parameters, and
+/// only then anything changes. Outside a transaction it takes effect at once; inside (transaction.control =
+/// 1) values are kept aside and take effect together with transaction.control = 2, which checks the rules
+/// over the whole set. A transaction in which nothing is written for 2 s is dropped, so a host that dies
+/// half way leaves nothing behind. Why a write was refused stays in refusal.reason and refusal.register.
+class DeviceRegisters {
+ public:
+  static constexpr std::uint32_t transaction_timeout_us = 2'000'000;
+
+  ParameterValues& values() { return values_; }
+  const ParameterValues& values() const { return values_; }
+
+  /// Rises with every change of a parameter; `disarmed_only_changes` only with those that restart the axes.
+  std::uint32_t changes() const { return changes_; }
+  std::uint32_t restarting_changes() const { return restarting_changes_; }
+
+  struct WriteResult {
+    Refusal refusal = Refusal::none;
+    std::uint16_t address = 0;
+  };
+
+  bool readable(bool holding, std::uint32_t address, std::size_t count) const {
+    for (std::uint32_t a = address; a < address + count;) {
+      const RegisterPlace* place = find(holding, a);
+      if (place == nullptr) return false;
+      a = place->address + std::uint32_t{place->words};
+    }
+    return true;
+  }
+
+  /// The range must be readable(). Reading may start or end within a value.
+  void read(bool holding, std::uint16_t address, std::span<std::uint16_t> out) const {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const auto a = static_cast<std::uint16_t>(address + i);
+      const RegisterPlace* place = find(holding, a);
+      const std::uint32_t raw = values_.raw(place->slot);
+      out[i] = static_cast<std::uint16_t>(place->words == 2 && a == place->address ? raw >> 16 : raw);
+    }
+  }
+
+  /// `armed`: some axis is. `now_us` drives the transaction's time-out.
+  WriteResult write(std::uint16_t address, std::span<const std::uint16_t> in, bool armed, std::uint32_t now_us);
+
+  /// Call at least every 2^31 us.
+  void poll(std::uint32_t now_us) {
+    if (staging_ && now_us - last_staged_us_ > transaction_timeout_us) staging_ = false;
+  }
+
+  bool transaction_open() const { return staging_; }
+  WriteResult last_refusal() const { return last_; }
+
+  /// Controlwords written since they were last fetched, per axis.
+  bool fetch_controlword(std::size_t axis, std::uint16_t& word) {
+    if (!commanded_[axis]) return false;
+    commanded_[axis] = false;
+    word = static_cast<std::uint16_t>(values_.whole<"drive.controlword">(axis));
+    return true;
+  }
+
+ private:
+  static const RegisterPlace* find(bool holding, std::uint32_t address) {
+    return holding ? find_in(register_places<true>, address) : find_in(register_places<false>, address);
+  }
+  template <std::size_t size>
+  static const RegisterPlace* find_in(const std::array<RegisterPlace, size>& places, std::uint32_t address) {
+    const auto after = std::upper_bound(places.begin(), places.end(), address,
+                                        [](std::uint32_t a, const RegisterPlace& p) { return a < p.address; });
+    if (after == places.begin()) return nullptr;
+    const RegisterPlace& place = *(after - 1);
+    return address < std::uint32_t{place.address} + place.words ? &place : nullptr;
+  }
+
+  WriteResult check_and_set(ParameterValues& target, std::uint16_t address, std::span<const std::uint16_t> in,
+                            bool armed);
+  WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed, std::uint32_t now_us);
+  WriteResult apply(const ParameterValues& wanted, bool armed);
+  WriteResult refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
+
+  ParameterValues values_;
+  ParameterValues staged_;
+  WriteResult last_;
+  std::uint32_t changes_ = 0, restarting_changes_ = 0;
+  std::uint32_t last_staged_us_ = 0;
+  bool staging_ = false;
+  std::array<bool, axis_count> commanded_{};
+};
+
+}  // namespace kmax::firmware

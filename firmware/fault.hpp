@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace kmax::firmware {
+
+/// Every way in which an axis loses its force by itself.
+enum class Fault : std::uint8_t { none, not_finite, over_speed, encoder, link_silent };
+
+struct FaultText {
+  Fault fault;
+  std::uint16_t error_code;  ///< CiA 402 / CiA 301 error code, object 0x603F
+  std::string_view name;
+  std::string_view unit;     ///< of drive.fault_value and drive.fault_bound
+  std::string_view what;     ///< what happened
+  std::string_view check;    ///< what the user should look at
+};
+
+/// Error codes: CiA 402 table of error codes where one fits; 0xFF00 and up are the manufacturer's.
+inline constexpr std::array fault_texts = std::to_array<FaultText>({
+    {Fault::none, 0x0000, "none", "", "no fault", ""},
+    {Fault::not_finite, 0xFF01, "not_finite", "", "the force or the velocity was not a finite number",
+     "look for absurd parameters with 'kmax dump'; if there are none, report it as a defect"},
+    {Fault::over_speed, 0x8480, "over_speed", "m/s", "the handle was faster than velocity.limit",
+     "check encoder.counts_per_turn and device.transmission, the encoder's cable, and velocity.limit"},
+    {Fault::encoder, 0x7305, "encoder", "", "the encoder gave no valid count",
+     "check the encoder's cable and supply, and encoder.kind"},
+    {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
+     "check the cable and the host program; link.timeout = 0 turns this off"},
+});
+
+constexpr const FaultText& text_of(Fault fault) { return fault_texts[static_cast<std::size_t>(fault)]; }
+
+constexpr const FaultText* fault_by_error_code(std::uint16_t error_code) {
+  for (const FaultText& text : fault_texts) {
+    if (text.error_code == error_code) return &text;
+  }
+  return nullptr;
+}
+
+static_assert([] {
+  for (std::size_t i = 0; i < fault_texts.size(); ++i) {
+    if (static_cast<std::size_t>(fault_texts[i].fault) != i) return false;
+  }
+  return true;
+}(), "fault_texts must follow the enumeration");
+
+}  // namespace kmax::firmware

@@ -1,0 +1,153 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace kmax::firmware {
+
+/// How a value is stored and sent. Every value fits 32 bits; a Modbus register holds 16 of them.
+enum class Type : std::uint8_t { unsigned8, integer8, unsigned16, unsigned32, integer32, float32 };
+
+/// read_only values are measured or fixed; command values act when written (a controlword).
+enum class Access : std::uint8_t { read_only, read_write };
+
+/// When a value may be written: disarmed_only ones would make the force jump or the scale change under
+/// the hand.
+enum class Change : std::uint8_t { any_time, disarmed_only };
+
+/// An axis entry exists once per axis (axis 1: index + 0x800), a device entry once.
+enum class Scope : std::uint8_t { axis, device };
+
+struct NamedValue {
+  std::string_view name;
+  std::int32_t value;
+};
+
+/// A record of the dictionary: its entries are sub-indices 1, 2, ... of one index and follow each other
+/// without a gap in the Modbus table from `modbus_base` on. Entries are only ever appended, so addresses
+/// stay. `record` false: each entry is an object of its own at sub-index 0 (CiA 402 objects).
+struct Group {
+  std::string_view name;
+  std::uint16_t index;
+  Scope scope;
+  std::uint16_t modbus_base;
+};
+
+/// One row of the object dictionary: the only place where a parameter is defined.
+struct Entry {
+  std::string_view name;
+  Group group;
+  std::uint8_t subindex;
+  Type type;
+  std::string_view unit;  ///< SI; empty: a number or a choice
+  double minimum;
+  double maximum;
+  double default_value;
+  std::string_view help;
+  Access access = Access::read_write;
+  Change change = Change::any_time;
+  bool persistent = true;               ///< part of what save keeps, dump writes and defaults restores
+  std::span<const NamedValue> values{};  ///< not empty: a choice, and only these values are allowed
+  std::uint16_t standard_index = 0;     ///< not 0: a CiA 402 object at this index, sub-index 0
+
+  constexpr std::uint16_t index() const { return standard_index != 0 ? standard_index : group.index; }
+  constexpr std::uint8_t object_subindex() const {
+    return standard_index != 0 ? std::uint8_t{0} : subindex;
+  }
+  constexpr Scope scope() const { return group.scope; }
+
+  constexpr Entry disarmed_only() const {
+    Entry e = *this;
+    e.change = Change::disarmed_only;
+    return e;
+  }
+  constexpr Entry volatile_value() const {
+    Entry e = *this;
+    e.persistent = false;
+    return e;
+  }
+  constexpr Entry at_standard_index(std::uint16_t index) const {
+    Entry e = *this;
+    e.standard_index = index;
+    return e;
+  }
+};
+
+constexpr std::uint16_t words_of(Type type) {
+  return type == Type::unsigned32 || type == Type::integer32 || type == Type::float32 ? 2 : 1;
+}
+
+/// A value as its 32-bit pattern, as it is stored and sent. The number must fit the type.
+constexpr std::uint32_t raw_from_number(Type type, double number) {
+  switch (type) {
+    case Type::float32:
+      return std::bit_cast<std::uint32_t>(static_cast<float>(number));
+    case Type::integer8:
+    case Type::integer32:
+      return static_cast<std::uint32_t>(static_cast<std::int32_t>(number));
+    case Type::unsigned8:
+    case Type::unsigned16:
+    case Type::unsigned32:
+      break;
+  }
+  return static_cast<std::uint32_t>(number);
+}
+
+constexpr double number_from_raw(Type type, std::uint32_t raw) {
+  switch (type) {
+    case Type::float32:
+      return static_cast<double>(std::bit_cast<float>(raw));
+    case Type::integer8:
+    case Type::integer32:
+      return static_cast<double>(static_cast<std::int32_t>(raw));
+    case Type::unsigned8:
+    case Type::unsigned16:
+    case Type::unsigned32:
+      break;
+  }
+  return static_cast<double>(raw);
+}
+
+// The words of a row, so that the table reads as a table.
+
+constexpr Entry real(std::string_view name, Group group, std::uint8_t subindex, std::string_view unit,
+                     double minimum, double maximum, double default_value, std::string_view help) {
+  return {name, group, subindex, Type::float32, unit, minimum, maximum, default_value, help};
+}
+
+constexpr Entry whole(std::string_view name, Group group, std::uint8_t subindex, Type type,
+                      std::string_view unit, double minimum, double maximum, double default_value,
+                      std::string_view help) {
+  return {name, group, subindex, type, unit, minimum, maximum, default_value, help};
+}
+
+template <std::size_t count>
+constexpr Entry choice(std::string_view name, Group group, std::uint8_t subindex,
+                       const NamedValue (&values)[count], std::int32_t default_value, std::string_view help) {
+  std::int32_t low = values[0].value, high = values[0].value;
+  for (const NamedValue& v : values) {
+    low = v.value < low ? v.value : low;
+    high = v.value > high ? v.value : high;
+  }
+  Entry e{name, group, subindex, low < 0 ? Type::integer8 : Type::unsigned8, "", double(low), double(high),
+          double(default_value), help};
+  e.values = std::span<const NamedValue>(values, count);
+  return e;
+}
+
+constexpr Entry reading(std::string_view name, Group group, std::uint8_t subindex, Type type,
+                        std::string_view unit, std::string_view help) {
+  double low = 0, high = 4294967295.0;
+  if (type == Type::float32) low = -3.4028234663852886e38, high = 3.4028234663852886e38;
+  if (type == Type::integer32) low = -2147483648.0, high = 2147483647.0;
+  if (type == Type::unsigned16) high = 65535;
+  if (type == Type::unsigned8) high = 255;
+  Entry e{name, group, subindex, type, unit, low, high, 0, help};
+  e.access = Access::read_only;
+  e.persistent = false;
+  return e;
+}
+
+}  // namespace kmax::firmware

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace kmax::firmware {
+
+/// Why a request was refused. Kept by the device (refusal.reason, drive.refusal) so that a host can say it
+/// in words; the numbers are part of the protocol and only ever appended to.
+enum class Refusal : std::uint16_t {
+  none = 0,
+  unknown_register = 1,
+  read_only = 2,
+  value_cut_in_two = 3,
+  out_of_range = 4,
+  not_a_choice = 5,
+  not_finite = 6,
+  while_armed = 7,
+  rate_does_not_divide = 8,
+  adaptive_interval_empty = 9,
+  supply_interval_empty = 10,
+  transaction_open = 11,
+  no_transaction = 12,
+  handle_inside_wall = 13,
+  fault_present = 14,
+  encoder_invalid = 15,
+};
+
+struct RefusalText {
+  Refusal refusal;
+  std::string_view words;
+};
+
+inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
+    {Refusal::none, "not refused"},
+    {Refusal::unknown_register, "there is no such register"},
+    {Refusal::read_only, "it can only be read"},
+    {Refusal::value_cut_in_two, "a value of two registers must be written whole"},
+    {Refusal::out_of_range, "the value is out of range"},
+    {Refusal::not_a_choice, "the value is not one of the choices"},
+    {Refusal::not_finite, "the value is not a finite number"},
+    {Refusal::while_armed, "it cannot change while an axis is armed; disarm first"},
+    {Refusal::rate_does_not_divide, "haptic.rate must divide the tick rate of 20000 Hz without a remainder"},
+    {Refusal::adaptive_interval_empty, "wall.adaptive_force_min must not exceed wall.adaptive_force_max"},
+    {Refusal::supply_interval_empty, "supply.voltage_min must be below supply.voltage_max"},
+    {Refusal::transaction_open, "another transaction is open; it is dropped after 2 s without a write"},
+    {Refusal::no_transaction, "no transaction is open"},
+    {Refusal::handle_inside_wall, "the handle is inside the wall; move it out and arm again"},
+    {Refusal::fault_present, "a fault is present; clear it first"},
+    {Refusal::encoder_invalid, "the encoder gives no valid count"},
+});
+
+constexpr std::string_view words_of(Refusal refusal) {
+  for (const RefusalText& text : refusal_texts) {
+    if (text.refusal == refusal) return text.words;
+  }
+  return "refused for a reason this program does not know";
+}
+
+}  // namespace kmax::firmware

@@ -1,0 +1,138 @@
+#include "firmware/axis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "firmware/haptic_configuration.hpp"
+
+namespace kmax::firmware {
+namespace {
+
+AxisSetting setting_from(const ParameterValues& values, std::uint32_t generation = 1) {
+  AxisSetting setting;
+  setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, 0), 0);
+  setting.encoder_offset = values.whole<"encoder.offset">();
+  setting.encoder_direction = values.whole<"encoder.direction">();
+  setting.generation = generation;
+  return setting;
+}
+
+ParameterValues plain_wall() {
+  ParameterValues values;
+  values.set_real<"device.transmission">(0.15915494309189535f);
+  values.set_whole<"encoder.counts_per_turn">(1'000'000);
+  values.set_real<"force.ramp_time">(0.0f);
+  values.set_real<"velocity.limit">(0.0f);
+  return values;
+}
+
+class AxisTest : public testing::Test {
+ protected:
+  Axis::Output tick(std::uint32_t count, bool enable, bool valid = true, float external = 0.0f) {
+    return axis.ISR_tick(setting, {count, valid}, enable, external, ++ticks);
+  }
+  Axis axis;
+  AxisSetting setting = setting_from(plain_wall());
+  std::uint32_t ticks = 0;
+};
+
+constexpr std::uint32_t at(std::int32_t count) { return static_cast<std::uint32_t>(count); }
+
+TEST_F(AxisTest, TripStaysUntilDisabledHasBeenSeen) {
+  EXPECT_EQ(tick(at(-1000), true).force, 1.0f);
+  EXPECT_EQ(tick(at(-1000), true, false).force, 0.0f);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::encoder);
+  for (int i = 0; i < 5; ++i) {
+    const auto out = tick(at(-1000), true);
+    EXPECT_EQ(out.force, 0.0f);
+    EXPECT_FALSE(out.enabled);
+    EXPECT_EQ(axis.ISR_report().fault, Fault::encoder);
+  }
+  EXPECT_EQ(tick(at(-1000), false).force, 0.0f);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::none);
+  EXPECT_EQ(tick(at(-1000), true).force, 1.0f);
+}
+
+TEST_F(AxisTest, FirstFaultIsKept) {
+  ParameterValues values = plain_wall();
+  values.set_real<"velocity.limit">(0.5f);
+  values.set_whole<"velocity.estimator">(0);
+  setting = setting_from(values);
+  tick(at(1000), true);
+  tick(at(2000), true);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::over_speed);
+  EXPECT_NEAR(axis.ISR_report().fault_value, 20.0f, 0.01f);
+  tick(at(9000), true, false);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::over_speed);
+  EXPECT_NEAR(axis.ISR_report().fault_value, 20.0f, 0.01f);
+}
+
+TEST_F(AxisTest, ExternalForceIsPartOfWhatIsLimitedAndOnlyWhileEnabled) {
+  EXPECT_EQ(tick(at(1000), true, true, 1.5f).force, 1.5f);
+  EXPECT_EQ(tick(at(1000), true, true, -100.0f).force, -3.3f);
+  EXPECT_EQ(tick(at(1000), false, true, 1.5f).force, 0.0f);
+}
+
+TEST_F(AxisTest, ExternalForceThatIsNotANumberTripsAndNeverReachesTheDevice) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::quiet_NaN()}) {
+    tick(at(1000), false);
+    EXPECT_EQ(tick(at(1000), true, true, bad).force, 0.0f);
+    EXPECT_EQ(axis.ISR_report().fault, Fault::not_finite);
+    EXPECT_EQ(tick(at(1000), true, true, 1.0f).force, 0.0f);
+  }
+}
+
+TEST_F(AxisTest, InvalidCountsHoldThePositionAndAreToldInTheReport) {
+  tick(at(500), false);
+  EXPECT_TRUE(axis.ISR_report().count_valid);
+  tick(at(9999), false, false);
+  EXPECT_EQ(axis.ISR_report().haptic.position, 500);
+  EXPECT_FALSE(axis.ISR_report().count_valid);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::none) << "not enabled: nothing to trip";
+}
+
+TEST_F(AxisTest, WhatTheCounterHeldBeforeItsFirstValidCountMeansNothing) {
+  for (int i = 0; i < 10; ++i) tick(0x7FFFFFFF, false, false);
+  EXPECT_EQ(axis.ISR_report().haptic.position, 0);
+  tick(0x80000001, false);
+  EXPECT_EQ(axis.ISR_report().haptic.position, static_cast<std::int32_t>(0x80000001)) << "as signed, no lap";
+  EXPECT_EQ(axis.ISR_report().haptic.velocity, 0.0f) << "the first count is no motion";
+  tick(0x80000001, false);
+  EXPECT_EQ(axis.ISR_report().haptic.velocity, 0.0f);
+}
+
+TEST_F(AxisTest, NewGenerationStartsEstimatorsAfresh) {
+  for (int i = 0; i < 50; ++i) tick(at(1000 + 10 * i), false);
+  EXPECT_GT(axis.ISR_report().haptic.velocity, 0.1f);
+  setting.encoder_offset = 100'000;
+  setting.generation = 2;
+  tick(at(1500), false);
+  EXPECT_EQ(axis.ISR_report().haptic.velocity, 0.0f);
+  EXPECT_EQ(axis.ISR_report().haptic.position, 1500 - 100'000);
+  EXPECT_EQ(axis.ISR_report().generation, 2u);
+}
+
+TEST_F(AxisTest, SamplesAreCountedFromArmingAndKeptAfterwards) {
+  for (int i = 0; i < 10; ++i) tick(at(1000), false);
+  for (int i = 0; i < 20; ++i) tick(at(i < 5 ? 1000 : -10'000), true);
+  EXPECT_EQ(axis.ISR_report().armed_samples, 20u);
+  EXPECT_EQ(axis.ISR_report().limited_samples, 15u);
+  for (int i = 0; i < 10; ++i) tick(at(-10'000), false);
+  EXPECT_EQ(axis.ISR_report().armed_samples, 20u);
+  tick(at(1000), true);
+  EXPECT_EQ(axis.ISR_report().armed_samples, 1u);
+  EXPECT_EQ(axis.ISR_report().limited_samples, 0u);
+}
+
+TEST(AxisPosition, OffsetAndDirectionWithoutOverflow) {
+  AxisSetting setting;
+  setting.encoder_offset = std::numeric_limits<std::int32_t>::min();
+  setting.encoder_direction = -1;
+  EXPECT_EQ(Axis::position_of(std::int64_t{1} << 40, setting), -(std::int64_t{1} << 40) - 2147483648LL);
+  setting.encoder_direction = 1;
+  EXPECT_EQ(Axis::position_of(0, setting), 2147483648LL);
+}
+
+}  // namespace
+}  // namespace kmax::firmware

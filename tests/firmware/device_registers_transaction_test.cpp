@@ -1,0 +1,178 @@
+// The transactions of DeviceRegisters; single writes are in device_registers_test.cpp.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <vector>
+
+#include "firmware/device_registers.hpp"
+#include "tests/firmware/register_words.hpp"
+
+namespace kmax::firmware {
+namespace {
+
+class Transaction : public testing::Test {
+ protected:
+  Refusal control(std::uint16_t request, bool armed = false) {
+    return registers.write(address_of("transaction.control"), Words{request}, armed, now).refusal;
+  }
+  Refusal set(std::string_view name, double number, bool armed = false) {
+    return registers.write(address_of(name), words_for(name, number), armed, now).refusal;
+  }
+  double get(std::string_view name) {
+    Words words(words_of(entry_at(entry_named(name)).type));
+    registers.read(true, address_of(name), words);
+    return number_in(name, words);
+  }
+  std::vector<std::uint32_t> bits() {
+    std::vector<std::uint32_t> all;
+    for (std::size_t slot = 0; slot < slot_count; ++slot) all.push_back(registers.values().raw(slot));
+    return all;
+  }
+
+  DeviceRegisters registers;
+  std::uint32_t now = 1000;
+};
+
+TEST_F(Transaction, NothingShowsBeforeTheCommitAndAllOfItAfter) {
+  EXPECT_EQ(control(1), Refusal::none);
+  const auto before = bits();
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(set("wall.position", 0.25), Refusal::none);
+  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(registers.changes(), 0u);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("wall.stiffness"), 5000);
+  EXPECT_EQ(get("wall.position"), 0.25);
+  EXPECT_EQ(registers.changes(), 1u);
+  EXPECT_EQ(registers.restarting_changes(), 1u);
+  EXPECT_FALSE(registers.transaction_open());
+  EXPECT_EQ(control(2), Refusal::no_transaction);
+}
+
+TEST_F(Transaction, AnOrderThatBreaksARuleHalfWayIsFineInside) {
+  EXPECT_EQ(set("wall.adaptive_force_min", 5), Refusal::adaptive_interval_empty);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.adaptive_force_min", 5), Refusal::none);
+  EXPECT_EQ(set("wall.adaptive_force_max", 6), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("wall.adaptive_force_min"), 5);
+}
+
+TEST_F(Transaction, ASetThatBreaksARuleIsDroppedWhole) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(set("haptic.rate", 300), Refusal::none);
+  const auto before = bits();
+  EXPECT_EQ(control(2), Refusal::rate_does_not_divide);
+  EXPECT_EQ(registers.last_refusal().address, address_of("haptic.rate"));
+  EXPECT_EQ(bits(), before);
+  EXPECT_FALSE(registers.transaction_open());
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(bits(), before) << "nothing of the dropped set comes back";
+}
+
+TEST_F(Transaction, ARefusedValueLeavesWhatWasStagedAndTheTransaction) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 2e6), Refusal::out_of_range);
+  EXPECT_EQ(registers.write(address_of("wall.stiffness"), Words{0x7FC0, 0, 0, 0}, false, now).refusal, Refusal::not_finite);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("wall.stiffness"), 5000);
+}
+
+TEST_F(Transaction, EndsWithoutEffectWhenDroppedAndASecondBeginIsRefused) {
+  const auto before = bits();
+  EXPECT_EQ(control(0), Refusal::none) << "nothing to drop is no error";
+  EXPECT_EQ(control(2), Refusal::no_transaction);
+  EXPECT_EQ(control(3), Refusal::out_of_range);
+  EXPECT_EQ(control(0xFFFF), Refusal::out_of_range);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(control(1), Refusal::transaction_open);
+  EXPECT_TRUE(registers.transaction_open());
+  EXPECT_EQ(control(0), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::no_transaction);
+  EXPECT_EQ(bits(), before);
+}
+
+TEST_F(Transaction, TwoSecondsWithoutAWriteDropItAlsoAcrossTheClocksWrap) {
+  for (const std::uint32_t start : {0u, 1000u, 0xFFFFFFFFu - 1'000'000u, 0xFFFFFFFFu, 0x7FFFFFFFu}) {
+    registers = {};
+    now = start;
+    ASSERT_EQ(control(1), Refusal::none);
+    now += 2'000'000;
+    registers.poll(now);
+    EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+    EXPECT_TRUE(registers.transaction_open()) << "exactly 2 s: still there";
+    now += 2'000'000;
+    registers.poll(now);
+    EXPECT_TRUE(registers.transaction_open()) << "a write keeps it alive";
+    EXPECT_EQ(set("wall.stiffness", 1e9), Refusal::out_of_range);  // refused: does not keep it alive
+    now += 1;
+    EXPECT_EQ(control(2), Refusal::no_transaction) << start;
+    EXPECT_EQ(get("wall.stiffness"), 1000);
+    // The poll alone drops it too.
+    ASSERT_EQ(control(1), Refusal::none);
+    now += 2'000'001;
+    registers.poll(now);
+    EXPECT_FALSE(registers.transaction_open());
+    EXPECT_EQ(set("wall.damping", 1), Refusal::none);
+    EXPECT_EQ(get("wall.damping"), 1) << "a write after that takes effect at once";
+  }
+}
+
+TEST_F(Transaction, ArmedBetweenStagingAndCommitIsRefusedWhole) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(set("wall.position", 0.25), Refusal::none);
+  const auto before = bits();
+  EXPECT_EQ(control(2, true), Refusal::while_armed);
+  EXPECT_EQ(registers.last_refusal().address, address_of("wall.position"));
+  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(control(2, false), Refusal::no_transaction) << "dropped, not kept for later";
+}
+
+TEST_F(Transaction, WhileArmedTakesWhatMayChangeAndRefusesTheRestWhenStaged) {
+  EXPECT_EQ(control(1, true), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000, true), Refusal::none);
+  EXPECT_EQ(set("wall.position", 0.25, true), Refusal::while_armed);
+  EXPECT_EQ(control(2, true), Refusal::none);
+  EXPECT_EQ(get("wall.stiffness"), 5000);
+  EXPECT_EQ(get("wall.position"), 0);
+}
+
+TEST_F(Transaction, ControlwordsActAtOnceAndAreNotUndoneByTheCommit) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(registers.write(address_of("drive.controlword"), Words{0x0F}, false, now).refusal, Refusal::none);
+  std::uint16_t word = 0;
+  ASSERT_TRUE(registers.fetch_controlword(0, word));
+  EXPECT_EQ(word, 0x0F);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("drive.controlword"), 0x0F);
+  EXPECT_FALSE(registers.fetch_controlword(0, word));
+}
+
+TEST_F(Transaction, AnEmptyOneChangesNothing) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(registers.changes(), 0u);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.position", 0.5), Refusal::none);
+  EXPECT_EQ(set("wall.position", 0), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(registers.restarting_changes(), 0u) << "back to the old value is no change";
+}
+
+TEST_F(Transaction, ReadingsThatChangeMeanwhileAreNotWrittenBack) {
+  EXPECT_EQ(control(1), Refusal::none);
+  registers.values().set_real<"measured.force">(1.5f);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  registers.values().set_real<"measured.force">(2.5f);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(registers.values().real<"measured.force">(), 2.5f);
+}
+
+}  // namespace
+}  // namespace kmax::firmware

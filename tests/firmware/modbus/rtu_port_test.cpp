@@ -1,0 +1,363 @@
+#include "firmware/modbus/rtu_port.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+
+#include "tests/firmware/modbus/in_memory_bank.hpp"
+#include "tests/firmware/modbus/rtu_client.hpp"
+#include "tests/firmware/modbus/rtu_line.hpp"
+
+namespace kmax::firmware::modbus {
+namespace {
+
+using Port = RtuPort<InMemoryBank>;
+
+const Bytes read_pdu{3, 0, 2, 0, 1};
+const Bytes read_reply_pdu{3, 2, 0x5A, 0x02};
+const Bytes write_pdu{6, 0, 2, 0x12, 0x34};
+
+class RtuPortAtBaud : public testing::TestWithParam<std::uint32_t> {};
+INSTANTIATE_TEST_SUITE_P(BaudRates, RtuPortAtBaud, testing::ValuesIn(tested_baud_rates));
+
+TEST_P(RtuPortAtBaud, AnswersItsUnit) {
+  RtuClient client({.unit = 17, .baud_rate = GetParam()});
+  EXPECT_EQ(client.exchange(adu(17, read_pdu)), adu(17, read_reply_pdu));
+  EXPECT_EQ(client.port.counters().requests, 1U);
+  EXPECT_EQ(client.port.counters().replies, 1U);
+  EXPECT_EQ(client.port.receiver_counters().frames_received, 1U);
+}
+
+// Asked every 7 us the reply comes t3.5 after the request's end at the earliest, and within one more
+// character.
+TEST_P(RtuPortAtBaud, ReplyIsDueNotBeforeT3_5AndOnlyOnce) {
+  for (const std::uint32_t start : {0U, 0xFFFF'FFFFU, 0xFFFF'F700U, 0x7FFF'F700U}) {
+    RtuClient client({.unit = 1, .baud_rate = GetParam()}, start);
+    client.send(adu(1, read_pdu));
+    double silence = 0.0;
+    Bytes reply;
+    while (reply.empty() && silence < 1e5) {
+      client.line.silence(7.0);
+      silence += 7.0;
+      const auto due = client.port.reply_due(client.line.now());
+      reply.assign(due.begin(), due.end());
+    }
+    EXPECT_EQ(reply, adu(1, read_reply_pdu));
+    EXPECT_GE(silence, client.line.t3_5_us());
+    EXPECT_LE(silence, client.line.t3_5_us() + client.line.character_us() + 10.0);
+    EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  }
+}
+
+TEST_P(RtuPortAtBaud, EchoOfTheReplyIsIgnored) {
+  RtuClient client({.unit = 1, .baud_rate = GetParam()}, 0xFFFF'FF00);
+  // The echo of a write single is a good request for this unit.
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    EXPECT_EQ(client.exchange(adu(1, write_pdu), true), adu(1, write_pdu));
+    client.settle();
+    client.port.poll(client.line.now());
+    EXPECT_TRUE(client.take_reply().empty());
+    EXPECT_EQ(client.bank.writes, static_cast<int>(i));
+    EXPECT_EQ(client.port.counters().echo_bytes, 8 * i);
+    EXPECT_EQ(client.port.counters().requests, i);
+  }
+  EXPECT_EQ(client.port.receiver_counters().frames_received, 3U);
+  EXPECT_EQ(client.port.receiver_counters().crc_errors, 0U);
+}
+
+// The echo of the last character may be handed over after reply_sent(), with a time stamp on either side of
+// it.
+TEST_P(RtuPortAtBaud, LateEchoOfTheLastCharacterIsIgnored) {
+  for (const int offset : {-3, -1, 0, 1, 3}) {
+    RtuClient client({.unit = 1, .baud_rate = GetParam()});
+    (void)client.exchange(adu(1, read_pdu));
+    client.port.receive(0x55, false, client.line.now() + static_cast<std::uint32_t>(offset));
+    EXPECT_EQ(client.port.counters().echo_bytes, 1U);
+    EXPECT_TRUE(client.is_alive());
+    EXPECT_EQ(client.port.receiver_counters().undersize, 0U);
+  }
+}
+
+TEST_P(RtuPortAtBaud, RequestThatBeginsRightAfterTheReplyIsServed) {
+  RtuClient client({.unit = 1, .baud_rate = GetParam()});
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(client.exchange(adu(1, read_pdu), true), adu(1, read_reply_pdu));
+    client.line.silence(1.0);
+  }
+}
+
+TEST_P(RtuPortAtBaud, GapInsideARequestIsSilentAndHarmless) {
+  RtuClient client({.unit = 1, .baud_rate = GetParam()});
+  const Bytes request = adu(1, write_pdu);
+  client.send(Bytes(request.begin(), request.begin() + 3));
+  client.line.silence(client.line.t1_5_us() + 4);
+  client.send(Bytes(request.begin() + 3, request.end()));
+  client.settle();
+  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_EQ(client.bank.writes, 0);
+  EXPECT_EQ(client.port.receiver_counters().gap_errors, 1U);
+  EXPECT_TRUE(client.is_alive());
+}
+
+// Without a look at the port in between, so that the first character of the second request ends the first
+// one.
+TEST_P(RtuPortAtBaud, OfTwoBackToBackRequestsTheSecondIsAnswered) {
+  for (const bool polled : {false, true}) {
+    RtuClient client({.unit = 1, .baud_rate = GetParam()});
+    client.send(adu(1, write_pdu));
+    if (polled) {
+      client.settle();
+      client.port.poll(client.line.now());
+    } else {
+      client.line.silence(client.line.t3_5_us() + 4);
+    }
+    EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, {3, 2, 0x12, 0x34}));
+    EXPECT_EQ(client.port.counters().replies_dropped, 1U);
+    EXPECT_EQ(client.port.counters().requests, 2U);
+    EXPECT_EQ(client.bank.writes, 1);
+    client.settle();
+    EXPECT_TRUE(client.take_reply().empty());
+    EXPECT_TRUE(client.is_alive());
+  }
+}
+
+TEST(RtuPort, NoReplyStartsWhileCharactersComeIn) {
+  RtuClient client;
+  client.send(adu(1, read_pdu));
+  client.settle();
+  client.port.poll(client.line.now());
+  client.send({0x02});
+  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  client.settle();
+  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_EQ(client.port.counters().replies_dropped, 1U);
+  EXPECT_TRUE(client.is_alive());
+}
+
+// 248..255 are reserved: even a port that was asked to be one of them does not answer.
+TEST(RtuPort, OnlyItsOwnUnitAnswers) {
+  for (unsigned own = 0; own < 256; ++own) {
+    for (const unsigned unit : {0U, 1U, 2U, 17U, 246U, 247U, 248U, 254U, 255U, own}) {
+      RtuClient client({.unit = static_cast<std::uint8_t>(own)});
+      const bool valid = own >= 1 && own <= 247;
+      EXPECT_EQ(client.port.config().unit, valid ? own : 1U);
+      const unsigned effective = valid ? own : 1U;
+      const Bytes reply = client.exchange(adu(static_cast<std::uint8_t>(unit), write_pdu));
+      EXPECT_EQ(reply, unit == effective ? adu(static_cast<std::uint8_t>(unit), write_pdu) : Bytes{})
+          << own << " " << unit;
+      EXPECT_EQ(client.bank.writes, unit == effective || unit == 0 ? 1 : 0);
+      EXPECT_EQ(client.port.counters().other_units, unit == effective || unit == 0 ? 0U : 1U);
+    }
+  }
+}
+
+TEST(RtuPort, BroadcastWritesAreExecutedWithoutReply) {
+  const Bytes writes[] = {
+      {6, 0, 2, 0x12, 0x34},
+      {16, 0, 2, 0, 1, 2, 0x12, 0x34},
+      {22, 0, 2, 0, 0, 0x12, 0x34},
+      {23, 0, 0, 0, 1, 0, 2, 0, 1, 2, 0x12, 0x34},
+  };
+  for (const Bytes& pdu : writes) {
+    RtuClient client;
+    EXPECT_TRUE(client.exchange(adu(0, pdu)).empty());
+    EXPECT_EQ(client.bank.holding[2], 0x1234) << int{pdu[0]};
+    EXPECT_EQ(client.port.counters().broadcasts, 1U);
+    EXPECT_EQ(client.port.counters().broadcasts_ignored, 0U);
+    EXPECT_EQ(client.port.counters().replies, 0U);
+    EXPECT_TRUE(client.is_alive());
+  }
+}
+
+TEST(RtuPort, BroadcastNeverGetsAReplyWhateverTheFunction) {
+  for (unsigned function = 0; function < 256; ++function) {
+    for (const Bytes& rest : {Bytes{}, Bytes{0, 2, 0, 1}, Bytes{14, 1, 0}, Bytes{0xFF, 0xFF, 0xFF, 0xFF}}) {
+      RtuClient client;
+      const int reads = client.bank.reads;
+      EXPECT_TRUE(client.exchange(adu(0, Bytes{static_cast<std::uint8_t>(function)} + rest)).empty())
+          << function;
+      EXPECT_EQ(client.port.counters().broadcasts, 1U);
+      if (!is_write(static_cast<std::uint8_t>(function))) {
+        EXPECT_EQ(client.port.counters().broadcasts_ignored, 1U);
+        EXPECT_EQ(client.bank.reads, reads);
+      }
+      EXPECT_TRUE(client.is_alive());
+    }
+  }
+}
+
+TEST(RtuPort, ExceptionsAreRepliesAndCounted) {
+  RtuClient client;
+  EXPECT_EQ(client.exchange(adu(1, {5, 0, 0, 0xFF, 0})), adu(1, {0x85, 1}));
+  client.settle();
+  EXPECT_EQ(client.exchange(adu(1, {3, 0, 0, 0, 0})), adu(1, {0x83, 3}));
+  EXPECT_EQ(client.port.counters().exceptions, 2U);
+  EXPECT_EQ(client.port.counters().replies, 2U);
+}
+
+TEST(RtuPort, LongestRequestAndLongestReply) {
+  RtuClient client;
+  Bytes request{23, 1, 0, 0, 125, 1, 0, 0, 121, 242};
+  request.resize(10 + 242, 0x77);
+  const Bytes reply = client.exchange(adu(1, request));
+  EXPECT_EQ(reply.size(), 1U + 252U + 2U);
+  EXPECT_EQ(with_crc(Bytes(reply.begin(), reply.end() - 2)), reply);
+  client.settle();
+  client.bank.objects[0x80] = std::string(244, 'x');
+  EXPECT_EQ(client.exchange(adu(1, {43, 14, 4, 0x80})).size(), adu_size_max);
+}
+
+TEST(RtuPort, HostSupervisionCountsOnlyValidFramesForThisUnit) {
+  RtuClient client;
+  const auto time = [&] { return client.port.last_valid_request_time(); };
+  EXPECT_FALSE(time().has_value());
+  (void)client.exchange(adu(2, read_pdu));
+  Bytes damaged = adu(1, read_pdu);
+  damaged[3] ^= 1;
+  client.settle();
+  (void)client.exchange(damaged);
+  client.settle();
+  (void)client.exchange({1, 2, 3});
+  EXPECT_FALSE(time().has_value());
+  client.settle();
+  for (const Bytes& frame : {adu(1, read_pdu), adu(1, {5, 0}), adu(0, write_pdu), adu(0, read_pdu)}) {
+    client.send(frame);
+    const std::uint32_t end = client.line.now();
+    client.settle();
+    client.port.poll(client.line.now());
+    (void)client.take_reply();
+    EXPECT_EQ(time(), end);
+    client.settle();
+    (void)client.exchange(adu(3, read_pdu));
+    EXPECT_EQ(time(), end);
+    client.settle();
+  }
+  EXPECT_EQ(client.port.counters().requests + client.port.counters().broadcasts, 4U);
+}
+
+TEST(RtuPort, InvalidConfigurationsAreRefused) {
+  RtuClient client;
+  const RtuPortConfig before = client.port.config();
+  EXPECT_FALSE(client.port.configure({.unit = 0}));
+  EXPECT_FALSE(client.port.configure({.unit = 248}));
+  EXPECT_FALSE(client.port.configure({.unit = 255}));
+  EXPECT_FALSE(client.port.configure({.baud_rate = 0}));
+  EXPECT_FALSE(client.port.configure({.baud_rate = baud_rate_min - 1}));
+  EXPECT_FALSE(client.port.configure({.baud_rate = baud_rate_max + 1}));
+  EXPECT_FALSE(client.port.configure({.format = {Parity::even, 0}}));
+  EXPECT_FALSE(client.port.configure({.format = {Parity::even, 3}}));
+  EXPECT_EQ(client.port.config(), before);
+  EXPECT_TRUE(client.port.configure({.unit = 247, .baud_rate = baud_rate_min}));
+  EXPECT_TRUE(client.port.configure({.unit = 1, .baud_rate = baud_rate_max, .format = {Parity::none, 2}}));
+  EXPECT_EQ(client.port.config(), (RtuPortConfig{1, baud_rate_max, {Parity::none, 2}}));
+  EXPECT_EQ(client.port.timing(), rtu_timing(baud_rate_max));
+}
+
+TEST(RtuPort, ConfigurationTakesEffectAtOnceWhenNoReplyIsUnderWay) {
+  RtuClient client;
+  EXPECT_TRUE(client.port.configure({.unit = 9, .baud_rate = 9600}));
+  EXPECT_EQ(client.port.config().unit, 9);
+  EXPECT_EQ(client.port.timing(), rtu_timing(9600));
+  client.line = RtuLine(9600, client.line.now());
+  EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
+  client.settle();
+  EXPECT_EQ(client.exchange(adu(9, read_pdu)), adu(9, read_reply_pdu));
+}
+
+// The bank configures the port from inside the write, as modbus.unit and modbus.baud_rate do.
+struct Reconfiguration {
+  Port* port;
+  RtuPortConfig config;
+  static void apply(void* context) {
+    auto* self = static_cast<Reconfiguration*>(context);
+    EXPECT_TRUE(self->port->configure(self->config));
+  }
+};
+
+TEST(RtuPort, WriteThatReconfiguresIsAnsweredUnderTheOldConfiguration) {
+  for (const bool echo : {false, true}) {
+    RtuClient client({.unit = 1, .baud_rate = 115200});
+    Reconfiguration change{&client.port, {.unit = 42, .baud_rate = 9600}};
+    client.bank.on_write = Reconfiguration::apply;
+    client.bank.on_write_context = &change;
+    client.send(adu(1, write_pdu));
+    client.settle();
+    client.port.poll(client.line.now());
+    EXPECT_EQ(client.port.config().unit, 1);
+    EXPECT_EQ(client.take_reply(echo), adu(1, write_pdu));
+    EXPECT_EQ(client.port.config(), change.config);
+    EXPECT_EQ(client.port.timing(), rtu_timing(9600));
+    client.bank.on_write = nullptr;
+
+    client.line = RtuLine(9600, client.line.now());
+    client.settle();
+    EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
+    client.settle();
+    EXPECT_EQ(client.exchange(adu(42, read_pdu)), adu(42, {3, 2, 0x12, 0x34}));
+  }
+}
+
+TEST(RtuPort, ReconfigurationWaitsForAReplyThatIsBeingSent) {
+  RtuClient client;
+  client.send(adu(1, read_pdu));
+  client.settle();
+  ASSERT_FALSE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_TRUE(client.port.configure({.unit = 5}));
+  EXPECT_TRUE(client.port.configure({.unit = 6}));
+  client.port.poll(client.line.now());
+  EXPECT_EQ(client.port.config().unit, 1);
+  client.port.reply_sent(client.line.now());
+  EXPECT_EQ(client.port.config().unit, 6);
+}
+
+TEST(RtuPort, ReconfigurationByBroadcastOrWithADroppedReplyIsNotLost) {
+  RtuClient client;
+  Reconfiguration change{&client.port, {.unit = 42}};
+  client.bank.on_write = Reconfiguration::apply;
+  client.bank.on_write_context = &change;
+  EXPECT_TRUE(client.exchange(adu(0, write_pdu)).empty());
+  EXPECT_EQ(client.port.config().unit, 42);
+  client.settle();
+
+  change.config.unit = 43;
+  client.send(adu(42, write_pdu));
+  client.settle();
+  client.port.poll(client.line.now());
+  EXPECT_EQ(client.port.config().unit, 42);
+  EXPECT_EQ(client.exchange(adu(43, read_pdu)), adu(43, {3, 2, 0x12, 0x34}));
+  EXPECT_EQ(client.port.config().unit, 43);
+}
+
+TEST(RtuPort, ReplySentWithoutAReplyChangesNothing) {
+  RtuClient client;
+  client.port.reply_sent(client.line.now());
+  client.send(adu(1, read_pdu));
+  client.port.reply_sent(client.line.now());
+  client.settle();
+  EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
+}
+
+TEST(RtuPort, AliveAfterLongIdleTime) {
+  RtuClient client;
+  (void)client.exchange(adu(1, read_pdu));
+  for (int second = 0; second < 3 * 3600; ++second) {
+    client.line.silence(1e6);
+    client.port.poll(client.line.now());
+  }
+  EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, read_reply_pdu));
+  EXPECT_EQ(client.port.counters().echo_bytes, 0U);
+}
+
+TEST(RtuPort, AReplyMayWaitForHours) {
+  RtuClient client;
+  client.send(adu(1, read_pdu));
+  for (int second = 0; second < 3600; ++second) {
+    client.line.silence(1e6);
+    client.port.poll(client.line.now());
+  }
+  EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
+}
+
+}  // namespace
+}  // namespace kmax::firmware::modbus

@@ -1,0 +1,231 @@
+#include "firmware/object_dictionary/dictionary.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+namespace kmax::firmware {
+namespace {
+
+const Entry& named(std::string_view name) {
+  const std::size_t found = find_entry(name);
+  if (found == entry_count) throw std::runtime_error("no entry " + std::string(name));
+  return entry_at(found);
+}
+
+// The vocabulary of the design: names are a contract with everyone who writes a script or a scene.
+struct Word {
+  std::string_view name, unit;
+  std::vector<std::string_view> choices = {};  // all of them must be there unless the firmware lacks the part
+};
+const std::vector<Word> vocabulary = {
+    {"wall.law", "", {"none", "plain", "magnetic", "adaptive"}},
+    {"wall.position", "m"},
+    {"wall.side", "", {"+1", "-1"}},
+    {"wall.stiffness", "N/m"},
+    {"wall.damping", "N s/m"},
+    {"wall.magnetic_coefficient", "N"},
+    {"wall.magnetic_length", "m"},
+    {"wall.adaptive_gain", "N"},
+    {"wall.adaptive_offset", "N"},
+    {"wall.adaptive_velocity_max", "m/s"},
+    {"wall.adaptive_relation", "", {"linear", "square", "square_root"}},
+    {"wall.adaptive_force_min", "N"},
+    {"wall.adaptive_force_max", "N"},
+    {"wall.adaptive_velocity", "", {"approach", "speed"}},
+    {"wall.adaptive_mode", "", {"instant", "latched", "peak_hold"}},
+    {"wall.adaptive_hold_time", "s"},
+    {"interference.mode", "", {"none", "perpendicular", "parallel"}},
+    {"interference.force", "N"},
+    {"interference.background_force", "N"},
+    {"interference.onset_time", "s"},
+    {"position.resolution", "m"},
+    {"position.rounding", "", {"nearest", "floor", "hysteresis"}},
+    {"velocity.estimator", "", {"difference", "low_pass", "foaw", "tracking"}},
+    {"velocity.window", "samples"},
+    {"velocity.bandwidth", "Hz"},
+    {"haptic.rate", "Hz"},
+    {"force.limit", "N"},
+    {"force.slew_limit", "N/s"},
+    {"force.ramp_time", "s"},
+    {"passivity.mode", "", {"off"}},  // 'observe' and 'control' when the firmware has them
+    {"guard.mode", "", {"off"}},      // 'warn' and 'refuse' when the firmware has them
+    {"guard.damping", "N s/m"},
+    {"guard.friction", "N"},
+    {"guard.operator_force", "N"},
+    {"guard.operator_speed", "m/s"},
+    {"device.transmission", "m/rad"},
+    {"device.mass", "kg"},
+    {"motor.kind", "", {"dc", "pmsm"}},
+    {"motor.resistance", "ohm"},
+    {"motor.inductance", "H"},
+    {"motor.torque_constant", "N m/A"},
+    {"motor.pole_pairs", ""},
+    {"current.limit", "A"},
+    {"current.bandwidth", "rad/s"},
+    {"encoder.kind", "", {"quadrature", "as5047p"}},
+    {"encoder.counts_per_turn", "counts"},
+    {"encoder.direction", "", {"+1", "-1"}},
+    {"encoder.offset", "counts"},
+    {"supply.voltage_min", "V"},
+    {"supply.voltage_max", "V"},
+    {"temperature.limit", "degC"},
+    {"velocity.limit", "m/s"},
+    {"link.timeout", "s"},
+    {"node.id", ""},
+    {"can.bit_rate", "bit/s"},
+    {"modbus.unit", ""},
+    {"modbus.baud_rate", "baud"},
+};
+
+TEST(Dictionary, HasEveryNameOfTheVocabularyWithItsUnitAndChoices) {
+  for (const Word& word : vocabulary) {
+    ASSERT_LT(find_entry(word.name), entry_count) << word.name;
+    const Entry& entry = named(word.name);
+    EXPECT_EQ(entry.unit, word.unit) << word.name;
+    EXPECT_EQ(entry.access, Access::read_write) << word.name;
+    EXPECT_TRUE(entry.persistent) << word.name;
+    EXPECT_FALSE(entry.help.empty()) << word.name;
+    if (entry.unit != "bit/s" && entry.unit != "baud") {
+      EXPECT_EQ(entry.values.empty(), word.choices.empty()) << word.name;
+    }
+    for (const std::string_view choice : word.choices) {
+      EXPECT_TRUE(std::any_of(entry.values.begin(), entry.values.end(),
+                              [&](const NamedValue& v) { return v.name == choice; }))
+          << word.name << " = " << choice;
+    }
+  }
+}
+
+// A setting that is kept and is not in the vocabulary would be an undocumented name.
+TEST(Dictionary, HasNoPersistentNameOutsideTheVocabulary) {
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    if (!entry_at(i).persistent) continue;
+    EXPECT_TRUE(std::any_of(vocabulary.begin(), vocabulary.end(),
+                            [&](const Word& w) { return w.name == entry_at(i).name; }))
+        << entry_at(i).name;
+  }
+}
+
+TEST(Dictionary, ChoicesHaveDistinctNamesAndNumbers) {
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    std::set<std::string_view> names;
+    std::set<std::int32_t> numbers;
+    for (const NamedValue& v : entry_at(i).values) {
+      EXPECT_TRUE(names.insert(v.name).second) << entry_at(i).name;
+      EXPECT_TRUE(numbers.insert(v.value).second) << entry_at(i).name;
+      EXPECT_LE(entry_at(i).minimum, v.value);
+      EXPECT_GE(entry_at(i).maximum, v.value);
+    }
+  }
+}
+
+// Addresses are in scripts and in the field: appending may not move them.
+TEST(Dictionary, ModbusAddressesArePinned) {
+  struct Pin {
+    std::string_view name;
+    int axis0, axis1;
+  };
+  constexpr Pin pins[] = {
+      {"wall.law", 0x0000, 0x0400},          {"wall.position", 0x0001, 0x0401},
+      {"wall.side", 0x0003, 0x0403},         {"wall.stiffness", 0x0004, 0x0404},
+      {"wall.adaptive_relation", 0x0012, 0x0412}, {"wall.adaptive_hold_time", 0x0019, 0x0419},
+      {"interference.mode", 0x0040, 0x0440}, {"position.resolution", 0x0060, 0x0460},
+      {"velocity.limit", 0x0074, 0x0474},    {"haptic.rate", 0x0080, 0x0480},
+      {"force.limit", 0x0090, 0x0490},       {"force.ramp_time", 0x0094, 0x0494},
+      {"encoder.counts_per_turn", 0x0111, 0x0511}, {"encoder.offset", 0x0114, 0x0514},
+      {"drive.controlword", 0x0200, 0x0600}, {"drive.statusword", 0x0000, 0x0400},
+      {"drive.error_code", 0x0001, 0x0401},  {"drive.refusal", 0x0002, 0x0402},
+      {"measured.tick", 0x0020, 0x0420},     {"measured.position", 0x0022, 0x0422},
+      {"measured.force", 0x0026, 0x0426},    {"measured.armed_samples", 0x0037, 0x0437},
+      {"supply.voltage_min", 0x0800, 0x0800}, {"link.timeout", 0x0810, 0x0810},
+      {"modbus.unit", 0x0830, 0x0830},       {"modbus.baud_rate", 0x0831, 0x0831},
+      {"trace.axis", 0x0840, 0x0840},        {"trace.interval", 0x0841, 0x0841},
+      {"transaction.control", 0x0900, 0x0900}, {"info.vendor_id", 0x0800, 0x0800},
+      {"info.uptime", 0x080F, 0x080F},       {"counters.queue_overflows", 0x0850, 0x0850},
+      {"refusal.reason", 0x0880, 0x0880},    {"trace.next", 0x08A0, 0x08A0},
+  };
+  for (const Pin& pin : pins) {
+    const std::size_t entry = find_entry(pin.name);
+    ASSERT_LT(entry, entry_count) << pin.name;
+    EXPECT_EQ(modbus_address(entry, 0), pin.axis0) << pin.name;
+    EXPECT_EQ(modbus_address(entry, 1), pin.axis1) << pin.name;
+  }
+}
+
+TEST(Dictionary, Cia402ObjectsStandAtTheStandardsIndex) {
+  EXPECT_EQ(named("drive.controlword").index(), 0x6040);
+  EXPECT_EQ(named("drive.statusword").index(), 0x6041);
+  EXPECT_EQ(named("drive.error_code").index(), 0x603F);
+  EXPECT_EQ(named("drive.statusword").object_subindex(), 0);
+}
+
+TEST(Dictionary, NoTwoObjectsShareAnIndexOnEitherAxis) {
+  std::set<std::pair<int, int>> places;
+  for (std::size_t slot = 0; slot < slot_count; ++slot) {
+    const auto [entry, axis] = owner_of(slot);
+    const int index = entry_at(entry).index() + static_cast<int>(axis) * axis_index_offset;
+    EXPECT_TRUE(places.insert({index, entry_at(entry).object_subindex()}).second) << entry_at(entry).name;
+  }
+}
+
+TEST(Dictionary, NoTwoValuesShareARegisterAndAxesDoNotRunIntoEachOther) {
+  std::map<std::pair<bool, int>, std::string> owner;
+  for (std::size_t slot = 0; slot < slot_count; ++slot) {
+    const auto [entry, axis] = owner_of(slot);
+    const Entry& e = entry_at(entry);
+    for (int word = 0; word < words_of(e.type); ++word) {
+      const std::pair<bool, int> place{e.access == Access::read_write, modbus_address(entry, axis) + word};
+      const auto [at, is_new] = owner.insert({place, std::string(e.name)});
+      EXPECT_TRUE(is_new) << e.name << " and " << at->second << " at " << place.second;
+      EXPECT_FALSE(place.second >= 0x4000 && place.second < 0x5000) << e.name << " is in the trace window";
+      if (e.scope() == Scope::axis) {
+        EXPECT_EQ(place.second / 0x400, static_cast<int>(axis)) << e.name;
+      } else {
+        EXPECT_GE(place.second, 0x800) << e.name;
+      }
+    }
+  }
+}
+
+TEST(Dictionary, SlotsAndOwnersAreInverse) {
+  std::set<std::size_t> seen;
+  for (std::size_t entry = 0; entry < entry_count; ++entry) {
+    const std::size_t axes = entry_at(entry).scope() == Scope::axis ? axis_count : 1;
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      const std::size_t slot = slot_of(entry, axis);
+      EXPECT_TRUE(seen.insert(slot).second);
+      EXPECT_EQ(owner_of(slot).entry, entry);
+      EXPECT_EQ(owner_of(slot).axis, axis);
+    }
+  }
+  EXPECT_EQ(seen.size(), slot_count);
+  EXPECT_EQ(*seen.rbegin(), slot_count - 1);
+}
+
+TEST(Dictionary, FindsEveryNameAndNoOther) {
+  for (std::size_t i = 0; i < entry_count; ++i) EXPECT_EQ(find_entry(entry_at(i).name), i);
+  for (const std::string_view wrong : {"", "wall", "wall.", "wall.stiffnes", "wall.stiffness ", "Wall.stiffness"})
+    EXPECT_EQ(find_entry(wrong), entry_count) << wrong;
+}
+
+// What would make the force jump or the scale change under the hand must not be writable while armed; what an
+// experiment turns up while the hand holds the handle must be.
+TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
+  for (const std::string_view name :
+       {"wall.law", "wall.position", "wall.side", "interference.mode", "position.resolution", "position.rounding",
+        "velocity.estimator", "velocity.window", "velocity.bandwidth", "haptic.rate", "device.transmission",
+        "encoder.counts_per_turn", "encoder.direction", "encoder.offset", "encoder.kind", "motor.kind"})
+    EXPECT_EQ(named(name).change, Change::disarmed_only) << name;
+  for (const std::string_view name : {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit",
+                                      "link.timeout", "trace.interval", "transaction.control", "drive.controlword"})
+    EXPECT_EQ(named(name).change, Change::any_time) << name;
+}
+
+}  // namespace
+}  // namespace kmax::firmware

@@ -1,0 +1,65 @@
+#include "firmware/object_dictionary/entry.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <bit>
+#include <limits>
+
+namespace kmax::firmware {
+namespace {
+
+constexpr Group plain_group{"group", 0x2000, Scope::axis, 0x10};
+
+TEST(Entry, WordsOfEveryType) {
+  EXPECT_EQ(words_of(Type::unsigned8), 1);
+  EXPECT_EQ(words_of(Type::integer8), 1);
+  EXPECT_EQ(words_of(Type::unsigned16), 1);
+  EXPECT_EQ(words_of(Type::unsigned32), 2);
+  EXPECT_EQ(words_of(Type::integer32), 2);
+  EXPECT_EQ(words_of(Type::float32), 2);
+}
+
+TEST(Entry, PatternsOfTheEdgesOfEveryType) {
+  EXPECT_EQ(raw_from_number(Type::integer8, -1), 0xFFFFFFFFu);
+  EXPECT_EQ(raw_from_number(Type::integer8, -128), 0xFFFFFF80u);
+  EXPECT_EQ(raw_from_number(Type::integer32, -2147483648.0), 0x80000000u);
+  EXPECT_EQ(raw_from_number(Type::unsigned32, 4294967295.0), 0xFFFFFFFFu);
+  EXPECT_EQ(raw_from_number(Type::unsigned16, 65535), 0xFFFFu);
+  EXPECT_EQ(raw_from_number(Type::float32, 1.0), 0x3F800000u);
+  EXPECT_EQ(raw_from_number(Type::float32, -0.0), 0x80000000u);
+  EXPECT_EQ(number_from_raw(Type::integer8, 0xFFFFFFFFu), -1.0);
+  EXPECT_EQ(number_from_raw(Type::unsigned32, 0xFFFFFFFFu), 4294967295.0);
+  EXPECT_EQ(number_from_raw(Type::float32, 0x7F7FFFFFu), static_cast<double>(std::numeric_limits<float>::max()));
+}
+
+RC_GTEST_PROP(Entry, PatternAndNumberAreInverse, (std::uint32_t bits)) {
+  for (const Type type : {Type::unsigned32, Type::integer32})
+    RC_ASSERT(raw_from_number(type, number_from_raw(type, bits)) == bits);
+  RC_ASSERT(raw_from_number(Type::unsigned16, number_from_raw(Type::unsigned16, bits & 0xFFFF)) == (bits & 0xFFFF));
+  const auto value = std::bit_cast<float>(bits);
+  if (value - value == 0.0f) RC_ASSERT(raw_from_number(Type::float32, number_from_raw(Type::float32, bits)) == bits);
+}
+
+TEST(Entry, WordsOfARowSetWhatTheySay) {
+  static constexpr NamedValue sides[] = {{"left", -1}, {"right", 1}};
+  constexpr Entry side = choice("group.side", plain_group, 3, sides, 1, "help").disarmed_only();
+  EXPECT_EQ(side.type, Type::integer8);
+  EXPECT_EQ(side.minimum, -1);
+  EXPECT_EQ(side.maximum, 1);
+  EXPECT_EQ(side.change, Change::disarmed_only);
+  EXPECT_EQ(side.index(), 0x2000);
+  EXPECT_EQ(side.object_subindex(), 3);
+  constexpr Entry word = reading("group.word", plain_group, 1, Type::unsigned16, "", "help").at_standard_index(0x6041);
+  EXPECT_EQ(word.access, Access::read_only);
+  EXPECT_FALSE(word.persistent);
+  EXPECT_EQ(word.index(), 0x6041);
+  EXPECT_EQ(word.object_subindex(), 0);
+  EXPECT_EQ(word.maximum, 65535);
+  constexpr Entry command = whole("group.command", plain_group, 2, Type::unsigned16, "", 0, 9, 0, "h").volatile_value();
+  EXPECT_FALSE(command.persistent);
+  EXPECT_EQ(command.access, Access::read_write);
+}
+
+}  // namespace
+}  // namespace kmax::firmware

@@ -1,0 +1,29 @@
+#include "firmware/refusal.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace kmax::firmware {
+namespace {
+
+TEST(Refusal, NumbersAreTheProtocolsAndEveryOneHasItsOwnWords) {
+  std::set<std::string_view> words;
+  for (std::uint16_t number = 0; number <= 15; ++number) {
+    const auto refusal = static_cast<Refusal>(number);
+    EXPECT_TRUE(words.insert(words_of(refusal)).second) << number << ": " << words_of(refusal);
+    EXPECT_EQ(refusal_texts[number].refusal, refusal);
+  }
+  EXPECT_EQ(refusal_texts.size(), 16u);
+  EXPECT_EQ(static_cast<int>(Refusal::encoder_invalid), 15);
+  EXPECT_EQ(static_cast<int>(Refusal::while_armed), 7);
+  EXPECT_EQ(static_cast<int>(Refusal::handle_inside_wall), 13);
+}
+
+TEST(Refusal, NumberOfALaterFirmwareIsSaidToBeUnknown) {
+  EXPECT_FALSE(words_of(static_cast<Refusal>(999)).empty());
+  EXPECT_NE(words_of(static_cast<Refusal>(999)), words_of(Refusal::none));
+}
+
+}  // namespace
+}  // namespace kmax::firmware
