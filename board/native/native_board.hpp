@@ -1,0 +1,111 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "firmware/application.hpp"
+#include "firmware/modbus/rtu_timing.hpp"
+
+namespace kmax::board {
+
+/// What moves instead of a real handle. Given from above, so that this floor knows no simulation.
+template <typename Device>
+concept SimulatedDevice = requires(Device device, std::size_t axis, const firmware::AxisOutput& output, double s) {
+  /// Encoder counter of an axis, free-running, wraps at 2^32; and whether the encoder answers.
+  { device.count(axis) } -> std::same_as<std::uint32_t>;
+  { device.count_valid(axis) } -> std::same_as<bool>;
+  /// The force held over the coming interval.
+  { device.drive(axis, output) };
+  /// Lets the time pass, in s.
+  { device.advance(s) };
+};
+
+/// The firmware on x86: the same Application, fed by a simulated device, in virtual time.
+///
+/// Time passes only in advance(), in ticks of 50 us, and everything in it is deterministic: the same calls
+/// give the same bits. Serial characters take their time on the line, so replies come as late as they would
+/// on a wire of modbus.baud_rate; whoever wants real time calls advance() at the pace of a clock.
+template <SimulatedDevice Device>
+class NativeBoard {
+ public:
+  static constexpr std::uint32_t tick_us = 1'000'000 / firmware::tick_rate_hz;
+
+  explicit NativeBoard(Device& device)
+      : device_(device), application_({.board_name = "native", .serial_number = 1, .core_clock_hz = 0, .clock_source = 4}) {}
+
+  firmware::Application& application() { return application_; }
+
+  /// Bytes from the host; each takes its character time from now on, one after the other.
+  void receive(std::span<const std::uint8_t> bytes) {
+    const std::uint64_t character = character_us();
+    for (const std::uint8_t byte : bytes) {
+      line_free_us_ = (line_free_us_ > now_us_ ? line_free_us_ : now_us_) + character;
+      incoming_.push_back({line_free_us_, byte});
+    }
+  }
+
+  /// Bytes for the host that have left the line since the last call.
+  std::vector<std::uint8_t> transmitted() {
+    std::vector<std::uint8_t> out;
+    out.swap(outgoing_);
+    return out;
+  }
+
+  /// Runs `ticks` ticks.
+  void advance(std::uint64_t ticks) {
+    for (std::uint64_t i = 0; i < ticks; ++i) tick();
+  }
+
+  std::uint64_t now_us() const { return now_us_; }
+  const firmware::TickOutput& output() const { return output_; }
+
+ private:
+  struct TimedByte {
+    std::uint64_t time_us;
+    std::uint8_t byte;
+  };
+
+  std::uint64_t character_us() const {
+    return firmware::modbus::rtu_timing(application_.serial_settings().baud_rate, {}).character_us;
+  }
+
+  void tick() {
+    firmware::TickInput input;
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      input.axis[axis] = {device_.count(axis), device_.count_valid(axis)};
+    output_ = application_.ISR_tick(input);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) device_.drive(axis, output_.axis[axis]);
+    device_.advance(static_cast<double>(tick_us) * 1e-6);
+    now_us_ += tick_us;
+
+    const auto now = static_cast<std::uint32_t>(now_us_);
+    while (!incoming_.empty() && incoming_.front().time_us <= now_us_) {
+      application_.ISR_serial_byte(incoming_.front().byte, false, static_cast<std::uint32_t>(incoming_.front().time_us));
+      incoming_.pop_front();
+    }
+    application_.poll(now);
+    if (sending_until_us_ != 0) {
+      if (now_us_ < sending_until_us_) return;
+      outgoing_.insert(outgoing_.end(), reply_.begin(), reply_.end());
+      application_.serial_reply_sent(static_cast<std::uint32_t>(sending_until_us_));
+      sending_until_us_ = 0;
+    }
+    const auto reply = application_.serial_reply_due(now);
+    if (reply.empty()) return;
+    reply_.assign(reply.begin(), reply.end());
+    sending_until_us_ = now_us_ + reply.size() * character_us();
+  }
+
+  Device& device_;
+  firmware::Application application_;
+  firmware::TickOutput output_{};
+  std::uint64_t now_us_ = 0, line_free_us_ = 0, sending_until_us_ = 0;
+  std::deque<TimedByte> incoming_;
+  std::vector<std::uint8_t> reply_, outgoing_;
+};
+
+}  // namespace kmax::board

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "drivers/stm32f4/gpio.hpp"
+
+// Pins of the ODrive v3.6 and their state at start-up. From the schematic of v3.5 and the vendor's firmware,
+// which treats v3.5 and v3.6 alike; the schematic of v3.6 is not public.
+
+namespace kmax::board::odrive_v3 {
+
+using drivers::stm32f4::GpioConfig;
+using drivers::stm32f4::GpioMode;
+using drivers::stm32f4::GpioPort;
+using drivers::stm32f4::GpioPull;
+using drivers::stm32f4::GpioSpeed;
+using drivers::stm32f4::PinLocation;
+
+struct PinState {
+  PinLocation pin;
+  GpioConfig config;
+};
+
+namespace pins {
+/// Enables both DRV8301. Low switches all twelve motor FETs off. No pull-down on the board.
+inline constexpr PinLocation gate_enable{GpioPort::b, 12};
+/// Brake half-bridge. The driver has no interlock: never both high. 3.3 kOhm pull-downs on the board.
+inline constexpr PinLocation brake_low_side{GpioPort::b, 10};
+inline constexpr PinLocation brake_high_side{GpioPort::b, 11};
+/// Wired-OR of both DRV8301, low = fault. No pull-up on the board.
+inline constexpr PinLocation gate_driver_fault{GpioPort::d, 2};
+/// Chip selects of the two DRV8301. PC13 to PC15 may only switch slowly and cannot drive a load.
+inline constexpr PinLocation gate_driver0_select{GpioPort::c, 13};
+inline constexpr PinLocation gate_driver1_select{GpioPort::c, 14};
+/// GPIO3 and GPIO4 of connector J3.
+inline constexpr PinLocation serial_transmit{GpioPort::a, 2};
+inline constexpr PinLocation serial_receive{GpioPort::a, 3};
+}  // namespace pins
+
+inline constexpr GpioConfig output_low{.mode = GpioMode::output};
+inline constexpr GpioConfig output_high{.mode = GpioMode::output, .initial_level = true};
+/// For a gate signal that no timer drives yet: the gate driver reads low.
+inline constexpr GpioConfig gate_off{.mode = GpioMode::input, .pull = GpioPull::down};
+
+/// Applied before anything else at start-up, in this order: the switch that turns everything off comes first.
+inline constexpr std::array power_stage_off = {
+    PinState{pins::gate_enable, output_low},
+    PinState{pins::brake_low_side, output_low},
+    PinState{pins::brake_high_side, output_low},
+    // Motor 0 (TIM1): high sides A, B, C, then low sides.
+    PinState{{GpioPort::a, 8}, gate_off},
+    PinState{{GpioPort::a, 9}, gate_off},
+    PinState{{GpioPort::a, 10}, gate_off},
+    PinState{{GpioPort::b, 13}, gate_off},
+    PinState{{GpioPort::b, 14}, gate_off},
+    PinState{{GpioPort::b, 15}, gate_off},
+    // Motor 1 (TIM8).
+    PinState{{GpioPort::c, 6}, gate_off},
+    PinState{{GpioPort::c, 7}, gate_off},
+    PinState{{GpioPort::c, 8}, gate_off},
+    PinState{{GpioPort::a, 7}, gate_off},
+    PinState{{GpioPort::b, 0}, gate_off},
+    PinState{{GpioPort::b, 1}, gate_off},
+    PinState{pins::gate_driver0_select, output_high},
+    PinState{pins::gate_driver1_select, output_high},
+    PinState{pins::gate_driver_fault, {.mode = GpioMode::input, .pull = GpioPull::up}},
+};
+
+/// USART2, alternate function 7. The pull-up keeps an open receive line idle.
+inline constexpr std::array serial_pins = {
+    PinState{pins::serial_transmit,
+             {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 7}},
+    PinState{pins::serial_receive,
+             {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 7}},
+};
+
+namespace detail {
+template <std::size_t count>
+constexpr bool names_no_pin_twice(const std::array<PinState, count>& table) {
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (table[i].pin == table[j].pin) return false;
+    }
+  }
+  return true;
+}
+}  // namespace detail
+static_assert(detail::names_no_pin_twice(power_stage_off));
+static_assert(detail::names_no_pin_twice(serial_pins));
+
+}  // namespace kmax::board::odrive_v3

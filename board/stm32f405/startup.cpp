@@ -1,0 +1,50 @@
+// From the reset vector to main. PM0214 (FPU enabling, VTOR).
+
+#include <cstdint>
+
+#include "board/stm32f405/vectors.hpp"
+#include "drivers/stm32f4/core_instructions.hpp"
+#include "drivers/stm32f4/registers/scb.hpp"
+
+using namespace kmax::drivers::stm32f4;
+
+int main();
+
+extern "C" {
+extern std::uint32_t kmax_data_begin[];
+extern std::uint32_t kmax_data_end[];
+extern const std::uint32_t kmax_data_image[];
+extern std::uint32_t kmax_bss_begin[];
+extern std::uint32_t kmax_bss_end[];
+using Constructor = void (*)();
+extern const Constructor kmax_constructors_begin[];
+extern const Constructor kmax_constructors_end[];
+}
+
+namespace {
+
+/// The compiler may use FPU registers for anything, moving memory included, so all that follows the enabling
+/// lives in a function of its own.
+[[noreturn, gnu::noinline, gnu::section(".boot.start")]] void start() {
+  const std::uint32_t* image = kmax_data_image;
+  for (std::uint32_t* word = kmax_data_begin; word != kmax_data_end; ++word) *word = *image++;
+  for (std::uint32_t* word = kmax_bss_begin; word != kmax_bss_end; ++word) *word = 0;
+  for (const Constructor* constructor = kmax_constructors_begin; constructor != kmax_constructors_end;
+       ++constructor) {
+    (*constructor)();
+  }
+  main();
+  for (;;) wait_for_interrupt();
+}
+
+}  // namespace
+
+extern "C" [[noreturn, gnu::section(".boot.reset")]] void ISR_reset() {
+  scb_cpacr::FpuAccess::set(scb().cpacr);
+  data_synchronization_barrier();
+  instruction_synchronization_barrier();
+  // A boot loader leaves its own table behind.
+  scb().vtor = reinterpret_cast<std::uintptr_t>(&kmax::board::vector_table);
+  data_synchronization_barrier();
+  start();
+}
