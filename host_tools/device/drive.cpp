@@ -1,0 +1,204 @@
+#include "host_tools/device/drive.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+
+#include "firmware/fault.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/number_text.hpp"
+
+namespace kmax::device {
+
+using firmware::DriveState;
+using firmware::Refusal;
+using std::chrono::milliseconds;
+
+namespace {
+// The controlwords of CiA 402's transitions.
+namespace word {
+using namespace firmware::controlword;
+constexpr std::uint16_t disable_voltage = 0;
+constexpr std::uint16_t quick_stop_now = enable_voltage;
+constexpr std::uint16_t shutdown = enable_voltage | quick_stop;
+constexpr std::uint16_t switch_on_now = shutdown | switch_on;
+constexpr std::uint16_t enable_now = switch_on_now | enable_operation;
+}  // namespace word
+
+constexpr milliseconds patience{1000};
+constexpr milliseconds poll_interval{10};
+// The device keeps the last refusal until the next attempt has been judged, which takes it at most one
+// haptic sample. A refusal that is shown for longer after the attempt is the attempt's own.
+constexpr milliseconds judgement{50};
+}  // namespace
+
+std::string_view name_of(DriveState state) {
+  switch (state) {
+    case DriveState::not_ready_to_switch_on:
+      return "not_ready_to_switch_on";
+    case DriveState::switch_on_disabled:
+      return "switch_on_disabled";
+    case DriveState::ready_to_switch_on:
+      return "ready_to_switch_on";
+    case DriveState::switched_on:
+      return "switched_on";
+    case DriveState::operation_enabled:
+      return "operation_enabled";
+    case DriveState::quick_stop_active:
+      return "quick_stop_active";
+    case DriveState::fault_reaction_active:
+      return "fault_reaction_active";
+    case DriveState::fault:
+      return "fault";
+  }
+  return "unknown";
+}
+
+std::string_view words_of(DriveState state) {
+  switch (state) {
+    case DriveState::not_ready_to_switch_on:
+      return "Not ready to switch on";
+    case DriveState::switch_on_disabled:
+      return "Switch on disabled";
+    case DriveState::ready_to_switch_on:
+      return "Ready to switch on";
+    case DriveState::switched_on:
+      return "Switched on";
+    case DriveState::operation_enabled:
+      return "Operation enabled";
+    case DriveState::quick_stop_active:
+      return "Quick stop active";
+    case DriveState::fault_reaction_active:
+      return "Fault reaction active";
+    case DriveState::fault:
+      return "Fault";
+  }
+  return "Unknown";
+}
+
+std::string DriveStatus::fault_words() const {
+  const firmware::FaultText* text = firmware::fault_by_error_code(error_code);
+  if (text == nullptr)
+    return fmt::format("error code 0x{:04X}, which this program does not know", error_code);
+  std::string words(text->what);
+  if (!text->unit.empty())
+    words += fmt::format(" ({} {}, bound {} {})", number_text(fault_value), text->unit,
+                         number_text(fault_bound), text->unit);
+  if (!text->check.empty()) words += fmt::format("; {}", text->check);
+  return words;
+}
+
+DriveStatus Drive::status() {
+  const Parameter asked[] = {Parameter::of<"drive.statusword">(axis_),
+                             Parameter::of<"drive.error_code">(axis_), Parameter::of<"drive.refusal">(axis_),
+                             Parameter::of<"drive.fault_value">(axis_),
+                             Parameter::of<"drive.fault_bound">(axis_)};
+  const auto raw = device_.read(asked);
+  return {static_cast<std::uint16_t>(raw[0]), static_cast<std::uint16_t>(raw[1]),
+          static_cast<Refusal>(raw[2]), std::bit_cast<float>(raw[3]), std::bit_cast<float>(raw[4])};
+}
+
+void Drive::command(std::uint16_t controlword, bool idempotent) {
+  try {
+    device_.write(Parameter::of<"drive.controlword">(axis_), controlword, idempotent);
+  } catch (const link::RefusedError&) {
+    throw DeviceError(fmt::format("axis {}: the device refused controlword {}: {}", axis_, controlword,
+                                  firmware::words_of(device_.last_refusal().reason)));
+  }
+}
+
+template <typename Predicate>
+DriveStatus Drive::wait_until(Predicate done) {
+  const auto start = device_.link().now();
+  for (;;) {
+    const DriveStatus seen = status();
+    if (done(seen) || device_.link().now() - start > patience) return seen;
+    device_.link().wait(poll_interval);
+  }
+}
+
+void Drive::advance(std::uint16_t controlword, DriveState wanted) {
+  command(controlword, true);
+  const auto seen = wait_until([wanted](const DriveStatus& s) { return s.state() == wanted || s.faulty(); });
+  if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
+  if (seen.state() != wanted)
+    throw DeviceError(fmt::format("axis {}: stays in '{}' instead of going to '{}'; look at 'kmax state'",
+                                  axis_, words_of(seen.state()), words_of(wanted)));
+}
+
+void Drive::enable() {
+  const auto start = device_.link().now();
+  // Not repeated when its answer is lost: an axis is never armed by a second try the user did not make.
+  command(word::enable_now, false);
+  const auto seen = wait_until([&](const DriveStatus& s) {
+    const bool judged = device_.link().now() - start > judgement;
+    return s.armed() || s.faulty() || (judged && s.refusal != Refusal::none);
+  });
+  if (seen.armed()) return;
+  if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
+  if (seen.refusal != Refusal::none)
+    throw DeviceError(fmt::format("axis {} was not armed: {}", axis_, firmware::words_of(seen.refusal)));
+  throw DeviceError(
+      fmt::format("axis {} was not armed: it stays in '{}' and gives no reason; look at 'kmax state'", axis_,
+                  words_of(seen.state())));
+}
+
+void Drive::arm() {
+  const DriveStatus before = status();
+  if (before.armed()) return;
+  if (before.faulty())
+    throw DeviceError(fmt::format("axis {} cannot be armed, it has a fault: {}; then 'kmax clear'", axis_,
+                                  before.fault_words()));
+  try {
+    advance(word::disable_voltage, DriveState::switch_on_disabled);
+    advance(word::shutdown, DriveState::ready_to_switch_on);
+    advance(word::switch_on_now, DriveState::switched_on);
+    enable();
+  } catch (const std::exception&) {
+    try {
+      command(word::disable_voltage, true);
+    } catch (const std::exception&) {
+      // The first error is the one to tell; link.timeout removes the force of an axis nobody talks to.
+    }
+    throw;
+  }
+}
+
+void Drive::disarm() {
+  command(word::shutdown, true);
+  command(word::disable_voltage, true);
+  const auto seen = wait_until([](const DriveStatus& s) {
+    return s.state() == DriveState::switch_on_disabled || s.state() == DriveState::fault;
+  });
+  if (seen.state() == DriveState::switch_on_disabled || seen.state() == DriveState::fault) return;
+  throw DeviceError(
+      fmt::format("axis {} is not disarmed: it stays in '{}'; cut its power", axis_, words_of(seen.state())));
+}
+
+void Drive::stop() {
+  command(word::quick_stop_now, true);
+  const auto stopped = [](const DriveStatus& s) {
+    return s.state() == DriveState::quick_stop_active || s.state() == DriveState::switch_on_disabled ||
+           s.state() == DriveState::fault;
+  };
+  const auto seen = wait_until(stopped);
+  if (!stopped(seen))
+    throw DeviceError(fmt::format("axis {} is not stopped: it stays in '{}'; cut its power", axis_,
+                                  words_of(seen.state())));
+}
+
+bool Drive::clear() {
+  // A reaction that is still running ends in "fault", from where alone there is a reset.
+  const DriveStatus before =
+      wait_until([](const DriveStatus& s) { return s.state() != DriveState::fault_reaction_active; });
+  if (!before.faulty()) return false;
+  // The reset is an edge: the bit must have been seen low, and must not stay high.
+  command(word::disable_voltage, true);
+  command(word::fault_reset, true);
+  const auto seen = wait_until([](const DriveStatus& s) { return !s.faulty(); });
+  command(word::disable_voltage, true);
+  if (!seen.faulty()) return true;
+  throw DeviceError(fmt::format("axis {}: the fault remains: {}", axis_, seen.fault_words()));
+}
+
+}  // namespace kmax::device

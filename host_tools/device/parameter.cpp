@@ -1,0 +1,108 @@
+#include "host_tools/device/parameter.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/suggestion.hpp"
+
+namespace kmax::device {
+
+using firmware::axis_count;
+
+namespace {
+struct SplitName {
+  std::optional<std::size_t> axis;
+  std::string_view rest;
+};
+
+/// Takes an axis prefix off: "axis" and digits before the first dot.
+SplitName split(std::string_view name) {
+  constexpr std::string_view prefix = "axis";
+  const auto dot = name.find('.');
+  if (dot == std::string_view::npos || !name.starts_with(prefix)) return {std::nullopt, name};
+  const std::string_view digits = name.substr(prefix.size(), dot - prefix.size());
+  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos)
+    return {std::nullopt, name};
+  std::size_t axis = 0;
+  for (const char digit : digits)
+    axis = std::min(axis_count, axis * 10 + static_cast<std::size_t>(digit - '0'));
+  return {axis, name.substr(dot + 1)};
+}
+
+const std::vector<std::string>& dictionary_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (std::size_t i = 0; i < firmware::entry_count; ++i) all.emplace_back(firmware::entry_at(i).name);
+    return all;
+  }();
+  return names;
+}
+
+bool is_group(std::string_view name) {
+  return std::any_of(dictionary_names().begin(), dictionary_names().end(), [name](const std::string& full) {
+    return full.size() > name.size() && full.starts_with(name) && full[name.size()] == '.';
+  });
+}
+}  // namespace
+
+std::string Parameter::name() const {
+  if (axis_ == 0) return std::string(definition().name);
+  return fmt::format("axis{}.{}", axis_, definition().name);
+}
+
+const std::vector<Parameter>& all_parameters() {
+  static const std::vector<Parameter> parameters = [] {
+    std::vector<Parameter> all;
+    for (std::size_t i = 0; i < firmware::entry_count; ++i) all.emplace_back(i, 0);
+    for (std::size_t axis = 1; axis < axis_count; ++axis) {
+      for (std::size_t i = 0; i < firmware::axis_entries.size(); ++i) all.emplace_back(i, axis);
+    }
+    return all;
+  }();
+  return parameters;
+}
+
+std::vector<std::string> suggest(std::string_view name) {
+  const SplitName parts = split(name);
+  auto names = closest(parts.rest, dictionary_names());
+  if (!parts.axis || *parts.axis >= axis_count) return names;
+  for (std::string& one : names) {
+    if (firmware::entry_at(firmware::find_entry(one)).scope() == firmware::Scope::axis)
+      one = fmt::format("axis{}.{}", *parts.axis, one);
+  }
+  return names;
+}
+
+Parameter resolve(std::string_view name, std::size_t default_axis) {
+  const SplitName parts = split(name);
+  const std::size_t entry = firmware::find_entry(parts.rest);
+  if (entry == firmware::entry_count) {
+    if (is_group(parts.rest))
+      throw ValueError(fmt::format("'{}' is a group of parameters; 'kmax list {}.' shows them", name, name));
+    const auto names = suggest(name);
+    throw ValueError(fmt::format("there is no parameter '{}'{}", name,
+                                 names.empty()
+                                     ? "; 'kmax list' shows all of them"
+                                     : fmt::format("; did you mean {}?", fmt::join(names, " or "))));
+  }
+  const auto& definition = firmware::entry_at(entry);
+  if (parts.axis && *parts.axis >= axis_count)
+    throw ValueError(fmt::format("'{}': there is no such axis; axes are 0 .. {}", name, axis_count - 1));
+  if (parts.axis && definition.scope() == firmware::Scope::device)
+    throw ValueError(fmt::format("'{}': {} belongs to the whole device, not to an axis; write {}", name,
+                                 parts.rest, parts.rest));
+  return {entry, parts.axis.value_or(default_axis)};
+}
+
+std::optional<Parameter> owner_of_holding_register(std::uint16_t address) {
+  for (const Parameter& parameter : all_parameters()) {
+    if (parameter.table() == Table::holding && parameter.address() <= address &&
+        address < parameter.address() + parameter.words())
+      return parameter;
+  }
+  return std::nullopt;
+}
+
+}  // namespace kmax::device

@@ -1,0 +1,176 @@
+#include "host_tools/device/value_text.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "firmware/parameter_values.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/device/suggestion.hpp"
+#include "host_tools/device/unit.hpp"
+
+namespace kmax::device {
+
+using firmware::Entry;
+using firmware::NamedValue;
+using firmware::Type;
+
+namespace {
+std::string in_unit(std::string text, std::string_view unit) {
+  return unit.empty() ? text : fmt::format("{} {}", text, unit);
+}
+
+std::string bound_text(const Entry& entry, double bound) {
+  return entry.type == Type::float32 ? number_text(bound) : fmt::format("{:.0f}", bound);
+}
+
+std::vector<std::string> choice_names(const Entry& entry) {
+  std::vector<std::string> names;
+  for (const NamedValue& value : entry.values) names.emplace_back(value.name);
+  return names;
+}
+
+[[noreturn]] void fail(const Parameter& parameter, const std::string& what) {
+  throw ValueError(fmt::format("{}: {}", parameter.name(), what));
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+struct WrittenNumber {
+  double value;          ///< in the parameter's unit
+  std::string as_given;  ///< number and unit, for messages
+};
+
+WrittenNumber parse_number(const Parameter& parameter, std::string_view text) {
+  const Entry& entry = parameter.definition();
+  const std::string kind =
+      entry.values.empty() ? "a number" : fmt::format("one of {}", allowed_text(parameter));
+  std::string_view rest = text;
+  if (rest.starts_with('+')) rest.remove_prefix(1);
+  // Keeps out what from_chars() would take as well: inf, nan.
+  const std::string_view digits =
+      rest.starts_with('-') && rest.size() != text.size() ? "" : rest.substr(rest.starts_with('-'));
+  const bool starts_like_a_number = digits.find_first_of("0123456789") == (digits.starts_with('.') ? 1u : 0u);
+  if (!starts_like_a_number) fail(parameter, fmt::format("'{}' is not {}", text, kind));
+
+  double number = 0;
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+  if (error != std::errc{})
+    fail(parameter, fmt::format("{} is not a number this program can hold; allowed is {}", text,
+                                allowed_text(parameter)));
+  const std::string_view suffix = trimmed(rest.substr(static_cast<std::size_t>(end - rest.data())));
+  const auto scale = scale_from(suffix, entry.unit);
+  if (!scale) {
+    if (entry.unit.empty())
+      fail(parameter, fmt::format("'{}': it has no unit, so nothing may follow the number", text));
+    fail(parameter, fmt::format("'{}': '{}' is not one of its units {}; without a unit the number is in {}",
+                                text, suffix, fmt::join(suffixes_of(entry.unit), ", "), entry.unit));
+  }
+  const std::string_view given = trimmed(text.substr(0, text.size() - suffix.size()));
+  return {scale->to_si(number), in_unit(std::string(given), suffix.empty() ? entry.unit : suffix)};
+}
+
+[[noreturn]] void fail_out_of_range(const Parameter& parameter, const WrittenNumber& number) {
+  const Entry& entry = parameter.definition();
+  const bool above = number.value > entry.maximum;
+  fail(parameter, fmt::format("{} is {} allowed value {} ({} .. {})", number.as_given,
+                              above ? "above the largest" : "below the smallest",
+                              in_unit(bound_text(entry, above ? entry.maximum : entry.minimum), entry.unit),
+                              bound_text(entry, entry.minimum), bound_text(entry, entry.maximum)));
+}
+
+std::uint32_t parse_choice(const Parameter& parameter, std::string_view text) {
+  const Entry& entry = parameter.definition();
+  for (const NamedValue& choice : entry.values) {
+    if (choice.name == text) return static_cast<std::uint32_t>(choice.value);
+  }
+  if (text.find_first_of("0123456789") < 2) {
+    const WrittenNumber number = parse_number(parameter, text);
+    for (const NamedValue& choice : entry.values) {
+      if (static_cast<double>(choice.value) == number.value) return static_cast<std::uint32_t>(choice.value);
+    }
+  }
+  fail(parameter, fmt::format("'{}' is not one of {}{}", text, allowed_text(parameter),
+                              did_you_mean(text, choice_names(entry))));
+}
+}  // namespace
+
+std::uint32_t parse_value(const Parameter& parameter, std::string_view given) {
+  const Entry& entry = parameter.definition();
+  const std::string_view text = trimmed(given);
+  if (text.empty())
+    fail(parameter, fmt::format("the value is missing; allowed is {}", allowed_text(parameter)));
+  if (!entry.values.empty()) return parse_choice(parameter, text);
+
+  WrittenNumber number = parse_number(parameter, text);
+  if (entry.type != Type::float32) {
+    if (number.value != std::floor(number.value))
+      fail(parameter, fmt::format("{} is not a whole number ({})", number.as_given, allowed_text(parameter)));
+    // Judged before the conversion, which must not meet a number its type cannot hold.
+    if (number.value < entry.minimum || number.value > entry.maximum) fail_out_of_range(parameter, number);
+  } else if (std::fabs(number.value) > static_cast<double>(std::numeric_limits<float>::max())) {
+    fail_out_of_range(parameter, number);
+  }
+  if (number.value == 0.0) number.value = 0.0;  // -0 is 0
+  const std::uint32_t raw = firmware::raw_from_number(entry.type, number.value);
+  if (firmware::check_value(firmware::descriptors[parameter.entry()], raw) != firmware::Refusal::none)
+    fail_out_of_range(parameter, number);
+  return raw;
+}
+
+std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts, std::size_t default_axis) {
+  std::vector<Assignment> assignments;
+  for (const std::string& text : texts) {
+    const auto equals = text.find('=');
+    if (equals == std::string::npos)
+      throw ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
+    const Parameter parameter = resolve(trimmed(std::string_view(text).substr(0, equals)), default_axis);
+    if (!parameter.writable()) fail(parameter, "it is measured or fixed and can only be read");
+    if (parameter.entry() == firmware::entry_of<"drive.controlword">())
+      fail(parameter, "it is a command, not a value; use 'kmax arm', 'disarm', 'stop' or 'clear'");
+    if (parameter.entry() == firmware::entry_of<"transaction.control">())
+      fail(parameter, "it is what 'kmax set' itself uses to set all values at once");
+    for (const Assignment& other : assignments) {
+      if (other.parameter == parameter) fail(parameter, "it is given twice");
+    }
+    assignments.push_back({parameter, parse_value(parameter, std::string_view(text).substr(equals + 1))});
+  }
+  return assignments;
+}
+
+std::string value_text(const Parameter& parameter, std::uint32_t raw) {
+  const Entry& entry = parameter.definition();
+  if (entry.type == Type::float32) return number_text(std::bit_cast<float>(raw));
+  for (const NamedValue& choice : entry.values) {
+    if (static_cast<std::uint32_t>(choice.value) == raw) return std::string(choice.name);
+  }
+  return fmt::format("{:.0f}", firmware::number_from_raw(entry.type, raw));
+}
+
+std::string value_with_unit(const Parameter& parameter, std::uint32_t raw) {
+  return in_unit(value_text(parameter, raw), parameter.definition().unit);
+}
+
+std::string allowed_text(const Parameter& parameter) {
+  const Entry& entry = parameter.definition();
+  if (entry.values.empty())
+    return in_unit(
+        fmt::format("{} .. {}", bound_text(entry, entry.minimum), bound_text(entry, entry.maximum)),
+        entry.unit);
+  return fmt::format("{}", fmt::join(choice_names(entry), ", "));
+}
+
+bool same_value(const Parameter& parameter, std::uint32_t a, std::uint32_t b) {
+  if (parameter.definition().type != Type::float32) return a == b;
+  return a == b || std::bit_cast<float>(a) == std::bit_cast<float>(b);
+}
+
+}  // namespace kmax::device

@@ -1,0 +1,136 @@
+#include "host_tools/experiment/contact_experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/value_text.hpp"
+
+namespace kmax::experiment {
+
+using device::TraceSample;
+
+std::vector<ContactCondition> contact_conditions() {
+  const auto magnetic = [](const char* coefficient) {
+    return std::vector<std::string>{"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", coefficient)};
+  };
+  const auto adaptive = [](const char* mode) {
+    return std::vector<std::string>{"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)};
+  };
+  return {
+      {"F_MC = 0 N", "9", magnetic("0"), "large sustained oscillation", false},
+      {"F_MC = 1 N", "10", magnetic("1"), "smaller oscillation, not stable", false},
+      {"F_MC = 2 N", "11", magnetic("2"), "stable", true},
+      {"adaptive, instant", "12", adaptive("instant"), "stable", true},
+      {"adaptive, latched", "12", adaptive("latched"), "stable", true},
+      {"adaptive, peak_hold", "12", adaptive("peak_hold"), "stable", true},
+  };
+}
+
+std::vector<std::string> contact_setup(const ContactSettings& settings) {
+  return {fmt::format("wall.stiffness={}", settings.stiffness),
+          fmt::format("haptic.rate={}", settings.haptic_rate),
+          "wall.damping=0",
+          "wall.magnetic_length=0.001",
+          "wall.adaptive_gain=2.4",
+          "wall.adaptive_offset=0.8",
+          "wall.adaptive_velocity_max=2.4",
+          "wall.adaptive_relation=linear",
+          "wall.adaptive_velocity=approach",
+          "wall.adaptive_force_min=0.8",
+          "wall.adaptive_force_max=2",
+          "wall.adaptive_hold_time=1.2",
+          "interference.mode=none"};
+}
+
+namespace {
+
+/// Removes the force whatever happens.
+class ArmedWhile {
+ public:
+  ArmedWhile(device::Device& device, std::size_t axis) : drive_(device, axis) { drive_.arm(); }
+  ~ArmedWhile() {
+    try {
+      drive_.disarm();
+    } catch (const std::exception&) {
+      // The link is gone: link.timeout removes the force on the device.
+    }
+  }
+  ArmedWhile(const ArmedWhile&) = delete;
+  ArmedWhile& operator=(const ArmedWhile&) = delete;
+
+  void require_armed() {
+    const device::DriveStatus status = drive_.status();
+    if (status.armed()) return;
+    throw device::DeviceError(fmt::format("the axis lost its force during the trial: {}",
+                                          status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+  }
+
+ private:
+  device::Drive drive_;
+};
+
+double number(device::Device& device, std::size_t axis, const char* name) {
+  return device.read_number(fmt::format("axis{}.{}", axis, name));
+}
+
+}  // namespace
+
+ContactResult run_contact(device::Device& device, const ContactCondition& condition, const ContactSettings& settings,
+                          const std::function<void(const std::string&)>& tell) {
+  ContactResult result;
+  result.condition = condition;
+  std::vector<std::string> assignments = contact_setup(settings);
+  assignments.insert(assignments.end(), condition.assignments.begin(), condition.assignments.end());
+  device.apply(device::parse_assignments(assignments, settings.axis));
+  result.surface = number(device, settings.axis, "wall.position");
+  result.side = number(device, settings.axis, "wall.side");
+  const device::Parameter estimator(firmware::entry_of<"velocity.estimator">(), settings.axis);
+  result.velocity_estimator = device::value_text(estimator, device.read(estimator));
+
+  device::TraceReader trace(device, settings.axis);
+  double touched = -1.0;
+  {
+    ArmedWhile armed(device, settings.axis);
+    constexpr double afterwards = 0.3;  // s of the release, for the picture
+    std::size_t looked_at = 0;
+    for (int round = 0;; ++round) {
+      device.link().wait(std::chrono::milliseconds(20));
+      trace.read(result.samples);
+      for (; looked_at < result.samples.size() && touched < 0; ++looked_at) {
+        if (result.outside_distance(result.samples[looked_at]) <= 0.0) touched = result.samples[looked_at].time;
+      }
+      const double now = result.samples.empty() ? 0.0 : result.samples.back().time;
+      if (touched < 0 && now > settings.contact_patience)
+        throw device::DeviceError(fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
+                                              settings.contact_patience));
+      if (touched >= 0 && now >= touched + settings.hold_time + afterwards) break;
+      if (round % 10 != 0) continue;
+      armed.require_armed();
+      tell(touched < 0 ? fmt::format("{}: waiting for the touch", condition.name)
+                       : fmt::format("{}: holding, {:.1f} of {:.1f} s", condition.name, now - touched, settings.hold_time));
+    }
+    const double all = number(device, settings.axis, "measured.armed_samples");
+    result.limited_share = all > 0 ? number(device, settings.axis, "measured.limited_samples") / all : 0.0;
+  }
+  trace.stop();
+
+  for (TraceSample& sample : result.samples) sample.time -= touched;
+  result.lost_records = trace.lost();
+  result.judged_to = settings.hold_time;
+  result.judged_from = settings.hold_time - std::min(1.0, settings.hold_time);
+  std::vector<simulation::ContactSample> positions;
+  for (const TraceSample& sample : result.samples) positions.push_back({sample.time, sample.position});
+  simulation::ContactCriterion criterion;
+  criterion.window_begin = result.judged_from;
+  criterion.window_end = result.judged_to;
+  criterion.threshold = settings.threshold;
+  criterion.wall_position = result.surface;
+  criterion.wall_side = result.side;
+  result.measure = simulation::measure_contact(positions, criterion);
+  return result;
+}
+
+}  // namespace kmax::experiment

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "host_tools/device/device.hpp"
+#include "host_tools/device/trace_reader.hpp"
+#include "host_tools/simulation/contact_measure.hpp"
+
+namespace kmax::experiment {
+
+/// One of the walls that paper 1 lets its subject 1 touch (section 4.4, Figs. 9 to 12).
+struct ContactCondition {
+  std::string name;
+  std::string figure;                     ///< of paper 1
+  std::vector<std::string> assignments;   ///< NAME=VALUE, what sets it apart
+  std::string paper_words;                ///< what the paper says of it
+  bool paper_stable;
+};
+
+/// F_MC = 0, 1, 2 N and the adaptive wall in each way its coefficient can follow the velocity; the paper
+/// does not say which way it used.
+std::vector<ContactCondition> contact_conditions();
+
+struct ContactSettings {
+  std::size_t axis = 0;
+  double stiffness = 5500;    ///< N/m
+  double haptic_rate = 500;   ///< Hz
+  double hold_time = 3.0;     ///< s from the first touch; the last second is judged
+  double contact_patience = 10.0;  ///< s from arming to the first touch
+  double threshold = 0.165e-3;     ///< m peak to peak, contact_measure.hpp
+};
+
+struct ContactResult {
+  ContactCondition condition;
+  std::vector<device::TraceSample> samples;  ///< from arming on; time 0 is the first touch
+  simulation::ContactMeasure measure;
+  double surface = 0, side = 1;  ///< m; wall.position and wall.side
+  double judged_from = 0, judged_to = 0;  ///< s
+  double limited_share = 0;               ///< of the haptic samples
+  std::string velocity_estimator;         ///< what the adaptive laws' velocity came from
+  std::uint64_t lost_records = 0;
+  double outside_distance(const device::TraceSample& sample) const { return side * (sample.position - surface); }
+  bool agrees_with_paper() const {
+    return (measure.verdict == simulation::ContactVerdict::stable) == condition.paper_stable &&
+           measure.verdict != simulation::ContactVerdict::no_contact;
+  }
+};
+
+/// What all conditions have in common, as assignments.
+std::vector<std::string> contact_setup(const ContactSettings& settings);
+
+/// Sets a condition up, arms, records until the hold is over, disarms. Whoever holds the handle presses it
+/// against the wall when the axis is armed and keeps pressing for hold_time: a simulated person does so by
+/// itself, a real one has to be told. `tell`: progress, called about five times a second with a short text.
+///
+/// The axis is disarmed however this ends. Errors: device::DeviceError (no touch, a fault on the way),
+/// device::ValueError, link::LinkError.
+ContactResult run_contact(device::Device& device, const ContactCondition& condition, const ContactSettings& settings,
+                          const std::function<void(const std::string&)>& tell);
+
+}  // namespace kmax::experiment

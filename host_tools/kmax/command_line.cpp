@@ -1,0 +1,105 @@
+#include "host_tools/kmax/command_line.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <set>
+
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/suggestion.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/link/device_address.hpp"
+
+namespace kmax::cli {
+
+namespace {
+int report_error(Context& context, const std::string& message, ExitCode code) {
+  context.note(message);
+  if (context.json) context.print({{"error", message}});
+  return code;
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+/// The first argument that stands where a command's name should; empty if there is none.
+std::string word_for_command(const std::vector<std::string>& arguments) {
+  static const std::set<std::string> with_value = {"--device"};
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (with_value.contains(arguments[i])) {
+      ++i;
+    } else if (!arguments[i].starts_with('-')) {
+      return arguments[i];
+    }
+  }
+  return {};
+}
+
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
+                          const std::vector<std::string>& arguments) {
+  const auto names = command_names(app);
+  const std::string word = word_for_command(arguments);
+  if (word.empty())
+    return fmt::format("a command is missing; commands are {}; 'kmax --help' explains them",
+                       fmt::join(names, ", "));
+  if (std::find(names.begin(), names.end(), word) == names.end()) {
+    const std::string meant = device::did_you_mean(word, names);
+    return fmt::format("there is no command '{}'{}", word,
+                       meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
+  }
+  return fmt::format("{}: {}; 'kmax {} --help' explains it", word, error.what(), word);
+}
+
+int run_action(Context& context) {
+  try {
+    const int code = context.action();
+    context.out.flush();
+    if (!context.out) {
+      context.note("the output could not be written; is the disk full or the pipe closed?");
+      return failed;
+    }
+    return code;
+  } catch (const UsageError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const device::ValueError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const link::AddressError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const std::exception& error) {
+    return report_error(context, error.what(), failed);
+  }
+}
+}  // namespace
+
+int run(std::vector<std::string> arguments, Context& context) {
+  CLI::App app("Sets parameters of a Kmax haptic device, reads its state and lets it make force.", "kmax");
+  app.set_version_flag("--version", "kmax " KMAX_VERSION);
+  app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
+  app.add_option(
+         "--device", context.device_option,
+         "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
+      ->type_name("ADDRESS");
+  app.require_subcommand(1);
+  app.footer(std::string("'kmax COMMAND --help' shows examples.\n\n") + exit_code_text);
+  for (const AddCommand add : all_commands()) add(app, context);
+
+  // Known before parsing can fail, so that an error is a document too.
+  const bool wants_json = std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
+  try {
+    std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+    app.parse(reversed);
+  } catch (const CLI::Success& request) {  // --help, --version
+    app.exit(request, context.out, context.out);
+    return done;
+  } catch (const CLI::ParseError& error) {
+    context.json = wants_json;
+    return report_error(context, usage_message(app, error, arguments), wrong_usage);
+  }
+  return run_action(context);
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,39 @@
+#include "host_tools/kmax/commands.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <array>
+
+#include "firmware/object_dictionary/dictionary.hpp"
+
+namespace kmax::cli {
+
+std::span<const AddCommand> all_commands() {
+  static constexpr std::array commands = {
+      &add_parameter_commands, &add_info_command,     &add_drive_commands,
+      &add_wall_command,       &add_simulate_command, &add_experiment_command,
+      &add_plot_command,       &add_serve_command,    &add_describe_command,
+  };
+  return commands;
+}
+
+CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes) {
+  CLI::App* command = app.add_subcommand(text.name, text.summary);
+  command->add_flag("--json", context.json, "One JSON document on standard output, in SI units");
+  if (takes != Takes::nothing)
+    command
+        ->add_option(
+            "--device", context.device_option,
+            "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
+        ->type_name("ADDRESS");
+  if (takes == Takes::device_and_axis)
+    command->add_option("--axis", context.axis_option, "Axis that names without a prefix are on")
+        ->type_name("N")
+        ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
+  const std::string examples = *text.examples == '\0' ? "" : fmt::format("Examples:\n{}\n\n", text.examples);
+  command->footer(examples + exit_code_text);
+  return command;
+}
+
+}  // namespace kmax::cli

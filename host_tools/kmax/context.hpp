@@ -1,0 +1,67 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <ostream>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "host_tools/device/device.hpp"
+#include "host_tools/kmax/exit_code.hpp"
+#include "host_tools/link/link.hpp"
+
+namespace kmax::cli {
+
+/// Keys stay in the order they are added.
+using Json = nlohmann::ordered_json;
+
+/// Wrong usage that only a command itself can find. Becomes exit code 2.
+class UsageError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// What every command works with: where it writes, how it reaches a device, and the options all commands
+/// share. Results go to `out`; with --json that is exactly one document (print()). Everything said to the
+/// user on the way goes to note().
+class Context {
+ public:
+  using Opener = std::function<std::unique_ptr<link::Link>(const std::string& address, const link::Notice&)>;
+
+  Context(std::ostream& out_stream, std::ostream& messages, Opener opener)
+      : out(out_stream), messages_(messages), opener_(std::move(opener)) {}
+
+  /// Opens the device of --device, or of KMAX_DEVICE, or the simulated one, and checks that it is a Kmax
+  /// device of this release.
+  device::Device connect();
+
+  /// One line on the messages' stream.
+  void note(const std::string& text);
+
+  /// For what a line at a time cannot show (Progress).
+  std::ostream& messages() { return messages_; }
+
+  void print(const Json& document) { out << document.dump(2) << '\n'; }
+
+  /// --axis, 0 without it.
+  std::size_t axis() const { return axis_option.value_or(0); }
+  /// The address in use.
+  std::string device_address() const;
+  bool simulated() const { return device_address() == "sim"; }
+
+  std::ostream& out;
+
+  // Set by the command line.
+  bool json = false;
+  std::string device_option;
+  std::optional<std::size_t> axis_option;
+  std::function<int()> action;  ///< what the chosen command does; returns an exit code
+
+ private:
+  std::ostream& messages_;
+  Opener opener_;
+};
+
+}  // namespace kmax::cli

@@ -1,0 +1,197 @@
+// kmax state, arm, disarm, stop, clear.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "firmware/fault.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+
+namespace kmax::cli {
+
+using device::Device;
+using device::DeviceError;
+using device::Drive;
+using device::DriveStatus;
+using firmware::DriveState;
+using std::chrono::milliseconds;
+
+namespace {
+/// --axis, or every axis: looking at and stopping one axis too many harms nobody.
+std::vector<std::size_t> chosen_axes(const Context& context) {
+  if (context.axis_option) return {*context.axis_option};
+  std::vector<std::size_t> axes;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) axes.push_back(axis);
+  return axes;
+}
+
+Json fault_json(const DriveStatus& status) {
+  if (!status.faulty()) return nullptr;
+  const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
+  const bool has_number = text != nullptr && !text->unit.empty();
+  return {{"name", text != nullptr ? std::string(text->name) : "unknown"},
+          {"error_code", status.error_code},
+          {"value", has_number ? Json(device::shortest_double(status.fault_value)) : Json(nullptr)},
+          {"bound", has_number ? Json(device::shortest_double(status.fault_bound)) : Json(nullptr)},
+          {"unit", has_number ? std::string(text->unit) : ""},
+          {"message", status.fault_words()}};
+}
+
+Json status_json(std::size_t axis, const DriveStatus& status) {
+  const bool refused = status.refusal != firmware::Refusal::none;
+  return {{"axis", axis},
+          {"state", std::string(device::name_of(status.state()))},
+          {"armed", status.armed()},
+          {"statusword", status.statusword},
+          {"fault", fault_json(status)},
+          {"refusal", refused ? Json(std::string(firmware::words_of(status.refusal))) : Json(nullptr)}};
+}
+
+std::string status_line(std::size_t axis, const DriveStatus& status) {
+  std::string line = fmt::format("axis {}: {}", axis, device::words_of(status.state()));
+  if (status.armed()) line += " (armed: force is on)";
+  if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";
+  if (status.faulty()) line += fmt::format(": {}; then 'kmax clear --axis {}'", status.fault_words(), axis);
+  if (!status.armed() && status.refusal != firmware::Refusal::none)
+    line += fmt::format("; the last attempt to arm was refused: {}", firmware::words_of(status.refusal));
+  return line;
+}
+
+int print_states(Context& context, Device& device, const std::vector<std::size_t>& axes) {
+  Json list = Json::array();
+  for (const std::size_t axis : axes) {
+    const DriveStatus status = Drive(device, axis).status();
+    if (context.json) {
+      list.push_back(status_json(axis, status));
+    } else {
+      fmt::print(context.out, "{}\n", status_line(axis, status));
+    }
+  }
+  if (context.json) context.print({{"axes", list}});
+  return done;
+}
+
+int run_state(Context& context) {
+  Device device = context.connect();
+  return print_states(context, device, chosen_axes(context));
+}
+
+/// Carries `act` out on every axis even if one fails; the first failure is then the command's.
+template <typename Act>
+int run_on_axes(Context& context, Act act) {
+  Device device = context.connect();
+  std::exception_ptr first_error;
+  for (const std::size_t axis : chosen_axes(context)) {
+    try {
+      act(Drive(device, axis));
+    } catch (const std::exception& error) {
+      if (first_error) context.note(error.what());
+      if (!first_error) first_error = std::current_exception();
+    }
+  }
+  if (first_error) std::rethrow_exception(first_error);
+  return print_states(context, device, chosen_axes(context));
+}
+
+/// Keeps talking to the device until the user interrupts or the axis loses its force. Returns the exit code.
+int hold(Context& context, Device& device, Drive& drive, const Interruption& interruption) {
+  const double timeout = device.read_number("link.timeout");
+  const auto interval = timeout > 0
+                            ? std::min(milliseconds(200), milliseconds(static_cast<int>(timeout * 250)))
+                            : milliseconds(200);
+  context.note("holding; Ctrl-C disarms");
+  const auto start = device.link().now();
+  const auto real_start = std::chrono::steady_clock::now();
+  while (!interruption.requested()) {
+    const DriveStatus status = drive.status();
+    if (!status.armed()) {
+      // Never re-armed: whoever took the force away had a reason.
+      throw DeviceError(fmt::format("the force is off: {}", status_line(drive.axis(), status)));
+    }
+    device.link().wait(interval);
+    // A simulated device's time may pass faster than the user's.
+    std::this_thread::sleep_until(real_start + (device.link().now() - start));
+  }
+  drive.disarm();
+  context.note("disarmed");
+  return done;
+}
+
+int run_arm(Context& context, bool holding) {
+  const Interruption interruption;
+  Device device = context.connect();
+  Drive drive(device, context.axis());
+  drive.arm();
+  const double timeout = device.read_number("link.timeout");
+  if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status()));
+  context.out.flush();
+  if (!holding && timeout > 0)
+    context.note(fmt::format(
+        "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps "
+        "it alive",
+        device::number_text(static_cast<float>(timeout))));
+  if (!holding && timeout == 0)
+    context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
+  int code = done;
+  // A link that is lost here ends the command; link.timeout then removes the force.
+  if (holding) code = hold(context, device, drive, interruption);
+  if (context.json) context.print({{"axes", Json::array({status_json(drive.axis(), drive.status())})}});
+  return code;
+}
+
+int run_clear(Context& context) {
+  Device device = context.connect();
+  Drive drive(device, context.axis());
+  if (!drive.clear()) context.note(fmt::format("axis {} has no fault", drive.axis()));
+  return print_states(context, device, {drive.axis()});
+}
+}  // namespace
+
+void add_drive_commands(CLI::App& app, Context& context) {
+  auto* state = add_command(app, context,
+                            {"state", "Shows each axis' CiA 402 state and its fault in words.",
+                             "  kmax state\n  kmax state --axis 1 --json"});
+  state->callback([&context] { context.action = [&context] { return run_state(context); }; });
+
+  auto* arm = add_command(
+      app, context,
+      {"arm", "Lets an axis make force.",
+       "  kmax arm --hold           until Ctrl-C\n  kmax arm --axis 1\n\n"
+       "The device removes the force, with a fault, when the host has been silent for link.timeout.\n"
+       "Refused while the handle is inside the wall or a fault is present."});
+  auto holding = std::make_shared<bool>(false);
+  arm->add_flag("--hold", *holding,
+                "Keep the link alive until Ctrl-C, then disarm; ends with code 1 on a fault");
+  arm->callback(
+      [&context, holding] { context.action = [&context, holding] { return run_arm(context, *holding); }; });
+
+  auto* disarm =
+      add_command(app, context,
+                  {"disarm", "Takes the force away in order, on every axis unless --axis names one.",
+                   "  kmax disarm\n  kmax disarm --axis 1"});
+  disarm->callback([&context] {
+    context.action = [&context] { return run_on_axes(context, [](Drive drive) { drive.disarm(); }); };
+  });
+
+  auto* stop =
+      add_command(app, context,
+                  {"stop", "Quick stop: the force is gone at once, on every axis unless --axis names one.",
+                   "  kmax stop                 then 'kmax disarm' before arming again"});
+  stop->callback([&context] {
+    context.action = [&context] { return run_on_axes(context, [](Drive drive) { drive.stop(); }); };
+  });
+
+  auto* clear = add_command(app, context,
+                            {"clear", "Resets an axis' fault; says what remains if its cause does.",
+                             "  kmax clear\n  kmax clear --axis 1"});
+  clear->callback([&context] { context.action = [&context] { return run_clear(context); }; });
+}
+
+}  // namespace kmax::cli

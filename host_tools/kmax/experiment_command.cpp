@@ -1,0 +1,122 @@
+// kmax experiment.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include "host_tools/experiment/contact_report.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct ContactOptions {
+  experiment::ContactSettings settings;
+  std::string folder, ending = ".svg";
+};
+
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted; the axis has been disarmed") {}
+};
+
+Json condition_json(const experiment::ContactResult& result) {
+  return {{"name", result.condition.name},
+          {"figure", result.condition.figure},
+          {"assignments", result.condition.assignments},
+          {"peak_to_peak_m", result.measure.peak_to_peak},
+          {"verdict", std::string(experiment::words_of(result.measure.verdict))},
+          {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},
+          {"agrees", result.agrees_with_paper()},
+          {"limited_share", result.limited_share},
+          {"deepest_m", result.measure.deepest},
+          {"samples", result.samples.size()},
+          {"lost_records", result.lost_records}};
+}
+
+int run_contact_experiment(Context& context, const ContactOptions& options) {
+  const Interruption interruption;
+  experiment::ContactSettings settings = options.settings;
+  settings.axis = context.axis();
+  const auto conditions = experiment::contact_conditions();
+  device::Device device = context.connect();
+  std::vector<experiment::ContactResult> results;
+  Json list = Json::array();
+  std::vector<std::filesystem::path> files;
+  {
+    Progress progress(context.messages());
+    for (const experiment::ContactCondition& condition : conditions) {
+      const auto tell = [&](const std::string& text) {
+        if (interruption.requested()) throw Interrupted();
+        progress.show(fmt::format("{} of {}, {}", results.size() + 1, conditions.size(), text));
+      };
+      results.push_back(experiment::run_contact(device, condition, settings, tell));
+      list.push_back(condition_json(results.back()));
+      if (options.folder.empty()) continue;
+      const auto written = experiment::write_contact(results.back(), options.folder, options.ending);
+      files.insert(files.end(), written.begin(), written.end());
+    }
+  }
+  if (context.json) {
+    Json names = Json::array();
+    for (const auto& file : files) names.push_back(file.string());
+    context.print({{"stiffness_n_per_m", settings.stiffness},
+                   {"haptic_rate_hz", settings.haptic_rate},
+                   {"hold_time_s", settings.hold_time},
+                   {"threshold_m", settings.threshold},
+                   {"velocity_estimator", results.front().velocity_estimator},
+                   {"conditions", list},
+                   {"files", names}});
+    return done;
+  }
+  fmt::print(context.out,
+             "Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.\n"
+             "Unstable: more than {:g} mm peak to peak in every quarter of it. Velocity estimator: {}.\n\n{}",
+             settings.stiffness / 1000, settings.haptic_rate, settings.hold_time, settings.threshold * 1000,
+             results.front().velocity_estimator, experiment::contact_table(results));
+  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  for (const auto& result : results) {
+    if (result.lost_records > 0)
+      context.note(fmt::format("{}: {} trace records were lost on the way", result.condition.name,
+                               result.lost_records));
+  }
+  return done;
+}
+}  // namespace
+
+void add_experiment_command(CLI::App& app, Context& context) {
+  auto* experiment =
+      app.add_subcommand("experiment", "Runs the papers' experiments on a device, simulated or real.");
+  experiment->require_subcommand(1);
+  auto* contact = add_command(
+      *experiment, context,
+      {"contact",
+       "Touches a stiff wall under each law and judges whether it holds still (paper 1, Figs. 9 to 12).",
+       "  kmax experiment contact                                       on the simulated device\n"
+       "  kmax experiment contact --device serial:/dev/ttyUSB0 --out results\n\n"
+       "On arming, press the handle against the wall and keep pressing until told otherwise; a simulated "
+       "person does\n"
+       "so by itself. The axis is disarmed after each condition and on Ctrl-C."});
+  auto options = std::make_shared<ContactOptions>();
+  experiment::ContactSettings& settings = options->settings;
+  contact->add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")->capture_default_str();
+  contact->add_option("--rate", settings.haptic_rate, "Rate of the haptic loop, Hz")->capture_default_str();
+  contact->add_option("--hold", settings.hold_time, "Time from the first touch to the end of judging, s")
+      ->check(CLI::Range(1.0, 60.0))
+      ->capture_default_str();
+  contact->add_option("--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m")
+      ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  contact->add_option("--out", options->folder, "Folder for a picture and a CSV file per condition")
+      ->type_name("DIR");
+  contact->add_option("--format", options->ending, "Kind of picture")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
+      ->type_name("svg|png");
+  contact->callback([&context, options] {
+    context.action = [&context, options] { return run_contact_experiment(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

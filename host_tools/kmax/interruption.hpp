@@ -1,0 +1,17 @@
+#pragma once
+
+namespace kmax::cli {
+
+/// While one exists, Ctrl-C (SIGINT), SIGTERM and SIGHUP do not end the program: they are remembered, so
+/// that a command can leave the device in order. One at a time.
+class Interruption {
+ public:
+  Interruption();
+  ~Interruption();
+  Interruption(const Interruption&) = delete;
+  Interruption& operator=(const Interruption&) = delete;
+
+  bool requested() const;
+};
+
+}  // namespace kmax::cli

@@ -1,0 +1,12 @@
+#include <iostream>
+
+#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/link/open_link.hpp"
+
+int main(int argc, char** argv) {
+  const auto open = [](const std::string& address, const kmax::link::Notice& notice) {
+    return kmax::link::open_link(kmax::link::parse_device_address(address), notice);
+  };
+  kmax::cli::Context context(std::cout, std::cerr, open);
+  return kmax::cli::run({argv + 1, argv + argc}, context);
+}

@@ -1,0 +1,81 @@
+// kmax plot.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/plot/csv_table.hpp"
+#include "host_tools/plot/figure.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct PlotOptions {
+  std::string table, picture, x;
+  std::vector<std::string> y;
+  bool together = false;
+};
+
+plot::Figure figure_of(const plot::CsvTable& table, const PlotOptions& options) {
+  const std::string x = options.x.empty() ? table.names.front() : options.x;
+  std::vector<std::string> columns = options.y;
+  if (columns.empty()) {
+    for (const std::string& name : table.names) {
+      if (name != x) columns.push_back(name);
+    }
+  }
+  plot::Figure figure;
+  figure.title = std::filesystem::path(options.table).filename().string();
+  figure.x_label = plot::label_of(x);
+  for (const std::string& column : columns) {
+    const plot::Series series{options.together ? column : "", table.column(x), table.column(column), false};
+    if (options.together && !figure.panels.empty()) {
+      figure.panels.front().series.push_back(series);
+    } else {
+      figure.panels.push_back(
+          {options.together && columns.size() > 1 ? "" : plot::label_of(column), {series}, {}});
+    }
+  }
+  return figure;
+}
+
+int run_plot(Context& context, const PlotOptions& options) {
+  std::string picture = options.picture;
+  if (picture.empty()) picture = std::filesystem::path(options.table).replace_extension(".svg").string();
+  plot::write_figure(figure_of(plot::read_csv(options.table), options), picture);
+  if (context.json) {
+    context.print({{"picture", picture}});
+  } else {
+    fmt::print(context.out, "{}\n", picture);
+  }
+  return done;
+}
+}  // namespace
+
+void add_plot_command(CLI::App& app, Context& context) {
+  auto* command =
+      add_command(app, context,
+                  {"plot", "Draws the columns of a CSV file.",
+                   "  kmax plot run.csv                                  every column over the first\n"
+                   "  kmax plot run.csv --y force_n --out force.png\n"
+                   "  kmax plot run.csv --x position_m --y force_n"},
+                  Takes::nothing);
+  auto options = std::make_shared<PlotOptions>();
+  command->add_option("table", options->table, "CSV file whose first line names the columns")
+      ->required()
+      ->option_text("FILE");
+  command->add_option("--x", options->x, "Column along the x axis (default: the first)")->type_name("COLUMN");
+  command->add_option("--y", options->y, "Column to draw; may be repeated (default: all others)")
+      ->type_name("COLUMN");
+  command->add_flag("--together", options->together, "All in one panel instead of one below the other");
+  command
+      ->add_option("--out", options->picture,
+                   "Picture to write, .svg or .png (default: the table's name with .svg)")
+      ->type_name("PICTURE");
+  command->callback(
+      [&context, options] { context.action = [&context, options] { return run_plot(context, *options); }; });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,68 @@
+// kmax serve.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/serve/real_time.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct ServeOptions {
+  std::string serial, can, scene;
+};
+
+int run_serve(Context& context, const ServeOptions& options) {
+  if (!options.can.empty()) throw UsageError("--can: this version has no CAN link yet; use --serial LINK");
+  if (options.serial.empty())
+    throw UsageError("--serial LINK is needed: the name under which the serial line appears");
+  const Interruption interruption;
+  const simulation::Scene scene =
+      options.scene.empty() ? simulated_board::factory_scene() : simulated_board::open_scene(options.scene);
+  simulated_board::SimulatedBoard simulation(scene);
+  serve::PseudoTerminal line(options.serial);
+  const auto& values = simulation.board().application().values();
+  const std::string address = fmt::format("serial:{}?unit={}&baud={}", options.serial,
+                                          values.whole<"modbus.unit">(), values.whole<"modbus.baud_rate">());
+  if (context.json) {
+    context.print({{"device", address}, {"scene", scene.name}});
+  } else {
+    fmt::print(context.out,
+               "serving scene '{}' as {}\nset KMAX_DEVICE to that, or give it with --device; Ctrl-C ends\n",
+               scene.name, address);
+  }
+  context.out.flush();
+  const auto report = serve::run_in_real_time(simulation, line, [&] { return interruption.requested(); });
+  if (report.behind_s > 0)
+    context.note(
+        fmt::format("this process was held up: {:.3f} s of real time were not simulated", report.behind_s));
+  return done;
+}
+}  // namespace
+
+void add_serve_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"serve", "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line.",
+       "  kmax serve --serial /tmp/kmax &\n"
+       "  export KMAX_DEVICE=serial:/tmp/kmax\n"
+       "  kmax info\n\n"
+       "The person of the scene presses against the wall whenever axis 0 is armed."},
+      Takes::nothing);
+  auto options = std::make_shared<ServeOptions>();
+  command
+      ->add_option("--serial", options->serial,
+                   "Name under which the serial line (a pseudo-terminal) appears")
+      ->type_name("LINK");
+  command->add_option("--can", options->can, "SocketCAN interface (not in this version)")->type_name("IFACE");
+  command
+      ->add_option("--scene", options->scene,
+                   "TOML file or supplied scene (default: touch, factory parameters)")
+      ->type_name("SCENE");
+  command->callback(
+      [&context, options] { context.action = [&context, options] { return run_serve(context, *options); }; });
+}
+
+}  // namespace kmax::cli

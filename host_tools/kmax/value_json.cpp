@@ -1,0 +1,76 @@
+#include "host_tools/kmax/value_json.hpp"
+
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/device/value_text.hpp"
+
+namespace kmax::cli {
+
+using firmware::Entry;
+using firmware::Type;
+
+namespace {
+std::string_view type_name(Type type) {
+  switch (type) {
+    case Type::unsigned8:
+      return "unsigned8";
+    case Type::integer8:
+      return "integer8";
+    case Type::unsigned16:
+      return "unsigned16";
+    case Type::unsigned32:
+      return "unsigned32";
+    case Type::integer32:
+      return "integer32";
+    case Type::float32:
+      return "float32";
+  }
+  return "unknown";
+}
+}  // namespace
+
+Json number_json(double number) {
+  constexpr double exact = 9007199254740992.0;  // every whole number up to 2^53 is a double
+  if (number == std::floor(number) && std::fabs(number) < exact) return static_cast<std::int64_t>(number);
+  return number;
+}
+
+Json value_json(const device::Parameter& parameter, std::uint32_t raw) {
+  const Entry& entry = parameter.definition();
+  if (!entry.values.empty()) return device::value_text(parameter, raw);
+  if (entry.type == Type::float32) return number_json(device::shortest_double(std::bit_cast<float>(raw)));
+  return number_json(firmware::number_from_raw(entry.type, raw));
+}
+
+Json value_and_unit_json(const device::Parameter& parameter, std::uint32_t raw) {
+  return {{"value", value_json(parameter, raw)}, {"unit", std::string(parameter.definition().unit)}};
+}
+
+Json description_json(const device::Parameter& parameter) {
+  const Entry& entry = parameter.definition();
+  Json names;  // null unless it is a choice
+  for (const auto& value : entry.values) names.push_back(std::string(value.name));
+  return {
+      {"name", parameter.name()},
+      {"index", parameter.index()},
+      {"subindex", entry.object_subindex()},
+      {"type", std::string(type_name(entry.type))},
+      {"unit", std::string(entry.unit)},
+      {"access", parameter.writable() ? "rw" : "ro"},
+      {"min", number_json(entry.minimum)},
+      {"max", number_json(entry.maximum)},
+      {"default", value_json(parameter, parameter.default_raw())},
+      {"values", names},
+      {"persistent", entry.persistent},
+      {"modbus",
+       {{"table", parameter.table() == device::Table::holding ? "holding" : "input"},
+        {"address", parameter.address()},
+        {"words", parameter.words()}}},
+      {"help", std::string(entry.help)},
+  };
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+
+#include "host_tools/device/parameter.hpp"
+#include "host_tools/kmax/context.hpp"
+
+namespace kmax::cli {
+
+/// Choices as their names; numbers as the shortest text that gives the same value, whole ones without a
+/// fraction.
+Json value_json(const device::Parameter& parameter, std::uint32_t raw);
+
+/// A number of the dictionary itself (a bound).
+Json number_json(double number);
+
+/// {"value": ..., "unit": ...}
+Json value_and_unit_json(const device::Parameter& parameter, std::uint32_t raw);
+
+/// One object of `kmax describe --format json`.
+Json description_json(const device::Parameter& parameter);
+
+}  // namespace kmax::cli

@@ -1,0 +1,108 @@
+// kmax wall.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include "firmware/parameter_rules.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/device/value_text.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/wall/force_curve.hpp"
+#include "host_tools/wall/wall_table.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct WallOptions {
+  std::optional<double> position;
+  double velocity = 0;
+  std::string input, output, picture;
+  std::vector<std::string> assignments;
+};
+
+firmware::ParameterValues values_of(const WallOptions& options, std::size_t axis) {
+  firmware::ParameterValues values;
+  for (const device::Assignment& assignment : device::parse_assignments(options.assignments, axis))
+    values.set_raw(firmware::slot_of(assignment.parameter.entry(), assignment.parameter.axis()),
+                   assignment.raw);
+  if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
+    throw device::ValueError(std::string(firmware::words_of(broken.refusal)));
+  return values;
+}
+
+int evaluate_point(Context& context, const WallOptions& options, const wall::WallEvaluator& evaluator) {
+  const wall::Evaluation at = evaluator.at(*options.position, options.velocity);
+  if (context.json) {
+    context.print({{"force_n", at.force}, {"magnetic_force_n", at.magnetic_force}, {"inside", at.inside}});
+  } else {
+    fmt::print(context.out, "force {:.9g} N, of which magnetic {:.9g} N, {} the wall\n", at.force,
+               at.magnetic_force, at.inside ? "inside" : "outside");
+  }
+  return done;
+}
+
+int run_wall(Context& context, const WallOptions& options) {
+  const bool table = !options.input.empty() || !options.output.empty();
+  const int asked = (options.position ? 1 : 0) + (table ? 1 : 0) + (options.picture.empty() ? 0 : 1);
+  if (asked != 1)
+    throw UsageError("give exactly one of: --position X; --csv IN with --out OUT; --picture FILE");
+  if (table && (options.input.empty() || options.output.empty()))
+    throw UsageError("--csv IN and --out OUT go together");
+  for (const double number : {options.position.value_or(0.0), options.velocity}) {
+    if (!control::is_finite(number)) throw UsageError("--position and --velocity must be finite numbers");
+  }
+  const firmware::ParameterValues values = values_of(options, context.axis());
+  if (!options.picture.empty()) {
+    wall::write_force_curves(values, context.axis(), options.picture);
+    if (context.json) {
+      context.print({{"picture", options.picture}});
+    } else {
+      fmt::print(context.out, "{}\n", options.picture);
+    }
+    return done;
+  }
+  const wall::WallEvaluator evaluator(values, context.axis());
+  if (!table) return evaluate_point(context, options, evaluator);
+  const std::size_t rows = wall::evaluate_table(evaluator, options.input, options.output);
+  if (context.json) {
+    context.print({{"rows", rows}, {"out", options.output}});
+  } else {
+    fmt::print(context.out, "{} rows written to {}\n", rows, options.output);
+  }
+  return done;
+}
+}  // namespace
+
+void add_wall_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"wall", "Evaluates the wall law as the firmware computes it, without a device.",
+       "  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.0001\n"
+       "  kmax wall --csv in.csv --out out.csv --set wall.law=adaptive\n"
+       "                        in: position_m,velocity_m_per_s; out: the same and force_n\n"
+       "  kmax wall --picture laws.svg      force against distance, each law with these parameters\n\n"
+       "Positions in m and velocities in m/s along +x. Parameters not set have their defaults. Every point "
+       "stands\n"
+       "alone, as the first sample of a contact; force limit, sampling and encoder are left out."},
+      Takes::nothing);
+  auto options = std::make_shared<WallOptions>();
+  command->add_option("--axis", context.axis_option, "Axis that names without a prefix are on")
+      ->type_name("N")
+      ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
+  command->add_option("--position", options->position, "Position of the handle, m");
+  command->add_option("--velocity", options->velocity, "Its velocity, m/s (default 0)");
+  command->add_option("--csv", options->input, "Table with the columns position_m and velocity_m_per_s")
+      ->type_name("IN");
+  command->add_option("--out", options->output, "Table to write, with the column force_n")->type_name("OUT");
+  command
+      ->add_option("--picture", options->picture, "Draws the force-position curve of each law, .svg or .png")
+      ->type_name("FILE");
+  command->add_option("--set", options->assignments, "Parameter of the wall; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->take_all();
+  command->callback(
+      [&context, options] { context.action = [&context, options] { return run_wall(context, *options); }; });
+}
+
+}  // namespace kmax::cli

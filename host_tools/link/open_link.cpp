@@ -1,0 +1,25 @@
+#include "host_tools/link/open_link.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/link/serial_link.hpp"
+#include "host_tools/link/sim_link.hpp"
+
+namespace kmax::link {
+
+std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& notice) {
+  switch (address.kind) {
+    case DeviceAddress::Kind::sim:
+      return make_sim_link();
+    case DeviceAddress::Kind::serial:
+      return std::make_unique<SerialLink>(address, notice);
+    case DeviceAddress::Kind::can:
+      break;
+  }
+  throw AddressError(
+      fmt::format("{}: this version has no CAN link yet; use the device's serial port (serial:PATH) or the "
+                  "simulated device (sim)",
+                  text_of(address)));
+}
+
+}  // namespace kmax::link

@@ -1,0 +1,132 @@
+#include "host_tools/plot/figure.hpp"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace kmax::plot {
+
+namespace {
+
+// Okabe and Ito's palette, blue first.
+constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"};
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c == '\n' ? ' ' : c;
+  }
+  return out + '"';
+}
+
+std::string data_block(const Series& series, std::size_t number) {
+  std::string block = fmt::format("$d{} << EOD\n", number);
+  for (std::size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
+    if (std::isfinite(series.x[i]) && std::isfinite(series.y[i])) {
+      block += fmt::format("{} {}\n", series.x[i], series.y[i]);
+    } else {
+      block += "\n";
+    }
+  }
+  return block + "EOD\n";
+}
+
+// From the lowest to the highest value with some air; a curve that never moves gets a height of its own.
+std::string y_range(const Panel& panel) {
+  if (panel.y_limits) return fmt::format("set yrange [{}:{}]\n", panel.y_limits->first, panel.y_limits->second);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Series& series : panel.series) {
+    for (const double y : series.y) {
+      if (!std::isfinite(y)) continue;
+      low = std::min(low, y);
+      high = std::max(high, y);
+    }
+  }
+  if (low > high) return "set yrange [*:*]\n";
+  const double span = high > low ? high - low : std::max(1.0, 0.5 * std::abs(high));
+  return fmt::format("set yrange [{}:{}]\n", low - 0.06 * span, high + 0.12 * span);
+}
+
+std::string panel_script(const Panel& panel, bool lowest, const Figure& figure, std::size_t first_block) {
+  std::string script = "unset label\nunset arrow\n" + y_range(panel);
+  script += fmt::format("set ylabel {}\n", quoted(panel.y_label));
+  script += lowest ? fmt::format("set xlabel {}\nset format x\n", quoted(figure.x_label))
+                   : "unset xlabel\nset format x ''\n";
+  for (const Mark& mark : panel.marks) {
+    if (mark.vertical) {
+      script += fmt::format("set arrow from {0},graph 0 to {0},graph 1 nohead dt 3 lc rgb '#666666'\n", mark.at);
+      script += fmt::format("set label {} at {},graph 0.94 offset 0.5,0 tc rgb '#444444'\n", quoted(mark.label), mark.at);
+    } else {
+      script += fmt::format("set arrow from graph 0,first {0} to graph 1,first {0} nohead dt 3 lc rgb '#666666'\n", mark.at);
+      script += fmt::format("set label {} at graph 0.01,first {} offset 0,0.6 tc rgb '#444444'\n", quoted(mark.label), mark.at);
+    }
+  }
+  bool any_label = false;
+  script += "plot ";
+  for (std::size_t i = 0; i < panel.series.size(); ++i) {
+    const Series& series = panel.series[i];
+    any_label = any_label || !series.label.empty();
+    script += fmt::format("{}$d{} using 1:2 with {} lw 1.5 dt {} lc rgb '{}' {}", i == 0 ? "" : ", ", first_block + i,
+                          series.steps ? "steps" : "lines", i % 5 + 1, colours[i % colours.size()],
+                          series.label.empty() ? "notitle" : "title " + quoted(series.label));
+  }
+  return fmt::format("set key {}\n", any_label ? "on" : "off") + script + "\n";
+}
+
+std::string script_for(const Figure& figure, const std::filesystem::path& path, const std::string& terminal) {
+  const std::size_t panels = figure.panels.size();
+  const std::size_t height = panels == 1 ? 480 : 120 + 200 * panels;
+  std::string script = fmt::format("set terminal {} size 900,{} font 'sans,12' background '#ffffff'\n", terminal, height);
+  script += fmt::format("set output {}\n", quoted(path.string()));
+  script += "set grid lc rgb '#dddddd' lt 1\nset border lc rgb '#444444'\nset key top right opaque noenhanced\n";
+  script += "set lmargin 10\nset rmargin 3\nset tics nomirror\n";
+  std::size_t block = 0;
+  for (const Panel& panel : figure.panels) {
+    for (const Series& series : panel.series) script += data_block(series, block++);
+  }
+  script += fmt::format("set multiplot layout {},1 title {} noenhanced\n", panels, quoted(figure.title));
+  block = 0;
+  for (std::size_t i = 0; i < panels; ++i) {
+    script += panel_script(figure.panels[i], i + 1 == panels, figure, block);
+    block += figure.panels[i].series.size();
+  }
+  return script + "unset multiplot\nset output\n";
+}
+
+}  // namespace
+
+void write_figure(const Figure& figure, const std::filesystem::path& path) {
+  const std::string ending = path.extension().string();
+  if (ending != ".svg" && ending != ".png")
+    throw FigureError(fmt::format("{}: a picture's name must end in .svg or .png", path.string()));
+  if (figure.panels.empty() || std::any_of(figure.panels.begin(), figure.panels.end(),
+                                           [](const Panel& p) { return p.series.empty(); }))
+    throw FigureError(fmt::format("{}: there is nothing to draw", path.string()));
+  if (!path.parent_path().empty() && !std::filesystem::is_directory(path.parent_path()))
+    throw FigureError(fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
+
+  std::filesystem::path unfinished = path;
+  unfinished += ".part";
+  const std::string script = script_for(figure, unfinished, ending == ".svg" ? "svg" : "pngcairo");
+  FILE* gnuplot = popen("gnuplot >/dev/null 2>&1", "w");
+  if (gnuplot == nullptr) throw FigureError("gnuplot cannot be started");
+  const bool written = std::fwrite(script.data(), 1, script.size(), gnuplot) == script.size();
+  const int status = pclose(gnuplot);
+  std::error_code error;
+  if (written && WIFEXITED(status) && WEXITSTATUS(status) == 0) std::filesystem::rename(unfinished, path, error);
+  if (!written || !WIFEXITED(status) || WEXITSTATUS(status) != 0 || error) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    throw FigureError(WIFEXITED(status) && WEXITSTATUS(status) == 127
+                          ? "gnuplot is not installed; on Debian: apt-get install gnuplot-nox"
+                          : fmt::format("{}: gnuplot could not draw it", path.string()));
+  }
+}
+
+}  // namespace kmax::plot

@@ -1,0 +1,89 @@
+#include "host_tools/simulated_board/scene_parameters.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/parameter.hpp"
+
+namespace kmax::simulated_board {
+
+namespace {
+
+std::string text_of(const simulation::ParameterValue& value) {
+  return std::visit(
+      [](const auto& v) -> std::string {
+        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
+          return v;
+        } else {
+          return fmt::format("{}", v);
+        }
+      },
+      value);
+}
+
+device::Assignment assignment_of(const std::string& name, const simulation::ParameterValue& value) {
+  const device::Parameter parameter = device::resolve(name);
+  if (!parameter.writable())
+    throw device::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
+  return {parameter, device::parse_value(parameter, text_of(value))};
+}
+
+void replace_or_add(std::vector<device::Assignment>& all, const device::Assignment& one) {
+  for (device::Assignment& present : all) {
+    if (present.parameter == one.parameter) {
+      present = one;
+      return;
+    }
+  }
+  all.push_back(one);
+}
+
+template <firmware::FixedName name>
+device::Assignment hardware(std::size_t axis, double number) {
+  constexpr std::size_t entry = firmware::entry_of<name>();
+  return {device::Parameter(entry, axis), firmware::raw_from_number(firmware::entry_at(entry).type, number)};
+}
+
+constexpr std::size_t transaction_entry = firmware::entry_of<"transaction.control">();
+
+}  // namespace
+
+std::optional<std::string> check_parameter(const std::string& name, const simulation::ParameterValue& value) {
+  try {
+    assignment_of(name, value);
+    return std::nullopt;
+  } catch (const device::ValueError& error) {
+    return error.what();
+  }
+}
+
+std::vector<device::Assignment> assignments_of(const simulation::Scene& scene) {
+  std::vector<device::Assignment> all;
+  for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
+    all.push_back(hardware<"encoder.counts_per_turn">(axis, scene.axes[axis].encoder.counts_per_turn));
+    all.push_back(hardware<"device.transmission">(axis, scene.axes[axis].encoder.transmission));
+    all.push_back(hardware<"device.mass">(axis, scene.axes[axis].device.mass));
+  }
+  for (const simulation::SceneParameter& parameter : scene.parameters)
+    replace_or_add(all, assignment_of(parameter.name, parameter.value));
+  return all;
+}
+
+void preset(firmware::Application& application, const std::vector<device::Assignment>& assignments) {
+  const auto refuse = [](firmware::Refusal refusal, std::uint16_t address) {
+    const auto owner = device::owner_of_holding_register(address);
+    throw simulation::SceneError(fmt::format("[parameters] {}: {}", owner ? owner->name() : "of the scene",
+                                             firmware::words_of(refusal)));
+  };
+  application.preset(transaction_entry, 0, 1);
+  for (const device::Assignment& assignment : assignments) {
+    const auto result = application.preset(assignment.parameter.entry(), assignment.parameter.axis(), assignment.raw);
+    if (result.refusal == firmware::Refusal::none) continue;
+    application.preset(transaction_entry, 0, 0);
+    refuse(result.refusal, result.address);
+  }
+  const auto result = application.preset(transaction_entry, 0, 2);
+  if (result.refusal != firmware::Refusal::none) refuse(result.refusal, result.address);
+}
+
+}  // namespace kmax::simulated_board

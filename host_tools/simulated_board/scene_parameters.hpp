@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "firmware/application.hpp"
+#include "host_tools/device/value_text.hpp"
+#include "host_tools/simulation/scene.hpp"
+
+namespace kmax::simulated_board {
+
+/// Checks a scene's [parameters] against the object dictionary: what load_scene() asks for every one.
+std::optional<std::string> check_parameter(const std::string& name, const simulation::ParameterValue& value);
+
+/// What a board must know to fit the scene's hardware, counts per turn, transmission and mass of each axis,
+/// followed by the scene's own parameters, which may say otherwise (a wrongly set-up device is a scene too).
+std::vector<device::Assignment> assignments_of(const simulation::Scene& scene);
+
+/// Sets all of them in one transaction before the first tick. Throws simulation::SceneError naming the
+/// parameter if the set as a whole is refused.
+void preset(firmware::Application& application, const std::vector<device::Assignment>& assignments);
+
+}  // namespace kmax::simulated_board

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string_view>
+
+#include "board/native/native_board.hpp"
+#include "host_tools/simulated_board/scene_parameters.hpp"
+#include "host_tools/simulated_board/simulated_device.hpp"
+
+namespace kmax::simulated_board {
+
+/// The firmware on x86 with a scene's device: what `sim`, `kmax serve` and `kmax simulate` run.
+class SimulatedBoard {
+ public:
+  /// Throws simulation::SceneError or std::invalid_argument.
+  explicit SimulatedBoard(const simulation::Scene& scene) : device_(scene), board_(device_) {
+    preset(board_.application(), assignments_of(scene));
+  }
+
+  SimulatedDevice& device() { return device_; }
+  board::NativeBoard<SimulatedDevice>& board() { return board_; }
+  const board::NativeBoard<SimulatedDevice>& board() const { return board_; }
+
+ private:
+  SimulatedDevice device_;
+  board::NativeBoard<SimulatedDevice> board_;
+};
+
+/// The supplied scenes, by name, in the program itself.
+struct SuppliedScene {
+  std::string_view name;
+  std::string_view text;
+};
+std::vector<SuppliedScene> supplied_scenes();
+
+/// A scene by file name, or by the name of a supplied one when there is no such file. Checks parameters.
+/// Throws simulation::SceneError.
+simulation::Scene open_scene(const std::string& name_or_path);
+
+/// The device that `sim` and `serve` have when no scene is named: the supplied "touch" hardware and person,
+/// all parameters as from the factory but those that describe the hardware.
+simulation::Scene factory_scene();
+
+}  // namespace kmax::simulated_board

@@ -1,0 +1,36 @@
+#pragma once
+// The mechanical side of one axis of a haptic device, seen at the handle: a mass with viscous and Coulomb
+// friction, driven by a force that the motor can supply only up to a limit.
+
+#include <array>
+#include <span>
+
+#include "host_tools/simulation/model_field.hpp"
+
+namespace kmax::simulation {
+
+// Defaults: a desktop device of the Geomagic Touch class. 45 g is its apparent tip mass and 3.3 N its peak
+// force (paper 1, section 4). Viscous damping and Coulomb friction are not published; 0.05 N s/m and 0.093 N
+// were fitted so that a group of twelve simulated hands has a plain K_max of 3.58 N/mm at 500 Hz (paper 1,
+// fig. 6). Mass, damping and friction cannot be told apart from that one number, so this is calibration, not
+// measurement.
+struct DeviceModel {
+  double mass = 0.045;       // kg
+  double damping = 0.05;     // N s/m
+  double friction = 0.093;   // N, Coulomb: the same standing and moving
+  double force_limit = 3.3;  // N; a commanded force beyond it is clipped; 0 = never clipped
+};
+
+inline constexpr std::array device_fields{
+    ModelField<DeviceModel>{"mass", &DeviceModel::mass, 1e-4, 100.0, "kg"},
+    ModelField<DeviceModel>{"damping", &DeviceModel::damping, 0.0, 1000.0, "N s/m"},
+    ModelField<DeviceModel>{"friction", &DeviceModel::friction, 0.0, 1000.0, "N"},
+    ModelField<DeviceModel>{"force_limit", &DeviceModel::force_limit, 0.0, 1e5, "N (0 = no limit)"},
+};
+
+// Throws std::invalid_argument.
+inline void validate(const DeviceModel& device) {
+  require_allowed(device, std::span<const ModelField<DeviceModel>>(device_fields), "device");
+}
+
+}  // namespace kmax::simulation

@@ -1,0 +1,311 @@
+#include "host_tools/simulation/scene.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <iterator>
+#include <sstream>
+
+namespace kmax::simulation {
+namespace {
+
+constexpr std::array encoder_fields{
+    ModelField<EncoderConfig>{"counts_per_turn", &EncoderConfig::counts_per_turn, 1.0, 1e9, ""},
+    ModelField<EncoderConfig>{"transmission", &EncoderConfig::transmission, 1e-6, 10.0, "m/rad"},
+};
+constexpr std::array measurement_fields{
+    ModelField<Measurement>{"window", &Measurement::window, 1e-3, 1e5, "s"},
+    ModelField<Measurement>{"threshold", &Measurement::threshold, 1e-9, 1.0, "m"},
+};
+constexpr std::array start_fields{
+    ModelField<HandleStart>{"start_position", &HandleStart::position, -10.0, 10.0, "m"},
+    ModelField<HandleStart>{"start_velocity", &HandleStart::velocity, -100.0, 100.0, "m/s"},
+};
+constexpr std::array scene_fields{ModelField<Scene>{"duration", &Scene::duration, 1e-3, 1e5, "s"}};
+
+std::string text_of(const toml::node& node) {
+  if (node.is_table()) return "{table}";
+  if (node.is_array()) return "[array]";
+  std::ostringstream text;
+  node.visit([&](const auto& value) { text << value; });
+  return text.str();
+}
+
+class SceneReader {
+ public:
+  SceneReader(std::string_view source, const ParameterCheck& check) : source_(source), check_(check) {}
+
+  Scene read(const toml::table& root) {
+    require_known(root, "",
+                  {"name", "description", "duration", "seed", "device", "operator", "motion", "encoder",
+                   "parameters", "measurement", "axis1"});
+    Scene scene;
+    scene.name = std::filesystem::path(source_).stem().string();
+    read_text(root, "name", scene.name);
+    read_text(root, "description", scene.description);
+    read_fields(root, "", scene_fields, scene);
+    read_seed(root, scene);
+    if (const toml::table* table = part(root, "", "measurement")) {
+      require_known(*table, "measurement.", {"window", "threshold"});
+      read_fields(*table, "measurement.", measurement_fields, scene.measurement);
+    }
+    if (const toml::table* table = part(root, "", "parameters")) read_parameters(*table, "", scene);
+    scene.axes.push_back(read_axis(root, "", scene));
+    if (const toml::table* second = part(root, "", "axis1")) {
+      require_known(*second, "axis1.", {"device", "operator", "motion", "encoder"});
+      scene.axes.push_back(read_axis(*second, "axis1.", scene));
+    }
+    return scene;
+  }
+
+ private:
+  [[noreturn]] void fail(const toml::source_region& where, const std::string& what) const {
+    throw SceneError(fmt::format("{}: {}", place(where), what));
+  }
+
+  std::string place(const toml::source_region& where) const {
+    return fmt::format("{}:{}:{}", source_, where.begin.line, where.begin.column);
+  }
+
+  void require_known(const toml::table& table, std::string_view prefix,
+                     std::initializer_list<std::string_view> allowed) const {
+    for (const auto& [key, node] : table) {
+      if (std::find(allowed.begin(), allowed.end(), key.str()) != allowed.end()) continue;
+      std::string list;
+      for (const std::string_view name : allowed) list += (list.empty() ? "" : ", ") + std::string(name);
+      fail(key.source(),
+           fmt::format("{}{} = {}: unknown key; allowed here: {}", prefix, key.str(), text_of(node), list));
+    }
+  }
+
+  const toml::table* part(const toml::table& table, std::string_view prefix, std::string_view name) const {
+    const toml::node* node = table.get(name);
+    if (node == nullptr) return nullptr;
+    if (!node->is_table()) {
+      fail(node->source(),
+           fmt::format("{}{} = {}: allowed is a table, [{}{}]", prefix, name, text_of(*node), prefix, name));
+    }
+    return node->as_table();
+  }
+
+  void read_text(const toml::table& table, std::string_view name, std::string& value) const {
+    const toml::node* node = table.get(name);
+    if (node == nullptr) return;
+    if (!node->is_string())
+      fail(node->source(), fmt::format("{} = {}: allowed is a text in quotes", name, text_of(*node)));
+    value = node->as_string()->get();
+  }
+
+  void read_seed(const toml::table& table, Scene& scene) const {
+    const toml::node* node = table.get("seed");
+    if (node == nullptr) return;
+    if (!node->is_integer() || node->as_integer()->get() < 0) {
+      fail(node->source(),
+           fmt::format("seed = {}: allowed is a whole number from 0 to 2^63 - 1", text_of(*node)));
+    }
+    scene.seed = static_cast<std::uint64_t>(node->as_integer()->get());
+  }
+
+  template <typename Model, std::size_t count>
+  void read_fields(const toml::table& table, std::string_view prefix,
+                   const std::array<ModelField<Model>, count>& fields, Model& model) const {
+    for (const ModelField<Model>& field : fields) {
+      const toml::node* node = table.get(field.name);
+      if (node == nullptr) continue;
+      // value_exact would refuse `mass = 1`, value<double> would accept `true`: a number is an integer or a
+      // float.
+      const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
+      if (!value || !is_allowed(field, *value)) {
+        fail(node->source(), fmt::format("{}{} = {}: allowed is {}", prefix, field.name, text_of(*node),
+                                         allowed_range(field)));
+      }
+      model.*field.member = *value;
+    }
+  }
+
+  // A table whose keys are exactly the fields of one model.
+  template <typename Model, std::size_t count>
+  void read_model(const toml::table& table, const std::string& prefix,
+                  const std::array<ModelField<Model>, count>& fields, Model& model) const {
+    for (const auto& [key, node] : table) {
+      const std::string_view name = key.str();
+      const bool known = std::any_of(fields.begin(), fields.end(),
+                                     [name](const ModelField<Model>& field) { return field.name == name; });
+      if (known) continue;
+      std::string list;
+      for (const ModelField<Model>& field : fields)
+        list += (list.empty() ? "" : ", ") + std::string(field.name);
+      fail(key.source(),
+           fmt::format("{}{} = {}: unknown key; allowed here: {}", prefix, key.str(), text_of(node), list));
+    }
+    read_fields(table, prefix, fields, model);
+  }
+
+  SceneAxis read_axis(const toml::table& table, const std::string& prefix, const Scene& scene) const {
+    SceneAxis axis;
+    const toml::table* device = part(table, prefix, "device");
+    if (device == nullptr) {
+      fail(table.source(), fmt::format("[{}device] is missing: every axis needs a device", prefix));
+    }
+    require_known(*device, prefix + "device.",
+                  {"mass", "damping", "friction", "force_limit", "start_position", "start_velocity"});
+    read_fields(*device, prefix + "device.", device_fields, axis.device);
+    if (const toml::table* person = part(table, prefix, "operator")) {
+      read_model(*person, prefix + "operator.", operator_fields, axis.person.emplace());
+    }
+    if (const toml::table* encoder = part(table, prefix, "encoder")) {
+      read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder);
+      if (!(axis.encoder.count_length() >= 1e-12)) {
+        fail(encoder->source(), fmt::format("{}encoder: {} m per count; allowed is 1e-12 m or more", prefix,
+                                            axis.encoder.count_length()));
+      }
+    }
+    if (const toml::table* motion = part(table, prefix, "motion")) {
+      read_motion(*motion, prefix, scene, axis);
+      axis.start.position = axis.motion->start_position;
+    }
+    read_fields(*device, prefix + "device.", start_fields, axis.start);
+    return axis;
+  }
+
+  void read_motion(const toml::table& table, const std::string& prefix, const Scene& scene,
+                   SceneAxis& axis) const {
+    if (!axis.person) {
+      fail(table.source(),
+           fmt::format("[{0}motion] without [{0}operator]: nobody is there to move the handle", prefix));
+    }
+    IntendedMotionConfig& motion = axis.motion.emplace();
+    read_wall(table, prefix, scene, "wall.position", "wall_position", motion.wall_position);
+    read_wall(table, prefix, scene, "wall.side", "wall_side", motion.wall_side);
+    read_model(table, prefix + "motion.", motion_fields, motion);
+    check_wall(table, prefix, scene, "wall.position", "wall_position", motion.wall_position);
+    check_wall(table, prefix, scene, "wall.side", "wall_side", motion.wall_side);
+    try {
+      validate(motion);
+    } catch (const std::invalid_argument& error) {
+      fail(table.source(), prefix + error.what());
+    }
+    if (scene.measurement.window > motion.hold_time) {
+      fail(table.source(),
+           fmt::format("{}motion.hold_time = {} s: allowed is {} s (measurement.window) or more", prefix,
+                       motion.hold_time, scene.measurement.window));
+    }
+    const double shortest =
+        std::abs(motion.start_position - motion.wall_position) / motion.approach_speed + motion.hold_time;
+    if (scene.duration < shortest) {
+      fail(table.source(),
+           fmt::format("duration = {} s: approach and hold of [{}motion] take at least {} s; allowed is "
+                       "that or more",
+                       scene.duration, prefix, shortest));
+    }
+  }
+
+  static const SceneParameter* find_parameter(const Scene& scene, const std::string& prefix,
+                                              std::string_view name) {
+    for (const SceneParameter& parameter : scene.parameters) {
+      if (parameter.name == prefix + std::string(name)) return &parameter;
+      if (prefix.empty() && parameter.name == "axis0." + std::string(name)) return &parameter;
+    }
+    return nullptr;
+  }
+
+  static std::optional<double> number_in(const SceneParameter* parameter) {
+    if (parameter == nullptr) return std::nullopt;
+    if (const auto* whole = std::get_if<std::int64_t>(&parameter->value)) return static_cast<double>(*whole);
+    if (const auto* number = std::get_if<double>(&parameter->value)) return *number;
+    return std::nullopt;
+  }
+
+  static void read_wall(const toml::table& table, const std::string& prefix, const Scene& scene,
+                        std::string_view parameter, std::string_view key, double& value) {
+    if (table.contains(key)) return;
+    value = number_in(find_parameter(scene, prefix, parameter)).value_or(value);
+  }
+
+  void check_wall(const toml::table& table, const std::string& prefix, const Scene& scene,
+                  std::string_view name, std::string_view key, double value) const {
+    const SceneParameter* parameter = find_parameter(scene, prefix, name);
+    const std::optional<double> wall = number_in(parameter);
+    const toml::node* node = table.get(key);
+    if (!wall || *wall == value || node == nullptr) return;
+    fail(node->source(),
+         fmt::format("{}motion.{} = {}: the parameter {} is {} ({}); allowed is the same value, or none here",
+                     prefix, key, value, parameter->name, *wall, parameter->where));
+  }
+
+  void read_parameters(const toml::table& table, const std::string& prefix, Scene& scene) const {
+    for (const auto& [key, node] : table) {
+      const std::string name = prefix + std::string(key.str());
+      if (const toml::table* inner = node.as_table()) {
+        read_parameters(*inner, name + ".", scene);
+        continue;
+      }
+      SceneParameter parameter{name, {}, place(node.source())};
+      if (const auto* truth = node.as_boolean()) {
+        parameter.value = truth->get();
+      } else if (const auto* whole = node.as_integer()) {
+        parameter.value = whole->get();
+      } else if (const auto* number = node.as_floating_point()) {
+        parameter.value = number->get();
+      } else if (const auto* text = node.as_string()) {
+        parameter.value = text->get();
+      } else {
+        fail(node.source(), fmt::format("parameters.{} = {}: allowed is a number, a text or true/false", name,
+                                        text_of(node)));
+      }
+      for (const SceneParameter& earlier : scene.parameters) {
+        if (earlier.name == name) {
+          fail(node.source(), fmt::format("parameters.{} = {}: given twice (also at {}); remove one", name,
+                                          text_of(node), earlier.where));
+        }
+      }
+      if (check_) {
+        if (const std::optional<std::string> problem = check_(name, parameter.value)) {
+          fail(node.source(), fmt::format("parameters.{} = {}: {}", name, text_of(node), *problem));
+        }
+      }
+      scene.parameters.push_back(std::move(parameter));
+    }
+  }
+
+  std::string source_;
+  const ParameterCheck& check_;
+};
+
+}  // namespace
+
+CoupledHandle SceneAxis::make_handle() const {
+  if (!person) return CoupledHandle(device, start);
+  if (motion) return CoupledHandle(device, *person, *motion, start);
+  IntendedMotionConfig stay;
+  stay.start_position = start.position;
+  stay.wall_position = start.position;
+  return CoupledHandle(device, *person, stay, start);
+}
+
+Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check) {
+  toml::table root;
+  try {
+    root = toml::parse(text, source);
+  } catch (const toml::parse_error& error) {
+    throw SceneError(fmt::format("{}:{}:{}: not valid TOML: {}", source, error.source().begin.line,
+                                 error.source().begin.column, error.description()));
+  }
+  return SceneReader(source, check).read(root);
+}
+
+Scene load_scene(const std::string& path, const ParameterCheck& check) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw SceneError(fmt::format("{}: cannot be read; give the path of a scene file (TOML)", path));
+  }
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return parse_scene(text, path, check);
+}
+
+}  // namespace kmax::simulation

@@ -1,0 +1,99 @@
+#pragma once
+// A scene: what a simulated run consists of, in a TOML file. It names its parts; a part that is not named is
+// not there and is not integrated (a scene without [operator] is a handle that nobody holds).
+//
+//   name = "touch"                  optional; the file name without ending
+//   description = "..."             optional
+//   duration = 5.0                  s, from the start of the motion
+//   seed = 1                        for parts with noise
+//
+//   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
+//   [operator]                      operator_model.hpp
+//   [motion]                        intended_motion.hpp; needs [operator]
+//   [encoder]                       counts_per_turn, transmission (m/rad)
+//   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
+//   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
+//   [axis1.device] [axis1.operator] [axis1.motion] [axis1.encoder]     a second axis
+//
+// SI units. Numbers that are not given keep the defaults of the model structs. The wall that a motion aims at
+// is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
+// axis); a motion that names another one is refused.
+//
+// Refused with SceneError, whose text begins with file:line:column and gives the key, its value and what is
+// allowed: syntax errors, unknown keys, wrong types, values out of range, parts that contradict each other.
+// Names and values of [parameters] are checked by a function that the caller passes, because the object
+// dictionary is not known here.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "host_tools/simulation/coupled_handle.hpp"
+#include "host_tools/simulation/device_model.hpp"
+#include "host_tools/simulation/encoder_model.hpp"
+#include "host_tools/simulation/intended_motion.hpp"
+#include "host_tools/simulation/operator_model.hpp"
+
+namespace kmax::simulation {
+
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Default: 0.055 mm per count, the resolution of the Geomagic Touch (paper 1, section 4).
+struct EncoderConfig {
+  double counts_per_turn = 4000.0;
+  double transmission = 0.0350140874800;  // handle metres per motor radian
+
+  double count_length() const { return simulation::count_length(counts_per_turn, transmission); }
+};
+
+struct Measurement {
+  double window = 1.0;          // s
+  double threshold = 0.165e-3;  // m
+};
+
+using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
+
+struct SceneParameter {
+  std::string name;
+  ParameterValue value;
+  std::string where;  // file:line:column, for a later error message
+};
+
+struct SceneAxis {
+  DeviceModel device;
+  HandleStart start;
+  std::optional<OperatorModel> person;
+  std::optional<IntendedMotionConfig> motion;
+  EncoderConfig encoder;
+
+  CoupledHandle make_handle() const;
+};
+
+struct Scene {
+  std::string name;
+  std::string description;
+  double duration = 5.0;
+  std::uint64_t seed = 1;
+  std::vector<SceneAxis> axes;  // one or two
+  std::vector<SceneParameter> parameters;
+  Measurement measurement;
+};
+
+// Returns what is wrong with a parameter, or nothing if it is right.
+using ParameterCheck =
+    std::function<std::optional<std::string>(const std::string& name, const ParameterValue& value)>;
+
+Scene load_scene(const std::string& path, const ParameterCheck& check = {});
+
+// `source` stands for the file name in messages.
+Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check = {});
+
+}  // namespace kmax::simulation

@@ -1,0 +1,120 @@
+#include "host_tools/wall/wall_table.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+namespace kmax::wall {
+
+namespace {
+
+constexpr std::string_view position_column = "position_m";
+constexpr std::string_view velocity_column = "velocity_m_per_s";
+constexpr std::size_t absent = static_cast<std::size_t>(-1);
+
+std::string read_whole(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw TableError(fmt::format("{}: cannot be opened for reading", path.string()));
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (file.bad()) throw TableError(fmt::format("{}: reading failed", path.string()));
+  return text;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  return text;
+}
+
+std::string_view next_field(std::string_view& line) {
+  const std::size_t comma = line.find(',');
+  const std::string_view field = line.substr(0, comma);
+  line.remove_prefix(comma == std::string_view::npos ? line.size() : comma + 1);
+  return trimmed(field);
+}
+
+struct Columns {
+  std::size_t position = absent, velocity = absent, count = 0;
+};
+
+Columns read_header(std::string_view line, const std::string& file) {
+  Columns columns;
+  const std::string whole(line);
+  do {
+    const std::string_view name = next_field(line);
+    if (name == position_column) columns.position = columns.count;
+    if (name == velocity_column) columns.velocity = columns.count;
+    ++columns.count;
+  } while (!line.empty());
+  if (columns.position == absent)
+    throw TableError(fmt::format("{}:1: the first line must name the columns, {} and if wanted {}; it reads '{}'", file,
+                                 position_column, velocity_column, trimmed(whole)));
+  return columns;
+}
+
+double read_number(std::string_view field, std::string_view column, const std::string& file, std::size_t line) {
+  double value = 0;
+  const std::string_view digits = !field.empty() && field.front() == '+' ? field.substr(1) : field;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc{} || end != digits.data() + digits.size() || !control::is_finite(value))
+    throw TableError(fmt::format("{}:{}: {} is '{}'; a finite number is needed", file, line, column, field));
+  return value;
+}
+
+}  // namespace
+
+std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem::path& input,
+                           const std::filesystem::path& output) {
+  const std::string text = read_whole(input);
+  const std::string file = input.string();
+  std::string_view rest = text;
+  std::size_t line_number = 0, rows = 0;
+  Columns columns;
+  fmt::memory_buffer out;
+  fmt::format_to(std::back_inserter(out), "{},{},force_n\n", position_column, velocity_column);
+
+  while (!rest.empty()) {
+    const std::size_t end = rest.find('\n');
+    std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+    ++line_number;
+    if (trimmed(line).empty() || line.front() == '#') continue;
+    if (columns.count == 0) {
+      columns = read_header(line, file);
+      continue;
+    }
+    double position = 0, velocity = 0;
+    std::size_t column = 0;
+    do {
+      const std::string_view field = next_field(line);
+      if (column == columns.position) position = read_number(field, position_column, file, line_number);
+      if (column == columns.velocity) velocity = read_number(field, velocity_column, file, line_number);
+      ++column;
+    } while (!line.empty());
+    if (column != columns.count)
+      throw TableError(fmt::format("{}:{}: {} fields where the first line names {} columns", file, line_number, column,
+                                   columns.count));
+    fmt::format_to(std::back_inserter(out), "{},{},{}\n", position, velocity, evaluator.at(position, velocity).force);
+    ++rows;
+  }
+  if (columns.count == 0) throw TableError(fmt::format("{}: the file is empty", file));
+
+  const std::filesystem::path unfinished = output.string() + ".part";
+  std::ofstream target(unfinished, std::ios::binary | std::ios::trunc);
+  target.write(out.data(), static_cast<std::streamsize>(out.size()));
+  target.close();
+  std::error_code error;
+  if (target) std::filesystem::rename(unfinished, output, error);
+  if (!target || error) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    throw TableError(fmt::format("{}: cannot be written: {}", output.string(),
+                                 error ? error.message() : "is the folder there, writable, and not full?"));
+  }
+  return rows;
+}
+
+}  // namespace kmax::wall

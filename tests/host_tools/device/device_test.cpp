@@ -1,0 +1,257 @@
+#include "host_tools/device/device.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/register_plan.hpp"
+#include "tests/host_tools/fake_device.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::device {
+namespace {
+using firmware::Refusal;
+using host_tools_test::FakeDevice;
+using host_tools_test::FakeLink;
+using host_tools_test::thrown_message;
+
+struct Connection {
+  std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
+  FakeLink* link = nullptr;
+  std::vector<std::string> notices;
+
+  Device open() {
+    auto owned = std::make_unique<FakeLink>(fake);
+    link = owned.get();
+    return Device(std::move(owned), [this](const std::string& text) { notices.push_back(text); });
+  }
+};
+
+std::vector<Assignment> assignments(std::vector<std::string> texts) {
+  return parse_assignments(texts);
+}
+
+TEST(Device, ReadsEverythingInOneRequestPerGroup) {
+  Connection connection;
+  Device device = connection.open();
+  connection.fake->registers.values().set_whole<"encoder.direction">(0xFFFFFFFFu, 1);
+  connection.fake->registers.values().set_whole<"encoder.offset">(0x89ABCDEFu, 1);
+  connection.link->requests = 0;
+  const auto values = device.read(all_parameters());
+  EXPECT_EQ(static_cast<std::size_t>(connection.link->requests),
+            plan_registers(all_parameters(), 125).size());
+  EXPECT_LE(connection.link->requests, 46);  // groups, each on its axes
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Parameter& parameter = all_parameters()[i];
+    EXPECT_EQ(values[i],
+              connection.fake->registers.values().raw(firmware::slot_of(parameter.entry(), parameter.axis())))
+        << parameter.name();
+  }
+}
+
+TEST(Device, OneGroupIsOneRequest) {
+  Connection connection;
+  Device device = connection.open();
+  connection.link->requests = 0;
+  std::vector<Parameter> wall;
+  for (const Parameter& parameter : all_parameters()) {
+    if (parameter.axis() == 0 && parameter.name().starts_with("wall.")) wall.push_back(parameter);
+  }
+  EXPECT_EQ(device.read(wall).size(), 16u);
+  EXPECT_EQ(connection.link->requests, 1);
+}
+
+TEST(Device, AnotherDictionaryIsRefusedWithAdvice) {
+  Connection connection;
+  connection.fake->registers.values().set_whole<"info.dictionary_checksum">(0x12345678);
+  const auto message = thrown_message<DeviceError>([&] { connection.open(); });
+  EXPECT_CONTAINS(message, "firmware 0.1.0");
+  EXPECT_CONTAINS(message, "12345678");
+  EXPECT_CONTAINS(message, "flash");
+}
+
+TEST(Device, SetsManyValuesAtOnceAndReadsThemBack) {
+  Connection connection;
+  Device device = connection.open();
+  device.apply(
+      assignments({"wall.stiffness=3.58N/mm", "wall.law=magnetic", "axis1.wall.side=-1", "link.timeout=2"}));
+  const auto& values = connection.fake->registers.values();
+  EXPECT_EQ(values.real<"wall.stiffness">(), 3580.0f);
+  EXPECT_EQ(values.whole<"wall.law">(), 2);
+  EXPECT_EQ(values.whole<"wall.side">(1), -1);
+  EXPECT_EQ(values.real<"link.timeout">(), 2.0f);
+  EXPECT_EQ(connection.fake->registers.changes(), 1u);  // one tick, not four
+  EXPECT_FALSE(connection.fake->registers.transaction_open());
+}
+
+TEST(Device, NothingToSetSendsNothing) {
+  Connection connection;
+  Device device = connection.open();
+  connection.link->requests = 0;
+  device.apply({});
+  EXPECT_EQ(connection.link->requests, 0);
+}
+
+TEST(Device, AParameterGivenTwiceIsRefused) {
+  Connection connection;
+  Device device = connection.open();
+  const Assignment one{Parameter::of<"wall.stiffness">(), std::bit_cast<std::uint32_t>(5.0f)};
+  const Assignment twice[] = {one, one};
+  EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.apply(twice); }), "twice");
+}
+
+struct RefusalCase {
+  std::vector<Assignment> set;
+  std::vector<std::string> said;
+};
+
+TEST(Device, EveryRefusalIsExplainedAndChangesNothing) {
+  const auto raw = [](auto parameter, std::uint32_t value) { return Assignment{parameter, value}; };
+  const std::uint32_t nan = 0x7FC00000, huge = std::bit_cast<std::uint32_t>(2e6f);
+  const Assignment good = raw(Parameter::of<"wall.damping">(), std::bit_cast<std::uint32_t>(7.0f));
+  const std::vector<RefusalCase> cases = {
+      {{good, raw(Parameter::of<"wall.stiffness">(1), huge)},
+       {"axis1.wall.stiffness", "2e6 N/m", "0 .. 1e6", "out of range"}},
+      {{good, raw(Parameter::of<"wall.stiffness">(), nan)}, {"wall.stiffness", "not a finite"}},
+      {{good, raw(Parameter::of<"wall.law">(), 9)},
+       {"wall.law", "none, plain, magnetic, adaptive", "not one of the choices"}},
+      {assignments({"wall.damping=7", "haptic.rate=333"}), {"haptic.rate = 333 Hz", "must divide"}},
+      {assignments({"wall.damping=7", "axis1.wall.adaptive_force_min=5"}),
+       {"axis1.wall.adaptive_force_min", "must not exceed"}},
+      {assignments({"wall.damping=7", "supply.voltage_min=50"}), {"supply.voltage_min", "must be below"}},
+  };
+  for (const RefusalCase& one : cases) {
+    Connection connection;
+    Device device = connection.open();
+    const auto before = connection.fake->settings();
+    const auto message = thrown_message<ValueError>([&] { device.apply(one.set); });
+    for (const std::string& part : one.said) EXPECT_CONTAINS(message, part);
+    EXPECT_CONTAINS(message, "nothing was changed");
+    EXPECT_EQ(connection.fake->settings(), before) << message;
+    EXPECT_FALSE(connection.fake->registers.transaction_open()) << message;
+    device.apply(std::span(&good, 1));  // and the next set works
+  }
+}
+
+TEST(Device, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
+  Connection connection;
+  Device device = connection.open();
+  for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
+    connection.fake->machines[1].command(word, Refusal::none, false);
+  const auto before = connection.fake->settings();
+  const auto message = thrown_message<DeviceError>([&] {
+    device.apply(assignments({"wall.damping=7", "wall.law=magnetic"}));
+  });
+  EXPECT_CONTAINS(message, "wall.law = magnetic");
+  EXPECT_CONTAINS(message, "disarm first");
+  EXPECT_EQ(connection.fake->settings(), before);
+  device.apply(assignments({"wall.damping=7"}));
+}
+
+TEST(Device, ATransactionLeftOpenIsWaitedFor) {
+  Connection connection;
+  Device device = connection.open();
+  device.write(Parameter::of<"transaction.control">(), 1, false);
+  device.apply(assignments({"wall.stiffness=50"}));
+  EXPECT_EQ(connection.fake->registers.values().real<"wall.stiffness">(), 50.0f);
+  ASSERT_EQ(connection.notices.size(), 1u);
+  EXPECT_CONTAINS(connection.notices[0], "waiting");
+}
+
+TEST(Device, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
+  Connection connection;
+  Device device = connection.open();
+  device.write(Parameter::of<"transaction.control">(), 1, false);
+  connection.link->while_waiting = [&] {
+    const std::uint16_t words[] = {0x3F80, 0};
+    connection.fake->write_holding(Parameter::of<"wall.damping">().address(), words);
+  };
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.stiffness=50"})); }),
+                  "another transaction");
+}
+
+TEST(Device, AnotherWriterIsFoundOut) {
+  Connection connection;
+  Device device = connection.open();
+  connection.link->after_request = [&](int) {
+    if (connection.fake->registers.values().real<"wall.stiffness">() == 3580.0f)
+      connection.fake->registers.values().set_real<"wall.stiffness">(42.0f);
+  };
+  const auto message =
+      thrown_message<DeviceError>([&] { device.apply(assignments({"wall.stiffness=3580"})); });
+  EXPECT_CONTAINS(message, "wall.stiffness was set to 3580 N/m");
+  EXPECT_CONTAINS(message, "42 N/m");
+}
+
+// The heart of it: whatever message is lost, and however many, the device has the old set or the new one.
+class LostMessages : public testing::TestWithParam<std::tuple<FakeLink::Loss, int>> {};
+
+TEST_P(LostMessages, LeaveTheOldSetOrTheNewOne) {
+  const auto [loss, how_many] = GetParam();
+  const auto wanted =
+      assignments({"wall.stiffness=3580", "wall.damping=3", "force.limit=2", "axis1.wall.law=magnetic"});
+  int last = 0, failures = 0, successes = 0;
+  for (int lost = 1; last == 0 || lost <= last + 1; ++lost) {
+    Connection connection;
+    Device device = connection.open();
+    const auto before = connection.fake->settings();
+    connection.link->requests = 0;
+    connection.link->loss = loss;
+    connection.link->first_lost = lost;
+    connection.link->last_lost = lost + how_many - 1;
+    std::string message;
+    try {
+      device.apply(wanted);
+    } catch (const link::LinkError& error) {
+      message = error.what();
+    }
+    const int requests = connection.link->requests;
+    connection.fake->pass(3'000'000);
+    bool old_set = connection.fake->settings() == before, new_set = true;
+    for (const Assignment& one : wanted)
+      new_set = new_set && connection.fake->registers.values().raw(
+                               firmware::slot_of(one.parameter.entry(), one.parameter.axis())) == one.raw;
+    EXPECT_NE(old_set, new_set) << "request " << lost << ": " << message;
+    EXPECT_FALSE(connection.fake->registers.transaction_open());
+    const bool says_new = message.empty() || message.find("the values were set") != std::string::npos;
+    const bool says_old = message.find("nothing was changed") != std::string::npos;
+    EXPECT_FALSE(says_new && old_set) << "request " << lost << ": " << message;
+    EXPECT_FALSE(says_old && new_set) << "request " << lost << ": " << message;
+    message.empty() ? ++successes : ++failures;
+    if (requests < lost) last = requests;  // beyond the end nothing is lost any more
+    ASSERT_LT(lost, 100);
+  }
+  EXPECT_GT(successes, 0);
+  // One lost message before the last step is made good; a line that stays dead is not.
+  EXPECT_TRUE(how_many <= 3 || failures > 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(RequestsAndReplies, LostMessages,
+                         testing::Combine(testing::Values(FakeLink::Loss::request, FakeLink::Loss::reply),
+                                          testing::Values(1, 2, 3, 1000)));
+
+// A program that is suspended between two messages comes back when the device has dropped the transaction;
+// what it would send then would act at once and alone.
+TEST(Device, ASuspendedProgramGivesUp) {
+  for (int request = 1; request <= 5; ++request) {
+    Connection connection;
+    Device device = connection.open();
+    const auto before = connection.fake->settings();
+    connection.link->requests = 0;
+    connection.link->after_request = [&](int number) {
+      if (number == request) connection.fake->pass(5'000'000);
+    };
+    const auto set = assignments({"wall.stiffness=3580", "force.limit=2", "axis1.wall.law=magnetic"});
+    if (request < 5) {
+      EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(set); }), "too long");
+      EXPECT_EQ(connection.fake->settings(), before) << "after request " << request;
+    } else {
+      device.apply(set);  // it was applied before
+      EXPECT_EQ(connection.fake->registers.values().real<"force.limit">(), 2.0f);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kmax::device

@@ -1,0 +1,145 @@
+#include "host_tools/device/drive.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/device/errors.hpp"
+#include "tests/host_tools/fake_device.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::device {
+namespace {
+using firmware::DriveState;
+using firmware::Fault;
+using firmware::Refusal;
+using host_tools_test::FakeDevice;
+using host_tools_test::FakeLink;
+using host_tools_test::thrown_message;
+
+class DriveTest : public testing::Test {
+ protected:
+  DriveState state(std::size_t axis = 1) const { return fake->machines[axis].state(); }
+
+  std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
+  FakeLink* link = new FakeLink(fake);
+  Device device{std::unique_ptr<link::Link>(link)};
+  Drive drive{device, 1};
+};
+
+TEST_F(DriveTest, ArmsOnlyItsAxisAndDisarmsIt) {
+  drive.arm();
+  EXPECT_EQ(state(1), DriveState::operation_enabled);
+  EXPECT_EQ(state(0), DriveState::switch_on_disabled);
+  EXPECT_TRUE(drive.status().armed());
+  drive.disarm();
+  EXPECT_EQ(state(1), DriveState::switch_on_disabled);
+}
+
+TEST_F(DriveTest, ArmingWhatIsArmedSendsNothing) {
+  drive.arm();
+  fake->controlwords.clear();
+  drive.arm();
+  EXPECT_TRUE(fake->controlwords.empty());
+}
+
+TEST_F(DriveTest, ArmsFromEveryStateWithoutAFault) {
+  for (const std::vector<std::uint16_t>& way :
+       std::vector<std::vector<std::uint16_t>>{{}, {6}, {6, 7}, {6, 7, 15, 2}, {6, 7, 15, 7}}) {
+    for (const std::uint16_t word : way) fake->machines[1].command(word, Refusal::none, false);
+    drive.arm();
+    EXPECT_EQ(state(), DriveState::operation_enabled);
+    drive.disarm();
+  }
+}
+
+TEST_F(DriveTest, ARefusalComesInWordsAndLeavesTheAxisDisabled) {
+  fake->obstacle[1] = Refusal::handle_inside_wall;
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+  EXPECT_EQ(state(), DriveState::switch_on_disabled);
+  // The refusal of then is still shown by the device, and must not be taken for one of now.
+  fake->obstacle[1] = Refusal::none;
+  drive.arm();
+  EXPECT_EQ(state(), DriveState::operation_enabled);
+}
+
+TEST_F(DriveTest, ADeviceThatDoesNotFollowIsReported) {
+  fake->deaf_to_commands = true;
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "stays in 'Switch on disabled'");
+}
+
+TEST_F(DriveTest, AnArmedAxisThatDoesNotStopIsAnError) {
+  drive.arm();
+  fake->deaf_to_commands = true;
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.disarm(); }), "cut its power");
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.stop(); }), "cut its power");
+}
+
+TEST_F(DriveTest, AFaultIsToldWithItsNumbersAndWhatToCheck) {
+  fake->trip(1, Fault::over_speed, 6.25f, 5.0f);
+  const auto message = thrown_message<DeviceError>([&] { drive.arm(); });
+  EXPECT_CONTAINS(message, "faster than velocity.limit");
+  EXPECT_CONTAINS(message, "6.25 m/s, bound 5 m/s");
+  EXPECT_CONTAINS(message, "encoder.counts_per_turn");
+  EXPECT_CONTAINS(message, "kmax clear");
+}
+
+TEST_F(DriveTest, AnUnknownErrorCodeIsShownAsANumber) {
+  DriveStatus status;
+  status.error_code = 0x4310;
+  EXPECT_CONTAINS(status.fault_words(), "0x4310");
+}
+
+TEST_F(DriveTest, ClearsAFaultWhoseCauseIsGone) {
+  EXPECT_FALSE(drive.clear());
+  fake->trip(1, Fault::encoder, 0, 0);
+  fake->machines[1].command(128, Refusal::none, true);  // a reset bit that is held is no edge
+  ASSERT_EQ(state(), DriveState::fault);
+  EXPECT_TRUE(drive.clear());
+  EXPECT_EQ(state(), DriveState::switch_on_disabled);
+  EXPECT_EQ(fake->controlwords, (std::vector<std::uint16_t>{0, 128, 0}));
+}
+
+TEST_F(DriveTest, AFaultWhoseCauseRemainsIsNamed) {
+  fake->trip(1, Fault::encoder, 0, 0);
+  fake->cause_remains[1] = true;
+  const auto message = thrown_message<DeviceError>([&] { drive.clear(); });
+  EXPECT_CONTAINS(message, "remains");
+  EXPECT_CONTAINS(message, "encoder");
+}
+
+TEST_F(DriveTest, StopRemovesTheForceAndKeepsItOff) {
+  drive.arm();
+  drive.stop();
+  EXPECT_EQ(state(), DriveState::quick_stop_active);
+  drive.stop();
+  EXPECT_EQ(state(), DriveState::quick_stop_active);
+}
+
+TEST_F(DriveTest, StopAndDisarmAreFineWithAFault) {
+  fake->trip(1, Fault::encoder, 0, 0);
+  drive.stop();
+  drive.disarm();
+  EXPECT_EQ(state(), DriveState::fault);
+}
+
+// Whichever message is lost while arming, an error never leaves the axis armed behind the user's back.
+TEST_F(DriveTest, ALostMessageWhileArmingLeavesNoForce) {
+  for (const auto loss : {FakeLink::Loss::request, FakeLink::Loss::reply}) {
+    for (int lost = 1; lost < 20; ++lost) {
+      link->requests = 0;
+      link->loss = loss;
+      link->first_lost = link->last_lost = lost;
+      bool failed = false;
+      try {
+        drive.arm();
+      } catch (const link::LinkError&) {
+        failed = true;
+      }
+      EXPECT_EQ(fake->machines[1].armed(), !failed) << "request " << lost;
+      link->loss = FakeLink::Loss::none;
+      drive.disarm();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kmax::device

@@ -1,0 +1,307 @@
+#include "host_tools/kmax/command_line.hpp"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <sstream>
+
+#include "host_tools/device/errors.hpp"
+#include "host_tools/link/device_address.hpp"
+#include "tests/host_tools/fake_device.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::cli {
+namespace {
+using firmware::DriveState;
+using firmware::Fault;
+using firmware::Refusal;
+using host_tools_test::FakeDevice;
+using host_tools_test::FakeLink;
+
+/// Runs commands in process on a device that outlives them.
+class CommandLine : public testing::Test {
+ protected:
+  int kmax(std::vector<std::string> arguments) {
+    std::ostringstream out, messages;
+    Context context(out, messages, [this](const std::string& address, const link::Notice&) {
+      link::parse_device_address(address);
+      opened = address;
+      auto link = std::make_unique<FakeLink>(fake);
+      if (prepare) prepare(*link);
+      return link;
+    });
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+
+  Json document() {
+    Json parsed = Json::parse(output, nullptr, false);
+    EXPECT_FALSE(parsed.is_discarded()) << output;
+    return parsed;
+  }
+
+  std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
+  std::function<void(FakeLink&)> prepare;
+  std::string output, said, opened;
+};
+
+TEST_F(CommandLine, GetIsTheContractedDocument) {
+  fake->registers.values().set_real<"wall.stiffness">(3580.0f);
+  EXPECT_EQ(kmax({"get", "wall.stiffness", "--json"}), done);
+  EXPECT_EQ(document(), Json::parse(R"({"wall.stiffness": {"value": 3580, "unit": "N/m"}})"));
+  EXPECT_EQ(kmax({"--json", "get", "wall.adaptive_gain", "wall.law", "axis0.wall.side", "encoder.offset"}),
+            done);
+  EXPECT_EQ(document(), Json::parse(R"({"wall.adaptive_gain": {"value": 2.4, "unit": "N"},
+                                        "wall.law": {"value": "plain", "unit": ""},
+                                        "axis0.wall.side": {"value": "+1", "unit": ""},
+                                        "encoder.offset": {"value": 0, "unit": "counts"}})"));
+  EXPECT_CONTAINS(output, "2.4,");  // not 2.4000000953674316
+}
+
+TEST_F(CommandLine, GetForPeople) {
+  EXPECT_EQ(kmax({"get", "wall.stiffness", "wall.law"}), done);
+  EXPECT_EQ(output, "wall.stiffness = 1000 N/m\nwall.law = plain\n");
+}
+
+TEST_F(CommandLine, AxisOptionMovesNamesWithoutPrefix) {
+  fake->registers.values().set_real<"wall.stiffness">(7.0f, 1);
+  EXPECT_EQ(kmax({"get", "--axis", "1", "wall.stiffness", "axis0.wall.stiffness", "link.timeout", "--json"}),
+            done);
+  const Json values = document();
+  EXPECT_EQ(values["axis1.wall.stiffness"]["value"], 7);
+  EXPECT_EQ(values["axis0.wall.stiffness"]["value"], 1000);
+  EXPECT_EQ(values["link.timeout"]["value"], 1);
+}
+
+TEST_F(CommandLine, SetSetsAndTells) {
+  EXPECT_EQ(kmax({"set", "wall.stiffness=3.58N/mm", "axis1.wall.law=magnetic", "wall.position=-1mm"}), done);
+  EXPECT_EQ(output,
+            "wall.stiffness = 3580 N/m (was 1000)\naxis1.wall.law = magnetic (was plain)\nwall.position = "
+            "-0.001 m (was 0)\n");
+  EXPECT_EQ(fake->registers.values().real<"wall.stiffness">(), 3580.0f);
+  EXPECT_EQ(kmax({"set", "wall.damping=2", "--json"}), done);
+  EXPECT_EQ(document(), Json::parse(R"({"wall.damping": {"value": 2, "unit": "N s/m"}})"));
+}
+
+TEST_F(CommandLine, ASetWithOneBadValueSendsNothing) {
+  EXPECT_EQ(kmax({"set", "wall.stiffness=3580", "wall.damping=-1"}), wrong_usage);
+  EXPECT_EQ(opened, "");
+  EXPECT_EQ(output, "");
+  EXPECT_CONTAINS(said, "wall.damping: -1 N s/m is below");
+}
+
+TEST_F(CommandLine, ExitCodesTellWhoseFaultItIs) {
+  EXPECT_EQ(kmax({"set", "haptic.rate=333"}), wrong_usage);  // only the device can tell
+  EXPECT_EQ(kmax({"get", "wall.stifness"}), wrong_usage);
+  EXPECT_EQ(kmax({"get", "wall.law", "--device", "tcp:x"}), wrong_usage);
+  EXPECT_EQ(kmax({"arm", "--axis", "2"}), wrong_usage);
+  EXPECT_EQ(kmax({"list", "nonsense"}), wrong_usage);
+  fake->obstacle[0] = Refusal::handle_inside_wall;
+  EXPECT_EQ(kmax({"arm"}), failed);
+  prepare = [](FakeLink& link) {
+    link.loss = FakeLink::Loss::request;
+    link.first_lost = 1;
+    link.last_lost = 1000;
+  };
+  EXPECT_EQ(kmax({"get", "wall.law"}), failed);
+}
+
+TEST_F(CommandLine, ErrorsAreADocumentToo) {
+  for (const std::vector<std::string>& bad :
+       std::vector<std::vector<std::string>>{{"get", "wall.stifness", "--json"},
+                                             {"--json"},
+                                             {"gett", "--json"},
+                                             {"get", "--json", "--no-such-option"},
+                                             {"describe", "--format", "eds", "--json"},
+                                             {"get", "wall.law", "--json", "--device", "tcp:x"},
+                                             {"set", "--json"}}) {
+    EXPECT_EQ(kmax(bad), wrong_usage);
+    const Json error = document();
+    ASSERT_EQ(error.size(), 1u) << output;
+    EXPECT_TRUE(error["error"].is_string());
+    EXPECT_CONTAINS(said, error["error"].get<std::string>());
+  }
+}
+
+TEST_F(CommandLine, MistypedCommandsGetASuggestion) {
+  EXPECT_EQ(kmax({"lsit"}), wrong_usage);
+  EXPECT_CONTAINS(said, "did you mean list?");
+  EXPECT_EQ(kmax({"--device", "sim", "disram"}), wrong_usage);
+  EXPECT_CONTAINS(said, "did you mean disarm?");
+  EXPECT_EQ(kmax({"bananas"}), wrong_usage);
+  EXPECT_CONTAINS(said, "commands are list, get");
+  EXPECT_EQ(kmax({}), wrong_usage);
+  EXPECT_CONTAINS(said, "a command is missing");
+}
+
+TEST_F(CommandLine, HelpNeedsNoDeviceAndShowsExamplesAndExitCodes) {
+  for (const char* command :
+       {"list", "get", "set", "info", "state", "arm", "disarm", "stop", "clear", "describe"}) {
+    EXPECT_EQ(kmax({command, "--help"}), done);
+    EXPECT_CONTAINS(output, "Examples:");
+    EXPECT_CONTAINS(output, "Exit codes: 0 done");
+    EXPECT_EQ(opened, "");
+  }
+  EXPECT_EQ(kmax({"--version"}), done);
+}
+
+TEST_F(CommandLine, TheDeviceIsTheOptionThenTheEnvironmentThenSim) {
+  setenv("KMAX_DEVICE", "serial:/dev/env", 1);
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_EQ(opened, "serial:/dev/env");
+  EXPECT_EQ(said.find("simulated"), std::string::npos);
+  EXPECT_EQ(kmax({"state", "--device", "serial:/dev/opt"}), done);
+  EXPECT_EQ(opened, "serial:/dev/opt");
+  unsetenv("KMAX_DEVICE");
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_EQ(opened, "sim");
+  EXPECT_CONTAINS(said, "lives only for this command");
+}
+
+TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
+  EXPECT_EQ(kmax({"describe", "--format", "json"}), done);
+  EXPECT_EQ(opened, "");
+  const Json objects = document()["objects"];
+  ASSERT_EQ(objects.size(), firmware::slot_count);
+  const std::vector<std::string> keys = {"name",       "index",  "subindex", "type",    "unit",
+                                         "access",     "min",    "max",      "default", "values",
+                                         "persistent", "modbus", "help"};
+  for (const Json& object : objects) {
+    std::vector<std::string> found;
+    for (const auto& item : object.items()) found.push_back(item.key());
+    EXPECT_EQ(found, keys);
+    EXPECT_TRUE(object["values"].is_null() || object["values"].is_array());
+    EXPECT_TRUE(object["access"] == "rw" || object["access"] == "ro");
+    // A client that has only the names can tell the numbers: a name that is a number stands for it, any
+    // other for its position.
+    if (object["values"].is_null()) continue;
+    const auto parameter = device::resolve(object["name"].get<std::string>());
+    for (std::size_t i = 0; i < object["values"].size(); ++i) {
+      const auto name = object["values"][i].get<std::string>();
+      const bool numeric = name.find_first_not_of("+-0123456789") == std::string::npos;
+      EXPECT_EQ(parameter.definition().values[i].value, numeric ? std::stol(name) : static_cast<long>(i))
+          << name;
+    }
+  }
+  EXPECT_EQ(objects[3],
+            Json::parse(R"({"name": "wall.stiffness", "index": 8192, "subindex": 4, "type": "float32",
+      "unit": "N/m", "access": "rw", "min": 0, "max": 1000000, "default": 1000, "values": null, "persistent": true,
+      "modbus": {"table": "holding", "address": 4, "words": 2}, "help": "Stiffness K inside the wall."})"));
+}
+
+TEST_F(CommandLine, DescribeInOtherFormats) {
+  EXPECT_EQ(kmax({"describe"}), done);
+  EXPECT_CONTAINS(output, "| `wall.stiffness` | N/m | 0 .. 1e6 N/m | 1000 |");
+  EXPECT_EQ(kmax({"describe", "--format", "modbus"}), done);
+  EXPECT_CONTAINS(output, "\nholding,0x0404,2,float32,rw,axis1.wall.stiffness,N/m,");
+  EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), static_cast<long>(firmware::slot_count) + 1);
+  for (const char* later : {"eds", "dbc"}) {
+    EXPECT_EQ(kmax({"describe", "--format", later}), wrong_usage);
+    EXPECT_CONTAINS(said, "not in this version");
+  }
+  EXPECT_EQ(kmax({"describe", "--format", "markdwon"}), wrong_usage);
+  EXPECT_CONTAINS(said, "did you mean markdown?");
+}
+
+TEST_F(CommandLine, ListFiltersAndMarks) {
+  fake->registers.values().set_real<"wall.stiffness">(5.0f);
+  EXPECT_EQ(kmax({"list", "wall."}), done);
+  EXPECT_CONTAINS(output, "*5");
+  EXPECT_EQ(output.find("guard"), std::string::npos);
+  EXPECT_EQ(output.find("axis1"), std::string::npos);
+  EXPECT_EQ(kmax({"list", "--changed", "--json"}), done);
+  EXPECT_EQ(document().size(), 1u);
+  EXPECT_EQ(document()["wall.stiffness"]["default"], 1000);
+  EXPECT_EQ(kmax({"list", "axis1.wall", "--json"}), done);
+  EXPECT_EQ(document().size(), 16u);
+  EXPECT_TRUE(document().contains("axis1.wall.law"));
+  EXPECT_EQ(kmax({"list", "wall", "--axis", "1", "--json"}), done);
+  EXPECT_TRUE(document().contains("axis1.wall.law"));
+  EXPECT_EQ(kmax({"list", "axis0.wall", "--json"}), done);
+  EXPECT_TRUE(document().contains("wall.law"));
+  EXPECT_EQ(document().size(), 16u);
+  EXPECT_EQ(kmax({"list", "--all", "--json"}), done);
+  EXPECT_EQ(document().size(), firmware::slot_count);
+  EXPECT_EQ(kmax({"list", "wal."}), wrong_usage);
+  EXPECT_CONTAINS(said, "did you mean wall");
+}
+
+TEST_F(CommandLine, InfoHasIdentityVersionClockAndCounters) {
+  EXPECT_EQ(kmax({"info", "--json"}), done);
+  const Json info = document();
+  EXPECT_EQ(info["identity"]["model_name"], "fake board");
+  EXPECT_EQ(info["info"]["firmware_version"], "0.1.0");
+  EXPECT_TRUE(info["counters"].contains("crc_errors"));
+  EXPECT_EQ(kmax({"info"}), done);
+  EXPECT_CONTAINS(output, "fake board");
+  EXPECT_CONTAINS(output, "crystal with PLL");
+}
+
+TEST_F(CommandLine, ArmTellsWhenTheForceGoesAway) {
+  EXPECT_EQ(kmax({"arm", "--axis", "1"}), done);
+  EXPECT_TRUE(fake->machines[1].armed());
+  EXPECT_CONTAINS(said, "after 1 s (link.timeout)");
+  EXPECT_CONTAINS(said, "--hold");
+  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(document()["axes"][1]["state"], "operation_enabled");
+  EXPECT_EQ(document()["axes"][1]["armed"], true);
+  EXPECT_EQ(document()["axes"][0]["fault"], nullptr);
+  EXPECT_EQ(kmax({"disarm"}), done);
+  EXPECT_FALSE(fake->armed());
+}
+
+TEST_F(CommandLine, StopAndDisarmActOnEveryAxis) {
+  EXPECT_EQ(kmax({"arm", "--axis", "1"}), done);
+  EXPECT_EQ(kmax({"stop"}), done);
+  EXPECT_EQ(fake->machines[1].state(), DriveState::quick_stop_active);
+  EXPECT_EQ(kmax({"disarm"}), done);
+  EXPECT_EQ(fake->machines[1].state(), DriveState::switch_on_disabled);
+}
+
+TEST_F(CommandLine, HoldDisarmsOnCtrlC) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    int waits = 0;
+    prepare = [&](FakeLink& link) {
+      link.while_waiting = [&] {
+        if (++waits == 3) raise(signal);
+      };
+    };
+    EXPECT_EQ(kmax({"arm", "--hold", "--json"}), done);
+    EXPECT_GE(waits, 3);
+    EXPECT_FALSE(fake->armed());
+    EXPECT_EQ(document()["axes"][0]["armed"], false);
+    EXPECT_CONTAINS(said, "disarmed");
+  }
+}
+
+TEST_F(CommandLine, HoldReportsAFaultAndNeverArmsAgain) {
+  prepare = [&](FakeLink& link) {
+    link.while_waiting = [&] { fake->trip(0, Fault::over_speed, 6.0f, 5.0f); };
+  };
+  EXPECT_EQ(kmax({"arm", "--hold", "--json"}), failed);
+  EXPECT_CONTAINS(document()["error"].get<std::string>(), "faster than velocity.limit");
+  EXPECT_FALSE(fake->armed());
+  prepare = {};
+  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(document()["axes"][0]["fault"]["name"], "over_speed");
+  EXPECT_EQ(document()["axes"][0]["fault"]["value"], 6);
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_CONTAINS(output, "6 m/s, bound 5 m/s");
+  EXPECT_EQ(kmax({"clear"}), done);
+  EXPECT_EQ(fake->machines[0].state(), DriveState::switch_on_disabled);
+}
+
+TEST_F(CommandLine, OutputThatCannotBeWrittenIsAnError) {
+  std::ostringstream messages;
+  std::ostream nowhere(nullptr);
+  Context context(nowhere, messages, [this](const std::string&, const link::Notice&) {
+    return std::make_unique<FakeLink>(fake);
+  });
+  EXPECT_EQ(run({"get", "wall.law"}, context), failed);
+  EXPECT_CONTAINS(messages.str(), "could not be written");
+}
+
+}  // namespace
+}  // namespace kmax::cli

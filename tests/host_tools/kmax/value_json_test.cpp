@@ -1,0 +1,48 @@
+#include "host_tools/kmax/value_json.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <bit>
+#include <cmath>
+
+namespace kmax::cli {
+namespace {
+using device::Parameter;
+
+constexpr Parameter position = Parameter::of<"wall.position">();
+
+std::string text_of(float value) {
+  return value_json(position, std::bit_cast<std::uint32_t>(value)).dump();
+}
+
+TEST(ValueJson, FloatsAreTheShortestTextOfTheFloat) {
+  EXPECT_EQ(text_of(2.4f), "2.4");
+  EXPECT_EQ(text_of(3580.0f), "3580");
+  EXPECT_EQ(text_of(-0.001f), "-0.001");
+  EXPECT_EQ(text_of(1e-6f), "1e-06");
+}
+
+TEST(ValueJson, CountersKeepAllTheirBits) {
+  EXPECT_EQ(value_json(Parameter::of<"info.tick">(), 0xFFFFFFFFu).dump(), "4294967295");
+  EXPECT_EQ(value_json(Parameter::of<"encoder.offset">(), 0x80000000u).dump(), "-2147483648");
+}
+
+TEST(ValueJson, ChoicesAreTheirNames) {
+  EXPECT_EQ(value_json(Parameter::of<"wall.law">(), 3).dump(), "\"adaptive\"");
+  EXPECT_EQ(value_json(Parameter::of<"wall.side">(), 0xFFFFFFFFu).dump(), "\"-1\"");
+}
+
+// JSON has no NaN; a document with one would be no document.
+TEST(ValueJson, WhatIsNoNumberIsNull) {
+  EXPECT_EQ(text_of(std::nanf("")), "null");
+}
+
+RC_GTEST_PROP(ValueJson, EveryFiniteFloatComesBack, (std::uint32_t pattern)) {
+  const auto value = std::bit_cast<float>(pattern);
+  RC_PRE(std::isfinite(value));
+  RC_ASSERT(static_cast<float>(Json::parse(text_of(value)).get<double>()) == value);
+}
+
+}  // namespace
+}  // namespace kmax::cli

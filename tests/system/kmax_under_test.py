@@ -1,0 +1,81 @@
+"""The programs under test as context managers, and kmax as a function. Run by ctest with KMAX and, for the
+emulated board, KMAX_ELF and KMAX_QEMU_BOARD in the environment."""
+
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+KMAX = os.environ.get("KMAX", "build/native/kmax")
+
+
+def kmax(*arguments, device=None, check=True, timeout=60):
+    """Runs kmax to its end; returns the finished process."""
+    environment = dict(os.environ)
+    environment.pop("KMAX_DEVICE", None)
+    if device:
+        environment["KMAX_DEVICE"] = device
+    done = subprocess.run([KMAX, *arguments], capture_output=True, text=True, env=environment, timeout=timeout)
+    if check and done.returncode != 0:
+        raise AssertionError(f"kmax {' '.join(arguments)} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+    return done
+
+
+def kmax_json(*arguments, **options):
+    return json.loads(kmax(*arguments, "--json", **options).stdout)
+
+
+class _Process:
+    """A process that offers a serial line under a name of its own."""
+
+    def __init__(self, command, seconds):
+        self.folder = tempfile.TemporaryDirectory()
+        self.link = Path(self.folder.name) / "line"
+        self.process = subprocess.Popen([part.replace("LINK", str(self.link)) for part in command],
+                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        end = time.monotonic() + seconds
+        while not self.link.exists():
+            if self.process.poll() is not None or time.monotonic() > end:
+                self.process.kill()
+                raise AssertionError(f"{command} did not come up:\n{self.process.communicate()[0]}")
+            time.sleep(0.02)
+
+    @property
+    def device(self):
+        return f"serial:{self.link}"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.communicate(timeout=10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+        self.folder.cleanup()
+
+
+class Serve(_Process):
+    """kmax serve: the native firmware with a simulated device."""
+
+    def __init__(self, *options):
+        super().__init__([KMAX, "serve", "--serial", "LINK", *options], 20)
+
+
+class QemuBoard(_Process):
+    """The ARM image in QEMU."""
+
+    def __init__(self):
+        super().__init__([os.environ["KMAX_QEMU_BOARD"], os.environ["KMAX_ELF"], "LINK"], 20)
+
+
+def registers():
+    """The generated register map: {name: {"table", "address", "words"}}."""
+    document = json.loads(kmax("describe", "--format", "json").stdout)
+    return {entry["name"]: entry["modbus"] for entry in document["objects"]}
