@@ -50,11 +50,13 @@ inline constexpr NamedValue adaptive_mode[] = {named("instant", AdaptiveMode::in
 inline constexpr NamedValue interference_mode[] = {named("none", InterferenceMode::none),
                                                    named("perpendicular", InterferenceMode::perpendicular),
                                                    named("parallel", InterferenceMode::parallel)};
-inline constexpr NamedValue rounding[] = {named("nearest", Rounding::nearest), named("floor", Rounding::floor),
+inline constexpr NamedValue rounding[] = {named("nearest", Rounding::nearest),
+                                          named("floor", Rounding::floor),
                                           named("hysteresis", Rounding::hysteresis)};
 inline constexpr NamedValue velocity_estimator[] = {
-    named("difference", VelocityEstimatorKind::difference), named("low_pass", VelocityEstimatorKind::low_pass),
-    named("foaw", VelocityEstimatorKind::foaw), named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
+    named("difference", VelocityEstimatorKind::difference),
+    named("low_pass", VelocityEstimatorKind::low_pass), named("foaw", VelocityEstimatorKind::foaw),
+    named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
     named("tracking", VelocityEstimatorKind::tracking)};
 // Only what this firmware can do is listed: a value that would be accepted and ignored is worse than none.
 inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
@@ -68,10 +70,12 @@ using enum Type;
 
 inline constexpr std::array axis_entries = std::to_array<Entry>({
     choice("wall.law", group::wall, 1, names::wall_law, 1,
-           "Wall law: no force, plain spring (paper 1 eq. 3), magnetic field of constant coefficient (eqs. 5-6), "
+           "Wall law: no force, plain spring (paper 1 eq. 3), magnetic field of constant coefficient (eqs. "
+           "5-6), "
            "or of a coefficient that follows the velocity (eqs. 5-7).")
         .disarmed_only(),
-    real("wall.position", group::wall, 2, "m", -1000, 1000, 0, "Where the wall's surface is.").disarmed_only(),
+    real("wall.position", group::wall, 2, "m", -1000, 1000, 0, "Where the wall's surface is.")
+        .disarmed_only(),
     choice("wall.side", group::wall, 3, names::wall_side, 1,
            "Free space is on this side of the surface, and the wall pushes towards it.")
         .disarmed_only(),
@@ -100,25 +104,30 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
          "Time constant with which a peak_hold F_MC decays to its value at rest."),
 
     choice("interference.mode", group::interference, 1, names::interference_mode, 0,
-           "Disturbance of paper 1 section 2: none, along the wall's normal (eq. 2), or along its surface (eq. 4; "
+           "Disturbance of paper 1 section 2: none, along the wall's normal (eq. 2), or along its surface "
+           "(eq. 4; "
            "the interference force goes to the other axis).")
         .disarmed_only(),
-    real("interference.force", group::interference, 2, "N", -100, 100, 0, "Interference force F_I while inside."),
+    real("interference.force", group::interference, 2, "N", -100, 100, 0,
+         "Interference force F_I while inside."),
     real("interference.background_force", group::interference, 3, "N", -100, 100, 0,
          "Background force F_B along the normal, outwards positive."),
     real("interference.onset_time", group::interference, 4, "s", 0, 3600, 0,
          "Time t_0 after contact at which F_B sets in; parallel mode only."),
 
-    real("position.resolution", group::position, 1, "m", 0, 1, 0,
-         "Step to which the position is re-quantized (paper 2); 0 keeps the encoder's own. Rounded to a whole "
-         "number of encoder counts, see measured.resolution.")
+    real(
+        "position.resolution", group::position, 1, "m", 0, 1, 0,
+        "Step to which the position is re-quantized (paper 2); 0 keeps the encoder's own. Rounded to a whole "
+        "number of encoder counts, see measured.resolution.")
         .disarmed_only(),
     choice("position.rounding", group::position, 2, names::rounding, 0,
-           "How a position between two steps is rounded; hysteresis holds the old step until it is a whole step off.")
+           "How a position between two steps is rounded; hysteresis holds the old step until it is a whole "
+           "step off.")
         .disarmed_only(),
 
     choice("velocity.estimator", group::velocity, 1, names::velocity_estimator, 2,
-           "Velocity estimator: finite difference, low-passed difference, first-order adaptive windowing with the "
+           "Velocity estimator: finite difference, low-passed difference, first-order adaptive windowing "
+           "with the "
            "best fit or the end fit, or a tracking loop.")
         .disarmed_only(),
     whole("velocity.window", group::velocity, 2, unsigned8, "samples", 1, 16, 16,
@@ -134,7 +143,8 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
          "Rate of the haptic loop; must divide the tick rate of 20000 Hz.")
         .disarmed_only(),
 
-    real("force.limit", group::force, 1, "N", 0, 1000, 3.3, "Largest force that is ever asked of the device."),
+    real("force.limit", group::force, 1, "N", 0, 1000, 3.3,
+         "Largest force that is ever asked of the device."),
     real("force.slew_limit", group::force, 2, "N/s", 0, 1e9, 0, "Fastest change of the force; 0: no limit."),
     real("force.ramp_time", group::force, 3, "s", 0, 60, 0.2, "Soft start: time from arming to full force."),
 
@@ -145,31 +155,47 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     choice("guard.mode", group::guard, 1, names::guard_mode, 0,
            "Stability check before arming. This firmware offers only 'off'.")
         .disarmed_only(),
-    real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0, "Viscous damping the stability check may count on."),
-    real("guard.friction", group::guard, 3, "N", 0, 100, 0, "Coulomb friction the stability check may count on."),
+    real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
+         "Viscous damping the stability check may count on. Not used by this version."),
+    real("guard.friction", group::guard, 3, "N", 0, 100, 0,
+         "Coulomb friction the stability check may count on. Not used by this version."),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
-         "Force F_h of the operator in paper 2's resolution criterion."),
+         "Force F_h of the operator in paper 2's resolution criterion. Not used by this version."),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
-         "Speed v of the operator in paper 2's resolution criterion."),
+         "Speed v of the operator in paper 2's resolution criterion. Not used by this version."),
 
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,
          "Handle travel per radian of the motor shaft.")
         .disarmed_only(),
-    real("device.mass", group::device, 2, "kg", 1e-4, 100, 0.045, "Mass felt at the handle.").disarmed_only(),
-
-    choice("motor.kind", group::motor, 1, names::motor_kind, 0, "Brushed DC motor or permanent-magnet synchronous.")
-        .disarmed_only(),
-    real("motor.resistance", group::motor, 2, "ohm", 1e-4, 1000, 1, "Winding (phase) resistance.").disarmed_only(),
-    real("motor.inductance", group::motor, 3, "H", 1e-7, 1, 1e-3, "Winding (phase) inductance.").disarmed_only(),
-    real("motor.torque_constant", group::motor, 4, "N m/A", 1e-5, 100, 0.05, "Torque per ampere.").disarmed_only(),
-    whole("motor.pole_pairs", group::motor, 5, unsigned8, "", 1, 64, 7, "Pole pairs of a synchronous motor.")
+    real("device.mass", group::device, 2, "kg", 1e-4, 100, 0.045,
+         "Mass felt at the handle. Not used by this version.")
         .disarmed_only(),
 
-    real("current.limit", group::current, 1, "A", 0, 120, 5, "Largest motor current."),
-    real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000, "Bandwidth of the current loop.")
+    choice("motor.kind", group::motor, 1, names::motor_kind, 0,
+           "Brushed DC motor or permanent-magnet synchronous. Not used by this version.")
+        .disarmed_only(),
+    real("motor.resistance", group::motor, 2, "ohm", 1e-4, 1000, 1,
+         "Winding (phase) resistance. Not used by this version.")
+        .disarmed_only(),
+    real("motor.inductance", group::motor, 3, "H", 1e-7, 1, 1e-3,
+         "Winding (phase) inductance. Not used by this version.")
+        .disarmed_only(),
+    real("motor.torque_constant", group::motor, 4, "N m/A", 1e-5, 100, 0.05,
+         "Torque per ampere. Not used by this version.")
+        .disarmed_only(),
+    whole("motor.pole_pairs", group::motor, 5, unsigned8, "", 1, 64, 7,
+          "Pole pairs of a synchronous motor. Not used by this version.")
         .disarmed_only(),
 
-    choice("encoder.kind", group::encoder, 1, names::encoder_kind, 0, "Encoder type.").disarmed_only(),
+    real("current.limit", group::current, 1, "A", 0, 120, 5,
+         "Largest motor current. Not used by this version."),
+    real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000,
+         "Bandwidth of the current loop. Not used by this version.")
+        .disarmed_only(),
+
+    choice("encoder.kind", group::encoder, 1, names::encoder_kind, 0,
+           "Encoder type. Not used by this version.")
+        .disarmed_only(),
     whole("encoder.counts_per_turn", group::encoder, 2, unsigned32, "counts", 4, 1e9, 8192,
           "Counts per turn of the motor shaft (quadrature: four times the lines).")
         .disarmed_only(),
@@ -180,28 +206,36 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
           "Count at which the position is zero.")
         .disarmed_only(),
 
-    real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100, "Trip level of the board's temperature."),
+    real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100,
+         "Trip level of the board's temperature. Not used by this version."),
 
-    whole("drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
-          "CiA 402 controlword: 6 shutdown, 7 switch on, 15 enable operation, 2 quick stop, 0 disable voltage, "
-          "128 fault reset (rising edge).")
+    whole(
+        "drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
+        "CiA 402 controlword: 6 shutdown, 7 switch on, 15 enable operation, 2 quick stop, 0 disable voltage, "
+        "128 fault reset (rising edge).")
         .volatile_value()
         .at_standard_index(0x6040),
 
-    reading("drive.statusword", group::drive_status, 1, unsigned16, "", "CiA 402 statusword.").at_standard_index(0x6041),
-    reading("drive.error_code", group::drive_status, 2, unsigned16, "", "CiA 402 error code of the present fault; 0: none.")
+    reading("drive.statusword", group::drive_status, 1, unsigned16, "", "CiA 402 statusword.")
+        .at_standard_index(0x6041),
+    reading("drive.error_code", group::drive_status, 2, unsigned16, "",
+            "CiA 402 error code of the present fault; 0: none.")
         .at_standard_index(0x603F),
     reading("drive.refusal", group::drive_status, 3, unsigned16, "",
             "Why the last request to enable operation was refused; 0: it was not."),
-    reading("drive.fault_value", group::drive_status, 4, float32, "", "The number that tripped the present fault."),
+    reading("drive.fault_value", group::drive_status, 4, float32, "",
+            "The number that tripped the present fault."),
     reading("drive.fault_bound", group::drive_status, 5, float32, "", "The bound it passed."),
 
-    reading("measured.tick", group::measured, 1, unsigned32, "ticks", "Tick at which these values were taken."),
+    reading("measured.tick", group::measured, 1, unsigned32, "ticks",
+            "Tick at which these values were taken."),
     reading("measured.position", group::measured, 2, float32, "m", "Position, re-sampled."),
     reading("measured.velocity", group::measured, 3, float32, "m/s", "Estimated velocity."),
     reading("measured.force", group::measured, 4, float32, "N", "Force asked of the device."),
-    reading("measured.distance", group::measured, 5, float32, "m", "Distance outside the wall; negative inside."),
-    reading("measured.magnetic_force", group::measured, 6, float32, "N", "Force of the magnetic field, outwards."),
+    reading("measured.distance", group::measured, 5, float32, "m",
+            "Distance outside the wall; negative inside."),
+    reading("measured.magnetic_force", group::measured, 6, float32, "N",
+            "Force of the magnetic field, outwards."),
     reading("measured.magnetic_coefficient", group::measured, 7, float32, "N", "F_MC at work."),
     reading("measured.count", group::measured, 8, integer32, "counts", "Position, re-sampled (low 32 bits)."),
     reading("measured.flags", group::measured, 9, unsigned16, "",
@@ -210,7 +244,8 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     reading("measured.resolution", group::measured, 11, float32, "m", "Position step that is really in use."),
     reading("measured.limited_samples", group::measured, 12, unsigned32, "samples",
             "Haptic samples since arming whose force was limited."),
-    reading("measured.armed_samples", group::measured, 13, unsigned32, "samples", "Haptic samples since arming."),
+    reading("measured.armed_samples", group::measured, 13, unsigned32, "samples",
+            "Haptic samples since arming."),
 });
 
 }  // namespace kmax::firmware

@@ -48,14 +48,12 @@ struct Entry {
   std::string_view help;
   Access access = Access::read_write;
   Change change = Change::any_time;
-  bool persistent = true;               ///< part of what save keeps, dump writes and defaults restores
+  bool persistent = true;                ///< part of what save keeps, dump writes and defaults restores
   std::span<const NamedValue> values{};  ///< not empty: a choice, and only these values are allowed
-  std::uint16_t standard_index = 0;     ///< not 0: a CiA 402 object at this index, sub-index 0
+  std::uint16_t standard_index = 0;      ///< not 0: a CiA 402 object at this index, sub-index 0
 
   constexpr std::uint16_t index() const { return standard_index != 0 ? standard_index : group.index; }
-  constexpr std::uint8_t object_subindex() const {
-    return standard_index != 0 ? std::uint8_t{0} : subindex;
-  }
+  constexpr std::uint8_t object_subindex() const { return standard_index != 0 ? std::uint8_t{0} : subindex; }
   constexpr Scope scope() const { return group.scope; }
 
   constexpr Entry disarmed_only() const {
@@ -131,8 +129,9 @@ constexpr Entry choice(std::string_view name, Group group, std::uint8_t subindex
     low = v.value < low ? v.value : low;
     high = v.value > high ? v.value : high;
   }
-  Entry e{name, group, subindex, low < 0 ? Type::integer8 : Type::unsigned8, "", double(low), double(high),
-          double(default_value), help};
+  Entry e{name, group,       subindex,     low < 0 ? Type::integer8 : Type::unsigned8,
+          "",   double(low), double(high), double(default_value),
+          help};
   e.values = std::span<const NamedValue>(values, count);
   return e;
 }
@@ -145,6 +144,16 @@ constexpr Entry reading(std::string_view name, Group group, std::uint8_t subinde
   if (type == Type::unsigned16) high = 65535;
   if (type == Type::unsigned8) high = 255;
   Entry e{name, group, subindex, type, unit, low, high, 0, help};
+  e.access = Access::read_only;
+  e.persistent = false;
+  return e;
+}
+
+/// A reading that is one of a few named states.
+template <std::size_t count>
+constexpr Entry named_reading(std::string_view name, Group group, std::uint8_t subindex,
+                              const NamedValue (&values)[count], std::string_view help) {
+  Entry e = choice(name, group, subindex, values, values[0].value, help);
   e.access = Access::read_only;
   e.persistent = false;
   return e;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/errors.hpp"
@@ -77,6 +78,26 @@ double number(device::Device& device, std::size_t axis, const char* name) {
 }
 
 }  // namespace
+
+ContactResult worst_of(std::vector<ContactResult> trials) {
+  std::size_t unstable = 0;
+  std::uint64_t lost = 0;
+  for (const ContactResult& trial : trials) {
+    unstable += trial.measure.verdict == simulation::ContactVerdict::unstable ? 1 : 0;
+    lost += trial.lost_records;
+  }
+  // An unstable trial outweighs any stable one, whatever a single slip of that one measured.
+  ContactResult worst = *std::max_element(trials.begin(), trials.end(), [](const ContactResult& a, const ContactResult& b) {
+    const auto weight = [](const ContactResult& trial) {
+      return std::pair(trial.measure.verdict == simulation::ContactVerdict::unstable, trial.measure.peak_to_peak);
+    };
+    return weight(a) < weight(b);
+  });
+  worst.trials = trials.size();
+  worst.unstable_trials = unstable;
+  worst.lost_records = lost;
+  return worst;
+}
 
 ContactResult run_contact(device::Device& device, const ContactCondition& condition, const ContactSettings& settings,
                           const std::function<void(const std::string&)>& tell) {

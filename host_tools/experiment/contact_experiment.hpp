@@ -42,6 +42,7 @@ struct ContactResult {
   std::string velocity_estimator;         ///< what the adaptive laws' velocity came from
   std::uint64_t lost_records = 0;
   double outside_distance(const device::TraceSample& sample) const { return side * (sample.position - surface); }
+  std::size_t trials = 1, unstable_trials = 0;  ///< of the condition; the rest is the worst trial's
   bool agrees_with_paper() const {
     return (measure.verdict == simulation::ContactVerdict::stable) == condition.paper_stable &&
            measure.verdict != simulation::ContactVerdict::no_contact;
@@ -51,7 +52,11 @@ struct ContactResult {
 /// What all conditions have in common, as assignments.
 std::vector<std::string> contact_setup(const ContactSettings& settings);
 
-/// Sets a condition up, arms, records until the hold is over, disarms. Whoever holds the handle presses it
+/// The trial with the largest oscillation, which decides: a wall is stable when no touch makes it unstable
+/// (paper 1's definition of the maximum stiffness, section 4.2). `trials` must not be empty.
+ContactResult worst_of(std::vector<ContactResult> trials);
+
+/// One trial: sets a condition up, arms, records until the hold is over, disarms. Whoever holds the handle presses it
 /// against the wall when the axis is armed and keeps pressing for hold_time: a simulated person does so by
 /// itself, a real one has to be told. `tell`: progress, called about five times a second with a short text.
 ///

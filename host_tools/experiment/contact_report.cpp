@@ -20,11 +20,12 @@ std::string_view words_of(simulation::ContactVerdict verdict) {
 }
 
 std::string contact_table(const std::vector<ContactResult>& results) {
-  std::string table = fmt::format("{:<22}{:>14}  {:<11}{:>8}  {:<8}{:<34}{}\n", "condition", "peak to peak", "verdict",
-                                  "limited", "figure", "paper 1 says", "agrees");
+  std::string table = fmt::format("{:<22}{:>14}  {:<10}{:<18}{:>8}  {:<8}{:<34}{}\n", "condition", "peak to peak",
+                                  "verdict", "unstable trials", "limited", "figure", "paper 1 says", "agrees");
   for (const ContactResult& result : results) {
-    table += fmt::format("{:<22}{:>11.3f} mm  {:<11}{:>6.1f} %  {:<8}{:<34}{}\n", result.condition.name,
-                         result.measure.peak_to_peak * 1e3, words_of(result.measure.verdict), result.limited_share * 100,
+    table += fmt::format("{:<22}{:>11.3f} mm  {:<10}{:<18}{:>6.1f} %  {:<8}{:<34}{}\n", result.condition.name,
+                         result.measure.peak_to_peak * 1e3, words_of(result.measure.verdict),
+                         fmt::format("{} of {}", result.unstable_trials, result.trials), result.limited_share * 100,
                          "Fig. " + result.condition.figure, result.condition.paper_words,
                          result.agrees_with_paper() ? "yes" : "no");
   }

@@ -13,6 +13,7 @@ namespace kmax::cli {
 namespace {
 struct ContactOptions {
   experiment::ContactSettings settings;
+  int trials = 3;
   std::string folder, ending = ".svg";
 };
 
@@ -27,6 +28,8 @@ Json condition_json(const experiment::ContactResult& result) {
           {"assignments", result.condition.assignments},
           {"peak_to_peak_m", result.measure.peak_to_peak},
           {"verdict", std::string(experiment::words_of(result.measure.verdict))},
+          {"trials", result.trials},
+          {"unstable_trials", result.unstable_trials},
           {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},
           {"agrees", result.agrees_with_paper()},
           {"limited_share", result.limited_share},
@@ -46,12 +49,17 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   std::vector<std::filesystem::path> files;
   {
     Progress progress(context.messages());
+    const std::size_t all_trials = conditions.size() * static_cast<std::size_t>(options.trials);
+    std::size_t done_trials = 0;
     for (const experiment::ContactCondition& condition : conditions) {
       const auto tell = [&](const std::string& text) {
         if (interruption.requested()) throw Interrupted();
-        progress.show(fmt::format("{} of {}, {}", results.size() + 1, conditions.size(), text));
+        progress.show(fmt::format("{} of {}, {}", done_trials + 1, all_trials, text));
       };
-      results.push_back(experiment::run_contact(device, condition, settings, tell));
+      std::vector<experiment::ContactResult> trials;
+      for (int trial = 0; trial < options.trials; ++trial, ++done_trials)
+        trials.push_back(experiment::run_contact(device, condition, settings, tell));
+      results.push_back(experiment::worst_of(std::move(trials)));
       list.push_back(condition_json(results.back()));
       if (options.folder.empty()) continue;
       const auto written = experiment::write_contact(results.back(), options.folder, options.ending);
@@ -72,9 +80,10 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   }
   fmt::print(context.out,
              "Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.\n"
-             "Unstable: more than {:g} mm peak to peak in every quarter of it. Velocity estimator: {}.\n\n{}",
+             "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.\n"
+             "Velocity estimator: {}.\n\n{}",
              settings.stiffness / 1000, settings.haptic_rate, settings.hold_time, settings.threshold * 1000,
-             results.front().velocity_estimator, experiment::contact_table(results));
+             options.trials, results.front().velocity_estimator, experiment::contact_table(results));
   for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
   for (const auto& result : results) {
     if (result.lost_records > 0)
@@ -107,6 +116,9 @@ void add_experiment_command(CLI::App& app, Context& context) {
       ->capture_default_str();
   contact->add_option("--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m")
       ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  contact->add_option("--trials", options->trials, "Touches per condition; the worst one counts")
+      ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   contact->add_option("--out", options->folder, "Folder for a picture and a CSV file per condition")
       ->type_name("DIR");

@@ -25,14 +25,11 @@ std::string duration_text(std::uint32_t seconds) {
   return fmt::format("{} s", seconds);
 }
 
-/// A reading for people. A number that stands for something comes with the dictionary's key to it.
+/// A reading for people.
 std::string reading_text(const Parameter& parameter, std::uint32_t raw) {
   if (parameter == Parameter::of<"info.firmware_version">()) return version_text(raw);
   if (parameter == Parameter::of<"info.uptime">()) return duration_text(raw);
   if (parameter == Parameter::of<"info.dictionary_checksum">()) return fmt::format("{:08X}", raw);
-  const bool is_unnamed_choice =
-      parameter == Parameter::of<"info.clock_source">() && parameter.definition().values.empty();
-  if (is_unnamed_choice) return fmt::format("{} ({})", raw, parameter.definition().help);
   return value_with_unit(parameter, raw);
 }
 

@@ -29,14 +29,48 @@ const std::map<std::string, std::set<std::string>> floors = {
     {"tests", {"tests", "host_tools", "board", "firmware", "control", "drivers"}},
 };
 // Standard headers whose contents need a heap, an operating system or libm: not on the device.
-const std::set<std::string> hosts_only = {
-    "cmath",  "math.h", "complex",  "random", "iostream", "ostream", "istream",   "sstream",       "fstream",
-    "string", "vector", "map",      "set",    "list",     "deque",   "queue",     "unordered_map", "unordered_set",
-    "memory", "thread", "mutex",    "future", "chrono",   "regex",   "locale",    "filesystem",    "functional",
-    "any",    "format", "iomanip",  "cstdio", "stdio.h",  "cstdlib", "stdlib.h",  "stdexcept",     "exception",
-    "condition_variable", "shared_mutex"};
+const std::set<std::string> hosts_only = {"cmath",
+                                          "math.h",
+                                          "complex",
+                                          "random",
+                                          "iostream",
+                                          "ostream",
+                                          "istream",
+                                          "sstream",
+                                          "fstream",
+                                          "string",
+                                          "vector",
+                                          "map",
+                                          "set",
+                                          "list",
+                                          "deque",
+                                          "queue",
+                                          "unordered_map",
+                                          "unordered_set",
+                                          "memory",
+                                          "thread",
+                                          "mutex",
+                                          "future",
+                                          "chrono",
+                                          "regex",
+                                          "locale",
+                                          "filesystem",
+                                          "functional",
+                                          "any",
+                                          "format",
+                                          "iomanip",
+                                          "cstdio",
+                                          "stdio.h",
+                                          "cstdlib",
+                                          "stdlib.h",
+                                          "stdexcept",
+                                          "exception",
+                                          "condition_variable",
+                                          "shared_mutex"};
 
-std::string folder_of(std::string_view path) { return std::string(path.substr(0, path.find('/'))); }
+std::string folder_of(std::string_view path) {
+  return std::string(path.substr(0, path.find('/')));
+}
 
 struct Include {
   std::string target;
@@ -62,13 +96,16 @@ std::string fault_of(std::string_view file, std::string_view line) {
   const bool on_device = floor == "control" || floor == "drivers" || floor == "firmware" ||
                          (floor == "board" && !file.starts_with("board/native/"));
   if (!include->quoted) {
-    if (on_device && hosts_only.contains(include->target)) return "<" + include->target + "> is not for the device";
+    if (on_device && hosts_only.contains(include->target))
+      return "<" + include->target + "> is not for the device";
     return {};
   }
   if (!include->target.starts_with("tests/") && floors.find(folder_of(include->target)) == floors.end())
     return "\"" + include->target + "\" does not start from the root of the repository";
-  if (!floors.at(floor).contains(folder_of(include->target))) return "\"" + include->target + "\" goes up the floors";
-  if (floor == "firmware" && include->target.starts_with("drivers/stm32")) return "the firmware is free of any chip";
+  if (!floors.at(floor).contains(folder_of(include->target)))
+    return "\"" + include->target + "\" goes up the floors";
+  if (floor == "firmware" && include->target.starts_with("drivers/stm32"))
+    return "the firmware is free of any chip";
   if (file.starts_with("board/native/") && include->target.starts_with("drivers/stm32"))
     return "the native board has no chip";
   return {};

@@ -49,7 +49,11 @@ class Bench {
 
   /// 0: written; else the Modbus exception.
   int write(std::uint16_t address, const Words& words) {
-    Bytes pdu{16, high(address), low(address), 0, static_cast<std::uint8_t>(words.size()),
+    Bytes pdu{16,
+              high(address),
+              low(address),
+              0,
+              static_cast<std::uint8_t>(words.size()),
               static_cast<std::uint8_t>(2 * words.size())};
     for (const std::uint16_t word : words) pdu.push_back(high(word)), pdu.push_back(low(word));
     return exception_of(request(pdu));
@@ -82,7 +86,9 @@ class Bench {
     return write(firmware::address_of("drive.controlword", axis), {word});
   }
   DriveState state(std::size_t axis = 0) { return application().state(axis); }
-  Refusal refusal(std::size_t axis = 0) { return static_cast<Refusal>(static_cast<int>(get("drive.refusal", axis))); }
+  Refusal refusal(std::size_t axis = 0) {
+    return static_cast<Refusal>(static_cast<int>(get("drive.refusal", axis)));
+  }
   /// As a host arms: shutdown, enable operation.
   bool arm(std::size_t axis = 0) {
     command(0x06, axis);

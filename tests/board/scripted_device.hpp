@@ -15,14 +15,17 @@ class ScriptedDevice {
  public:
   using Script = std::function<std::int64_t(std::uint64_t tick)>;
 
-  ScriptedDevice() { script.fill([](std::uint64_t) { return 0; }); }
+  ScriptedDevice() {
+    script.fill([](std::uint64_t) { return 0; });
+  }
 
   std::uint32_t count(std::size_t axis) { return static_cast<std::uint32_t>(script[axis](tick)); }
   bool count_valid(std::size_t axis) { return valid[axis]; }
   void drive(std::size_t axis, const firmware::AxisOutput& output) {
     last[axis] = output;
     if (recording) forces[axis].push_back(output.force);
-    for (const float value : {output.force, output.tangential_force, output.background_force}) mix(std::bit_cast<std::uint32_t>(value));
+    for (const float value : {output.force, output.tangential_force, output.background_force})
+      mix(std::bit_cast<std::uint32_t>(value));
     mix(output.enabled ? 1 : 0);
   }
   void advance(double) { ++tick; }
@@ -33,7 +36,9 @@ class ScriptedDevice {
   /// From `from` on at `counts_per_tick`, beginning now.
   void move(std::int64_t from, std::int64_t counts_per_tick, std::size_t axis = 0) {
     const std::uint64_t start = tick;
-    script[axis] = [=](std::uint64_t now) { return from + counts_per_tick * static_cast<std::int64_t>(now - start); };
+    script[axis] = [=](std::uint64_t now) {
+      return from + counts_per_tick * static_cast<std::int64_t>(now - start);
+    };
   }
 
   std::array<Script, firmware::axis_count> script;

@@ -37,7 +37,8 @@ TEST_F(Arming, InsideTheWallIsRefusedWithTheReasonAndNeverComesLater) {
   bench.command(0x0F);
   bench.command(0x0F);
   bench.run_ms(20);
-  EXPECT_EQ(bench.state(), DriveState::switched_on) << "a held word must not arm when the handle leaves the wall";
+  EXPECT_EQ(bench.state(), DriveState::switched_on)
+      << "a held word must not arm when the handle leaves the wall";
   bench.command(0x07);
   bench.command(0x0F);
   bench.run_ticks(2);
@@ -136,7 +137,7 @@ TEST_F(Arming, ForceIsZeroInEveryStateButOperationEnabled) {
     EXPECT_EQ(bench.force(), 1.0f);
     EXPECT_TRUE(bench.device.last[0].enabled);
     bench.command(static_cast<std::uint16_t>(leaving));
-    expect_no_force(leaving == 0 ? DriveState::switch_on_disabled
+    expect_no_force(leaving == 0   ? DriveState::switch_on_disabled
                     : leaving == 6 ? DriveState::ready_to_switch_on
                     : leaving == 7 ? DriveState::switched_on
                                    : DriveState::quick_stop_active);

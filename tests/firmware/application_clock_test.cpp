@@ -28,7 +28,8 @@ class BareBoard {
 
   void preset(std::string_view name, double number, std::size_t axis = 0) {
     const std::size_t entry = entry_named(name);
-    EXPECT_EQ(application->preset(entry, axis, raw_from_number(entry_at(entry).type, number)).refusal, Refusal::none);
+    EXPECT_EQ(application->preset(entry, axis, raw_from_number(entry_at(entry).type, number)).refusal,
+              Refusal::none);
   }
   void tick() { output = application->ISR_tick({{{{count, valid}, {count, valid}}}}); }
   void step(std::uint32_t us = 50) {
@@ -42,7 +43,8 @@ class BareBoard {
     now += 2000;
   }
   void hear_command(unsigned word) {
-    hear(modbus::adu(0, {6, 0x02, 0x00, static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)}));
+    hear(modbus::adu(0,
+                     {6, 0x02, 0x00, static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)}));
   }
   void command(unsigned word) {
     hear_command(word);
@@ -57,7 +59,8 @@ class BareBoard {
   }
   double read_input(std::string_view name) {
     const std::uint16_t address = address_of(name);
-    hear(modbus::adu(1, {4, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address), 0, 2}));
+    hear(modbus::adu(1,
+                     {4, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address), 0, 2}));
     application->poll(now);
     const auto reply = application->serial_reply_due(now);
     const Bytes bytes(reply.begin(), reply.end());
@@ -121,7 +124,8 @@ TEST(Clock, DayAndNightArmedWithAHostThatTalks) {
   EXPECT_NEAR(board.read_input("info.uptime"), static_cast<double>(elapsed) * 1e-6, 2.0);
   // And then it falls silent.
   const std::uint32_t last = board.now;
-  while (board.application->state(0) == DriveState::operation_enabled && board.now - last < 5'000'000) board.step(1000);
+  while (board.application->state(0) == DriveState::operation_enabled && board.now - last < 5'000'000)
+    board.step(1000);
   EXPECT_EQ(board.application->state(0), DriveState::fault);
   EXPECT_LE(board.now - last, 1'020'000u);
 }
@@ -156,9 +160,10 @@ TEST(Clock, ForgottenTransactionIsNotFoundAgainOneLapOfTheClockLater) {
   };
   transaction(1);
   const Words stiffness = words_for("wall.stiffness", 5000);
-  board.hear(modbus::adu(0, {16, 0x00, 0x04, 0, 2, 4, static_cast<std::uint8_t>(stiffness[0] >> 8),
-                             static_cast<std::uint8_t>(stiffness[0]), static_cast<std::uint8_t>(stiffness[1] >> 8),
-                             static_cast<std::uint8_t>(stiffness[1])}));
+  board.hear(
+      modbus::adu(0, {16, 0x00, 0x04, 0, 2, 4, static_cast<std::uint8_t>(stiffness[0] >> 8),
+                      static_cast<std::uint8_t>(stiffness[0]), static_cast<std::uint8_t>(stiffness[1] >> 8),
+                      static_cast<std::uint8_t>(stiffness[1])}));
   board.application->poll(board.now);
   const std::uint32_t staged = board.now;
   for (int i = 0; i < 4294; ++i) board.step(1'000'000);
@@ -223,9 +228,10 @@ TEST(LatePoll, WallMovedOntoTheHandleAndArmedInOnePollIsRefused) {
   board.preset("link.timeout", 0);
   board.command(0x06);
   const Words position = words_for("wall.position", 0.0015);
-  board.hear(modbus::adu(0, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
-                             static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
-                             static_cast<std::uint8_t>(position[1])}));
+  board.hear(
+      modbus::adu(0, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
+                      static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
+                      static_cast<std::uint8_t>(position[1])}));
   board.hear_command(0x0F);
   board.application->poll(board.now);  // no tick in between
   EXPECT_NE(board.application->state(0), DriveState::operation_enabled);
@@ -233,6 +239,27 @@ TEST(LatePoll, WallMovedOntoTheHandleAndArmedInOnePollIsRefused) {
     board.step();
     EXPECT_EQ(board.output.axis[0].force, 0.0f);
   }
+  EXPECT_EQ(board.application->state(0), DriveState::switched_on);
+}
+
+TEST(LatePoll, SettingsTakenByATickInTheMiddleOfAPollAreNotJudgedByTheReportBefore) {
+  BareBoard board(0);
+  board.preset("link.timeout", 0);
+  board.command(0x06);
+  const Words position = words_for("wall.position", 0.0015);
+  board.hear(
+      modbus::adu(0, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
+                      static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
+                      static_cast<std::uint8_t>(position[1])}));
+  board.hear_command(0x0F);
+  board.hear(modbus::adu(0, {6, 0x08, 0x40, 0, 0}));     // a third request, whose end is seen only below
+  board.application->poll(board.now - 2000);             // the wall moves; the command waits for the tick
+  board.tick();                                          // takes the settings
+  (void)board.application->serial_reply_due(board.now);  // the third request, with the report from before
+  EXPECT_NE(board.application->state(0), DriveState::operation_enabled);
+  board.tick();
+  EXPECT_FALSE(board.output.axis[0].enabled);
+  board.step();
   EXPECT_EQ(board.application->state(0), DriveState::switched_on);
 }
 

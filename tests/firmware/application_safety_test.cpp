@@ -12,11 +12,12 @@
 namespace kmax::board {
 namespace {
 
-// Which settings a random host turns at: all that move the wall, the origin or the scale, and some that do not.
-constexpr std::string_view names[] = {"wall.law",         "wall.position",     "wall.side",
-                                      "encoder.offset",   "encoder.direction", "encoder.counts_per_turn",
-                                      "haptic.rate",      "wall.stiffness",    "force.limit",
-                                      "velocity.window",  "interference.mode", "interference.force"};
+// Which settings a random host turns at: all that move the wall, the origin or the scale, and some that do
+// not.
+constexpr std::string_view names[] = {"wall.law",        "wall.position",     "wall.side",
+                                      "encoder.offset",  "encoder.direction", "encoder.counts_per_turn",
+                                      "haptic.rate",     "wall.stiffness",    "force.limit",
+                                      "velocity.window", "interference.mode", "interference.force"};
 
 double value_for(std::string_view name) {
   if (name == "wall.law") return *rc::gen::inRange(0, 4);
@@ -34,8 +35,10 @@ double value_for(std::string_view name) {
 bool may_be_armed(const firmware::ParameterValues& v, std::int64_t count) {
   if (v.whole<"wall.law">() == 0) return true;
   const double length = firmware::count_length(v, 0);
-  const double position = v.whole<"encoder.direction">() * static_cast<double>(count - v.whole<"encoder.offset">());
-  const double distance = v.whole<"wall.side">() * (position * length - static_cast<double>(v.real<"wall.position">()));
+  const double position =
+      v.whole<"encoder.direction">() * static_cast<double>(count - v.whole<"encoder.offset">());
+  const double distance =
+      v.whole<"wall.side">() * (position * length - static_cast<double>(v.real<"wall.position">()));
   return distance > -1e-9;  // on the surface to within rounding: either
 }
 
@@ -55,7 +58,8 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
       bench.run_ticks(1);
       const auto& out = bench.device.last[0];
       RC_ASSERT(!out.enabled || allowed);
-      RC_ASSERT(out.enabled || (out.force == 0.0f && out.tangential_force == 0.0f && out.background_force == 0.0f));
+      RC_ASSERT(out.enabled ||
+                (out.force == 0.0f && out.tangential_force == 0.0f && out.background_force == 0.0f));
       if (out.enabled && !was_enabled) {
         RC_ASSERT(possible);
         ++armings;
@@ -79,7 +83,11 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
       const auto axis = static_cast<std::size_t>(*rc::gen::inRange(0, 5) / 4);
       const std::uint16_t address = firmware::address_of(name, axis);
       const Words words = firmware::words_for(name, value_for(name));
-      Bytes pdu{16, Bench::high(address), Bench::low(address), 0, static_cast<std::uint8_t>(words.size()),
+      Bytes pdu{16,
+                Bench::high(address),
+                Bench::low(address),
+                0,
+                static_cast<std::uint8_t>(words.size()),
                 static_cast<std::uint8_t>(2 * words.size())};
       for (const auto word : words) pdu.push_back(Bench::high(word)), pdu.push_back(Bench::low(word));
       bench.board().receive(firmware::modbus::adu(static_cast<std::uint8_t>(*rc::gen::inRange(0, 2)), pdu));
@@ -90,7 +98,8 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
       const auto word = *rc::gen::element<std::uint8_t>(0x00, 0x06, 0x07, 0x0F, 0x80, 0x8F, 0x02);
       bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, word}));
     } else {
-      bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, action < 8 ? std::uint8_t{0x80} : std::uint8_t{0}}));
+      bench.board().receive(
+          firmware::modbus::adu(0, {6, 0x02, 0x00, 0, action < 8 ? std::uint8_t{0x80} : std::uint8_t{0}}));
       watch(60);
       bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, 0x06}));
       watch(60);
@@ -102,8 +111,8 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
   RC_CLASSIFY(armings > 1, "armed again");
 }
 
-// Any bytes at all, some of them with line errors, at any pace: the application stays alive, and what no valid
-// request has armed makes no force.
+// Any bytes at all, some of them with line errors, at any pace: the application stays alive, and what no
+// valid request has armed makes no force.
 RC_GTEST_PROP(Safety, NoiseOnTheLineNeitherArmsNorDeafens, ()) {
   Bench bench;
   bench.set_up_plain_wall();

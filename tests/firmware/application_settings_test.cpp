@@ -22,7 +22,11 @@ class Settings : public testing::Test {
   void send_write(std::string_view name, double number, std::size_t axis = 0) {
     const auto address = firmware::address_of(name, axis);
     const Words words = firmware::words_for(name, number);
-    Bytes pdu{16, Bench::high(address), Bench::low(address), 0, static_cast<std::uint8_t>(words.size()),
+    Bytes pdu{16,
+              Bench::high(address),
+              Bench::low(address),
+              0,
+              static_cast<std::uint8_t>(words.size()),
               static_cast<std::uint8_t>(2 * words.size())};
     for (const auto word : words) pdu.push_back(Bench::high(word)), pdu.push_back(Bench::low(word));
     bench.board().receive(firmware::modbus::adu(1, pdu));
@@ -108,13 +112,17 @@ TEST_F(Settings, TwoChangesBeforeATickLastWinsAndTheRestartIsNotLost) {
 }
 
 TEST_F(Settings, ScaleAndOriginChangesAreNeverTakenForMotion) {
-  for (const auto& [name, number] : {std::pair{"encoder.offset", -123456.0}, {"encoder.direction", -1.0},
-                                     {"device.transmission", 0.05}, {"encoder.counts_per_turn", 8192.0},
-                                     {"position.resolution", 0.001}, {"haptic.rate", 500.0}}) {
+  for (const auto& [name, number] : {std::pair{"encoder.offset", -123456.0},
+                                     {"encoder.direction", -1.0},
+                                     {"device.transmission", 0.05},
+                                     {"encoder.counts_per_turn", 8192.0},
+                                     {"position.resolution", 0.001},
+                                     {"haptic.rate", 500.0}}) {
     send_write(name, number);
     for (int i = 0; i < 400; ++i) {
       bench.run_ticks(1);
-      bench.application().ISR_serial_byte(0, true, static_cast<std::uint32_t>(bench.board().now_us()));  // noise
+      bench.application().ISR_serial_byte(0, true,
+                                          static_cast<std::uint32_t>(bench.board().now_us()));  // noise
     }
     bench.run_ms(5);
     EXPECT_EQ(bench.get("measured.velocity"), 0.0) << name;

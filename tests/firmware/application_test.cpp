@@ -39,7 +39,8 @@ TEST(Application, EveryRegisterOfTheDictionaryCanBeReadOverTheLineAndStartsAsIts
     for (std::size_t axis = 0; axis < axes; ++axis) {
       const double value = bench.get(entry.name, axis);
       if (entry.access == firmware::Access::read_write) {
-        EXPECT_EQ(value, firmware::number_from_raw(entry.type, firmware::raw_from_number(entry.type, entry.default_value)))
+        EXPECT_EQ(value, firmware::number_from_raw(
+                             entry.type, firmware::raw_from_number(entry.type, entry.default_value)))
             << entry.name;
       }
     }
@@ -70,11 +71,13 @@ TEST(Application, CountersTellWhatHappenedOnTheLine) {
 
 TEST(Application, SingleMaskAndCombinedWritesActOnTheDictionary) {
   Bench bench;
-  EXPECT_EQ(bench.request({6, 0x00, 0x03, 0xFF, 0xFF}), (Bytes{6, 0x00, 0x03, 0xFF, 0xFF}));  // wall.side = -1
+  EXPECT_EQ(bench.request({6, 0x00, 0x03, 0xFF, 0xFF}),
+            (Bytes{6, 0x00, 0x03, 0xFF, 0xFF}));  // wall.side = -1
   EXPECT_EQ(bench.get("wall.side"), -1);
   EXPECT_EQ(bench.request({6, 0x00, 0x03, 0x00, 0x00}), (Bytes{0x86, 3}));
   EXPECT_EQ(bench.request({6, 0x00, 0x04, 0x00, 0x00}), (Bytes{0x86, 2})) << "half of wall.stiffness";
-  EXPECT_EQ(bench.request({22, 0x00, 0x00, 0xFF, 0xFE, 0x00, 0x00}), (Bytes{22, 0x00, 0x00, 0xFF, 0xFE, 0x00, 0x00}));
+  EXPECT_EQ(bench.request({22, 0x00, 0x00, 0xFF, 0xFE, 0x00, 0x00}),
+            (Bytes{22, 0x00, 0x00, 0xFF, 0xFE, 0x00, 0x00}));
   EXPECT_EQ(bench.get("wall.law"), 0) << "bit 0 of 1 cleared";
   EXPECT_EQ(bench.request({22, 0x00, 0x04, 0xFF, 0xFF, 0x00, 0x00}), (Bytes{0x96, 2}));
   // Write wall.law = 2 and read it back with wall.position in one request.
@@ -159,8 +162,9 @@ RC_GTEST_PROP(Application, NoParametersAndNoMotionMakeAForceThatIsNotANumberOrBe
                   bench.state(axis) == DriveState::fault);
       }
     }
-    for (const char* name : {"measured.position", "measured.velocity", "measured.force", "measured.distance",
-                             "measured.magnetic_force", "measured.magnetic_coefficient", "drive.fault_value"}) {
+    for (const char* name :
+         {"measured.position", "measured.velocity", "measured.force", "measured.distance",
+          "measured.magnetic_force", "measured.magnetic_coefficient", "drive.fault_value"}) {
       RC_ASSERT(std::isfinite(bench.get(name, 0)));
       RC_ASSERT(std::isfinite(bench.get(name, 1)));
     }

@@ -31,7 +31,8 @@ class TraceOfABoard : public testing::Test {
         break;
       }
       const auto at = [&](std::size_t i) { return std::uint32_t{w[i]} << 16 | w[i + 1]; };
-      out.push_back({at(0), static_cast<std::int32_t>(at(2)), std::bit_cast<float>(at(4)), std::bit_cast<float>(at(6))});
+      out.push_back({at(0), static_cast<std::int32_t>(at(2)), std::bit_cast<float>(at(4)),
+                     std::bit_cast<float>(at(6))});
     }
     return out;
   }

@@ -10,7 +10,9 @@ namespace {
 
 using firmware::Fault;
 
-int code_of(Fault fault) { return firmware::text_of(fault).error_code; }
+int code_of(Fault fault) {
+  return firmware::text_of(fault).error_code;
+}
 
 class Trips : public testing::Test {
  protected:

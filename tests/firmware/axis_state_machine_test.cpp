@@ -12,9 +12,9 @@ namespace kmax::firmware {
 namespace {
 
 using enum DriveState;
-constexpr std::array all_states = {not_ready_to_switch_on, switch_on_disabled, ready_to_switch_on,
-                                   switched_on,            operation_enabled,  quick_stop_active,
-                                   fault_reaction_active,  fault};
+constexpr std::array all_states = {
+    not_ready_to_switch_on, switch_on_disabled, ready_to_switch_on,    switched_on,
+    operation_enabled,      quick_stop_active,  fault_reaction_active, fault};
 
 // The standard's command table (CiA 402-2, "command coding"), as masks: a bit that is not in the mask does
 // not matter. Written from the standard, apart from the code under test.
@@ -86,7 +86,9 @@ struct Model {
 // A machine in `state` that saw `previous` last; nothing if no sequence leads there.
 std::optional<AxisStateMachine> machine_in(DriveState state, std::uint16_t previous) {
   AxisStateMachine m;
-  const auto say = [&m](std::uint16_t word, Refusal obstacle = Refusal::none) { m.command(word, obstacle, true); };
+  const auto say = [&m](std::uint16_t word, Refusal obstacle = Refusal::none) {
+    m.command(word, obstacle, true);
+  };
   if (state != not_ready_to_switch_on) m.initialised();
   switch (state) {
     case not_ready_to_switch_on:
@@ -137,8 +139,8 @@ TEST(AxisStateMachine, EveryStateWithEveryControlwordFollowsTheStandardsTables) 
           machine.command(static_cast<std::uint16_t>(word), obstacle, hindered);
           model.command(word, hindered, hindered);
           ASSERT_EQ(machine.state(), model.state)
-              << "from state " << int(state) << ", previous word " << previous << ", word " << word << ", hindered "
-              << hindered;
+              << "from state " << int(state) << ", previous word " << previous << ", word " << word
+              << ", hindered " << hindered;
           const bool became_enabled = state != operation_enabled && model.state == operation_enabled;
           if (!hindered) {
             ASSERT_EQ(asks, became_enabled) << int(state) << " " << previous << " " << word;
@@ -255,9 +257,9 @@ TEST(Statusword, MasksOfTheStandardTellEveryStateWhateverTheOtherBits) {
     unsigned mask, value;
   };
   constexpr Pattern patterns[] = {{not_ready_to_switch_on, 0x4F, 0x00}, {switch_on_disabled, 0x4F, 0x40},
-                          {ready_to_switch_on, 0x6F, 0x21},     {switched_on, 0x6F, 0x23},
-                          {operation_enabled, 0x6F, 0x27},      {quick_stop_active, 0x6F, 0x07},
-                          {fault_reaction_active, 0x4F, 0x0F},  {fault, 0x4F, 0x08}};
+                                  {ready_to_switch_on, 0x6F, 0x21},     {switched_on, 0x6F, 0x23},
+                                  {operation_enabled, 0x6F, 0x27},      {quick_stop_active, 0x6F, 0x07},
+                                  {fault_reaction_active, 0x4F, 0x0F},  {fault, 0x4F, 0x08}};
   for (const Pattern& row : patterns) {
     EXPECT_EQ(statusword::base_of(row.state) & row.mask, row.value);
     for (unsigned word = 0; word <= 0xFFFF; ++word) {
@@ -299,7 +301,8 @@ RC_GTEST_PROP(AxisStateMachine, RandomHistoriesAgreeWithTheTables, ()) {
         RC_ASSERT((word & 0x08) != 0 && (previous & 0x08) == 0 && !hindered);
     }
     RC_ASSERT(machine.state() == model.state);
-    RC_ASSERT((machine.fault() != Fault::none) == (model.state == fault || model.state == fault_reaction_active));
+    RC_ASSERT((machine.fault() != Fault::none) ==
+              (model.state == fault || model.state == fault_reaction_active));
   }
 }
 

@@ -37,7 +37,9 @@ class AxisTest : public testing::Test {
   std::uint32_t ticks = 0;
 };
 
-constexpr std::uint32_t at(std::int32_t count) { return static_cast<std::uint32_t>(count); }
+constexpr std::uint32_t at(std::int32_t count) {
+  return static_cast<std::uint32_t>(count);
+}
 
 TEST_F(AxisTest, TripStaysUntilDisabledHasBeenSeen) {
   EXPECT_EQ(tick(at(-1000), true).force, 1.0f);
@@ -75,7 +77,8 @@ TEST_F(AxisTest, ExternalForceIsPartOfWhatIsLimitedAndOnlyWhileEnabled) {
 }
 
 TEST_F(AxisTest, ExternalForceThatIsNotANumberTripsAndNeverReachesTheDevice) {
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::quiet_NaN()}) {
     tick(at(1000), false);
     EXPECT_EQ(tick(at(1000), true, true, bad).force, 0.0f);
     EXPECT_EQ(axis.ISR_report().fault, Fault::not_finite);

@@ -22,10 +22,12 @@ std::vector<std::uint32_t> bits_of(const DeviceRegisters& registers) {
 
 struct Written {
   DeviceRegisters registers;
-  DeviceRegisters::WriteResult write(std::uint16_t address, Words words, bool armed = false, std::uint32_t now = 0) {
+  DeviceRegisters::WriteResult write(std::uint16_t address, Words words, bool armed = false,
+                                     std::uint32_t now = 0) {
     return registers.write(address, words, armed, now);
   }
-  DeviceRegisters::WriteResult write(std::string_view name, double number, std::size_t axis = 0, bool armed = false) {
+  DeviceRegisters::WriteResult write(std::string_view name, double number, std::size_t axis = 0,
+                                     bool armed = false) {
     return write(address_of(name, axis), words_for(name, number), armed);
   }
   Words read(bool holding, std::uint16_t address, std::size_t count) {
@@ -43,7 +45,9 @@ TEST(DeviceRegisters, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxi
     std::vector<double> numbers = {e.minimum, e.maximum, e.default_value};
     for (const NamedValue& v : e.values) numbers.push_back(v.value);
     for (const double number : numbers) {
-      if (!e.values.empty() && check_value(descriptors[entry], raw_from_number(e.type, number)) != Refusal::none) continue;
+      if (!e.values.empty() &&
+          check_value(descriptors[entry], raw_from_number(e.type, number)) != Refusal::none)
+        continue;
       Written w;
       const auto before = bits_of(w.registers);
       const Words words = words_for(e.name, number);
@@ -68,7 +72,8 @@ TEST(DeviceRegisters, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNo
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
-    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword") continue;
+    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword")
+      continue;
     std::vector<std::pair<Words, Refusal>> wrong;
     const Refusal outside = e.values.empty() ? Refusal::out_of_range : Refusal::not_a_choice;
     if (e.type == Type::float32) {
@@ -131,7 +136,8 @@ TEST(DeviceRegisters, HalfOfATwoRegisterValueIsRefusedWhereverTheRangeCutsIt) {
     EXPECT_EQ(result.address, first + 1);
     // As long as a value, but begun in the middle of one.
     const auto before = bits_of(w.registers);
-    EXPECT_EQ(w.write(static_cast<std::uint16_t>(first + 1), words).refusal, Refusal::value_cut_in_two) << e.name;
+    EXPECT_EQ(w.write(static_cast<std::uint16_t>(first + 1), words).refusal, Refusal::value_cut_in_two)
+        << e.name;
     EXPECT_EQ(bits_of(w.registers), before) << e.name;
   }
 }
@@ -180,11 +186,14 @@ TEST(DeviceRegisters, GapsEndsAndReadOnlyPlacesAreNotWritable) {
   Written w;
   const auto before = bits_of(w.registers);
   for (const unsigned address : {0x003Fu, 0x0201u, 0x07FFu, 0x0FFFu, 0x4000u, 0xFFFFu})
-    EXPECT_EQ(w.write(static_cast<std::uint16_t>(address), {0}).refusal, Refusal::unknown_register) << address;
+    EXPECT_EQ(w.write(static_cast<std::uint16_t>(address), {0}).refusal, Refusal::unknown_register)
+        << address;
   // Input registers have no holding register at their number unless another value lives there.
-  EXPECT_EQ(w.write(static_cast<std::uint16_t>(address_of("measured.tick") + 0), {0, 0}).refusal, Refusal::unknown_register);
+  EXPECT_EQ(w.write(static_cast<std::uint16_t>(address_of("measured.tick") + 0), {0, 0}).refusal,
+            Refusal::unknown_register);
   EXPECT_EQ(w.write(address_of("refusal.reason"), {0}).refusal, Refusal::unknown_register);
-  EXPECT_EQ(w.write(0xFFFF, {0, 0}).refusal, Refusal::unknown_register) << "past the end of the address space";
+  EXPECT_EQ(w.write(0xFFFF, {0, 0}).refusal, Refusal::unknown_register)
+      << "past the end of the address space";
   // The controlword and the transaction are their own; a range over them and their gap does not act.
   EXPECT_EQ(w.write(address_of("drive.controlword"), {0x06, 0}).refusal, Refusal::unknown_register);
   EXPECT_EQ(w.write(address_of("transaction.control"), {1, 0}).refusal, Refusal::unknown_register);
@@ -228,17 +237,20 @@ TEST(DeviceRegisters, ReadingMayStartAndEndWithinAValue) {
 TEST(DeviceRegisters, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& e = entry_at(i);
-    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword") continue;
+    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword")
+      continue;
     double other = e.default_value;
     for (const NamedValue& v : e.values) other = v.value != e.default_value ? v.value : other;
-    if (e.values.empty()) other = e.name == "haptic.rate" ? 500 : e.default_value == e.minimum ? e.maximum : e.minimum;
+    if (e.values.empty())
+      other = e.name == "haptic.rate" ? 500 : e.default_value == e.minimum ? e.maximum : e.minimum;
     if (e.name == "wall.adaptive_force_max" || e.name == "supply.voltage_max") other = e.maximum;
     if (other == e.default_value) continue;  // a choice of one
     Written w;
     EXPECT_EQ(w.write(e.name, e.default_value, 0, true).refusal, Refusal::none) << e.name;
     EXPECT_EQ(w.registers.changes(), 0u);
     const bool refused = e.change == Change::disarmed_only;
-    EXPECT_EQ(w.write(e.name, other, 0, true).refusal, refused ? Refusal::while_armed : Refusal::none) << e.name;
+    EXPECT_EQ(w.write(e.name, other, 0, true).refusal, refused ? Refusal::while_armed : Refusal::none)
+        << e.name;
     EXPECT_EQ(w.registers.changes(), refused ? 0u : 1u) << e.name;
     Written disarmed;
     EXPECT_EQ(disarmed.write(e.name, other).refusal, Refusal::none) << e.name;
@@ -278,13 +290,15 @@ RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
         words = {*rc::gen::inRange<std::uint16_t>(0, 4)};
         break;
       case 1:
-        words = *rc::gen::container<Words>(*rc::gen::inRange<std::size_t>(1, 30), rc::gen::arbitrary<std::uint16_t>());
+        words = *rc::gen::container<Words>(*rc::gen::inRange<std::size_t>(1, 30),
+                                           rc::gen::arbitrary<std::uint16_t>());
         break;
       default: {
         const auto share = static_cast<double>(*rc::gen::inRange(-1, 12)) / 10.0;
-        words = words_for(e.name, std::clamp(e.minimum + share * (e.maximum - e.minimum),
-                                             e.type == Type::integer8 || e.type == Type::integer32 ? -2147483648.0 : 0.0,
-                                             e.type == Type::integer32 ? 2147483647.0 : 4294967295.0));
+        words = words_for(
+            e.name, std::clamp(e.minimum + share * (e.maximum - e.minimum),
+                               e.type == Type::integer8 || e.type == Type::integer32 ? -2147483648.0 : 0.0,
+                               e.type == Type::integer32 ? 2147483647.0 : 4294967295.0));
       }
     }
     const auto before = bits_of(registers);
@@ -300,7 +314,8 @@ RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
       RC_ASSERT(d.writable);
       RC_ASSERT(check_value(d, after[s]) == Refusal::none);
       RC_ASSERT(!(armed && d.disarmed_only));
-      if (entry_at(owner_of(s).entry).name != "drive.controlword") RC_ASSERT(registers.changes() == changes + 1);
+      if (entry_at(owner_of(s).entry).name != "drive.controlword")
+        RC_ASSERT(registers.changes() == changes + 1);
     }
   }
 }

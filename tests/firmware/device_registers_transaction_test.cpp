@@ -76,7 +76,8 @@ TEST_F(Transaction, ARefusedValueLeavesWhatWasStagedAndTheTransaction) {
   EXPECT_EQ(control(1), Refusal::none);
   EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
   EXPECT_EQ(set("wall.stiffness", 2e6), Refusal::out_of_range);
-  EXPECT_EQ(registers.write(address_of("wall.stiffness"), Words{0x7FC0, 0, 0, 0}, false, now).refusal, Refusal::not_finite);
+  EXPECT_EQ(registers.write(address_of("wall.stiffness"), Words{0x7FC0, 0, 0, 0}, false, now).refusal,
+            Refusal::not_finite);
   EXPECT_EQ(control(2), Refusal::none);
   EXPECT_EQ(get("wall.stiffness"), 5000);
 }

@@ -22,13 +22,15 @@ TEST(Fault, EveryFaultHasItsOwnCodeAndWords) {
 }
 
 TEST(Fault, CodesOfTheFieldArePinned) {
-  EXPECT_EQ(text_of(Fault::over_speed).error_code, 0x8480);   // CiA 402: velocity speed controller, over-speed
-  EXPECT_EQ(text_of(Fault::encoder).error_code, 0x7305);      // CiA 402: incremental encoder 1
+  EXPECT_EQ(text_of(Fault::over_speed).error_code, 0x8480);  // CiA 402: velocity speed controller, over-speed
+  EXPECT_EQ(text_of(Fault::encoder).error_code, 0x7305);     // CiA 402: incremental encoder 1
   EXPECT_EQ(text_of(Fault::link_silent).error_code, 0x8130);  // CiA 301: life guard or heartbeat error
   EXPECT_EQ(text_of(Fault::not_finite).error_code, 0xFF01);   // manufacturer's
 }
 
-TEST(Fault, UnknownCodeIsNoFault) { EXPECT_EQ(fault_by_error_code(0x1234), nullptr); }
+TEST(Fault, UnknownCodeIsNoFault) {
+  EXPECT_EQ(fault_by_error_code(0x1234), nullptr);
+}
 
 }  // namespace
 }  // namespace kmax::firmware

@@ -10,7 +10,9 @@
 namespace kmax::firmware {
 namespace {
 
-std::uint32_t bits(float value) { return std::bit_cast<std::uint32_t>(value); }
+std::uint32_t bits(float value) {
+  return std::bit_cast<std::uint32_t>(value);
+}
 
 TEST(ParameterValues, StartAsTheDefaultsOnBothAxes) {
   const ParameterValues values;
@@ -86,7 +88,8 @@ TEST(CheckValue, ChoicesAreTheListedOnesAndNothingBetween) {
     }
     for (const NamedValue& v : e.values) {
       EXPECT_EQ(check_value(descriptors[i], static_cast<std::uint32_t>(v.value)), Refusal::none) << e.name;
-      EXPECT_EQ(check_value(descriptors[i], static_cast<std::uint32_t>(v.value) + 0x10000u), Refusal::not_a_choice);
+      EXPECT_EQ(check_value(descriptors[i], static_cast<std::uint32_t>(v.value) + 0x10000u),
+                Refusal::not_a_choice);
     }
   }
 }

@@ -13,7 +13,8 @@ TraceRecord record_at(const Trace& trace, std::uint32_t number) {
   std::uint32_t fields[4];
   for (std::uint16_t i = 0; i < 4; ++i) {
     const auto high = static_cast<std::uint16_t>(first + 2 * i);
-    fields[i] = std::uint32_t{trace.word_at(high)} << 16 | trace.word_at(static_cast<std::uint16_t>(high + 1));
+    fields[i] =
+        std::uint32_t{trace.word_at(high)} << 16 | trace.word_at(static_cast<std::uint16_t>(high + 1));
   }
   TraceRecord record;
   std::memcpy(&record.tick, &fields[0], 4);
@@ -35,7 +36,8 @@ TEST(Trace, KeepsTheLast512RecordsWithTheirExactBits) {
   Trace trace;
   EXPECT_EQ(trace.next(), 0u);
   const auto made = [](std::uint32_t i) {
-    return TraceRecord{0xFFFF0000u + i, std::numeric_limits<std::int32_t>::min() + static_cast<std::int32_t>(i),
+    return TraceRecord{0xFFFF0000u + i,
+                       std::numeric_limits<std::int32_t>::min() + static_cast<std::int32_t>(i),
                        -1.1f * static_cast<float>(i), 0.1f * static_cast<float>(i)};
   };
   for (std::uint32_t i = 0; i < 2000; ++i) {

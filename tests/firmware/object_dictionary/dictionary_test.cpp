@@ -106,9 +106,9 @@ TEST(Dictionary, HasEveryNameOfTheVocabularyWithItsUnitAndChoices) {
 TEST(Dictionary, HasNoPersistentNameOutsideTheVocabulary) {
   for (std::size_t i = 0; i < entry_count; ++i) {
     if (!entry_at(i).persistent) continue;
-    EXPECT_TRUE(std::any_of(vocabulary.begin(), vocabulary.end(),
-                            [&](const Word& w) { return w.name == entry_at(i).name; }))
-        << entry_at(i).name;
+    EXPECT_TRUE(std::any_of(vocabulary.begin(), vocabulary.end(), [&](const Word& w) {
+      return w.name == entry_at(i).name;
+    })) << entry_at(i).name;
   }
 }
 
@@ -132,23 +132,40 @@ TEST(Dictionary, ModbusAddressesArePinned) {
     int axis0, axis1;
   };
   constexpr Pin pins[] = {
-      {"wall.law", 0x0000, 0x0400},          {"wall.position", 0x0001, 0x0401},
-      {"wall.side", 0x0003, 0x0403},         {"wall.stiffness", 0x0004, 0x0404},
-      {"wall.adaptive_relation", 0x0012, 0x0412}, {"wall.adaptive_hold_time", 0x0019, 0x0419},
-      {"interference.mode", 0x0040, 0x0440}, {"position.resolution", 0x0060, 0x0460},
-      {"velocity.limit", 0x0074, 0x0474},    {"haptic.rate", 0x0080, 0x0480},
-      {"force.limit", 0x0090, 0x0490},       {"force.ramp_time", 0x0094, 0x0494},
-      {"encoder.counts_per_turn", 0x0111, 0x0511}, {"encoder.offset", 0x0114, 0x0514},
-      {"drive.controlword", 0x0200, 0x0600}, {"drive.statusword", 0x0000, 0x0400},
-      {"drive.error_code", 0x0001, 0x0401},  {"drive.refusal", 0x0002, 0x0402},
-      {"measured.tick", 0x0020, 0x0420},     {"measured.position", 0x0022, 0x0422},
-      {"measured.force", 0x0026, 0x0426},    {"measured.armed_samples", 0x0037, 0x0437},
-      {"supply.voltage_min", 0x0800, 0x0800}, {"link.timeout", 0x0810, 0x0810},
-      {"modbus.unit", 0x0830, 0x0830},       {"modbus.baud_rate", 0x0831, 0x0831},
-      {"trace.axis", 0x0840, 0x0840},        {"trace.interval", 0x0841, 0x0841},
-      {"transaction.control", 0x0900, 0x0900}, {"info.vendor_id", 0x0800, 0x0800},
-      {"info.uptime", 0x080F, 0x080F},       {"counters.queue_overflows", 0x0850, 0x0850},
-      {"refusal.reason", 0x0880, 0x0880},    {"trace.next", 0x08A0, 0x08A0},
+      {"wall.law", 0x0000, 0x0400},
+      {"wall.position", 0x0001, 0x0401},
+      {"wall.side", 0x0003, 0x0403},
+      {"wall.stiffness", 0x0004, 0x0404},
+      {"wall.adaptive_relation", 0x0012, 0x0412},
+      {"wall.adaptive_hold_time", 0x0019, 0x0419},
+      {"interference.mode", 0x0040, 0x0440},
+      {"position.resolution", 0x0060, 0x0460},
+      {"velocity.limit", 0x0074, 0x0474},
+      {"haptic.rate", 0x0080, 0x0480},
+      {"force.limit", 0x0090, 0x0490},
+      {"force.ramp_time", 0x0094, 0x0494},
+      {"encoder.counts_per_turn", 0x0111, 0x0511},
+      {"encoder.offset", 0x0114, 0x0514},
+      {"drive.controlword", 0x0200, 0x0600},
+      {"drive.statusword", 0x0000, 0x0400},
+      {"drive.error_code", 0x0001, 0x0401},
+      {"drive.refusal", 0x0002, 0x0402},
+      {"measured.tick", 0x0020, 0x0420},
+      {"measured.position", 0x0022, 0x0422},
+      {"measured.force", 0x0026, 0x0426},
+      {"measured.armed_samples", 0x0037, 0x0437},
+      {"supply.voltage_min", 0x0800, 0x0800},
+      {"link.timeout", 0x0810, 0x0810},
+      {"modbus.unit", 0x0830, 0x0830},
+      {"modbus.baud_rate", 0x0831, 0x0831},
+      {"trace.axis", 0x0840, 0x0840},
+      {"trace.interval", 0x0841, 0x0841},
+      {"transaction.control", 0x0900, 0x0900},
+      {"info.vendor_id", 0x0800, 0x0800},
+      {"info.uptime", 0x080F, 0x080F},
+      {"counters.queue_overflows", 0x0850, 0x0850},
+      {"refusal.reason", 0x0880, 0x0880},
+      {"trace.next", 0x08A0, 0x08A0},
   };
   for (const Pin& pin : pins) {
     const std::size_t entry = find_entry(pin.name);
@@ -210,7 +227,8 @@ TEST(Dictionary, SlotsAndOwnersAreInverse) {
 
 TEST(Dictionary, FindsEveryNameAndNoOther) {
   for (std::size_t i = 0; i < entry_count; ++i) EXPECT_EQ(find_entry(entry_at(i).name), i);
-  for (const std::string_view wrong : {"", "wall", "wall.", "wall.stiffnes", "wall.stiffness ", "Wall.stiffness"})
+  for (const std::string_view wrong :
+       {"", "wall", "wall.", "wall.stiffnes", "wall.stiffness ", "Wall.stiffness"})
     EXPECT_EQ(find_entry(wrong), entry_count) << wrong;
 }
 
@@ -218,12 +236,14 @@ TEST(Dictionary, FindsEveryNameAndNoOther) {
 // experiment turns up while the hand holds the handle must be.
 TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
   for (const std::string_view name :
-       {"wall.law", "wall.position", "wall.side", "interference.mode", "position.resolution", "position.rounding",
-        "velocity.estimator", "velocity.window", "velocity.bandwidth", "haptic.rate", "device.transmission",
-        "encoder.counts_per_turn", "encoder.direction", "encoder.offset", "encoder.kind", "motor.kind"})
+       {"wall.law", "wall.position", "wall.side", "interference.mode", "position.resolution",
+        "position.rounding", "velocity.estimator", "velocity.window", "velocity.bandwidth", "haptic.rate",
+        "device.transmission", "encoder.counts_per_turn", "encoder.direction", "encoder.offset",
+        "encoder.kind", "motor.kind"})
     EXPECT_EQ(named(name).change, Change::disarmed_only) << name;
-  for (const std::string_view name : {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit",
-                                      "link.timeout", "trace.interval", "transaction.control", "drive.controlword"})
+  for (const std::string_view name :
+       {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit", "link.timeout",
+        "trace.interval", "transaction.control", "drive.controlword"})
     EXPECT_EQ(named(name).change, Change::any_time) << name;
 }
 

@@ -30,15 +30,18 @@ TEST(Entry, PatternsOfTheEdgesOfEveryType) {
   EXPECT_EQ(raw_from_number(Type::float32, -0.0), 0x80000000u);
   EXPECT_EQ(number_from_raw(Type::integer8, 0xFFFFFFFFu), -1.0);
   EXPECT_EQ(number_from_raw(Type::unsigned32, 0xFFFFFFFFu), 4294967295.0);
-  EXPECT_EQ(number_from_raw(Type::float32, 0x7F7FFFFFu), static_cast<double>(std::numeric_limits<float>::max()));
+  EXPECT_EQ(number_from_raw(Type::float32, 0x7F7FFFFFu),
+            static_cast<double>(std::numeric_limits<float>::max()));
 }
 
 RC_GTEST_PROP(Entry, PatternAndNumberAreInverse, (std::uint32_t bits)) {
   for (const Type type : {Type::unsigned32, Type::integer32})
     RC_ASSERT(raw_from_number(type, number_from_raw(type, bits)) == bits);
-  RC_ASSERT(raw_from_number(Type::unsigned16, number_from_raw(Type::unsigned16, bits & 0xFFFF)) == (bits & 0xFFFF));
+  RC_ASSERT(raw_from_number(Type::unsigned16, number_from_raw(Type::unsigned16, bits & 0xFFFF)) ==
+            (bits & 0xFFFF));
   const auto value = std::bit_cast<float>(bits);
-  if (value - value == 0.0f) RC_ASSERT(raw_from_number(Type::float32, number_from_raw(Type::float32, bits)) == bits);
+  if (value - value == 0.0f)
+    RC_ASSERT(raw_from_number(Type::float32, number_from_raw(Type::float32, bits)) == bits);
 }
 
 TEST(Entry, WordsOfARowSetWhatTheySay) {
@@ -50,13 +53,15 @@ TEST(Entry, WordsOfARowSetWhatTheySay) {
   EXPECT_EQ(side.change, Change::disarmed_only);
   EXPECT_EQ(side.index(), 0x2000);
   EXPECT_EQ(side.object_subindex(), 3);
-  constexpr Entry word = reading("group.word", plain_group, 1, Type::unsigned16, "", "help").at_standard_index(0x6041);
+  constexpr Entry word =
+      reading("group.word", plain_group, 1, Type::unsigned16, "", "help").at_standard_index(0x6041);
   EXPECT_EQ(word.access, Access::read_only);
   EXPECT_FALSE(word.persistent);
   EXPECT_EQ(word.index(), 0x6041);
   EXPECT_EQ(word.object_subindex(), 0);
   EXPECT_EQ(word.maximum, 65535);
-  constexpr Entry command = whole("group.command", plain_group, 2, Type::unsigned16, "", 0, 9, 0, "h").volatile_value();
+  constexpr Entry command =
+      whole("group.command", plain_group, 2, Type::unsigned16, "", 0, 9, 0, "h").volatile_value();
   EXPECT_FALSE(command.persistent);
   EXPECT_EQ(command.access, Access::read_write);
 }

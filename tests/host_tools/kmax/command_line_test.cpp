@@ -69,7 +69,7 @@ TEST_F(CommandLine, AxisOptionMovesNamesWithoutPrefix) {
   fake->registers.values().set_real<"wall.stiffness">(7.0f, 1);
   EXPECT_EQ(kmax({"get", "--axis", "1", "wall.stiffness", "axis0.wall.stiffness", "link.timeout", "--json"}),
             done);
-  const Json values = document();
+  Json values = document();
   EXPECT_EQ(values["axis1.wall.stiffness"]["value"], 7);
   EXPECT_EQ(values["axis0.wall.stiffness"]["value"], 1000);
   EXPECT_EQ(values["link.timeout"]["value"], 1);
@@ -118,7 +118,7 @@ TEST_F(CommandLine, ErrorsAreADocumentToo) {
                                              {"get", "wall.law", "--json", "--device", "tcp:x"},
                                              {"set", "--json"}}) {
     EXPECT_EQ(kmax(bad), wrong_usage);
-    const Json error = document();
+    Json error = document();
     ASSERT_EQ(error.size(), 1u) << output;
     EXPECT_TRUE(error["error"].is_string());
     EXPECT_CONTAINS(said, error["error"].get<std::string>());
@@ -230,13 +230,13 @@ TEST_F(CommandLine, ListFiltersAndMarks) {
 
 TEST_F(CommandLine, InfoHasIdentityVersionClockAndCounters) {
   EXPECT_EQ(kmax({"info", "--json"}), done);
-  const Json info = document();
+  Json info = document();
   EXPECT_EQ(info["identity"]["model_name"], "fake board");
   EXPECT_EQ(info["info"]["firmware_version"], "0.1.0");
   EXPECT_TRUE(info["counters"].contains("crc_errors"));
   EXPECT_EQ(kmax({"info"}), done);
   EXPECT_CONTAINS(output, "fake board");
-  EXPECT_CONTAINS(output, "crystal with PLL");
+  EXPECT_CONTAINS(output, "crystal_pll");
 }
 
 TEST_F(CommandLine, ArmTellsWhenTheForceGoesAway) {
