@@ -8,9 +8,9 @@ namespace kmax::control {
 
 template <typename Scalar>
 struct ForceLimiterConfig {
-  Scalar limit = Scalar(3.3);     ///< N, >= 0: the Geomagic Touch's peak force (paper 1, section 4)
-  Scalar slew_limit = Scalar(0);  ///< N/s, >= 0; 0: unlimited
-  Scalar ramp_time = Scalar(0.2); ///< s from zero to full force after enabling; 0: none
+  Scalar limit = Scalar(3.3);      ///< N, >= 0: the Geomagic Touch's peak force (paper 1, section 4)
+  Scalar slew_limit = Scalar(0);   ///< N/s, >= 0; 0: unlimited
+  Scalar ramp_time = Scalar(0.2);  ///< s from zero to full force after enabling; 0: none
 };
 
 /// The last step before the device: soft start, magnitude limit, slew limit, in this order.

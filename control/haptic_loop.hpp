@@ -63,20 +63,20 @@ class HapticLoop {
   };
 
   struct Output {
-    Scalar force{};             ///< N along +x, what the device is asked for
-    Scalar tangential_force{};  ///< N along the surface (parallel interference), for another axis
-    std::int64_t position{};    ///< counts, re-sampled
-    Scalar outside_distance{};  ///< m, > 0 in free space
-    Scalar velocity{};          ///< m/s along +x
-    Scalar magnetic_force{};    ///< N, outwards
+    Scalar force{};                 ///< N along +x, what the device is asked for
+    Scalar tangential_force{};      ///< N along the surface (parallel interference), for another axis
+    std::int64_t position{};        ///< counts, re-sampled
+    Scalar outside_distance{};      ///< m, > 0 in free space
+    Scalar velocity{};              ///< m/s along +x
+    Scalar magnetic_force{};        ///< N, outwards
     Scalar magnetic_coefficient{};  ///< N
     bool inside = false;
-    bool limited = false;       ///< force.limit took something away
+    bool limited = false;  ///< force.limit took something away
     bool slew_limited = false;
-    bool ramping = false;       ///< soft start under way
-    bool not_finite = false;    ///< fault
-    bool over_speed = false;    ///< fault
-    bool new_sample = false;    ///< this tick computed; false: the previous sample is held
+    bool ramping = false;     ///< soft start under way
+    bool not_finite = false;  ///< fault
+    bool over_speed = false;  ///< fault
+    bool new_sample = false;  ///< this tick computed; false: the previous sample is held
   };
 
   /// Outside the interrupt path. `count_near`: a recent count, the resampler's anchor.
@@ -95,7 +95,8 @@ class HapticLoop {
   }
 
   /// One tick. `external_force`: N along +x, added before the limiter (another axis' tangential force).
-  const Output& tick(const Coefficients& c, std::int64_t count, bool enabled, Scalar external_force = Scalar(0)) {
+  const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
+                     Scalar external_force = Scalar(0)) {
     if (ticks_until_sample_ != 0) {
       --ticks_until_sample_;
       held_.new_sample = false;

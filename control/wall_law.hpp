@@ -19,10 +19,10 @@ enum class WallKind : std::uint8_t {
 template <typename Scalar>
 struct WallLawConfig {
   WallKind kind = WallKind::plain;
-  Scalar stiffness = Scalar(1000);            ///< K, N/m, >= 0
-  Scalar damping = Scalar(0);                 ///< B, N s/m, >= 0
-  Scalar magnetic_coefficient = Scalar(2);    ///< F_MC, N, >= 0; constant law only
-  Scalar magnetic_length = Scalar(0.001);     ///< x_0, m, > 0
+  Scalar stiffness = Scalar(1000);          ///< K, N/m, >= 0
+  Scalar damping = Scalar(0);               ///< B, N s/m, >= 0
+  Scalar magnetic_coefficient = Scalar(2);  ///< F_MC, N, >= 0; constant law only
+  Scalar magnetic_length = Scalar(0.001);   ///< x_0, m, > 0
   AdaptiveCoefficientConfig<Scalar> adaptive;
 };
 

@@ -56,7 +56,8 @@ void Application::offer_settings_if_changed() {
   settings_ = make_settings();
   handover_.offer(settings_);
   port_.configure(port_configuration(registers_.values()));
-  trace_axis_.store(static_cast<std::uint8_t>(registers_.values().whole<"trace.axis">()), std::memory_order_relaxed);
+  trace_axis_.store(static_cast<std::uint8_t>(registers_.values().whole<"trace.axis">()),
+                    std::memory_order_relaxed);
   trace_interval_.store(static_cast<std::uint32_t>(registers_.values().whole<"trace.interval">()),
                         std::memory_order_relaxed);
 }
@@ -80,7 +81,8 @@ Refusal Application::obstacle_to_arming(std::size_t axis) const {
 
 void Application::trip(std::size_t axis, Fault fault, float value, float bound) {
   machines_[axis].trip(fault);
-  if (machines_[axis].fault() != fault || machines_[axis].state() != DriveState::fault_reaction_active) return;
+  if (machines_[axis].fault() != fault || machines_[axis].state() != DriveState::fault_reaction_active)
+    return;
   fault_value_[axis] = value;
   fault_bound_[axis] = bound;
 }
@@ -153,7 +155,8 @@ DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t 
     return {refusal, register_address(entry, axis)};
   std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
   const auto needed = words_of(descriptors[entry].type);
-  const auto result = registers_.write(register_address(entry, axis), std::span(words).last(needed), any_armed(), now_us_);
+  const auto result =
+      registers_.write(register_address(entry, axis), std::span(words).last(needed), any_armed(), now_us_);
   offer_settings_if_changed();
   return result;
 }

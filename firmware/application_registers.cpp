@@ -58,12 +58,18 @@ Exception Application::Bank::write_holding(std::uint16_t address, std::span<cons
 
 std::string_view Application::Bank::identification(std::uint8_t object_id) const {
   switch (object_id) {
-    case 0: return "Kmax";
-    case 1: return "kmax-haptic-controller";
-    case 2: return firmware_version_text;
-    case 4: return "Kmax haptic device controller";
-    case 5: return app_.board_.board_name;
-    default: return {};
+    case 0:
+      return "Kmax";
+    case 1:
+      return "kmax-haptic-controller";
+    case 2:
+      return firmware_version_text;
+    case 4:
+      return "Kmax haptic device controller";
+    case 5:
+      return app_.board_.board_name;
+    default:
+      return {};
   }
 }
 
@@ -93,11 +99,13 @@ void Application::refresh_readings() {
     v.set_real<"measured.magnetic_force">(haptic.magnetic_force, axis);
     v.set_real<"measured.magnetic_coefficient">(haptic.magnetic_coefficient, axis);
     v.set_whole<"measured.count">(static_cast<std::uint32_t>(haptic.position), axis);
-    const unsigned flags = (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) | (haptic.slew_limited ? 4u : 0u) |
-                           (haptic.ramping ? 8u : 0u) | (machine.armed() ? 16u : 0u);
+    const unsigned flags = (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) |
+                           (haptic.slew_limited ? 4u : 0u) | (haptic.ramping ? 8u : 0u) |
+                           (machine.armed() ? 16u : 0u);
     v.set_whole<"measured.flags">(flags, axis);
     v.set_real<"measured.count_length">(static_cast<float>(length), axis);
-    const double step = control::resampler_step(static_cast<double>(v.real<"position.resolution">(axis)), length);
+    const double step =
+        control::resampler_step(static_cast<double>(v.real<"position.resolution">(axis)), length);
     v.set_real<"measured.resolution">(static_cast<float>(step * length), axis);
     v.set_whole<"measured.limited_samples">(report.limited_samples, axis);
     v.set_whole<"measured.armed_samples">(report.armed_samples, axis);

@@ -33,7 +33,8 @@ TickOutput Application::ISR_tick(const TickInput& input) {
     // A countdown as long as the interval is left over from a longer one.
     if (ISR_trace_countdown_ == 0 || ISR_trace_countdown_ >= interval) {
       ISR_trace_countdown_ = interval;
-      trace_.ISR_push({tick, static_cast<std::int32_t>(traced.position), traced.force, traced.magnetic_coefficient});
+      trace_.ISR_push(
+          {tick, static_cast<std::int32_t>(traced.position), traced.force, traced.magnetic_coefficient});
     }
     --ISR_trace_countdown_;
   }

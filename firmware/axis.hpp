@@ -20,7 +20,7 @@ struct AxisSetting {
 /// What the tick of one axis tells the main loop.
 struct AxisReport {
   control::HapticLoop<float>::Output haptic{};
-  std::int64_t counted = 0;      ///< the encoder's extended count, before offset and direction
+  std::int64_t counted = 0;  ///< the encoder's extended count, before offset and direction
   std::uint32_t tick = 0;
   std::uint32_t generation = 0;  ///< of the setting it was computed with
   std::uint32_t armed_samples = 0, limited_samples = 0;

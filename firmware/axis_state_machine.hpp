@@ -36,14 +36,22 @@ inline constexpr std::uint16_t internal_limit_active = 1u << 11;
 
 constexpr std::uint16_t base_of(DriveState state) {
   switch (state) {
-    case DriveState::not_ready_to_switch_on: return 0x00;
-    case DriveState::switch_on_disabled: return 0x40;
-    case DriveState::ready_to_switch_on: return 0x21;
-    case DriveState::switched_on: return 0x23;
-    case DriveState::operation_enabled: return 0x27;
-    case DriveState::quick_stop_active: return 0x07;
-    case DriveState::fault_reaction_active: return 0x0F;
-    case DriveState::fault: return 0x08;
+    case DriveState::not_ready_to_switch_on:
+      return 0x00;
+    case DriveState::switch_on_disabled:
+      return 0x40;
+    case DriveState::ready_to_switch_on:
+      return 0x21;
+    case DriveState::switched_on:
+      return 0x23;
+    case DriveState::operation_enabled:
+      return 0x27;
+    case DriveState::quick_stop_active:
+      return 0x07;
+    case DriveState::fault_reaction_active:
+      return 0x0F;
+    case DriveState::fault:
+      return 0x08;
   }
   return 0x00;
 }
@@ -124,9 +132,9 @@ class AxisStateMachine {
         if (command == Command::enable_operation && enable_edge) enable(obstacle);    // 4
         break;
       case DriveState::operation_enabled:
-        if (command == Command::switch_on) state_ = DriveState::switched_on;          // 5
-        if (command == Command::shutdown) state_ = DriveState::ready_to_switch_on;    // 8
-        if (command == Command::quick_stop) state_ = DriveState::quick_stop_active;   // 11
+        if (command == Command::switch_on) state_ = DriveState::switched_on;         // 5
+        if (command == Command::shutdown) state_ = DriveState::ready_to_switch_on;   // 8
+        if (command == Command::quick_stop) state_ = DriveState::quick_stop_active;  // 11
         break;
       case DriveState::not_ready_to_switch_on:
       case DriveState::quick_stop_active:
@@ -138,7 +146,8 @@ class AxisStateMachine {
 
   /// Something failed (transition 13). The first fault is kept until it is reset.
   void trip(Fault fault) {
-    if (fault == Fault::none || state_ == DriveState::fault || state_ == DriveState::fault_reaction_active) return;
+    if (fault == Fault::none || state_ == DriveState::fault || state_ == DriveState::fault_reaction_active)
+      return;
     fault_ = fault;
     state_ = DriveState::fault_reaction_active;
   }
@@ -149,7 +158,14 @@ class AxisStateMachine {
   }
 
  private:
-  enum class Command : std::uint8_t { none, shutdown, switch_on, disable_voltage, quick_stop, enable_operation };
+  enum class Command : std::uint8_t {
+    none,
+    shutdown,
+    switch_on,
+    disable_voltage,
+    quick_stop,
+    enable_operation
+  };
 
   // The standard's command table; a bit that does not matter is not looked at. Bit 7 set is a fault reset
   // and no other command.

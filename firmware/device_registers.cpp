@@ -13,7 +13,8 @@ constexpr std::size_t transaction_entry = entry_of<"transaction.control">();
 // A signed 8-bit value in one register may come with its sign extended (0xFFFF) or as the bare byte (0x00FF).
 std::uint32_t pattern_of(Type type, std::uint16_t word) {
   if (type != Type::integer8) return word;
-  if (word <= 0xFF) return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int8_t>(word)));
+  if (word <= 0xFF)
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int8_t>(word)));
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int16_t>(word)));
 }
 }  // namespace
@@ -57,8 +58,9 @@ DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wante
   return {};
 }
 
-DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t address, std::uint32_t request,
-                                                                  bool armed, std::uint32_t now_us) {
+DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t address,
+                                                                  std::uint32_t request, bool armed,
+                                                                  std::uint32_t now_us) {
   switch (request) {
     case 0:
       staging_ = false;

@@ -32,7 +32,8 @@ inline constexpr auto register_places = [] {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     if (descriptors[entry].writable != writable) continue;
-    places[next++] = {modbus_address(entry, axis), static_cast<std::uint8_t>(words_of(descriptors[entry].type)),
+    places[next++] = {modbus_address(entry, axis),
+                      static_cast<std::uint8_t>(words_of(descriptors[entry].type)),
                       static_cast<std::uint8_t>(slot)};
   }
   std::sort(places.begin(), places.end(),
@@ -46,7 +47,8 @@ inline constexpr auto register_places = [] {
 /// only then anything changes. Outside a transaction it takes effect at once; inside (transaction.control =
 /// 1) values are kept aside and take effect together with transaction.control = 2, which checks the rules
 /// over the whole set. A transaction in which nothing is written for 2 s is dropped, so a host that dies
-/// half way leaves nothing behind. Why a write was refused stays in refusal.reason and refusal.register.
+/// half way leaves nothing behind. Reading always gives the values in force, not those put aside. Why a write
+/// was refused stays in refusal.reason and refusal.register.
 class DeviceRegisters {
  public:
   static constexpr std::uint32_t transaction_timeout_us = 2'000'000;
@@ -83,7 +85,8 @@ class DeviceRegisters {
   }
 
   /// `armed`: some axis is. `now_us` drives the transaction's time-out.
-  WriteResult write(std::uint16_t address, std::span<const std::uint16_t> in, bool armed, std::uint32_t now_us);
+  WriteResult write(std::uint16_t address, std::span<const std::uint16_t> in, bool armed,
+                    std::uint32_t now_us);
 
   /// Call at least every 2^31 us.
   void poll(std::uint32_t now_us) {
@@ -107,8 +110,9 @@ class DeviceRegisters {
   }
   template <std::size_t size>
   static const RegisterPlace* find_in(const std::array<RegisterPlace, size>& places, std::uint32_t address) {
-    const auto after = std::upper_bound(places.begin(), places.end(), address,
-                                        [](std::uint32_t a, const RegisterPlace& p) { return a < p.address; });
+    const auto after =
+        std::upper_bound(places.begin(), places.end(), address,
+                         [](std::uint32_t a, const RegisterPlace& p) { return a < p.address; });
     if (after == places.begin()) return nullptr;
     const RegisterPlace& place = *(after - 1);
     return address < std::uint32_t{place.address} + place.words ? &place : nullptr;
@@ -116,7 +120,8 @@ class DeviceRegisters {
 
   WriteResult check_and_set(ParameterValues& target, std::uint16_t address, std::span<const std::uint16_t> in,
                             bool armed);
-  WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed, std::uint32_t now_us);
+  WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed,
+                                  std::uint32_t now_us);
   WriteResult apply(const ParameterValues& wanted, bool armed);
   WriteResult refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
 

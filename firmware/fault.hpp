@@ -13,9 +13,9 @@ struct FaultText {
   Fault fault;
   std::uint16_t error_code;  ///< CiA 402 / CiA 301 error code, object 0x603F
   std::string_view name;
-  std::string_view unit;     ///< of drive.fault_value and drive.fault_bound
-  std::string_view what;     ///< what happened
-  std::string_view check;    ///< what the user should look at
+  std::string_view unit;   ///< of drive.fault_value and drive.fault_bound
+  std::string_view what;   ///< what happened
+  std::string_view check;  ///< what the user should look at
 };
 
 /// Error codes: CiA 402 table of error codes where one fits; 0xFF00 and up are the manufacturer's.
@@ -31,7 +31,9 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
      "check the cable and the host program; link.timeout = 0 turns this off"},
 });
 
-constexpr const FaultText& text_of(Fault fault) { return fault_texts[static_cast<std::size_t>(fault)]; }
+constexpr const FaultText& text_of(Fault fault) {
+  return fault_texts[static_cast<std::size_t>(fault)];
+}
 
 constexpr const FaultText* fault_by_error_code(std::uint16_t error_code) {
   for (const FaultText& text : fault_texts) {
@@ -40,11 +42,13 @@ constexpr const FaultText* fault_by_error_code(std::uint16_t error_code) {
   return nullptr;
 }
 
-static_assert([] {
-  for (std::size_t i = 0; i < fault_texts.size(); ++i) {
-    if (static_cast<std::size_t>(fault_texts[i].fault) != i) return false;
-  }
-  return true;
-}(), "fault_texts must follow the enumeration");
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < fault_texts.size(); ++i) {
+        if (static_cast<std::size_t>(fault_texts[i].fault) != i) return false;
+      }
+      return true;
+    }(),
+    "fault_texts must follow the enumeration");
 
 }  // namespace kmax::firmware

@@ -32,7 +32,8 @@ class Handover {
   /// Interrupt: the value to use in this tick.
   const Value& ISR_take() {
     if (offered_.load(std::memory_order_acquire)) {
-      held_.store(static_cast<std::uint8_t>(1 - held_.load(std::memory_order_relaxed)), std::memory_order_relaxed);
+      held_.store(static_cast<std::uint8_t>(1 - held_.load(std::memory_order_relaxed)),
+                  std::memory_order_relaxed);
       offered_.store(false, std::memory_order_release);
     }
     return places_[held_.load(std::memory_order_relaxed)];

@@ -16,7 +16,7 @@ struct SlotDescriptor {
   bool writable;
   bool disarmed_only;
   bool per_axis;
-  std::uint8_t first_choice, choice_count;  ///< in listed_choices; 0 choices: any value in range
+  std::uint8_t first_choice, choice_count;        ///< in listed_choices; 0 choices: any value in range
   std::uint32_t minimum, maximum, default_value;  ///< patterns
 };
 
@@ -78,7 +78,8 @@ constexpr Refusal check_value(const SlotDescriptor& entry, std::uint32_t raw) {
     inside = std::bit_cast<float>(entry.minimum) <= value && value <= std::bit_cast<float>(entry.maximum);
   } else if (entry.type == Type::integer8 || entry.type == Type::integer32) {
     const auto value = static_cast<std::int32_t>(raw);
-    inside = static_cast<std::int32_t>(entry.minimum) <= value && value <= static_cast<std::int32_t>(entry.maximum);
+    inside = static_cast<std::int32_t>(entry.minimum) <= value &&
+             value <= static_cast<std::int32_t>(entry.maximum);
   } else {
     inside = entry.minimum <= raw && raw <= entry.maximum;
   }

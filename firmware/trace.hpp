@@ -10,9 +10,9 @@ namespace kmax::firmware {
 /// One line of the running trace: four 32-bit values, eight registers.
 struct TraceRecord {
   std::uint32_t tick = 0;
-  std::int32_t count = 0;              ///< re-sampled position, low 32 bits
-  float force = 0.0f;                  ///< N
-  float magnetic_coefficient = 0.0f;   ///< N
+  std::int32_t count = 0;             ///< re-sampled position, low 32 bits
+  float force = 0.0f;                 ///< N
+  float magnetic_coefficient = 0.0f;  ///< N
 };
 
 /// The last 512 trace records of one axis, written by the tick and read through a window of input

@@ -14,14 +14,15 @@ namespace kmax::board {
 
 /// What moves instead of a real handle. Given from above, so that this floor knows no simulation.
 template <typename Device>
-concept SimulatedDevice = requires(Device device, std::size_t axis, const firmware::AxisOutput& output, double s) {
+concept SimulatedDevice = requires(Device device, std::size_t axis, const firmware::AxisOutput& output,
+                                   double s) {
   /// Encoder counter of an axis, free-running, wraps at 2^32; and whether the encoder answers.
   { device.count(axis) } -> std::same_as<std::uint32_t>;
   { device.count_valid(axis) } -> std::same_as<bool>;
   /// The force held over the coming interval.
-  { device.drive(axis, output) };
+  {device.drive(axis, output)};
   /// Lets the time pass, in s.
-  { device.advance(s) };
+  {device.advance(s)};
 };
 
 /// The firmware on x86: the same Application, fed by a simulated device, in virtual time.
@@ -35,7 +36,8 @@ class NativeBoard {
   static constexpr std::uint32_t tick_us = 1'000'000 / firmware::tick_rate_hz;
 
   explicit NativeBoard(Device& device)
-      : device_(device), application_({.board_name = "native", .serial_number = 1, .core_clock_hz = 0, .clock_source = 4}) {}
+      : device_(device),
+        application_({.board_name = "native", .serial_number = 1, .core_clock_hz = 0, .clock_source = 4}) {}
 
   firmware::Application& application() { return application_; }
 
@@ -84,7 +86,8 @@ class NativeBoard {
 
     const auto now = static_cast<std::uint32_t>(now_us_);
     while (!incoming_.empty() && incoming_.front().time_us <= now_us_) {
-      application_.ISR_serial_byte(incoming_.front().byte, false, static_cast<std::uint32_t>(incoming_.front().time_us));
+      application_.ISR_serial_byte(incoming_.front().byte, false,
+                                   static_cast<std::uint32_t>(incoming_.front().time_us));
       incoming_.pop_front();
     }
     application_.poll(now);

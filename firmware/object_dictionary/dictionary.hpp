@@ -88,7 +88,7 @@ constexpr SlotOwner owner_of(std::size_t slot) {
   return {slot - (axis_count - 1) * axis_entries.size(), 0};
 }
 
-/// FNV-1a over what host and device must agree on: name, place, type, bounds. Texts may differ.
+/// FNV-1a over what host and device must agree on: name, place, type, bounds, choices. Texts may differ.
 inline constexpr std::uint32_t dictionary_checksum = [] {
   std::uint32_t hash = 2166136261u;
   const auto mix = [&hash](std::uint32_t value) {
@@ -103,6 +103,10 @@ inline constexpr std::uint32_t dictionary_checksum = [] {
     mix(static_cast<std::uint32_t>(entry.type));
     mix(raw_from_number(entry.type, entry.minimum));
     mix(raw_from_number(entry.type, entry.maximum));
+    for (const NamedValue& choice : entry.values) {
+      for (const char c : choice.name) mix(static_cast<std::uint32_t>(c));
+      mix(static_cast<std::uint32_t>(choice.value));
+    }
   }
   return hash;
 }();

@@ -46,7 +46,6 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
   while (next_ != available) {
     const std::uint32_t waiting = available - next_;
     if (waiting > firmware::trace_capacity) {
-      lost_ += waiting - firmware::trace_capacity;
       next_ = available - static_cast<std::uint32_t>(firmware::trace_capacity);
     }
     const auto slot = static_cast<std::uint32_t>(next_ % firmware::trace_capacity);
@@ -56,7 +55,14 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
         static_cast<std::uint16_t>(firmware::trace_window + slot * firmware::trace_words_per_record);
     const auto words = device_.link().read_input(
         address, static_cast<std::uint16_t>(count * firmware::trace_words_per_record));
-    for (std::uint32_t i = 0; i < count; ++i) {
+    // Records near the end of the ring may have been overwritten while they were read.
+    std::uint32_t overwritten = 0;
+    if (waiting > firmware::trace_capacity / 2) {
+      const std::uint32_t age = device_.read(Parameter::of<"trace.next">()) - next_;
+      if (age > firmware::trace_capacity)
+        overwritten = std::min(count, age - static_cast<std::uint32_t>(firmware::trace_capacity));
+    }
+    for (std::uint32_t i = overwritten; i < count; ++i) {
       const std::uint32_t tick = field(words, i, 0);
       if (!started_) {
         started_ = true;
@@ -66,10 +72,7 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
       // A gap means records that were overwritten before they were read; one from an earlier time has been
       // passed already.
       const std::uint32_t gap = tick - last_tick_;
-      if (gap == 0 || gap > 0x80000000u) {
-        ++lost_;
-        continue;
-      }
+      if (gap == 0 || gap > 0x80000000u) continue;
       lost_ += gap / ticks_per_record_ - 1;
       last_tick_ = tick;
       samples.push_back({static_cast<double>(tick - first_tick_) / firmware::tick_rate_hz,

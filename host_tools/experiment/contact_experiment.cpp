@@ -15,7 +15,8 @@ using device::TraceSample;
 
 std::vector<ContactCondition> contact_conditions() {
   const auto magnetic = [](const char* coefficient) {
-    return std::vector<std::string>{"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", coefficient)};
+    return std::vector<std::string>{"wall.law=magnetic",
+                                    fmt::format("wall.magnetic_coefficient={}", coefficient)};
   };
   const auto adaptive = [](const char* mode) {
     return std::vector<std::string>{"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)};
@@ -65,8 +66,9 @@ class ArmedWhile {
   void require_armed() {
     const device::DriveStatus status = drive_.status();
     if (status.armed()) return;
-    throw device::DeviceError(fmt::format("the axis lost its force during the trial: {}",
-                                          status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+    throw device::DeviceError(
+        fmt::format("the axis lost its force during the trial: {}",
+                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
   }
 
  private:
@@ -87,19 +89,22 @@ ContactResult worst_of(std::vector<ContactResult> trials) {
     lost += trial.lost_records;
   }
   // An unstable trial outweighs any stable one, whatever a single slip of that one measured.
-  ContactResult worst = *std::max_element(trials.begin(), trials.end(), [](const ContactResult& a, const ContactResult& b) {
-    const auto weight = [](const ContactResult& trial) {
-      return std::pair(trial.measure.verdict == simulation::ContactVerdict::unstable, trial.measure.peak_to_peak);
-    };
-    return weight(a) < weight(b);
-  });
+  ContactResult worst =
+      *std::max_element(trials.begin(), trials.end(), [](const ContactResult& a, const ContactResult& b) {
+        const auto weight = [](const ContactResult& trial) {
+          return std::pair(trial.measure.verdict == simulation::ContactVerdict::unstable,
+                           trial.measure.peak_to_peak);
+        };
+        return weight(a) < weight(b);
+      });
   worst.trials = trials.size();
   worst.unstable_trials = unstable;
   worst.lost_records = lost;
   return worst;
 }
 
-ContactResult run_contact(device::Device& device, const ContactCondition& condition, const ContactSettings& settings,
+ContactResult run_contact(device::Device& device, const ContactCondition& condition,
+                          const ContactSettings& settings,
                           const std::function<void(const std::string&)>& tell) {
   ContactResult result;
   result.condition = condition;
@@ -121,17 +126,20 @@ ContactResult run_contact(device::Device& device, const ContactCondition& condit
       device.link().wait(std::chrono::milliseconds(20));
       trace.read(result.samples);
       for (; looked_at < result.samples.size() && touched < 0; ++looked_at) {
-        if (result.outside_distance(result.samples[looked_at]) <= 0.0) touched = result.samples[looked_at].time;
+        if (result.outside_distance(result.samples[looked_at]) <= 0.0)
+          touched = result.samples[looked_at].time;
       }
       const double now = result.samples.empty() ? 0.0 : result.samples.back().time;
       if (touched < 0 && now > settings.contact_patience)
-        throw device::DeviceError(fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
-                                              settings.contact_patience));
+        throw device::DeviceError(
+            fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
+                        settings.contact_patience));
       if (touched >= 0 && now >= touched + settings.hold_time + afterwards) break;
       if (round % 10 != 0) continue;
       armed.require_armed();
       tell(touched < 0 ? fmt::format("{}: waiting for the touch", condition.name)
-                       : fmt::format("{}: holding, {:.1f} of {:.1f} s", condition.name, now - touched, settings.hold_time));
+                       : fmt::format("{}: holding, {:.1f} of {:.1f} s", condition.name,
+                                     std::min(now - touched, settings.hold_time), settings.hold_time));
     }
     const double all = number(device, settings.axis, "measured.armed_samples");
     result.limited_share = all > 0 ? number(device, settings.axis, "measured.limited_samples") / all : 0.0;

@@ -13,9 +13,9 @@ namespace kmax::experiment {
 /// One of the walls that paper 1 lets its subject 1 touch (section 4.4, Figs. 9 to 12).
 struct ContactCondition {
   std::string name;
-  std::string figure;                     ///< of paper 1
-  std::vector<std::string> assignments;   ///< NAME=VALUE, what sets it apart
-  std::string paper_words;                ///< what the paper says of it
+  std::string figure;                    ///< of paper 1
+  std::vector<std::string> assignments;  ///< NAME=VALUE, what sets it apart
+  std::string paper_words;               ///< what the paper says of it
   bool paper_stable;
 };
 
@@ -25,9 +25,9 @@ std::vector<ContactCondition> contact_conditions();
 
 struct ContactSettings {
   std::size_t axis = 0;
-  double stiffness = 5500;    ///< N/m
-  double haptic_rate = 500;   ///< Hz
-  double hold_time = 3.0;     ///< s from the first touch; the last second is judged
+  double stiffness = 5500;         ///< N/m
+  double haptic_rate = 500;        ///< Hz
+  double hold_time = 3.0;          ///< s from the first touch; the last second is judged
   double contact_patience = 10.0;  ///< s from arming to the first touch
   double threshold = 0.165e-3;     ///< m peak to peak, contact_measure.hpp
 };
@@ -36,12 +36,14 @@ struct ContactResult {
   ContactCondition condition;
   std::vector<device::TraceSample> samples;  ///< from arming on; time 0 is the first touch
   simulation::ContactMeasure measure;
-  double surface = 0, side = 1;  ///< m; wall.position and wall.side
+  double surface = 0, side = 1;           ///< m; wall.position and wall.side
   double judged_from = 0, judged_to = 0;  ///< s
   double limited_share = 0;               ///< of the haptic samples
   std::string velocity_estimator;         ///< what the adaptive laws' velocity came from
   std::uint64_t lost_records = 0;
-  double outside_distance(const device::TraceSample& sample) const { return side * (sample.position - surface); }
+  double outside_distance(const device::TraceSample& sample) const {
+    return side * (sample.position - surface);
+  }
   std::size_t trials = 1, unstable_trials = 0;  ///< of the condition; the rest is the worst trial's
   bool agrees_with_paper() const {
     return (measure.verdict == simulation::ContactVerdict::stable) == condition.paper_stable &&
@@ -56,13 +58,15 @@ std::vector<std::string> contact_setup(const ContactSettings& settings);
 /// (paper 1's definition of the maximum stiffness, section 4.2). `trials` must not be empty.
 ContactResult worst_of(std::vector<ContactResult> trials);
 
-/// One trial: sets a condition up, arms, records until the hold is over, disarms. Whoever holds the handle presses it
-/// against the wall when the axis is armed and keeps pressing for hold_time: a simulated person does so by
-/// itself, a real one has to be told. `tell`: progress, called about five times a second with a short text.
+/// One trial: sets a condition up, arms, records until the hold is over, disarms. Whoever holds the handle
+/// presses it against the wall when the axis is armed and keeps pressing for hold_time: a simulated person
+/// does so by itself, a real one has to be told. `tell`: progress, called about five times a second with a
+/// short text.
 ///
 /// The axis is disarmed however this ends. Errors: device::DeviceError (no touch, a fault on the way),
 /// device::ValueError, link::LinkError.
-ContactResult run_contact(device::Device& device, const ContactCondition& condition, const ContactSettings& settings,
+ContactResult run_contact(device::Device& device, const ContactCondition& condition,
+                          const ContactSettings& settings,
                           const std::function<void(const std::string&)>& tell);
 
 }  // namespace kmax::experiment

@@ -13,7 +13,8 @@ std::string contact_table(const std::vector<ContactResult>& results);
 
 /// A picture (position, force and F_MC over time) and a CSV file with the same base name for one condition.
 /// Returns the names written. Throws plot::FigureError or std::runtime_error.
-std::vector<std::filesystem::path> write_contact(const ContactResult& result, const std::filesystem::path& folder,
+std::vector<std::filesystem::path> write_contact(const ContactResult& result,
+                                                 const std::filesystem::path& folder,
                                                  const std::string& picture_ending);
 
 std::string_view words_of(simulation::ContactVerdict verdict);

@@ -78,12 +78,13 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"files", names}});
     return done;
   }
-  fmt::print(context.out,
-             "Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.\n"
-             "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.\n"
-             "Velocity estimator: {}.\n\n{}",
-             settings.stiffness / 1000, settings.haptic_rate, settings.hold_time, settings.threshold * 1000,
-             options.trials, results.front().velocity_estimator, experiment::contact_table(results));
+  fmt::print(
+      context.out,
+      "Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.\n"
+      "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.\n"
+      "Velocity estimator: {}.\n\n{}",
+      settings.stiffness / 1000, settings.haptic_rate, settings.hold_time, settings.threshold * 1000,
+      options.trials, results.front().velocity_estimator, experiment::contact_table(results));
   for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
   for (const auto& result : results) {
     if (result.lost_records > 0)

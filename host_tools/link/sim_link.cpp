@@ -8,8 +8,12 @@
 namespace kmax::link {
 
 namespace {
-std::uint8_t high(std::uint16_t word) { return static_cast<std::uint8_t>(word >> 8); }
-std::uint8_t low(std::uint16_t word) { return static_cast<std::uint8_t>(word & 0xFF); }
+std::uint8_t high(std::uint16_t word) {
+  return static_cast<std::uint8_t>(word >> 8);
+}
+std::uint8_t low(std::uint16_t word) {
+  return static_cast<std::uint8_t>(word & 0xFF);
+}
 }  // namespace
 
 SimLink::SimLink(const simulation::Scene& scene)
@@ -54,8 +58,8 @@ std::vector<std::uint16_t> SimLink::read_input(std::uint16_t address, std::uint1
 void SimLink::write_holding(std::uint16_t address, std::span<const std::uint16_t> values) {
   constexpr std::uint8_t function = 16;
   const auto count = static_cast<std::uint16_t>(values.size());
-  std::vector<std::uint8_t> request{function,   high(address), low(address),
-                                    high(count), low(count),   static_cast<std::uint8_t>(2 * count)};
+  std::vector<std::uint8_t> request{function,    high(address), low(address),
+                                    high(count), low(count),    static_cast<std::uint8_t>(2 * count)};
   for (const std::uint16_t value : values) {
     request.push_back(high(value));
     request.push_back(low(value));
@@ -79,7 +83,8 @@ std::map<std::string, std::string> SimLink::identify() {
   return texts;
 }
 
-void SimLink::follow_line_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> /*baud_rate*/) {
+void SimLink::follow_line_settings(std::optional<std::uint8_t> unit,
+                                   std::optional<std::uint32_t> /*baud_rate*/) {
   if (unit) unit_ = *unit;
 }
 
@@ -92,6 +97,8 @@ void SimLink::wait(std::chrono::microseconds duration) {
   simulation_.board().advance(static_cast<std::uint64_t>((duration.count() + tick - 1) / tick));
 }
 
-std::unique_ptr<Link> make_sim_link() { return std::make_unique<SimLink>(simulated_board::factory_scene()); }
+std::unique_ptr<Link> make_sim_link() {
+  return std::make_unique<SimLink>(simulated_board::factory_scene());
+}
 
 }  // namespace kmax::link

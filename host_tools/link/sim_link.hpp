@@ -21,7 +21,8 @@ class SimLink final : public Link {
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override;
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override;
   std::map<std::string, std::string> identify() override;
-  void follow_line_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud_rate) override;
+  void follow_line_settings(std::optional<std::uint8_t> unit,
+                            std::optional<std::uint32_t> baud_rate) override;
   std::string description() const override { return "sim"; }
   std::chrono::microseconds now() const override;
   void wait(std::chrono::microseconds duration) override;

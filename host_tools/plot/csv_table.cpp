@@ -20,7 +20,8 @@ std::vector<std::string> fields_of(const std::string& line) {
     const std::size_t comma = line.find(',', begin);
     std::string field = line.substr(begin, comma == std::string::npos ? comma : comma - begin);
     while (!field.empty() && (field.back() == '\r' || field.back() == ' ')) field.pop_back();
-    field.erase(0, field.find_first_not_of(' ') == std::string::npos ? field.size() : field.find_first_not_of(' '));
+    field.erase(
+        0, field.find_first_not_of(' ') == std::string::npos ? field.size() : field.find_first_not_of(' '));
     fields.push_back(std::move(field));
     if (comma == std::string::npos) return fields;
     begin = comma + 1;
@@ -42,8 +43,8 @@ CsvTable read_csv(const std::filesystem::path& path) {
       continue;
     }
     if (fields.size() != table.names.size())
-      throw CsvError(fmt::format("{}:{}: {} fields where the first line names {} columns", path.string(), number,
-                                 fields.size(), table.names.size()));
+      throw CsvError(fmt::format("{}:{}: {} fields where the first line names {} columns", path.string(),
+                                 number, fields.size(), table.names.size()));
     for (std::size_t i = 0; i < fields.size(); ++i) {
       double value = 0;
       const char* const end = fields[i].data() + fields[i].size();
@@ -53,7 +54,8 @@ CsvTable read_csv(const std::filesystem::path& path) {
     }
   }
   if (table.names.empty()) throw CsvError(fmt::format("{}: the file is empty", path.string()));
-  if (table.columns[0].empty()) throw CsvError(fmt::format("{}: there are no rows below the column names", path.string()));
+  if (table.columns[0].empty())
+    throw CsvError(fmt::format("{}: there are no rows below the column names", path.string()));
   return table;
 }
 
@@ -64,16 +66,17 @@ const std::vector<double>& CsvTable::column(const std::string& name) const {
 }
 
 std::string label_of(const std::string& column) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> units = {{{"_m_per_s", "m/s"},
-                                                                                           {"_n_per_m", "N/m"},
-                                                                                           {"_counts", "counts"},
-                                                                                           {"_hz", "Hz"},
-                                                                                           {"_mm", "mm"},
-                                                                                           {"_m", "m"},
-                                                                                           {"_n", "N"},
-                                                                                           {"_s", "s"},
-                                                                                           {"_a", "A"},
-                                                                                           {"_v", "V"}}};
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> units = {
+      {{"_m_per_s", "m/s"},
+       {"_n_per_m", "N/m"},
+       {"_counts", "counts"},
+       {"_hz", "Hz"},
+       {"_mm", "mm"},
+       {"_m", "m"},
+       {"_n", "N"},
+       {"_s", "s"},
+       {"_a", "A"},
+       {"_v", "V"}}};
   for (const auto& [ending, unit] : units) {
     if (!column.ends_with(ending) || column.size() == ending.size()) continue;
     std::string words = column.substr(0, column.size() - ending.size());

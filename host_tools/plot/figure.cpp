@@ -39,7 +39,8 @@ std::string data_block(const Series& series, std::size_t number) {
 
 // From the lowest to the highest value with some air; a curve that never moves gets a height of its own.
 std::string y_range(const Panel& panel) {
-  if (panel.y_limits) return fmt::format("set yrange [{}:{}]\n", panel.y_limits->first, panel.y_limits->second);
+  if (panel.y_limits)
+    return fmt::format("set yrange [{}:{}]\n", panel.y_limits->first, panel.y_limits->second);
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Series& series : panel.series) {
     for (const double y : series.y) {
@@ -60,11 +61,15 @@ std::string panel_script(const Panel& panel, bool lowest, const Figure& figure, 
                    : "unset xlabel\nset format x ''\n";
   for (const Mark& mark : panel.marks) {
     if (mark.vertical) {
-      script += fmt::format("set arrow from {0},graph 0 to {0},graph 1 nohead dt 3 lc rgb '#666666'\n", mark.at);
-      script += fmt::format("set label {} at {},graph 0.94 offset 0.5,0 tc rgb '#444444'\n", quoted(mark.label), mark.at);
+      script +=
+          fmt::format("set arrow from {0},graph 0 to {0},graph 1 nohead dt 3 lc rgb '#666666'\n", mark.at);
+      script += fmt::format("set label {} at {},graph 0.94 offset 0.5,0 tc rgb '#444444'\n",
+                            quoted(mark.label), mark.at);
     } else {
-      script += fmt::format("set arrow from graph 0,first {0} to graph 1,first {0} nohead dt 3 lc rgb '#666666'\n", mark.at);
-      script += fmt::format("set label {} at graph 0.01,first {} offset 0,0.6 tc rgb '#444444'\n", quoted(mark.label), mark.at);
+      script += fmt::format(
+          "set arrow from graph 0,first {0} to graph 1,first {0} nohead dt 3 lc rgb '#666666'\n", mark.at);
+      script += fmt::format("set label {} at graph 0.01,first {} offset 0,0.6 tc rgb '#444444'\n",
+                            quoted(mark.label), mark.at);
     }
   }
   bool any_label = false;
@@ -72,9 +77,10 @@ std::string panel_script(const Panel& panel, bool lowest, const Figure& figure, 
   for (std::size_t i = 0; i < panel.series.size(); ++i) {
     const Series& series = panel.series[i];
     any_label = any_label || !series.label.empty();
-    script += fmt::format("{}$d{} using 1:2 with {} lw 1.5 dt {} lc rgb '{}' {}", i == 0 ? "" : ", ", first_block + i,
-                          series.steps ? "steps" : "lines", i % 5 + 1, colours[i % colours.size()],
-                          series.label.empty() ? "notitle" : "title " + quoted(series.label));
+    script +=
+        fmt::format("{}$d{} using 1:2 with {} lw 1.5 dt {} lc rgb '{}' {}", i == 0 ? "" : ", ",
+                    first_block + i, series.steps ? "steps" : "lines", i % 5 + 1, colours[i % colours.size()],
+                    series.label.empty() ? "notitle" : "title " + quoted(series.label));
   }
   return fmt::format("set key {}\n", any_label ? "on" : "off") + script + "\n";
 }
@@ -82,9 +88,11 @@ std::string panel_script(const Panel& panel, bool lowest, const Figure& figure, 
 std::string script_for(const Figure& figure, const std::filesystem::path& path, const std::string& terminal) {
   const std::size_t panels = figure.panels.size();
   const std::size_t height = panels == 1 ? 480 : 120 + 200 * panels;
-  std::string script = fmt::format("set terminal {} size 900,{} font 'sans,12' background '#ffffff'\n", terminal, height);
+  std::string script =
+      fmt::format("set terminal {} size 900,{} font 'sans,12' background '#ffffff'\n", terminal, height);
   script += fmt::format("set output {}\n", quoted(path.string()));
-  script += "set grid lc rgb '#dddddd' lt 1\nset border lc rgb '#444444'\nset key top right opaque noenhanced\n";
+  script +=
+      "set grid lc rgb '#dddddd' lt 1\nset border lc rgb '#444444'\nset key top right opaque noenhanced\n";
   script += "set lmargin 10\nset rmargin 3\nset tics nomirror\n";
   std::size_t block = 0;
   for (const Panel& panel : figure.panels) {
@@ -109,7 +117,8 @@ void write_figure(const Figure& figure, const std::filesystem::path& path) {
                                            [](const Panel& p) { return p.series.empty(); }))
     throw FigureError(fmt::format("{}: there is nothing to draw", path.string()));
   if (!path.parent_path().empty() && !std::filesystem::is_directory(path.parent_path()))
-    throw FigureError(fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
+    throw FigureError(
+        fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
 
   std::filesystem::path unfinished = path;
   unfinished += ".part";
@@ -119,7 +128,8 @@ void write_figure(const Figure& figure, const std::filesystem::path& path) {
   const bool written = std::fwrite(script.data(), 1, script.size(), gnuplot) == script.size();
   const int status = pclose(gnuplot);
   std::error_code error;
-  if (written && WIFEXITED(status) && WEXITSTATUS(status) == 0) std::filesystem::rename(unfinished, path, error);
+  if (written && WIFEXITED(status) && WEXITSTATUS(status) == 0)
+    std::filesystem::rename(unfinished, path, error);
   if (!written || !WIFEXITED(status) || WEXITSTATUS(status) != 0 || error) {
     std::error_code ignored;
     std::filesystem::remove(unfinished, ignored);

@@ -28,10 +28,11 @@ bool may_replace(const std::filesystem::path& link) {
 
 PseudoTerminal::PseudoTerminal(const std::filesystem::path& link) : link_(link) {
   if (!may_replace(link))
-    throw std::runtime_error(
-        fmt::format("{}: something else has this name; choose another one for the serial link", link.string()));
+    throw std::runtime_error(fmt::format(
+        "{}: something else has this name; choose another one for the serial link", link.string()));
   descriptor_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor_ < 0 || grantpt(descriptor_) != 0 || unlockpt(descriptor_) != 0) fail("no pseudo-terminal to be had");
+  if (descriptor_ < 0 || grantpt(descriptor_) != 0 || unlockpt(descriptor_) != 0)
+    fail("no pseudo-terminal to be had");
   std::array<char, 128> name{};
   if (ptsname_r(descriptor_, name.data(), name.size()) != 0) fail("the pseudo-terminal has no name");
   device_ = name.data();
@@ -61,7 +62,8 @@ std::vector<std::uint8_t> PseudoTerminal::read(std::int64_t timeout_us) {
   if (ppoll(&waiting, 1, &timeout, nullptr) <= 0) return {};
   std::array<std::uint8_t, 1024> buffer{};
   const ssize_t got = ::read(descriptor_, buffer.data(), buffer.size());
-  return got > 0 ? std::vector<std::uint8_t>(buffer.begin(), buffer.begin() + got) : std::vector<std::uint8_t>{};
+  return got > 0 ? std::vector<std::uint8_t>(buffer.begin(), buffer.begin() + got)
+                 : std::vector<std::uint8_t>{};
 }
 
 void PseudoTerminal::write(std::span<const std::uint8_t> bytes) {

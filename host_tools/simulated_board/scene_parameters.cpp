@@ -77,7 +77,8 @@ void preset(firmware::Application& application, const std::vector<device::Assign
   };
   application.preset(transaction_entry, 0, 1);
   for (const device::Assignment& assignment : assignments) {
-    const auto result = application.preset(assignment.parameter.entry(), assignment.parameter.axis(), assignment.raw);
+    const auto result =
+        application.preset(assignment.parameter.entry(), assignment.parameter.axis(), assignment.raw);
     if (result.refusal == firmware::Refusal::none) continue;
     application.preset(transaction_entry, 0, 0);
     refuse(result.refusal, result.address);

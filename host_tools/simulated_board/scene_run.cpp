@@ -19,7 +19,8 @@ void arm(SimulatedBoard& simulation) {
 }
 
 std::optional<simulation::ContactMeasure> judge(const simulation::Scene& scene, const RunResult& result) {
-  if (!scene.axes[0].motion || result.judged_to > scene.duration || result.samples.empty()) return std::nullopt;
+  if (!scene.axes[0].motion || result.judged_to > scene.duration || result.samples.empty())
+    return std::nullopt;
   std::vector<simulation::ContactSample> positions;
   for (const RunSample& sample : result.samples) positions.push_back({sample.time, sample.true_position});
   simulation::ContactCriterion criterion;
@@ -54,8 +55,8 @@ RunResult run_scene(const simulation::Scene& scene) {
     simulation.board().advance(1);
     const auto& haptic = application.ISR_report(0).haptic;
     if (!haptic.new_sample) continue;
-    result.samples.push_back({static_cast<double>(tick) / firmware::tick_rate_hz, true_position, true_velocity, hand,
-                              intended, static_cast<double>(haptic.position) * length,
+    result.samples.push_back({static_cast<double>(tick) / firmware::tick_rate_hz, true_position,
+                              true_velocity, hand, intended, static_cast<double>(haptic.position) * length,
                               static_cast<double>(haptic.velocity), static_cast<double>(haptic.force),
                               handle.applied_force(), static_cast<double>(haptic.magnetic_coefficient)});
   }

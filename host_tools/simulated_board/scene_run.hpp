@@ -25,12 +25,12 @@ struct RunSample {
 struct RunResult {
   std::vector<RunSample> samples;
   firmware::DriveState end_state{};
-  firmware::Refusal refusal{};            ///< why it could not be armed
+  firmware::Refusal refusal{};  ///< why it could not be armed
   firmware::Fault fault{};
   std::optional<simulation::ContactMeasure> contact;  ///< if there is a person whose hold was long enough
-  double judged_from = 0, judged_to = 0;  ///< s
-  double limited_share = 0;               ///< of the haptic samples, by force.limit
-  double clipped_share = 0;               ///< of the ticks, by the device
+  double judged_from = 0, judged_to = 0;              ///< s
+  double limited_share = 0;                           ///< of the haptic samples, by force.limit
+  double clipped_share = 0;                           ///< of the ticks, by the device
   double simulated_s = 0, real_s = 0;
 };
 

@@ -13,8 +13,8 @@ simulation::Scene open_scene(const std::string& name_or_path) {
     if (scene.name == name_or_path) return simulation::parse_scene(scene.text, scene.name, check_parameter);
     names += fmt::format("{}{}", names.empty() ? "" : ", ", scene.name);
   }
-  throw simulation::SceneError(
-      fmt::format("{}: no such file, and no supplied scene of that name; supplied are {}", name_or_path, names));
+  throw simulation::SceneError(fmt::format(
+      "{}: no such file, and no supplied scene of that name; supplied are {}", name_or_path, names));
 }
 
 simulation::Scene factory_scene() {

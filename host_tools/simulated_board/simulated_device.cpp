@@ -28,8 +28,8 @@ void SimulatedDevice::drive(std::size_t axis, const firmware::AxisOutput& output
 void SimulatedDevice::advance(double duration) {
   for (auto& axis : axes_) {
     if (!axis) continue;
-    axis->handle.advance(static_cast<double>(axis->output.force), static_cast<double>(axis->output.background_force),
-                         duration);
+    axis->handle.advance(static_cast<double>(axis->output.force),
+                         static_cast<double>(axis->output.background_force), duration);
   }
 }
 

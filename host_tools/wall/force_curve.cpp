@@ -10,8 +10,8 @@
 namespace kmax::wall {
 
 namespace {
-plot::Series curve(firmware::ParameterValues values, std::size_t axis, control::WallKind law, double approach_speed,
-                   std::string label) {
+plot::Series curve(firmware::ParameterValues values, std::size_t axis, control::WallKind law,
+                   double approach_speed, std::string label) {
   values.set_whole<"wall.law">(static_cast<std::uint32_t>(law), axis);
   const WallEvaluator evaluator(values, axis);
   const double surface = static_cast<double>(values.real<"wall.position">(axis));
@@ -35,16 +35,18 @@ void write_force_curves(const firmware::ParameterValues& values, std::size_t axi
                         const std::filesystem::path& picture) {
   using control::WallKind;
   plot::Figure figure;
-  figure.title = fmt::format("Wall laws, K = {:g} N/mm, x_0 = {:g} mm", values.real<"wall.stiffness">(axis) / 1000.0f,
-                             values.real<"wall.magnetic_length">(axis) * 1000.0f);
+  figure.title =
+      fmt::format("Wall laws, K = {:g} N/mm, x_0 = {:g} mm", values.real<"wall.stiffness">(axis) / 1000.0f,
+                  values.real<"wall.magnetic_length">(axis) * 1000.0f);
   figure.x_label = "distance outside the surface (mm); negative is inside";
-  figure.panels = {{"force outwards (N)",
-                    {curve(values, axis, WallKind::plain, 0, "plain"),
-                     curve(values, axis, WallKind::magnetic, 0,
-                           fmt::format("magnetic, F_MC = {:g} N", values.real<"wall.magnetic_coefficient">(axis))),
-                     curve(values, axis, WallKind::adaptive, 0, "adaptive, at rest"),
-                     curve(values, axis, WallKind::adaptive, 0.5, "adaptive, approaching at 0.5 m/s")},
-                    {{0.0, true, "surface"}}}};
+  figure.panels = {
+      {"force outwards (N)",
+       {curve(values, axis, WallKind::plain, 0, "plain"),
+        curve(values, axis, WallKind::magnetic, 0,
+              fmt::format("magnetic, F_MC = {:g} N", values.real<"wall.magnetic_coefficient">(axis))),
+        curve(values, axis, WallKind::adaptive, 0, "adaptive, at rest"),
+        curve(values, axis, WallKind::adaptive, 0.5, "adaptive, approaching at 0.5 m/s")},
+       {{0.0, true, "surface"}}}};
   plot::write_figure(figure, picture);
 }
 

@@ -5,8 +5,9 @@
 namespace kmax::wall {
 
 WallEvaluator::WallEvaluator(const firmware::ParameterValues& values, std::size_t axis)
-    : coefficients_(control::WallLaw<double>::prepare(firmware::wall_configuration<double>(values, axis),
-                                                      1.0 / static_cast<double>(values.real<"haptic.rate">(axis)))),
+    : coefficients_(
+          control::WallLaw<double>::prepare(firmware::wall_configuration<double>(values, axis),
+                                            1.0 / static_cast<double>(values.real<"haptic.rate">(axis)))),
       position_(static_cast<double>(values.real<"wall.position">(axis))),
       side_(values.whole<"wall.side">(axis)) {}
 

@@ -25,7 +25,8 @@ std::string read_whole(const std::filesystem::path& path) {
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
   return text;
 }
 
@@ -50,12 +51,14 @@ Columns read_header(std::string_view line, const std::string& file) {
     ++columns.count;
   } while (!line.empty());
   if (columns.position == absent)
-    throw TableError(fmt::format("{}:1: the first line must name the columns, {} and if wanted {}; it reads '{}'", file,
-                                 position_column, velocity_column, trimmed(whole)));
+    throw TableError(
+        fmt::format("{}:1: the first line must name the columns, {} and if wanted {}; it reads '{}'", file,
+                    position_column, velocity_column, trimmed(whole)));
   return columns;
 }
 
-double read_number(std::string_view field, std::string_view column, const std::string& file, std::size_t line) {
+double read_number(std::string_view field, std::string_view column, const std::string& file,
+                   std::size_t line) {
   double value = 0;
   const std::string_view digits = !field.empty() && field.front() == '+' ? field.substr(1) : field;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
@@ -95,9 +98,10 @@ std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem
       ++column;
     } while (!line.empty());
     if (column != columns.count)
-      throw TableError(fmt::format("{}:{}: {} fields where the first line names {} columns", file, line_number, column,
-                                   columns.count));
-    fmt::format_to(std::back_inserter(out), "{},{},{}\n", position, velocity, evaluator.at(position, velocity).force);
+      throw TableError(fmt::format("{}:{}: {} fields where the first line names {} columns", file,
+                                   line_number, column, columns.count));
+    fmt::format_to(std::back_inserter(out), "{},{},{}\n", position, velocity,
+                   evaluator.at(position, velocity).force);
     ++rows;
   }
   if (columns.count == 0) throw TableError(fmt::format("{}: the file is empty", file));

@@ -23,7 +23,9 @@ Config literal() {
   return config;
 }
 
-double any_velocity() { return *rc::gen::map(rc::gen::inRange(-500000, 500000), [](int n) { return n * 1e-5; }); }
+double any_velocity() {
+  return *rc::gen::map(rc::gen::inRange(-500000, 500000), [](int n) { return n * 1e-5; });
+}
 
 TEST(AdaptiveCoefficient, EquationSevenIsVelocityPlusEightTenthsWithThePapersNumbers) {
   for (double speed : {0.0, 0.1, 1.0, 1.2, 2.0, 2.4}) EXPECT_NEAR(at(literal(), -speed), speed + 0.8, 1e-12);
@@ -36,7 +38,9 @@ TEST(AdaptiveCoefficient, DefaultsKeepThePapersBestInterval) {
   EXPECT_DOUBLE_EQ(at(Config{}, -1e300), 2.0);
 }
 
-TEST(AdaptiveCoefficient, NormalisedVelocityStopsAtOne) { EXPECT_NEAR(at(literal(), -24.0), 3.2, 1e-12); }
+TEST(AdaptiveCoefficient, NormalisedVelocityStopsAtOne) {
+  EXPECT_NEAR(at(literal(), -24.0), 3.2, 1e-12);
+}
 
 TEST(AdaptiveCoefficient, ApproachIgnoresMotionAwayAndSpeedDoesNot) {
   Config config = literal();
@@ -59,9 +63,11 @@ RC_GTEST_PROP(AdaptiveCoefficient, RelationsAreTheirFormulas, ()) {
 RC_GTEST_PROP(AdaptiveCoefficient, NeverLeavesItsInterval, ()) {
   Config config;
   config.force_min = *rc::gen::map(rc::gen::inRange(0, 1000), [](int n) { return n * 0.01; });
-  config.force_max = config.force_min + *rc::gen::map(rc::gen::inRange(0, 1000), [](int n) { return n * 0.01; });
+  config.force_max =
+      config.force_min + *rc::gen::map(rc::gen::inRange(0, 1000), [](int n) { return n * 0.01; });
   config.mode = *rc::gen::element(AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold);
-  config.relation = *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
+  config.relation =
+      *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
   config.velocity = *rc::gen::element(AdaptiveVelocity::approach, AdaptiveVelocity::speed);
   Coefficient coefficient;
   const auto c = Coefficient::prepare(config, period);
@@ -74,7 +80,8 @@ RC_GTEST_PROP(AdaptiveCoefficient, NeverLeavesItsInterval, ()) {
 
 RC_GTEST_PROP(AdaptiveCoefficient, FasterApproachNeverGivesLess, ()) {
   Config config;
-  config.relation = *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
+  config.relation =
+      *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
   const double slow = -std::abs(any_velocity());
   const double fast = slow - std::abs(any_velocity());
   RC_ASSERT(at(config, fast) >= at(config, slow));
@@ -95,7 +102,8 @@ TEST(AdaptiveCoefficient, LatchedKeepsTheValueOfTheContactUntilTheWallIsLeft) {
   const auto c = Coefficient::prepare(config, period);
   EXPECT_NEAR(coefficient.update(c, -1.0, false), 1.8, 1e-12) << "outside: at once";
   EXPECT_NEAR(coefficient.update(c, -0.5, true), 1.3, 1e-12) << "contact";
-  for (int i = 0; i < 1000; ++i) ASSERT_NEAR(coefficient.update(c, i % 2 == 0 ? -2.0 : 0.5, true), 1.3, 1e-12);
+  for (int i = 0; i < 1000; ++i)
+    ASSERT_NEAR(coefficient.update(c, i % 2 == 0 ? -2.0 : 0.5, true), 1.3, 1e-12);
   EXPECT_NEAR(coefficient.update(c, 0.0, false), 0.8, 1e-12) << "left";
   EXPECT_NEAR(coefficient.update(c, -0.2, true), 1.0, 1e-12) << "next contact";
 }

@@ -73,7 +73,8 @@ RC_GTEST_PROP(ForceLimiter, NothingThatGoesInBreaksTheLimit, ()) {
   ForceLimiterConfig<float> config;
   config.limit = *rc::gen::map(rc::gen::inRange(0, 1000), [](int n) { return static_cast<float>(n) * 0.1f; });
   config.slew_limit = *rc::gen::map(rc::gen::inRange(0, 1000), [](int n) { return static_cast<float>(n); });
-  config.ramp_time = *rc::gen::map(rc::gen::inRange(0, 10), [](int n) { return static_cast<float>(n) * 0.001f; });
+  config.ramp_time =
+      *rc::gen::map(rc::gen::inRange(0, 10), [](int n) { return static_cast<float>(n) * 0.001f; });
   const auto c = Limiter::prepare(config, period);
   Limiter limiter;
   for (int i = 0; i < 50; ++i) {

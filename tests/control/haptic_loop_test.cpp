@@ -26,7 +26,8 @@ class Loop {
  public:
   explicit Loop(const HapticLoopConfig<Scalar>& config, std::int64_t near = 0)
       : coefficients_(HapticLoop<Scalar>::prepare(config, near)) {}
-  const typename HapticLoop<Scalar>::Output& at(std::int64_t count, bool enabled = true, Scalar external = Scalar(0)) {
+  const typename HapticLoop<Scalar>::Output& at(std::int64_t count, bool enabled = true,
+                                                Scalar external = Scalar(0)) {
     return loop_.tick(coefficients_, count, enabled, external);
   }
   HapticLoop<Scalar>& loop() { return loop_; }
@@ -50,7 +51,8 @@ TEST(HapticLoop, PenetrationIsExactToTheCountTenMetresFromZero) {
       const float penetration = -out.outside_distance;
       ASSERT_EQ(std::lround(static_cast<double>(penetration) / 1e-7), n);
       // One rounding of the count length and one of the product.
-      ASSERT_NEAR(static_cast<double>(penetration), static_cast<double>(n) * 1e-7, static_cast<double>(n) * 1e-7 * 2e-7);
+      ASSERT_NEAR(static_cast<double>(penetration), static_cast<double>(n) * 1e-7,
+                  static_cast<double>(n) * 1e-7 * 2e-7);
     }
     EXPECT_FALSE(loop.at(100'000'000 + side).inside);
   }
@@ -160,14 +162,30 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
       config.wall.damping = 1.0f;
       auto c = HapticLoop<float>::prepare(config, 0);
       switch (field) {
-        case 0: c.wall.stiffness = value; break;
-        case 1: c.wall.magnetic_coefficient = value; break;
-        case 2: c.count_length = value; break;
-        case 3: c.wall_fraction = value; break;
-        case 4: c.wall.adaptive.gain = value; break;
-        case 5: c.wall.adaptive.offset = value; break;
-        case 6: c.side = value; break;
-        case 7: c.force.limit = value; break;
+        case 0:
+          c.wall.stiffness = value;
+          break;
+        case 1:
+          c.wall.magnetic_coefficient = value;
+          break;
+        case 2:
+          c.count_length = value;
+          break;
+        case 3:
+          c.wall_fraction = value;
+          break;
+        case 4:
+          c.wall.adaptive.gain = value;
+          break;
+        case 5:
+          c.wall.adaptive.offset = value;
+          break;
+        case 6:
+          c.side = value;
+          break;
+        case 7:
+          c.force.limit = value;
+          break;
       }
       HapticLoop<float> loop;
       for (int i = 0; i < 10; ++i) {
@@ -184,7 +202,8 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
 
 RC_GTEST_PROP(HapticLoop, AnyWalkOfCountsGivesAFiniteForceWithinTheLimit, ()) {
   auto config = plain_wall<float>();
-  config.wall.kind = *rc::gen::element(WallKind::none, WallKind::plain, WallKind::magnetic, WallKind::adaptive);
+  config.wall.kind =
+      *rc::gen::element(WallKind::none, WallKind::plain, WallKind::magnetic, WallKind::adaptive);
   config.wall.stiffness = 1e6f;
   config.wall.damping = 1000.0f;
   config.wall.magnetic_length = 1e-6f;

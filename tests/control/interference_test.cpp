@@ -33,7 +33,9 @@ TEST(Interference, OnsetIsAWholeNumberOfSamplesInFloatToo) {
     const auto c = Interference<float>::prepare({InterferenceMode::parallel, 1.0f, 1.0f, 0.1f}, period);
     EXPECT_NEAR(static_cast<double>(c.onset_samples), 0.1 / static_cast<double>(period), 0.51) << period;
   }
-  EXPECT_EQ(Interference<float>::prepare({InterferenceMode::parallel, 1.0f, 1.0f, 0.1f}, 0.002f).onset_samples, 50u);
+  EXPECT_EQ(
+      Interference<float>::prepare({InterferenceMode::parallel, 1.0f, 1.0f, 0.1f}, 0.002f).onset_samples,
+      50u);
 }
 
 TEST(Interference, AnAbsurdOnsetNeverComesAndNeverWraps) {

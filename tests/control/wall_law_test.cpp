@@ -11,9 +11,11 @@ namespace kmax::control {
 namespace {
 
 template <typename Scalar>
-Scalar force_at(const WallLawConfig<Scalar>& config, Scalar outside_distance, Scalar outward_velocity = Scalar(0)) {
+Scalar force_at(const WallLawConfig<Scalar>& config, Scalar outside_distance,
+                Scalar outward_velocity = Scalar(0)) {
   WallLaw<Scalar> law;
-  return law.update(WallLaw<Scalar>::prepare(config, Scalar(0.002)), outside_distance, outward_velocity).force;
+  return law.update(WallLaw<Scalar>::prepare(config, Scalar(0.002)), outside_distance, outward_velocity)
+      .force;
 }
 
 template <typename Scalar>
@@ -56,9 +58,10 @@ TEST(WallLaw, MeetsTheTestValuesInFloatWithinFourUlp) {
     // The reference is what the float inputs stand for, worked in double.
     const double distance = static_cast<double>(static_cast<float>(point.outside_distance));
     const double length = static_cast<double>(0.001f);
-    const double exact =
-        distance > 0 ? 2.0 / std::pow(distance / length + 1.0, 2) : 2.0 + 8410.0 * -distance;
-    EXPECT_LE(ulp_distance(force_at(config, static_cast<float>(point.outside_distance)), static_cast<float>(exact)), 4)
+    const double exact = distance > 0 ? 2.0 / std::pow(distance / length + 1.0, 2) : 2.0 + 8410.0 * -distance;
+    EXPECT_LE(
+        ulp_distance(force_at(config, static_cast<float>(point.outside_distance)), static_cast<float>(exact)),
+        4)
         << "at " << point.outside_distance << " m";
   }
 }
@@ -119,8 +122,9 @@ RC_GTEST_PROP(WallLaw, ForceNeverFallsOnTheWayIn, ()) {
   const auto number = [](int low, int high, double scale) {
     return *rc::gen::map(rc::gen::inRange(low, high), [scale](int n) { return n * scale; });
   };
-  const auto config = magnetic<float>(static_cast<float>(number(0, 1000000, 1)), static_cast<float>(number(0, 100000, 1e-3)),
-                                      static_cast<float>(number(1, 1000000, 1e-6)));
+  const auto config =
+      magnetic<float>(static_cast<float>(number(0, 1000000, 1)), static_cast<float>(number(0, 100000, 1e-3)),
+                      static_cast<float>(number(1, 1000000, 1e-6)));
   const auto far = static_cast<float>(number(-1000000, 1000000, 1e-7));
   const auto near = far - static_cast<float>(number(0, 1000000, 1e-9));
   RC_ASSERT(force_at(config, near) >= force_at(config, far));
@@ -128,9 +132,9 @@ RC_GTEST_PROP(WallLaw, ForceNeverFallsOnTheWayIn, ()) {
 
 RC_GTEST_PROP(WallLaw, EveryFiniteInputGivesAFiniteForce, ()) {
   const auto any_finite = [] {
-    return *rc::gen::suchThat(rc::gen::map(rc::gen::arbitrary<std::uint32_t>(), [](std::uint32_t bits) {
-      return std::bit_cast<float>(bits);
-    }), [](float v) { return std::isfinite(v); });
+    return *rc::gen::suchThat(rc::gen::map(rc::gen::arbitrary<std::uint32_t>(),
+                                           [](std::uint32_t bits) { return std::bit_cast<float>(bits); }),
+                              [](float v) { return std::isfinite(v); });
   };
   WallLawConfig<float> config;
   config.kind = *rc::gen::element(WallKind::plain, WallKind::magnetic, WallKind::adaptive);
@@ -143,8 +147,10 @@ RC_GTEST_PROP(WallLaw, EveryFiniteInputGivesAFiniteForce, ()) {
   config.adaptive.velocity_max = std::abs(any_finite());
   config.adaptive.force_min = 0.8f;
   config.adaptive.force_max = std::numeric_limits<float>::max();
-  config.adaptive.relation = *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
-  config.adaptive.mode = *rc::gen::element(AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold);
+  config.adaptive.relation =
+      *rc::gen::element(AdaptiveRelation::linear, AdaptiveRelation::square, AdaptiveRelation::square_root);
+  config.adaptive.mode =
+      *rc::gen::element(AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold);
   RC_PRE(config.magnetic_length > 0.0f && config.adaptive.velocity_max > 0.0f);
   WallLaw<float> law;
   const auto coefficients = WallLaw<float>::prepare(config, 5e-5f);
@@ -157,8 +163,10 @@ RC_GTEST_PROP(WallLaw, EveryFiniteInputGivesAFiniteForce, ()) {
 }
 
 TEST(WallLaw, SurvivesATinyFieldLengthAndAHugeStiffness) {
-  EXPECT_EQ(force_at(magnetic<float>(1e6f, 2.0f, 1e-6f), 0.1f), 2.0f / ((0.1f * 1e6f + 1) * (0.1f * 1e6f + 1)));
-  EXPECT_EQ(force_at(magnetic<float>(0.0f, 2.0f, 1e-44f), 1.0f), 0.0f) << "x_0 below the smallest normal number";
+  EXPECT_EQ(force_at(magnetic<float>(1e6f, 2.0f, 1e-6f), 0.1f),
+            2.0f / ((0.1f * 1e6f + 1) * (0.1f * 1e6f + 1)));
+  EXPECT_EQ(force_at(magnetic<float>(0.0f, 2.0f, 1e-44f), 1.0f), 0.0f)
+      << "x_0 below the smallest normal number";
   EXPECT_EQ(force_at(magnetic<float>(1e38f, 2.0f, 1e-3f), -1e9f), std::numeric_limits<float>::max());
   EXPECT_EQ(force_at(magnetic<double>(1e6, 2, 1e-3), -1.0), 1e6 + 2);
 }
