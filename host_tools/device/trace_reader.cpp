@@ -24,7 +24,7 @@ std::uint32_t field(const std::vector<std::uint16_t>& words, std::size_t record,
 TraceReader::TraceReader(Device& device, std::size_t axis, std::uint16_t interval) : device_(device) {
   set_interval(device_, 0);
   device_.write(Parameter::of<"trace.axis">(), static_cast<std::uint32_t>(axis), true);
-  next_ = device_.read(Parameter::of<"trace.next">());
+  next_ = began_ = device_.read(Parameter::of<"trace.next">());
   const double rate = static_cast<double>(
       std::bit_cast<float>(device_.read(Parameter(firmware::entry_of<"haptic.rate">(), axis))));
   ticks_per_record_ = static_cast<std::uint32_t>(firmware::tick_rate_hz / rate + 0.5) * interval;
@@ -66,7 +66,9 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
       const std::uint32_t tick = field(words, i, 0);
       if (!started_) {
         started_ = true;
-        first_tick_ = tick;
+        const std::uint32_t missed = next_ + i - began_;
+        lost_ = missed;
+        first_tick_ = tick - missed * ticks_per_record_;
         last_tick_ = tick - ticks_per_record_;
       }
       // A gap means records that were overwritten before they were read; one from an earlier time has been

@@ -34,7 +34,8 @@ class TraceReader {
 
  private:
   Device& device_;
-  std::uint32_t next_ = 0;  // record to read next
+  std::uint32_t next_ = 0;   // record to read next
+  std::uint32_t began_ = 0;  // first record of this trace
   std::uint32_t first_tick_ = 0, last_tick_ = 0;
   std::uint32_t ticks_per_record_;
   double count_length_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "host_tools/device/drive.hpp"
@@ -120,15 +121,21 @@ ContactResult run_contact(device::Device& device, const ContactCondition& condit
   double touched = -1.0;
   {
     ArmedWhile armed(device, settings.axis);
-    constexpr double afterwards = 0.3;  // s of the release, for the picture
+    constexpr double afterwards = 0.3;                         // s of the release, for the picture
+    constexpr auto longest_silence = std::chrono::seconds(2);  // of the trace; each request takes < 1 s
     std::size_t looked_at = 0;
+    auto last_news = device.link().now();
     for (int round = 0;; ++round) {
       device.link().wait(std::chrono::milliseconds(20));
       trace.read(result.samples);
-      for (; looked_at < result.samples.size() && touched < 0; ++looked_at) {
-        if (result.outside_distance(result.samples[looked_at]) <= 0.0)
+      if (looked_at < result.samples.size()) last_news = device.link().now();
+      for (; looked_at < result.samples.size(); ++looked_at) {
+        if (touched < 0 && result.outside_distance(result.samples[looked_at]) <= 0.0)
           touched = result.samples[looked_at].time;
       }
+      // Without this the axis would stay armed for ever.
+      if (device.link().now() - last_news > longest_silence)
+        throw device::DeviceError("the trace has stopped during the trial; does another program use it?");
       const double now = result.samples.empty() ? 0.0 : result.samples.back().time;
       if (touched < 0 && now > settings.contact_patience)
         throw device::DeviceError(
@@ -141,6 +148,7 @@ ContactResult run_contact(device::Device& device, const ContactCondition& condit
                        : fmt::format("{}: holding, {:.1f} of {:.1f} s", condition.name,
                                      std::min(now - touched, settings.hold_time), settings.hold_time));
     }
+    armed.require_armed();
     const double all = number(device, settings.axis, "measured.armed_samples");
     result.limited_share = all > 0 ? number(device, settings.axis, "measured.limited_samples") / all : 0.0;
   }

@@ -76,7 +76,7 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
   figure.x_label = "time since the first touch (s)";
   const std::vector<plot::Mark> judged = {{result.judged_from, true, "judged"}, {result.judged_to, true, ""}};
   const std::vector<plot::Mark> unnamed = {{result.judged_from, true, ""}, {result.judged_to, true, ""}};
-  figure.panels = {{"distance outside (mm)", {distance}, judged},
+  figure.panels = {{"position from the surface (mm)", {distance}, judged},
                    {"force (N)", {force}, unnamed},
                    {"F_{MC} (N)", {coefficient}, unnamed}};
   // The approach from centimetres away would hide what happens at the surface.

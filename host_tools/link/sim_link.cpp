@@ -94,6 +94,7 @@ std::chrono::microseconds SimLink::now() const {
 
 void SimLink::wait(std::chrono::microseconds duration) {
   const auto tick = static_cast<std::int64_t>(board::NativeBoard<simulated_board::SimulatedDevice>::tick_us);
+  if (duration.count() <= 0) return;
   simulation_.board().advance(static_cast<std::uint64_t>((duration.count() + tick - 1) / tick));
 }
 

@@ -53,6 +53,7 @@ CsvTable read_csv(const std::filesystem::path& path) {
       table.columns[i].push_back(whole ? value : std::numeric_limits<double>::quiet_NaN());
     }
   }
+  if (file.bad()) throw CsvError(fmt::format("{}: reading failed; is it a folder?", path.string()));
   if (table.names.empty()) throw CsvError(fmt::format("{}: the file is empty", path.string()));
   if (table.columns[0].empty())
     throw CsvError(fmt::format("{}: there are no rows below the column names", path.string()));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <limits>
 
@@ -16,14 +17,33 @@ namespace {
 // Okabe and Ito's palette, blue first.
 constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"};
 
+// In single quotes: between double ones gnuplot runs what stands in `backquotes` as a command, and the text
+// may come from a file that somebody else made.
 std::string quoted(const std::string& text) {
-  std::string out = "\"";
+  std::string out = "'";
   for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
+    if (c == '\'') out += '\'';
+    out += c == '\n' || c == '\r' ? ' ' : c;
   }
-  return out + '"';
+  return out + "'";
 }
+
+/// A gnuplot that ends early, or is not there, closes the pipe: an error to report, no reason to die.
+class WithoutPipeSignal {
+ public:
+  WithoutPipeSignal() {
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    sigemptyset(&ignore.sa_mask);
+    sigaction(SIGPIPE, &ignore, &previous_);
+  }
+  ~WithoutPipeSignal() { sigaction(SIGPIPE, &previous_, nullptr); }
+  WithoutPipeSignal(const WithoutPipeSignal&) = delete;
+  WithoutPipeSignal& operator=(const WithoutPipeSignal&) = delete;
+
+ private:
+  struct sigaction previous_ {};
+};
 
 std::string data_block(const Series& series, std::size_t number) {
   std::string block = fmt::format("$d{} << EOD\n", number);
@@ -125,6 +145,7 @@ void write_figure(const Figure& figure, const std::filesystem::path& path) {
   const std::string script = script_for(figure, unfinished, ending == ".svg" ? "svg" : "pngcairo");
   FILE* gnuplot = popen("gnuplot >/dev/null 2>&1", "w");
   if (gnuplot == nullptr) throw FigureError("gnuplot cannot be started");
+  const WithoutPipeSignal guard;
   const bool written = std::fwrite(script.data(), 1, script.size(), gnuplot) == script.size();
   const int status = pclose(gnuplot);
   std::error_code error;

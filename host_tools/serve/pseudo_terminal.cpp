@@ -30,18 +30,18 @@ PseudoTerminal::PseudoTerminal(const std::filesystem::path& link) : link_(link) 
   if (!may_replace(link))
     throw std::runtime_error(fmt::format(
         "{}: something else has this name; choose another one for the serial link", link.string()));
-  descriptor_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor_ < 0 || grantpt(descriptor_) != 0 || unlockpt(descriptor_) != 0)
+  controlling_.number = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (controlling_.number < 0 || grantpt(controlling_.number) != 0 || unlockpt(controlling_.number) != 0)
     fail("no pseudo-terminal to be had");
   std::array<char, 128> name{};
-  if (ptsname_r(descriptor_, name.data(), name.size()) != 0) fail("the pseudo-terminal has no name");
+  if (ptsname_r(controlling_.number, name.data(), name.size()) != 0) fail("the pseudo-terminal has no name");
   device_ = name.data();
   // Kept open here too, so that the line does not hang up between one program and the next.
-  kept_open_ = open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  kept_open_.number = open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC);
   termios settings{};
-  if (kept_open_ < 0 || tcgetattr(kept_open_, &settings) != 0) fail(device_.string());
+  if (kept_open_.number < 0 || tcgetattr(kept_open_.number, &settings) != 0) fail(device_.string());
   cfmakeraw(&settings);
-  tcsetattr(kept_open_, TCSANOW, &settings);
+  tcsetattr(kept_open_.number, TCSANOW, &settings);
 
   std::error_code error;
   std::filesystem::remove(link, error);
@@ -49,25 +49,27 @@ PseudoTerminal::PseudoTerminal(const std::filesystem::path& link) : link_(link) 
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", link.string(), error.message()));
 }
 
+PseudoTerminal::Descriptor::~Descriptor() {
+  if (number >= 0) close(number);
+}
+
 PseudoTerminal::~PseudoTerminal() {
   std::error_code error;
   if (std::filesystem::read_symlink(link_, error) == device_) std::filesystem::remove(link_, error);
-  close(kept_open_);
-  close(descriptor_);
 }
 
 std::vector<std::uint8_t> PseudoTerminal::read(std::int64_t timeout_us) {
-  pollfd waiting{descriptor_, POLLIN, 0};
+  pollfd waiting{controlling_.number, POLLIN, 0};
   const timespec timeout{timeout_us / 1'000'000, (timeout_us % 1'000'000) * 1000};
   if (ppoll(&waiting, 1, &timeout, nullptr) <= 0) return {};
   std::array<std::uint8_t, 1024> buffer{};
-  const ssize_t got = ::read(descriptor_, buffer.data(), buffer.size());
+  const ssize_t got = ::read(controlling_.number, buffer.data(), buffer.size());
   return got > 0 ? std::vector<std::uint8_t>(buffer.begin(), buffer.begin() + got)
                  : std::vector<std::uint8_t>{};
 }
 
 void PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
-  const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+  const ssize_t written = ::write(controlling_.number, bytes.data(), bytes.size());
   static_cast<void>(written);
 }
 

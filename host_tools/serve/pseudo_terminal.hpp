@@ -27,8 +27,14 @@ class PseudoTerminal {
   const std::filesystem::path& device() const { return device_; }
 
  private:
-  int descriptor_ = -1;
-  int kept_open_ = -1;
+  struct Descriptor {
+    Descriptor() = default;
+    ~Descriptor();
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    int number = -1;
+  };
+  Descriptor controlling_, kept_open_;
   std::filesystem::path link_, device_;
 };
 

@@ -4,8 +4,10 @@
 
 #include <charconv>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace kmax::wall {
 
@@ -17,7 +19,10 @@ constexpr std::size_t absent = static_cast<std::size_t>(-1);
 
 std::string read_whole(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw TableError(fmt::format("{}: cannot be opened for reading", path.string()));
+  std::error_code error;
+  // A folder can be opened; only reading it fails, outside the stream's own error handling.
+  if (!file || std::filesystem::is_directory(path, error))
+    throw TableError(fmt::format("{}: cannot be opened for reading", path.string()));
   std::string text(std::istreambuf_iterator<char>(file), {});
   if (file.bad()) throw TableError(fmt::format("{}: reading failed", path.string()));
   return text;
@@ -30,11 +35,13 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-std::string_view next_field(std::string_view& line) {
+/// Takes the first field off `rest`, which has no value after the last one: a comma at the end of a line
+/// is followed by an empty field.
+std::string_view next_field(std::optional<std::string_view>& rest) {
+  const std::string_view line = *rest;
   const std::size_t comma = line.find(',');
-  const std::string_view field = line.substr(0, comma);
-  line.remove_prefix(comma == std::string_view::npos ? line.size() : comma + 1);
-  return trimmed(field);
+  rest = comma == std::string_view::npos ? std::nullopt : std::optional(line.substr(comma + 1));
+  return trimmed(line.substr(0, comma));
 }
 
 struct Columns {
@@ -43,24 +50,29 @@ struct Columns {
 
 Columns read_header(std::string_view line, const std::string& file) {
   Columns columns;
-  const std::string whole(line);
-  do {
-    const std::string_view name = next_field(line);
-    if (name == position_column) columns.position = columns.count;
-    if (name == velocity_column) columns.velocity = columns.count;
+  std::optional<std::string_view> fields = line;
+  while (fields) {
+    const std::string_view name = next_field(fields);
+    for (const auto& [wanted, place] :
+         {std::pair(position_column, &columns.position), std::pair(velocity_column, &columns.velocity)}) {
+      if (name != wanted) continue;
+      if (*place != absent) throw TableError(fmt::format("{}:1: two columns are named {}", file, wanted));
+      *place = columns.count;
+    }
     ++columns.count;
-  } while (!line.empty());
+  }
   if (columns.position == absent)
     throw TableError(
         fmt::format("{}:1: the first line must name the columns, {} and if wanted {}; it reads '{}'", file,
-                    position_column, velocity_column, trimmed(whole)));
+                    position_column, velocity_column, trimmed(line)));
   return columns;
 }
 
 double read_number(std::string_view field, std::string_view column, const std::string& file,
                    std::size_t line) {
   double value = 0;
-  const std::string_view digits = !field.empty() && field.front() == '+' ? field.substr(1) : field;
+  const bool plus = field.starts_with('+') && !field.starts_with("+-");
+  const std::string_view digits = plus ? field.substr(1) : field;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error != std::errc{} || end != digits.data() + digits.size() || !control::is_finite(value))
     throw TableError(fmt::format("{}:{}: {} is '{}'; a finite number is needed", file, line, column, field));
@@ -91,12 +103,13 @@ std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem
     }
     double position = 0, velocity = 0;
     std::size_t column = 0;
-    do {
-      const std::string_view field = next_field(line);
+    std::optional<std::string_view> fields = line;
+    while (fields) {
+      const std::string_view field = next_field(fields);
       if (column == columns.position) position = read_number(field, position_column, file, line_number);
       if (column == columns.velocity) velocity = read_number(field, velocity_column, file, line_number);
       ++column;
-    } while (!line.empty());
+    }
     if (column != columns.count)
       throw TableError(fmt::format("{}:{}: {} fields where the first line names {} columns", file,
                                    line_number, column, columns.count));
@@ -106,11 +119,15 @@ std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem
   }
   if (columns.count == 0) throw TableError(fmt::format("{}: the file is empty", file));
 
+  std::error_code error;
+  // The finished table takes the place of what has its name: that must not be /dev/stdout, or a folder.
+  if (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error))
+    throw TableError(
+        fmt::format("{}: is not a regular file; give the name of a file to write", output.string()));
   const std::filesystem::path unfinished = output.string() + ".part";
   std::ofstream target(unfinished, std::ios::binary | std::ios::trunc);
   target.write(out.data(), static_cast<std::streamsize>(out.size()));
   target.close();
-  std::error_code error;
   if (target) std::filesystem::rename(unfinished, output, error);
   if (!target || error) {
     std::error_code ignored;

@@ -43,7 +43,9 @@ class FakeDevice {
       std::uint16_t word = 0;
       if (deaf_to_commands || !registers.fetch_controlword(axis, word)) continue;
       controlwords.push_back(word);
-      machines[axis].command(word, obstacle[axis], cause_remains[axis]);
+      const bool enables = machines[axis].asks_to_enable(word);
+      pending_.push_back({axis, word, now_us + (enables ? judgement_us : 0)});
+      carry_out_due();
     }
     return Exception::none;
   }
@@ -77,6 +79,7 @@ class FakeDevice {
   void pass(std::uint64_t microseconds) {
     now_us += microseconds;
     registers.poll(static_cast<std::uint32_t>(now_us));
+    carry_out_due();
   }
 
   std::array<std::uint32_t, firmware::slot_count> settings() const {
@@ -95,8 +98,23 @@ class FakeDevice {
   std::vector<std::uint16_t> controlwords;
   bool deaf_to_commands = false;
   std::uint64_t now_us = 1'000'000;
+  std::uint64_t judgement_us = 0;  ///< until a request to enable operation is carried out or refused
 
  private:
+  struct PendingCommand {
+    std::size_t axis;
+    std::uint16_t word;
+    std::uint64_t due_us;
+  };
+
+  void carry_out_due() {
+    while (!pending_.empty() && pending_.front().due_us <= now_us) {
+      const PendingCommand command = pending_.front();
+      pending_.erase(pending_.begin());
+      machines[command.axis].command(command.word, obstacle[command.axis], cause_remains[command.axis]);
+    }
+  }
+
   Exception read(bool holding, std::uint16_t address, std::span<std::uint16_t> out) {
     if (!registers.readable(holding, address, out.size())) return Exception::illegal_data_address;
     registers.read(holding, address, out);
@@ -114,6 +132,8 @@ class FakeDevice {
     values.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers.last_refusal().refusal));
     values.set_whole<"refusal.register">(registers.last_refusal().address);
   }
+
+  std::vector<PendingCommand> pending_;
 };
 
 /// A link that can lose messages, to a device that outlives it.

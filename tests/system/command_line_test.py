@@ -29,6 +29,11 @@ class Contract(unittest.TestCase):
             self.assertIn(entry["modbus"]["table"], ("holding", "input"))
             self.assertIn(entry["modbus"]["words"], (1, 2))
 
+    def test_the_parameter_reference_in_docs_is_this_program_s(self):
+        reference = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
+        self.assertEqual(kmax("describe", "--format", "markdown").stdout, reference.read_text(),
+                         "run scripts/docs")
+
     def test_wall_point(self):
         point = kmax_json("wall", "--set", "wall.law=magnetic", "--set", "wall.stiffness=8410", "--position", "-0.0001")
         self.assertAlmostEqual(point["force_n"], 2.841, delta=2.841e-6)

@@ -135,6 +135,17 @@ TEST(RtuPort, NoReplyStartsWhileCharactersComeIn) {
   EXPECT_TRUE(client.is_alive());
 }
 
+// The first character of the second request ends the first one, and is itself still coming in.
+TEST(RtuPort, NoReplyStartsOnTheCharacterThatEndedTheRequest) {
+  RtuClient client;
+  client.send(adu(1, read_pdu));
+  client.line.silence(client.line.t3_5_us() + 4);
+  client.send({0x01});
+  EXPECT_EQ(client.port.counters().requests, 1U);
+  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_TRUE(client.is_alive());
+}
+
 // 248..255 are reserved: even a port that was asked to be one of them does not answer.
 TEST(RtuPort, OnlyItsOwnUnitAnswers) {
   for (unsigned own = 0; own < 256; ++own) {
@@ -263,6 +274,16 @@ TEST(RtuPort, ConfigurationTakesEffectAtOnceWhenNoReplyIsUnderWay) {
   EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
   client.settle();
   EXPECT_EQ(client.exchange(adu(9, read_pdu)), adu(9, read_reply_pdu));
+}
+
+TEST(RtuPort, ChangeOfTheUnitAloneLeavesAFrameUnderWayIntact) {
+  RtuClient client;
+  const Bytes request = adu(9, read_pdu);
+  client.send(Bytes(request.begin(), request.begin() + 3));
+  EXPECT_TRUE(client.port.configure({.unit = 9}));
+  client.send(Bytes(request.begin() + 3, request.end()));
+  client.settle();
+  EXPECT_EQ(client.take_reply(), adu(9, read_reply_pdu));
 }
 
 // The bank configures the port from inside the write, as modbus.unit and modbus.baud_rate do.

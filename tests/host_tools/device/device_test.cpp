@@ -231,6 +231,18 @@ INSTANTIATE_TEST_SUITE_P(RequestsAndReplies, LostMessages,
                          testing::Combine(testing::Values(FakeLink::Loss::request, FakeLink::Loss::reply),
                                           testing::Values(1, 2, 3, 1000)));
 
+// If only the answer to its first message was lost, the program is the one that left the transaction open,
+// and need not wait for the device to drop it.
+TEST(Device, ItsOwnUnansweredTransactionIsNotWaitedFor) {
+  Connection connection;
+  Device device = connection.open();
+  connection.link->requests = 0;
+  connection.link->loss = FakeLink::Loss::reply;
+  connection.link->first_lost = connection.link->last_lost = 1;
+  device.apply(assignments({"wall.stiffness=3580"}));
+  EXPECT_TRUE(connection.notices.empty());
+}
+
 // A program that is suspended between two messages comes back when the device has dropped the transaction;
 // what it would send then would act at once and alone.
 TEST(Device, ASuspendedProgramGivesUp) {

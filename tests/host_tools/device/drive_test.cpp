@@ -61,6 +61,15 @@ TEST_F(DriveTest, ARefusalComesInWordsAndLeavesTheAxisDisabled) {
   EXPECT_EQ(state(), DriveState::operation_enabled);
 }
 
+TEST_F(DriveTest, AnOldRefusalIsNotTakenForTheAnswerThatIsStillToCome) {
+  fake->obstacle[1] = Refusal::handle_inside_wall;
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+  fake->obstacle[1] = Refusal::none;
+  fake->judgement_us = 30'000;
+  drive.arm();
+  EXPECT_EQ(state(), DriveState::operation_enabled);
+}
+
 TEST_F(DriveTest, ADeviceThatDoesNotFollowIsReported) {
   fake->deaf_to_commands = true;
   EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "stays in 'Switch on disabled'");

@@ -69,6 +69,13 @@ TEST(SerialLink, APortThatVanishesInMidCommandEndsItAtOnce) {
   }
 }
 
+TEST(SerialLink, AWriteThatIsSentOnceTellsAVanishedPortFromASilentDevice) {
+  PtyDevice device([](int, Bytes) { return Answer{{}, true}; });
+  SerialLink link(address_of(device));
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.write_holding(stiffness, one_thousand); }),
+                  "vanished");
+}
+
 TEST(SerialLink, APortThatVanishesDuringIdentification) {
   PtyDevice device([](int, Bytes) { return Answer{{}, true}; });
   SerialLink link(address_of(device));
