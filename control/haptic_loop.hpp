@@ -37,7 +37,8 @@ struct HapticLoopConfig {
 /// Called at every tick; the haptic part runs on every divider-th one and its force is held in between
 /// (a zero-order hold, as in both papers). The position stays an integer until the distance to the wall
 /// has been taken: the surface is held as a whole count and a fraction below one, so the penetration is
-/// exact to the count wherever the wall is.
+/// exact to the count wherever the wall is (as long as it is itself below 2^24 counts, in float; a distance
+/// beyond 2^31 counts is taken as that).
 ///
 /// A value that is not finite anywhere gives zero force and `not_finite`; a velocity beyond the limit
 /// gives zero force and `over_speed`. Both are reported on every tick until the next haptic sample; to

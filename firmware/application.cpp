@@ -74,8 +74,9 @@ bool Application::settled(std::size_t of_axis) const {
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (!report_.axis[axis].count_valid) return Refusal::encoder_invalid;
   const auto& haptic = report_.axis[axis].haptic;
-  const bool has_wall = settings_[axis].haptic.wall.kind != control::WallKind::none;
-  if (has_wall && haptic.inside) return Refusal::handle_inside_wall;
+  const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
+                           settings_[axis].haptic.interference.mode != control::InterferenceMode::none;
+  if (makes_force && haptic.inside) return Refusal::handle_inside_wall;
   return Refusal::none;
 }
 
@@ -136,6 +137,7 @@ void Application::poll(std::uint32_t now_us) {
     uptime_second_us_ = now_us;
   }
   now_us_ = now_us;
+  polls_.store(polls_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   while (now_us - uptime_second_us_ >= 1'000'000) {
     uptime_second_us_ += 1'000'000;
     ++uptime_s_;

@@ -138,6 +138,7 @@ class Application {
   InterruptQueue<SerialByte, 512> serial_queue_;
   Trace trace_;
   std::array<std::atomic<bool>, axis_count> enable_{};
+  std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
   std::atomic<std::uint8_t> trace_axis_{0};
   std::atomic<std::uint32_t> trace_interval_{0};
 
@@ -145,6 +146,7 @@ class Application {
   std::array<Axis, axis_count> axes_;
   std::array<float, axis_count> tangential_{};
   TickState ISR_state_;
+  std::uint32_t ISR_polls_seen_ = 0, ISR_ticks_without_poll_ = 0;
   std::uint32_t ISR_trace_countdown_ = 0;
 };
 

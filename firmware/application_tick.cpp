@@ -8,12 +8,20 @@ TickOutput Application::ISR_tick(const TickInput& input) {
   const std::uint32_t tick = ISR_state_.tick + 1;
   ISR_state_.tick = tick;
 
+  // The main loop is what hears the host and the faults: without it no force may go on.
+  constexpr std::uint32_t most_ticks_without_poll = tick_rate_hz / 10;
+  const std::uint32_t polls = polls_.load(std::memory_order_relaxed);
+  ISR_ticks_without_poll_ = polls == ISR_polls_seen_ ? ISR_ticks_without_poll_ + 1 : 0;
+  ISR_polls_seen_ = polls;
+  const bool main_loop_stands = ISR_ticks_without_poll_ > most_ticks_without_poll;
+
   TickOutput output{};
   // The force along one axis' wall belongs to the other axis; it is made one tick later.
   const std::array<float, axis_count> from_other = {tangential_[1], tangential_[0]};
   bool news = false;
   for (std::size_t i = 0; i < axis_count; ++i) {
     const bool enable = enable_[i].load(std::memory_order_relaxed);
+    if (main_loop_stands && enable) axes_[i].ISR_trip(Fault::main_loop);
     output.axis[i] = axes_[i].ISR_tick(settings[i], input.axis[i], enable, from_other[i], tick);
     tangential_[i] = output.axis[i].tangential_force;
     const AxisReport& report = axes_[i].ISR_report();

@@ -86,6 +86,11 @@ class Axis {
     return {out.force, out.tangential_force, out.magnetic_force, true};
   }
 
+  /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled.
+  void ISR_trip(Fault fault) {
+    if (trip_ == Fault::none) trip(fault, 0.0f);
+  }
+
   /// Where an encoder count is on the handle's axis, counts.
   static constexpr std::int64_t position_of(std::int64_t counted, const AxisSetting& setting) {
     const std::int64_t moved = counted - setting.encoder_offset;

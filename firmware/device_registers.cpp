@@ -61,6 +61,7 @@ DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wante
 DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t address,
                                                                   std::uint32_t request, bool armed,
                                                                   std::uint32_t now_us) {
+  if (request <= 1) dropped_ = false;
   switch (request) {
     case 0:
       staging_ = false;
@@ -100,6 +101,7 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
     }
   }
 
+  if (dropped_) return refuse(Refusal::no_transaction, address);
   ParameterValues wanted = staging_ ? staged_ : values_;
   const WriteResult checked = check_and_set(wanted, address, in, armed);
   if (checked.refusal != Refusal::none) return refuse(checked.refusal, checked.address);

@@ -47,16 +47,19 @@ inline constexpr auto register_places = [] {
 /// only then anything changes. Outside a transaction it takes effect at once; inside (transaction.control =
 /// 1) values are kept aside and take effect together with transaction.control = 2, which checks the rules
 /// over the whole set. A transaction in which nothing is written for 2 s is dropped, so a host that dies
-/// half way leaves nothing behind. Reading always gives the values in force, not those put aside. Why a write
-/// was refused stays in refusal.reason and refusal.register.
+/// half way leaves nothing behind; for 30 s, or until transaction.control is written, no value is taken
+/// outside a transaction then, lest a message of that host that was held up takes effect by itself. Reading
+/// always gives the values in force, not those put aside. Why a write was refused stays in refusal.reason and
+/// refusal.register.
 class DeviceRegisters {
  public:
   static constexpr std::uint32_t transaction_timeout_us = 2'000'000;
+  static constexpr std::uint32_t stragglers_us = 30'000'000;
 
   ParameterValues& values() { return values_; }
   const ParameterValues& values() const { return values_; }
 
-  /// Rises with every change of a parameter; `disarmed_only_changes` only with those that restart the axes.
+  /// Rises with every change of a parameter; restarting_changes() only with those that restart the axes.
   std::uint32_t changes() const { return changes_; }
   std::uint32_t restarting_changes() const { return restarting_changes_; }
 
@@ -90,7 +93,12 @@ class DeviceRegisters {
 
   /// Call at least every 2^31 us.
   void poll(std::uint32_t now_us) {
-    if (staging_ && now_us - last_staged_us_ > transaction_timeout_us) staging_ = false;
+    if (staging_ && now_us - last_staged_us_ > transaction_timeout_us) {
+      staging_ = false;
+      dropped_ = true;
+      dropped_us_ = now_us;
+    }
+    if (dropped_ && now_us - dropped_us_ > stragglers_us) dropped_ = false;
   }
 
   bool transaction_open() const { return staging_; }
@@ -129,8 +137,8 @@ class DeviceRegisters {
   ParameterValues staged_;
   WriteResult last_;
   std::uint32_t changes_ = 0, restarting_changes_ = 0;
-  std::uint32_t last_staged_us_ = 0;
-  bool staging_ = false;
+  std::uint32_t last_staged_us_ = 0, dropped_us_ = 0;
+  bool staging_ = false, dropped_ = false;
   std::array<bool, axis_count> commanded_{};
 };
 

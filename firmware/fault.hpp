@@ -7,7 +7,7 @@
 namespace kmax::firmware {
 
 /// Every way in which an axis loses its force by itself.
-enum class Fault : std::uint8_t { none, not_finite, over_speed, encoder, link_silent };
+enum class Fault : std::uint8_t { none, not_finite, over_speed, encoder, link_silent, main_loop };
 
 struct FaultText {
   Fault fault;
@@ -22,13 +22,15 @@ struct FaultText {
 inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::none, 0x0000, "none", "", "no fault", ""},
     {Fault::not_finite, 0xFF01, "not_finite", "", "the force or the velocity was not a finite number",
-     "look for absurd parameters with 'kmax dump'; if there are none, report it as a defect"},
+     "look for absurd parameters with 'kmax list --changed'; if there are none, report it as a defect"},
     {Fault::over_speed, 0x8480, "over_speed", "m/s", "the handle was faster than velocity.limit",
      "check encoder.counts_per_turn and device.transmission, the encoder's cable, and velocity.limit"},
     {Fault::encoder, 0x7305, "encoder", "", "the encoder gave no valid count",
      "check the encoder's cable and supply, and encoder.kind"},
     {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
      "check the cable and the host program; link.timeout = 0 turns this off"},
+    {Fault::main_loop, 0x6100, "main_loop", "", "the firmware's main loop stood still for more than 0.1 s",
+     "report it as a defect, with what was done before"},
 });
 
 constexpr const FaultText& text_of(Fault fault) {

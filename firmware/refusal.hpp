@@ -45,7 +45,9 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::adaptive_interval_empty, "wall.adaptive_force_min must not exceed wall.adaptive_force_max"},
     {Refusal::supply_interval_empty, "supply.voltage_min must be below supply.voltage_max"},
     {Refusal::transaction_open, "another transaction is open; it is dropped after 2 s without a write"},
-    {Refusal::no_transaction, "no transaction is open"},
+    {Refusal::no_transaction,
+     "no transaction is open (one that was left open has been dropped; write 0 to transaction.control, or "
+     "wait 30 s)"},
     {Refusal::handle_inside_wall, "the handle is inside the wall; move it out and arm again"},
     {Refusal::fault_present, "a fault is present; clear it first"},
     {Refusal::encoder_invalid, "the encoder gives no valid count"},

@@ -27,8 +27,6 @@ namespace {
 
 namespace stm32 = drivers::stm32f4;
 
-constexpr std::uint32_t tick_rate_hz = 20'000;
-
 stm32::InterruptController interrupts{stm32::nvic(), stm32::scb()};
 stm32::SystemTick tick{stm32::system_tick(), stm32::scb()};
 stm32::Usart serial{stm32::usart2()};
@@ -111,7 +109,7 @@ class SerialLine {
 
   interrupts.set_priority(stm32::SystemException::system_tick, odrive_v3::priority::tick);
   // Each core clock of the clock tree is a whole number of MHz and of ticks.
-  if (!tick.start(clocks.core_hz, tick_rate_hz)) stop_on_unexpected_interrupt();
+  if (!tick.start(clocks.core_hz, firmware::tick_rate_hz)) stop_on_unexpected_interrupt();
   SerialLine line{clocks};
   line.start();
 
@@ -135,8 +133,8 @@ void enter_safe_state() {
 void ISR_system_tick() {
   using namespace kmax;
   board::tick.ISR_count();
-  // No encoder is read yet: both axes stand still at zero.
-  constexpr firmware::TickInput input{{{{0, true}, {0, true}}}};
+  // No encoder is read yet, and none is claimed: the axes tick, and refuse to be armed.
+  constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
   static_cast<void>(board::application->ISR_tick(input));
 }
 

@@ -15,9 +15,10 @@
 // received in between, and every character that began before reply_sent(), is the line's echo of the reply
 // (RS-485, two wires) and is dropped.
 //
-// On a full-duplex line (half_duplex = false) there is no echo, and nothing is dropped: the next request may begin as soon
-// as the client has the last character of the reply, which can be before the driver reports that it left. A request that
-// is complete while the reply is still being sent is not answered, and counted.
+// On a full-duplex line (half_duplex = false) there is no echo, and nothing is dropped: the next request may
+// begin as soon as the client has the last character of the reply, which can be before the driver reports
+// that it left. A request that is complete while the reply is still being sent is not carried out, but
+// counted, and shows that the host is alive.
 //
 // A character that arrives while a reply waits to be fetched means that the client has given up on that reply
 // (or does not keep the protocol). The reply is dropped, since sent now it would be taken for the answer to
@@ -72,10 +73,10 @@ struct RtuPortCounters {
   std::uint32_t broadcasts = 0;          // unit 0, executed or ignored
   std::uint32_t broadcasts_ignored = 0;  // of these: not a write
   std::uint32_t other_units = 0;
-  std::uint32_t replies = 0;          // handed out by reply_due()
-  std::uint32_t exceptions = 0;       // requests answered with an exception
-  std::uint32_t replies_dropped = 0;  // superseded by the next request before they were fetched
-  std::uint32_t echo_bytes = 0;       // received while sending, half duplex
+  std::uint32_t replies = 0;                 // handed out by reply_due()
+  std::uint32_t exceptions = 0;              // requests answered with an exception
+  std::uint32_t replies_dropped = 0;         // superseded by the next request before they were fetched
+  std::uint32_t echo_bytes = 0;              // received while sending, half duplex
   std::uint32_t requests_while_sending = 0;  // complete before the last reply had left, full duplex
 };
 
@@ -172,10 +173,6 @@ class RtuPort {
   }
 
   void handle(const RtuFrame& frame) {
-    if (state_ == State::sending) {
-      ++counters_.requests_while_sending;
-      return;
-    }
     const bool broadcast = frame.unit == broadcast_unit;
     if (!broadcast && frame.unit != config_.unit) {
       ++counters_.other_units;
@@ -183,6 +180,10 @@ class RtuPort {
     }
     last_valid_request_us_ = frame.end_us;
     ++(broadcast ? counters_.broadcasts : counters_.requests);
+    if (state_ == State::sending) {  // the buffer still holds the reply
+      ++counters_.requests_while_sending;
+      return;
+    }
     if (broadcast && !is_write(frame.pdu[0])) {
       ++counters_.broadcasts_ignored;
       return;

@@ -58,7 +58,8 @@ inline constexpr NamedValue velocity_estimator[] = {
     named("low_pass", VelocityEstimatorKind::low_pass), named("foaw", VelocityEstimatorKind::foaw),
     named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
     named("tracking", VelocityEstimatorKind::tracking)};
-// Only what this firmware can do is listed: a value that would be accepted and ignored is worse than none.
+// Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
+// ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
 inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
 inline constexpr NamedValue guard_mode[] = {{"off", 0}};
 inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};

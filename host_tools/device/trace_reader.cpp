@@ -37,7 +37,16 @@ TraceReader::TraceReader(Device& device, std::size_t axis, std::uint16_t interva
   set_interval(device_, interval);
 }
 
+TraceReader::~TraceReader() {
+  try {
+    if (running_) stop();
+  } catch (const std::exception&) {
+    // The link is gone; a trace nobody reads does no harm.
+  }
+}
+
 void TraceReader::stop() {
+  running_ = false;
   set_interval(device_, 0);
 }
 
@@ -55,9 +64,10 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
         static_cast<std::uint16_t>(firmware::trace_window + slot * firmware::trace_words_per_record);
     const auto words = device_.link().read_input(
         address, static_cast<std::uint16_t>(count * firmware::trace_words_per_record));
-    // Records near the end of the ring may have been overwritten while they were read.
+    // Records near the end of the ring may have been overwritten while they were read. Later the ticks tell
+    // which record it is, but the first one must be what it is taken for.
     std::uint32_t overwritten = 0;
-    if (waiting > firmware::trace_capacity / 2) {
+    if (!started_ || waiting > firmware::trace_capacity / 2) {
       const std::uint32_t age = device_.read(Parameter::of<"trace.next">()) - next_;
       if (age > firmware::trace_capacity)
         overwritten = std::min(count, age - static_cast<std::uint32_t>(firmware::trace_capacity));

@@ -23,6 +23,10 @@ class TraceReader {
  public:
   /// Starts the trace of `axis`, one record per `interval` haptic samples. Errors as Device.
   TraceReader(Device& device, std::size_t axis, std::uint16_t interval = 1);
+  /// Stops the trace, if that has not happened yet and the device can still be reached.
+  ~TraceReader();
+  TraceReader(const TraceReader&) = delete;
+  TraceReader& operator=(const TraceReader&) = delete;
 
   /// Stops the trace. Errors as Device.
   void stop();
@@ -39,7 +43,7 @@ class TraceReader {
   std::uint32_t first_tick_ = 0, last_tick_ = 0;
   std::uint32_t ticks_per_record_;
   double count_length_;
-  bool started_ = false;
+  bool started_ = false, running_ = true;
   std::uint64_t lost_ = 0;
 };
 

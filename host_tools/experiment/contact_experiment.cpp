@@ -80,7 +80,40 @@ double number(device::Device& device, std::size_t axis, const char* name) {
   return device.read_number(fmt::format("axis{}.{}", axis, name));
 }
 
+/// Whoever pressed in the trial before may still be inside the wall, where arming is refused: waits until the
+/// handle is out, as long as the patience lasts.
+void wait_until_outside(device::Device& device, const ContactResult& result, const ContactSettings& settings,
+                        const std::function<void(const std::string&)>& tell) {
+  const auto begin = device.link().now();
+  const auto outside = [&] {
+    return result.side * (number(device, settings.axis, "measured.position") - result.surface) > 0.0;
+  };
+  while (!outside() &&
+         device.link().now() - begin < std::chrono::duration<double>(settings.contact_patience)) {
+    tell(fmt::format("{}: take the handle out of the wall", result.condition.name));
+    device.link().wait(std::chrono::milliseconds(200));
+  }
+}
+
 }  // namespace
+
+RestoredAfterwards::RestoredAfterwards(device::Device& device, const ContactSettings& settings)
+    : device_(device) {
+  std::vector<std::string> changed = contact_setup(settings);
+  changed.push_back("wall.law=plain");
+  changed.push_back("wall.magnetic_coefficient=0");
+  changed.push_back("wall.adaptive_mode=instant");
+  before_ = device::parse_assignments(changed, settings.axis);
+  for (device::Assignment& assignment : before_) assignment.raw = device_.read(assignment.parameter);
+}
+
+RestoredAfterwards::~RestoredAfterwards() {
+  try {
+    device_.apply(before_);
+  } catch (const std::exception&) {
+    // The link is gone, and with it the way to put anything back.
+  }
+}
 
 ContactResult worst_of(std::vector<ContactResult> trials) {
   std::size_t unstable = 0;
@@ -117,6 +150,7 @@ ContactResult run_contact(device::Device& device, const ContactCondition& condit
   const device::Parameter estimator(firmware::entry_of<"velocity.estimator">(), settings.axis);
   result.velocity_estimator = device::value_text(estimator, device.read(estimator));
 
+  wait_until_outside(device, result, settings, tell);
   device::TraceReader trace(device, settings.axis);
   double touched = -1.0;
   {

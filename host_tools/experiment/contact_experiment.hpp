@@ -54,6 +54,19 @@ struct ContactResult {
 /// What all conditions have in common, as assignments.
 std::vector<std::string> contact_setup(const ContactSettings& settings);
 
+/// Everything the experiment changes on an axis, put back when it is over, however it ends.
+class RestoredAfterwards {
+ public:
+  RestoredAfterwards(device::Device& device, const ContactSettings& settings);
+  ~RestoredAfterwards();
+  RestoredAfterwards(const RestoredAfterwards&) = delete;
+  RestoredAfterwards& operator=(const RestoredAfterwards&) = delete;
+
+ private:
+  device::Device& device_;
+  std::vector<device::Assignment> before_;
+};
+
 /// The trial with the largest oscillation, which decides: a wall is stable when no touch makes it unstable
 /// (paper 1's definition of the maximum stiffness, section 4.2). `trials` must not be empty.
 ContactResult worst_of(std::vector<ContactResult> trials);

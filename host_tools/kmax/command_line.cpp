@@ -10,6 +10,10 @@
 #include "host_tools/device/suggestion.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/link/device_address.hpp"
+#include "host_tools/plot/csv_table.hpp"
+#include "host_tools/plot/figure.hpp"
+#include "host_tools/simulation/scene.hpp"
+#include "host_tools/wall/wall_table.hpp"
 
 namespace kmax::cli {
 
@@ -68,6 +72,14 @@ int run_action(Context& context) {
   } catch (const device::ValueError& error) {
     return report_error(context, error.what(), wrong_usage);
   } catch (const link::AddressError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const simulation::SceneError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const wall::TableError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const plot::CsvError& error) {
+    return report_error(context, error.what(), wrong_usage);
+  } catch (const plot::PictureNameError& error) {
     return report_error(context, error.what(), wrong_usage);
   } catch (const std::exception& error) {
     return report_error(context, error.what(), failed);

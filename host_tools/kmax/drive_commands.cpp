@@ -100,6 +100,20 @@ int run_on_axes(Context& context, Act act) {
   return print_states(context, device, chosen_axes(context));
 }
 
+/// Whatever went wrong, the force must not outlast the program that asked for it.
+void disarm_after_failure(Context& context, Drive& drive, double link_timeout) {
+  try {
+    drive.disarm();
+  } catch (const std::exception&) {
+    context.note(
+        link_timeout > 0
+            ? fmt::format("the axis could not be disarmed; link.timeout removes its force after {} s",
+                          device::number_text(static_cast<float>(link_timeout)))
+            : std::string("the axis could not be disarmed and link.timeout is 0: its force MAY STILL BE ON, "
+                          "cut its power"));
+  }
+}
+
 /// Keeps talking to the device until the user interrupts or the axis loses its force. Returns the exit code.
 int hold(Context& context, Device& device, Drive& drive, const Interruption& interruption) {
   const double timeout = device.read_number("link.timeout");
@@ -140,8 +154,14 @@ int run_arm(Context& context, bool holding) {
   if (!holding && timeout == 0)
     context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
   int code = done;
-  // A link that is lost here ends the command; link.timeout then removes the force.
-  if (holding) code = hold(context, device, drive, interruption);
+  if (holding) {
+    try {
+      code = hold(context, device, drive, interruption);
+    } catch (const std::exception&) {
+      disarm_after_failure(context, drive, timeout);
+      throw;
+    }
+  }
   if (context.json) context.print({{"axes", Json::array({status_json(drive.axis(), drive.status())})}});
   return code;
 }

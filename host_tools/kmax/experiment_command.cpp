@@ -3,6 +3,8 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
+
 #include "host_tools/experiment/contact_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
@@ -43,7 +45,10 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   experiment::ContactSettings settings = options.settings;
   settings.axis = context.axis();
   const auto conditions = experiment::contact_conditions();
+  // Before anybody presses anything.
+  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
   device::Device device = context.connect();
+  const experiment::RestoredAfterwards restored(device, settings);
   std::vector<experiment::ContactResult> results;
   Json list = Json::array();
   std::vector<std::filesystem::path> files;
@@ -66,6 +71,10 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
       files.insert(files.end(), written.begin(), written.end());
     }
   }
+  const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {
+    return r.agrees_with_paper();
+  });
+  const int verdict = all_agree ? done : verdict_is_no;
   if (context.json) {
     Json names = Json::array();
     for (const auto& file : files) names.push_back(file.string());
@@ -76,7 +85,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"velocity_estimator", results.front().velocity_estimator},
                    {"conditions", list},
                    {"files", names}});
-    return done;
+    return verdict;
   }
   fmt::print(
       context.out,
@@ -91,7 +100,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
       context.note(fmt::format("{}: {} trace records were lost on the way", result.condition.name,
                                result.lost_records));
   }
-  return done;
+  return verdict;
 }
 }  // namespace
 
@@ -107,7 +116,9 @@ void add_experiment_command(CLI::App& app, Context& context) {
        "  kmax experiment contact --device serial:/dev/ttyUSB0 --out results\n\n"
        "On arming, press the handle against the wall and keep pressing until told otherwise; a simulated "
        "person does\n"
-       "so by itself. The axis is disarmed after each condition and on Ctrl-C."});
+       "so by itself. The axis is disarmed after each trial and on Ctrl-C, and its parameters are put back "
+       "at the end.\n"
+       "Exit code 3: some condition did not come out as the paper says."});
   auto options = std::make_shared<ContactOptions>();
   experiment::ContactSettings& settings = options->settings;
   contact->add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")->capture_default_str();

@@ -1,7 +1,9 @@
 // kmax wall.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
+
 #include <CLI/CLI.hpp>
+#include <filesystem>
 
 #include "firmware/parameter_rules.hpp"
 #include "host_tools/device/errors.hpp"
@@ -62,8 +64,19 @@ int run_wall(Context& context, const WallOptions& options) {
     }
     return done;
   }
+  for (const device::Assignment& assignment :
+       device::parse_assignments(options.assignments, context.axis())) {
+    const bool counts = assignment.parameter.definition().name.starts_with("wall.") &&
+                        assignment.parameter.axis() == context.axis();
+    if (!counts)
+      context.note(fmt::format("{} has no effect on the wall law of axis {}", assignment.parameter.name(),
+                               context.axis()));
+  }
   const wall::WallEvaluator evaluator(values, context.axis());
   if (!table) return evaluate_point(context, options, evaluator);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.input, options.output, ignored))
+    throw UsageError(fmt::format("--out {} is the table that is read; give another name", options.output));
   const std::size_t rows = wall::evaluate_table(evaluator, options.input, options.output);
   if (context.json) {
     context.print({{"rows", rows}, {"out", options.output}});

@@ -63,7 +63,9 @@ void SerialLink::connect() {
   const auto fail = [this](const char* what) {
     throw LinkError(fmt::format("{}: {}: {}", address_.path, what, modbus_strerror(errno)));
   };
-  context_.reset(modbus_new_rtu(address_.path.c_str(), static_cast<int>(address_.baud_rate), 'E', 8, 1));
+  // A pseudo-terminal has no parity, and the C library calls asking for it an error when nothing else changes.
+  const char parity = lock_.pseudo_terminal() ? 'N' : 'E';
+  context_.reset(modbus_new_rtu(address_.path.c_str(), static_cast<int>(address_.baud_rate), parity, 8, 1));
   if (!context_) fail("cannot use this port");
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
   modbus_set_response_timeout(context_.get(), 0, std::chrono::microseconds(response_timeout).count());

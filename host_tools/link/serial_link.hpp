@@ -14,7 +14,8 @@ namespace kmax::link {
 
 /// Modbus RTU on a serial port or pseudo-terminal, through libmodbus: 8 data bits, even parity, 1 stop bit.
 ///
-/// The port is this program's alone (SerialPortLock). A request that gets no answer within 500 ms, or an
+/// The port is this program's alone (SerialPortLock), except while it waits: then another kmax may use it,
+/// to stop the drive for instance. A request that gets no answer within 500 ms, or an
 /// answer that is not one (bad CRC, other unit, other length), is sent again up to two times if it is a
 /// read or an idempotent write; other writes are sent once, since a lost answer does not tell whether the
 /// device acted. Before anything is sent after such a failure the line is listened to until it is silent: an
@@ -39,6 +40,7 @@ class SerialLink final : public Link {
   void follow_line_settings(std::optional<std::uint8_t> unit,
                             std::optional<std::uint32_t> baud_rate) override;
   std::string description() const override { return text_of(address_); }
+  void wait(std::chrono::microseconds duration) override { lock_.lend(duration); }
 
  private:
   struct Deleter {

@@ -77,6 +77,20 @@ SerialPortLock::~SerialPortLock() {
   close(descriptor_);
 }
 
+void SerialPortLock::lend(std::chrono::microseconds duration) {
+  const bool excluded = excluding_;
+  admit_others();
+  flock(descriptor_, LOCK_UN);
+  std::this_thread::sleep_for(duration);
+  const auto start = std::chrono::steady_clock::now();
+  while (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
+    if (std::chrono::steady_clock::now() - start > patience)
+      throw LinkError("another program took the serial port and did not give it back");
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  if (excluded) exclude_others();
+}
+
 void SerialPortLock::exclude_others() {
   if (!pseudo_terminal_) excluding_ = ioctl(descriptor_, TIOCEXCL) == 0;
 }

@@ -25,8 +25,14 @@ class SerialPortLock {
   SerialPortLock(const SerialPortLock&) = delete;
   SerialPortLock& operator=(const SerialPortLock&) = delete;
 
+  bool pseudo_terminal() const { return pseudo_terminal_; }
+
   void exclude_others();
   void admit_others();
+
+  /// Lets others have the port for `duration` and takes it back: a program that keeps an axis armed must not
+  /// keep out the one that stops it. Errors: LinkError if another program does not give it back.
+  void lend(std::chrono::microseconds duration);
 
  private:
   int descriptor_ = -1;

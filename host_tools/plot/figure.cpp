@@ -132,12 +132,12 @@ std::string script_for(const Figure& figure, const std::filesystem::path& path, 
 void write_figure(const Figure& figure, const std::filesystem::path& path) {
   const std::string ending = path.extension().string();
   if (ending != ".svg" && ending != ".png")
-    throw FigureError(fmt::format("{}: a picture's name must end in .svg or .png", path.string()));
+    throw PictureNameError(fmt::format("{}: a picture's name must end in .svg or .png", path.string()));
   if (figure.panels.empty() || std::any_of(figure.panels.begin(), figure.panels.end(),
                                            [](const Panel& p) { return p.series.empty(); }))
     throw FigureError(fmt::format("{}: there is nothing to draw", path.string()));
   if (!path.parent_path().empty() && !std::filesystem::is_directory(path.parent_path()))
-    throw FigureError(
+    throw PictureNameError(
         fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
 
   std::filesystem::path unfinished = path;

@@ -44,9 +44,15 @@ class FigureError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The name given for a picture cannot be one: its ending, or a folder that does not exist.
+class PictureNameError : public FigureError {
+ public:
+  using FigureError::FigureError;
+};
+
 /// Draws with gnuplot into an SVG or a PNG, by the file's ending. Curves keep Okabe and Ito's colours, which
 /// colour-blind readers can tell apart, and differ in dash pattern too. The folder must exist. About 0.1 s.
-/// Throws FigureError; a picture appears whole or not at all.
+/// Throws FigureError, PictureNameError; a picture appears whole or not at all.
 void write_figure(const Figure& figure, const std::filesystem::path& path);
 
 }  // namespace kmax::plot

@@ -9,7 +9,8 @@ SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(s
     throw std::invalid_argument("a board has two axes; the scene names more");
   for (std::size_t i = 0; i < scene.axes.size(); ++i) {
     const simulation::SceneAxis& axis = scene.axes[i];
-    axes_[i].emplace(Axis{axis.make_handle(), simulation::EncoderModel(axis.encoder.count_length()), {}});
+    axes_[i].emplace(
+        Axis{axis.make_handle(), simulation::EncoderModel(axis.encoder.count_length()), {}, false});
   }
   encoder_connected_.fill(true);
 }
@@ -22,12 +23,13 @@ void SimulatedDevice::drive(std::size_t axis, const firmware::AxisOutput& output
   if (!axes_[axis]) return;
   const bool armed_now = output.enabled && !axes_[axis]->output.enabled;
   axes_[axis]->output = output;
+  axes_[axis]->let_go = axes_[axis]->let_go || armed_now;
   if (armed_now && axes_[axis]->handle.has_operator()) axes_[axis]->handle.begin_motion();
 }
 
 void SimulatedDevice::advance(double duration) {
   for (auto& axis : axes_) {
-    if (!axis) continue;
+    if (!axis || (!axis->let_go && !axis->handle.has_operator())) continue;
     axis->handle.advance(static_cast<double>(axis->output.force),
                          static_cast<double>(axis->output.background_force), duration);
   }

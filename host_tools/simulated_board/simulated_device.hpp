@@ -13,7 +13,9 @@ namespace kmax::simulated_board {
 /// The handles of a scene behind the encoders and forces of a board (board::SimulatedDevice).
 ///
 /// An axis that the scene does not have stands still at count 0 and costs nothing. A person begins the
-/// approach when the axis is armed, as one would who was told "now"; arming again begins another trial.
+/// approach when the axis is armed, as one would who was told "now"; arming again begins another trial. A
+/// handle that nobody holds stays at its start until its axis is armed for the first time, and is let go
+/// then.
 class SimulatedDevice {
  public:
   /// Throws std::invalid_argument for a scene whose parts are not allowed.
@@ -35,6 +37,7 @@ class SimulatedDevice {
     simulation::CoupledHandle handle;
     simulation::EncoderModel encoder;
     firmware::AxisOutput output{};
+    bool let_go = false;
   };
 
   std::array<std::optional<Axis>, firmware::axis_count> axes_;

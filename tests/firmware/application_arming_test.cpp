@@ -53,6 +53,15 @@ TEST_F(Arming, OnTheSurfaceIsInsideOneCountOutsideIsNot) {
   EXPECT_TRUE(bench.arm());
 }
 
+TEST_F(Arming, InterferenceAloneIsReasonEnoughToRefuseInside) {
+  bench.set("wall.law", 0);
+  bench.set("interference.mode", 1);
+  bench.set("interference.force", 3);
+  bench.device.stand_at(-5000);
+  EXPECT_FALSE(bench.arm());
+  EXPECT_EQ(bench.refusal(), Refusal::handle_inside_wall);
+}
+
 TEST_F(Arming, WithoutAWallThereIsNothingToBeInsideOf) {
   bench.set("wall.law", 0);
   bench.device.stand_at(-5000);

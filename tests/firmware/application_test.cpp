@@ -216,6 +216,20 @@ TEST(Application, IsDeterministicWhateverTheMemoryHeldBefore) {
     application->preset(firmware::entry_named("drive.controlword"), 0, 0x0F);
     application->poll(550);
     EXPECT_EQ(application->state(0), DriveState::operation_enabled) << pattern;
+    // The main loop stops: within 0.1 s the tick takes the force away by itself, and the fault is told later.
+    application->preset(firmware::entry_named("force.ramp_time"), 0, 0);
+    application->preset(firmware::entry_named("velocity.limit"), 0, 0);
+    application->poll(600);
+    const firmware::TickInput deep{{{{static_cast<std::uint32_t>(-50), true}, {5u, true}}}};
+    for (int tick = 0; tick < 1990; ++tick) (void)application->ISR_tick(deep);
+    EXPECT_GT(application->ISR_tick(deep).axis[0].force, 0.0f);
+    for (int tick = 0; tick < 20; ++tick) (void)application->ISR_tick(deep);
+    EXPECT_EQ(application->ISR_tick(deep).axis[0].force, 0.0f);
+    EXPECT_FALSE(application->ISR_tick(deep).axis[0].enabled);
+    application->poll(110'000);
+    EXPECT_EQ(application->state(0), DriveState::fault);
+    EXPECT_EQ(application->fault(0), firmware::Fault::main_loop);
+    EXPECT_EQ(application->ISR_tick(deep).axis[0].force, 0.0f);
     application->~Application();
   }
 }

@@ -118,8 +118,16 @@ TEST_F(Transaction, TwoSecondsWithoutAWriteDropItAlsoAcrossTheClocksWrap) {
     now += 2'000'001;
     registers.poll(now);
     EXPECT_FALSE(registers.transaction_open());
+    EXPECT_EQ(set("wall.damping", 1), Refusal::no_transaction) << "a message of that host that was held up";
+    EXPECT_EQ(get("wall.damping"), 0);
+    now += 30'000'001;
     EXPECT_EQ(set("wall.damping", 1), Refusal::none);
-    EXPECT_EQ(get("wall.damping"), 1) << "a write after that takes effect at once";
+    EXPECT_EQ(get("wall.damping"), 1) << "half a minute later a write takes effect at once";
+    ASSERT_EQ(control(1), Refusal::none);
+    now += 2'000'001;
+    registers.poll(now);
+    ASSERT_EQ(control(0), Refusal::none);
+    EXPECT_EQ(set("wall.damping", 2), Refusal::none) << "whoever writes transaction.control knows of it";
   }
 }
 

@@ -41,7 +41,10 @@ class Contract(unittest.TestCase):
         self.assertIs(point["inside"], True)
 
     def test_contact_experiment_on_the_simulated_device(self):
-        result = kmax_json("experiment", "contact", timeout=120)
+        done = kmax("experiment", "contact", "--json", check=False, timeout=120)
+        result = json.loads(done.stdout)
+        all_agree = all(c["agrees"] for c in result["conditions"])
+        self.assertEqual(done.returncode, 0 if all_agree else 3)
         verdicts = {c["name"]: c["verdict"] for c in result["conditions"]}
         self.assertEqual(verdicts["F_MC = 0 N"], "unstable")
         self.assertEqual(verdicts["F_MC = 1 N"], "unstable")
@@ -75,7 +78,7 @@ class WallTable(unittest.TestCase):
             table, out = Path(folder) / "in.csv", Path(folder) / "out.csv"
             table.write_text("position_m,velocity_m_per_s\n0,0\n0.1,fast\n")
             done = kmax("wall", "--csv", str(table), "--out", str(out), check=False)
-            self.assertEqual(done.returncode, 1)
+            self.assertEqual(done.returncode, 2)
             self.assertIn("in.csv:3", done.stderr)
             self.assertIn("fast", done.stderr)
             self.assertEqual(os.listdir(folder), ["in.csv"])
@@ -184,6 +187,41 @@ class BadInput(unittest.TestCase):
         self.assertEqual(errors, [])
         self.assertIn((self.value("wall.stiffness"), self.value("wall.damping")), ((1100, 1), (2200, 2)))
         kmax("set", "wall.stiffness=1000", "wall.damping=0", device=self.board.device)
+
+
+class Stopping(unittest.TestCase):
+    def test_stop_from_another_terminal_takes_the_force_away_from_a_holding_one(self):
+        with Serve() as board:
+            holding = subprocess.Popen([KMAX, "arm", "--hold", "--device", board.device], stdout=subprocess.PIPE,
+                                       stderr=subprocess.PIPE, text=True)
+            time.sleep(1.0)
+            kmax("set", "wall.stiffness=1200", device=board.device)
+            kmax("stop", device=board.device)
+            _, errors = holding.communicate(timeout=20)
+            self.assertEqual(holding.returncode, 1)
+            self.assertIn("the force is off", errors)
+
+    def test_ctrl_c_leaves_the_drive_disarmed(self):
+        with Serve() as board:
+            holding = subprocess.Popen([KMAX, "arm", "--hold", "--device", board.device], stdout=subprocess.PIPE,
+                                       stderr=subprocess.PIPE, text=True)
+            time.sleep(1.0)
+            holding.send_signal(signal.SIGINT)
+            holding.communicate(timeout=20)
+            self.assertEqual(holding.returncode, 0)
+            state = kmax_json("state", "--axis", "0", device=board.device)["axes"][0]
+            self.assertEqual(state["state"], "switch_on_disabled")
+
+    def test_an_interrupted_experiment_puts_the_parameters_back(self):
+        with Serve() as board:
+            running = subprocess.Popen([KMAX, "experiment", "contact", "--device", board.device],
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            time.sleep(2.0)
+            running.send_signal(signal.SIGINT)
+            running.communicate(timeout=20)
+            self.assertEqual(running.returncode, 1)
+            values = kmax_json("get", "wall.stiffness", "wall.law", "haptic.rate", device=board.device)
+            self.assertEqual([v["value"] for v in values.values()], [1000, "plain", 20000])
 
 
 class VanishingPort(unittest.TestCase):

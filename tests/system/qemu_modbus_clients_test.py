@@ -7,7 +7,7 @@ import sys
 import time
 import unittest
 
-from kmax_under_test import QemuBoard, kmax_json, registers
+from kmax_under_test import QemuBoard, kmax, kmax_json, registers
 from mbpoll_session import mbpoll
 
 PATIENCE = 8
@@ -56,14 +56,14 @@ class Image(unittest.TestCase):
         second = mbpoll(self.board.link, "input", tick, kind="int", tries=PATIENCE)[0]
         self.assertGreater(second, first)
 
-    def test_the_idle_axis_arms_and_disarms(self):
-        # The idle encoder stands at 0; a wall whose surface is there counts as touched.
-        eventually(lambda: kmax_json("set", "wall.law=plain", "wall.position=-0.01", device=self.board.device))
-        eventually(lambda: kmax_json("set", "link.timeout=0", device=self.board.device))
-        eventually(lambda: kmax_json("arm", device=self.board.device))
-        state = eventually(lambda: kmax_json("state", "--axis", "0", device=self.board.device))
-        self.assertEqual(state["axes"][0]["state"], "operation_enabled")
-        eventually(lambda: kmax_json("disarm", device=self.board.device))
+    def test_an_axis_without_an_encoder_is_not_armed(self):
+        eventually(lambda: kmax_json("get", "info.tick", device=self.board.device))
+        for _ in range(PATIENCE):
+            done = kmax("arm", device=self.board.device, check=False)
+            if "no answer" not in done.stderr:
+                break
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("encoder", done.stderr)
         state = eventually(lambda: kmax_json("state", "--axis", "0", device=self.board.device))
         self.assertEqual(state["axes"][0]["state"], "switch_on_disabled")
 

@@ -116,7 +116,9 @@ TEST_F(CommandLine, ErrorsAreADocumentToo) {
                                              {"get", "--json", "--no-such-option"},
                                              {"describe", "--format", "eds", "--json"},
                                              {"get", "wall.law", "--json", "--device", "tcp:x"},
-                                             {"set", "--json"}}) {
+                                             {"set", "--json"},
+                                             {"arm", "--json", "--axis"},
+                                             {"arm", "--axis", "2", "--json"}}) {
     EXPECT_EQ(kmax(bad), wrong_usage);
     Json error = document();
     ASSERT_EQ(error.size(), 1u) << output;

@@ -1,0 +1,51 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "tests/host_tools/kmax/simulated_command_line.hpp"
+
+namespace kmax::cli {
+namespace {
+using Serve = SimulatedCommandLine;
+
+TEST_F(Serve, WhatCannotBeServedIsSaidAtOnce) {
+  expect_error({"serve"}, wrong_usage, "--serial LINK is needed");
+  expect_error({"serve", "--can", "can0"}, wrong_usage, "no CAN link yet");
+  expect_error({"serve", "--serial", in("line"), "--scene", "tuoch"}, wrong_usage, "supplied are");
+  folder.write("line", "precious");
+  expect_error({"serve", "--serial", in("line")}, failed, "something else has this name");
+  EXPECT_EQ(folder.read("line"), "precious");
+  expect_error({"serve", "--serial", in("no/line")}, failed, "cannot be made");
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
+  std::map<std::string, std::string> identity;
+  std::string problem;
+  std::thread user([&] {
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!std::filesystem::is_symlink(folder / "line") && std::chrono::steady_clock::now() < patience)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    try {
+      identity = link::open_link(link::parse_device_address("serial:" + in("line")))->identify();
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    kill(getpid(), SIGTERM);
+  });
+  // Against the signal reaching a program that does not serve (yet).
+  const auto previous = std::signal(SIGTERM, SIG_IGN);
+  EXPECT_EQ(kmax({"serve", "--serial", in("line"), "--json"}), done) << said;
+  user.join();
+  std::signal(SIGTERM, previous);
+  EXPECT_EQ(problem, "");
+  EXPECT_EQ(identity["model_name"], "native");
+  EXPECT_EQ(document()["scene"], "touch");
+  EXPECT_CONTAINS(document()["device"].get<std::string>(), "serial:" + in("line") + "?unit=1&baud=");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+}  // namespace
+}  // namespace kmax::cli

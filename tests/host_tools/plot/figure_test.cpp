@@ -1,0 +1,121 @@
+#include "host_tools/plot/figure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+
+#include "tests/host_tools/temporary_folder.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::plot {
+namespace {
+using host_tools_test::TemporaryFolder;
+using host_tools_test::thrown_message;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+Figure figure_of(Series series) {
+  Figure figure;
+  figure.title = "title";
+  figure.x_label = "x (m)";
+  figure.panels = {{"y (N)", {std::move(series)}, {{0.5, true, "a mark"}, {1.5, false, "level"}}}};
+  return figure;
+}
+const Series line{"line", {0, 1, 2}, {1, 3, 2}};
+
+TEST(Figure, SvgAndPngByTheNamesEnding) {
+  const TemporaryFolder folder;
+  write_figure(figure_of(line), folder / "a.svg");
+  const std::string svg = folder.read("a.svg");
+  for (const char* text :
+       {"<svg", "</svg>", "title", "x (m)", "y (N)", "a mark", "level", ">line<", "rgb(  0, 114, 178)"})
+    EXPECT_CONTAINS(svg, text);
+  write_figure(figure_of(line), folder / "a.png");
+  EXPECT_EQ(folder.read("a.png").substr(1, 3), "PNG");
+  EXPECT_EQ(folder.entries(), 2u) << "something was left behind";
+}
+
+TEST(Figure, PanelsStandAboveEachOther) {
+  const TemporaryFolder folder;
+  Figure figure = figure_of(line);
+  figure.panels.push_back({"second", {line, {"other", {0, 2}, {5, 6}, true}}, {}, std::pair(0.0, 10.0)});
+  write_figure(figure, folder / "a.svg");
+  EXPECT_CONTAINS(folder.read("a.svg"), "second");
+  EXPECT_CONTAINS(folder.read("a.svg"), "other");
+}
+
+TEST(Figure, ValuesThatAreNotFiniteAreGaps) {
+  const TemporaryFolder folder;
+  write_figure(figure_of({"", {0, 1, 2, 3, nan, 5}, {1, nan, infinity, 2, 3, -infinity}}),
+               folder / "gaps.svg");
+  write_figure(figure_of({"", {0, 1, 2}, {4, 4, 4}}), folder / "level.svg");
+  write_figure(figure_of({"", {1}, {1e300}}), folder / "point.svg");
+  EXPECT_EQ(folder.entries(), 3u);
+}
+
+TEST(Figure, OtherEndingsMissingFoldersAndNothingToDrawAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.gif", "a", "a.SVG", "svg", ".svg", "a.svg.part"})
+    EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(figure_of(line), folder / name); }),
+                    "must end in .svg or .png");
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(figure_of(line), folder / "no/a.svg"); }),
+                  "no does not exist");
+  Figure empty = figure_of(line);
+  empty.panels[0].series.clear();
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(empty, folder / "a.svg"); }),
+                  "nothing to draw");
+  empty.panels.clear();
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(empty, folder / "a.svg"); }),
+                  "nothing to draw");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(Figure, APictureThatFailsLeavesTheOldOne) {
+  const TemporaryFolder folder;
+  folder.write("a.svg", "as it was");
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] {
+                    write_figure(figure_of({"", {nan}, {nan}}), folder / "a.svg");
+                  }),
+                  "a.svg: gnuplot could not draw it");
+  EXPECT_EQ(folder.read("a.svg"), "as it was");
+  EXPECT_EQ(folder.entries(), 1u);
+  std::filesystem::create_directory(folder / "b.svg");
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(figure_of(line), folder / "b.svg"); }),
+                  "b.svg");
+  EXPECT_EQ(folder.entries(), 2u);
+}
+
+// Titles and column names come from files that others make.
+TEST(Figure, TextIsOnlyText) {
+  const TemporaryFolder folder;
+  const std::string touch = "touch " + (folder / "done").string();
+  const std::string text =
+      "`" + touch + "` \"; system(\"" + touch + "\") # ' . system('" + touch + "') \\ \n set output $d0 @x";
+  Figure figure = figure_of(line);
+  figure.title = figure.x_label = text;
+  figure.panels[0].y_label = figure.panels[0].series[0].label = figure.panels[0].marks[0].label = text;
+  write_figure(figure, folder / "it's `a` \"name\".svg");
+  EXPECT_FALSE(std::filesystem::exists(folder / "done"));
+  EXPECT_EQ(folder.entries(), 1u);
+  EXPECT_CONTAINS(folder.read("it's `a` \"name\".svg"), "`touch");
+}
+
+// More than a pipe holds: writing to a gnuplot that is not there must end in words, not in SIGPIPE.
+TEST(Figure, MissingGnuplotIsSaid) {
+  const TemporaryFolder folder;
+  const std::string path = getenv("PATH");
+  Series longer{"", {}, {}};
+  for (int i = 0; i < 100'000; ++i) {
+    longer.x.push_back(i);
+    longer.y.push_back(i % 7);
+  }
+  setenv("PATH", folder.path().c_str(), 1);
+  const auto what = thrown_message<FigureError>([&] { write_figure(figure_of(longer), folder / "a.svg"); });
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_CONTAINS(what, "gnuplot is not installed");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+}  // namespace
+}  // namespace kmax::plot

@@ -1,0 +1,108 @@
+#include "host_tools/simulated_board/scene_run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+
+namespace kmax::simulated_board {
+namespace {
+using firmware::DriveState;
+
+simulation::Scene touch(double duration) {
+  simulation::Scene scene = open_scene("touch");
+  scene.duration = duration;
+  return scene;
+}
+
+void set(simulation::Scene& scene, const std::string& name, simulation::ParameterValue value) {
+  for (auto& parameter : scene.parameters) {
+    if (parameter.name == name) {
+      parameter.value = value;
+      return;
+    }
+  }
+  scene.parameters.push_back({name, value, ""});
+}
+
+std::vector<std::uint64_t> bits_of(const RunResult& result) {
+  std::vector<std::uint64_t> bits;
+  for (const RunSample& s : result.samples) {
+    for (const double value : {s.time, s.true_position, s.true_velocity, s.hand_position, s.intended_position,
+                               s.position, s.velocity, s.force, s.applied_force, s.magnetic_coefficient})
+      bits.push_back(std::bit_cast<std::uint64_t>(value));
+  }
+  return bits;
+}
+
+TEST(SceneRun, TheSameSceneGivesTheSameBits) {
+  for (const char* name : {"touch", "two_axes", "free_handle"}) {
+    simulation::Scene scene = open_scene(name);
+    scene.duration = 0.8;
+    const RunResult first = run_scene(scene), second = run_scene(scene);
+    ASSERT_GT(first.samples.size(), 300u) << name;
+    EXPECT_EQ(bits_of(first), bits_of(second)) << name;
+  }
+  simulation::Scene changed = touch(0.8);
+  set(changed, "wall.stiffness", 5499.0);
+  EXPECT_NE(bits_of(run_scene(touch(0.8))), bits_of(run_scene(changed)))
+      << "a test that must be able to fail";
+}
+
+TEST(SceneRun, HasEverySampleOfTheDurationAndTheFirmwaresNumbers) {
+  const RunResult result = run_scene(touch(1.0));
+  EXPECT_EQ(result.samples.size(), 500u);
+  EXPECT_EQ(result.end_state, DriveState::operation_enabled);
+  EXPECT_EQ(result.fault, firmware::Fault::none);
+  EXPECT_FALSE(result.contact) << "the hold is not over";
+  EXPECT_GE(result.simulated_s, 1.0);
+  EXPECT_GT(result.real_s, 0.0);
+  for (std::size_t i = 1; i < result.samples.size(); ++i)
+    ASSERT_NEAR(result.samples[i].time - result.samples[i - 1].time, 0.002, 1e-12);
+  for (const RunSample& sample : result.samples) {
+    ASSERT_NEAR(sample.position, sample.true_position, 0.2e-3);
+    ASSERT_LE(std::abs(sample.applied_force), 3.3 + 1e-6);
+  }
+}
+
+TEST(SceneRun, AWholeHoldIsJudged) {
+  const RunResult result = run_scene(touch(5.0));
+  ASSERT_TRUE(result.contact);
+  EXPECT_EQ(result.contact->verdict, simulation::ContactVerdict::unstable);
+  EXPECT_DOUBLE_EQ(result.judged_to - result.judged_from, 1.0);
+  EXPECT_GT(result.contact->deepest, 0.0);
+  EXPECT_GE(result.limited_share, 0.0);
+  EXPECT_LE(result.limited_share, 1.0);
+}
+
+TEST(SceneRun, AHandleNobodyHoldsIsNotJudged) {
+  simulation::Scene scene = open_scene("free_handle");
+  scene.duration = 0.5;
+  const RunResult result = run_scene(scene);
+  EXPECT_FALSE(result.contact);
+  EXPECT_FALSE(result.samples.empty());
+}
+
+TEST(SceneRun, WhatKeepsItFromBeingArmedIsSaid) {
+  simulation::Scene scene = open_scene("free_handle");
+  scene.axes[0].start.position = -0.001;
+  scene.axes[0].start.velocity = 0;
+  const RunResult result = run_scene(scene);
+  EXPECT_TRUE(result.samples.empty());
+  EXPECT_EQ(result.refusal, firmware::Refusal::handle_inside_wall);
+  EXPECT_NE(result.end_state, DriveState::operation_enabled);
+  EXPECT_FALSE(result.contact);
+}
+
+TEST(SceneRun, AFaultEndsTheForceAndIsReported) {
+  simulation::Scene scene = touch(2.0);
+  set(scene, "velocity.limit", 0.05);  // m/s; the approach is four times as fast
+  const RunResult result = run_scene(scene);
+  EXPECT_EQ(result.fault, firmware::Fault::over_speed);
+  EXPECT_EQ(result.end_state, DriveState::fault);
+  ASSERT_FALSE(result.samples.empty());
+  EXPECT_EQ(result.samples.back().applied_force, 0.0);
+}
+
+}  // namespace
+}  // namespace kmax::simulated_board

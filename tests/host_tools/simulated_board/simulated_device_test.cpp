@@ -1,0 +1,97 @@
+#include "host_tools/simulated_board/simulated_device.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/simulated_board/simulated_board.hpp"
+
+namespace kmax::simulated_board {
+namespace {
+
+firmware::AxisOutput output(float force, bool enabled) {
+  firmware::AxisOutput out{};
+  out.force = force;
+  out.enabled = enabled;
+  return out;
+}
+
+void pass(SimulatedDevice& device, double duration) {
+  for (int i = 0; i < duration * 20000; ++i) device.advance(50e-6);
+}
+
+TEST(SimulatedDevice, CountsArePositionsInItsOwnResolution) {
+  const simulation::Scene scene = open_scene("touch");
+  const SimulatedDevice device(scene);
+  const double length = scene.axes[0].encoder.count_length();
+  EXPECT_NEAR(static_cast<std::int32_t>(device.count(0)) * length, device.handle(0).position(), length);
+  EXPECT_EQ(device.axis_count(), 1u);
+}
+
+TEST(SimulatedDevice, AnAxisThatIsNotThereStandsStill) {
+  SimulatedDevice device(open_scene("touch"));
+  device.drive(1, output(3.0f, true));
+  pass(device, 0.01);
+  EXPECT_EQ(device.count(1), 0u);
+  EXPECT_TRUE(device.count_valid(1));
+}
+
+TEST(SimulatedDevice, ForceOfOneAxisMovesOnlyThatOne) {
+  simulation::Scene scene = open_scene("two_axes");
+  scene.axes[0] = scene.axes[1];
+  SimulatedDevice device(scene);
+  const double start = device.handle(0).position();
+  device.drive(1, output(1.0f, true));
+  pass(device, 0.05);
+  EXPECT_EQ(device.handle(0).position(), start);
+  EXPECT_GT(device.handle(1).position(), start + 1e-3);
+  EXPECT_GT(static_cast<std::int32_t>(device.count(1)), static_cast<std::int32_t>(device.count(0)));
+  EXPECT_EQ(device.axis_count(), 2u);
+}
+
+TEST(SimulatedDevice, AHandleNobodyHoldsIsLetGoWhenItIsArmed) {
+  SimulatedDevice device(open_scene("free_handle"));
+  const double start = device.handle(0).position();
+  pass(device, 0.5);
+  EXPECT_EQ(device.handle(0).position(), start);
+  device.drive(0, output(0, true));
+  pass(device, 0.005);
+  EXPECT_LT(device.handle(0).position(), start - 3e-4);
+  device.drive(0, output(0, false));
+  const double later = device.handle(0).position();
+  pass(device, 0.005);
+  EXPECT_LT(device.handle(0).position(), later) << "it goes on without force";
+}
+
+TEST(SimulatedDevice, PlugsArePulledOneByOne) {
+  SimulatedDevice device(open_scene("two_axes"));
+  device.connect_encoder(1, false);
+  EXPECT_TRUE(device.count_valid(0));
+  EXPECT_FALSE(device.count_valid(1));
+  device.connect_encoder(1, true);
+  EXPECT_TRUE(device.count_valid(1));
+}
+
+TEST(SimulatedDevice, ThePersonBeginsWhenTheAxisIsArmedAndAgainWhenArmedAgain) {
+  SimulatedDevice device(open_scene("touch"));
+  const double start = device.handle(0).position();
+  pass(device, 0.5);
+  EXPECT_NEAR(device.handle(0).position(), start, 1e-4) << "nobody has said 'now'";
+  device.drive(0, output(0, true));
+  pass(device, 0.3);
+  const double after = device.handle(0).intended_position();
+  EXPECT_LT(after, start - 5e-3);
+  device.drive(0, output(0, true));
+  EXPECT_EQ(device.handle(0).intended_position(), after) << "already armed: the motion goes on";
+  device.drive(0, output(0, false));
+  pass(device, 3.0);
+  device.drive(0, output(0, true));
+  EXPECT_NEAR(device.handle(0).intended_position(), start, 5e-3);
+}
+
+TEST(SimulatedDevice, ABoardHasTwoAxes) {
+  simulation::Scene scene = open_scene("two_axes");
+  scene.axes.push_back(scene.axes[0]);
+  EXPECT_THROW(SimulatedDevice device(scene), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace kmax::simulated_board
