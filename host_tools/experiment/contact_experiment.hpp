@@ -16,7 +16,7 @@ struct ContactCondition {
   std::string figure;                    ///< of paper 1
   std::vector<std::string> assignments;  ///< NAME=VALUE, what sets it apart
   std::string paper_words;               ///< what the paper says of it
-  bool paper_stable;
+  bool paper_stable = false;
 };
 
 /// F_MC = 0, 1, 2 N and the adaptive wall in each way its coefficient can follow the velocity; the paper
