@@ -39,13 +39,14 @@ struct AdaptiveCoefficientConfig {
 
 /// The adaptive magnetic coefficient of paper 1's AIT method, one value per haptic sample.
 ///
-/// Cost: about 20 instructions; one square root only for the square-root relation.
+/// Cost: with the wall law around it, see wall_law.hpp; one square root only for the square-root relation.
 template <typename Scalar>
 class AdaptiveCoefficient {
  public:
   struct Coefficients {
     Scalar gain{}, offset{}, inverse_velocity_max{}, force_min{}, force_max{};
     Scalar rest{};       ///< N, the bounded value at zero velocity
+    Scalar most{};       ///< N, the bounded value at V_max and beyond
     Scalar retention{};  ///< share of the excess over `rest` that is left after one sample
     AdaptiveRelation relation{};
     AdaptiveVelocity velocity{};
@@ -58,13 +59,15 @@ class AdaptiveCoefficient {
     Coefficients c;
     c.gain = config.gain;
     c.offset = config.offset;
-    c.inverse_velocity_max = saturate(Scalar(1) / config.velocity_max);
+    // Without a gain the velocity does not count; its product with 0 must stay 0 however large V_k is.
+    c.inverse_velocity_max = config.gain == Scalar(0) ? Scalar(0) : saturate(Scalar(1) / config.velocity_max);
     c.force_min = config.force_min;
     c.force_max = config.force_max;
     c.relation = config.relation;
     c.velocity = config.velocity;
     c.mode = config.mode;
     c.rest = bounded(c, config.offset);
+    c.most = bounded(c, config.gain + config.offset);
     c.retention = config.hold_time > Scalar(0) ? config.hold_time / (config.hold_time + period) : Scalar(0);
     return c;
   }
@@ -78,38 +81,63 @@ class AdaptiveCoefficient {
   /// `outward_velocity`: m/s, positive away from the wall. `inside`: the handle is in the wall.
   /// Returns F_MC in N, within [force_min, force_max] for finite inputs.
   Scalar update(const Coefficients& c, Scalar outward_velocity, bool inside) {
-    const Scalar present = at_velocity(c, outward_velocity);
-    const Scalar present_excess = present - c.rest;
-    const Scalar decayed = excess_ * c.retention;
-    excess_ = present_excess > decayed ? present_excess : decayed;
-    if (inside && !was_inside_) latched_ = present;
-    was_inside_ = inside;
-    switch (c.mode) {
-      case AdaptiveMode::latched:
-        return inside ? bounded(c, latched_) : present;
-      case AdaptiveMode::peak_hold:
-        return bounded(c, c.rest + excess_);
-      case AdaptiveMode::instant:
-        break;
+    return inside ? update_inside(c, outward_velocity) : update_outside(c, outward_velocity);
+  }
+
+  /// The same where the caller has already asked on which side of the surface the handle is.
+  Scalar update_inside(const Coefficients& c, Scalar outward_velocity) {
+    const Scalar present = follow(c, outward_velocity);
+    if (!was_inside_) {
+      was_inside_ = true;
+      latched_ = present;
+      return c.mode == AdaptiveMode::peak_hold ? held(c) : present;
     }
-    return present;
+    if (c.mode == AdaptiveMode::instant) return present;
+    return c.mode == AdaptiveMode::latched ? bounded(c, latched_) : held(c);
+  }
+  Scalar update_outside(const Coefficients& c, Scalar outward_velocity) {
+    const Scalar present = follow(c, outward_velocity);
+    was_inside_ = false;
+    return c.mode == AdaptiveMode::peak_hold ? held(c) : present;
   }
 
   /// Eq. 7 without memory.
   static Scalar at_velocity(const Coefficients& c, Scalar outward_velocity) {
     Scalar speed = -outward_velocity;
-    if (speed < Scalar(0)) speed = c.velocity == AdaptiveVelocity::speed ? -speed : Scalar(0);
+    if (c.velocity == AdaptiveVelocity::speed) {
+      speed = magnitude(speed);
+    } else if (speed < Scalar(0)) {
+      speed = Scalar(0);
+    }
     Scalar normalised = speed * c.inverse_velocity_max;
-    if (normalised > Scalar(1)) normalised = Scalar(1);
     if (c.relation == AdaptiveRelation::square) {
       normalised = normalised * normalised;
     } else if (c.relation == AdaptiveRelation::square_root) {
       normalised = square_root(normalised);
     }
-    return bounded(c, c.gain * normalised + c.offset);
+    // V_k is not bounded to 1 before: all three relations rise with it, and `most` is what they give at 1.
+    const Scalar force = c.gain * normalised + c.offset;
+    if (force > c.most) return c.most;
+    if (force < c.force_min) return c.force_min;
+    return force;
   }
 
  private:
+  // The coefficient at this velocity; the excess follows it.
+  Scalar follow(const Coefficients& c, Scalar outward_velocity) {
+    const Scalar present = at_velocity(c, outward_velocity);
+    const Scalar present_excess = present - c.rest;
+    const Scalar decayed = excess_ * c.retention;
+    excess_ = present_excess > decayed ? present_excess : decayed;
+    return present;
+  }
+
+  // The excess is never below 0 and the rest never below force_min: one bound is left to be kept.
+  Scalar held(const Coefficients& c) const {
+    const Scalar force = c.rest + excess_;
+    return force > c.force_max ? c.force_max : force;
+  }
+
   static constexpr Scalar bounded(const Coefficients& c, Scalar force) {
     if (force > c.force_max) return c.force_max;
     if (force < c.force_min) return c.force_min;

@@ -12,12 +12,27 @@ constexpr bool is_finite(Scalar value) {
   return value - value == Scalar(0);
 }
 
+/// |value|, one instruction; the magnitude of a NaN is a NaN.
+constexpr float magnitude(float value) {
+  return __builtin_fabsf(value);
+}
+constexpr double magnitude(double value) {
+  return __builtin_fabs(value);
+}
+
 /// `value` bounded to [-limit, limit]. A NaN stays a NaN so that a later is_finite() sees it.
 template <typename Scalar>
 constexpr Scalar clamp_magnitude(Scalar value, Scalar limit) {
   if (value > limit) return limit;
   if (value < -limit) return -limit;
   return value;
+}
+
+/// A share brought into 0 .. 1; a NaN gives 1.
+template <typename Scalar>
+constexpr Scalar bounded_share(Scalar share) {
+  if (!(share < Scalar(1))) return Scalar(1);
+  return share > Scalar(0) ? share : Scalar(0);
 }
 
 /// `value` with an overflow to infinity brought back to the largest finite number; NaN stays a NaN.

@@ -95,8 +95,10 @@ class HapticLoop {
     held_ = Output{};
   }
 
+  /// A function of its own even where the caller is flattened: FOAW needs all the registers there are.
+  ///
   /// One tick. `external_force`: N along +x, added before the limiter (another axis' tangential force).
-  const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
+  [[gnu::noinline]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
                      Scalar external_force = Scalar(0)) {
     if (ticks_until_sample_ != 0) {
       --ticks_until_sample_;
@@ -106,14 +108,15 @@ class HapticLoop {
     }
     ticks_until_sample_ = c.divider - 1;
 
-    Output out;
+    Output& out = held_;
     out.new_sample = true;
-    out.position = resampler_.update(c.resampler, count);
+    const Resampler::Sample sample = resampler_.sample(c.resampler, count);
+    out.position = sample.count;
     if (!settled_) {
       velocity_.reset(out.position);
       settled_ = true;
     }
-    out.velocity = velocity_.update(c.velocity, out.position);
+    out.velocity = velocity_.update(c.velocity, sample);
     out.outside_distance = outside_distance(c, out.position);
 
     const auto wall = wall_.update(c.wall, out.outside_distance, c.side * out.velocity);
@@ -127,19 +130,20 @@ class HapticLoop {
     out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
     out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
 
-    if (enabled && !out.over_speed && !out.not_finite) {
+    if (enabled && !out.over_speed && !out.not_finite) [[likely]] {
       const auto limited = limiter_.update(c.force, requested);
       out.force = limited.force;
       out.limited = limited.limited;
       out.slew_limited = limited.slew_limited;
       out.ramping = limited.ramping;
     } else {
-      limiter_.reset();
-      out.tangential_force = Scalar(0);
+      disable();
     }
-    held_ = out;
     return held_;
   }
+
+  /// What the last tick() gave.
+  const Output& output() const { return held_; }
 
   /// Distance of a count from the surface, m, > 0 in free space.
   static Scalar outside_distance(const Coefficients& c, std::int64_t position) {

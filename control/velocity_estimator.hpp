@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "control/difference_velocity.hpp"
 #include "control/foaw_velocity.hpp"
 #include "control/low_pass_velocity.hpp"
+#include "control/resampler.hpp"
 #include "control/tracking_velocity.hpp"
 
 namespace kmax::control {
@@ -30,15 +30,14 @@ struct VelocityEstimatorConfig {
 //
 // A change of kind between samples gives no spike, because the new estimator does not start from nothing:
 //   - difference, foaw and foaw_end_fit give exactly what they would have given had they always been
-//   selected:
-//     their state is the history, which is always kept;
+//     selected: their state is the history, which is always kept;
 //   - low_pass and tracking start on the previous sample with the last output as their velocity.
 // So the first output after a change is one that the new estimator gives in its own right, or lies between
 // the last output and the present difference.
 //
 // A change of the step (position.resolution in flight) moves the count by up to half of both steps although
 // the handle has not moved. That sample is taken as the new origin, the output is held for it, and every
-// estimator continues on the new grid from the held velocity; FOAW's history is laid out along it (about 200
+// estimator continues on the new grid from the held velocity; FOAW's history is laid out along it (about 300
 // instructions, once).
 //
 // After another period or count length call reset(). Every count is valid and gives a finite output.
@@ -47,7 +46,7 @@ class VelocityEstimator {
  public:
   struct Coefficients {
     VelocityEstimatorKind kind = VelocityEstimatorKind::foaw;
-    typename DifferenceVelocity<Scalar>::Coefficients difference;
+    std::uint32_t key = 0;  // the state that the kind uses, and the step: update() looks for a change of it
     typename LowPassVelocity<Scalar>::Coefficients low_pass;
     typename FoawVelocity<Scalar>::Coefficients foaw;
     typename TrackingVelocity<Scalar>::Coefficients tracking;
@@ -57,7 +56,7 @@ class VelocityEstimator {
   // resampler's).
   static constexpr Coefficients prepare(const VelocityEstimatorConfig<Scalar>& config, Scalar period,
                                         Scalar count_length, std::int32_t step) {
-    return {config.kind, DifferenceVelocity<Scalar>::prepare(period, count_length),
+    return {config.kind, key_of(config.kind, step),
             LowPassVelocity<Scalar>::prepare(config.bandwidth, period, count_length),
             FoawVelocity<Scalar>::prepare(config.window, period, count_length, step),
             TrackingVelocity<Scalar>::prepare(config.bandwidth, period, count_length)};
@@ -65,65 +64,89 @@ class VelocityEstimator {
 
   // As if the handle had always stood on this count.
   void reset(std::int64_t count) {
-    difference_.reset(count);
     low_pass_.reset(count);
     foaw_.reset(count);
     tracking_.reset(count);
     last_ = count;
     velocity_ = 0;
-    step_ = 0;
+    key_ = no_key;
   }
 
+  // `sample.steps` must say by how many steps the count has moved since the last call, as the resampler's
+  // does.
+  [[gnu::always_inline]] Scalar update(const Coefficients& coefficients, const Resampler::Sample& sample) {
+    if (coefficients.key != key_) [[unlikely]] {
+      if (changed(coefficients, sample.count)) return velocity_;
+    }
+    return advance(coefficients, sample);
+  }
+
+  // The same without a resampler before it. What a count is off the multiples of the step is left for the
+  // next one.
   Scalar update(const Coefficients& coefficients, std::int64_t count) {
-    if (coefficients.foaw.step != step_) {
-      const bool resampled_anew = step_ != 0;
-      step_ = coefficients.foaw.step;
-      if (resampled_anew) {
-        foaw_.reset(coefficients.foaw, count, velocity_);
-        start(coefficients, count);
-        last_ = count;
-        return velocity_;
-      }
+    if (coefficients.key != key_) [[unlikely]] {
+      if (changed(coefficients, count)) return velocity_;
     }
-    if (coefficients.kind != kind_) start(coefficients, last_);
-    foaw_.push(coefficients.foaw, count);
-    switch (kind_) {
-      case VelocityEstimatorKind::difference:
-        velocity_ = difference_.update(coefficients.difference, count);
-        break;
-      case VelocityEstimatorKind::low_pass:
-        velocity_ = low_pass_.update(coefficients.low_pass, count);
-        break;
-      case VelocityEstimatorKind::foaw:
-        velocity_ = foaw_.template estimate<FoawFit::best>(coefficients.foaw);
-        break;
-      case VelocityEstimatorKind::foaw_end_fit:
-        velocity_ = foaw_.template estimate<FoawFit::end>(coefficients.foaw);
-        break;
-      case VelocityEstimatorKind::tracking:
-        velocity_ = tracking_.update(coefficients.tracking, count);
-        break;
-    }
-    last_ = count;
-    return velocity_;
+    const std::int32_t difference = count_difference(count, last_);
+    const std::int32_t steps = difference / coefficients.foaw.step;
+    return advance(coefficients, {count - (difference - steps * coefficients.foaw.step), steps});
   }
 
  private:
-  void start(const Coefficients& coefficients, std::int64_t count) {
-    kind_ = coefficients.kind;
-    difference_.reset(count);
-    low_pass_.reset(count, velocity_);
-    tracking_.reset(coefficients.tracking, count, velocity_);
+  [[gnu::always_inline]] Scalar advance(const Coefficients& coefficients, const Resampler::Sample& sample) {
+    last_ = sample.count;
+    const auto pushed = foaw_.push(sample.steps);
+    if (coefficients.kind == VelocityEstimatorKind::foaw) [[likely]] {
+      return velocity_ = foaw_.template estimate<FoawFit::best>(coefficients.foaw, pushed);
+    }
+    switch (coefficients.kind) {
+      case VelocityEstimatorKind::difference:
+        velocity_ = static_cast<Scalar>(sample.steps) * coefficients.foaw.scale;
+        break;
+      case VelocityEstimatorKind::low_pass:
+        velocity_ = low_pass_.update(coefficients.low_pass, sample.count);
+        break;
+      case VelocityEstimatorKind::foaw:  // above
+      case VelocityEstimatorKind::foaw_end_fit:
+        velocity_ = foaw_.template estimate<FoawFit::end>(coefficients.foaw, pushed);
+        break;
+      case VelocityEstimatorKind::tracking:
+        velocity_ = tracking_.update(coefficients.tracking, sample.count);
+        break;
+    }
+    return velocity_;
   }
 
-  DifferenceVelocity<Scalar> difference_;
-  LowPassVelocity<Scalar> low_pass_;
+  static constexpr std::uint32_t step_bits = 0x3FFFFFFFU;
+  static constexpr std::uint32_t no_key = 0xFFFFFFFFU;
+
+  // The three kinds that work on the history share a state. Steps up to 2^30 are told apart.
+  static constexpr std::uint32_t key_of(VelocityEstimatorKind kind, std::int32_t step) {
+    const std::uint32_t state = kind == VelocityEstimatorKind::low_pass   ? 1U
+                                : kind == VelocityEstimatorKind::tracking ? 2U
+                                                                          : 0U;
+    return state << 30 | (static_cast<std::uint32_t>(step) & step_bits);
+  }
+
+  // Another kind or another step: true if this sample is only a new origin.
+  [[gnu::noinline, gnu::cold]] bool changed(const Coefficients& coefficients, std::int64_t count) {
+    const bool resampled_anew = key_ != no_key && ((coefficients.key ^ key_) & step_bits) != 0;
+    key_ = coefficients.key;
+    if (resampled_anew) {
+      foaw_.reset(coefficients.foaw, count, velocity_);
+      last_ = count;
+    }
+    low_pass_.reset(last_, velocity_);
+    tracking_.reset(coefficients.tracking, last_, velocity_);
+    return resampled_anew;
+  }
+
   FoawVelocity<Scalar> foaw_;
+  LowPassVelocity<Scalar> low_pass_;
   TrackingVelocity<Scalar> tracking_;
   std::int64_t last_ = 0;
   Scalar velocity_ = 0;
-  std::int32_t step_ = 0;  // 0: no sample since reset()
-  VelocityEstimatorKind kind_ = VelocityEstimatorKind::foaw;
+  std::uint32_t key_ = no_key;
 };
 
 }  // namespace kmax::control

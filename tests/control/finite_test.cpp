@@ -30,5 +30,20 @@ TEST(Finite, SaturateBringsInfinitiesBackAndKeepsNaN) {
   EXPECT_TRUE(std::isnan(saturate(std::nanf(""))));
 }
 
+TEST(Magnitude, KeepsANotANumberAndDropsTheSign) {
+  EXPECT_EQ(magnitude(-2.5F), 2.5F);
+  EXPECT_EQ(magnitude(2.5), 2.5);
+  EXPECT_FALSE(std::signbit(magnitude(-0.0F)));
+  EXPECT_TRUE(std::isinf(magnitude(-INFINITY)));
+  EXPECT_TRUE(std::isnan(magnitude(std::nanf(""))));
+}
+
+TEST(BoundedShare, StaysBetweenNothingAndAll) {
+  EXPECT_EQ(bounded_share(0.3F), 0.3F);
+  EXPECT_EQ(bounded_share(-0.3F), 0.0F);
+  EXPECT_EQ(bounded_share(1.5), 1.0);
+  EXPECT_EQ(bounded_share(std::nanf("")), 1.0F);
+}
+
 }  // namespace
 }  // namespace kmax::control

@@ -17,27 +17,30 @@ struct Choice {
   double slope = 0.0;  // steps per sample
 };
 
-// The definition, written down literally: for every window its own line, checked against every sample of the
-// window. `newest_first` in steps. The tolerance lies far below the smallest distance of two different
-// slopes, 1/13056.
+double slope_of(const std::vector<double>& newest_first, int n, FoawFit fit) {
+  if (fit == FoawFit::end) return (newest_first[0] - newest_first[static_cast<std::size_t>(n)]) / n;
+  double numerator = 0.0;
+  for (int l = 0; l <= n; ++l)
+    numerator += (n - 2 * l) * (newest_first[static_cast<std::size_t>(l)] - newest_first[0]);
+  return numerator / (n * (n + 1) * (n + 2) / 6.0);
+}
+
+// The definition, written down literally: for every window its own chord, checked against every sample of the
+// window; over the last one that held, the slope of the fit. `newest_first` in steps. The tolerance lies far
+// below the smallest distance of two different slopes of chords, 1/240.
 Choice defined_choice(const std::vector<double>& newest_first, int longest, FoawFit fit) {
-  Choice choice;
+  int window = 1;
   for (int n = 1; n <= longest; ++n) {
-    double slope = 0.0;
-    if (fit == FoawFit::end) {
-      slope = (newest_first[0] - newest_first[static_cast<std::size_t>(n)]) / n;
-    } else {
-      for (int l = 0; l <= n; ++l)
-        slope += (n - 2 * l) * (newest_first[static_cast<std::size_t>(l)] - newest_first[0]);
-      slope /= n * (n + 1) * (n + 2) / 6.0;
-    }
+    const double chord = slope_of(newest_first, n, FoawFit::end);
+    bool holds = true;
     for (int j = 1; j <= n; ++j) {
-      const double line = newest_first[0] - slope * j;
-      if (std::fabs(line - newest_first[static_cast<std::size_t>(j)]) > 1.0 + 1e-7) return choice;
+      const double line = newest_first[0] - chord * j;
+      holds = holds && std::fabs(line - newest_first[static_cast<std::size_t>(j)]) <= 1.0 + 1e-7;
     }
-    choice = {n, slope};
+    if (!holds) break;
+    window = n;
   }
-  return choice;
+  return {window, slope_of(newest_first, window, fit)};
 }
 
 // Motions that make windows of all lengths: bounded accelerations, noise of a step, jumps, still stretches.

@@ -175,6 +175,26 @@ RC_GTEST_PROP(Resampler, DitherOfLessThanAStepNeverTogglesTheHysteresis, (std::i
   RC_ASSERT(resampler.update(coefficients, held + step) == held + step);
 }
 
+// sample() gives what update() gives, and its steps add up to the way made on the grid.
+RC_GTEST_PROP(Resampler, TheStepsAreTheWayOnTheGrid, ()) {
+  const std::int32_t step = *rc::gen::element(1, 2, 3, 10, 550, 1 << 20);
+  const auto rounding = *rc::gen::element(Rounding::nearest, Rounding::floor, Rounding::hysteresis);
+  std::int64_t count = *rc::gen::element<std::int64_t>(0, -1, 1LL << 40);
+  const auto coefficients = Resampler::prepare({step, rounding}, count);
+  Resampler sampled;
+  Resampler updated;
+  std::int64_t last = sampled.sample(coefficients, count).count;
+  RC_ASSERT(last == updated.update(coefficients, count));
+  for (const std::int32_t move :
+       *rc::gen::container<std::vector<std::int32_t>>(60, rc::gen::inRange(-5000, 5000))) {
+    count += *rc::gen::element(move, move % 7, move * 1000, 0);
+    const auto sample = sampled.sample(coefficients, count);
+    RC_ASSERT(sample.count == updated.update(coefficients, count));
+    RC_ASSERT(sample.count == last + std::int64_t{sample.steps} * step);
+    last = sample.count;
+  }
+}
+
 TEST(ResamplerStep, NearestWholeNumberOfCounts) {
   EXPECT_EQ(resampler_step(0.0, 1e-6), 1);
   EXPECT_EQ(resampler_step(55e-6, 1e-7), 550);

@@ -36,5 +36,30 @@ RC_GTEST_PROP(SaturatedDifference, IsTheClampedDifference, (std::int64_t to, std
   RC_ASSERT(saturated_difference(to, from) == static_cast<std::int32_t>(exact));
 }
 
+// Up to 2^62 - 1 on both sides of zero it is the same function.
+RC_GTEST_PROP(CountDifference, IsTheSaturatedOneForCountsBelowTwoToThe62, (std::int64_t a, std::int64_t b)) {
+  const int shift_a = *rc::gen::inRange(2, 64);
+  const int shift_b = *rc::gen::inRange(2, 64);
+  const std::int64_t to = a >> shift_a;
+  const std::int64_t from = b >> shift_b;
+  if (to > -(1LL << 62) && from > -(1LL << 62))
+    RC_ASSERT(count_difference(to, from) == saturated_difference(to, from));
+  constexpr std::int64_t edge = (1LL << 62) - 1;
+  RC_ASSERT(count_difference(edge, -edge) == largest);
+  RC_ASSERT(count_difference(-edge, edge) == smallest);
+  RC_ASSERT(count_difference(from + largest, from) == largest);
+  RC_ASSERT(count_difference(from + smallest, from) == smallest);
+}
+
+RC_GTEST_PROP(DifferenceToFourBits, IsTheDifferenceCutToItsRange, (std::int32_t from)) {
+  const std::int32_t to = *rc::gen::oneOf(
+      rc::gen::arbitrary<std::int32_t>(),
+      rc::gen::element(std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min()),
+      rc::gen::map(rc::gen::inRange(-20, 20), [&](int by) {
+        return static_cast<std::int32_t>(std::clamp(std::int64_t{from} + by, smallest, largest));
+      }));
+  RC_ASSERT(difference_to_4_bits(to, from) == std::clamp<std::int64_t>(std::int64_t{to} - from, -8, 7));
+}
+
 }  // namespace
 }  // namespace kmax::control

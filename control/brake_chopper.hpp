@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+namespace kmax::control {
+
+struct BrakeChopperConfig {
+  float on_voltage = 0.0f;  ///< V, 0: no brake resistor
+  float hysteresis = 0.5f;  ///< V, >= 0: off again this far below
+};
+
+/// Switches a brake resistor by the supply voltage, so that a motor that brakes does not pump the supply up.
+///
+/// Called at the tick rate. The resistor lies between the half-bridge's middle and ground, so only its high
+/// side is ever switched on: there is nothing to shoot through. Its bootstrap capacitor recharges through the
+/// resistor while the high side is off; every 20th tick is therefore always off (95 % at most).
+///
+/// A voltage that is not a number counts as low: off.
+class BrakeChopper {
+ public:
+  struct Coefficients {
+    float on_voltage = 0.0f, off_voltage = 0.0f;
+  };
+
+  /// Outside the interrupt.
+  static constexpr Coefficients prepare(const BrakeChopperConfig& config) {
+    return {config.on_voltage, config.on_voltage - config.hysteresis};
+  }
+
+  /// True: high side on until the next call.
+  bool update(const Coefficients& c, float supply_voltage) {
+    if (!(c.on_voltage > 0.0f) || !(supply_voltage > c.off_voltage)) on_ = false;
+    if (c.on_voltage > 0.0f && supply_voltage >= c.on_voltage) on_ = true;
+    ticks_ = ticks_ + 1 < recharge_every ? ticks_ + 1 : 0;
+    return on_ && ticks_ != 0;
+  }
+
+ private:
+  static constexpr std::uint32_t recharge_every = 20;
+  std::uint32_t ticks_ = 0;
+  bool on_ = false;
+};
+
+}  // namespace kmax::control

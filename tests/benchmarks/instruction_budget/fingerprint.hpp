@@ -1,0 +1,112 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+#include "tests/benchmarks/instruction_budget/inputs.hpp"
+#include "tests/benchmarks/instruction_budget/steps.hpp"
+
+namespace kmax::instruction_budget {
+
+/// One number for all bits that the steps put out over a long run of inputs. The Cortex-M4F, with its own
+/// instructions for halves of words and for pairs of them, and x86, without, must come to the same.
+class Fingerprint {
+ public:
+  std::uint32_t of_all() {
+    for (int kind = 0; kind <= 4; ++kind) position(static_cast<control::VelocityEstimatorKind>(kind));
+    wall();
+    currents();
+    return value_;
+  }
+
+ private:
+  void add(std::uint32_t word) {  // FNV-1a over words
+    value_ = (value_ ^ word) * 16777619U;
+  }
+  void add(float number) {
+    // Which NaN comes out of an operation is up to the machine.
+    add(number == number ? std::bit_cast<std::uint32_t>(number) : 0x7FC00000U);
+  }
+
+  void position(control::VelocityEstimatorKind kind) {
+    Position<std::uint32_t> position;
+    PositionOutput out;
+    Path path;
+    position.extender.reset(0);
+    position.velocity.reset(0);
+    for (int i = 0; i < 6000; ++i) {
+      const std::int32_t step = i < 2000 ? 1 : i < 4000 ? 7 : 550;
+      control::VelocityEstimatorConfig<float> config;
+      config.kind = kind;
+      const PositionCoefficients c{
+          control::Resampler::prepare({step, static_cast<control::Rounding>(i / 500 % 3)}, out.count),
+          Velocity::prepare(config, 5e-5F, 1e-7F, step)};
+      const auto raw = static_cast<std::int32_t>(path.next(inputs_) * static_cast<float>(step));
+      position32_step(position, c, out, static_cast<std::uint32_t>(raw));
+      add(static_cast<std::uint32_t>(out.count));
+      add(out.velocity);
+    }
+  }
+
+  void wall() {
+    Wall wall;
+    for (int i = 0; i < 6000; ++i) {
+      control::WallLawConfig<float> config;
+      config.kind = static_cast<control::WallKind>(inputs_.random() % 4);
+      config.damping = 5.0F;
+      config.adaptive.relation = static_cast<control::AdaptiveRelation>(inputs_.random() % 3);
+      config.adaptive.velocity = static_cast<control::AdaptiveVelocity>(inputs_.random() % 2);
+      config.adaptive.mode = static_cast<control::AdaptiveMode>(inputs_.random() % 3);
+      const float distance = inputs_.hard(0.002F * inputs_.unit());
+      const auto out =
+          wall_step(wall, Wall::prepare(config, 5e-5F), distance, inputs_.hard(3.0F * inputs_.unit()));
+      add(out.force);
+      add(out.magnetic_force);
+      add(out.magnetic_coefficient);
+      if (i % 64 == 0) wall.reset();
+    }
+  }
+
+  void currents() {
+    Dc dc;
+    FieldOriented field_oriented;
+    for (int i = 0; i < 6000; ++i) {
+      control::DcCurrentControllerConfig<float> dc_config;
+      dc_config.torque_constant = 0.05F;
+      dc_config.resistance = 0.1F + static_cast<float>(i) * 0.01F;
+      control::FieldOrientedControllerConfig<float> config;
+      config.torque_constant = 0.05F;
+      config.resistance = dc_config.resistance;
+      FieldOriented::Input in;
+      in.angle = inputs_.random();
+      const float size = i / 100 % 2 == 0 ? 1.0F : 30.0F;
+      in.current_b = inputs_.hard(size * inputs_.unit());
+      in.current_c = size * inputs_.unit();
+      in.electrical_speed = 500.0F * inputs_.unit();
+      in.reference_d = size * inputs_.unit();
+      in.reference_q = inputs_.hard(size * inputs_.unit());
+      in.supply = 24.0F + 12.0F * inputs_.unit();
+      const auto a = dc_step(dc, Dc::prepare(dc_config, 5e-5F), in.reference_q, in.current_b,
+                             in.electrical_speed, in.supply);
+      add(a.voltage);
+      add(a.duty_b);
+      add(a.duty_c);
+      const auto b = field_oriented_step(field_oriented, FieldOriented::prepare(config, 5e-5F), in);
+      for (const float number :
+           {b.duty_a, b.duty_b, b.duty_c, b.current_d, b.current_q, b.voltage_d, b.voltage_q})
+        add(number);
+      const auto c = transmission_step(Transmission::prepare({}), in.reference_q);
+      add(c.current);
+      add(c.force);
+    }
+  }
+
+  Inputs inputs_;
+  std::uint32_t value_ = 2166136261U;
+};
+
+/// What it was when the steps were last changed on purpose. When it differs on one machine only, the machines
+/// do not agree; when it differs on both in the same way, put the new number here.
+inline constexpr std::uint32_t known_fingerprint = 4196734200U;
+
+}  // namespace kmax::instruction_budget

@@ -1,0 +1,232 @@
+// Counts the instructions of each step of the interrupt path over inputs that reach its branches, prints the
+// worst ones beside their budgets, and exits with 1 when one is above it.
+#include <cstdint>
+
+#include "tests/benchmarks/instruction_budget/fingerprint.hpp"
+#include "tests/benchmarks/instruction_budget/inputs.hpp"
+#include "tests/benchmarks/instruction_budget/machine.hpp"
+#include "tests/benchmarks/instruction_budget/steps.hpp"
+
+namespace kmax::instruction_budget {
+namespace {
+
+using namespace control;
+
+constexpr float period = 5e-5F;
+
+Inputs inputs;
+
+void print_number(std::uint32_t value, int width) {
+  char text[12];
+  int at = 11;
+  text[at] = '\0';
+  do {
+    text[--at] = static_cast<char>('0' + value % 10);
+    value /= 10;
+  } while (value != 0);
+  while (at > 11 - width) text[--at] = ' ';
+  print(text + at);
+}
+
+std::uint32_t overhead = 0;
+
+std::uint32_t count(const Registers& arguments, auto* function) {
+  return counted_call(arguments, reinterpret_cast<void (*)()>(function)) - overhead;
+}
+
+bool within = true;
+
+void report(const char* step, std::uint32_t worst, std::uint32_t usual, std::uint32_t budget) {
+  print(step);
+  print_number(usual, 7);
+  print_number(worst, 7);
+  if (budget == 0) {
+    print("      -\n");
+    return;
+  }
+  print_number(budget, 7);
+  print(worst <= budget ? "\n" : "  TOO MANY\n");
+  if (worst > budget) within = false;
+}
+
+void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
+  static Wall wall;
+  static Wall::Output out;
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (int i = 0; i < 20000; ++i) {
+    WallLawConfig<float> config;
+    config.kind = kind;
+    config.damping = (inputs.random() & 1U) != 0 ? 5.0F : 0.0F;
+    if (i > 0) {
+      config.adaptive.relation = static_cast<AdaptiveRelation>(inputs.random() % 3);
+      config.adaptive.velocity = static_cast<AdaptiveVelocity>(inputs.random() % 2);
+      config.adaptive.mode = static_cast<AdaptiveMode>(inputs.random() % 3);
+    }
+    if (i % 64 == 0) wall.reset();
+    const auto c = Wall::prepare(config, period);
+    const Registers arguments{{&out, &wall, &c},
+                              {inputs.hard(0.002F * inputs.unit()), inputs.hard(3.0F * inputs.unit())}};
+    const std::uint32_t counted = count(arguments, &wall_step);
+    if (i == 0) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+  report(name, worst, usual, budget);
+}
+
+template <typename Counter>
+void measure_position(const char* name,
+                      void (*step)(Position<Counter>&, const PositionCoefficients&, PositionOutput&,
+                                   std::uint32_t),
+                      VelocityEstimatorKind kind, std::uint32_t budget) {
+  static Position<Counter> position;
+  static PositionOutput out;
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (const std::int32_t quantum : {1, 7, 550}) {
+    for (const Rounding rounding : {Rounding::nearest, Rounding::floor, Rounding::hysteresis}) {
+      VelocityEstimatorConfig<float> config;
+      config.kind = kind;
+      const PositionCoefficients c{Resampler::prepare({quantum, rounding}, 0),
+                                   Velocity::prepare(config, period, 1e-7F, quantum)};
+      position.extender.reset(0);
+      position.resampler.reset();
+      position.velocity.reset(0);
+      Path path;
+      for (int i = 0; i < 12000; ++i) {
+        const auto raw = static_cast<std::int32_t>(path.next(inputs) * static_cast<float>(quantum));
+        Registers arguments{{&position, &c, &out, nullptr}, {}};
+        arguments.integers[3] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(raw));
+        const std::uint32_t counted = count(arguments, step);
+        // The first sample of a grid is not the tick's worst case: it comes once.
+        if (i > 0 && counted > worst) worst = counted;
+        if (i == 63 && quantum == 7 && rounding == Rounding::nearest) usual = counted;
+      }
+    }
+  }
+  report(name, worst, usual, budget);
+}
+
+void measure_haptic() {
+  static Haptic loop;
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  HapticLoopConfig<float> config;
+  config.wall.kind = WallKind::adaptive;
+  config.count_length = 1e-7;
+  config.position_resolution = 7e-7;
+  config.force.slew_limit = 1000.0F;
+  const auto c = Haptic::prepare(config, 0);
+  Path path;
+  for (int i = 0; i < 20000; ++i) {
+    // r0 loop, r1 coefficients, r2 and r3 the count.
+    const auto position = static_cast<std::int32_t>(path.next(inputs) * 7.0F);
+    Registers arguments{{&loop, &c, nullptr, nullptr}, {}};
+    arguments.integers[2] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(position));
+    arguments.integers[3] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(position >> 31));
+    const std::uint32_t counted = count(arguments, &haptic_step);
+    if (i > 0 && counted > worst) worst = counted;
+    if (i == 63) usual = counted;
+  }
+  report("haptic tick, adaptive wall, resampled  ", worst, usual, 0);
+}
+
+void measure_dc() {
+  static Dc dc;
+  static Dc::Output out;
+  DcCurrentControllerConfig<float> config;
+  config.torque_constant = 0.05F;
+  const auto c = Dc::prepare(config, period);
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (int i = 0; i < 50000; ++i) {
+    if (i % 100 == 0) dc.reset();
+    const float size = (i / 100) % 2 == 0 ? 1.0F : 50.0F;
+    const Registers arguments{
+        {&out, &dc, &c},
+        {i == 0 ? 0.1F : inputs.hard(size * inputs.unit()), i == 0 ? 0.0F : inputs.hard(size * inputs.unit()),
+         i == 0 ? 0.0F : inputs.hard(100.0F * inputs.unit()),
+         i == 0 ? 24.0F : inputs.hard(24.0F + 12.0F * inputs.unit())}};
+    const std::uint32_t counted = count(arguments, &dc_step);
+    if (i == 0) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+  report("DC current step                        ", worst, usual, 45);
+}
+
+void measure_field_oriented() {
+  static FieldOriented controller;
+  static FieldOriented::Output out;
+  static FieldOriented::Input in;
+  FieldOrientedControllerConfig<float> config;
+  config.torque_constant = 0.05F;
+  config.pole_pairs = 7;
+  const auto c = FieldOriented::prepare(config, period);
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (int i = 0; i < 50000; ++i) {
+    if (i % 100 == 0) controller.reset();
+    const float size = (i / 100) % 2 == 0 ? 1.0F : 50.0F;
+    in = {inputs.random(),
+          inputs.hard(size * inputs.unit()),
+          inputs.hard(size * inputs.unit()),
+          inputs.hard(1000.0F * inputs.unit()),
+          inputs.hard(size * inputs.unit()),
+          inputs.hard(size * inputs.unit()),
+          inputs.hard(24.0F + 12.0F * inputs.unit())};
+    if (i == 0) in = {0x12345678U, 0.1F, 0.1F, 10.0F, 0.0F, 0.2F, 24.0F};
+    const std::uint32_t counted = count(Registers{{&out, &controller, &c, &in}, {}}, &field_oriented_step);
+    if (i == 0) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+  report("PMSM current step, sine and cosine in  ", worst, usual, 150);
+}
+
+void measure_small_steps() {
+  static Transmission::Output out;
+  const auto c = Transmission::prepare({});
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Registers arguments{{&out, &c}, {i == 0 ? 1.0F : inputs.hard(40.0F * inputs.unit())}};
+    const std::uint32_t counted = count(arguments, &transmission_step);
+    if (i == 0) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+  report("force to current                       ", worst, usual, 0);
+  worst = count(Registers{}, &sine_cosine_step);
+  report("sine and cosine alone                  ", worst, worst, 0);
+}
+
+}  // namespace
+}  // namespace kmax::instruction_budget
+
+int main() {
+  using namespace kmax::instruction_budget;
+  using Kind = kmax::control::VelocityEstimatorKind;
+  start_counter();
+  // An empty function is its return alone, which counts.
+  overhead = count(Registers{}, &nothing_step) - 1;
+  print("Executed instructions, Cortex-M4F       usual  worst budget\n");
+  measure_wall("adaptive wall law                      ", kmax::control::WallKind::adaptive, 90);
+  measure_wall("magnetic wall law                      ", kmax::control::WallKind::magnetic, 0);
+  measure_position("32-bit position, FOAW best fit         ", &position32_step, Kind::foaw, 220);
+  measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 220);
+  measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 220);
+  measure_position("32-bit position, tracking              ", &position32_step, Kind::tracking, 0);
+  measure_position("32-bit position without velocity       ", &resample_step, Kind::foaw, 0);
+  measure_haptic();
+  measure_dc();
+  measure_field_oriented();
+  measure_small_steps();
+  const std::uint32_t fingerprint = Fingerprint{}.of_all();
+  print("Fingerprint of the results ");
+  print_number(fingerprint, 0);
+  if (fingerprint == known_fingerprint) {
+    print(", as on x86\n");
+  } else {
+    print(", not the known one: see fingerprint.hpp\n");
+    within = false;
+  }
+  return within ? 0 : 1;
+}

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+
+#include "control/count_extender.hpp"
+#include "control/dc_current_controller.hpp"
+#include "control/field_oriented_controller.hpp"
+#include "control/haptic_loop.hpp"
+#include "control/motor_transmission.hpp"
+#include "control/resampler.hpp"
+#include "control/velocity_estimator.hpp"
+#include "control/wall_law.hpp"
+
+// The steps of the interrupt path as functions of their own, compiled apart from what calls them: nothing
+// about their arguments is known to the compiler, as in the tick. An argument that the step before leaves in
+// a register is passed in one.
+namespace kmax::instruction_budget {
+
+using Wall = control::WallLaw<float>;
+using Velocity = control::VelocityEstimator<float>;
+using Dc = control::DcCurrentController<float>;
+using FieldOriented = control::FieldOrientedController<float>;
+using Haptic = control::HapticLoop<float>;
+using Transmission = control::MotorTransmission<float>;
+
+// From the counter's register to position and velocity.
+template <typename Counter>
+struct Position {
+  control::CountExtender<Counter> extender;
+  control::Resampler resampler;
+  Velocity velocity;
+};
+struct PositionCoefficients {
+  control::Resampler::Coefficients resampler;
+  Velocity::Coefficients velocity;
+};
+struct PositionOutput {
+  std::int64_t count = 0;
+  float velocity = 0.0F;
+};
+
+extern "C" {
+void nothing_step();
+Wall::Output wall_step(Wall& wall, const Wall::Coefficients& c, float distance, float velocity);
+void position16_step(Position<std::uint16_t>& position, const PositionCoefficients& c, PositionOutput& out,
+                     std::uint32_t raw);
+void position32_step(Position<std::uint32_t>& position, const PositionCoefficients& c, PositionOutput& out,
+                     std::uint32_t raw);
+void resample_step(Position<std::uint32_t>& position, const PositionCoefficients& c, PositionOutput& out,
+                   std::uint32_t raw);
+Dc::Output dc_step(Dc& dc, const Dc::Coefficients& c, float reference, float current, float speed,
+                   float supply);
+FieldOriented::Output field_oriented_step(FieldOriented& controller, const FieldOriented::Coefficients& c,
+                                          const FieldOriented::Input& in);
+Transmission::Output transmission_step(const Transmission::Coefficients& c, float force);
+const Haptic::Output& haptic_step(Haptic& loop, const Haptic::Coefficients& c, std::int64_t count);
+control::SineCosine<float> sine_cosine_step(std::uint32_t angle);
+}
+
+}  // namespace kmax::instruction_budget

@@ -1,0 +1,309 @@
+#include "control/field_oriented_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "tests/control/motor_winding.hpp"
+
+namespace kmax::control {
+namespace {
+
+using test::SynchronousMotor;
+using test::tick;
+constexpr double two_pi = 2.0 * std::numbers::pi;
+constexpr std::int32_t pole_pairs = 7;
+
+TurnFraction fraction_of(double radians) {
+  const double turns = radians / two_pi;
+  return static_cast<TurnFraction>(std::llround((turns - std::floor(turns)) * 4294967296.0));
+}
+
+template <typename Scalar>
+struct Loop {
+  FieldOrientedControllerConfig<Scalar> config;
+  SynchronousMotor motor;
+  double supply = 24.0;
+  FieldOrientedController<Scalar> controller;
+  typename FieldOrientedController<Scalar>::Coefficients c;
+  typename FieldOrientedController<Scalar>::Output out;
+
+  // The controller is told the motor's resistance and inductances times these.
+  explicit Loop(const SynchronousMotor& plant, double bandwidth_hertz, double resistance_error = 1.0,
+                double inductance_error = 1.0, double flux_error = 1.0)
+      : motor(plant) {
+    config.resistance = static_cast<Scalar>(plant.resistance * resistance_error);
+    config.inductance_d = static_cast<Scalar>(plant.inductance_d * inductance_error);
+    config.inductance_q = static_cast<Scalar>(plant.inductance_q * inductance_error);
+    config.torque_constant = static_cast<Scalar>(1.5 * pole_pairs * plant.flux * flux_error);
+    config.pole_pairs = pole_pairs;
+    config.bandwidth = static_cast<Scalar>(two_pi * bandwidth_hertz);
+    c = FieldOrientedController<Scalar>::prepare(config, static_cast<Scalar>(tick));
+  }
+  void run(double reference_d, double reference_q) {
+    const auto currents = motor.currents();
+    out = controller.update(c, {.angle = fraction_of(motor.angle),
+                                .current_b = static_cast<Scalar>(currents.b),
+                                .current_c = static_cast<Scalar>(currents.c),
+                                .electrical_speed = static_cast<Scalar>(motor.electrical_speed),
+                                .reference_d = static_cast<Scalar>(reference_d),
+                                .reference_q = static_cast<Scalar>(reference_q),
+                                .supply = static_cast<Scalar>(supply)});
+    motor.run(
+        {static_cast<double>(out.duty_a), static_cast<double>(out.duty_b), static_cast<double>(out.duty_c)},
+        supply);
+  }
+};
+
+TEST(FieldOrientedController, MeasuresTheCurrentsInTheRotorsFrame) {
+  for (const double angle : {0.0, 0.3, 2.0, 4.5, 6.2}) {
+    Loop<double> loop({}, 500.0);
+    loop.motor.angle = angle;
+    loop.motor.current_d = -1.25;
+    loop.motor.current_q = 0.75;
+    loop.run(0.0, 0.0);
+    EXPECT_NEAR(loop.out.current_d, -1.25, 1e-8) << angle;
+    EXPECT_NEAR(loop.out.current_q, 0.75, 1e-8) << angle;
+  }
+}
+
+// At rest both axes are the DC controller's loop: the request is met without overshoot up to 1 kHz.
+TEST(FieldOrientedController, StepsOfBothAxesAreFastAndDoNotDisturbTheOther) {
+  struct Case {
+    double hertz, overshoot;
+    int ticks_to_90_percent;
+  };
+  for (const Case& test : {Case{200.0, 2e-3, 40}, Case{1000.0, 2e-3, 9}, Case{2500.0, 0.11, 5}}) {
+    for (const bool on_q : {false, true}) {
+      Loop<double> loop({.angle = 1.0}, test.hertz);
+      double highest = 0.0;
+      double other = 0.0;
+      int reached = -1;
+      for (int k = 0; k < 1000; ++k) {
+        loop.run(on_q ? 0.0 : 1.0, on_q ? 1.0 : 0.0);
+        const double stepped = on_q ? loop.motor.current_q : loop.motor.current_d;
+        highest = std::max(highest, stepped);
+        other = std::max(other, std::fabs(on_q ? loop.motor.current_d : loop.motor.current_q));
+        if (reached < 0 && stepped > 0.9) reached = k + 1;
+      }
+      EXPECT_FALSE(loop.out.saturated);
+      EXPECT_LE(highest, 1.0 + test.overshoot) << test.hertz;
+      EXPECT_LE(reached, test.ticks_to_90_percent) << test.hertz;
+      EXPECT_LE(other, 1e-6) << test.hertz;
+    }
+  }
+}
+
+// Turning fast, with saliency: without the decoupling the d axis would be disturbed several times as much.
+TEST(FieldOrientedController, DecouplingKeepsTheAxesApartAtSpeed) {
+  double disturbance[2] = {};
+  for (int decoupled = 0; decoupled < 2; ++decoupled) {
+    Loop<double> loop({.inductance_d = 0.8e-3, .inductance_q = 1.4e-3, .electrical_speed = 700.0}, 400.0);
+    if (decoupled == 0) loop.c.inductance_d = loop.c.inductance_q = 0.0;
+    for (int k = 0; k < 4000; ++k) loop.run(0.0, 0.0);
+    for (int k = 0; k < 400; ++k) {
+      loop.run(0.0, 3.0);
+      disturbance[decoupled] = std::max(disturbance[decoupled], std::fabs(loop.motor.current_d));
+    }
+  }
+  EXPECT_LT(disturbance[1], 0.35 * disturbance[0]);
+  EXPECT_LT(disturbance[1], 0.25);
+}
+
+TEST(FieldOrientedController, TheFeedForwardOfTheFluxKeepsASpeedStepOutOfTheCurrent) {
+  double disturbed[2] = {};
+  for (int with = 0; with < 2; ++with) {
+    Loop<double> loop({}, 500.0, 1.0, 1.0, with);
+    for (int k = 0; k < 2000; ++k) loop.run(0.0, 0.5);
+    loop.motor.electrical_speed = 500.0;  // 5 V
+    for (int k = 0; k < 200; ++k) {
+      loop.run(0.0, 0.5);
+      disturbed[with] = std::max(disturbed[with], std::fabs(loop.motor.current_q - 0.5));
+    }
+  }
+  EXPECT_LT(disturbed[1], 0.2 * disturbed[0]);
+}
+
+TEST(FieldOrientedController, NoSteadyErrorWithWrongParametersAtSpeed) {
+  for (const double speed : {-700.0, 0.0, 300.0}) {
+    for (const double r : {0.7, 1.3}) {
+      for (const double l : {0.7, 1.3}) {
+        Loop<double> loop({.electrical_speed = speed}, 1500.0, r, l, 0.6);
+        for (int k = 0; k < 8000; ++k) loop.run(-0.5, 2.0);
+        EXPECT_NEAR(loop.motor.current_d, -0.5, 2e-3) << speed << " " << r << " " << l;
+        EXPECT_NEAR(loop.motor.current_q, 2.0, 2e-3) << speed << " " << r << " " << l;
+      }
+    }
+  }
+}
+
+TEST(FieldOrientedController, AWindingThatSettlesWithinATickIsControlledAsWell) {
+  Loop<double> loop({.resistance = 10.0, .inductance_d = 1e-4, .inductance_q = 1e-4}, 2500.0);
+  double highest = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    loop.run(0.0, 0.4);
+    highest = std::max(highest, loop.motor.current_q);
+  }
+  EXPECT_LE(highest, 0.45);
+  EXPECT_NEAR(loop.motor.current_q, 0.4, 1e-6);
+}
+
+TEST(FieldOrientedController, TheDAxisIsServedFirst) {
+  // 20 V of back-EMF alone are more than the 13 V there are: a field weakening of -8 A must still be held.
+  Loop<double> loop({.electrical_speed = 2000.0}, 500.0);
+  for (int k = 0; k < 4000; ++k) loop.run(-8.0, 5.0);
+  EXPECT_TRUE(loop.out.saturated);
+  EXPECT_NEAR(loop.motor.current_d, -8.0, 0.4);
+  EXPECT_LT(loop.motor.current_q, 4.5) << "there was room for all of it: nothing was tested";
+  const double length = std::hypot(loop.out.voltage_d, loop.out.voltage_q);
+  EXPECT_NEAR(length, 24.0 * 0.95 / std::sqrt(3.0), 1e-3);
+}
+
+TEST(FieldOrientedController, TheCircleIsNeverLeftAndVoltagesAreThoseOfTheDuties) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
+  for (const float limit : {0.95F, 0.3F, 1.0F, 0.0F, 3.0F}) {
+    FieldOrientedControllerConfig<float> config;
+    config.modulation_limit = limit;
+    config.torque_constant = 0.05F;
+    config.pole_pairs = pole_pairs;
+    const auto c = FieldOrientedController<float>::prepare(config, 5e-5F);
+    FieldOrientedController<float> controller;
+    const float allowed = std::min(limit, 1.0F);
+    int saturated = 0;
+    int inside = 0;
+    for (int k = 0; k < 20'000; ++k) {
+      const float size = k % 3 == 0 ? 30.0F : 0.5F;
+      const float supply = 24.0F + 12.0F * unit(random);
+      const auto angle = static_cast<TurnFraction>(random());
+      const auto out = controller.update(c, {.angle = angle,
+                                             .current_b = size * unit(random),
+                                             .current_c = size * unit(random),
+                                             .electrical_speed = 500.0F * unit(random),
+                                             .reference_d = size * unit(random),
+                                             .reference_q = size * unit(random),
+                                             .supply = supply});
+      ASSERT_FALSE(out.not_finite);
+      const std::array<float, 3> duties = {out.duty_a, out.duty_b, out.duty_c};
+      for (const float duty : duties) {
+        ASSERT_GE(duty, 0.5F - allowed / 2);
+        ASSERT_LE(duty, 0.5F + allowed / 2);
+        ASSERT_GE(duty, 0.0F);
+        ASSERT_LE(duty, 1.0F);
+      }
+      // Min-max: centred, so that the largest and the smallest are equally far from the rails.
+      const auto [least, most] = std::minmax_element(duties.begin(), duties.end());
+      ASSERT_NEAR(*least + *most, 1.0F, 3e-7F);
+      // The voltages between the phases are those of the inverse transformations.
+      const auto [sine, cosine] = sine_cosine<double>(angle);
+      const double alpha =
+          static_cast<double>(out.voltage_d) * cosine - static_cast<double>(out.voltage_q) * sine;
+      const double beta =
+          static_cast<double>(out.voltage_d) * sine + static_cast<double>(out.voltage_q) * cosine;
+      const double b = -alpha / 2 + std::sqrt(3.0) / 2 * beta;
+      const double to_c = -alpha / 2 - std::sqrt(3.0) / 2 * beta;
+      ASSERT_NEAR(static_cast<double>((out.duty_a - out.duty_b) * supply), alpha - b, 2e-5);
+      ASSERT_NEAR(static_cast<double>((out.duty_b - out.duty_c) * supply), b - to_c, 2e-5);
+      ASSERT_LE(std::hypot(out.voltage_d, out.voltage_q), allowed * supply / std::sqrt(3.0F) * 1.000001F);
+      ++(out.saturated ? saturated : inside);
+    }
+    EXPECT_GT(saturated, 1000);
+    if (allowed > 0.0F) {
+      EXPECT_GT(inside, 1000);
+    }
+  }
+}
+
+TEST(FieldOrientedController, LeavesSaturationWithoutWindUp) {
+  for (const double sign : {1.0, -1.0}) {
+    Loop<double> loop({.electrical_speed = 300.0}, 1000.0);
+    for (int k = 0; k < 20'000; ++k) {
+      loop.run(0.0, sign * 200.0);
+      ASSERT_TRUE(loop.out.saturated);
+    }
+    int ticks = 0;
+    while (std::fabs(loop.motor.current_q - sign) > 0.05 && ticks < 1000) {
+      loop.run(0.0, sign * 1.0);
+      ++ticks;
+    }
+    EXPECT_LE(ticks, 60);
+    for (int k = 0; k < 400; ++k) {
+      loop.run(0.0, sign * 1.0);
+      ASSERT_NEAR(loop.motor.current_q, sign, 0.25) << k;
+    }
+    EXPECT_NEAR(loop.motor.current_q, sign, 1e-3);
+    EXPECT_NEAR(loop.motor.current_d, 0.0, 1e-3);
+  }
+}
+
+TEST(FieldOrientedController, WhatIsNotFiniteGivesNoVoltageAndAFaultAndLeavesNoTrace) {
+  using Controller = FieldOrientedController<float>;
+  FieldOrientedControllerConfig<float> config;
+  config.torque_constant = 0.05F;
+  const auto c = Controller::prepare(config, 5e-5F);
+  const Controller::Input usual = {.angle = 0x23456789U,
+                                   .current_b = 0.1F,
+                                   .current_c = 0.2F,
+                                   .electrical_speed = 100.0F,
+                                   .reference_d = 0.1F,
+                                   .reference_q = 0.5F,
+                                   .supply = 24.0F};
+  const std::array<float Controller::Input::*, 6> inputs = {
+      &Controller::Input::current_b,   &Controller::Input::current_c,   &Controller::Input::electrical_speed,
+      &Controller::Input::reference_d, &Controller::Input::reference_q, &Controller::Input::supply};
+  for (const float bad :
+       {std::nanf(""), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
+    for (const auto input : inputs) {
+      if (input == &Controller::Input::supply && !std::isnan(bad))
+        continue;  // an infinite supply is not measured
+      Controller controller;
+      for (int k = 0; k < 10; ++k) controller.update(c, usual);
+      auto in = usual;
+      in.*input = bad;
+      const auto out = controller.update(c, in);
+      EXPECT_TRUE(out.not_finite);
+      EXPECT_EQ(out.duty_a, 0.5F);
+      EXPECT_EQ(out.duty_b, 0.5F);
+      EXPECT_EQ(out.duty_c, 0.5F);
+      EXPECT_EQ(out.voltage_d, 0.0F);
+      EXPECT_EQ(out.voltage_q, 0.0F);
+      const auto next = controller.update(c, {.supply = 24.0F});
+      EXPECT_FALSE(next.not_finite);
+      EXPECT_EQ(next.voltage_d, 0.0F) << "an integrator kept something";
+      EXPECT_EQ(next.voltage_q, 0.0F) << "an integrator kept something";
+    }
+  }
+  auto without_supply = usual;
+  without_supply.supply = 0.0F;
+  Controller controller;
+  EXPECT_TRUE(controller.update(c, without_supply).not_finite);
+}
+
+TEST(FieldOrientedController, FloatFollowsDouble) {
+  const SynchronousMotor motor{.inductance_d = 0.8e-3, .inductance_q = 1.2e-3};
+  Loop<float> single(motor, 1500.0);
+  Loop<double> wide(motor, 1500.0);
+  for (int k = 0; k < 20'000; ++k) {
+    single.motor.electrical_speed = wide.motor.electrical_speed = 600.0 * std::sin(0.002 * k);
+    const double reference = 3.0 * std::sin(0.01 * k) * std::sin(0.0003 * k);
+    single.run(-0.2, reference);
+    wide.run(-0.2, reference);
+    ASSERT_NEAR(single.motor.current_d, wide.motor.current_d, 1e-4) << k;
+    ASSERT_NEAR(single.motor.current_q, wide.motor.current_q, 1e-4) << k;
+  }
+}
+
+// A positive q current drives in the direction in which the angle grows: with it the motor takes up power.
+TEST(FieldOrientedController, PositiveTorqueIsInTheDirectionOfGrowingAngle) {
+  Loop<double> loop({.electrical_speed = 200.0}, 1000.0);
+  for (int k = 0; k < 2000; ++k) loop.run(0.0, 1.0);
+  EXPECT_NEAR(loop.out.voltage_q, 0.5 * 1.0 + 200.0 * 0.01, 0.05);
+}
+
+}  // namespace
+}  // namespace kmax::control
