@@ -279,6 +279,71 @@ TEST(Usart, OldByteAndErrorsAreDroppedByConfigure) {
   EXPECT_FALSE(line.registers.asks_for_interrupt());
 }
 
+/// Remembers its levels and what the line had sent and the driver had enabled at each change.
+struct RecordedDriverEnable {
+  struct Change {
+    bool level;
+    std::size_t bytes_sent;
+    bool first_byte_handed_over;
+  };
+  FakeUsart* registers;
+  std::vector<Change>* changes;
+  void write(bool level) {
+    changes->push_back({level, registers->line.size(), !registers->dr.writes.empty()});
+  }
+};
+
+TEST(UsartDriverEnable, OnBeforeTheFirstBitOffAfterTheLastStopBit) {
+  FakeUsart registers;
+  std::vector<RecordedDriverEnable::Change> changes;
+  Usart usart{registers, RecordedDriverEnable{&registers, &changes}};
+  ASSERT_TRUE(usart.configure({}, apb1));
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_FALSE(changes[0].level) << "at rest";
+  const std::array<std::uint8_t, 3> bytes{1, 2, 3};
+  ASSERT_TRUE(usart.transmit(bytes));
+  ASSERT_EQ(changes.size(), 2U);
+  EXPECT_TRUE(changes[1].level);
+  EXPECT_FALSE(changes[1].first_byte_handed_over);
+  EXPECT_FALSE(usart.transmit(bytes));
+  for (int step = 0; step < 20; ++step) {
+    if (registers.asks_for_interrupt()) usart.ISR_serve();
+    if (registers.asks_for_interrupt()) usart.ISR_serve();
+    if (registers.line.size() < 3) {
+      EXPECT_EQ(changes.size(), 2U) << "not between bytes, not at TXE";
+    }
+    registers.frame_sent();
+  }
+  ASSERT_EQ(changes.size(), 3U);
+  EXPECT_FALSE(changes[2].level);
+  EXPECT_EQ(changes[2].bytes_sent, 3U);
+  EXPECT_TRUE(usart.transmit(bytes));
+  ASSERT_TRUE(usart.configure({}, apb1)) << "drops the transmission";
+  EXPECT_FALSE(changes.back().level);
+}
+
+// An interrupt without cause sends the first byte as soon as `transmitting` says so.
+TEST(UsartDriverEnable, OnBeforeAnInterruptCanSendAnything) {
+  FakeUsart registers;
+  struct Interrupting {
+    FakeUsart* registers;
+    Usart<FakeUsart, Interrupting>** usart;
+    void write(bool level) {
+      if (!level) return;
+      static_cast<void>((*usart)->ISR_serve());
+      EXPECT_TRUE(registers->dr.writes.empty());
+    }
+  };
+  Usart<FakeUsart, Interrupting>* pointer = nullptr;
+  Usart<FakeUsart, Interrupting> usart{registers, Interrupting{&registers, &pointer}};
+  pointer = &usart;
+  const std::array<std::uint8_t, 1> bytes{1};
+  EXPECT_TRUE(usart.transmit(bytes));
+}
+
+static_assert(sizeof(Usart<UsartRegisters>) == sizeof(void*) * 2 + sizeof(std::size_t) + sizeof(void*),
+              "no pin, no memory");
+
 // Any order of frames in, frames out, interrupts with and without cause: every byte leaves once and in order,
 // every received byte is seen or its loss is.
 RC_GTEST_PROP(Usart, AnyInterleaving, ()) {

@@ -33,8 +33,12 @@ static_assert(offsetof(GpioRegisters, afr) == 0x20);
 
 enum class GpioPort : std::uint8_t { a, b, c, d };
 
+constexpr std::uint32_t gpio_base(GpioPort port) {
+  return 0x4002'0000U + 0x400U * static_cast<std::uint32_t>(port);
+}
+
 inline GpioRegisters& gpio(GpioPort port) {
-  return peripheral_at<GpioRegisters>(0x4002'0000U + 0x400U * static_cast<std::uintptr_t>(port));
+  return peripheral_at<GpioRegisters>(gpio_base(port));
 }
 
 }  // namespace kmax::drivers::stm32f4

@@ -34,12 +34,31 @@ static_assert(offsetof(NvicRegisters, ispr) == 0x100);
 static_assert(offsetof(NvicRegisters, icpr) == 0x180);
 static_assert(offsetof(NvicRegisters, ipr) == 0x300);
 
+inline constexpr std::uint32_t nvic_base = 0xE000'E100;
+
 inline NvicRegisters& nvic() {
-  return peripheral_at<NvicRegisters>(0xE000'E100);
+  return peripheral_at<NvicRegisters>(nvic_base);
 }
+
+/// STIR: pends the interrupt whose number is written; lies apart from the rest.
+struct SoftwareTriggerRegisters {
+  volatile std::uint32_t stir;
+};
+
+inline constexpr std::uint32_t software_trigger_base = 0xE000'EF00;
+
+inline SoftwareTriggerRegisters& software_trigger() {
+  return peripheral_at<SoftwareTriggerRegisters>(software_trigger_base);
+}
+
+namespace nvic_stir {
+using InterruptNumber = Field<0, 9>;
+}  // namespace nvic_stir
 
 /// Those that the firmware uses or is about to; the numbers are the positions in the vector table minus 16.
 enum class Interrupt : std::uint8_t {
+  flash = 4,
+  rcc = 5,
   exti2 = 8,
   exti4 = 10,
   adc = 18,
@@ -47,9 +66,17 @@ enum class Interrupt : std::uint8_t {
   can1_rx0 = 20,
   can1_rx1 = 21,
   can1_sce = 22,
+  exti9_5 = 23,
+  tim1_brk_tim9 = 24,
   tim1_up_tim10 = 25,
+  tim2 = 28,
+  tim3 = 29,
+  tim4 = 30,
   usart2 = 38,
+  exti15_10 = 40,
+  tim8_brk_tim12 = 43,
   tim8_up_tim13 = 44,
+  tim5 = 50,
   spi3 = 51,
   uart4 = 52,
 };

@@ -16,13 +16,19 @@ struct PwrRegisters {
 static_assert(offsetof(PwrRegisters, cr) == 0x00);
 static_assert(offsetof(PwrRegisters, csr) == 0x04);
 
+inline constexpr std::uint32_t pwr_base = 0x4000'7000;
+
 inline PwrRegisters& pwr() {
-  return peripheral_at<PwrRegisters>(0x4000'7000);
+  return peripheral_at<PwrRegisters>(pwr_base);
 }
 
 namespace pwr_cr {
 /// VOS: 1 = scale 1, needed above 144 MHz. One bit on the F405 (the two-bit field is that of later parts).
 using VoltageScale1 = Field<14>;
 }  // namespace pwr_cr
+
+namespace pwr_csr {
+using VoltageScaleReady = Field<14>;  // VOSRDY
+}  // namespace pwr_csr
 
 }  // namespace kmax::drivers::stm32f4

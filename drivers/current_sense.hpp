@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cstdint>
+
+// Phase current from the code of a shunt amplifier: low-side shunt, amplifier with a mid-point output,
+// converter with the same reference. Arithmetic alone; who converts is not its business.
+//
+// Sign: the amplifier's output is reference/2 - gain (V_SN - V_SP) with SP at the power ground and SN at the
+// FET (DRV8301 data sheet, current sense amplifiers; ODrive v3.5 schematic). Current that leaves the board
+// into the motor comes up from ground through the shunt, so a code above the mid-point is positive current
+// into the motor.
+//
+//   current = (code - offset) * reference / (4096 * gain * shunt)
+//
+// Range and resolution with 0.5 mOhm and 3.3 V, amplifier used within +-1.35 V of its middle:
+//   gain 10: +-270 A, 161 mA per code    gain 40: +-67.5 A, 40.3 mA per code
+//   gain 20: +-135 A, 80.6 mA per code   gain 80: +-33.75 A, 20.1 mA per code
+
+namespace kmax::drivers {
+
+enum class CurrentSenseGain : std::uint8_t { x10, x20, x40, x80 };
+
+constexpr float gain_factor(CurrentSenseGain gain) {
+  return static_cast<float>(10U << static_cast<unsigned>(gain));
+}
+
+struct CurrentSenseConfig {
+  float shunt_ohm = 0.0005F;  // above 0
+  CurrentSenseGain gain = CurrentSenseGain::x40;
+  float reference_volt = 3.3F;  // of the converter and of the amplifier
+  // Codes outside say nothing about the current any more: the amplifier is linear from 0.3 V to 3.0 V.
+  std::uint16_t lowest_linear_code = 373;
+  std::uint16_t highest_linear_code = 3723;
+};
+
+class CurrentSense {
+ public:
+  static constexpr float middle_code = 2048.0F;
+
+  /// Two divisions: not for the interrupt path.
+  constexpr explicit CurrentSense(const CurrentSenseConfig& config = {})
+      : amperes_per_code_(config.reference_volt / 4096.0F / (gain_factor(config.gain) * config.shunt_ohm)),
+        lowest_(config.lowest_linear_code),
+        highest_(config.highest_linear_code) {}
+
+  constexpr float amperes_per_code() const { return amperes_per_code_; }
+
+  /// The code at zero current, from OffsetCalibration.
+  constexpr void set_offset(float code) { offset_ = code; }
+  constexpr float offset() const { return offset_; }
+
+  /// A, positive into the motor. One conversion, one subtraction, one multiplication.
+  constexpr float ISR_amperes(std::uint16_t code) const {
+    return (static_cast<float>(code) - offset_) * amperes_per_code_;
+  }
+
+  /// The true current may be anything beyond what the code says: treat it as over-current.
+  constexpr bool ISR_saturated(std::uint16_t code) const { return code < lowest_ || code > highest_; }
+
+  /// The largest current that reads without saturation in both directions, A.
+  constexpr float range() const {
+    const float up = (static_cast<float>(highest_) - offset_) * amperes_per_code_;
+    const float down = (offset_ - static_cast<float>(lowest_)) * amperes_per_code_;
+    return up < down ? up : down;
+  }
+
+ private:
+  float amperes_per_code_;
+  std::uint16_t lowest_;
+  std::uint16_t highest_;
+  float offset_ = middle_code;
+};
+
+struct OffsetCalibrationConfig {
+  std::uint8_t log2_samples = 10;  // 1024 samples: 51 ms at 20 kHz; 0 to 16
+  // How far the mean may lie from the mid-point: 205 codes are 5 % of full scale, 165 mV at the amplifier.
+  std::uint16_t window = 205;
+  // Largest minus smallest code: more means that current flowed, or that the input is open.
+  std::uint16_t largest_spread = 64;
+};
+
+enum class OffsetResult : std::uint8_t {
+  running,               // samples are still missing
+  accepted,              // offset() holds
+  offset_out_of_window,  // mean too far from the mid-point: amplifier, wiring or reference
+  spread_too_large,      // the current was not zero all the time
+};
+
+/// Mean of 2^n codes while no current can flow: bridge off and motor at rest, or all low sides on. One per
+/// phase.
+class OffsetCalibration {
+ public:
+  constexpr explicit OffsetCalibration(const OffsetCalibrationConfig& config = {}) : config_(config) {
+    if (config_.log2_samples > 16) config_.log2_samples = 16;  // the sum of 2^16 codes has 28 bits
+    // 2^-n exactly, without a division at run time.
+    scale_ = 1.0F;
+    for (unsigned i = 0; i < config_.log2_samples; ++i) scale_ *= 0.5F;
+    restart();
+  }
+
+  constexpr void restart() {
+    sum_ = 0;
+    remaining_ = 1U << config_.log2_samples;
+    smallest_ = 0xFFFF;
+    largest_ = 0;
+    result_ = OffsetResult::running;
+  }
+
+  /// Once per sample of the phase; without effect when the result stands.
+  constexpr OffsetResult ISR_add(std::uint16_t code) {
+    if (result_ != OffsetResult::running) return result_;
+    sum_ += code;
+    if (code < smallest_) smallest_ = code;
+    if (code > largest_) largest_ = code;
+    if (--remaining_ == 0) result_ = judge();
+    return result_;
+  }
+
+  constexpr OffsetResult result() const { return result_; }
+  /// Mean code; also after a refusal, to be shown. 0 while running.
+  constexpr float offset() const {
+    return result_ == OffsetResult::running ? 0.0F : static_cast<float>(sum_) * scale_;
+  }
+  constexpr std::uint16_t spread() const {
+    return largest_ < smallest_ ? std::uint16_t{0} : static_cast<std::uint16_t>(largest_ - smallest_);
+  }
+
+ private:
+  constexpr OffsetResult judge() const {
+    // Spread first: a mean of changing currents is no offset, wherever it lies.
+    if (largest_ - smallest_ > config_.largest_spread) return OffsetResult::spread_too_large;
+    const float distance = static_cast<float>(sum_) * scale_ - CurrentSense::middle_code;
+    const auto window = static_cast<float>(config_.window);
+    return distance > window || distance < -window ? OffsetResult::offset_out_of_window
+                                                   : OffsetResult::accepted;
+  }
+
+  OffsetCalibrationConfig config_;
+  float scale_ = 1.0F;
+  std::uint32_t sum_ = 0;
+  std::uint32_t remaining_ = 0;
+  std::uint16_t smallest_ = 0xFFFF;
+  std::uint16_t largest_ = 0;
+  OffsetResult result_ = OffsetResult::running;
+};
+
+}  // namespace kmax::drivers

@@ -1,0 +1,248 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "drivers/stm32f4/registers/adc.hpp"
+
+// Phase currents of two axes, supply voltage and temperatures, converted in step with the PWM. RM0090, ADC.
+//
+// TIM1's update event (TRGO, at underflow and at overflow, every 25 us at 20 kHz PWM) starts the injected
+// groups of all three converters at the same instant. Underflow is the sampling point of axis 0, overflow
+// that of axis 1, whose timer runs half a period later. ADC2 converts phase B and ADC3 phase C of one axis
+// per trigger; the interrupt that reads them writes the lists of the other axis before the next trigger. ADC1
+// converts the slow quantities on every trigger. The interrupt is ADC2's end of sequence alone.
+//
+// Budget at ADCCLK = 84 MHz / 4 = 21 MHz, a conversion takes its sampling time plus 12 cycles:
+//   currents  3 + 12 = 15 cycles = 0.71 us; the window of the low sides must hold from the trigger for the
+//   sampling
+//             time, 0.14 us, and the interrupt starts 0.71 us after the trigger
+//   ADC1      4 x (28 + 12) = 160 cycles = 7.6 us, so its results are of the trigger before in an interrupt
+//   that
+//             comes in time (it may come up to 24 us late and still be counted as in time by the lists)
+// 28 cycles for the slow ones: the sampling capacitor (4 pF) pulls the 270 pF at the voltage divider's tap
+// down by up to 61 codes when the channel changes; that recovers with 909 Ohm x 274 pF = 0.25 us, to half a
+// code in 1.2 us = 25 cycles. The thermistors' 2.2 uF need less. Three cycles for the currents are the
+// shortest there is; the amplifiers drive through 22 Ohm and 2.2 nF (48 ns), and with the data sheet's
+// greatest switch resistance (6 kOhm) up to 0.25 % of the difference to the other axis' current remains.
+// `current_sampling_code` = 1 (15 cycles, 0.71 us) removes it when the low-side window allows.
+//
+// What is checked on every read, and counted:
+//   axis_mismatches   the lists in force were not those of the axis that the caller names (it takes the axis
+//   from the
+//                     timer's direction): the sample is not valid. The lists are set for the next trigger by
+//                     the caller's axis, so one good interrupt is enough to be in step again.
+//   overruns          a trigger fell between the reading and the writing of the lists (flags up again), or
+//   the same
+//                     axis came twice in a row: the other's sample was lost. An even number of lost triggers
+//                     looks like none: flags hold one bit. The caller sees that by its clock.
+//   missing_phase_c   ADC2 was done, ADC3 not.
+//   spurious          called without a finished conversion; nothing was touched.
+// A lost interrupt counts as overrun and mismatch. A mismatch alone means that caller and trigger disagree on
+// the phase.
+// One gap remains: a trigger in the few cycles between the caller's look at the timer and the clearing of the
+// flags. A caller that finds the timer's direction unchanged after ISR_read knows that there was none.
+//
+// Order: `configure` (timers' trigger still off or not), wait adc_stabilization_us, `start`. The converters'
+// clocks, the pins (analog mode) and the NVIC are the composition root's.
+//
+// Cost of ISR_read: 10 loads and 5 stores on APB2, no loop longer than four, no division.
+
+namespace kmax::drivers::stm32f4 {
+
+/// Which channels are where, and how long they are sampled. Defaults: ODrive v3.6.
+struct CurrentSamplingConfig {
+  struct Phases {
+    std::uint8_t b;  // converted by ADC2
+    std::uint8_t c;  // converted by ADC3
+  };
+  std::array<Phases, 2> axes{{{10, 11}, {13, 12}}};  // PC0, PC1; PC3, PC2
+  std::uint8_t supply = 6;                           // PA6
+  std::array<std::uint8_t, 2> temperatures{15, 4};   // power stage of axis 0 (PC5), axis 1 (PA4)
+  std::uint8_t auxiliary_temperature = 5;            // PA5
+  std::uint8_t current_sampling_code = 0;            // index into adc_sampling_cycles: 3 cycles
+  std::uint8_t slow_sampling_code = 2;               // 28 cycles
+};
+
+/// Codes are 0 to 4095, 3.3 V full scale.
+struct CurrentSample {
+  bool valid = false;  ///< phase_b and phase_c are of the axis asked for, and of one trigger
+  std::uint16_t phase_b = 0;
+  std::uint16_t phase_c = 0;
+  std::uint16_t supply = 0;
+  std::array<std::uint16_t, 2> temperatures{};
+  std::uint16_t auxiliary_temperature = 0;
+  /// Reads since ADC1 finished a sequence: 0 normally, 1 after a late interrupt, more means that ADC1 stands
+  /// still and the slow codes are old. Stays at 255.
+  std::uint8_t slow_age = 0;
+};
+
+struct CurrentSamplingCounters {
+  std::uint32_t axis_mismatches = 0;
+  std::uint32_t overruns = 0;
+  std::uint32_t missing_phase_c = 0;
+  std::uint32_t spurious = 0;
+};
+
+template <typename Adc = AdcRegisters, typename Common = AdcCommonRegisters>
+class CurrentSampling {
+ public:
+  constexpr CurrentSampling(Adc& adc1, Adc& adc2, Adc& adc3, Common& common,
+                            const CurrentSamplingConfig& config = {})
+      : adc1_(adc1), adc2_(adc2), adc3_(adc3), common_(common), config_(config) {
+    for (unsigned axis = 0; axis < 2; ++axis) {
+      lists_[axis] = {list_of<1>({config.axes[axis].b}), list_of<1>({config.axes[axis].c})};
+    }
+  }
+
+  /// Turns the converters on with their triggers off. False, and nothing touched, when the ADC clock would be
+  /// above 36 MHz, a channel cannot be reached by its converter or a sampling code is above 7.
+  [[nodiscard]] bool configure(std::uint32_t apb2_hz) {
+    if (apb2_hz > prescaler * adc_maximum_clock_hz || !channels_reachable()) return false;
+    stop();
+    common_.ccr = adc_ccr::Prescaler::bits(prescaler / 2 - 1);
+    adc1_.cr1 = adc_cr1::Scan::mask;
+    adc2_.cr1 = adc_cr1::InjectedEndInterrupt::mask;
+    adc3_.cr1 = 0;
+    const std::array<std::uint8_t, 4> slow{config_.supply, config_.temperatures[0], config_.temperatures[1],
+                                           config_.auxiliary_temperature};
+    set_sampling_times(adc1_, slow, config_.slow_sampling_code);
+    set_sampling_times(adc2_, std::array{config_.axes[0].b, config_.axes[1].b},
+                       config_.current_sampling_code);
+    set_sampling_times(adc3_, std::array{config_.axes[0].c, config_.axes[1].c},
+                       config_.current_sampling_code);
+    adc1_.jsqr = list_of<4>(slow);
+    for (Adc* each : {&adc1_, &adc2_, &adc3_}) each->cr2 = adc_cr2::On::mask;
+    return true;
+  }
+
+  /// The next trigger converts the currents of `first_axis` (0 or 1). Not sooner than adc_stabilization_us
+  /// after `configure`. ADC2 comes last: its interrupt means that all three were listening.
+  void start(unsigned first_axis) {
+    arm_lists(first_axis & 1U);
+    last_axis_ = none;
+    latest_ = CurrentSample{};
+    for (Adc* each : {&adc1_, &adc3_, &adc2_}) {
+      each->sr = flags_cleared;
+      each->cr2 = adc_cr2::On::mask | adc_cr2::InjectedTrigger::bits(adc_cr2::timer1_trgo) |
+                  adc_cr2::InjectedTriggerEdge::bits(adc_cr2::rising);
+    }
+  }
+
+  /// No further trigger is heeded; a conversion under way still ends and interrupts.
+  void stop() {
+    for (Adc* each : {&adc2_, &adc3_, &adc1_}) {
+      each->cr2 = static_cast<std::uint32_t>(each->cr2) & ~adc_cr2::InjectedTriggerEdge::mask;
+    }
+  }
+
+  /// The body of the ADC interrupt. `axis` (0 or 1) is the one whose sampling point the latest trigger was,
+  /// by the timer's own direction bit and not by counting interrupts.
+  CurrentSample ISR_read(unsigned axis) {
+    axis &= 1U;
+    if (!finished(adc2_)) {
+      ++counters_.spurious;
+      latest_.valid = false;
+      return latest_;
+    }
+    const bool phase_c_finished = finished(adc3_);
+    // Before the data is read: a conversion that ends from here on shows in the flags again.
+    adc2_.sr = flags_cleared;
+    adc3_.sr = flags_cleared;
+    latest_.phase_b = code(adc2_.jdr[0]);
+    latest_.phase_c = code(adc3_.jdr[0]);
+    const unsigned converted_axis = axis_in_force_;
+    arm_lists(axis ^ 1U);
+    const bool disturbed = (static_cast<std::uint32_t>(adc2_.sr) &
+                            (adc_sr::InjectedStarted::mask | adc_sr::InjectedEnd::mask)) != 0;
+    // That trigger may have come before or after its list was written: its sample belongs to nobody.
+    if (disturbed) axis_in_force_ = none;
+
+    if (disturbed || axis == last_axis_) ++counters_.overruns;
+    if (converted_axis != axis) ++counters_.axis_mismatches;
+    if (!phase_c_finished) ++counters_.missing_phase_c;
+    last_axis_ = axis;
+    latest_.valid = !disturbed && converted_axis == axis && phase_c_finished;
+    read_slow();
+    return latest_;
+  }
+
+  /// Written by the interrupt; each is a word that another context may read.
+  const CurrentSamplingCounters& counters() const { return counters_; }
+
+ private:
+  struct Lists {
+    std::uint32_t adc2 = 0;
+    std::uint32_t adc3 = 0;
+  };
+  static constexpr std::uint32_t prescaler = 4;
+  static constexpr unsigned none = 2;
+  /// Writing 0 clears, 1 leaves alone.
+  static constexpr std::uint32_t flags_cleared =
+      adc_sr::all & ~(adc_sr::InjectedEnd::mask | adc_sr::InjectedStarted::mask);
+
+  template <unsigned count>
+  static constexpr std::uint32_t list_of(const std::array<std::uint8_t, count>& channels) {
+    std::uint32_t word = adc_jsqr::LastIndex::bits(count - 1);
+    for (unsigned i = 0; i < count; ++i) {
+      word |= (channels[i] & adc_jsqr::channel_mask) << adc_jsqr::position(i, count);
+    }
+    return word;
+  }
+
+  bool channels_reachable() const {
+    bool all = config_.current_sampling_code < 8 && config_.slow_sampling_code < 8;
+    for (const auto& axis : config_.axes) all = all && adc_reaches(2, axis.b) && adc_reaches(3, axis.c);
+    for (const std::uint8_t channel : config_.temperatures) all = all && adc_reaches(1, channel);
+    return all && adc_reaches(1, config_.supply) && adc_reaches(1, config_.auxiliary_temperature);
+  }
+
+  template <std::size_t count>
+  static void set_sampling_times(Adc& adc, const std::array<std::uint8_t, count>& channels,
+                                 std::uint32_t sampling) {
+    std::uint32_t low = 0;
+    std::uint32_t high = 0;
+    for (const std::uint8_t channel : channels) {
+      const std::uint32_t shifted = sampling << adc_sampling_position(channel);
+      (adc_sampling_in_smpr1(channel) ? high : low) |= shifted;
+    }
+    adc.smpr1 = high;
+    adc.smpr2 = low;
+  }
+
+  static bool finished(const Adc& adc) { return adc_sr::InjectedEnd::read(adc.sr) != 0; }
+  static std::uint16_t code(const Register auto& data) {
+    return static_cast<std::uint16_t>(static_cast<std::uint32_t>(data));
+  }
+
+  void arm_lists(unsigned axis) {
+    adc2_.jsqr = lists_[axis].adc2;
+    adc3_.jsqr = lists_[axis].adc3;
+    axis_in_force_ = axis;
+  }
+
+  void read_slow() {
+    if (!finished(adc1_)) {
+      if (latest_.slow_age != 0xFF) ++latest_.slow_age;
+      return;
+    }
+    adc1_.sr = flags_cleared;
+    latest_.supply = code(adc1_.jdr[0]);
+    latest_.temperatures = {code(adc1_.jdr[1]), code(adc1_.jdr[2])};
+    latest_.auxiliary_temperature = code(adc1_.jdr[3]);
+    latest_.slow_age = 0;
+  }
+
+  Adc& adc1_;
+  Adc& adc2_;
+  Adc& adc3_;
+  Common& common_;
+  CurrentSamplingConfig config_;
+  std::array<Lists, 2> lists_{};
+  unsigned axis_in_force_ = none;
+  unsigned last_axis_ = none;
+  CurrentSample latest_{};
+  CurrentSamplingCounters counters_{};
+};
+
+}  // namespace kmax::drivers::stm32f4

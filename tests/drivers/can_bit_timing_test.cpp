@@ -1,0 +1,70 @@
+#include "drivers/stm32f4/can_bit_timing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+constexpr std::uint32_t board_clock = 42'000'000;
+
+TEST(CanBitTiming, RatesOfTheBoardAreExactAndWithinCia301) {
+  for (const std::uint32_t rate : {125'000U, 250'000U, 500'000U, 1'000'000U}) {
+    const auto solution = solve_can_bit_timing(board_clock, rate);
+    ASSERT_TRUE(solution.usable) << rate;
+    EXPECT_TRUE(solution.timing.valid());
+    EXPECT_EQ(solution.rate_error_ppm, 0U) << rate;
+    EXPECT_EQ(solution.timing.clocks_per_bit() * rate, board_clock);
+    EXPECT_GE(solution.timing.sample_point_permille(), 850U) << rate;
+    EXPECT_LE(solution.timing.sample_point_permille(), 900U) << rate;
+    EXPECT_GE(solution.timing.clock_tolerance_ppm(), 3000U) << "crystals have 100";
+  }
+}
+
+TEST(CanBitTiming, WordsOfTheRegister) {
+  // RM0090, CAN bit timing register: all fields minus one. The vendor's 1 Mbit/s setting, 2, 16, 4, 4.
+  constexpr CanBitTiming vendor{2, 16, 4, 4};
+  static_assert(vendor.btr() == 0x033F'0001);
+  static_assert(vendor.clocks_per_bit() == 42);
+  static_assert(vendor.sample_point_permille() == 810);
+  EXPECT_EQ(solve_can_bit_timing(board_clock, 1'000'000, {.sample_point_permille = 810}).timing, vendor);
+  EXPECT_EQ((CanBitTiming{1024, 16, 8, 4}.btr()), 0x037F'03FFU);
+}
+
+TEST(CanBitTiming, NothingBetterExists) {
+  for (const std::uint32_t clock : {16'000'000U, 36'000'000U, 42'000'000U, 45'000'000U}) {
+    for (const std::uint32_t rate : {10'000U, 83'333U, 125'000U, 250'000U, 500'000U, 800'000U, 1'000'000U}) {
+      const auto solution = solve_can_bit_timing(clock, rate);
+      for (std::uint32_t prescaler = 1; prescaler <= 1024; ++prescaler) {
+        for (std::uint32_t quanta = 4; quanta <= 25; ++quanta) {
+          const double made = static_cast<double>(clock) / (prescaler * quanta);
+          const double error = std::abs(made - rate) / rate * 1e6;
+          ASSERT_GE(error * 1.01 + 2, solution.rate_error_ppm) << clock << " " << rate;
+        }
+      }
+    }
+  }
+}
+
+TEST(CanBitTiming, OutsideOfToleranceIsNotUsable) {
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 800'000).usable) << "52.5 clocks a bit";
+  EXPECT_TRUE(solve_can_bit_timing(board_clock, 800'000, {.rate_tolerance_ppm = 20'000}).timing.valid());
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 1'000'000, {.sample_point_permille = 990}).usable);
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 2'000'000).usable);
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 0).usable);
+  EXPECT_FALSE(solve_can_bit_timing(0, 500'000).usable);
+  EXPECT_FALSE(solve_can_bit_timing(2'000'000, 1'000'000).usable) << "two clocks are no bit";
+  EXPECT_TRUE(solve_can_bit_timing(168'000'000, 10'000).usable);
+}
+
+TEST(CanBitTiming, ValidKnowsTheFields) {
+  EXPECT_FALSE((CanBitTiming{}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 17, 2, 1}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 2, 9, 1}.valid()));
+  EXPECT_FALSE((CanBitTiming{1025, 2, 2, 1}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 5, 1, 2}.valid())) << "jump wider than the segment that is shortened";
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4

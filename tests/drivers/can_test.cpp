@@ -1,0 +1,296 @@
+#include "drivers/stm32f4/can.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "tests/drivers/fake_register.hpp"
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+using testing::FakeRegister;
+
+struct FakeTransmitMailbox {
+  FakeRegister tir, tdtr, tdlr, tdhr;
+};
+struct FakeReceiveMailbox {
+  FakeRegister rir, rdtr, rdlr, rdhr;
+};
+struct FakeBank {
+  FakeRegister fr1, fr2;
+};
+struct FakeCan {
+  FakeRegister mcr, msr, tsr, rfr[2], ier, esr, btr;
+  FakeTransmitMailbox mailbox[3];
+  FakeReceiveMailbox fifo[2];
+  FakeRegister fmr, fm1r, fs1r, ffa1r, fa1r;
+  FakeBank bank[28];
+};
+
+struct Pend {
+  unsigned* count;
+  void operator()() const { ++*count; }
+};
+
+struct Bench {
+  Bench() {
+    can.mcr.value = 0x0001'0002;
+    can.msr.value = 0xC02;
+    can.fmr.value = 0x2A1C'0E01;
+    can.tsr.value = empty;
+    can.mcr.on_write = [this](std::uint32_t word) {
+      can.msr.value = acknowledges ? (word & 1U) | 0xC00 : 0U;
+    };
+    // The status register as the hardware keeps it, for the mailboxes at least.
+    can.tsr.on_write = [this](std::uint32_t word) {
+      status &= ~(word & 0x000F'0F0F);
+      for (unsigned i = 0; i < 3; ++i) {
+        if ((word >> (8 * i) & 1U) != 0) status &= ~(0xFU << (8 * i));
+      }
+      aborts |= word & 0x0080'8080;
+    };
+    can.tsr.on_read = [this](std::uint32_t) { return status; };
+    for (unsigned i = 0; i < 3; ++i) {
+      can.mailbox[i].tir.on_write = [this, i](std::uint32_t word) {
+        if ((word & 1U) == 0) return;
+        EXPECT_NE(status >> (26 + i) & 1U, 0U) << "mailbox " << i << " is not empty";
+        status &= ~(1U << (26 + i));
+      };
+    }
+    for (FakeRegister& each : can.rfr) each.on_write = [](std::uint32_t) {};
+  }
+  void join() {
+    ASSERT_EQ(driver.configure({}, std::array{can_filter_accept_all()}), CanConfigureResult::ok);
+    EXPECT_EQ(driver.poll(0), CanBusState::on_bus);
+    aborts = 0;
+  }
+  /// The hardware is done with a mailbox.
+  void complete(unsigned i, bool sent, std::uint32_t more = 0) {
+    status |= (sent ? 3U : 1U) << (8 * i) | more << (8 * i) | 1U << (26 + i);
+    aborts &= ~(0x80U << (8 * i));
+    driver.ISR_serve_transmit();
+  }
+  std::uint32_t identifier_in(unsigned mailbox) const { return can.mailbox[mailbox].tir.value >> 21; }
+  bool taken(unsigned mailbox) const { return (status >> (26 + mailbox) & 1U) == 0; }
+  void send(std::uint32_t identifier, std::uint8_t byte = 0) {
+    ASSERT_EQ(driver.send({.identifier = identifier, .length = 1, .data = {byte}}), CanSendResult::queued);
+    driver.ISR_serve_transmit();
+  }
+
+  static constexpr std::uint32_t empty = 0x1C00'0000;
+  bool acknowledges = true;
+  std::uint32_t status = empty, aborts = 0;
+  unsigned pended = 0;
+  FakeCan can;
+  Can<Pend, 8, FakeCan> driver{can, Pend{&pended}};
+};
+
+TEST(Can, ConfigureInOrder) {
+  Bench bench;
+  std::vector<CanFilter> filters{can_filter_standard(0x601, 0x7FF), can_filter_standard_list(0, 0x80, 1)};
+  ASSERT_EQ(bench.driver.configure({.timing = can_bit_timing<42'000'000, 1'000'000>()}, filters),
+            CanConfigureResult::ok);
+  EXPECT_EQ(bench.can.mcr.writes, (std::vector<std::uint32_t>{0x0001'0001, 0x0001'0000}))
+      << "SLEEP falls with INRQ";
+  EXPECT_EQ(bench.can.btr.value, 0x011A'0002U);
+  EXPECT_EQ(bench.can.fa1r.writes, (std::vector<std::uint32_t>{0, 3}));
+  EXPECT_EQ(bench.can.fm1r.value, 2U);
+  EXPECT_EQ(bench.can.fs1r.value, 3U);
+  EXPECT_EQ(bench.can.ffa1r.value, 2U);
+  EXPECT_EQ(bench.can.fmr.value, 0x2A1C'0E00U);
+  EXPECT_EQ(bench.can.ier.value, 0x0000'865BU);
+}
+
+TEST(Can, SilentHardwareIsNamed) {
+  Bench bench;
+  bench.acknowledges = false;
+  EXPECT_EQ(bench.driver.configure({}, {}), CanConfigureResult::no_initialization_mode);
+  EXPECT_EQ(bench.driver.send({}), CanSendResult::not_on_the_bus);
+  EXPECT_EQ(bench.driver.poll(0), CanBusState::off);
+
+  Bench busy;
+  busy.can.mcr.on_write = [&](std::uint32_t) { busy.can.msr.value = 1; };
+  EXPECT_EQ(busy.driver.configure({}, {}), CanConfigureResult::waiting_for_idle_bus);
+  EXPECT_EQ(busy.driver.poll(0), CanBusState::joining);
+  busy.can.msr.value = 0;
+  EXPECT_EQ(busy.driver.poll(1), CanBusState::on_bus);
+}
+
+TEST(Can, RefusesBadSettings) {
+  Bench bench;
+  EXPECT_EQ(bench.driver.configure({.timing = {}}, {}), CanConfigureResult::bad_timing);
+  EXPECT_EQ(bench.driver.configure({}, std::vector<CanFilter>(15)), CanConfigureResult::too_many_filters);
+  EXPECT_TRUE(bench.can.mcr.writes.empty());
+  bench.join();
+  EXPECT_EQ(bench.driver.send({.identifier = 0x800}), CanSendResult::bad_frame);
+  EXPECT_EQ(bench.driver.send({.length = 9}), CanSendResult::bad_frame);
+}
+
+TEST(Can, FrameIntoTheMailbox) {
+  Bench bench;
+  bench.join();
+  ASSERT_EQ(bench.driver.send(
+                {.identifier = 0x1ABCDEF0, .extended = true, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}}),
+            CanSendResult::queued);
+  EXPECT_EQ(bench.pended, 1U);
+  EXPECT_TRUE(bench.can.mailbox[0].tir.writes.empty()) << "mailboxes belong to the interrupt";
+  bench.driver.ISR_serve_transmit();
+  EXPECT_EQ(bench.can.mailbox[0].tir.value, 0x1ABCDEF0U << 3 | 5U);
+  EXPECT_EQ(bench.can.mailbox[0].tdtr.value, 8U);
+  EXPECT_EQ(bench.can.mailbox[0].tdlr.value, 0x0403'0201U);
+  EXPECT_EQ(bench.can.mailbox[0].tdhr.value, 0x0807'0605U);
+}
+
+TEST(Can, OneIdentifierIsNeverInTwoMailboxes) {
+  Bench bench;
+  bench.join();
+  for (std::uint8_t i = 0; i < 4; ++i) bench.send(0x200, i);
+  ASSERT_EQ(bench.driver.send({.identifier = 0x200, .remote = true}), CanSendResult::queued);
+  bench.driver.ISR_serve_transmit();
+  EXPECT_FALSE(bench.taken(1) || bench.taken(2));
+  for (std::uint8_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(bench.can.mailbox[0].tdlr.value, i);
+    EXPECT_FALSE(bench.taken(1) || bench.taken(2));
+    bench.complete(0, true);
+  }
+  EXPECT_NE(bench.can.mailbox[0].tir.value & 2U, 0U) << "the remote frame is the youngest";
+  EXPECT_EQ(bench.driver.transmit_counters().sent, 4U);
+}
+
+TEST(Can, MostUrgentFirstAndTheLeastUrgentMakesRoom) {
+  Bench bench;
+  bench.join();
+  for (const std::uint32_t identifier : {0x500U, 0x700U, 0x600U}) bench.send(identifier);
+  EXPECT_EQ(bench.aborts, 0U);
+  bench.send(0x650);
+  EXPECT_EQ(bench.aborts, 0x0000'8000U) << "0x700 in mailbox 1";
+  bench.send(0x080);
+  EXPECT_EQ(bench.aborts, 0x0000'8000U) << "one at a time";
+  bench.complete(1, false);
+  EXPECT_EQ(bench.identifier_in(1), 0x080U) << "the alarm, not the one that was first to ask";
+  EXPECT_EQ(bench.aborts, 0U) << "0x650 is less urgent than all three mailboxes";
+  EXPECT_EQ(bench.driver.transmit_counters().aborted, 1U);
+  bench.complete(1, true);
+  EXPECT_EQ(bench.identifier_in(1), 0x650U);
+  bench.complete(0, true);
+  EXPECT_EQ(bench.identifier_in(0), 0x700U) << "taken back, not lost";
+}
+
+TEST(Can, AbortedFrameKeepsItsPlaceAmongItsOwn) {
+  Bench bench;
+  bench.join();
+  for (const std::uint32_t identifier : {0x500U, 0x600U}) bench.send(identifier);
+  bench.send(0x700, 1);
+  bench.send(0x700, 2);
+  bench.send(0x100);
+  ASSERT_EQ(bench.aborts, 0x0080'0000U);
+  bench.complete(2, false);
+  EXPECT_EQ(bench.identifier_in(2), 0x100U);
+  bench.complete(2, true);
+  EXPECT_EQ(bench.can.mailbox[2].tdlr.value, 1U) << "the older one again";
+  bench.complete(2, true);
+  EXPECT_EQ(bench.can.mailbox[2].tdlr.value, 2U);
+}
+
+TEST(Can, AbortThatCameTooLateCountsAsSent) {
+  Bench bench;
+  bench.join();
+  for (const std::uint32_t identifier : {0x500U, 0x600U, 0x700U, 0x100U}) bench.send(identifier);
+  ASSERT_NE(bench.aborts, 0U);
+  bench.complete(2, true, 4);
+  EXPECT_EQ(bench.driver.transmit_counters().sent, 1U);
+  EXPECT_EQ(bench.driver.transmit_counters().aborted, 0U);
+  EXPECT_EQ(bench.driver.transmit_counters().arbitration_lost, 1U);
+}
+
+TEST(Can, FullQueueIsCountedAndNothingIsOverwritten) {
+  Bench bench;
+  bench.join();
+  for (std::uint8_t i = 0; i < 8; ++i) bench.send(0x300, i);
+  EXPECT_EQ(bench.driver.send({.identifier = 0x300}), CanSendResult::queue_full);
+  EXPECT_EQ(bench.driver.transmit_counters().queue_full, 1U);
+  for (std::uint8_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(bench.can.mailbox[0].tdlr.value, i);
+    bench.complete(0, true);
+  }
+}
+
+TEST(Can, BusOffDropsWhatIsWaitingAndComesBack) {
+  Bench bench;
+  bench.join();
+  for (std::uint8_t i = 0; i < 5; ++i) bench.send(0x100U + i);
+  bench.can.esr.value = 4;
+  EXPECT_EQ(bench.driver.poll(1000), CanBusState::waiting);
+  EXPECT_EQ(bench.aborts & 0x0080'8080U, 0x0080'8080U);
+  EXPECT_EQ(bench.driver.send({}), CanSendResult::not_on_the_bus);
+  for (unsigned i = 0; i < 3; ++i) bench.complete(i, false);
+  EXPECT_EQ(bench.driver.transmit_counters().discarded, 5U);
+  EXPECT_FALSE(bench.taken(0) || bench.taken(1) || bench.taken(2));
+
+  EXPECT_EQ(bench.driver.poll(100'999), CanBusState::waiting);
+  EXPECT_EQ(bench.driver.poll(101'000), CanBusState::entering);
+  EXPECT_EQ(bench.can.mcr.value, 0x0001'0001U);
+  EXPECT_EQ(bench.driver.poll(101'001), CanBusState::recovering);
+  EXPECT_EQ(bench.can.mcr.value, 0x0001'0000U);
+  EXPECT_EQ(bench.driver.poll(101'002), CanBusState::recovering) << "BOFF is still up";
+  bench.can.esr.value = 0;
+  EXPECT_EQ(bench.driver.poll(110'000), CanBusState::on_bus);
+  EXPECT_EQ(bench.driver.bus_off_counters().bus_offs, 1U);
+  bench.send(0x123);
+  EXPECT_EQ(bench.identifier_in(0), 0x123U);
+}
+
+TEST(Can, ReceivesUntilTheFifoIsEmptyAndCountsOverruns) {
+  Bench bench;
+  std::deque<std::uint32_t> pending{0x100, 0x200, 0x300};
+  bool overrun = true;
+  bench.can.rfr[1].on_read = [&](std::uint32_t) {
+    return static_cast<std::uint32_t>(pending.size()) | (overrun ? 0x18U : 0U);
+  };
+  bench.can.rfr[1].on_write = [&](std::uint32_t word) {
+    EXPECT_EQ(word & ~0x38U, 0U);
+    if ((word & 0x20U) != 0) pending.pop_front();
+    if ((word & 0x10U) != 0) overrun = false;
+  };
+  bench.can.fifo[1].rir.on_read = [&](std::uint32_t) { return pending.front() << 21; };
+  bench.can.fifo[1].rdtr.value = 0x0000'050F;  // FMI 5; DLC 15 means 8
+  bench.can.fifo[1].rdlr.value = 0x0403'0201;
+  std::vector<CanFrame> frames;
+  bench.driver.ISR_receive(1, [&](const CanFrame& frame, std::uint8_t filter) {
+    frames.push_back(frame);
+    EXPECT_EQ(filter, 5);
+  });
+  ASSERT_EQ(frames.size(), 3U);
+  for (unsigned i = 0; i < 3; ++i) EXPECT_EQ(frames[i].identifier, 0x100 * (i + 1));
+  EXPECT_EQ(frames[0].length, 8);
+  EXPECT_EQ(frames[0].data[2], 3);
+  EXPECT_EQ(bench.driver.receive_counters().received, 3U);
+  EXPECT_EQ(bench.driver.receive_counters().overruns, 1U);
+}
+
+TEST(Can, ReceiveIsBoundedWhenTheFifoNeverEmpties) {
+  Bench bench;
+  bench.can.rfr[0].on_read = [](std::uint32_t) { return 3U; };
+  unsigned frames = 0;
+  bench.driver.ISR_receive(0, [&](const CanFrame&, std::uint8_t) { ++frames; });
+  EXPECT_EQ(frames, 3U);
+}
+
+TEST(Can, ErrorsByName) {
+  Bench bench;
+  bench.can.esr.value = 0x2A90'0033;
+  const CanErrors errors = bench.driver.errors();
+  EXPECT_EQ(errors.transmit, 0x90);
+  EXPECT_EQ(errors.receive, 0x2A);
+  EXPECT_EQ(errors.last, CanLastError::acknowledgement);
+  EXPECT_TRUE(errors.warning && errors.passive);
+  EXPECT_FALSE(errors.bus_off);
+  EXPECT_EQ(bench.can.esr.value, 0x70U);
+  bench.can.esr.value = 4;
+  EXPECT_TRUE(bench.driver.ISR_serve_status());
+  EXPECT_EQ(bench.can.msr.value, 4U) << "ERRI is written 1";
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4

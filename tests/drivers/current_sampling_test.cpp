@@ -1,0 +1,233 @@
+#include "drivers/stm32f4/current_sampling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/drivers/fake_register.hpp"
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+using testing::FakeRegister;
+
+constexpr std::uint32_t apb2 = 84'000'000;
+constexpr std::uint32_t jeoc = 1U << 2, jstrt = 1U << 3;
+
+struct FakeAdc {
+  FakeRegister sr, cr1, cr2, smpr1, smpr2, jsqr;
+  FakeRegister jdr[4];
+
+  FakeAdc() {
+    // Writing 0 clears, 1 leaves alone: RM0090, ADC status register.
+    sr.on_read = [this](std::uint32_t) { return flags; };
+    sr.on_write = [this](std::uint32_t word) { flags &= word; };
+  }
+  void done(std::uint32_t result) {
+    jdr[0].value = result;
+    flags |= jeoc | jstrt;
+  }
+  std::uint32_t flags = 0;
+};
+struct FakeCommon {
+  FakeRegister csr, ccr, cdr;
+};
+
+struct Board {
+  explicit Board(const CurrentSamplingConfig& config = {}) : sampling{adc1, adc2, adc3, common, config} {}
+  FakeAdc adc1, adc2, adc3;
+  FakeCommon common;
+  CurrentSampling<FakeAdc, FakeCommon> sampling;
+
+  void started(unsigned first_axis = 0) {
+    ASSERT_TRUE(sampling.configure(apb2));
+    sampling.start(first_axis);
+  }
+  void trigger(std::uint32_t b, std::uint32_t c) {
+    adc2.done(b);
+    adc3.done(c);
+  }
+};
+
+TEST(CurrentSampling, ConfiguresAsTheManualWantsIt) {
+  Board board;
+  ASSERT_TRUE(board.sampling.configure(apb2));
+  EXPECT_EQ(board.common.ccr.value, 1U << 16) << "84 MHz / 4";
+  EXPECT_EQ(board.adc1.cr1.value, 1U << 8) << "SCAN for four conversions, no interrupt";
+  EXPECT_EQ(board.adc2.cr1.value, 1U << 7) << "JEOCIE";
+  EXPECT_EQ(board.adc3.cr1.value, 0U);
+  // Four: JL = 3, JSQ1 = 6 (supply), JSQ2 = 15, JSQ3 = 4, JSQ4 = 5.
+  EXPECT_EQ(board.adc1.jsqr.value, 3U << 20 | 5U << 15 | 4U << 10 | 15U << 5 | 6U);
+  // 28 cycles (2): channels 4, 5, 6 in SMPR2, channel 15 in SMPR1.
+  EXPECT_EQ(board.adc1.smpr2.value, 2U << 12 | 2U << 15 | 2U << 18);
+  EXPECT_EQ(board.adc1.smpr1.value, 2U << 15);
+  EXPECT_EQ(board.adc2.smpr1.value | board.adc2.smpr2.value | board.adc3.smpr1.value | board.adc3.smpr2.value,
+            0U);
+  for (const FakeAdc* each : {&board.adc1, &board.adc2, &board.adc3})
+    EXPECT_EQ(each->cr2.value, 1U) << "on, deaf";
+}
+
+TEST(CurrentSampling, StartArmsTheListOfTheFirstAxisAndThenTheTriggers) {
+  for (const unsigned axis : {0U, 1U}) {
+    Board board;
+    ASSERT_TRUE(board.sampling.configure(apb2));
+    std::string order;
+    board.adc2.jsqr.on_write = [&](std::uint32_t) { order += 'l'; };
+    board.adc3.jsqr.on_write = [&](std::uint32_t) { order += 'l'; };
+    board.adc1.cr2.on_write = [&](std::uint32_t) { order += '1'; };
+    board.adc2.cr2.on_write = [&](std::uint32_t) { order += '2'; };
+    board.adc3.cr2.on_write = [&](std::uint32_t) { order += '3'; };
+    board.adc2.flags = jeoc | jstrt;
+    board.sampling.start(axis);
+    EXPECT_EQ(order, "ll132");
+    EXPECT_EQ(board.adc2.jsqr.value, (axis == 0 ? 10U : 13U) << 15) << "one conversion is JSQ4";
+    EXPECT_EQ(board.adc3.jsqr.value, (axis == 0 ? 11U : 12U) << 15);
+    EXPECT_EQ(board.adc2.flags, 0U) << "a conversion from before is forgotten";
+    for (const FakeAdc* each : {&board.adc1, &board.adc2, &board.adc3}) {
+      EXPECT_EQ(each->cr2.value, 1U | 1U << 16 | 1U << 20) << "ADON, JEXTSEL T1_TRGO, JEXTEN rising";
+    }
+    board.sampling.stop();
+    for (const FakeAdc* each : {&board.adc1, &board.adc2, &board.adc3})
+      EXPECT_EQ(each->cr2.value >> 20 & 3U, 0U);
+  }
+}
+
+TEST(CurrentSampling, RefusesWhatCannotWorkAndTouchesNothing) {
+  const auto refused = [](const CurrentSamplingConfig& config, std::uint32_t clock) {
+    Board board{config};
+    const bool configured = board.sampling.configure(clock);
+    EXPECT_TRUE(configured || (board.common.ccr.writes.empty() && board.adc1.cr2.writes.empty()));
+    return !configured;
+  };
+  EXPECT_FALSE(refused({}, 144'000'000));
+  EXPECT_TRUE(refused({}, 144'000'001)) << "more than 36 MHz after /4";
+  EXPECT_TRUE(refused({.axes = {{{10, 4}, {13, 12}}}}, apb2)) << "ADC3 has no channel 4 here";
+  EXPECT_TRUE(refused({.axes = {{{10, 11}, {13, 15}}}}, apb2));
+  EXPECT_FALSE(refused({.axes = {{{4, 11}, {13, 12}}}}, apb2)) << "ADC2 has";
+  EXPECT_TRUE(refused({.supply = 16}, apb2));
+  EXPECT_TRUE(refused({.current_sampling_code = 8}, apb2));
+  EXPECT_TRUE(refused({.slow_sampling_code = 8}, apb2));
+}
+
+TEST(CurrentSampling, AlternatesAndArmsTheOtherAxis) {
+  Board board;
+  board.started(0);
+  for (unsigned i = 0; i < 6; ++i) {
+    const unsigned axis = i % 2;
+    EXPECT_EQ(board.adc2.jsqr.value >> 15, axis == 0 ? 10U : 13U);
+    board.trigger(100 + i, 200 + i);
+    const CurrentSample sample = board.sampling.ISR_read(axis);
+    EXPECT_TRUE(sample.valid);
+    EXPECT_EQ(sample.phase_b, 100 + i);
+    EXPECT_EQ(sample.phase_c, 200 + i);
+    EXPECT_EQ(board.adc2.flags | board.adc3.flags, 0U);
+  }
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 0U);
+  EXPECT_EQ(board.sampling.counters().overruns, 0U);
+}
+
+TEST(CurrentSampling, WrongPhaseIsCountedAndHealsAtOnce) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  EXPECT_FALSE(board.sampling.ISR_read(1).valid) << "the list was that of axis 0";
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+  EXPECT_EQ(board.sampling.counters().overruns, 0U);
+  EXPECT_EQ(board.adc2.jsqr.value, 10U << 15) << "axis 0 is next by the timer";
+  board.trigger(3, 4);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+}
+
+TEST(CurrentSampling, LostInterruptIsOverrunAndMismatch) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  board.trigger(3, 4);  // axis 1; nobody reads
+  board.trigger(5, 6);  // axis 0, but converted with the list of axis 1
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+  board.trigger(7, 8);
+  EXPECT_TRUE(board.sampling.ISR_read(1).valid);
+}
+
+TEST(CurrentSampling, TriggerBetweenReadingAndArmingIsCounted) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  // The next trigger starts its conversion just as the new list is written.
+  board.adc2.jsqr.on_write = [&](std::uint32_t) { board.adc2.flags |= jstrt; };
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 0U);
+  board.adc2.jsqr.on_write = nullptr;
+  board.trigger(3, 4);
+  EXPECT_FALSE(board.sampling.ISR_read(1).valid) << "nobody knows which list that one used";
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+  board.trigger(5, 6);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+}
+
+TEST(CurrentSampling, MissingPhaseC) {
+  Board board;
+  board.started(0);
+  board.adc2.done(1);
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().missing_phase_c, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 0U);
+}
+
+TEST(CurrentSampling, SpuriousCallTouchesNothing) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  const auto lists = board.adc2.jsqr.writes.size();
+  const auto cleared = board.adc2.sr.writes.size();
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid) << "an old sample must not count twice";
+  EXPECT_EQ(board.sampling.counters().spurious, 1U);
+  EXPECT_EQ(board.sampling.counters().overruns, 0U);
+  EXPECT_EQ(board.adc2.jsqr.writes.size(), lists);
+  EXPECT_EQ(board.adc2.sr.writes.size(), cleared);
+  board.trigger(3, 4);
+  EXPECT_TRUE(board.sampling.ISR_read(1).valid);
+}
+
+TEST(CurrentSampling, OnlyItsOwnFlagsAreCleared) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  board.adc2.flags |= 0x33;  // AWD, EOC, STRT, OVR
+  board.sampling.ISR_read(0);
+  EXPECT_EQ(board.adc2.flags, 0x33U);
+}
+
+TEST(CurrentSampling, SlowCodesAndTheirAge) {
+  Board board;
+  board.started(0);
+  board.trigger(1, 2);
+  EXPECT_EQ(board.sampling.ISR_read(0).slow_age, 1U);
+  const std::uint16_t codes[] = {1111, 2222, 3333, 444};
+  for (unsigned i = 0; i < 4; ++i) board.adc1.jdr[i].value = codes[i];
+  board.adc1.flags = jeoc | jstrt;
+  board.trigger(1, 2);
+  CurrentSample sample = board.sampling.ISR_read(1);
+  EXPECT_EQ(sample.slow_age, 0U);
+  EXPECT_EQ(sample.supply, 1111);
+  EXPECT_EQ(sample.temperatures[0], 2222);
+  EXPECT_EQ(sample.temperatures[1], 3333);
+  EXPECT_EQ(sample.auxiliary_temperature, 444);
+  board.adc1.jdr[0].value = 9;  // a new sequence is under way
+  for (unsigned i = 0; i < 600; ++i) {
+    board.trigger(1, 2);
+    sample = board.sampling.ISR_read(i % 2);
+  }
+  EXPECT_EQ(sample.supply, 1111) << "the last complete sequence";
+  EXPECT_EQ(sample.slow_age, 255U);
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4

@@ -1,0 +1,135 @@
+#include "drivers/current_sense.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+namespace kmax::drivers {
+namespace {
+
+TEST(CurrentSense, RangeAndResolutionOfEachGain) {
+  struct Row {
+    CurrentSenseGain gain;
+    double milliampere_per_code;
+    double range;
+  };
+  for (const Row& row : {Row{CurrentSenseGain::x10, 161.13, 270}, Row{CurrentSenseGain::x20, 80.57, 135},
+                         Row{CurrentSenseGain::x40, 40.28, 67.5}, Row{CurrentSenseGain::x80, 20.14, 33.75}}) {
+    const CurrentSense sense{{.gain = row.gain}};
+    EXPECT_NEAR(1000.0 * static_cast<double>(sense.amperes_per_code()), row.milliampere_per_code,
+                0.01 * row.milliampere_per_code / 100);
+    EXPECT_NEAR(static_cast<double>(sense.range()), row.range, 0.002 * row.range);
+  }
+}
+
+TEST(CurrentSense, AboveTheMiddleFlowsIntoTheMotor) {
+  const CurrentSense sense;
+  EXPECT_EQ(sense.ISR_amperes(2048), 0.0F);
+  EXPECT_GT(sense.ISR_amperes(2049), 0.0F);
+  EXPECT_LT(sense.ISR_amperes(2047), 0.0F);
+}
+
+// From amperes to volts as the amplifier does it, to a code as the converter does it, and back.
+RC_GTEST_PROP(CurrentSense, InvertsTheAnalogChain, ()) {
+  const auto gain = *rc::gen::element(CurrentSenseGain::x10, CurrentSenseGain::x20, CurrentSenseGain::x40,
+                                      CurrentSenseGain::x80);
+  const double offset_volt = *rc::gen::inRange(-150, 151) * 1e-3;
+  const double factor = static_cast<double>(gain_factor(gain)) * 0.0005;
+  const double current = *rc::gen::inRange(-1000, 1001) * 1e-3 * 1.15 / factor;
+  const double volt = 1.65 + offset_volt + factor * current;
+  const auto code = static_cast<std::uint16_t>(std::lround(volt / 3.3 * 4096));
+
+  CurrentSense sense{{.gain = gain}};
+  sense.set_offset(static_cast<float>(2048 + offset_volt / 3.3 * 4096));
+  RC_ASSERT(!sense.ISR_saturated(code));
+  const double half_code = 0.501 * static_cast<double>(sense.amperes_per_code());
+  RC_ASSERT(std::abs(static_cast<double>(sense.ISR_amperes(code)) - current) <= half_code);
+}
+
+TEST(CurrentSense, SaturatedOutsideTheLinearWindow) {
+  const CurrentSense sense;
+  using Code = std::uint16_t;
+  for (const Code code : {Code{0}, Code{1}, Code{372}, Code{3724}, Code{4094}, Code{4095}})
+    EXPECT_TRUE(sense.ISR_saturated(code)) << code;
+  for (const Code code : {Code{373}, Code{2048}, Code{3723}}) EXPECT_FALSE(sense.ISR_saturated(code)) << code;
+}
+
+TEST(CurrentSense, OffsetNarrowsTheRangeOnOneSide) {
+  CurrentSense sense;
+  const float centred = sense.range();
+  sense.set_offset(2148.0F);
+  EXPECT_NEAR(sense.range(), centred - 100 * sense.amperes_per_code(), 0.01F * centred);
+  sense.set_offset(1948.0F);
+  EXPECT_NEAR(sense.range(), centred - 100 * sense.amperes_per_code(), 0.01F * centred);
+}
+
+TEST(OffsetCalibration, TakesExactlyItsSamples) {
+  OffsetCalibration calibration{{.log2_samples = 3}};
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(calibration.ISR_add(2050), OffsetResult::running) << i;
+  EXPECT_EQ(calibration.offset(), 0.0F);
+  EXPECT_EQ(calibration.ISR_add(2058), OffsetResult::accepted);
+  EXPECT_EQ(calibration.offset(), 2051.0F);
+  EXPECT_EQ(calibration.spread(), 8);
+  EXPECT_EQ(calibration.ISR_add(0), OffsetResult::accepted) << "the result stands";
+  EXPECT_EQ(calibration.offset(), 2051.0F);
+  calibration.restart();
+  EXPECT_EQ(calibration.result(), OffsetResult::running);
+  for (int i = 0; i < 8; ++i) calibration.ISR_add(2040);
+  EXPECT_EQ(calibration.offset(), 2040.0F) << "nothing of the first run is left";
+  EXPECT_EQ(calibration.spread(), 0);
+}
+
+TEST(OffsetCalibration, WindowIsInclusiveOnBothSides) {
+  const auto result_of = [](std::uint16_t code) {
+    OffsetCalibration calibration{{.log2_samples = 4, .window = 205}};
+    for (int i = 0; i < 16; ++i) calibration.ISR_add(code);
+    return calibration.result();
+  };
+  EXPECT_EQ(result_of(2048 + 205), OffsetResult::accepted);
+  EXPECT_EQ(result_of(2048 - 205), OffsetResult::accepted);
+  EXPECT_EQ(result_of(2048 + 206), OffsetResult::offset_out_of_window);
+  EXPECT_EQ(result_of(2048 - 206), OffsetResult::offset_out_of_window);
+  EXPECT_EQ(result_of(0), OffsetResult::offset_out_of_window) << "input shorted to ground";
+  EXPECT_EQ(result_of(4095), OffsetResult::offset_out_of_window);
+}
+
+TEST(OffsetCalibration, OneOutlierIsTooMuchSpread) {
+  for (const int at : {0, 7, 15}) {
+    OffsetCalibration calibration{{.log2_samples = 4, .largest_spread = 64}};
+    for (int i = 0; i < 16; ++i) calibration.ISR_add(i == at ? 2113 : 2048);
+    EXPECT_EQ(calibration.result(), OffsetResult::spread_too_large) << at;
+  }
+  OffsetCalibration calibration{{.log2_samples = 4, .largest_spread = 64}};
+  for (int i = 0; i < 16; ++i) calibration.ISR_add(i == 3 ? 2112 : 2048);
+  EXPECT_EQ(calibration.result(), OffsetResult::accepted);
+}
+
+TEST(OffsetCalibration, TheLongestRunDoesNotOverflow) {
+  OffsetCalibration calibration{{.log2_samples = 16, .window = 2048}};
+  for (unsigned i = 0; i < 65'535; ++i) ASSERT_EQ(calibration.ISR_add(4095), OffsetResult::running);
+  EXPECT_EQ(calibration.ISR_add(4095), OffsetResult::accepted);
+  EXPECT_EQ(calibration.offset(), 4095.0F);
+  // More is cut to that, not shifted out of the word.
+  OffsetCalibration cut{{.log2_samples = 40}};
+  for (unsigned i = 0; i < 65'535; ++i) cut.ISR_add(2048);
+  EXPECT_EQ(cut.result(), OffsetResult::running);
+  EXPECT_EQ(cut.ISR_add(2048), OffsetResult::accepted);
+}
+
+RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
+  const auto log2_samples = *rc::gen::inRange<std::uint8_t>(0, 9);
+  const auto codes = *rc::gen::container<std::vector<std::uint16_t>>(
+      1U << log2_samples, rc::gen::inRange<std::uint16_t>(2020, 2080));
+  OffsetCalibration calibration{{.log2_samples = log2_samples}};
+  for (const std::uint16_t code : codes) calibration.ISR_add(code);
+  const double mean = std::accumulate(codes.begin(), codes.end(), 0.0) / static_cast<double>(codes.size());
+  RC_ASSERT(calibration.result() == OffsetResult::accepted);
+  RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
+}
+
+}  // namespace
+}  // namespace kmax::drivers

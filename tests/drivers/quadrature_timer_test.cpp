@@ -1,0 +1,114 @@
+#include "drivers/stm32f4/quadrature_timer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <optional>
+
+#include "tests/drivers/fake_timer.hpp"
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+using testing::FakeTimer;
+
+TEST(QuadratureTimer, CountsAllFourEdgesOnBothInputs) {
+  TimerRegisters timer{};
+  timer.cr1 = 0xFFFF;
+  timer.ccmr[1] = 0xFFFF;
+  QuadratureTimer<> encoder{timer};
+  ASSERT_TRUE(encoder.configure({}));
+  EXPECT_EQ(timer.smcr, 3U);
+  EXPECT_EQ(timer.ccmr[0], 0x4141U) << "CC1S = CC2S = 1, ICxF = 4";
+  EXPECT_EQ(timer.ccmr[1], 0U);
+  EXPECT_EQ(timer.ccer, 0U);
+  EXPECT_EQ(timer.arr, 0xFFFFU);
+  EXPECT_EQ(timer.psc, 0U);
+  EXPECT_EQ(timer.cr1, 1U | 1U << 2) << "CEN, URS";
+  timer.cnt = 0x1'2345;
+  EXPECT_EQ(encoder.count(), 0x2345);
+}
+
+TEST(QuadratureTimer, ReversedInvertsOneInputOnly) {
+  TimerRegisters timer{};
+  QuadratureTimer<> encoder{timer};
+  ASSERT_TRUE(encoder.configure({.reversed = true}));
+  EXPECT_EQ(timer.ccer, 2U) << "CC1P";
+}
+
+TEST(QuadratureTimer, ThirtyTwoBitTimerUsesItsWholeRange) {
+  TimerRegisters timer{};
+  QuadratureTimer<TimerRegisters, std::uint32_t> encoder{timer};
+  ASSERT_TRUE(encoder.configure({.input_filter = 0}));
+  EXPECT_EQ(timer.arr, 0xFFFF'FFFFU);
+  EXPECT_EQ(timer.ccmr[0], 0x0101U);
+  timer.cnt = 0x8000'0000;
+  EXPECT_EQ(encoder.count(), 0x8000'0000U);
+}
+
+TEST(QuadratureTimer, CaptureChannels) {
+  TimerRegisters timer{};
+  QuadratureTimer<> encoder{timer};
+  ASSERT_TRUE(encoder.configure({.input_filter = 15, .index_capture = IndexCapture{}}));
+  EXPECT_EQ(timer.ccmr[1], 0xF100U);
+  EXPECT_EQ(timer.ccer, 1U << 12);
+  ASSERT_TRUE(encoder.configure(
+      {.reversed = true, .index_capture = IndexCapture{.channel = 3, .falling_edge = true}}));
+  EXPECT_EQ(timer.ccmr[1], 0x0041U);
+  EXPECT_EQ(timer.ccer, 3U << 8 | 2U);
+}
+
+TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
+  FakeTimer timer;
+  QuadratureTimer<FakeTimer> encoder{timer};
+  EXPECT_FALSE(encoder.configure({.input_filter = 16}));
+  for (const int number : {0, 1, 2, 5}) {
+    const auto channel = static_cast<std::uint8_t>(number);
+    EXPECT_FALSE(encoder.configure({.index_capture = IndexCapture{.channel = channel}})) << number;
+  }
+  EXPECT_TRUE(timer.cr1.writes.empty());
+  EXPECT_TRUE(timer.ccer.writes.empty());
+  EXPECT_TRUE(timer.smcr.writes.empty());
+}
+
+TEST(QuadratureTimer, SampledIndexIsHandedOutOnce) {
+  TimerRegisters timer{};
+  QuadratureTimer<> encoder{timer};
+  ASSERT_TRUE(encoder.configure({}));
+  EXPECT_EQ(encoder.take_index(), std::nullopt);
+  timer.cnt = 0;
+  encoder.ISR_sample_index();
+  timer.cnt = 5;
+  EXPECT_EQ(encoder.take_index(), 0) << "a count of 0 is an index too";
+  EXPECT_EQ(encoder.take_index(), std::nullopt);
+  encoder.ISR_sample_index();
+  timer.cnt = 6;
+  encoder.ISR_sample_index();
+  EXPECT_EQ(encoder.take_index(), 6) << "the later of two";
+  EXPECT_EQ(encoder.take_index(), std::nullopt);
+  encoder.ISR_sample_index();
+  ASSERT_TRUE(encoder.configure({}));
+  EXPECT_EQ(encoder.take_index(), std::nullopt) << "an index from before the start";
+}
+
+TEST(QuadratureTimer, CaptureIsReadOnlyWhenItsFlagIsUp) {
+  FakeTimer timer;
+  QuadratureTimer<FakeTimer> encoder{timer};
+  ASSERT_TRUE(encoder.configure({.index_capture = IndexCapture{}}));
+  timer.ccr[3].value = 777;
+  timer.sr.value = 1U << 3 | 1U << 12;  // another channel's, and a stale overcapture
+  EXPECT_EQ(encoder.take_index(), std::nullopt);
+  EXPECT_EQ(timer.ccr[3].reads, 0U) << "a read would clear the flag of an edge that comes in between";
+  timer.sr.value |= 1U << 4;
+  EXPECT_EQ(encoder.take_index(), 777);
+}
+
+// RM0090, TIMx_CCMR1, IC1F: sampling divider and number of samples.
+TEST(QuadratureTimer, FilterTable) {
+  const std::uint32_t expected[16] = {0, 2, 4, 8, 12, 16, 24, 32, 48, 64, 80, 96, 128, 160, 192, 256};
+  for (std::uint8_t code = 0; code < 16; ++code)
+    EXPECT_EQ(input_filter_clocks(code), expected[code]) << +code;
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4

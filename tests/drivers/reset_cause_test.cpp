@@ -1,0 +1,40 @@
+#include "drivers/stm32f4/reset_cause.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/drivers/fake_register.hpp"
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+TEST(ResetCause, EachAsTheChipShowsIt) {
+  EXPECT_EQ(reset_cause(0x0E00'0000), ResetCause::power_on);
+  EXPECT_EQ(reset_cause(0x0600'0000), ResetCause::brown_out);
+  EXPECT_EQ(reset_cause(0x0400'0000), ResetCause::pin);
+  EXPECT_EQ(reset_cause(0x1400'0000), ResetCause::software);
+  EXPECT_EQ(reset_cause(0x2400'0000), ResetCause::independent_watchdog);
+  EXPECT_EQ(reset_cause(0x4400'0000), ResetCause::window_watchdog);
+  EXPECT_EQ(reset_cause(0x8400'0000), ResetCause::low_power);
+  EXPECT_EQ(reset_cause(0), ResetCause::none);
+  EXPECT_EQ(reset_cause(3), ResetCause::none) << "LSION, LSIRDY";
+}
+
+TEST(ResetCause, TheLaterOneCountsWhenThePowerOnFlagIsStillThere) {
+  EXPECT_EQ(reset_cause(0x2E00'0000), ResetCause::independent_watchdog);
+  EXPECT_EQ(reset_cause(0x1E00'0000), ResetCause::software);
+}
+
+TEST(ResetCause, TakingItRemovesTheFlagsAndLeavesTheOscillatorOn) {
+  struct {
+    testing::FakeRegister csr;
+  } rcc;
+  rcc.csr.value = 0x2400'0003;
+  EXPECT_EQ(take_reset_cause(rcc), ResetCause::independent_watchdog);
+  ASSERT_EQ(rcc.csr.writes.size(), 2U);
+  EXPECT_EQ(rcc.csr.writes[0] & 0x0100'0003U, 0x0100'0003U) << "RMVF";
+  EXPECT_EQ(rcc.csr.writes[1] & 0x0100'0003U, 0x0000'0003U)
+      << "or the flags of the next reset are removed too";
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4

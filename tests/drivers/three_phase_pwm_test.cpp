@@ -1,0 +1,164 @@
+#include "drivers/stm32f4/three_phase_pwm.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/drivers/fake_timer.hpp"
+
+namespace kmax::drivers::stm32f4 {
+namespace {
+
+using testing::FakeTimer;
+
+constexpr std::uint32_t moe = 1U << 15;
+// DTG 21, LOCK 2, OSSI, OSSR, BKE, BKP; AOE and MOE 0.
+constexpr std::uint32_t disarmed = 21U | 2U << 8 | 1U << 10 | 1U << 11 | 1U << 12 | 1U << 13;
+
+TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
+  TimerRegisters timer{};
+  timer.cr1 = 0x1;
+  timer.cr2 = 0x7F00;
+  timer.dier = 0xFFFF;
+  timer.smcr = 6;
+  timer.rcr = 3;
+  ThreePhasePwm<> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_EQ(timer.cr1, 1U << 2 | 1U << 5 | 1U << 7) << "URS, CMS = 1, ARPE, stopped";
+  EXPECT_EQ(timer.cr2 & 0x7F00U, 0U) << "all idle levels 0";
+  EXPECT_EQ(timer.dier, 0U);
+  EXPECT_EQ(timer.smcr, 0U);
+  EXPECT_EQ(timer.rcr, 0U) << "an update at each turn";
+  EXPECT_EQ(timer.ccmr[0], 0x7878U) << "PWM mode 2, preloaded";
+  EXPECT_EQ(timer.ccmr[1], 0x0078U);
+  EXPECT_EQ(timer.ccer, 0x555U);
+  EXPECT_EQ(timer.arr, 4200U);
+  for (unsigned leg = 0; leg < 3; ++leg) EXPECT_EQ(timer.ccr[leg], 4200U) << "duty 0";
+  EXPECT_EQ(timer.bdtr, disarmed);
+  EXPECT_FALSE(pwm.armed());
+}
+
+TEST(ThreePhasePwm, OutputsAreOffBeforeAnythingElseIsTouched) {
+  FakeTimer timer;
+  std::string order;
+  timer.bdtr.on_write = [&](std::uint32_t) { order += 'b'; };
+  timer.cr1.on_write = [&](std::uint32_t) { order += '1'; };
+  timer.ccer.on_write = [&](std::uint32_t) { order += 'e'; };
+  timer.arr.on_write = [&](std::uint32_t) { order += 'a'; };
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_EQ(order.front(), 'b');
+  EXPECT_EQ(order.back(), 'e') << "the legs come last";
+}
+
+TEST(ThreePhasePwm, RefusesImpossibleConfigurations) {
+  for (const ThreePhasePwmConfig& config :
+       {ThreePhasePwmConfig{.half_period_ticks = 252}, ThreePhasePwmConfig{.minimum_low_ticks = 4200},
+        ThreePhasePwmConfig{.minimum_low_ticks = 21}, ThreePhasePwmConfig{.dead_time_code = 255},
+        ThreePhasePwmConfig{.dead_time_code = 0}}) {
+    TimerRegisters timer{};
+    timer.bdtr = moe;
+    ThreePhasePwm<> pwm{timer, config};
+    EXPECT_FALSE(pwm.configure());
+    EXPECT_FALSE(pwm.armed()) << "off all the same";
+    EXPECT_EQ(timer.ccer, 0U);
+  }
+}
+
+TEST(ThreePhasePwm, NoticesALockedBreakAndDeadTimeRegister) {
+  FakeTimer timer;
+  timer.bdtr.on_read = [](std::uint32_t) { return disarmed - 1; };
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  EXPECT_FALSE(pwm.configure());
+}
+
+TEST(ThreePhasePwm, DisarmIsOneStoreWithoutARead) {
+  FakeTimer timer;
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  pwm.disarm();
+  EXPECT_EQ(timer.bdtr.writes, std::vector<std::uint32_t>{disarmed}) << "before configure, too";
+  EXPECT_EQ(timer.bdtr.reads, 0U);
+}
+
+TEST(ThreePhasePwm, ArmIsOneStoreAndLooksWhetherItTook) {
+  FakeTimer timer;
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  timer.bdtr.writes.clear();
+  EXPECT_FALSE(pwm.arm()) << "the counter stands";
+  EXPECT_TRUE(timer.bdtr.writes.empty());
+  timer.cr1.value |= 1;
+  EXPECT_TRUE(pwm.arm());
+  EXPECT_EQ(timer.bdtr.writes, std::vector<std::uint32_t>{disarmed | moe});
+  pwm.disarm();
+  timer.bdtr.on_read = [](std::uint32_t word) { return word & ~moe; };  // a break holds MOE at 0
+  EXPECT_FALSE(pwm.arm());
+}
+
+TEST(ThreePhasePwm, LegsChangeOnlyWhileDisarmed) {
+  TimerRegisters timer{};
+  ThreePhasePwm<> pwm{timer, {.legs = brushed_motor_legs}};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_EQ(timer.ccer, 0x550U) << "leg A off";
+  timer.cr1 = timer.cr1 | 1U;
+  ASSERT_TRUE(pwm.arm());
+  EXPECT_FALSE(pwm.enable_legs({}));
+  EXPECT_EQ(timer.ccer, 0x550U);
+  pwm.disarm();
+  EXPECT_TRUE(pwm.enable_legs({}));
+  EXPECT_EQ(timer.ccer, 0x555U);
+}
+
+TEST(ThreePhasePwm, DutyIsTicksAboveTheCompareValue) {
+  TimerRegisters timer{};
+  ThreePhasePwm<> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  ASSERT_TRUE(pwm.ISR_set_duty({0.0F, 0.5F, 0.25F}));
+  EXPECT_EQ(timer.ccr[0], 4200U);
+  EXPECT_EQ(timer.ccr[1], 2100U);
+  EXPECT_EQ(timer.ccr[2], 3150U);
+  pwm.ISR_set_ticks({0, 1, 4200});
+  EXPECT_EQ(timer.ccr[0], 4200U);
+  EXPECT_EQ(timer.ccr[1], 4199U);
+  EXPECT_EQ(timer.ccr[2], 252U) << "the low-side window stays open";
+  EXPECT_EQ(pwm.maximum_ticks(), 3948);
+  EXPECT_FLOAT_EQ(pwm.maximum_duty(), 0.94F);
+}
+
+TEST(ThreePhasePwm, NotANumberLeavesTheDutyAlone) {
+  TimerRegisters timer{};
+  ThreePhasePwm<> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  ASSERT_TRUE(pwm.ISR_set_duty({0.5F, 0.5F, 0.5F}));
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(pwm.ISR_set_duty({nan, 0.1F, 0.1F}));
+  EXPECT_FALSE(pwm.ISR_set_duty({0.1F, nan, 0.1F}));
+  EXPECT_FALSE(pwm.ISR_set_duty({0.1F, 0.1F, nan}));
+  for (unsigned leg = 0; leg < 3; ++leg) EXPECT_EQ(timer.ccr[leg], 2100U);
+}
+
+RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
+  TimerRegisters timer{};
+  const auto half = *rc::gen::inRange<std::uint16_t>(300, 65535);
+  ThreePhasePwm<> pwm{timer, {.half_period_ticks = half}};
+  RC_ASSERT(pwm.configure());
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float value :
+       {duty, duty * 1e30F, -duty, infinity, -infinity, 1.0F, std::nextafter(1.0F, 2.0F)}) {
+    if (value != value) continue;
+    RC_ASSERT(pwm.ISR_set_duty({value, value, value}));
+    RC_ASSERT(timer.ccr[0] >= 252U && timer.ccr[0] <= half);
+    const double limited =
+        std::min(std::max(static_cast<double>(value), 0.0), static_cast<double>(half - 252) / half);
+    const double error = static_cast<double>(half - timer.ccr[0]) - limited * half;
+    RC_ASSERT(error <= 0.51 && error >= -0.51);
+  }
+}
+
+}  // namespace
+}  // namespace kmax::drivers::stm32f4
