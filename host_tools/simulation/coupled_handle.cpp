@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "host_tools/simulation/first_crossing.hpp"
@@ -234,13 +235,21 @@ void CoupledHandle::step(double duration, double force, double intended, double 
   }
 }
 
+void CoupledHandle::block(bool blocked) {
+  blocked_ = blocked;
+  if (!blocked) return;
+  v_ = 0.0;
+  sticking_ = true;
+}
+
 double CoupledHandle::stick_limit(double force) const {
+  if (blocked_) return std::numeric_limits<double>::infinity();
   return device_.friction + 1e-13 * (device_.friction + std::abs(force) +
                                      k1_ * (std::abs(x_) + std::abs(y_)) + b1_ * std::abs(w_));
 }
 
 bool CoupledHandle::leaves_stick(double force) {
-  if (device_.friction == 0.0) return true;
+  if (device_.friction == 0.0 && !blocked_) return true;
   const double net = force + grip_force();
   direction_ = std::copysign(1.0, net);
   return std::abs(net) > stick_limit(force);

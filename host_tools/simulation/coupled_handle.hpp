@@ -66,6 +66,10 @@ class CoupledHandle {
   // duration out of range.
   void advance(double force, double background_force, double duration);
 
+  // Holds the handle where it is, at once and against any force, or lets it go again; the person goes on.
+  void block(bool blocked);
+  bool blocked() const { return blocked_; }
+
   double position() const { return x_; }       // m
   double velocity() const { return v_; }       // m/s; exactly 0 while sticking
   double hand_position() const { return y_; }  // m; without a person the start position
@@ -119,6 +123,7 @@ class CoupledHandle {
   OperatorModel person_;
   IntendedMotion motion_;
   bool has_operator_ = false;
+  bool blocked_ = false;
 
   double x_ = 0.0;
   double v_ = 0.0;

@@ -3,21 +3,18 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <initializer_list>
 #include <iterator>
-#include <sstream>
+
+#include "host_tools/simulation/scene_motor.hpp"
+#include "host_tools/simulation/scene_table.hpp"
 
 namespace kmax::simulation {
 namespace {
 
-constexpr std::array encoder_fields{
-    ModelField<EncoderConfig>{"counts_per_turn", &EncoderConfig::counts_per_turn, 1.0, 1e9, ""},
-    ModelField<EncoderConfig>{"transmission", &EncoderConfig::transmission, 1e-6, 10.0, "m/rad"},
-};
 constexpr std::array measurement_fields{
     ModelField<Measurement>{"window", &Measurement::window, 1e-3, 1e5, "s"},
     ModelField<Measurement>{"threshold", &Measurement::threshold, 1e-9, 1.0, "m"},
@@ -28,24 +25,16 @@ constexpr std::array start_fields{
 };
 constexpr std::array scene_fields{ModelField<Scene>{"duration", &Scene::duration, 1e-3, 1e5, "s"}};
 
-std::string text_of(const toml::node& node) {
-  if (node.is_table()) return "{table}";
-  if (node.is_array()) return "[array]";
-  std::ostringstream text;
-  node.visit([&](const auto& value) { text << value; });
-  return text.str();
-}
-
-class SceneReader {
+class SceneReader : private SceneTables {
  public:
-  SceneReader(std::string_view source, const ParameterCheck& check) : source_(source), check_(check) {}
+  SceneReader(std::string_view source, const ParameterCheck& check) : SceneTables(source), check_(check) {}
 
   Scene read(const toml::table& root) {
     require_known(root, "",
                   {"name", "description", "duration", "seed", "device", "operator", "motion", "encoder",
-                   "parameters", "measurement", "axis1"});
+                   "parameters", "measurement", "motor", "inverter", "current_sensor", "supply", "axis1"});
     Scene scene;
-    scene.name = std::filesystem::path(source_).stem().string();
+    scene.name = std::filesystem::path(source()).stem().string();
     read_text(root, "name", scene.name);
     read_text(root, "description", scene.description);
     read_fields(root, "", scene_fields, scene);
@@ -57,50 +46,15 @@ class SceneReader {
     if (const toml::table* table = part(root, "", "parameters")) read_parameters(*table, "", scene);
     scene.axes.push_back(read_axis(root, "", scene));
     if (const toml::table* second = part(root, "", "axis1")) {
-      require_known(*second, "axis1.", {"device", "operator", "motion", "encoder"});
+      require_known(*second, "axis1.",
+                    {"device", "operator", "motion", "encoder", "motor", "inverter", "current_sensor"});
       scene.axes.push_back(read_axis(*second, "axis1.", scene));
     }
+    read_supply_table(*this, root, scene);
     return scene;
   }
 
  private:
-  [[noreturn]] void fail(const toml::source_region& where, const std::string& what) const {
-    throw SceneError(fmt::format("{}: {}", place(where), what));
-  }
-
-  std::string place(const toml::source_region& where) const {
-    return fmt::format("{}:{}:{}", source_, where.begin.line, where.begin.column);
-  }
-
-  void require_known(const toml::table& table, std::string_view prefix,
-                     std::initializer_list<std::string_view> allowed) const {
-    for (const auto& [key, node] : table) {
-      if (std::find(allowed.begin(), allowed.end(), key.str()) != allowed.end()) continue;
-      std::string list;
-      for (const std::string_view name : allowed) list += (list.empty() ? "" : ", ") + std::string(name);
-      fail(key.source(),
-           fmt::format("{}{} = {}: unknown key; allowed here: {}", prefix, key.str(), text_of(node), list));
-    }
-  }
-
-  const toml::table* part(const toml::table& table, std::string_view prefix, std::string_view name) const {
-    const toml::node* node = table.get(name);
-    if (node == nullptr) return nullptr;
-    if (!node->is_table()) {
-      fail(node->source(),
-           fmt::format("{}{} = {}: allowed is a table, [{}{}]", prefix, name, text_of(*node), prefix, name));
-    }
-    return node->as_table();
-  }
-
-  void read_text(const toml::table& table, std::string_view name, std::string& value) const {
-    const toml::node* node = table.get(name);
-    if (node == nullptr) return;
-    if (!node->is_string())
-      fail(node->source(), fmt::format("{} = {}: allowed is a text in quotes", name, text_of(*node)));
-    value = node->as_string()->get();
-  }
-
   void read_seed(const toml::table& table, Scene& scene) const {
     const toml::node* node = table.get("seed");
     if (node == nullptr) return;
@@ -109,41 +63,6 @@ class SceneReader {
            fmt::format("seed = {}: allowed is a whole number from 0 to 2^63 - 1", text_of(*node)));
     }
     scene.seed = static_cast<std::uint64_t>(node->as_integer()->get());
-  }
-
-  template <typename Model, std::size_t count>
-  void read_fields(const toml::table& table, std::string_view prefix,
-                   const std::array<ModelField<Model>, count>& fields, Model& model) const {
-    for (const ModelField<Model>& field : fields) {
-      const toml::node* node = table.get(field.name);
-      if (node == nullptr) continue;
-      // value_exact would refuse `mass = 1`, value<double> would accept `true`: a number is an integer or a
-      // float.
-      const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
-      if (!value || !is_allowed(field, *value)) {
-        fail(node->source(), fmt::format("{}{} = {}: allowed is {}", prefix, field.name, text_of(*node),
-                                         allowed_range(field)));
-      }
-      model.*field.member = *value;
-    }
-  }
-
-  // A table whose keys are exactly the fields of one model.
-  template <typename Model, std::size_t count>
-  void read_model(const toml::table& table, const std::string& prefix,
-                  const std::array<ModelField<Model>, count>& fields, Model& model) const {
-    for (const auto& [key, node] : table) {
-      const std::string_view name = key.str();
-      const bool known = std::any_of(fields.begin(), fields.end(),
-                                     [name](const ModelField<Model>& field) { return field.name == name; });
-      if (known) continue;
-      std::string list;
-      for (const ModelField<Model>& field : fields)
-        list += (list.empty() ? "" : ", ") + std::string(field.name);
-      fail(key.source(),
-           fmt::format("{}{} = {}: unknown key; allowed here: {}", prefix, key.str(), text_of(node), list));
-    }
-    read_fields(table, prefix, fields, model);
   }
 
   SceneAxis read_axis(const toml::table& table, const std::string& prefix, const Scene& scene) const {
@@ -158,13 +77,8 @@ class SceneReader {
     if (const toml::table* person = part(table, prefix, "operator")) {
       read_model(*person, prefix + "operator.", operator_fields, axis.person.emplace());
     }
-    if (const toml::table* encoder = part(table, prefix, "encoder")) {
-      read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder);
-      if (!(axis.encoder.count_length() >= 1e-12)) {
-        fail(encoder->source(), fmt::format("{}encoder: {} m per count; allowed is 1e-12 m or more", prefix,
-                                            axis.encoder.count_length()));
-      }
-    }
+    read_encoder_table(*this, table, prefix, axis);
+    read_motor_tables(*this, table, prefix, axis);
     if (const toml::table* motion = part(table, prefix, "motion")) {
       read_motion(*motion, prefix, scene, axis);
       axis.start.position = axis.motion->start_position;
@@ -273,7 +187,6 @@ class SceneReader {
     }
   }
 
-  std::string source_;
   const ParameterCheck& check_;
 };
 

@@ -10,10 +10,16 @@
 //   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
 //   [operator]                      operator_model.hpp
 //   [motion]                        intended_motion.hpp; needs [operator]
-//   [encoder]                       counts_per_turn, transmission (m/rad)
+//   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p"
+//   [motor]                         kind = "dc" (brushed_dc_motor.hpp) or "pmsm" (synchronous_motor.hpp; also
+//                                   inductance for inductance_d and inductance_q); without it the axis has
+//                                   an ideal actuator and a force limit
+//   [inverter] [current_sensor]     inverter.hpp, current_sensor.hpp; need [motor]
+//   [supply]                        supply.hpp, one for all axes
 //   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
 //   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
-//   [axis1.device] [axis1.operator] [axis1.motion] [axis1.encoder]     a second axis
+//   [axis1.device] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor] [axis1.inverter]
+//   [axis1.current_sensor]          a second axis
 //
 // SI units. Numbers that are not given keep the defaults of the model structs. The wall that a motion aims at
 // is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
@@ -35,23 +41,17 @@
 
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/device_model.hpp"
-#include "host_tools/simulation/encoder_model.hpp"
+#include "host_tools/simulation/encoder_config.hpp"
 #include "host_tools/simulation/intended_motion.hpp"
+#include "host_tools/simulation/motor_drive.hpp"
 #include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/simulation/supply.hpp"
 
 namespace kmax::simulation {
 
 class SceneError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
-};
-
-// Default: 0.055 mm per count, the resolution of the Geomagic Touch (paper 1, section 4).
-struct EncoderConfig {
-  double counts_per_turn = 4000.0;
-  double transmission = 0.0350140874800;  // handle metres per motor radian
-
-  double count_length() const { return simulation::count_length(counts_per_turn, transmission); }
 };
 
 struct Measurement {
@@ -73,8 +73,13 @@ struct SceneAxis {
   std::optional<OperatorModel> person;
   std::optional<IntendedMotionConfig> motion;
   EncoderConfig encoder;
+  std::optional<MotorConfig> motor;
+  InverterConfig inverter;
+  CurrentSensorConfig current_sensor;
 
   CoupledHandle make_handle() const;
+  // The handle behind its motor, without the device's force limit. Throws std::logic_error without a motor.
+  MotorDrive make_drive(std::uint64_t seed) const;
 };
 
 struct Scene {
@@ -85,6 +90,11 @@ struct Scene {
   std::vector<SceneAxis> axes;  // one or two
   std::vector<SceneParameter> parameters;
   Measurement measurement;
+  std::optional<SupplyConfig> supply;
+
+  // make_drive() of that axis, with a seed of its own made from the scene's.
+  MotorDrive make_drive(std::size_t axis) const;
+  Supply make_supply() const { return Supply(supply.value_or(SupplyConfig{})); }
 };
 
 // Returns what is wrong with a parameter, or nothing if it is right.

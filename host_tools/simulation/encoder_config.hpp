@@ -1,0 +1,53 @@
+#pragma once
+// The encoder on a motor shaft, and the transmission between the shaft and the handle.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+
+#include "host_tools/simulation/encoder_model.hpp"
+#include "host_tools/simulation/model_field.hpp"
+
+namespace kmax::simulation {
+
+enum class EncoderKind : std::uint8_t { quadrature, as5047p };
+
+// Default: 0.055 mm per count, the resolution of the Geomagic Touch (paper 1, section 4), and no defects.
+struct EncoderConfig {
+  double counts_per_turn = 4000.0;        // quadrature: four times the lines
+  double transmission = 0.0350140874800;  // handle metres per motor radian
+  double index_position = 0.0;            // count within the turn at which the index is high
+  double dropout_probability = 0.0;       // of every edge, to be lost
+  double edge_noise = 0.0;                // counts, standard deviation of where an edge is seen
+  EncoderKind kind = EncoderKind::quadrature;
+
+  double count_length() const { return simulation::count_length(counts_per_turn, transmission); }
+};
+
+inline constexpr std::array encoder_fields{
+    ModelField<EncoderConfig>{"counts_per_turn", &EncoderConfig::counts_per_turn, 1.0, 1e9, ""},
+    ModelField<EncoderConfig>{"transmission", &EncoderConfig::transmission, 1e-6, 10.0, "m/rad"},
+    ModelField<EncoderConfig>{"index_position", &EncoderConfig::index_position, 0.0, 1e9, "counts"},
+    ModelField<EncoderConfig>{"dropout_probability", &EncoderConfig::dropout_probability, 0.0, 1.0, ""},
+    ModelField<EncoderConfig>{"edge_noise", &EncoderConfig::edge_noise, 0.0, 100.0, "counts"},
+};
+
+// Throws std::invalid_argument: a field outside its range; an index position that is not a whole number below
+// the counts of a turn; counts of a turn that are not whole.
+inline void validate(const EncoderConfig& config) {
+  require_allowed(config, std::span<const ModelField<EncoderConfig>>(encoder_fields), "encoder");
+  if (config.counts_per_turn != std::floor(config.counts_per_turn)) {
+    throw std::invalid_argument(
+        fmt::format("encoder.counts_per_turn = {}: allowed is a whole number", config.counts_per_turn));
+  }
+  if (config.index_position != std::floor(config.index_position) ||
+      config.index_position >= config.counts_per_turn) {
+    throw std::invalid_argument(
+        fmt::format("encoder.index_position = {}: allowed is a whole number below counts_per_turn = {}",
+                    config.index_position, config.counts_per_turn));
+  }
+}
+
+}  // namespace kmax::simulation

@@ -1,0 +1,90 @@
+#pragma once
+// Reads the tables of a scene file: finds parts, refuses what is unknown, of the wrong type or out of range,
+// with the place in the file. For the readers of scenes only: it needs toml++.
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host_tools/simulation/model_field.hpp"
+
+namespace kmax::simulation {
+
+class SceneTables {
+ public:
+  // `source` stands for the file name in messages.
+  explicit SceneTables(std::string_view source) : source_(source) {}
+
+  const std::string& source() const { return source_; }
+
+  // Throws SceneError that begins with file:line:column.
+  [[noreturn]] void fail(const toml::source_region& where, const std::string& what) const;
+
+  std::string place(const toml::source_region& where) const;
+
+  // The value as a person would write it.
+  static std::string text_of(const toml::node& node);
+
+  // Refuses keys that are not listed. `prefix`: what stands before a key in messages, "axis1.device.".
+  void require_known(const toml::table& table, std::string_view prefix,
+                     std::initializer_list<std::string_view> allowed) const;
+
+  // The table of this name, or nullptr if it is not there.
+  const toml::table* part(const toml::table& table, std::string_view prefix, std::string_view name) const;
+
+  // Leaves `value` as it is if the key is not there.
+  void read_text(const toml::table& table, std::string_view name, std::string& value) const;
+  void read_truth(const toml::table& table, std::string_view prefix, std::string_view name,
+                  bool& value) const;
+
+  // Numbers that are there replace those of the model.
+  template <typename Model, std::size_t count>
+  void read_fields(const toml::table& table, std::string_view prefix,
+                   const std::array<ModelField<Model>, count>& fields, Model& model) const {
+    for (const ModelField<Model>& field : fields) {
+      const toml::node* node = table.get(field.name);
+      if (node == nullptr) continue;
+      // value_exact would refuse `mass = 1`, value<double> would accept `true`: a number is an integer or a
+      // float.
+      const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
+      if (!value || !is_allowed(field, *value)) {
+        fail(node->source(), fmt::format("{}{} = {}: allowed is {}", prefix, field.name, text_of(*node),
+                                         allowed_range(field)));
+      }
+      model.*field.member = *value;
+    }
+  }
+
+  // A table whose keys are the fields of one model and `others`, which are read elsewhere.
+  template <typename Model, std::size_t count>
+  void read_model(const toml::table& table, const std::string& prefix,
+                  const std::array<ModelField<Model>, count>& fields, Model& model,
+                  std::initializer_list<std::string_view> others = {}) const {
+    for (const auto& [key, node] : table) {
+      const std::string_view name = key.str();
+      const bool known = std::any_of(fields.begin(), fields.end(),
+                                     [name](const ModelField<Model>& field) { return field.name == name; });
+      if (known || std::find(others.begin(), others.end(), name) != others.end()) continue;
+      std::string list;
+      for (const std::string_view other : others) list += (list.empty() ? "" : ", ") + std::string(other);
+      for (const ModelField<Model>& field : fields)
+        list += (list.empty() ? "" : ", ") + std::string(field.name);
+      refuse_key(key, node, prefix, list);
+    }
+    read_fields(table, prefix, fields, model);
+  }
+
+ private:
+  [[noreturn]] void refuse_key(const toml::key& key, const toml::node& node, std::string_view prefix,
+                               const std::string& allowed) const;
+
+  std::string source_;
+};
+
+}  // namespace kmax::simulation

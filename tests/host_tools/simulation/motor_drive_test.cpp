@@ -1,0 +1,343 @@
+#include "host_tools/simulation/motor_drive.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace kmax::simulation {
+namespace {
+
+using Channel = CurrentSensor::Channel;
+constexpr double interval = 25e-6;
+
+DeviceModel frictionless(double damping = 0.5) {
+  return {0.045, damping, 0.0, 0.0};
+}
+
+MotorDriveConfig config_of(const MotorConfig& motor) {
+  MotorDriveConfig config;
+  config.motor = motor;
+  config.inverter = {0.0, 0.8};
+  config.encoder.transmission = 0.01;
+  config.encoder.counts_per_turn = 4096;
+  return config;
+}
+
+MotorDrive brushed_drive(const DeviceModel& device = frictionless()) {
+  return MotorDrive(config_of(BrushedDcMotorConfig{}), CoupledHandle(device));
+}
+MotorDrive synchronous_drive(const DeviceModel& device = frictionless(),
+                             const SynchronousMotorConfig& motor = {}) {
+  return MotorDrive(config_of(motor), CoupledHandle(device));
+}
+
+InverterCommand duties(double a, double b, double c) {
+  return {{{{true, a}, {true, b}, {true, c}}}};
+}
+
+// Duties that put `volts` on the q axis of the rotor where it is.
+InverterCommand along_q(const MotorDrive& drive, double volts, double supply) {
+  const double e = drive.synchronous_motor()->electrical_angle(drive.shaft_angle());
+  InverterCommand command;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double phase = e - static_cast<double>(k) * 2.0943951023931953;
+    command.legs[k] = {true, 0.5 - volts / supply * std::sin(phase)};
+  }
+  return command;
+}
+
+void run(MotorDrive& drive, Supply& supply, const InverterCommand& command, double duration,
+         double step = interval) {
+  const int steps = static_cast<int>(std::lround(duration / step));
+  for (int n = 0; n < steps; ++n) {
+    drive.advance(step, command, supply);
+    supply.advance(step);
+  }
+}
+
+TEST(MotorDrive, ForceOnTheHandleIsTorqueOverTransmission) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  drive.block(true);
+  // 1.1 A make 3.3 N.
+  run(drive, supply, duties(0.0, 0.5 + 1.1 / 48, 0.5 - 1.1 / 48), 0.02);
+  EXPECT_NEAR(drive.currents()[terminal_b], 1.1, 1e-3);
+  EXPECT_NEAR(drive.force(), 3.3, 4e-3);
+  EXPECT_EQ(drive.handle().applied_force(), drive.force());
+  EXPECT_EQ(drive.shaft_speed(), 0.0);
+}
+
+TEST(MotorDrive, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
+  for (const bool brushed : {true, false}) {
+    MotorDrive drive = brushed ? brushed_drive() : synchronous_drive();
+    Supply supply({24.0, 1e-4, 1.0});  // stiff
+    for (int n = 0; n < 40000; ++n) {
+      drive.advance(interval,
+                    brushed ? duties(0.0, 0.5 + 2.0 / 48, 0.5 - 2.0 / 48) : along_q(drive, 2.0, 24.0),
+                    supply);
+      supply.advance(interval);
+    }
+    // Per radian of the shaft: k (V - E) / R = damping x transmission^2 x speed; the q axis sees E = 2/3 k
+    // speed.
+    const double k = brushed ? 0.03 : 0.05, resistance = brushed ? 1.0 : 0.6,
+                 share = brushed ? 1.0 : 2.0 / 3.0;
+    const double load = 0.5 * 1e-4;
+    const double speed = 2.0 * k / (resistance * load + share * k * k);
+    EXPECT_NEAR(drive.shaft_speed(), speed, (brushed ? 1e-3 : 1e-2) * speed) << brushed;
+  }
+}
+
+TEST(MotorDrive, EnergyFromTheSupplyIsHeatAndMotion) {
+  for (const bool brushed : {true, false}) {
+    const DeviceModel device = frictionless(2.0);
+    MotorDrive drive = brushed ? brushed_drive(device) : synchronous_drive(device);
+    Supply supply({24.0, 1e-4, 1.0});
+    double heat = 0.0, damped = 0.0, given = 0.0;
+    for (int n = 0; n < 8000; ++n) {
+      const double volts = n < 3000 ? 3.0 : n < 5000 ? -2.0 : 1.0;
+      const TerminalValues begin = drive.currents();
+      const double speed = drive.handle().velocity(), voltage = supply.voltage();
+      const double source = supply.source_charge();
+      drive.advance(
+          interval,
+          brushed ? duties(0.0, 0.5 + volts / 48, 0.5 - volts / 48) : along_q(drive, volts, supply.voltage()),
+          supply);
+      supply.advance(interval);
+      const TerminalValues end = drive.currents();
+      for (std::size_t k = 0; k < 3; ++k) {
+        heat += (brushed ? 0.5 : 0.6) * interval / 3 *
+                (begin[k] * begin[k] + begin[k] * end[k] + end[k] * end[k]);
+      }
+      const double after = drive.handle().velocity();
+      damped += 2.0 * interval / 3 * (speed * speed + speed * after + after * after);
+      // What leaves the bus: what the source gave less what the capacitor kept.
+      given += 0.5 * (voltage + supply.voltage()) *
+               (supply.source_charge() - source - 1.0 * (supply.voltage() - voltage));
+    }
+    const double stored = drive.magnetic_energy() + drive.handle().energy();
+    EXPECT_GT(damped, 5e-3);
+    EXPECT_NEAR(given, heat + damped + stored, 2e-4 * given) << brushed;
+  }
+}
+
+TEST(MotorDrive, SplittingIsOfSecondOrderInTheInterval) {
+  const auto end = [](double step) {
+    MotorDrive drive = brushed_drive();
+    Supply supply({24.0, 1e-4, 10.0});
+    run(drive, supply, duties(0.0, 0.6, 0.4), 0.01, step);
+    return drive.handle().velocity();
+  };
+  const double fine = end(25e-6 / 64), coarse = end(25e-6), half = end(12.5e-6);
+  EXPECT_NEAR(coarse, fine, 3e-6 * std::fabs(fine));
+  EXPECT_LT(std::fabs(half - fine), 0.35 * std::fabs(coarse - fine) + 1e-12);
+}
+
+TEST(MotorDrive, LongIntervalsAreDivided) {
+  MotorDrive one = brushed_drive(), many = brushed_drive();
+  Supply supply({24.0, 1e-4, 10.0}), other({24.0, 1e-4, 10.0});
+  one.advance(1e-3, duties(0.0, 0.6, 0.4), supply);
+  for (int n = 0; n < 40; ++n) many.advance(25e-6, duties(0.0, 0.6, 0.4), other);
+  EXPECT_NEAR(one.handle().velocity(), many.handle().velocity(), 1e-12);
+}
+
+TEST(MotorDrive, APersonPressesAgainstTheMotor) {
+  DeviceModel device;
+  device.force_limit = 0.0;
+  IntendedMotionConfig motion;
+  motion.start_position = 0.0;
+  motion.wall_position = -0.02;
+  CoupledHandle handle(device, OperatorModel{}, motion);
+  MotorDrive drive(config_of(BrushedDcMotorConfig{}), handle);
+  Supply supply;
+  drive.handle().begin_motion();
+  // A spring of 500 N/m by feedback from the encoder.
+  for (int n = 0; n < 60000; ++n) {
+    const double position =
+        static_cast<double>(drive.encoder().edges()) * drive.encoder().config().count_length();
+    const double force = std::fmax(0.0, -500.0 * (position + 0.02));
+    const double volts = force * 0.01 / 0.03 * 1.0;
+    drive.advance(interval, duties(0.0, 0.5 + volts / 48, 0.5 - volts / 48), supply);
+    supply.advance(interval);
+  }
+  EXPECT_NEAR(drive.force(), 1.0, 0.3);
+  EXPECT_NEAR(drive.handle().position(), -0.022, 0.001);
+}
+
+TEST(MotorDrive, AForceLimitIsRefusedWhenItClips) {
+  DeviceModel device = frictionless();
+  device.force_limit = 1.0;
+  MotorDrive drive = brushed_drive(device);
+  drive.block(true);
+  Supply supply;
+  EXPECT_THROW(run(drive, supply, duties(0.0, 0.6, 0.4), 0.01), std::logic_error);
+  device.force_limit = 0.0;
+  MotorDrive free = brushed_drive(device);
+  free.block(true);
+  run(free, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_GT(free.force(), 10.0);
+}
+
+TEST(MotorDrive, BlockedItStandsAndLetGoItMoves) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  const double position = drive.handle().position();
+  ASSERT_GT(drive.handle().velocity(), 0.0);
+  drive.block(true);
+  EXPECT_EQ(drive.handle().velocity(), 0.0);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_EQ(drive.handle().position(), position);
+  drive.block(false);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_GT(drive.handle().position(), position);
+}
+
+TEST(MotorDrive, ABlockedHandleHoldsAgainstAPerson) {
+  for (const double friction : {0.0, 0.1}) {
+    IntendedMotionConfig motion;
+    CoupledHandle handle({0.045, 0.05, friction, 0.0}, OperatorModel{}, motion);
+    handle.begin_motion();
+    handle.block(true);
+    for (int n = 0; n < 1000; ++n) handle.advance(5.0, 0.0, 1e-3);
+    EXPECT_EQ(handle.position(), motion.start_position);
+    EXPECT_LT(handle.hand_position(), motion.start_position - 1e-4) << "the hand moves on";
+    handle.block(false);
+    handle.advance(0.0, 0.0, 1e-3);
+    EXPECT_LT(handle.position(), motion.start_position);
+  }
+}
+
+TEST(MotorDrive, OpenPhases) {
+  MotorDrive dc = brushed_drive();
+  Supply supply;
+  dc.open_terminal(terminal_c, true);
+  run(dc, supply, duties(0.0, 0.9, 0.1), 0.01);
+  EXPECT_EQ(dc.force(), 0.0);
+  EXPECT_EQ(dc.handle().position(), 0.0);
+
+  MotorDrive three = synchronous_drive();
+  three.block(true);
+  three.open_terminal(terminal_b, true);
+  run(three, supply, duties(0.6, 0.9, 0.4), 0.01);
+  EXPECT_NEAR(three.currents()[terminal_b], 0.0, 1e-14);
+  EXPECT_NEAR(three.currents()[terminal_a], 0.2 * supply.voltage() / 1.2, 1e-2);
+}
+
+TEST(MotorDrive, ThePinsShowTheCurrentWhileSomethingConductsBelow) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  drive.block(true);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  const double current = drive.currents()[terminal_b];
+  ASSERT_GT(current, 4.0);
+  EXPECT_NEAR(drive.current_pin(Channel::b, true), 1.65 + 0.02 * current, 1e-12);
+  EXPECT_NEAR(drive.current_pin(Channel::c, true), 1.65 - 0.02 * current, 1e-12);
+  EXPECT_EQ(drive.current_pin(Channel::b, false), 1.65);
+  // Off: B's current comes up through the lower diode and its shunt, C's goes to the upper rail.
+  drive.advance(5e-6, InverterCommand{}, supply);
+  ASSERT_GT(drive.currents()[terminal_b], 1.0);
+  EXPECT_GT(drive.current_pin(Channel::b, false), 1.66);
+  EXPECT_EQ(drive.current_pin(Channel::c, true), 1.65);
+}
+
+TEST(MotorDrive, BrakingPumpsTheSupplyUp) {
+  MotorDrive drive = brushed_drive();
+  Supply supply({24.0, 0.05, 100e-6});
+  run(drive, supply, duties(0.0, 0.75, 0.25), 0.2);
+  EXPECT_LT(supply.voltage(), 24.0);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.02);
+  EXPECT_GT(supply.voltage(), 24.1);
+}
+
+TEST(MotorDrive, WithoutSupplyThereIsSoonNoForce) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  drive.block(true);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  supply.disconnect();
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.3);
+  EXPECT_LT(supply.voltage(), 0.1);
+  EXPECT_NEAR(drive.force(), 0.0, 0.1);
+}
+
+TEST(MotorDrive, TheEncoderFollowsTheHandle) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.1);
+  const double turns = drive.handle().position() / 0.01 / 6.283185307179586;
+  EXPECT_EQ(drive.encoder().edges(), static_cast<std::int64_t>(std::floor(turns * 4096)));
+  drive.encoder().set_plugged(false);
+  const std::int64_t before = drive.encoder().edges();
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.1);
+  EXPECT_EQ(drive.encoder().edges(), before);
+}
+
+TEST(MotorDrive, TheBackgroundForceIsASetting) {
+  IntendedMotionConfig motion;
+  const CoupledHandle handle({0.045, 0.05, 0.093, 0.0}, OperatorModel{}, motion);
+  Supply supply;
+  const auto activation = [&](auto prepare) {
+    MotorDrive drive(config_of(BrushedDcMotorConfig{}), handle);
+    prepare(drive);
+    run(drive, supply, duties(0.0, 0.5 + 0.01, 0.5 - 0.01), 0.2);
+    return drive.handle().activation();
+  };
+  EXPECT_EQ(activation([](MotorDrive&) {}), 0.0);
+  EXPECT_NEAR(activation([](MotorDrive& drive) { drive.set_background_force(2.0); }),
+              2.0 * (1.0 - std::exp(-0.5)), 1e-9);
+  EXPECT_GT(activation([](MotorDrive& drive) { drive.background_from_motor(); }), 0.2);
+}
+
+TEST(MotorDrive, CoggingMovesAFreeHandleIntoItsPosition) {
+  SynchronousMotorConfig motor;
+  motor.cogging_torque = 2e-3;
+  motor.cogging_periods = 36;
+  CoupledHandle start(frictionless(5.0), {0.0004, 0.0});  // 0.04 rad, a positions' distance is 0.175 rad
+  MotorDrive drive(config_of(motor), start);
+  Supply supply;
+  run(drive, supply, InverterCommand{}, 1.0);
+  EXPECT_NEAR(drive.shaft_angle(), 0.0, 1e-6);
+}
+
+TEST(MotorDrive, TheSameSeedGivesTheSameRun) {
+  MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
+  config.current_sensor.noise = 1e-5;
+  config.encoder.dropout_probability = 0.1;
+  config.encoder.counts_per_turn = 40000;
+  config.seed = 17;
+  const auto record = [&] {
+    MotorDrive drive(config, CoupledHandle(frictionless()));
+    Supply supply;
+    double sum = 0.0;
+    for (int n = 0; n < 2000; ++n) {
+      const double pin = drive.current_pin(Channel::b, true);
+      sum += pin * (n + 1) + static_cast<double>(drive.encoder().edges());
+      run(drive, supply, duties(0.0, pin > 1.65 ? 0.55 : 0.6, 0.4), interval);
+    }
+    return sum;
+  };
+  const double first = record();
+  EXPECT_EQ(first, record());
+  config.seed = 18;
+  EXPECT_NE(first, record());
+}
+
+TEST(MotorDrive, RefusesWhatIsNotANumber) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  EXPECT_THROW(drive.advance(nan, duties(0, 0.5, 0.5), supply), std::invalid_argument);
+  EXPECT_THROW(drive.advance(-1e-6, duties(0, 0.5, 0.5), supply), std::invalid_argument);
+  EXPECT_THROW(drive.advance(25e-6, duties(0, nan, 0.5), supply), std::invalid_argument);
+  EXPECT_THROW(drive.set_background_force(nan), std::invalid_argument);
+  EXPECT_EQ(drive.handle().samples(), 0u);
+  EXPECT_THROW(drive.open_terminal(3, true), std::out_of_range);
+  MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
+  config.encoder.transmission = 0.0;
+  EXPECT_THROW(MotorDrive(config, CoupledHandle(frictionless())), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace kmax::simulation

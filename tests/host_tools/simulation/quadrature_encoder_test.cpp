@@ -1,0 +1,161 @@
+#include "host_tools/simulation/quadrature_encoder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace kmax::simulation {
+namespace {
+
+constexpr double count = 0x1p-20;  // m; a power of two, so that positions have no rounding of their own
+
+EncoderConfig config_of(double counts_per_turn = 16.0) {
+  EncoderConfig config;
+  config.counts_per_turn = counts_per_turn;
+  config.transmission = counts_per_turn * count / 6.283185307179586;
+  return config;
+}
+
+// What a timer in encoder mode counts from one pair of levels to the next.
+int decoded(const EncoderLines& from, const EncoderLines& to) {
+  const auto gray = [](const EncoderLines& lines) { return lines.b ? (lines.a ? 2 : 3) : (lines.a ? 1 : 0); };
+  const int step = (gray(to) - gray(from) + 4) & 3;
+  EXPECT_NE(step, 2) << "both lines changed at once";
+  return step == 3 ? -1 : step;
+}
+
+TEST(QuadratureEncoder, LinesDecodeToTheEdges) {
+  QuadratureEncoder encoder(config_of(), 0.5 * count);
+  EXPECT_EQ(encoder.edges(), 0);
+  std::int64_t decoder = 0;
+  EncoderLines last = encoder.lines();
+  EXPECT_EQ(last, (EncoderLines{false, false, true}));
+  const auto visit = [&](int n) {
+    encoder.update((n + 0.5) * count);
+    decoder += decoded(last, encoder.lines());
+    last = encoder.lines();
+    EXPECT_EQ(encoder.edges(), n);
+    EXPECT_EQ(decoder, n);
+  };
+  for (int n = 0; n <= 40; ++n) visit(n);
+  for (int n = 39; n >= -40; --n) visit(n);
+  QuadratureEncoder forward(config_of(), 0.5 * count);
+  forward.update(1.5 * count);
+  EXPECT_TRUE(forward.lines().a && !forward.lines().b) << "A leads B upwards";
+}
+
+TEST(QuadratureEncoder, TheIndexIsHighOnceATurnAndOneStateWide) {
+  EncoderConfig config = config_of();
+  config.index_position = 5.0;
+  QuadratureEncoder encoder(config, 0.0);
+  for (int n = -64; n < 64; ++n) {
+    encoder.update((n + 0.5) * count);
+    EXPECT_EQ(encoder.lines().z, ((n % 16) + 16) % 16 == 5) << n;
+  }
+}
+
+TEST(QuadratureEncoder, BeginsWithTheDiscsCountAndCountsFarAway) {
+  QuadratureEncoder encoder(config_of(), -7.5 * count);
+  EXPECT_EQ(encoder.edges(), -8);
+  encoder.update(0x1p40 * count);
+  EXPECT_EQ(encoder.edges(), std::int64_t{1} << 40);
+}
+
+TEST(QuadratureEncoder, UnpluggedAllLinesAreHighAndNothingCounts) {
+  QuadratureEncoder encoder(config_of(), 0.5 * count);
+  encoder.update(3.5 * count);
+  encoder.set_plugged(false);
+  for (int n = 3; n < 30; ++n) {
+    encoder.update((n + 0.5) * count);
+    EXPECT_EQ(encoder.lines(), (EncoderLines{true, true, true}));
+    EXPECT_EQ(encoder.edges(), 3);
+  }
+  encoder.set_plugged(true);
+  EXPECT_EQ(encoder.edges(), 3) << "what happened meanwhile is lost";
+  encoder.update(31.5 * count);
+  EXPECT_EQ(encoder.edges(), 5);
+  EXPECT_TRUE((encoder.update(32.5 * count), encoder.lines().z)) << "the disc is where it is";
+}
+
+TEST(QuadratureEncoder, DropoutsLoseEdgesButNotTheIndex) {
+  EncoderConfig config = config_of();
+  config.dropout_probability = 0.01;
+  QuadratureEncoder encoder(config, 0.5 * count, 3);
+  constexpr int edges = 100000;
+  for (int n = 1; n <= edges; ++n) {
+    encoder.update((n + 0.5) * count);
+    EXPECT_EQ(encoder.lines().z, n % 16 == 0);
+  }
+  EXPECT_EQ(encoder.edges() + encoder.lost_edges(), edges);
+  EXPECT_NEAR(static_cast<double>(encoder.lost_edges()), 0.01 * edges, 4 * std::sqrt(0.01 * edges));
+  // Several edges at once are lost one by one.
+  QuadratureEncoder quick(config, 0.5 * count, 3);
+  quick.update((edges + 0.5) * count);
+  EXPECT_EQ(quick.edges(), encoder.edges());
+  quick.update(-0.5 * count);
+  EXPECT_GT(quick.lost_edges(), 1.5 * static_cast<double>(encoder.lost_edges()));
+  config.dropout_probability = 1.0;
+  QuadratureEncoder dead(config, 0.5 * count, 3);
+  dead.update(50.5 * count);
+  EXPECT_EQ(dead.edges(), 0);
+}
+
+TEST(QuadratureEncoder, TheSameSeedGivesTheSameDefects) {
+  EncoderConfig config = config_of();
+  config.dropout_probability = 0.3;
+  config.edge_noise = 0.5;
+  QuadratureEncoder one(config, 0.0, 11), two(config, 0.0, 11), other(config, 0.0, 12);
+  bool differs = false;
+  for (int n = 0; n < 500; ++n) {
+    const double position = 30.0 * std::sin(0.05 * n) * count;
+    one.update(position);
+    two.update(position);
+    other.update(position);
+    ASSERT_EQ(one.edges(), two.edges());
+    differs = differs || one.edges() != other.edges();
+  }
+  EXPECT_TRUE(differs);
+}
+
+TEST(QuadratureEncoder, EdgeNoiseChattersAtAnEdgeAndNowhereElse) {
+  EncoderConfig config = config_of();
+  config.edge_noise = 0.02;
+  QuadratureEncoder encoder(config, 10.0 * count);
+  int changes = 0;
+  std::int64_t last = encoder.edges();
+  for (int n = 0; n < 1000; ++n) {
+    encoder.update(10.0 * count);
+    changes += encoder.edges() != last ? 1 : 0;
+    last = encoder.edges();
+    EXPECT_TRUE(last == 9 || last == 10) << last;
+  }
+  EXPECT_GT(changes, 300);
+  for (int n = 0; n < 1000; ++n) {
+    encoder.update(10.5 * count);
+    EXPECT_EQ(encoder.edges(), 10);
+  }
+}
+
+TEST(QuadratureEncoder, RefusesWhatCannotBeCounted) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EncoderConfig config = config_of();
+  config.index_position = 16.0;
+  EXPECT_THROW(QuadratureEncoder(config, 0.0), std::invalid_argument);
+  config.index_position = 0.5;
+  EXPECT_THROW(QuadratureEncoder(config, 0.0), std::invalid_argument);
+  config = config_of(16.5);
+  EXPECT_THROW(QuadratureEncoder(config, 0.0), std::invalid_argument);
+  config = config_of();
+  config.dropout_probability = nan;
+  EXPECT_THROW(QuadratureEncoder(config, 0.0), std::invalid_argument);
+  config = config_of();
+  config.counts_per_turn = nan;
+  EXPECT_THROW(QuadratureEncoder(config, 0.0), std::invalid_argument);
+  QuadratureEncoder encoder(config_of(), 0.0);
+  EXPECT_THROW(encoder.update(nan), std::domain_error);
+}
+
+}  // namespace
+}  // namespace kmax::simulation
