@@ -6,6 +6,23 @@
 namespace kmax::firmware {
 
 namespace {
+/// Why an axis cannot be armed while the board is in this condition.
+Refusal refusal_for(Fault condition) {
+  switch (condition) {
+    case Fault::emergency_stop:
+      return Refusal::emergency_stop;
+    case Fault::gate_driver:
+      return Refusal::gate_driver_fault;
+    case Fault::under_voltage:
+    case Fault::over_voltage:
+      return Refusal::supply_out_of_range;
+    case Fault::current_sense:
+      return Refusal::current_sense_invalid;
+    default:
+      return Refusal::power_stage_not_ready;
+  }
+}
+
 modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
   modbus::RtuPortConfig config;
   config.unit = static_cast<std::uint8_t>(values.whole<"modbus.unit">());
@@ -40,8 +57,11 @@ Application::Settings Application::make_settings() const {
     settings[axis].encoder_direction = values.whole<"encoder.direction">(axis);
     settings[axis].generation = generation_;
     // Near the position by the new origin: the resampler starts from there.
-    const std::int64_t position = Axis::position_of(report_.axis[axis].counted, settings[axis]);
+    const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
     settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
+    settings[axis].motor = MotorControl::prepare(motor_configuration(values, axis));
+    settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
+    settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
   }
   return settings;
 }
@@ -64,16 +84,25 @@ void Application::offer_settings_if_changed() {
 
 /// The tick works by the present settings, and knows of the axis' last disarming.
 bool Application::settled(std::size_t of_axis) const {
-  if (!handover_.taken() || report_.axis[of_axis].enabled) return false;
-  for (const AxisReport& axis : report_.axis) {
+  if (!handover_.taken() || report_[of_axis].enabled) return false;
+  for (const AxisReport& axis : report_) {
     if (axis.generation != generation_) return false;
   }
   return true;
 }
 
+void Application::take_reports() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    report_[axis] = snapshots_[axis].read();
+    report_wanted_[axis].store(true, std::memory_order_relaxed);
+  }
+}
+
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
-  if (!report_.axis[axis].count_valid) return Refusal::encoder_invalid;
-  const auto& haptic = report_.axis[axis].haptic;
+  if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
+  if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
+  if (!report_[axis].count_valid) return Refusal::encoder_invalid;
+  const auto& haptic = report_[axis].haptic;
   const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
                            settings_[axis].haptic.interference.mode != control::InterferenceMode::none;
   if (makes_force && haptic.inside) return Refusal::handle_inside_wall;
@@ -88,17 +117,36 @@ void Application::trip(std::size_t axis, Fault fault, float value, float bound) 
   fault_bound_[axis] = bound;
 }
 
+namespace {
+float bound_of(Fault fault, const ParameterValues& values, std::size_t axis) {
+  switch (fault) {
+    case Fault::over_speed:
+      return values.real<"velocity.limit">(axis);
+    case Fault::under_voltage:
+      return values.real<"supply.voltage_min">();
+    case Fault::over_voltage:
+      return values.real<"supply.voltage_max">();
+    case Fault::over_current:
+      return over_current_factor * values.real<"current.limit">(axis);
+    default:
+      return 0.0f;
+  }
+}
+}  // namespace
+
 void Application::supervise(std::size_t axis) {
   AxisStateMachine& machine = machines_[axis];
-  const AxisReport& report = report_.axis[axis];
+  const AxisReport& report = report_[axis];
   const ParameterValues& values = registers_.values();
 
   // Before the commands: a fault is reported even if the host disarms in the same moment.
   if (machine.armed()) {
     if (report.fault != Fault::none && enable_[axis].load(std::memory_order_relaxed)) {
-      const float bound = report.fault == Fault::over_speed ? values.real<"velocity.limit">(axis) : 0.0f;
-      trip(axis, report.fault, report.fault_value, bound);
+      trip(axis, report.fault, report.fault_value, bound_of(report.fault, values, axis));
     }
+    const float temperature = readings_.power_stage_temperature[axis];
+    const float hottest = values.real<"temperature.limit">(axis);
+    if (!(temperature <= hottest)) trip(axis, Fault::over_temperature, temperature, hottest);
     const float timeout = values.real<"link.timeout">();
     const auto last = port_.last_valid_request_time();
     if (timeout > 0.0f && last.has_value()) {
@@ -118,7 +166,8 @@ void Application::supervise(std::size_t axis) {
     const std::uint16_t pending = pending_command_[axis];
     if (!machine.asks_to_enable(pending) || settled(axis)) {
       command_pending_[axis] = false;
-      const bool cause_remains = machine.fault() == Fault::encoder && !report.count_valid;
+      const bool cause_remains = (machine.fault() == Fault::encoder && !report.count_valid) ||
+                                 (machine.fault() != Fault::none && machine.fault() == report.condition);
       machine.command(pending, obstacle_to_arming(axis), cause_remains);
     }
   }
@@ -142,13 +191,14 @@ void Application::poll(std::uint32_t now_us) {
     uptime_second_us_ += 1'000'000;
     ++uptime_s_;
   }
-  report_ = snapshot_.read();
+  take_reports();
   registers_.poll(now_us);
 
   SerialByte received;
   while (serial_queue_.pop(received)) port_.receive(received.byte, received.line_error, received.time_us);
   port_.poll(now_us);
   act();
+  keeper_.poll();
 }
 
 DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {

@@ -8,10 +8,12 @@
 
 #include "firmware/axis.hpp"
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/crash_record.hpp"
 #include "firmware/device_registers.hpp"
 #include "firmware/handover.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
+#include "firmware/parameter_keeper.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/trace.hpp"
 
@@ -23,6 +25,8 @@ struct BoardIdentity {
   std::uint32_t serial_number = 0;
   std::uint32_t core_clock_hz = 0;
   std::uint8_t clock_source = 0;  ///< as info.clock_source says
+  ResetCause reset_cause = ResetCause::unknown;
+  CrashRecord crash{};  ///< what is left of the run before
 };
 
 inline constexpr std::uint32_t firmware_version = 0x000100;  ///< 0.1.0
@@ -43,8 +47,19 @@ struct SerialSettings {
   friend constexpr bool operator==(const SerialSettings&, const SerialSettings&) = default;
 };
 
-/// The whole firmware, free of any chip. A board owns one, calls ISR_tick() from its 20 kHz interrupt,
-/// ISR_serial_byte() from its serial receive interrupt, and everything else from its main loop.
+/// What a board measures slowly and counts, for a host to read and for the main loop's trips.
+struct BoardReadings {
+  std::array<float, axis_count> power_stage_temperature{25.0f, 25.0f};  ///< degC
+  float supply_voltage = 0.0f;                                          ///< V; 0: not measured
+  std::uint32_t missed_ticks = 0;
+};
+
+/// The whole firmware, free of any chip. A board owns one, calls ISR_tick() for each axis at 20 kHz from the
+/// interrupt that follows the axis' current sample, ISR_serial_byte() from its serial receive interrupt, and
+/// everything else from its main loop.
+///
+/// The two axes' ticks never interrupt each other, and axis 0's comes first: it takes over new settings for
+/// both and counts the ticks. Half a tick apart or one right after the other makes no difference.
 ///
 /// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
 /// What crosses: settings and enables main -> tick (Handover, atomics), reports and the trace tick -> main
@@ -59,10 +74,17 @@ class Application {
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 
-  TickOutput ISR_tick(const TickInput& input);
+  /// The result is valid until the axis' next tick.
+  const AxisOutput& ISR_tick(std::size_t axis, const AxisInput& input);
+  /// Both axes, for a board that samples them at the same time.
+  TickOutput ISR_tick(const TickInput& input) {
+    return {{{ISR_tick(0, input.axis[0]), ISR_tick(1, input.axis[1])}}};
+  }
   void ISR_serial_byte(std::uint8_t byte, bool line_error, std::uint32_t time_us);
 
   void poll(std::uint32_t now_us);
+  /// Before poll(), as often as they change.
+  void set_readings(const BoardReadings& readings) { readings_ = readings; }
 
   /// A reply that may be sent now, once; the bytes stay valid until serial_reply_sent().
   std::span<const std::uint8_t> serial_reply_due(std::uint32_t now_us) { return port_.reply_due(now_us); }
@@ -75,12 +97,20 @@ class Application {
   /// then nothing changes.
   DeviceRegisters::WriteResult preset(std::size_t entry, std::size_t axis, std::uint32_t raw);
 
+  /// Gives the application the memory it keeps parameters in, and takes the newest set in it over; before the
+  /// first tick, once. Parameters that the set lacks keep their present values. Without it nothing can be
+  /// saved. `flash` refers to a memory that outlives the application.
+  const LoadReport& attach_store(AnyFlashSectors flash);
+
   const ParameterValues& values() const { return registers_.values(); }
+  /// Rises with every change of a parameter.
+  std::uint32_t parameter_changes() const { return registers_.changes(); }
+  bool any_armed() const;
   DriveState state(std::size_t axis) const { return machines_[axis].state(); }
   Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
   Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
   /// Of the last tick; for interrupt context, or where nothing interrupts.
-  const AxisReport& ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
+  AxisReport ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
 
  private:
   /// The registers as the Modbus server sees them.
@@ -98,17 +128,12 @@ class Application {
   };
 
   using Settings = std::array<AxisSetting, axis_count>;
-  struct TickState {
-    std::array<AxisReport, axis_count> axis;
-    std::uint32_t tick = 0;
-  };
   struct SerialByte {
     std::uint32_t time_us;
     std::uint8_t byte;
     bool line_error;
   };
 
-  bool any_armed() const;
   bool settled(std::size_t axis) const;
   Settings make_settings() const;
   void offer_settings_if_changed();
@@ -117,6 +142,11 @@ class Application {
   Refusal obstacle_to_arming(std::size_t axis) const;
   void trip(std::size_t axis, Fault fault, float value, float bound);
   void refresh_readings();
+  void refresh_store_readings();
+  DeviceRegisters::WriteResult command_store(std::uint16_t command);
+  void take_reports();
+  void ISR_supervise_main_loop();
+  void ISR_trace(const control::HapticLoop<float>::Output& traced);
 
   BoardIdentity board_;
   DeviceRegisters registers_;
@@ -126,26 +156,31 @@ class Application {
   std::array<bool, axis_count> command_pending_{};
   std::array<std::uint16_t, axis_count> pending_command_{};
   std::array<float, axis_count> fault_value_{}, fault_bound_{};
+  BoardReadings readings_;
+  ParameterKeeper keeper_;
   // Before settings_, which is made from them.
-  TickState report_;  ///< main loop's copy
+  std::array<AxisReport, axis_count> report_;  ///< main loop's copies
   std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
   Settings settings_;
   std::uint32_t now_us_ = 0, uptime_second_us_ = 0, uptime_s_ = 0;
   bool started_ = false;
 
   Handover<Settings> handover_;
-  Snapshot<TickState> snapshot_;
+  std::array<Snapshot<AxisReport>, axis_count> snapshots_;
   InterruptQueue<SerialByte, 512> serial_queue_;
   Trace trace_;
   std::array<std::atomic<bool>, axis_count> enable_{};
   std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
+  /// Asked for by the main loop, taken back by the tick that publishes.
+  std::array<std::atomic<bool>, axis_count> report_wanted_{};
   std::atomic<std::uint8_t> trace_axis_{0};
   std::atomic<std::uint32_t> trace_interval_{0};
 
   // Interrupt context only.
   std::array<Axis, axis_count> axes_;
   std::array<float, axis_count> tangential_{};
-  TickState ISR_state_;
+  std::uint32_t ISR_tick_ = 0;
+  bool ISR_main_loop_stands_ = false;
   std::uint32_t ISR_polls_seen_ = 0, ISR_ticks_without_poll_ = 0;
   std::uint32_t ISR_trace_countdown_ = 0;
 };

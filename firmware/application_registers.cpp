@@ -17,8 +17,10 @@ Exception exception_for(Refusal refusal) {
       return Exception::illegal_data_address;
     case Refusal::while_armed:
     case Refusal::no_transaction:
+    case Refusal::store_missing:
       return Exception::server_device_failure;
     case Refusal::transaction_open:
+    case Refusal::store_busy:
       return Exception::server_device_busy;
     default:
       return Exception::illegal_data_value;
@@ -50,7 +52,9 @@ Exception Application::Bank::read_input(std::uint16_t address, std::span<std::ui
 }
 
 Exception Application::Bank::write_holding(std::uint16_t address, std::span<const std::uint16_t> in) {
-  const auto result = app_.registers_.write(address, in, app_.any_armed(), app_.now_us_);
+  const bool to_store = in.size() == 1 && address == register_address(entry_of<"store.command">(), 0);
+  const auto result = to_store ? app_.command_store(in[0])
+                               : app_.registers_.write(address, in, app_.any_armed(), app_.now_us_);
   // At once: a poll that comes late finds several requests, and each must act as if it had come alone.
   app_.act();
   return exception_for(result.refusal);
@@ -75,9 +79,9 @@ std::string_view Application::Bank::identification(std::uint8_t object_id) const
 
 void Application::refresh_readings() {
   ParameterValues& v = registers_.values();
-  report_ = snapshot_.read();
+  take_reports();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const AxisReport& report = report_.axis[axis];
+    const AxisReport& report = report_[axis];
     const auto& haptic = report.haptic;
     const AxisStateMachine& machine = machines_[axis];
     std::uint16_t status = statusword::base_of(machine.state()) | statusword::remote;
@@ -109,6 +113,9 @@ void Application::refresh_readings() {
     v.set_real<"measured.resolution">(static_cast<float>(step * length), axis);
     v.set_whole<"measured.limited_samples">(report.limited_samples, axis);
     v.set_whole<"measured.armed_samples">(report.armed_samples, axis);
+    v.set_real<"measured.current">(report.motor.current, axis);
+    v.set_real<"measured.current_reference">(report.motor.current_reference, axis);
+    v.set_real<"measured.temperature">(readings_.power_stage_temperature[axis], axis);
   }
   v.set_whole<"info.vendor_id">(0);
   v.set_whole<"info.product_code">(product_code);
@@ -119,7 +126,7 @@ void Application::refresh_readings() {
   v.set_whole<"info.core_clock">(board_.core_clock_hz);
   v.set_whole<"info.clock_source">(board_.clock_source);
   v.set_whole<"info.uptime">(uptime_s_);
-  v.set_whole<"info.tick">(report_.tick);
+  v.set_whole<"info.tick">(report_[0].tick);
 
   const modbus::RtuPortCounters& port = port_.counters();
   const modbus::RtuReceiverCounters& line = port_.receiver_counters();
@@ -132,7 +139,10 @@ void Application::refresh_readings() {
   v.set_whole<"counters.length_errors">(line.undersize + line.oversize);
   v.set_whole<"counters.other_units">(port.other_units);
   v.set_whole<"counters.queue_overflows">(serial_queue_.overflows());
+  v.set_whole<"counters.missed_ticks">(readings_.missed_ticks);
+  v.set_real<"supply.voltage">(readings_.supply_voltage);
 
+  refresh_store_readings();
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers_.last_refusal().refusal));
   v.set_whole<"refusal.register">(registers_.last_refusal().address);
   v.set_whole<"trace.next">(trace_.next());

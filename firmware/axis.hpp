@@ -6,31 +6,37 @@
 #include "control/count_extender.hpp"
 #include "control/haptic_loop.hpp"
 #include "firmware/fault.hpp"
+#include "firmware/motor_control.hpp"
 
 namespace kmax::firmware {
 
 /// What the tick of one axis works by; made in the main loop, handed over whole.
 struct AxisSetting {
   control::HapticLoop<float>::Coefficients haptic{};
-  std::int32_t encoder_offset = 0;     ///< counts
-  std::int32_t encoder_direction = 1;  ///< +1 or -1
-  std::uint32_t generation = 0;        ///< differs from the last one: estimators start afresh
+  MotorControl::Coefficients motor{};
+  float supply_voltage_min = 0.0f, supply_voltage_max = 0.0f;  ///< V
+  std::int32_t encoder_offset = 0;                             ///< counts
+  std::int32_t encoder_direction = 1;                          ///< +1 or -1
+  std::uint32_t generation = 0;  ///< differs from the last one: estimators start afresh
 };
 
 /// What the tick of one axis tells the main loop.
 struct AxisReport {
   control::HapticLoop<float>::Output haptic{};
+  MotorControl::Output motor{};
   std::int64_t counted = 0;  ///< the encoder's extended count, before offset and direction
   std::uint32_t tick = 0;
   std::uint32_t generation = 0;  ///< of the setting it was computed with
   std::uint32_t armed_samples = 0, limited_samples = 0;
-  Fault fault = Fault::none;  ///< kept until the axis has been disabled
+  Fault fault = Fault::none;      ///< kept until the axis has been disabled
+  Fault condition = Fault::none;  ///< of the board: what would keep the axis from being driven now
   float fault_value = 0.0f;
   bool enabled = false;      ///< as the main loop had asked
   bool count_valid = false;  ///< the encoder's last count
 };
 
-/// One axis in the tick: from encoder counter to force, with the trips that must act at once.
+/// One axis in the tick: from encoder counter to force and on to the motor's duty, with the trips that must
+/// act at once.
 ///
 /// A trip removes the force in the tick that finds it and stays until enabled has been seen false: the main
 /// loop disables the axis when it reads the fault, so force never comes back by itself.
@@ -39,52 +45,21 @@ class Axis {
   struct Input {
     std::uint32_t count;  ///< free-running, wraps at 2^32
     bool count_valid;
+    Fault condition = Fault::none;  ///< what the board has found wrong with power stage or lines
+    MotorControl::Measured motor{};
   };
   struct Output {
     float force;             ///< N along +x; 0 unless enabled
     float tangential_force;  ///< N, to be made by the other axis
     float background_force;  ///< N, the field's share of the force while enabled, outwards
-    bool enabled;
+    bool enabled;            ///< false: the bridge must be off
+    MotorControl::Output motor{};
   };
 
-  Output ISR_tick(const AxisSetting& setting, const Input& input, bool enable, float external_force,
-                  std::uint32_t tick) {
-    if (!enable) trip_ = Fault::none;
-    if (input.count_valid && !started_) {
-      // What the counter held before its first valid count means nothing, and neither does the jump to it.
-      extender_.reset(input.count);
-      loop_.reset();
-      started_ = true;
-    }
-    if (input.count_valid) report_.counted = extender_.update(input.count);
-    if (generation_ != setting.generation) {
-      generation_ = setting.generation;
-      loop_.reset();
-    }
-    const bool was_enabled = enable && trip_ == Fault::none;
-    const std::int64_t position = position_of(report_.counted, setting);
-    const auto& out = loop_.tick(setting.haptic, position, was_enabled && input.count_valid, external_force);
-    if (was_enabled) {
-      if (!input.count_valid) {
-        trip(Fault::encoder, 0.0f);
-      } else if (out.not_finite) {
-        trip(Fault::not_finite, out.velocity);
-      } else if (out.over_speed) {
-        trip(Fault::over_speed, out.velocity);
-      }
-    }
-    count_samples(out, enable);
-    report_.haptic = out;
-    report_.tick = tick;
-    report_.generation = generation_;
-    report_.fault = trip_;
-    report_.fault_value = trip_value_;
-    report_.enabled = enable;
-    report_.count_valid = input.count_valid;
-    const bool driving = was_enabled && trip_ == Fault::none;
-    if (!driving) return {0.0f, 0.0f, 0.0f, false};
-    return {out.force, out.tangential_force, out.magnetic_force, true};
-  }
+  /// Defined apart, so that it is one function in the image whose arguments and result a test can follow.
+  /// The result is valid until the next call.
+  const Output& ISR_tick(const AxisSetting& setting, const Input& input, bool enable, float external_force,
+                         std::uint32_t tick);
 
   /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled.
   void ISR_trip(Fault fault) {
@@ -97,35 +72,45 @@ class Axis {
     return setting.encoder_direction < 0 ? -moved : moved;
   }
 
-  /// Valid until the next tick; interrupt context.
-  const AxisReport& ISR_report() const { return report_; }
+  /// Of the last tick: a fault, an enable, a validity or a condition has changed. The main loop must not act
+  /// on what was before.
+  bool ISR_changed() const { return changed_; }
+  const control::HapticLoop<float>::Output& ISR_haptic() const { return loop_.output(); }
+  void ISR_fill(AxisReport& report) const;
+  AxisReport ISR_report() const {
+    AxisReport report;
+    ISR_fill(report);
+    return report;
+  }
 
  private:
+  static constexpr std::uint32_t enabled_bit = 1U << 16, count_valid_bit = 1U << 17;
+
+  /// All that the main loop must hear of at once, in one word, since comparing words is what the tick can
+  /// afford.
+  static constexpr std::uint32_t state_word(Fault trip, Fault condition, bool enabled, bool count_valid) {
+    return static_cast<std::uint32_t>(trip) | static_cast<std::uint32_t>(condition) << 8 |
+           (enabled ? enabled_bit : 0U) | (count_valid ? count_valid_bit : 0U);
+  }
+
   void trip(Fault fault, float value) {
     trip_ = fault;
     trip_value_ = value;
   }
 
-  void count_samples(const control::HapticLoop<float>::Output& out, bool enable) {
-    if (!enable) {
-      was_counting_ = false;
-      return;
-    }
-    if (!was_counting_) {
-      report_.armed_samples = report_.limited_samples = 0;
-      was_counting_ = true;
-    }
-    if (!out.new_sample) return;
-    ++report_.armed_samples;
-    if (out.limited) ++report_.limited_samples;
-  }
+  void count_samples(const control::HapticLoop<float>::Output& out, bool enable);
 
   control::CountExtender<std::uint32_t> extender_;
   control::HapticLoop<float> loop_;
-  AxisReport report_;
-  std::uint32_t generation_ = 0;
+  MotorControl motor_;
+  Output output_{};
+  std::int64_t counted_ = 0;
+  std::uint32_t tick_ = 0, generation_ = 0;
+  std::uint32_t armed_samples_ = 0, limited_samples_ = 0;
   float trip_value_ = 0.0f;
   Fault trip_ = Fault::none;
+  std::uint32_t state_ = 0;  ///< of the last tick, see state_word
+  bool changed_ = false;
   bool started_ = false, was_counting_ = false;
 };
 

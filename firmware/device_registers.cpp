@@ -9,6 +9,7 @@ constexpr std::uint16_t address_of_slot(std::size_t slot) {
 }
 constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 constexpr std::size_t transaction_entry = entry_of<"transaction.control">();
+constexpr std::size_t store_entry = entry_of<"store.command">();
 
 // A signed 8-bit value in one register may come with its sign extended (0xFFFF) or as the bare byte (0x00FF).
 std::uint32_t pattern_of(Type type, std::uint16_t word) {
@@ -92,6 +93,10 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
   poll(now_us);
   if (in.size() == 1 && address == register_address(transaction_entry, 0))
     return control_transaction(address, in[0], armed, now_us);
+  // A command and no value; the application takes it before it comes here, if it has a store.
+  if (in.size() == 1 && address == register_address(store_entry, 0))
+    return refuse(in[0] > descriptors[store_entry].maximum ? Refusal::out_of_range : Refusal::store_missing,
+                  address);
 
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (in.size() == 1 && address == register_address(controlword_entry, axis)) {

@@ -102,6 +102,12 @@ class DeviceRegisters {
   }
 
   bool transaction_open() const { return staging_; }
+
+  /// Takes every writable value of `wanted` at once, outside any transaction: a stored set, the defaults.
+  WriteResult set_all(const ParameterValues& wanted, bool armed) { return apply(wanted, armed); }
+  /// What a request that others carry out came to; last_refusal() tells it from now on.
+  WriteResult refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
+
   WriteResult last_refusal() const { return last_; }
 
   /// Controlwords written since they were last fetched, per axis.
@@ -131,7 +137,6 @@ class DeviceRegisters {
   WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed,
                                   std::uint32_t now_us);
   WriteResult apply(const ParameterValues& wanted, bool armed);
-  WriteResult refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
 
   ParameterValues values_;
   ParameterValues staged_;

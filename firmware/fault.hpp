@@ -7,7 +7,24 @@
 namespace kmax::firmware {
 
 /// Every way in which an axis loses its force by itself.
-enum class Fault : std::uint8_t { none, not_finite, over_speed, encoder, link_silent, main_loop };
+enum class Fault : std::uint8_t {
+  none,
+  not_finite,
+  over_speed,
+  encoder,
+  link_silent,
+  main_loop,
+  emergency_stop,
+  gate_driver,
+  under_voltage,
+  over_voltage,
+  over_current,
+  phase_open,
+  current_sense,
+  over_temperature,
+  power_stage,
+  tick_missed,
+};
 
 struct FaultText {
   Fault fault;
@@ -30,6 +47,27 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
      "check the cable and the host program; link.timeout = 0 turns this off"},
     {Fault::main_loop, 0x6100, "main_loop", "", "the firmware's main loop stood still for more than 0.1 s",
+     "report it as a defect, with what was done before"},
+    {Fault::emergency_stop, 0xFF02, "emergency_stop", "", "the emergency stop line was opened",
+     "release the emergency stop, look why it was pressed, then clear the fault"},
+    {Fault::gate_driver, 0x5440, "gate_driver", "", "the gate driver pulled its fault line",
+     "look for a short between phases or to ground, and check the supply"},
+    {Fault::under_voltage, 0x3220, "under_voltage", "V", "the supply fell below supply.voltage_min",
+     "check the supply, its cable and its current limit"},
+    {Fault::over_voltage, 0x3210, "over_voltage", "V", "the supply rose above supply.voltage_max",
+     "a braking motor pumps the supply up: check the brake resistor, and that the supply is the right one"},
+    {Fault::over_current, 0x2310, "over_current", "A", "a phase current was far above current.limit",
+     "check for a short, motor.resistance and motor.inductance, and current.bandwidth"},
+    {Fault::phase_open, 0x3331, "phase_open", "A",
+     "a phase current vanished while the motor was being driven",
+     "check the motor's cable, plugs and solder joints"},
+    {Fault::current_sense, 0x5210, "current_sense", "A", "a current sensor read against its rail",
+     "check the gate driver's amplifier settings and the shunts"},
+    {Fault::over_temperature, 0x4310, "over_temperature", "degC",
+     "the power stage was hotter than temperature.limit", "let it cool down; lower current.limit"},
+    {Fault::power_stage, 0x5400, "power_stage", "", "the power stage was not ready",
+     "check the supply; the gate driver needs it to answer"},
+    {Fault::tick_missed, 0xFF03, "tick_missed", "ticks", "a control tick was late or lost",
      "report it as a defect, with what was done before"},
 });
 

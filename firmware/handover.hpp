@@ -36,8 +36,11 @@ class Handover {
                   std::memory_order_relaxed);
       offered_.store(false, std::memory_order_release);
     }
-    return places_[held_.load(std::memory_order_relaxed)];
+    return ISR_current();
   }
+
+  /// Interrupt: the value taken last.
+  const Value& ISR_current() const { return places_[held_.load(std::memory_order_relaxed)]; }
 
  private:
   std::array<Value, 2> places_;

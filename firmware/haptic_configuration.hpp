@@ -1,6 +1,7 @@
 #pragma once
 
 #include "control/haptic_loop.hpp"
+#include "firmware/motor_control.hpp"
 #include "firmware/parameter_values.hpp"
 
 namespace kmax::firmware {
@@ -57,6 +58,23 @@ constexpr control::HapticLoopConfig<float> haptic_configuration(const ParameterV
   config.tick_rate = static_cast<double>(tick_rate_hz);
   config.divider =
       static_cast<std::uint32_t>(static_cast<float>(tick_rate_hz) / v.real<"haptic.rate">(axis) + 0.5f);
+  return config;
+}
+
+/// The motor's part of one axis' parameters.
+constexpr MotorControlConfig motor_configuration(const ParameterValues& v, std::size_t axis) {
+  MotorControlConfig config;
+  config.kind = v.choice<MotorKind, "motor.kind">(axis);
+  config.transmission = v.real<"device.transmission">(axis);
+  config.torque_constant = v.real<"motor.torque_constant">(axis);
+  config.resistance = v.real<"motor.resistance">(axis);
+  config.inductance = v.real<"motor.inductance">(axis);
+  config.pole_pairs = v.whole<"motor.pole_pairs">(axis);
+  config.electrical_offset = v.real<"motor.electrical_offset">(axis);
+  config.counts_per_turn = static_cast<std::uint32_t>(v.whole<"encoder.counts_per_turn">(axis));
+  config.current_limit = v.real<"current.limit">(axis);
+  config.bandwidth = v.real<"current.bandwidth">(axis);
+  config.tick_rate = static_cast<float>(tick_rate_hz);
   return config;
 }
 

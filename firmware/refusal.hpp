@@ -25,6 +25,13 @@ enum class Refusal : std::uint16_t {
   handle_inside_wall = 13,
   fault_present = 14,
   encoder_invalid = 15,
+  emergency_stop = 16,
+  gate_driver_fault = 17,
+  supply_out_of_range = 18,
+  power_stage_not_ready = 19,
+  current_sense_invalid = 20,
+  store_busy = 21,
+  store_missing = 22,
 };
 
 struct RefusalText {
@@ -51,6 +58,14 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::handle_inside_wall, "the handle is inside the wall; move it out and arm again"},
     {Refusal::fault_present, "a fault is present; clear it first"},
     {Refusal::encoder_invalid, "the encoder gives no valid count"},
+    {Refusal::emergency_stop, "the emergency stop is pressed or its line is open"},
+    {Refusal::gate_driver_fault, "the gate driver reports a fault or does not answer"},
+    {Refusal::supply_out_of_range, "the supply is outside supply.voltage_min .. supply.voltage_max"},
+    {Refusal::power_stage_not_ready, "the power stage is still starting; try again in a moment"},
+    {Refusal::current_sense_invalid,
+     "a current sensor reads current while the bridge is off; check the power stage before arming"},
+    {Refusal::store_busy, "the parameters are being saved; try again in a moment"},
+    {Refusal::store_missing, "this device has no memory to keep parameters in"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

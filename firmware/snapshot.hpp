@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <concepts>
 #include <cstdint>
 
 namespace kmax::firmware {
@@ -12,10 +13,17 @@ template <typename Value>
 class Snapshot {
  public:
   void ISR_publish(const Value& value) {
+    ISR_publish([&value](Value& place) { place = value; });
+  }
+
+  /// The same without a copy: `fill` writes the value where it is kept.
+  template <typename Fill>
+  requires std::invocable<Fill, Value&>
+  void ISR_publish(Fill fill) {
     const std::uint32_t sequence = sequence_.load(std::memory_order_relaxed);
     sequence_.store(sequence + 1, std::memory_order_relaxed);
     std::atomic_signal_fence(std::memory_order_seq_cst);
-    value_ = value;
+    fill(value_);
     std::atomic_signal_fence(std::memory_order_seq_cst);
     sequence_.store(sequence + 2, std::memory_order_release);
   }

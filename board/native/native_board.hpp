@@ -37,7 +37,11 @@ class NativeBoard {
 
   explicit NativeBoard(Device& device)
       : device_(device),
-        application_({.board_name = "native", .serial_number = 1, .core_clock_hz = 0, .clock_source = 4}) {}
+        application_({.board_name = "native",
+                      .serial_number = 1,
+                      .core_clock_hz = 0,
+                      .clock_source = 4,
+                      .reset_cause = firmware::ResetCause::native}) {}
 
   firmware::Application& application() { return application_; }
 

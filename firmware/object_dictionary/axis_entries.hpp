@@ -64,6 +64,7 @@ inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
 inline constexpr NamedValue guard_mode[] = {{"off", 0}};
 inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
 inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
+inline constexpr NamedValue encoder_index[] = {{"none", 0}, {"once_per_turn", 1}};
 inline constexpr NamedValue encoder_direction[] = {{"-1", -1}, {"+1", 1}};
 }  // namespace names
 
@@ -173,29 +174,32 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
         .disarmed_only(),
 
     choice("motor.kind", group::motor, 1, names::motor_kind, 0,
-           "Brushed DC motor or permanent-magnet synchronous. Not used by this version.")
+           "Brushed DC motor or permanent-magnet synchronous.")
         .disarmed_only(),
     real("motor.resistance", group::motor, 2, "ohm", 1e-4, 1000, 1,
-         "Winding (phase) resistance. Not used by this version.")
+         "Winding (phase) resistance.")
         .disarmed_only(),
     real("motor.inductance", group::motor, 3, "H", 1e-7, 1, 1e-3,
-         "Winding (phase) inductance. Not used by this version.")
+         "Winding (phase) inductance.")
         .disarmed_only(),
     real("motor.torque_constant", group::motor, 4, "N m/A", 1e-5, 100, 0.05,
-         "Torque per ampere. Not used by this version.")
+         "Torque per ampere (synchronous motor: of q current, amplitude).")
         .disarmed_only(),
     whole("motor.pole_pairs", group::motor, 5, unsigned8, "", 1, 64, 7,
-          "Pole pairs of a synchronous motor. Not used by this version.")
+          "Pole pairs of a synchronous motor.")
+        .disarmed_only(),
+    real("motor.electrical_offset", group::motor, 6, "rad", -7, 7, 0,
+         "Electrical angle of a synchronous motor where the position is zero.")
         .disarmed_only(),
 
     real("current.limit", group::current, 1, "A", 0, 120, 5,
-         "Largest motor current. Not used by this version."),
+         "Largest motor current; a phase that carries half as much again trips the axis."),
     real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000,
-         "Bandwidth of the current loop. Not used by this version.")
+         "Bandwidth of the current loop.")
         .disarmed_only(),
 
     choice("encoder.kind", group::encoder, 1, names::encoder_kind, 0,
-           "Encoder type. Not used by this version.")
+           "Encoder: quadrature lines, or an AS5047P on the serial peripheral interface.")
         .disarmed_only(),
     whole("encoder.counts_per_turn", group::encoder, 2, unsigned32, "counts", 4, 1e9, 8192,
           "Counts per turn of the motor shaft (quadrature: four times the lines).")
@@ -206,9 +210,13 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     whole("encoder.offset", group::encoder, 4, integer32, "counts", -2147483648.0, 2147483647.0, 0,
           "Count at which the position is zero.")
         .disarmed_only(),
+    choice("encoder.index", group::encoder, 5, names::encoder_index, 0,
+           "Index line of a quadrature encoder. With one, a cable that comes off is found at once: all lines "
+           "then read high away from the index.")
+        .disarmed_only(),
 
     real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100,
-         "Trip level of the board's temperature. Not used by this version."),
+         "Trip level of the power stage's temperature."),
 
     whole(
         "drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
@@ -247,6 +255,12 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
             "Haptic samples since arming whose force was limited."),
     reading("measured.armed_samples", group::measured, 13, unsigned32, "samples",
             "Haptic samples since arming."),
+    reading("measured.current", group::measured, 14, float32, "A",
+            "Motor current that makes torque, measured; 0 on a board without current sensors."),
+    reading("measured.current_reference", group::measured, 15, float32, "A",
+            "Motor current asked for."),
+    reading("measured.temperature", group::measured, 16, float32, "degC",
+            "Temperature of the axis' power stage."),
 });
 
 }  // namespace kmax::firmware

@@ -19,6 +19,9 @@ inline constexpr Group info{"info", 0x3011, Scope::device, 0x0800};
 inline constexpr Group counters{"counters", 0x3012, Scope::device, 0x0840};
 inline constexpr Group refusal{"refusal", 0x3013, Scope::device, 0x0880};
 inline constexpr Group trace_state{"trace", 0x3014, Scope::device, 0x08A0};
+inline constexpr Group supply_state{"supply", 0x3015, Scope::device, 0x08B0};
+inline constexpr Group store{"store", 0x3016, Scope::device, 0x0910};
+inline constexpr Group store_status{"store", 0x3017, Scope::device, 0x08C0};
 }  // namespace group
 
 namespace names {
@@ -26,6 +29,13 @@ inline constexpr NamedValue can_bit_rate[] = {
     {"125000", 125000}, {"250000", 250000}, {"500000", 500000}, {"1000000", 1000000}};
 inline constexpr NamedValue clock_source[] = {{"crystal_pll", 0}, {"internal_pll", 1}, {"internal", 2},
                                               {"unreadable", 3},  {"native", 4},       {"unresponsive", 5}};
+inline constexpr NamedValue reset_cause[] = {
+    {"unknown", 0},         {"power_on", 1},  {"pin", 2},       {"software", 3}, {"independent_watchdog", 4},
+    {"window_watchdog", 5}, {"low_power", 6}, {"brown_out", 7}, {"native", 8}};
+inline constexpr NamedValue crash_cause[] = {{"none", 0}, {"fault", 1}, {"unexpected_interrupt", 2}};
+inline constexpr NamedValue store_state[] = {{"idle", 0},     {"busy", 1},    {"saved", 2},
+                                             {"failed", 3},   {"refused", 4}, {"defaults_set", 5},
+                                             {"no_memory", 6}};
 inline constexpr NamedValue baud_rate[] = {{"9600", 9600},     {"19200", 19200},   {"38400", 38400},
                                            {"57600", 57600},   {"115200", 115200}, {"230400", 230400},
                                            {"460800", 460800}, {"921600", 921600}};
@@ -44,9 +54,11 @@ constexpr Entry rate_choice(std::string_view name, Group group, std::uint8_t sub
 
 inline constexpr std::array device_entries = std::to_array<Entry>({
     real("supply.voltage_min", group::supply, 1, "V", 0, 100, 8,
-         "Trip level of the supply, low. Not used by this version."),
+         "Trip level of the supply, low: an armed axis loses its force at once."),
     real("supply.voltage_max", group::supply, 2, "V", 0, 100, 26,
-         "Trip level of the supply, high. Not used by this version."),
+         "Trip level of the supply, high: an armed axis loses its force at once."),
+    real("supply.brake_voltage", group::supply, 3, "V", 0, 100, 0,
+         "Supply voltage from which the brake resistor is switched on; 0: none is fitted."),
 
     real("link.timeout", group::link, 1, "s", 0, 60, 1,
          "Host silence after which an armed axis loses its force with a fault; 0 turns it off."),
@@ -85,6 +97,21 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
                   "Where the processor clock comes from."),
     reading("info.uptime", group::info, 9, Type::unsigned32, "s", "Seconds since start."),
     reading("info.tick", group::info, 10, Type::unsigned32, "ticks", "Ticks since start (low 32 bits)."),
+    named_reading("info.reset_cause", group::info, 11, names::reset_cause, "Why the processor started."),
+    reading("info.crash_count", group::info, 12, Type::unsigned32, "",
+            "Crashes of the firmware since power-on; the last one's record follows."),
+    named_reading("info.crash_cause", group::info, 13, names::crash_cause, "What ended the run before."),
+    reading("info.crash_exception", group::info, 14, Type::unsigned16, "",
+            "Exception number: 3 hard fault, 16 + n interrupt n."),
+    reading("info.crash_program_counter", group::info, 15, Type::unsigned32, "",
+            "Where the program was; 0: its stack could not be read."),
+    reading("info.crash_link_register", group::info, 16, Type::unsigned32, "",
+            "Where it would have returned to."),
+    reading("info.crash_status", group::info, 17, Type::unsigned32, "",
+            "Cortex-M4 CFSR; 'kmax info' says it in words."),
+    reading("info.crash_hard_fault_status", group::info, 18, Type::unsigned32, "", "Cortex-M4 HFSR."),
+    reading("info.crash_address", group::info, 19, Type::unsigned32, "",
+            "Address of the access that failed, if info.crash_status says that it is known."),
 
     reading("counters.frames_received", group::counters, 1, Type::unsigned32, "",
             "Modbus frames received whole."),
@@ -101,12 +128,52 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     reading("counters.other_units", group::counters, 8, Type::unsigned32, "", "Frames for another unit."),
     reading("counters.queue_overflows", group::counters, 9, Type::unsigned32, "",
             "Serial bytes lost between interrupt and main loop."),
+    reading("counters.missed_ticks", group::counters, 10, Type::unsigned32, "ticks",
+            "Control ticks that came late or were lost."),
 
     reading("refusal.reason", group::refusal, 1, Type::unsigned16, "",
             "Why the last write was refused; 0: it was not."),
     reading("refusal.register", group::refusal, 2, Type::unsigned16, "", "Holding register it was about."),
 
     reading("trace.next", group::trace_state, 1, Type::unsigned32, "records", "Records traced since start."),
+
+    reading("supply.voltage", group::supply_state, 1, Type::float32, "V",
+            "Supply of the power stage, measured; 0 on a board that does not measure it."),
+
+    whole("store.command", group::store, 1, Type::unsigned16, "", 0, 2, 0,
+          "1 saves all persistent parameters; 2 sets all of them to their defaults, which only the next save "
+          "keeps. Both only while no axis is armed. See store.state; reads as 0.")
+        .volatile_value(),
+
+    named_reading("store.state", group::store_status, 1, names::store_state,
+                  "What the parameter store does or did last. While it is busy no axis can be armed."),
+    reading("store.sequence", group::store_status, 2, Type::unsigned32, "",
+            "Number of the newest record that is kept; each save adds one."),
+    reading("store.saved_parameters", group::store_status, 3, Type::unsigned16, "",
+            "Parameters in that record; 0: nothing has been saved."),
+    reading("store.unsaved_parameters", group::store_status, 4, Type::unsigned16, "",
+            "Parameters whose present value a restart would not bring back."),
+    reading("store.free_saves", group::store_status, 5, Type::unsigned16, "",
+            "Saves that fit before the next erase, which takes up to 0.5 s."),
+    reading("store.erases", group::store_status, 6, Type::unsigned32, "",
+            "Erases of the store's two sectors so far; each of them lasts for 10000."),
+    reading("store.write_errors", group::store_status, 7, Type::unsigned32, "",
+            "Words and erases since start that the memory did not take."),
+    reading("store.damaged_records", group::store_status, 8, Type::unsigned16, "",
+            "Records in the store that cannot be used: saves cut short by a loss of power, or changed bits."),
+    reading("store.migrated_dropped", group::store_status, 9, Type::unsigned16, "",
+            "Values in the record loaded at start that this firmware has no parameter for."),
+    reading("store.migrated_defaulted", group::store_status, 10, Type::unsigned16, "",
+            "Parameters that the record loaded at start lacks or has with a value that is not allowed: they "
+            "have their defaults."),
+    reading("store.dropped_1", group::store_status, 11, Type::unsigned32, "",
+            "First dropped value: object index x 65536 + sub-index x 256 + type; 0: none."),
+    reading("store.dropped_2", group::store_status, 12, Type::unsigned32, "", "Second dropped value."),
+    reading("store.dropped_3", group::store_status, 13, Type::unsigned32, "", "Third dropped value."),
+    reading("store.defaulted_1", group::store_status, 14, Type::unsigned32, "",
+            "First parameter that has its default, in the same form; 0: none."),
+    reading("store.defaulted_2", group::store_status, 15, Type::unsigned32, "", "Second such parameter."),
+    reading("store.defaulted_3", group::store_status, 16, Type::unsigned32, "", "Third such parameter."),
 });
 
 }  // namespace kmax::firmware

@@ -21,6 +21,7 @@ namespace kmax::cli {
 // ExitCode and reports errors by throwing: UsageError, device::ValueError and link::AddressError become exit
 // code 2, every other exception 1; the message is shown, with --json as {"error": "..."}.
 void add_parameter_commands(CLI::App& app, Context& context);  // list, get, set
+void add_store_commands(CLI::App& app, Context& context);      // save, defaults
 void add_info_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
 void add_wall_command(CLI::App& app, Context& context);

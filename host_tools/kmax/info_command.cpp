@@ -5,8 +5,10 @@
 
 #include <map>
 
+#include "host_tools/device/crash_words.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -23,6 +25,25 @@ std::string duration_text(std::uint32_t seconds) {
   if (hours != 0) return fmt::format("{} h {} min", hours, minutes % 60);
   if (minutes != 0) return fmt::format("{} min {} s", minutes, seconds % 60);
   return fmt::format("{} s", seconds);
+}
+
+bool is_about_crash(const Parameter& parameter) {
+  return parameter.definition().name.starts_with("info.crash_");
+}
+
+std::string crash_text(device::Device& device) {
+  const auto number = [&device](std::string_view name) { return device.read(device::resolve(name)); };
+  firmware::CrashRecord crash;
+  crash.count = number("info.crash_count");
+  if (crash.count == 0) return {};
+  crash.cause = static_cast<firmware::CrashCause>(number("info.crash_cause"));
+  crash.exception_number = static_cast<std::uint16_t>(number("info.crash_exception"));
+  crash.program_counter = number("info.crash_program_counter");
+  crash.link_register = number("info.crash_link_register");
+  crash.status = number("info.crash_status");
+  crash.hard_fault_status = number("info.crash_hard_fault_status");
+  crash.address = number("info.crash_address");
+  return device::crash_words(crash);
 }
 
 /// A reading for people.
@@ -47,6 +68,8 @@ int run_info(Context& context) {
     if (group == "info" || group == "counters") parameters.push_back(parameter);
   }
   const auto raw = device.read(parameters);
+  const std::string crash = crash_text(device);
+  const device::StoreStatus store = device::Store(device).status();
 
   if (context.json) {
     Json identity = Json::object();
@@ -59,6 +82,8 @@ int run_info(Context& context) {
       document[std::string(name.substr(0, dot))][std::string(name.substr(dot + 1))] =
           reading_json(parameters[i], raw[i]);
     }
+    document["crash"] = crash.empty() ? Json(nullptr) : Json(crash);
+    document["store"] = store_json(store);
     context.print(document);
     return done;
   }
@@ -75,7 +100,10 @@ int run_info(Context& context) {
                                                             {"model_name", "board"},
                                                             {"revision", "firmware revision"}};
   for (const auto& [name, text] : texts) line(labels.contains(name) ? labels.at(name) : name, text);
+  for (const auto& [name, text] : store_lines(store)) line(name, text);
+  if (!crash.empty()) line("last crash", crash);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (is_about_crash(parameters[i])) continue;  // said in words above
     const std::string_view name = parameters[i].definition().name;
     line(std::string(name.substr(name.find('.') + 1)), reading_text(parameters[i], raw[i]));
   }
@@ -84,11 +112,13 @@ int run_info(Context& context) {
 }  // namespace
 
 void add_info_command(CLI::App& app, Context& context) {
-  auto* info =
-      add_command(app, context,
-                  {"info", "Shows what the device is, its firmware, board, clock, uptime and link counters.",
-                   "  kmax info\n  kmax info --device 'serial:/dev/ttyUSB0?unit=2'"},
-                  Takes::device);
+  auto* info = add_command(app, context,
+                           {"info",
+                            "Shows what the device is, its firmware, board, clock, last reset and crash, "
+                            "kept parameters, uptime and "
+                            "link counters.",
+                            "  kmax info\n  kmax info --device 'serial:/dev/ttyUSB0?unit=2'"},
+                           Takes::device);
   info->callback([&context] { context.action = [&context] { return run_info(context); }; });
 }
 

@@ -6,12 +6,13 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/serve/real_time.hpp"
+#include "host_tools/simulated_board/file_flash.hpp"
 
 namespace kmax::cli {
 
 namespace {
 struct ServeOptions {
-  std::string serial, can, scene;
+  std::string serial, can, scene, store;
 };
 
 int run_serve(Context& context, const ServeOptions& options) {
@@ -21,7 +22,10 @@ int run_serve(Context& context, const ServeOptions& options) {
   const Interruption interruption;
   const simulation::Scene scene =
       options.scene.empty() ? simulated_board::factory_scene() : simulated_board::open_scene(options.scene);
-  simulated_board::SimulatedBoard simulation(scene);
+  std::optional<simulated_board::FileFlash> flash;
+  if (!options.store.empty()) flash.emplace(options.store);
+  simulated_board::SimulatedBoard simulation(
+      scene, flash ? firmware::AnyFlashSectors::of(*flash) : firmware::AnyFlashSectors{});
   serve::PseudoTerminal line(options.serial);
   const auto& values = simulation.board().application().values();
   const std::string address = fmt::format("serial:{}?unit={}&baud={}", options.serial,
@@ -48,7 +52,9 @@ void add_serve_command(CLI::App& app, Context& context) {
       {"serve", "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line.",
        "  kmax serve --serial /tmp/kmax &\n"
        "  export KMAX_DEVICE=serial:/tmp/kmax\n"
-       "  kmax info\n\n"
+       "  kmax info\n"
+       "  kmax serve --serial /tmp/kmax --store ~/kmax.store    what 'kmax save' keeps outlasts the "
+       "process\n\n"
        "The person of the scene presses against the wall whenever axis 0 is armed."},
       Takes::nothing);
   auto options = std::make_shared<ServeOptions>();
@@ -61,6 +67,12 @@ void add_serve_command(CLI::App& app, Context& context) {
       ->add_option("--scene", options->scene,
                    "TOML file or supplied scene (default: touch, factory parameters)")
       ->type_name("SCENE");
+  command
+      ->add_option("--store", options->store,
+                   "File that keeps what 'kmax save' saves (32 KiB, made if it is missing). Kept parameters "
+                   "replace the defaults, also those that fit the scene's hardware; the scene's own "
+                   "[parameters] replace the kept ones. Without it they last as long as this process")
+      ->type_name("FILE");
   command->callback(
       [&context, options] { context.action = [&context, options] { return run_serve(context, *options); }; });
 }

@@ -25,6 +25,8 @@ device::Assignment assignment_of(const std::string& name, const simulation::Para
   const device::Parameter parameter = device::resolve(name);
   if (!parameter.writable())
     throw device::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
+  if (parameter == device::Parameter::of<"store.command">())
+    throw device::ValueError(fmt::format("{} is a command, not a value; leave it out of the scene", name));
   return {parameter, device::parse_value(parameter, text_of(value))};
 }
 
@@ -57,15 +59,26 @@ std::optional<std::string> check_parameter(const std::string& name, const simula
   }
 }
 
-std::vector<device::Assignment> assignments_of(const simulation::Scene& scene) {
+std::vector<device::Assignment> hardware_assignments_of(const simulation::Scene& scene) {
   std::vector<device::Assignment> all;
   for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
     all.push_back(hardware<"encoder.counts_per_turn">(axis, scene.axes[axis].encoder.counts_per_turn));
     all.push_back(hardware<"device.transmission">(axis, scene.axes[axis].encoder.transmission));
     all.push_back(hardware<"device.mass">(axis, scene.axes[axis].device.mass));
   }
+  return all;
+}
+
+std::vector<device::Assignment> own_assignments_of(const simulation::Scene& scene) {
+  std::vector<device::Assignment> all;
   for (const simulation::SceneParameter& parameter : scene.parameters)
     replace_or_add(all, assignment_of(parameter.name, parameter.value));
+  return all;
+}
+
+std::vector<device::Assignment> assignments_of(const simulation::Scene& scene) {
+  std::vector<device::Assignment> all = hardware_assignments_of(scene);
+  for (const device::Assignment& one : own_assignments_of(scene)) replace_or_add(all, one);
   return all;
 }
 

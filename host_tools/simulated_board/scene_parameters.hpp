@@ -15,6 +15,10 @@ std::optional<std::string> check_parameter(const std::string& name, const simula
 /// followed by the scene's own parameters, which may say otherwise (a wrongly set-up device is a scene too).
 std::vector<device::Assignment> assignments_of(const simulation::Scene& scene);
 
+/// The two parts of that by themselves: what fits the board to the hardware, and what the scene says.
+std::vector<device::Assignment> hardware_assignments_of(const simulation::Scene& scene);
+std::vector<device::Assignment> own_assignments_of(const simulation::Scene& scene);
+
 /// Sets all of them in one transaction before the first tick. Throws simulation::SceneError naming the
 /// parameter if the set as a whole is refused.
 void preset(firmware::Application& application, const std::vector<device::Assignment>& assignments);

@@ -3,17 +3,25 @@
 #include <string_view>
 
 #include "board/native/native_board.hpp"
+#include "host_tools/simulated_board/memory_flash.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_device.hpp"
 
 namespace kmax::simulated_board {
 
 /// The firmware on x86 with a scene's device: what `sim`, `kmax serve` and `kmax simulate` run.
+///
+/// At the start the defaults are made to fit the scene's hardware, then the parameters kept in the store
+/// replace them, then the scene's own [parameters] replace those.
 class SimulatedBoard {
  public:
-  /// Throws simulation::SceneError or std::invalid_argument.
-  explicit SimulatedBoard(const simulation::Scene& scene) : device_(scene), board_(device_) {
-    preset(board_.application(), assignments_of(scene));
+  /// `store`: where parameters are kept; without it, in memory for the life of this object. Throws
+  /// simulation::SceneError or std::invalid_argument.
+  explicit SimulatedBoard(const simulation::Scene& scene, firmware::AnyFlashSectors store = {})
+      : device_(scene), board_(device_) {
+    preset(board_.application(), hardware_assignments_of(scene));
+    board_.application().attach_store(store.present() ? store : firmware::AnyFlashSectors::of(memory_));
+    preset(board_.application(), own_assignments_of(scene));
   }
 
   SimulatedDevice& device() { return device_; }
@@ -21,6 +29,7 @@ class SimulatedBoard {
   const board::NativeBoard<SimulatedDevice>& board() const { return board_; }
 
  private:
+  MemoryFlash memory_;
   SimulatedDevice device_;
   board::NativeBoard<SimulatedDevice> board_;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <utility>
 
 #include "firmware/haptic_configuration.hpp"
 
@@ -135,6 +136,69 @@ TEST(AxisPosition, OffsetAndDirectionWithoutOverflow) {
   EXPECT_EQ(Axis::position_of(std::int64_t{1} << 40, setting), -(std::int64_t{1} << 40) - 2147483648LL);
   setting.encoder_direction = 1;
   EXPECT_EQ(Axis::position_of(0, setting), 2147483648LL);
+}
+
+// What the board finds wrong keeps the axis from driving in the tick that hears of it.
+TEST_F(AxisTest, TripsOnTheBoardsConditionAtOnce) {
+  for (const Fault condition : {Fault::emergency_stop, Fault::gate_driver, Fault::power_stage}) {
+    (void)tick(at(-1000), false);
+    ASSERT_TRUE(tick(at(-1000), true).enabled);
+    const auto out = axis.ISR_tick(setting, {at(-1000), true, condition, {}}, true, 0.0f, ++ticks);
+    EXPECT_FALSE(out.enabled);
+    EXPECT_EQ(out.force, 0.0f);
+    EXPECT_EQ(axis.ISR_report().fault, condition);
+    EXPECT_EQ(axis.ISR_report().condition, condition);
+  }
+}
+
+TEST_F(AxisTest, SupplyOutsideItsBoundsTripsWithTheVoltage) {
+  setting.supply_voltage_min = 8.0f;
+  setting.supply_voltage_max = 26.0f;
+  setting.motor = MotorControl::prepare({});
+  const auto with_supply = [&](float voltage) {
+    return axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, voltage, 0.0f, 0.0f}}, true, 0.0f,
+                         ++ticks);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::pair<float, Fault> cases[] = {
+      {7.9f, Fault::under_voltage}, {26.1f, Fault::over_voltage}, {0.0f, Fault::under_voltage}};
+  for (const auto& [voltage, fault] : cases) {
+    (void)tick(at(-1000), false);
+    ASSERT_TRUE(with_supply(24.0f).enabled);
+    EXPECT_FALSE(with_supply(voltage).enabled);
+    EXPECT_EQ(axis.ISR_report().fault, fault);
+    EXPECT_EQ(axis.ISR_report().fault_value, voltage);
+  }
+  (void)tick(at(-1000), false);
+  EXPECT_FALSE(with_supply(nan).enabled);
+}
+
+// The duty of a tick in which the axis trips must never reach the bridge.
+TEST_F(AxisTest, ATripOfTheMotorLeavesNoDuty) {
+  setting.supply_voltage_max = 26.0f;
+  setting.motor = MotorControl::prepare({});
+  const auto out =
+      axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, 24.0f, 9.0f, -9.0f}}, true, 0.0f, ++ticks);
+  EXPECT_FALSE(out.enabled);
+  EXPECT_EQ(out.motor.duty_b, 0.5f);
+  EXPECT_EQ(axis.ISR_report().fault, Fault::over_current);
+}
+
+TEST_F(AxisTest, SaysWhenTheMainLoopMustSeeItsReport) {
+  (void)tick(at(0), false);
+  EXPECT_TRUE(axis.ISR_changed());  // the first setting, the first count
+  for (int i = 1; i < 20; ++i) {
+    (void)tick(at(i), false);
+    EXPECT_FALSE(axis.ISR_changed()) << i;
+  }
+  (void)tick(at(0), true);
+  EXPECT_TRUE(axis.ISR_changed());  // an enable
+  (void)tick(at(0), true);
+  EXPECT_FALSE(axis.ISR_changed());
+  (void)tick(at(0), true, false);
+  EXPECT_TRUE(axis.ISR_changed());  // a fault
+  (void)tick(at(0), true, false);
+  EXPECT_FALSE(axis.ISR_changed());
 }
 
 }  // namespace

@@ -41,7 +41,8 @@ TEST(DeviceRegisters, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxi
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
-    if (e.access == Access::read_only || e.name == "transaction.control") continue;
+    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "store.command")
+      continue;
     std::vector<double> numbers = {e.minimum, e.maximum, e.default_value};
     for (const NamedValue& v : e.values) numbers.push_back(v.value);
     for (const double number : numbers) {
@@ -237,7 +238,8 @@ TEST(DeviceRegisters, ReadingMayStartAndEndWithinAValue) {
 TEST(DeviceRegisters, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& e = entry_at(i);
-    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword")
+    if (e.access == Access::read_only || e.name == "transaction.control" || e.name == "drive.controlword" ||
+        e.name == "store.command")
       continue;
     double other = e.default_value;
     for (const NamedValue& v : e.values) other = v.value != e.default_value ? v.value : other;
@@ -255,6 +257,23 @@ TEST(DeviceRegisters, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
     Written disarmed;
     EXPECT_EQ(disarmed.write(e.name, other).refusal, Refusal::none) << e.name;
     EXPECT_EQ(disarmed.registers.restarting_changes(), refused ? 1u : 0u) << e.name;
+  }
+}
+
+TEST(DeviceRegisters, StoreCommandsAreForTheApplicationAndNeverAValue) {
+  for (const bool in_transaction : {false, true}) {
+    Written w;
+    if (in_transaction) {
+      ASSERT_EQ(w.write("transaction.control", 1).refusal, Refusal::none);
+    }
+    for (const double command : {0, 1, 2})
+      EXPECT_EQ(w.write("store.command", command).refusal, Refusal::store_missing);
+    EXPECT_EQ(w.write("store.command", 3).refusal, Refusal::out_of_range);
+    if (in_transaction) {
+      ASSERT_EQ(w.write("transaction.control", 2).refusal, Refusal::none);
+    }
+    EXPECT_EQ(w.registers.values().whole<"store.command">(), 0);
+    EXPECT_EQ(w.registers.changes(), 0u);
   }
 }
 

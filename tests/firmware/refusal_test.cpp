@@ -9,13 +9,14 @@ namespace {
 
 TEST(Refusal, NumbersAreTheProtocolsAndEveryOneHasItsOwnWords) {
   std::set<std::string_view> words;
-  for (std::uint16_t number = 0; number <= 15; ++number) {
+  for (std::uint16_t number = 0; number < refusal_texts.size(); ++number) {
     const auto refusal = static_cast<Refusal>(number);
     EXPECT_TRUE(words.insert(words_of(refusal)).second) << number << ": " << words_of(refusal);
     EXPECT_EQ(refusal_texts[number].refusal, refusal);
   }
-  EXPECT_EQ(refusal_texts.size(), 16u);
   EXPECT_EQ(static_cast<int>(Refusal::encoder_invalid), 15);
+  EXPECT_EQ(static_cast<int>(Refusal::emergency_stop), 16);
+  EXPECT_EQ(static_cast<int>(Refusal::current_sense_invalid), 20);
   EXPECT_EQ(static_cast<int>(Refusal::while_armed), 7);
   EXPECT_EQ(static_cast<int>(Refusal::handle_inside_wall), 13);
 }

@@ -21,6 +21,13 @@ TEST_F(Serve, WhatCannotBeServedIsSaidAtOnce) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
+TEST_F(Serve, AStoreThatCannotBeUsedIsSaidAndLeftAlone) {
+  folder.write("notes", "precious");
+  expect_error({"serve", "--serial", in("line"), "--store", in("notes")}, failed, "is 8 bytes long");
+  EXPECT_EQ(folder.read("notes"), "precious");
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
 TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
   std::map<std::string, std::string> identity;
   std::string problem;

@@ -1,0 +1,59 @@
+#include "firmware/parameter_keeper.hpp"
+
+namespace kmax::firmware {
+
+const LoadReport& ParameterKeeper::attach(AnyFlashSectors flash, ParameterValues& values) {
+  flash_ = flash;
+  state_ = flash_.present() ? StoreState::idle : StoreState::no_memory;
+  survey_ = store_.survey();
+  loaded_ = store_.load(values);
+  kept_ = persistent_part(values);
+  return loaded_;
+}
+
+Refusal ParameterKeeper::save(const ParameterValues& values, bool armed) {
+  if (busy()) return Refusal::store_busy;
+  if (!flash_.present()) return Refusal::store_missing;
+  if (armed) {
+    state_ = StoreState::refused;
+    return Refusal::while_armed;
+  }
+  store_.begin(values);
+  state_ = StoreState::busy;
+  return Refusal::none;
+}
+
+void ParameterKeeper::poll() {
+  if (!busy()) return;
+  const SaveProgress progress = store_.step();
+  if (progress == SaveProgress::busy) return;
+  survey_ = store_.survey();
+  state_ = progress == SaveProgress::done ? StoreState::saved : StoreState::failed;
+  if (progress == SaveProgress::done) kept_ = store_.set();
+}
+
+void ParameterKeeper::publish(ParameterValues& v) const {
+  v.set_whole<"store.state">(static_cast<std::uint32_t>(state_));
+  v.set_whole<"store.sequence">(survey_.header.sequence);
+  v.set_whole<"store.saved_parameters">(survey_.header.count);
+  std::uint32_t unsaved = 0;
+  for (std::size_t i = 0; i < persistent_count; ++i)
+    unsaved += v.raw(persistent_parameters[i].slot) != kept_[i] ? 1U : 0U;
+  v.set_whole<"store.unsaved_parameters">(unsaved);
+  v.set_whole<"store.free_saves">(
+      flash_.present() ? static_cast<std::uint32_t>(decltype(store_)::free_saves(survey_)) : 0U);
+  v.set_whole<"store.erases">(survey_.erases);
+  v.set_whole<"store.write_errors">(store_.write_errors());
+  v.set_whole<"store.damaged_records">(survey_.damaged);
+  const MigrationReport& migration = loaded_.migration;
+  v.set_whole<"store.migrated_dropped">(migration.dropped);
+  v.set_whole<"store.migrated_defaulted">(migration.defaulted);
+  v.set_whole<"store.dropped_1">(migration.first_dropped[0]);
+  v.set_whole<"store.dropped_2">(migration.first_dropped[1]);
+  v.set_whole<"store.dropped_3">(migration.first_dropped[2]);
+  v.set_whole<"store.defaulted_1">(migration.first_defaulted[0]);
+  v.set_whole<"store.defaulted_2">(migration.first_defaulted[1]);
+  v.set_whole<"store.defaulted_3">(migration.first_defaulted[2]);
+}
+
+}  // namespace kmax::firmware

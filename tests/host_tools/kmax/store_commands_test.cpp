@@ -1,0 +1,195 @@
+// kmax save, defaults and info on a simulated device that outlives the commands, and restarts when told.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::cli {
+namespace {
+using firmware::DriveState;
+
+/// A wire to a device that stays; it can lose answers, and the device can lose words.
+class Wire final : public link::Link {
+ public:
+  enum class Loss { none, request, reply };
+
+  explicit Wire(std::shared_ptr<link::SimLink> device, Loss loss, int lost_write)
+      : device_(std::move(device)), loss_(loss), lost_write_(lost_write) {}
+
+  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
+    return device_->read_holding(address, count);
+  }
+  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
+    return device_->read_input(address, count);
+  }
+  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
+    const bool lost = ++writes_ == lost_write_;
+    if (!lost || loss_ == Loss::reply) device_->write_holding(address, values);
+    if (!lost) return;
+    device_->wait(std::chrono::milliseconds(500));
+    throw link::LinkError("no answer");
+  }
+  void follow_line_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
+    device_->follow_line_settings(unit, baud);
+  }
+  std::chrono::microseconds now() const override { return device_->now(); }
+  void wait(std::chrono::microseconds duration) override { device_->wait(duration); }
+  std::string description() const override { return "wire"; }
+
+ private:
+  std::shared_ptr<link::SimLink> device_;
+  Loss loss_;
+  int lost_write_, writes_ = 0;
+};
+
+class StoreCommands : public testing::Test {
+ protected:
+  int kmax(std::vector<std::string> arguments) {
+    std::ostringstream out, messages;
+    Context context(out, messages, [this](const std::string&, const link::Notice&) {
+      return std::make_unique<Wire>(device, loss, lost_write);
+    });
+    arguments.insert(arguments.end(), {"--device", "serial:/dev/wire"});
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+  Json document() {
+    Json parsed = Json::parse(output, nullptr, false);
+    EXPECT_FALSE(parsed.is_discarded()) << output;
+    return parsed;
+  }
+  firmware::Application& application() { return device->simulation().board().application(); }
+
+  std::shared_ptr<link::SimLink> device = std::make_shared<link::SimLink>(simulated_board::factory_scene());
+  Wire::Loss loss = Wire::Loss::none;
+  int lost_write = 0;
+  std::string output, said;
+};
+
+const std::string all = std::to_string(firmware::persistent_count);
+
+TEST_F(StoreCommands, SaveSaysWhatItDidInWords) {
+  ASSERT_EQ(kmax({"set", "wall.stiffness=111"}), done);
+  ASSERT_EQ(kmax({"info"}), done);
+  EXPECT_CONTAINS(output, "none; a restart brings the defaults; 1 parameter is different now");
+  ASSERT_EQ(kmax({"save"}), done) << said;
+  EXPECT_CONTAINS(output, "saved " + all + " parameters as record 1, read back equal; ");
+  EXPECT_CONTAINS(output, " more saves fit before the next erase\n");
+  EXPECT_EQ(said, "");
+  ASSERT_EQ(kmax({"info"}), done);
+  EXPECT_CONTAINS(output, all + " parameters as record 1\n");
+  ASSERT_EQ(kmax({"save", "--json"}), done);
+  EXPECT_EQ(document()["record"], 2);
+  EXPECT_EQ(document()["read_back_equal"], true);
+  EXPECT_EQ(document()["saved_parameters"], firmware::persistent_count);
+  EXPECT_EQ(document()["unsaved_parameters"], 0);
+}
+
+TEST_F(StoreCommands, SavingGoesOnOverTheEndOfASector) {
+  std::uint32_t last_free = 1000;
+  int erases = 0;
+  for (int i = 1; i <= 40; ++i) {
+    ASSERT_EQ(kmax({"save", "--json"}), done);
+    const Json saved = document();
+    EXPECT_EQ(saved["record"], i);
+    if (saved["free_saves"].get<std::uint32_t>() > last_free) ++erases;
+    last_free = saved["free_saves"].get<std::uint32_t>();
+    EXPECT_EQ(saved["erases"], erases);
+  }
+  EXPECT_GE(erases, 2);
+}
+
+TEST_F(StoreCommands, RefusedWhileArmedInWords) {
+  ASSERT_EQ(kmax({"set", "link.timeout=0", "wall.law=none"}), done);
+  ASSERT_EQ(kmax({"arm"}), done) << said;
+  ASSERT_EQ(application().state(0), DriveState::operation_enabled);
+  for (const char* command : {"save", "defaults"}) {
+    EXPECT_EQ(kmax({command}), failed);
+    EXPECT_CONTAINS(said, "it cannot change while an axis is armed; disarm first");
+    EXPECT_EQ(kmax({command, "--json"}), failed);
+    EXPECT_CONTAINS(document()["error"].get<std::string>(), "disarm first");
+  }
+  EXPECT_EQ(application().state(0), DriveState::operation_enabled);
+  ASSERT_EQ(kmax({"disarm"}), done);
+  EXPECT_EQ(kmax({"save"}), done);
+}
+
+TEST_F(StoreCommands, DefaultsSayWhatChangedAndThatItIsNotKept) {
+  ASSERT_EQ(kmax({"set", "wall.stiffness=111", "axis1.velocity.window=4"}), done);
+  ASSERT_EQ(kmax({"save"}), done);
+  ASSERT_EQ(kmax({"defaults"}), done) << said;
+  EXPECT_CONTAINS(output, "wall.stiffness = 1000 N/m (was 111)\n");
+  EXPECT_CONTAINS(output, "axis1.velocity.window = 16 samples (was 4)\n");
+  EXPECT_CONTAINS(output, "all " + all + " parameters have their defaults");
+  EXPECT_CONTAINS(said, "only 'kmax save' keeps them");
+  ASSERT_EQ(kmax({"list", "--changed", "--all", "--json"}), done);
+  EXPECT_EQ(document().size(), 0u);
+  ASSERT_EQ(kmax({"save"}), done);
+  ASSERT_EQ(kmax({"defaults", "--json"}), done);
+  EXPECT_EQ(document()["parameters"], firmware::persistent_count);
+  EXPECT_EQ(document()["changed"].size(), 0u);
+  EXPECT_EQ(document()["unsaved_parameters"], 0);
+  EXPECT_CONTAINS(said, "");
+}
+
+TEST_F(StoreCommands, DefaultsOfTheLinkAreFollowed) {
+  ASSERT_EQ(kmax({"set", "modbus.unit=9", "modbus.baud_rate=921600"}), done);
+  ASSERT_EQ(kmax({"defaults", "--json"}), done) << said;
+  EXPECT_EQ(document()["changed"]["modbus.unit"]["before"], 9);
+  EXPECT_EQ(document()["changed"]["modbus.baud_rate"]["value"], "115200");
+  EXPECT_EQ(kmax({"get", "modbus.unit"}), done);
+}
+
+TEST_F(StoreCommands, ALostRequestIsRepeatedAndALostAnswerIsNot) {
+  lost_write = 1;
+  loss = Wire::Loss::request;
+  ASSERT_EQ(kmax({"save", "--json"}), done) << said;
+  EXPECT_EQ(document()["record"], 1);
+  loss = Wire::Loss::reply;
+  ASSERT_EQ(kmax({"save", "--json"}), done) << said;
+  EXPECT_EQ(document()["record"], 2);
+  lost_write = 0;
+  ASSERT_EQ(kmax({"set", "wall.stiffness=111"}), done);
+  lost_write = 1;
+  ASSERT_EQ(kmax({"defaults"}), done) << "the values show that it was carried out: " << said;
+  EXPECT_CONTAINS(output, "wall.stiffness = 1000 N/m (was 111)");
+  loss = Wire::Loss::none;
+  ASSERT_EQ(kmax({"set", "wall.stiffness=111"}), done);
+  loss = Wire::Loss::request;
+  EXPECT_EQ(kmax({"defaults"}), failed);
+  EXPECT_CONTAINS(said, "wall.stiffness is 111 N/m instead of its default");
+}
+
+TEST_F(StoreCommands, TheCommandIsNotToBeSetByHand) {
+  EXPECT_EQ(kmax({"set", "store.command=1"}), wrong_usage);
+  EXPECT_CONTAINS(said, "use 'kmax save' or 'kmax defaults'");
+}
+
+TEST_F(StoreCommands, InfoShowsResetCauseStoreAndNoCrash) {
+  ASSERT_EQ(kmax({"info", "--json"}), done);
+  const Json info = document();
+  EXPECT_EQ(info["info"]["reset_cause"], "native");
+  EXPECT_EQ(info["crash"], nullptr);
+  EXPECT_EQ(info["store"]["state"], "idle");
+  EXPECT_EQ(info["store"]["saved_parameters"], 0);
+  EXPECT_EQ(info["store"]["first_dropped"], Json::array());
+  ASSERT_EQ(kmax({"info"}), done);
+  EXPECT_CONTAINS(output, "reset cause          native");
+  EXPECT_EQ(output.find("crash"), std::string::npos);
+}
+
+TEST_F(StoreCommands, HelpSaysWhatSaveAndDefaultsDo) {
+  EXPECT_EQ(kmax({"save", "--help"}), done);
+  EXPECT_CONTAINS(output, "loss\nof power leaves the one or the other");
+  EXPECT_EQ(kmax({"defaults", "--help"}), done);
+  EXPECT_CONTAINS(output, "only 'kmax save' keeps");
+  EXPECT_CONTAINS(output, "Exit codes: 0 done");
+}
+
+}  // namespace
+}  // namespace kmax::cli
