@@ -1,44 +1,73 @@
 // Composition root of the ODrive v3.6: names the peripherals, gives them their pins and priorities, and hands
-// time, bytes and counts to the application.
+// time, bytes, counts and currents to the application.
 
-#include <array>
-#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <span>
 
 #include "board/odrive_v3/pins.hpp"
+#include "board/odrive_v3/power_hardware.hpp"
 #include "board/odrive_v3/priorities.hpp"
-#include "board/stm32f405/fault_handler.hpp"
+#include "board/odrive_v3/serial_line.hpp"
+#include "board/stm32f405/crash_record.hpp"
 #include "board/stm32f405/unique_id.hpp"
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/core_instructions.hpp"
-#include "drivers/stm32f4/gpio.hpp"
-#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "drivers/stm32f4/external_interrupt.hpp"
+#include "drivers/stm32f4/flash_sectors.hpp"
+#include "drivers/stm32f4/independent_watchdog.hpp"
 #include "drivers/stm32f4/peripheral_clock.hpp"
+#include "drivers/stm32f4/registers/system_memory.hpp"
+#include "drivers/stm32f4/reset_cause.hpp"
 #include "drivers/stm32f4/system_tick.hpp"
-#include "drivers/stm32f4/usart.hpp"
-#include "firmware/application.hpp"
+
+extern "C" {
+extern volatile std::uint32_t kmax_parameters_begin[];
+}
 
 namespace kmax::board {
 
 namespace {
 
 namespace stm32 = drivers::stm32f4;
+using namespace odrive_v3;
+
+/// The main loop's heartbeat and the microsecond clock; also the tick of the axes where there are no timers
+/// (QEMU), so that parameters can be set and read there.
+constexpr std::uint32_t clock_rate_hz = 1'000;
+
+/// Longer than an erase of the parameter flash, during which nothing runs.
+constexpr std::uint32_t watchdog_ms = 1'000;
+static_assert(watchdog_ms > stm32::longest_erase_ms);
 
 stm32::InterruptController interrupts{stm32::nvic(), stm32::scb()};
-stm32::SystemTick tick{stm32::system_tick(), stm32::scb()};
-stm32::Usart serial{stm32::usart2()};
+stm32::SystemTick system_tick{stm32::system_tick(), stm32::scb()};
+stm32::ExternalInterrupts line_interrupts{stm32::exti(), stm32::syscfg()};
+stm32::IndependentWatchdog watchdog{stm32::iwdg(), stm32::dbgmcu()};
 
-/// Made in main, once the clocks are known; no interrupt is enabled before.
+using ParameterFlash = stm32::FlashSectors<>;
+std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_sector(std::size_t index) {
+  return std::span<volatile std::uint32_t, ParameterFlash::words_per_sector>{
+      kmax_parameters_begin + index * ParameterFlash::words_per_sector, ParameterFlash::words_per_sector};
+}
+ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, parameter_sector(1)}}}};
+
+/// All that drives motors. Made in main, once the clocks are known; no interrupt is enabled before.
+struct Power {
+  explicit Power(VoltageVariant variant)
+      : bus(stm32::spi3()), drives(variant, bus), hardware(drives, bus), stage(hardware) {}
+  ChipBus bus;
+  Drives drives;
+  PowerHardware hardware;
+  PowerStage<PowerHardware> stage;
+};
+
 std::optional<firmware::Application> application;
+std::optional<SerialLine> serial;
+std::optional<Power> power;
+bool power_runs = false;  ///< written before the interrupts that read it are enabled
 
-/// Set by the serial interrupt, taken by the main loop; the time is written before the flag.
-std::uint32_t reply_sent_us;
-std::atomic<bool> reply_sent;
-
-void apply(std::span<const odrive_v3::PinState> states) {
+void apply(std::span<const PinState> states) {
   for (const auto& [pin, config] : states)
     stm32::GpioPin{stm32::gpio(pin.port), pin.number}.configure(config);
 }
@@ -47,56 +76,16 @@ void switch_power_stage_off() {
   stm32::enable_peripheral_clock(stm32::rcc().ahb1enr,
                                  stm32::rcc_ahb1enr::GpioA::mask | stm32::rcc_ahb1enr::GpioB::mask |
                                      stm32::rcc_ahb1enr::GpioC::mask | stm32::rcc_ahb1enr::GpioD::mask);
-  apply(odrive_v3::power_stage_off);
+  apply(power_stage_off);
 }
 
-/// 8E1 at the wanted rate; false when this clock cannot make it.
-bool configure_serial(const firmware::SerialSettings& settings, const stm32::ClockFrequencies& clocks) {
-  interrupts.disable(stm32::Interrupt::usart2);
-  const bool configured = serial.configure({settings.baud_rate, stm32::UsartParity::even}, clocks.apb1_hz);
-  interrupts.enable(stm32::Interrupt::usart2);
-  return configured;
+VoltageVariant voltage_variant() {
+  // NOLINTNEXTLINE(performance-no-int-to-ptr)
+  const auto* otp = reinterpret_cast<const volatile std::uint8_t*>(stm32::otp_base);
+  return voltage_variant_from_otp([otp](std::size_t i) { return otp[i]; }).value_or(variant_of_blank_board);
 }
 
-/// Follows the application's wish, but not in the middle of a reply. A rate that this clock cannot make
-/// leaves the line as it was.
-class SerialLine {
- public:
-  explicit SerialLine(const stm32::ClockFrequencies& clocks) : clocks_(clocks) {}
-
-  void start() {
-    stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
-    apply(odrive_v3::serial_pins);
-    interrupts.set_priority(stm32::Interrupt::usart2, odrive_v3::priority::serial);
-    settings_ = application->serial_settings();
-    if (!configure_serial(settings_, clocks_)) static_cast<void>(configure_serial({115'200}, clocks_));
-  }
-
-  void poll() {
-    if (reply_sent.exchange(false)) application->serial_reply_sent(reply_sent_us);
-    if (serial.transmitting()) {
-      // On silicon TXE and TC ask for the interrupt themselves. QEMU's USART never does, and a handler that
-      // finds nothing to do costs little, so a reply that is under way is pushed along once per pass.
-      interrupts.pend(stm32::Interrupt::usart2);
-      return;
-    }
-    const std::span<const std::uint8_t> reply = application->serial_reply_due(tick.now_us());
-    if (serial.transmit(reply)) return;
-    const firmware::SerialSettings wanted = application->serial_settings();
-    if (wanted == settings_) return;
-    settings_ = wanted;
-    static_cast<void>(configure_serial(settings_, clocks_));
-  }
-
- private:
-  stm32::ClockFrequencies clocks_;
-  firmware::SerialSettings settings_{};
-};
-
-[[noreturn]] void run() {
-  switch_power_stage_off();
-  const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
-
+firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   firmware::BoardIdentity identity{};
   identity.board_name = "odrive_v3";
   // An emulator without clocks does not have the identity words either, and reading them there is a bus
@@ -105,18 +94,101 @@ class SerialLine {
       clocks.source == stm32::ClockSource::unreadable ? 0 : serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
-  application.emplace(identity);
+  identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
+  if (identity.reset_cause == firmware::ResetCause::power_on) fault_record.magic = 0;
+  identity.crash = crash_record_of(fault_record);
+  return identity;
+}
 
-  interrupts.set_priority(stm32::SystemException::system_tick, odrive_v3::priority::tick);
-  // Each core clock of the clock tree is a whole number of MHz and of ticks.
-  if (!tick.start(clocks.core_hz, firmware::tick_rate_hz)) stop_on_unexpected_interrupt();
-  SerialLine line{clocks};
-  line.start();
+void start_line_interrupts() {
+  static_cast<void>(line_interrupts.configure(pins::gate_driver_fault, stm32::Edge::falling));
+  static_cast<void>(line_interrupts.configure(pins::emergency_stop, stm32::Edge::rising));
+  for (const auto interrupt : {stm32::Interrupt::exti2, stm32::Interrupt::exti4}) {
+    interrupts.set_priority(interrupt, priority::lines);
+    interrupts.enable(interrupt);
+  }
+  line_interrupts.enable(pins::gate_driver_fault.number);
+  line_interrupts.enable(pins::emergency_stop.number);
+}
 
+/// Timers, converters and lines. False where they do not exist.
+bool start_power(const stm32::ClockFrequencies& clocks) {
+  stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Timer3::mask |
+                                                           stm32::rcc_apb1enr::Timer4::mask |
+                                                           stm32::rcc_apb1enr::Spi3::mask);
+  stm32::enable_peripheral_clock(stm32::rcc().apb2enr,
+                                 stm32::rcc_apb2enr::Timer1::mask | stm32::rcc_apb2enr::Timer8::mask |
+                                     stm32::rcc_apb2enr::Adc1::mask | stm32::rcc_apb2enr::Adc2::mask |
+                                     stm32::rcc_apb2enr::Adc3::mask |
+                                     stm32::rcc_apb2enr::SystemConfiguration::mask);
+  apply(analog_pins);
+  apply(encoder_pins);
+  apply(line_pins);
+  apply(bus_pins);
+  // The chips' delays count cycles.
+  static_cast<void>(stm32::CycleCounter{stm32::dwt(), stm32::core_debug()}.start());
+  if (!power->bus.configure({})) return false;
+  if (!power->drives.configure(clocks.apb2_hz)) return false;
+  const std::uint32_t converters_on_us = system_tick.now_us();
+  // Only now: until here the gates were inputs with pull-downs.
+  apply(gate_pins);
+  power->drives.apply(application->values());
+  power_runs = true;
+  start_line_interrupts();
+  interrupts.set_priority(stm32::Interrupt::adc, priority::tick);
+  interrupts.enable(stm32::Interrupt::adc);
+  while (system_tick.now_us() - converters_on_us <= stm32::adc_stabilization_us) {
+  }
+  return power->drives.start();
+}
+
+/// What the main loop does for the power stage.
+void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
+  if (!application->any_armed()) {
+    if (application->parameter_changes() != applied_changes) {
+      applied_changes = application->parameter_changes();
+      power->drives.apply(application->values());
+    }
+    if (power->stage.ready() && power->hardware.gain_has_changed()) power->stage.restart(now_us);
+  }
+  power->stage.poll(now_us, application->any_armed());
+  bool healthy = power->stage.ISR_condition() == firmware::Fault::none;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+    healthy = healthy && application->fault(axis) == firmware::Fault::none;
+  power->hardware.show_healthy(healthy);
+  if (power->drives.watchdog_gate().may_feed()) watchdog.feed();
+}
+
+[[noreturn]] void run() {
+  switch_power_stage_off();
+  const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
+  const bool emulator_without_clocks = clocks.source == stm32::ClockSource::unreadable;
+  application.emplace(identity(clocks));
+  if (!emulator_without_clocks) application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
+
+  interrupts.set_priority(stm32::SystemException::system_tick, priority::clock);
+  // Each core clock of the clock tree is a whole number of MHz and of periods.
+  if (!system_tick.start(clocks.core_hz, clock_rate_hz)) stop_on_unexpected_interrupt();
+  stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
+  apply(serial_pins);
+  serial.emplace(interrupts, clocks.apb1_hz);
+  serial->start(*application);
+
+  std::uint32_t applied_changes = application->parameter_changes();
+  if (!emulator_without_clocks) {
+    power.emplace(voltage_variant());
+    if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
+  }
   for (;;) {
-    application->poll(tick.now_us());
-    line.poll();
-    // Work that arrives between the poll and here waits for the next interrupt, at most one tick.
+    const bool due = !power_runs || power->drives.main_loop_due() || serial->news();
+    if (due) {
+      const std::uint32_t now = system_tick.now_us();
+      if (power_runs) application->set_readings(power->drives.readings());
+      application->poll(now);
+      serial->poll(*application, now);
+      if (power_runs) poll_power(now, applied_changes);
+    }
+    // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
     stm32::wait_for_interrupt();
   }
 }
@@ -124,31 +196,49 @@ class SerialLine {
 }  // namespace
 
 void enter_safe_state() {
+  // MOE first: one store for each bridge, if its timer has a clock.
+  constexpr std::uint32_t bridges = stm32::rcc_apb2enr::Timer1::mask | stm32::rcc_apb2enr::Timer8::mask;
+  if ((static_cast<std::uint32_t>(stm32::rcc().apb2enr) & bridges) == bridges) {
+    stm32::tim1().bdtr = 0;
+    stm32::tim8().bdtr = 0;
+  }
   // The pins' latches first, then the direction, in case the pins were not set up yet.
   switch_power_stage_off();
 }
 
 }  // namespace kmax::board
 
+void ISR_adc() {
+  using namespace kmax::board;
+  power->drives.ISR_tick(*application, power->stage);
+}
+
+void ISR_exti2() {
+  using namespace kmax::board;
+  power->drives.ISR_disarm();
+  power->stage.ISR_fault_line();
+  static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::gate_driver_fault.number));
+}
+
+void ISR_exti4() {
+  using namespace kmax::board;
+  power->drives.ISR_disarm();
+  power->stage.ISR_emergency_stop();
+  static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::emergency_stop.number));
+}
+
 void ISR_system_tick() {
   using namespace kmax;
-  board::tick.ISR_count();
-  // No encoder is read yet, and none is claimed: the axes tick, and refuse to be armed.
+  board::system_tick.ISR_count();
+  if (board::power_runs) return;
+  // No encoder is read here, and none is claimed: the axes tick, and refuse to be armed.
   constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
   static_cast<void>(board::application->ISR_tick(input));
 }
 
 void ISR_usart2() {
-  using namespace kmax;
-  const drivers::stm32f4::UsartEvent event = board::serial.ISR_serve();
-  if (!event.received && !event.line_error && !event.transmission_complete) return;
-  const std::uint32_t now = board::tick.now_us();
-  if (event.received || event.line_error)
-    board::application->ISR_serial_byte(event.byte, event.line_error, now);
-  if (event.transmission_complete) {
-    board::reply_sent_us = now;
-    board::reply_sent.store(true);
-  }
+  using namespace kmax::board;
+  serial->ISR_serve(*application, system_tick);
 }
 
 int main() {

@@ -33,6 +33,25 @@ inline constexpr PinLocation gate_driver_fault{GpioPort::d, 2};
 /// Chip selects of the two DRV8301. PC13 to PC15 may only switch slowly and cannot drive a load.
 inline constexpr PinLocation gate_driver0_select{GpioPort::c, 13};
 inline constexpr PinLocation gate_driver1_select{GpioPort::c, 14};
+/// SPI3, shared by both gate drivers and connector J3.
+inline constexpr PinLocation bus_clock{GpioPort::c, 10};
+inline constexpr PinLocation bus_from_chips{GpioPort::c, 11};
+inline constexpr PinLocation bus_to_chips{GpioPort::c, 12};
+/// Quadrature lines; 3.3 kOhm pull-ups on the board. Index of motor 1 has no timer on its pin.
+inline constexpr PinLocation encoder0_a{GpioPort::b, 4};
+inline constexpr PinLocation encoder0_b{GpioPort::b, 5};
+inline constexpr PinLocation encoder0_index{GpioPort::c, 9};
+inline constexpr PinLocation encoder1_a{GpioPort::b, 6};
+inline constexpr PinLocation encoder1_b{GpioPort::b, 7};
+inline constexpr PinLocation encoder1_index{GpioPort::c, 15};
+/// GPIO5 of connector J3: a normally closed contact to ground; open = stop. It has an interrupt vector of its
+/// own, no boot strap and no filter.
+inline constexpr PinLocation emergency_stop{GpioPort::c, 4};
+/// GPIO8 of connector J3: high = ready and without fault. Needs a pull-down at the other end: during reset
+/// the pin is the debugger's.
+inline constexpr PinLocation healthy{GpioPort::b, 3};
+/// GPIO7 of connector J3, pulled up during reset: chip select of an AS5047P on the bus.
+inline constexpr PinLocation encoder_select{GpioPort::a, 15};
 /// GPIO3 and GPIO4 of connector J3.
 inline constexpr PinLocation serial_transmit{GpioPort::a, 2};
 inline constexpr PinLocation serial_receive{GpioPort::a, 3};
@@ -75,6 +94,63 @@ inline constexpr std::array serial_pins = {
              {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 7}},
 };
 
+/// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides. The pull-downs hold a leg off that
+/// the timer does not drive.
+constexpr GpioConfig gate(std::uint8_t alternate_function) {
+  return {.mode = GpioMode::alternate,
+          .pull = GpioPull::down,
+          .speed = GpioSpeed::high,
+          .alternate_function = alternate_function};
+}
+inline constexpr std::array gate_pins = {
+    PinState{{GpioPort::a, 8}, gate(1)},  PinState{{GpioPort::a, 9}, gate(1)},
+    PinState{{GpioPort::a, 10}, gate(1)}, PinState{{GpioPort::b, 13}, gate(1)},
+    PinState{{GpioPort::b, 14}, gate(1)}, PinState{{GpioPort::b, 15}, gate(1)},
+    PinState{{GpioPort::c, 6}, gate(3)},  PinState{{GpioPort::c, 7}, gate(3)},
+    PinState{{GpioPort::c, 8}, gate(3)},  PinState{{GpioPort::a, 7}, gate(3)},
+    PinState{{GpioPort::b, 0}, gate(3)},  PinState{{GpioPort::b, 1}, gate(3)},
+};
+
+/// TIM3 and TIM4, alternate function 2; the board's own pull-ups are stronger than the chip's.
+inline constexpr GpioConfig encoder_line{.mode = GpioMode::alternate, .alternate_function = 2};
+inline constexpr GpioConfig plain_input{.mode = GpioMode::input};
+inline constexpr std::array encoder_pins = {
+    PinState{pins::encoder0_a, encoder_line},    PinState{pins::encoder0_b, encoder_line},
+    PinState{pins::encoder0_index, plain_input}, PinState{pins::encoder1_a, encoder_line},
+    PinState{pins::encoder1_b, encoder_line},    PinState{pins::encoder1_index, plain_input},
+};
+
+/// Phase currents, supply, thermistors.
+inline constexpr GpioConfig analog_input{.mode = GpioMode::analog};
+inline constexpr std::array analog_pins = {
+    PinState{{GpioPort::c, 0}, analog_input}, PinState{{GpioPort::c, 1}, analog_input},
+    PinState{{GpioPort::c, 2}, analog_input}, PinState{{GpioPort::c, 3}, analog_input},
+    PinState{{GpioPort::a, 6}, analog_input}, PinState{{GpioPort::c, 5}, analog_input},
+    PinState{{GpioPort::a, 4}, analog_input}, PinState{{GpioPort::a, 5}, analog_input},
+};
+
+/// SPI3, alternate function 6. Pulled so that a chip that does not answer reads as all ones.
+inline constexpr std::array bus_pins = {
+    PinState{pins::bus_clock,
+             {.mode = GpioMode::alternate,
+              .pull = GpioPull::down,
+              .speed = GpioSpeed::medium,
+              .alternate_function = 6}},
+    PinState{pins::bus_from_chips,
+             {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 6}},
+    PinState{pins::bus_to_chips,
+             {.mode = GpioMode::alternate,
+              .pull = GpioPull::down,
+              .speed = GpioSpeed::medium,
+              .alternate_function = 6}},
+    PinState{pins::encoder_select, output_high},
+};
+
+inline constexpr std::array line_pins = {
+    PinState{pins::emergency_stop, {.mode = GpioMode::input, .pull = GpioPull::up}},
+    PinState{pins::healthy, output_low},
+};
+
 namespace detail {
 template <std::size_t count>
 constexpr bool names_no_pin_twice(const std::array<PinState, count>& table) {
@@ -88,5 +164,9 @@ constexpr bool names_no_pin_twice(const std::array<PinState, count>& table) {
 }  // namespace detail
 static_assert(detail::names_no_pin_twice(power_stage_off));
 static_assert(detail::names_no_pin_twice(serial_pins));
+static_assert(detail::names_no_pin_twice(gate_pins));
+static_assert(detail::names_no_pin_twice(encoder_pins));
+static_assert(detail::names_no_pin_twice(analog_pins));
+static_assert(detail::names_no_pin_twice(bus_pins));
 
 }  // namespace kmax::board::odrive_v3

@@ -4,14 +4,24 @@
 
 // Who may interrupt whom, for the whole board: 0 is the most urgent, 15 the least.
 //
-// The microsecond clock is exact only in contexts that do not outrank the tick, so nothing that asks for the
-// time may stand above it.
+//   0  lines     nFAULT and emergency stop: clear MOE of both bridges and leave a flag. They interrupt a tick
+//   in the middle;
+//                what that tick still writes cannot set MOE again (see drives.hpp). They need no time and
+//                touch nothing else.
+//   1  tick      the conversions' end: the control of one axis, 40,000 times a second
+//   4  clock     SysTick at 1 kHz, the microsecond clock and the main loop's heartbeat
+//   8  serial    one byte in, one byte out
+//
+// The microsecond clock is exact only in contexts that do not outrank it: the lines and the tick never ask
+// for the time.
 
 namespace kmax::board::odrive_v3::priority {
 
-inline constexpr std::uint8_t tick = 0;
+inline constexpr std::uint8_t lines = 0;
+inline constexpr std::uint8_t tick = 1;
+inline constexpr std::uint8_t clock = 4;
 inline constexpr std::uint8_t serial = 8;
 
-static_assert(tick < serial);
+static_assert(lines < tick && tick < clock && clock < serial);
 
 }  // namespace kmax::board::odrive_v3::priority

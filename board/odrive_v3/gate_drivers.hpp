@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "board/odrive_v3/pins.hpp"
+#include "drivers/current_sense.hpp"
+#include "drivers/drv8301.hpp"
+#include "drivers/stm32f4/cycle_counter.hpp"
+#include "drivers/stm32f4/gpio.hpp"
+#include "drivers/stm32f4/spi_master.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+using ChipBus = drivers::stm32f4::SpiMaster<>;
+
+/// The two DRV8301 behind SPI3. Main loop only; the bus is claimed for each conversation, so that the tick's
+/// encoder frames and these never mix.
+class GateDrivers {
+ public:
+  explicit GateDrivers(ChipBus& bus) : bus_(bus) {}
+
+  /// Both control registers written and read back. False: the chip does not answer or does not keep them; see
+  /// last_result().
+  bool configure(std::size_t axis, drivers::CurrentSenseGain gain) {
+    if (!bus_.claim()) return false;
+    Selected chip{bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
+    drivers::Drv8301<Selected> driver{chip};
+    drivers::Drv8301Config config;
+    config.gain = gain;
+    last_result_[axis] = driver.configure(config);
+    bus_.release();
+    return last_result_[axis] == drivers::Drv8301Result::ok;
+  }
+
+  drivers::Drv8301Result last_result(std::size_t axis) const { return last_result_[axis]; }
+
+ private:
+  /// One chip on the bus (drivers::SpiChip).
+  class Selected {
+   public:
+    Selected(ChipBus& bus, PinLocation select)
+        : bus_(bus), pin_(drivers::stm32f4::gpio(select.port), select.number) {}
+
+    void select(bool selected) { pin_.write(!selected); }
+    std::optional<std::uint16_t> exchange(std::uint16_t word) { return bus_.exchange(word); }
+    void delay_us(std::uint32_t microseconds) {
+      // By the cycle counter: at 168 MHz; longer on a slower clock, which these delays may be.
+      constexpr std::uint32_t cycles_per_us = 168;
+      drivers::stm32f4::CycleCounter counter{drivers::stm32f4::dwt(), drivers::stm32f4::core_debug()};
+      const std::uint32_t start = counter.now();
+      // Bounded in case the counter stands still.
+      for (std::uint32_t spins = 0;
+           counter.since(start) < microseconds * cycles_per_us && spins < 1000 * microseconds; ++spins) {
+      }
+    }
+
+   private:
+    ChipBus& bus_;
+    drivers::stm32f4::GpioPin<> pin_;
+  };
+
+  ChipBus& bus_;
+  std::array<drivers::Drv8301Result, firmware::axis_count> last_result_{};
+};
+
+}  // namespace kmax::board::odrive_v3

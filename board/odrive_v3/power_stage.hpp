@@ -1,0 +1,152 @@
+#pragma once
+
+#include <atomic>
+#include <concepts>
+#include <cstdint>
+
+#include "firmware/fault.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+enum class OffsetProgress : std::uint8_t { running, accepted, refused };
+
+/// What the power stage's sequence needs of the board. All calls come from the main loop.
+template <typename Hardware>
+concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool level) {
+  /// EN_GATE, common to both gate drivers and to the supply of the brake's driver.
+  {hardware.set_gate_enable(level)};
+  { hardware.fault_line_low() } -> std::same_as<bool>;
+  { hardware.emergency_stop_open() } -> std::same_as<bool>;
+  /// Writes and reads back one DRV8301; false: it does not answer or does not keep what is written.
+  { hardware.configure_gate_driver(axis) } -> std::same_as<bool>;
+  /// Begins to average the current sensors' codes with the bridges off.
+  {hardware.restart_offset_calibration()};
+  { hardware.offset_progress() } -> std::same_as<OffsetProgress>;
+};
+
+/// From power-up to bridges that may be armed, and back again after a fault. Bridges are off all the while;
+/// what switches them on is the tick, and only while condition is none.
+///
+///   resetting   EN_GATE low for 1 ms (20 us make a full reset)
+///   waking      20 ms until the gate drivers' serial interface answers
+///   configuring both chips written and read back; a chip that fails sends all to `resetting` after 200 ms
+///   measuring   offsets of the current sensors
+///   ready
+///
+/// An edge of nFAULT takes ready to `resetting` as soon as no axis is armed: the driver's latched fault goes
+/// away with the reset, and comes back if its cause is still there. So the host's fault reset is all that a
+/// user has to do.
+///
+/// The emergency stop does not touch EN_GATE: without it the brake's driver has no supply either, and a motor
+/// that is stopped is one that brakes. It counts as pressed until its line is closed and no axis is armed.
+///
+/// Contexts: ISR_ functions from the two line interrupts and the tick; poll() from the main loop.
+template <PowerStageHardware Hardware>
+class PowerStage {
+ public:
+  static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000;
+
+  explicit PowerStage(Hardware& hardware) : hardware_(hardware) {}
+
+  void ISR_fault_line() { fault_edge_.store(true, std::memory_order_relaxed); }
+  void ISR_emergency_stop() { stop_edge_.store(true, std::memory_order_relaxed); }
+
+  /// Why no axis may be driven now; none: it may.
+  firmware::Fault ISR_condition() const {
+    if (stop_edge_.load(std::memory_order_relaxed)) return firmware::Fault::emergency_stop;
+    if (fault_edge_.load(std::memory_order_relaxed)) return firmware::Fault::gate_driver;
+    return condition_.load(std::memory_order_relaxed);
+  }
+
+  /// Main loop, at least every few milliseconds.
+  void poll(std::uint32_t now_us, bool any_armed) {
+    if (hardware_.emergency_stop_open()) {
+      stop_edge_.store(true, std::memory_order_relaxed);
+    } else if (!any_armed) {
+      stop_edge_.store(false, std::memory_order_relaxed);
+    }
+    if (!started_) {
+      started_ = true;
+      begin_reset(now_us, firmware::Fault::power_stage);
+    }
+    const bool fault = fault_edge_.load(std::memory_order_relaxed) || hardware_.fault_line_low();
+    if (state_ == State::ready && fault) {
+      condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
+      if (!any_armed) begin_reset(now_us, firmware::Fault::gate_driver);
+      return;
+    }
+    advance(now_us);
+  }
+
+  /// Main loop, only while no axis is armed: through the whole sequence again, as when the gain must change.
+  void restart(std::uint32_t now_us) { begin_reset(now_us, firmware::Fault::power_stage); }
+
+  bool ready() const { return state_ == State::ready; }
+
+ private:
+  enum class State : std::uint8_t { resetting, waking, measuring, waiting, ready };
+
+  void begin_reset(std::uint32_t now_us, firmware::Fault reason) {
+    hardware_.set_gate_enable(false);
+    condition_.store(reason, std::memory_order_relaxed);
+    enter(State::resetting, now_us);
+  }
+
+  void enter(State state, std::uint32_t now_us) {
+    state_ = state;
+    since_us_ = now_us;
+  }
+
+  void advance(std::uint32_t now_us) {
+    const std::uint32_t elapsed = now_us - since_us_;
+    switch (state_) {
+      case State::resetting:
+        if (elapsed < reset_us) return;
+        hardware_.set_gate_enable(true);
+        return enter(State::waking, now_us);
+      case State::waking:
+        if (elapsed < wake_us) return;
+        // The drivers pull nFAULT while they start; an edge from then says nothing.
+        fault_edge_.store(false, std::memory_order_relaxed);
+        for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+          if (hardware_.configure_gate_driver(axis)) continue;
+          condition_.store(firmware::Fault::power_stage, std::memory_order_relaxed);
+          return enter(State::waiting, now_us);
+        }
+        if (hardware_.fault_line_low()) {
+          condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
+          return enter(State::waiting, now_us);
+        }
+        hardware_.restart_offset_calibration();
+        return enter(State::measuring, now_us);
+      case State::measuring:
+        switch (hardware_.offset_progress()) {
+          case OffsetProgress::running:
+            return;
+          case OffsetProgress::accepted:
+            condition_.store(firmware::Fault::none, std::memory_order_relaxed);
+            return enter(State::ready, now_us);
+          case OffsetProgress::refused:
+            condition_.store(firmware::Fault::current_sense, std::memory_order_relaxed);
+            return enter(State::waiting, now_us);
+        }
+        return;
+      case State::waiting:
+        if (elapsed >= retry_us) begin_reset(now_us, condition_.load(std::memory_order_relaxed));
+        return;
+      case State::ready:
+        return;
+    }
+  }
+
+  Hardware& hardware_;
+  State state_ = State::resetting;
+  std::uint32_t since_us_ = 0;
+  bool started_ = false;
+  // Each flag is set by its interrupt and taken back by the main loop; the condition is the main loop's.
+  std::atomic<bool> fault_edge_{false}, stop_edge_{false};
+  std::atomic<firmware::Fault> condition_{firmware::Fault::power_stage};
+};
+
+}  // namespace kmax::board::odrive_v3

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+#include "board/odrive_v3/pins.hpp"
+#include "board/odrive_v3/priorities.hpp"
+#include "drivers/stm32f4/clock_tree.hpp"
+#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "drivers/stm32f4/usart.hpp"
+#include "firmware/application.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+/// USART2 on GPIO3 and GPIO4, between its interrupt and the application.
+///
+/// Follows the application's wish for a baud rate, but not in the middle of a reply. A rate that this clock
+/// cannot make leaves the line as it was.
+class SerialLine {
+ public:
+  SerialLine(drivers::stm32f4::InterruptController<>& interrupts, std::uint32_t kernel_clock_hz)
+      : interrupts_(interrupts), kernel_clock_hz_(kernel_clock_hz) {}
+
+  /// Pins and clock are on.
+  void start(const firmware::Application& application) {
+    interrupts_.set_priority(drivers::stm32f4::Interrupt::usart2, priority::serial);
+    settings_ = application.serial_settings();
+    if (!configure()) {
+      settings_ = {115'200};
+      static_cast<void>(configure());
+    }
+  }
+
+  /// Main loop, after the application's poll().
+  void poll(firmware::Application& application, std::uint32_t now_us) {
+    if (reply_sent_.exchange(false)) application.serial_reply_sent(reply_sent_us_);
+    if (usart_.transmitting()) {
+      // On silicon TXE and TC ask for the interrupt themselves. QEMU's USART never does, and a handler that
+      // finds nothing to do costs little, so a reply that is under way is pushed along once per pass.
+      interrupts_.pend(drivers::stm32f4::Interrupt::usart2);
+      return;
+    }
+    const std::span<const std::uint8_t> reply = application.serial_reply_due(now_us);
+    if (usart_.transmit(reply)) return;
+    const firmware::SerialSettings wanted = application.serial_settings();
+    if (wanted == settings_) return;
+    settings_ = wanted;
+    static_cast<void>(configure());
+  }
+
+  /// The USART's interrupt.
+  template <typename Clock>
+  void ISR_serve(firmware::Application& application, const Clock& clock) {
+    const drivers::stm32f4::UsartEvent event = usart_.ISR_serve();
+    if (!event.received && !event.line_error && !event.transmission_complete) return;
+    const std::uint32_t now = clock.now_us();
+    if (event.received || event.line_error) application.ISR_serial_byte(event.byte, event.line_error, now);
+    if (event.transmission_complete) {
+      reply_sent_us_ = now;
+      reply_sent_.store(true);
+    }
+    news_.store(true, std::memory_order_relaxed);
+  }
+
+  /// The interrupt has left something for the main loop since the last call.
+  bool news() { return news_.exchange(false, std::memory_order_relaxed); }
+  bool transmitting() const { return usart_.transmitting(); }
+
+ private:
+  bool configure() {
+    using drivers::stm32f4::Interrupt;
+    interrupts_.disable(Interrupt::usart2);
+    const bool configured =
+        usart_.configure({settings_.baud_rate, drivers::stm32f4::UsartParity::even}, kernel_clock_hz_);
+    interrupts_.enable(Interrupt::usart2);
+    return configured;
+  }
+
+  drivers::stm32f4::InterruptController<>& interrupts_;
+  std::uint32_t kernel_clock_hz_;
+  drivers::stm32f4::Usart<> usart_{drivers::stm32f4::usart2()};
+  firmware::SerialSettings settings_{};
+  std::atomic<std::uint32_t> reply_sent_us_{0};  ///< written before the flag
+  std::atomic<bool> reply_sent_{false}, news_{false};
+};
+
+}  // namespace kmax::board::odrive_v3

@@ -1,0 +1,35 @@
+#include "host_tools/virtual_board/block_table.hpp"
+
+namespace kmax::virtual_board {
+
+const Block& BlockTable::add(std::uint32_t address, std::span<const std::uint8_t> code) {
+  auto block = std::make_unique<Block>();
+  block->address = address;
+  block->size = static_cast<std::uint32_t>(code.size());
+  const auto half_word = [&](std::size_t at) {
+    if (at + 2 > code.size()) return std::uint16_t{0};
+    return static_cast<std::uint16_t>(code[at] | code[at + 1] << 8);
+  };
+  for (std::uint32_t at = 0; at < block->size;) {
+    const Instruction instruction = decode(half_word(at), half_word(at + 2), address + at);
+    ++block->instructions;
+    block->cycles += instruction.cycles;
+    block->cycles_if_taken = instruction.cycles_if_taken;  // only the last one can branch
+    if (instruction.floating_point && !block->floating_point) {
+      block->floating_point = true;
+      block->first_floating_point = address + at;
+    }
+    if (instruction.memory) {
+      block->memory.push_back({static_cast<std::uint16_t>(at),
+                               static_cast<std::uint16_t>(block->instructions), block->cycles,
+                               *instruction.memory});
+    }
+    at += instruction.bytes;
+  }
+  const Block& added = *block;
+  blocks_[key(address, added.size)] = std::move(block);
+  slots_[address / 2 % slot_count] = &added;
+  return added;
+}
+
+}  // namespace kmax::virtual_board

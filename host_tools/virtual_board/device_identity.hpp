@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "drivers/stm32f4/registers/system_memory.hpp"
+#include "host_tools/virtual_board/peripheral.hpp"
+
+namespace kmax::virtual_board {
+
+/// What a virtual chip says about itself, and its board in the one-time programmable bytes.
+struct Identity {
+  std::array<std::uint32_t, 3> unique_id{0x0032'0021, 0x3335'5108, 0x3832'3436};
+  std::uint16_t flash_kib = 1024;
+  bool board_record =
+      true;  ///< false: the OTP is blank (0xFF), as on a board that did not come from its maker
+  std::uint8_t version_major = 3;
+  std::uint8_t version_minor = 6;
+  std::uint8_t volts = 56;
+};
+
+/// One-time programmable bytes, unique identifier and flash size: RM0090, chapters Embedded Flash memory
+/// interface (one-time programmable bytes) and Device electronic signature. Read only, in any width. At
+/// system_memory `base`.
+class DeviceIdentity final : public Peripheral {
+ public:
+  static constexpr std::uint32_t base = drivers::stm32f4::otp_base;
+  /// Up to and with the word that holds the flash size.
+  static constexpr std::uint32_t size = (drivers::stm32f4::flash_size_base - base + 4) / 4 * 4;
+
+  explicit DeviceIdentity(const Identity& identity = {});
+
+  std::uint32_t read(const Access& access) override;
+  void write(const Access& access, std::uint32_t value) override;
+  void reset(BoardTime now) override;
+
+ private:
+  std::array<std::uint8_t, size> bytes_{};
+  std::array<bool, size> known_{};
+};
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,146 @@
+// kmax-board: runs the flashed image on an emulated ODrive v3.6.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <iostream>
+#include <optional>
+
+#include "host_tools/kmax/exit_code.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/serve/pseudo_terminal.hpp"
+#include "host_tools/simulated_board/file_flash.hpp"
+#include "host_tools/simulated_board/scene_parameters.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/virtual_board/budget.hpp"
+#include "host_tools/virtual_board/parameter_sectors.hpp"
+#include "host_tools/virtual_board/real_time_run.hpp"
+#include "host_tools/virtual_board/scene_world.hpp"
+#include "host_tools/virtual_board/virtual_board.hpp"
+
+namespace {
+
+using namespace kmax;
+
+struct Options {
+  std::string elf, serial, can, gpio, scene = "motor_axes", store;
+  double duration = 0.0;
+  int volts = 24;
+  bool free_running = false, budget = false, json = false;
+};
+
+/// Parameter sectors from a file to the board's flash, and back again at the end.
+class StoreFile {
+ public:
+  StoreFile(const std::string& path, virtual_board::VirtualBoard& board)
+      : file_(path), sectors_(board.bus()) {
+    copy(file_, sectors_);
+  }
+  ~StoreFile() { copy(sectors_, file_); }
+  StoreFile(const StoreFile&) = delete;
+  StoreFile& operator=(const StoreFile&) = delete;
+
+ private:
+  static void copy(auto& from, auto& to) {
+    for (std::size_t sector = 0; sector < 2; ++sector) {
+      to.erase(sector);
+      for (std::size_t word = 0; word < virtual_board::ParameterSectors::words_per_sector; ++word) {
+        if (const std::uint32_t value = from.read(sector, word); value != 0xFFFF'FFFFU)
+          to.program(sector, word, value);
+      }
+    }
+  }
+
+  simulated_board::FileFlash file_;
+  virtual_board::ParameterSectors sectors_;
+};
+
+int run(const Options& options) {
+  const cli::Interruption interruption;
+  const simulation::Scene scene = simulated_board::open_scene(options.scene);
+  const auto image = virtual_board::ElfImage::load(options.elf);
+  virtual_board::SceneWorld world(scene);
+  virtual_board::VirtualBoardConfig config;
+  config.identity.volts = static_cast<std::uint8_t>(options.volts);
+  if (options.budget) {
+    const auto report = virtual_board::measure_budget(options.elf, scene, config);
+    fmt::print("{}", options.json ? virtual_board::budget_json(report) : virtual_board::budget_table(report));
+    return report.kept() ? cli::done : cli::verdict_is_no;
+  }
+  virtual_board::VirtualBoard board(image, &world, config);
+  std::optional<StoreFile> store;
+  if (!options.store.empty()) store.emplace(options.store, board);
+  virtual_board::store_parameters(board, simulated_board::assignments_of(scene));
+  std::optional<serve::PseudoTerminal> line;
+  if (!options.serial.empty()) {
+    line.emplace(options.serial);
+    fmt::print(
+        "{} on the virtual board with scene '{}', as serial:{}\nset KMAX_DEVICE to that; Ctrl-C ends\n",
+        options.elf, scene.name, options.serial);
+    std::cout.flush();
+  }
+  const auto report =
+      virtual_board::run_board(board, line ? &*line : nullptr, options.duration, options.free_running,
+                               [&] { return interruption.requested(); });
+  fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", report.simulated_s,
+             board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
+  if (report.behind_s > 0.0)
+    fmt::print(stderr, "this machine was too slow or busy: {:.3f} s of real time were not simulated\n",
+               report.behind_s);
+  return cli::done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Runs a Kmax image, the very one that is flashed, on an emulated ODrive v3.6 with the motors and "
+      "handles of a "
+      "scene.\nWhat the firmware must not do (an unknown register, a clock that is off) stops it with the "
+      "place."};
+  app.footer(
+      "Examples:\n"
+      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --serial /tmp/board &\n"
+      "  kmax --device serial:/tmp/board info\n"
+      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --budget      instructions of each step of the tick");
+  Options options;
+  app.add_option("ELF", options.elf, "The image, as linked")->required()->check(CLI::ExistingFile);
+  app.add_option("--serial", options.serial, "Name under which USART2 appears as a pseudo-terminal")
+      ->type_name("LINK");
+  app.add_option("--can", options.can, "SocketCAN interface (not in this version)")->type_name("IFACE");
+  app.add_option("--gpio", options.gpio, "GPIO chip for reset, E-stop and fault lines (not in this version)")
+      ->type_name("CHIP");
+  app.add_option("--scene", options.scene, "TOML file or supplied scene; one with motors")
+      ->type_name("SCENE")
+      ->capture_default_str();
+  app.add_option("--store", options.store, "File that keeps the parameter sectors (32 KiB, made if missing)")
+      ->type_name("FILE");
+  app.add_option("--voltage", options.volts, "Variant written into the board: 24 or 56")
+      ->check(CLI::IsMember({24, 56}))
+      ->capture_default_str();
+  app.add_option("--duration", options.duration, "Board time after which it ends; 0: at Ctrl-C")
+      ->type_name("SECONDS")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--free-running", options.free_running, "As fast as this machine goes instead of real time");
+  app.add_flag("--budget", options.budget,
+               "Counts the instructions and cycles of each step of the tick, and judges them");
+  app.add_flag("--json", options.json, "The budget as JSON");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? cli::done : cli::wrong_usage;
+  }
+  try {
+    if (!options.can.empty() || !options.gpio.empty()) {
+      fmt::print(stderr, "kmax-board: --can and --gpio are not in this version; use --serial LINK\n");
+      return cli::wrong_usage;
+    }
+    return run(options);
+  } catch (const simulation::SceneError& error) {
+    fmt::print(stderr, "kmax-board: {}\n", error.what());
+    return cli::wrong_usage;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "kmax-board: {}\n", error.what());
+    return cli::failed;
+  }
+}

@@ -1,0 +1,140 @@
+#include "board/odrive_v3/power_stage.hpp"
+
+#include <gtest/gtest.h>
+
+namespace kmax::board::odrive_v3 {
+namespace {
+
+using firmware::Fault;
+
+struct Hardware {
+  bool gate = false, fault_low = false, stop_open = false;
+  bool answers[2] = {true, true};
+  OffsetProgress offsets = OffsetProgress::accepted;
+  int gate_rises = 0, configured = 0, calibrations = 0;
+
+  void set_gate_enable(bool level) {
+    gate_rises += level && !gate ? 1 : 0;
+    gate = level;
+  }
+  bool fault_line_low() const { return fault_low; }
+  bool emergency_stop_open() const { return stop_open; }
+  bool configure_gate_driver(std::size_t axis) {
+    EXPECT_TRUE(gate) << "the chips do not answer while EN_GATE is low";
+    ++configured;
+    return answers[axis];
+  }
+  void restart_offset_calibration() { ++calibrations; }
+  OffsetProgress offset_progress() const { return offsets; }
+};
+
+class PowerStageTest : public testing::Test {
+ protected:
+  void run(std::uint32_t duration_us, bool armed = false) {
+    for (const std::uint32_t end = now + duration_us; now != end; now += 100) stage.poll(now, armed);
+  }
+
+  Hardware hardware;
+  PowerStage<Hardware> stage{hardware};
+  std::uint32_t now = 0xFFFF'FF9C - 10'000;  // the clock wraps while it starts
+};
+
+TEST_F(PowerStageTest, IsNotReadyBeforeItHasRun) {
+  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_FALSE(stage.ready());
+}
+
+TEST_F(PowerStageTest, WaitsForTheChipsBeforeItWritesToThem) {
+  run(20'900);
+  EXPECT_EQ(hardware.configured, 0);
+  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  run(500);
+  EXPECT_EQ(hardware.configured, 2);
+  EXPECT_TRUE(stage.ready());
+  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+}
+
+TEST_F(PowerStageTest, WaitsForTheOffsets) {
+  hardware.offsets = OffsetProgress::running;
+  run(500'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  hardware.offsets = OffsetProgress::accepted;
+  run(200);
+  EXPECT_TRUE(stage.ready());
+}
+
+TEST_F(PowerStageTest, AChipThatDoesNotAnswerIsTriedAgain) {
+  hardware.answers[1] = false;
+  run(1'000'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_GE(hardware.gate_rises, 4);
+  hardware.answers[1] = true;
+  run(300'000);
+  EXPECT_TRUE(stage.ready());
+}
+
+TEST_F(PowerStageTest, OffsetsOutOfBoundsAreNamedAndMeasuredAgain) {
+  hardware.offsets = OffsetProgress::refused;
+  run(100'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::current_sense);
+  hardware.offsets = OffsetProgress::accepted;
+  run(300'000);
+  EXPECT_TRUE(stage.ready());
+  EXPECT_GE(hardware.calibrations, 2);
+}
+
+TEST_F(PowerStageTest, AFaultEdgeActsAtOnceAndIsResetOnlyWhenNobodyIsArmed) {
+  run(100'000);
+  ASSERT_TRUE(stage.ready());
+  stage.ISR_fault_line();  // a pulse: the line is high again
+  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  run(50'000, true);
+  EXPECT_TRUE(hardware.gate) << "the other axis may still be braking";
+  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  run(100'000, false);
+  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+  EXPECT_EQ(hardware.gate_rises, 2);
+}
+
+TEST_F(PowerStageTest, AFaultThatStaysKeepsTheBridgesOff) {
+  run(100'000);
+  hardware.fault_low = true;
+  stage.ISR_fault_line();
+  run(2'000'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  hardware.fault_low = false;
+  run(300'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+}
+
+TEST_F(PowerStageTest, AFaultLineThatIsLowWithoutAnEdgeIsSeenToo) {
+  run(100'000);
+  hardware.fault_low = true;
+  run(100);
+  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+}
+
+TEST_F(PowerStageTest, TheEmergencyStopLeavesTheBrakesSupplyOn) {
+  run(100'000);
+  hardware.stop_open = true;
+  stage.ISR_emergency_stop();
+  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+  run(100'000, false);
+  EXPECT_TRUE(hardware.gate);
+  EXPECT_EQ(hardware.gate_rises, 1);
+  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+  hardware.stop_open = false;
+  run(100'000, true);
+  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop) << "an armed axis has not yet seen it";
+  run(200, false);
+  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+}
+
+TEST_F(PowerStageTest, AStopPressedSincePowerUpIsSeenWithoutAnEdge) {
+  hardware.stop_open = true;
+  run(200'000);
+  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+}
+
+}  // namespace
+}  // namespace kmax::board::odrive_v3

@@ -1,0 +1,59 @@
+#include "board/odrive_v3/voltage_variant.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace kmax::board::odrive_v3 {
+namespace {
+
+class Otp {
+ public:
+  Otp() { bytes_.fill(0xFF); }
+  Otp& record(std::size_t index, std::uint8_t magic, std::uint8_t major, std::uint8_t voltage) {
+    bytes_[16 * index] = magic;
+    bytes_[16 * index + 3] = major;
+    bytes_[16 * index + 4] = 6;
+    bytes_[16 * index + 5] = voltage;
+    return *this;
+  }
+  std::optional<VoltageVariant> variant() const {
+    return voltage_variant_from_otp([this](std::size_t i) { return bytes_.at(i); });
+  }
+
+ private:
+  std::array<std::uint8_t, drivers::stm32f4::otp_bytes> bytes_{};
+};
+
+TEST(VoltageVariant, BlankAreaSaysNothing) {
+  EXPECT_EQ(Otp().variant(), std::nullopt);
+}
+
+TEST(VoltageVariant, ReadsTheMakersRecord) {
+  EXPECT_EQ(Otp().record(0, 0xFE, 3, 24).variant(), VoltageVariant::v24);
+  EXPECT_EQ(Otp().record(0, 0xFE, 3, 48).variant(), VoltageVariant::v56);
+  EXPECT_EQ(Otp().record(0, 0xFE, 3, 56).variant(), VoltageVariant::v56);
+}
+
+TEST(VoltageVariant, AVoidRecordIsFollowedByTheNext) {
+  EXPECT_EQ(Otp().record(0, 0x00, 3, 24).record(1, 0xFE, 3, 56).variant(), VoltageVariant::v56);
+  EXPECT_EQ(Otp().record(0, 0x00, 3, 24).variant(), std::nullopt);
+  Otp all_void;
+  for (std::size_t i = 0; i < 32; ++i) all_void.record(i, 0x00, 3, 24);
+  EXPECT_EQ(all_void.variant(), std::nullopt) << "and the search ends with the area";
+}
+
+TEST(VoltageVariant, WhatIsNotUnderstoodIsNotGuessed) {
+  EXPECT_EQ(Otp().record(0, 0xFE, 4, 24).variant(), std::nullopt);
+  EXPECT_EQ(Otp().record(0, 0xFE, 3, 12).variant(), std::nullopt);
+  EXPECT_EQ(Otp().record(0, 0x7E, 3, 24).variant(), std::nullopt);
+}
+
+TEST(VoltageVariant, BlankBoardsGetTheDividerThatReadsHigh) {
+  EXPECT_EQ(variant_of_blank_board, VoltageVariant::v56);
+  EXPECT_FLOAT_EQ(supply_divider_ratio(VoltageVariant::v24), 11.0f);
+  EXPECT_FLOAT_EQ(supply_divider_ratio(VoltageVariant::v56), 19.0f);
+}
+
+}  // namespace
+}  // namespace kmax::board::odrive_v3

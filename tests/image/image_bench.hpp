@@ -1,0 +1,83 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "firmware/fault.hpp"
+#include "host_tools/simulated_board/scene_parameters.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/virtual_board/modbus_master.hpp"
+#include "host_tools/virtual_board/parameter_sectors.hpp"
+#include "host_tools/virtual_board/scene_world.hpp"
+#include "host_tools/virtual_board/virtual_board.hpp"
+
+namespace kmax::tests {
+
+/// The image under test: the one that is flashed.
+inline std::string image_path() {
+  const std::string path = KMAX_ODRIVE_ELF;
+  if (!std::filesystem::exists(path))
+    throw std::runtime_error(path + " is missing: build it with 'scripts/build stm32f405' first");
+  return path;
+}
+
+inline const virtual_board::ElfImage& image() {
+  static const virtual_board::ElfImage loaded = virtual_board::ElfImage::load(image_path());
+  return loaded;
+}
+
+inline constexpr double tick_s = 1.0 / 20e3;
+inline virtual_board::BoardTime ticks(double count) {
+  return static_cast<virtual_board::BoardTime>(count * tick_s *
+                                               static_cast<double>(virtual_board::units_per_second));
+}
+
+/// A variant board of 24 V with the motors of a scene, started, with a master on its serial line.
+class ImageBench {
+ public:
+  using Parameters = std::vector<std::pair<std::string, simulation::ParameterValue>>;
+
+  /// `push`: N, how hard the persons press; 0: as the scene says.
+  explicit ImageBench(const Parameters& parameters = {}, double push = 0.0)
+      : scene(with(simulated_board::open_scene("motor_axes"), parameters, push)), world(scene) {
+    virtual_board::VirtualBoardConfig config;
+    config.identity.volts = 24;
+    board = std::make_unique<virtual_board::VirtualBoard>(image(), &world, config);
+    virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
+    master = std::make_unique<virtual_board::ModbusMaster>(*board);
+  }
+
+  /// Until the power stage is ready.
+  void start() {
+    for (int tries = 0; tries < 100 && !board->healthy(); ++tries) board->run_for(0.01);
+    if (!board->healthy()) throw std::runtime_error("the power stage does not become ready");
+  }
+
+  std::uint16_t reading(std::size_t entry, std::size_t axis) {
+    return master->read_input(firmware::register_address(entry, axis), 1)[0];
+  }
+  firmware::Fault fault(std::size_t axis) {
+    const auto* text = firmware::fault_by_error_code(reading(firmware::entry_of<"drive.error_code">(), axis));
+    if (text == nullptr) throw std::runtime_error("an error code that no fault has");
+    return text->fault;
+  }
+
+  simulation::Scene scene;
+  virtual_board::SceneWorld world;
+  std::unique_ptr<virtual_board::VirtualBoard> board;
+  std::unique_ptr<virtual_board::ModbusMaster> master;
+
+ private:
+  static simulation::Scene with(simulation::Scene scene, const Parameters& parameters, double push) {
+    for (simulation::SceneAxis& axis : scene.axes) {
+      if (push > 0.0 && axis.motion) axis.motion->push_force = push;
+    }
+    for (const auto& [name, value] : parameters) scene.parameters.push_back({name, value, "test"});
+    return scene;
+  }
+};
+
+}  // namespace kmax::tests

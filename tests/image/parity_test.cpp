@@ -1,0 +1,200 @@
+// The image's tick against the same source on this machine, bit for bit: every call of Axis::ISR_tick in the
+// image is repeated here with the very bytes that it was given.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstring>
+#include <random>
+
+#include "firmware/axis.hpp"
+#include "tests/image/image_bench.hpp"
+
+namespace kmax::tests {
+namespace {
+
+using firmware::Axis;
+using virtual_board::BoardTime;
+
+constexpr const char* tick_symbol = "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbfm";
+
+/// Listens to the image and computes along.
+class Companion {
+ public:
+  explicit Companion(virtual_board::VirtualBoard& board)
+      : board_(board), entry_(image().required_symbol(tick_symbol).address) {
+    board.processor().on_instruction([this](std::uint32_t address, unsigned) {
+      if (address == entry_) enter();
+      if (address == return_to_) leave();
+    });
+  }
+
+  std::uint64_t ticks = 0, driven = 0, differences = 0;
+  std::string first_difference;
+
+ private:
+  template <typename Value>
+  Value at(std::uint32_t address) {
+    Value value;
+    const auto bytes = board_.bus().memory(address, sizeof value);
+    if (bytes.size() < sizeof value) throw std::runtime_error("an argument outside memory");
+    std::memcpy(static_cast<void*>(&value), bytes.data(), sizeof value);
+    return value;
+  }
+
+  void enter() {
+    auto& processor = board_.processor();
+    const std::uint32_t self = processor.core_register(0);
+    axis_ = self == first_self_ || first_self_ == 0 ? 0 : 1;
+    if (first_self_ == 0) first_self_ = self;
+    const auto setting = at<firmware::AxisSetting>(processor.core_register(1));
+    const auto input = at<Axis::Input>(processor.core_register(2));
+    const bool enable = (processor.core_register(3) & 0xFFU) != 0;
+    const float external = processor.fp_register(0);
+    const auto tick = at<std::uint32_t>(processor.core_register(13));
+    expected_ = axes_[axis_].ISR_tick(setting, input, enable, external, tick);
+    return_to_ = processor.core_register(14) & ~1U;
+  }
+
+  void leave() {
+    const auto made = at<Axis::Output>(board_.processor().core_register(0));
+    return_to_ = 0;
+    ++ticks;
+    driven += made.enabled ? 1 : 0;
+    compare("force", made.force, expected_.force);
+    compare("tangential_force", made.tangential_force, expected_.tangential_force);
+    compare("background_force", made.background_force, expected_.background_force);
+    compare("current_reference", made.motor.current_reference, expected_.motor.current_reference);
+    compare("current", made.motor.current, expected_.motor.current);
+    compare("duty_a", made.motor.duty_a, expected_.motor.duty_a);
+    compare("duty_b", made.motor.duty_b, expected_.motor.duty_b);
+    compare("duty_c", made.motor.duty_c, expected_.motor.duty_c);
+    if (made.enabled != expected_.enabled || made.motor.fault != expected_.motor.fault)
+      note("enabled or fault", 0, 0);
+  }
+
+  void compare(const char* name, float made, float expected) {
+    if (std::bit_cast<std::uint32_t>(made) != std::bit_cast<std::uint32_t>(expected))
+      note(name, made, expected);
+  }
+
+  void note(const char* name, float made, float expected) {
+    if (differences++ == 0)
+      first_difference =
+          fmt::format("tick {}, axis {}: {} is {} in the image, {} here", ticks, axis_, name, made, expected);
+  }
+
+  virtual_board::VirtualBoard& board_;
+  std::uint32_t entry_, return_to_ = 0, first_self_ = 0;
+  std::size_t axis_ = 0;
+  std::array<Axis, 2> axes_;
+  Axis::Output expected_{};
+};
+
+/// Handles that jump and drift, and sensors that read anything.
+class RandomWorld final : public virtual_board::BoardWorld {
+ public:
+  explicit RandomWorld(std::uint64_t seed) : random_(seed) {}
+
+  void set_bridge(std::size_t, const std::array<virtual_board::PwmLegOutput, 3>&, BoardTime) override {}
+  void set_brake(bool, BoardTime) override {}
+  void set_amplifiers(std::size_t, double, bool, BoardTime) override {}
+  double supply_voltage() const override { return 24.0; }
+  double analogue(unsigned channel, BoardTime) override {
+    if (channel == 6) return (quiet ? 24.0 : 22.0 + uniform(0, 3.9)) / 11.0;
+    if (channel == 15 || channel == 4 || channel == 5) return 0.82;
+    return quiet ? 1.65 : 1.65 + uniform(-0.25, 0.25);
+  }
+  virtual_board::EncoderSignals encoder(std::size_t axis, BoardTime) override {
+    if (!quiet) {
+      const double kind = uniform(0, 1);
+      if (kind < 0.3) edges_[axis] += static_cast<std::int64_t>(uniform(-3, 4));
+      if (kind > 0.999) edges_[axis] += static_cast<std::int64_t>(uniform(-200, 200));
+      // Drawn back, so that the wall is crossed again and again.
+      if (kind > 0.7 && kind < 0.8) edges_[axis] -= edges_[axis] / 400 + (edges_[axis] > 0 ? 1 : -1);
+    }
+    return {edges_[axis], false};
+  }
+
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1.0p-53;
+  }
+
+  bool quiet = true;
+
+ private:
+  std::mt19937_64 random_;
+  std::array<std::int64_t, 2> edges_{};
+};
+
+void expect_equal(const Companion& companion) {
+  EXPECT_EQ(companion.differences, 0u) << companion.first_difference;
+}
+
+TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
+  RandomWorld world(20260101);
+  virtual_board::VirtualBoardConfig config;
+  config.identity.volts = 24;
+  virtual_board::VirtualBoard board(image(), &world, config);
+  Companion companion(board);
+  virtual_board::ModbusMaster master(board);
+  const auto write = [&master](std::size_t entry, std::size_t axis, std::uint32_t raw) {
+    const std::uint16_t address = firmware::register_address(entry, axis);
+    if (firmware::words_of(firmware::descriptors[entry].type) == 1)
+      return master.write_register(address, static_cast<std::uint16_t>(raw));
+    master.write_registers(address, {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
+  };
+  const auto real = [](double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); };
+  board.run_for(0.3);
+  while (companion.ticks < 1'000'000) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      write(firmware::entry_of<"drive.controlword">(), axis, 0);
+      write(firmware::entry_of<"drive.controlword">(), axis, 0x80);
+    }
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      write(firmware::entry_of<"wall.law">(), axis, static_cast<std::uint32_t>(world.uniform(0, 4)));
+      write(firmware::entry_of<"wall.side">(), axis, world.uniform(0, 1) < 0.5 ? 0xFFFFu : 1u);
+      write(firmware::entry_of<"wall.stiffness">(), axis, real(world.uniform(0, 20000)));
+      write(firmware::entry_of<"wall.damping">(), axis, real(world.uniform(0, 20)));
+      write(firmware::entry_of<"wall.adaptive_mode">(), axis,
+            static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write(firmware::entry_of<"wall.adaptive_relation">(), axis,
+            static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write(firmware::entry_of<"velocity.estimator">(), axis,
+            static_cast<std::uint32_t>(world.uniform(0, 5)));
+      write(firmware::entry_of<"velocity.window">(), axis, static_cast<std::uint32_t>(world.uniform(1, 17)));
+      write(firmware::entry_of<"velocity.limit">(), axis, real(0.0));
+      write(firmware::entry_of<"position.resolution">(), axis, real(world.uniform(0, 2e-4)));
+      write(firmware::entry_of<"position.rounding">(), axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write(firmware::entry_of<"motor.kind">(), axis, static_cast<std::uint32_t>(world.uniform(0, 2)));
+      write(firmware::entry_of<"current.limit">(), axis, real(20.0));
+      write(firmware::entry_of<"haptic.rate">(), axis, real(world.uniform(0, 1) < 0.5 ? 20000.0 : 2000.0));
+    }
+    board.run_for(0.25);  // another amplifier gain restarts the power stage
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      try {
+        master.arm(axis);
+      } catch (const std::runtime_error&) {
+        // Inside the wall: it computes all the same.
+      }
+    }
+    world.quiet = false;
+    board.run_for(0.8);
+    world.quiet = true;
+  }
+  expect_equal(companion);
+  EXPECT_GT(companion.driven, 100'000u) << "the comparison must see forces";
+}
+
+TEST(Parity, AContactIsBitIdentical) {
+  ImageBench bench(
+      {{"wall.law", std::string("adaptive")}, {"wall.stiffness", 3000.0}, {"link.timeout", 0.0}});
+  Companion companion(*bench.board);
+  bench.start();
+  for (std::size_t axis = 0; axis < 2; ++axis) bench.master->arm(axis);
+  bench.board->run_for(1.0);
+  expect_equal(companion);
+  EXPECT_GT(companion.driven, 30'000u);
+}
+
+}  // namespace
+}  // namespace kmax::tests
