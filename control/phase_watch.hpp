@@ -27,14 +27,14 @@ enum class PhaseCondition : std::uint8_t {
 /// Looks at every current sample for what a motor cable does when it breaks.
 ///
 /// Open phase: the reference asks a phase for more than `present`, and less than `absent` is measured in it.
-/// If the sample before still carried more than `present`, the current has vanished within one sample, which
-/// no winding does by itself, and the verdict falls at once. If the current never came, the verdict waits for
-/// `patience` samples: five time constants of the current loop, at least 1 ms; a motor so fast that its
-/// back-EMF may be what holds the current down is not judged that way
-/// (`slow` false). present = max(0.25 A, 5 % of current_limit), absent = present / 3: below that a phase can
-/// open unnoticed.
+/// If the sample before carried more than `present` the same way, the current has vanished within one sample,
+/// which no winding does by itself, and the verdict falls at once. If the current never came, the verdict
+/// waits for `patience` samples: five time constants of the current loop, at least 1 ms. Neither is judged
+/// while `slow` is false: a fast motor's back-EMF may hold the current down, and a glitch of the encoder,
+/// which looks like speed, makes the feed-forward throw the current about. present = max(0.25 A, 5 % of
+/// current_limit), absent = present / 3: below that a phase can open unnoticed.
 ///
-/// A NaN counts as over-current. Cost: about 45 Cortex-M4F instructions.
+/// A NaN counts as over-current. Cost: about 75 Cortex-M4F instructions.
 template <typename Scalar>
 class PhaseWatch {
  public:
@@ -70,7 +70,7 @@ class PhaseWatch {
                              missing_bit(c, measured.b, reference.b, before_.b) |
                              missing_bit(c, measured.c, reference.c, before_.c);
     before_ = measured;
-    if ((missing & vanished) != 0) return PhaseCondition::open;
+    if ((missing & vanished) != 0 && slow) return PhaseCondition::open;
     starved_ = missing != 0 && slow ? starved_ + 1 : 0;
     return starved_ > c.patience ? PhaseCondition::open : PhaseCondition::good;
   }
@@ -82,7 +82,8 @@ class PhaseWatch {
 
   static unsigned missing_bit(const Coefficients& c, Scalar measured, Scalar reference, Scalar before) {
     if (magnitude(reference) <= c.present || magnitude(measured) >= c.absent) return 0;
-    return magnitude(before) > c.present ? vanished : starving;
+    // On its way through zero to the other side a current may be caught at any value.
+    return before * reference > Scalar(0) && magnitude(before) > c.present ? vanished : starving;
   }
 
   PhaseCurrents<Scalar> before_{};

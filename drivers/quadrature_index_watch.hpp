@@ -13,11 +13,12 @@ struct QuadratureIndexConfig {
 ///
 /// Its lines are pulled up on the board, so an open cable reads A = B = Z = 1: the count stays, which alone
 /// looks like a handle at rest, but the index line is high where no index is. Where the index is, is learned
-/// from its first edge; from then on a high line anywhere else is wrong at the first look. Before
-/// that, a line that stays high while the count leaves the tolerance is.
+/// when the line has been high and falls again near the same count: a cable that comes off never does that.
+/// From then on a high line anywhere else is wrong at the first look. Before that, only a line that stays
+/// high while the count leaves the tolerance is.
 ///
-/// What it cannot see: a cable that comes off before the index was ever passed and while the handle does not
-/// move, and one that comes off on the index itself.
+/// So a cable that comes off before the index has once been passed is not seen, and neither is one that comes
+/// off on the index.
 ///
 /// Once wrong it stays wrong until reset(): edges have been lost, and with them the position.
 ///
@@ -28,35 +29,21 @@ class QuadratureIndexWatch {
 
   constexpr void reset(const QuadratureIndexConfig& config) {
     config_ = config;
-    learned_ = false;
-    failed_ = false;
-    was_high_ = true;
-    high_since_known_ = false;
+    learned_ = failed_ = high_ = false;
   }
 
   /// `count`: free-running. `index_line`: its level at the same moment. False: the encoder is not to be
   /// believed.
   constexpr bool ISR_plausible(std::uint32_t count, bool index_line) {
     if (!index_line) {
-      // It was high from the start and has fallen where it was: that is the index.
-      if (high_since_known_ && !learned_ && !failed_) learned_ = true;
-      was_high_ = false;
-      high_since_known_ = false;
+      if (high_ && !learned_ && !failed_ && distance_from(index_, count) <= config_.tolerance)
+        learned_ = true;
+      high_ = false;
       return !failed_;
     }
-    if (learned_) {
-      if (distance_from(index_, count) > config_.tolerance) failed_ = true;
-    } else if (!was_high_) {
-      learned_ = true;
-      index_ = count;
-    } else if (!high_since_known_) {
-      // High from the start: the handle may stand on the index.
-      high_since_known_ = true;
-      index_ = count;
-    } else if (distance_from(index_, count) > config_.tolerance) {
-      failed_ = true;
-    }
-    was_high_ = true;
+    if (!learned_ && !high_) index_ = count;
+    high_ = true;
+    if (distance_from(index_, count) > config_.tolerance) failed_ = true;
     return !failed_;
   }
 
@@ -75,9 +62,7 @@ class QuadratureIndexWatch {
 
   QuadratureIndexConfig config_;
   std::uint32_t index_ = 0;
-  bool learned_ = false, failed_ = false;
-  bool was_high_ = true;  // what was not seen low has no rising edge
-  bool high_since_known_ = false;
+  bool learned_ = false, failed_ = false, high_ = false;
 };
 
 }  // namespace kmax::drivers

@@ -91,6 +91,11 @@ bool Application::settled(std::size_t of_axis) const {
   return true;
 }
 
+bool Application::too_hot(std::size_t axis) const {
+  // Not a number: the sensor is broken.
+  return !(readings_.power_stage_temperature[axis] <= registers_.values().real<"temperature.limit">(axis));
+}
+
 void Application::take_reports() {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     report_[axis] = snapshots_[axis].read();
@@ -101,6 +106,7 @@ void Application::take_reports() {
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
   if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
+  if (too_hot(axis)) return Refusal::too_hot;
   if (!report_[axis].count_valid) return Refusal::encoder_invalid;
   const auto& haptic = report_[axis].haptic;
   const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
@@ -144,9 +150,11 @@ void Application::supervise(std::size_t axis) {
     if (report.fault != Fault::none && enable_[axis].load(std::memory_order_relaxed)) {
       trip(axis, report.fault, report.fault_value, bound_of(report.fault, values, axis));
     }
-    const float temperature = readings_.power_stage_temperature[axis];
-    const float hottest = values.real<"temperature.limit">(axis);
-    if (!(temperature <= hottest)) trip(axis, Fault::over_temperature, temperature, hottest);
+    if (too_hot(axis)) {
+      trip(axis, Fault::over_temperature, readings_.power_stage_temperature[axis],
+           values.real<"temperature.limit">(axis));
+    }
+    if (readings_.ticks_have_stopped) trip(axis, Fault::tick_missed, 0.0f, 0.0f);
     const float timeout = values.real<"link.timeout">();
     const auto last = port_.last_valid_request_time();
     if (timeout > 0.0f && last.has_value()) {
@@ -167,6 +175,7 @@ void Application::supervise(std::size_t axis) {
     if (!machine.asks_to_enable(pending) || settled(axis)) {
       command_pending_[axis] = false;
       const bool cause_remains = (machine.fault() == Fault::encoder && !report.count_valid) ||
+                                 (machine.fault() == Fault::over_temperature && too_hot(axis)) ||
                                  (machine.fault() != Fault::none && machine.fault() == report.condition);
       machine.command(pending, obstacle_to_arming(axis), cause_remains);
     }

@@ -52,6 +52,7 @@ struct BoardReadings {
   std::array<float, axis_count> power_stage_temperature{25.0f, 25.0f};  ///< degC
   float supply_voltage = 0.0f;                                          ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
+  bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
 };
 
 /// The whole firmware, free of any chip. A board owns one, calls ISR_tick() for each axis at 20 kHz from the
@@ -106,6 +107,8 @@ class Application {
   /// Rises with every change of a parameter.
   std::uint32_t parameter_changes() const { return registers_.changes(); }
   bool any_armed() const;
+  /// A save is under way; its next step may stop the processor for half a second.
+  bool store_busy() const { return keeper_.busy(); }
   DriveState state(std::size_t axis) const { return machines_[axis].state(); }
   Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
   Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
@@ -145,6 +148,7 @@ class Application {
   void refresh_store_readings();
   DeviceRegisters::WriteResult command_store(std::uint16_t command);
   void take_reports();
+  bool too_hot(std::size_t axis) const;
   void ISR_supervise_main_loop();
   void ISR_trace(const control::HapticLoop<float>::Output& traced);
 

@@ -29,7 +29,8 @@ namespace kmax::firmware {
   const auto& out = loop_.tick(setting.haptic, position, was_enabled && input.count_valid, external_force);
   if (was_enabled) {
     if (condition != Fault::none) {
-      trip(condition, input.motor.supply_voltage);
+      const bool of_supply = condition == Fault::under_voltage || condition == Fault::over_voltage;
+      trip(condition, of_supply ? input.motor.supply_voltage : 0.0f);
     } else if (!input.count_valid) {
       trip(Fault::encoder, 0.0f);
     } else if (out.not_finite) {

@@ -43,7 +43,9 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::over_speed, 0x8480, "over_speed", "m/s", "the handle was faster than velocity.limit",
      "check encoder.counts_per_turn and device.transmission, the encoder's cable, and velocity.limit"},
     {Fault::encoder, 0x7305, "encoder", "", "the encoder gave no valid count",
-     "check the encoder's cable and supply, and encoder.kind"},
+     "check the encoder's cable and supply, and encoder.kind; then switch the device off and on: its "
+     "position is "
+     "lost"},
     {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
      "check the cable and the host program; link.timeout = 0 turns this off"},
     {Fault::main_loop, 0x6100, "main_loop", "", "the firmware's main loop stood still for more than 0.1 s",
@@ -61,13 +63,13 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::phase_open, 0x3331, "phase_open", "A",
      "a phase current vanished while the motor was being driven",
      "check the motor's cable, plugs and solder joints"},
-    {Fault::current_sense, 0x5210, "current_sense", "A", "a current sensor read against its rail",
+    {Fault::current_sense, 0x5210, "current_sense", "", "a current sensor read against its rail",
      "check the gate driver's amplifier settings and the shunts"},
     {Fault::over_temperature, 0x4310, "over_temperature", "degC",
      "the power stage was hotter than temperature.limit", "let it cool down; lower current.limit"},
     {Fault::power_stage, 0x5400, "power_stage", "", "the power stage was not ready",
      "check the supply; the gate driver needs it to answer"},
-    {Fault::tick_missed, 0xFF03, "tick_missed", "ticks", "a control tick was late or lost",
+    {Fault::tick_missed, 0xFF03, "tick_missed", "", "a control tick was late or lost",
      "report it as a defect, with what was done before"},
 });
 

@@ -32,6 +32,7 @@ enum class Refusal : std::uint16_t {
   current_sense_invalid = 20,
   store_busy = 21,
   store_missing = 22,
+  too_hot = 23,
 };
 
 struct RefusalText {
@@ -66,6 +67,7 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
      "a current sensor reads current while the bridge is off; check the power stage before arming"},
     {Refusal::store_busy, "the parameters are being saved; try again in a moment"},
     {Refusal::store_missing, "this device has no memory to keep parameters in"},
+    {Refusal::too_hot, "the power stage is hotter than temperature.limit, or its sensor is broken"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

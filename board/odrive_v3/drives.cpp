@@ -1,5 +1,7 @@
 #include "board/odrive_v3/drives.hpp"
 
+#include <limits>
+
 #include "board/odrive_v3/power_hardware.hpp"
 
 #include "drivers/stm32f4/gpio.hpp"
@@ -54,8 +56,8 @@ bool Drives::ISR_index_line(std::size_t axis) const {
 firmware::AxisInput Drives::ISR_measure(std::size_t axis, const stm32::CurrentSample& sample) {
   AxisHardware& hardware = axes_[axis];
   const Settings& settings = axis == 0 ? handover_.ISR_take() : handover_.ISR_current();
-  if (hardware.settings_generation != settings.generation) {
-    hardware.settings_generation = settings.generation;
+  if (hardware.index_generation != settings.index_generation[axis]) {
+    hardware.index_generation = settings.index_generation[axis];
     hardware.index.reset(settings.index[axis]);
   }
   firmware::AxisInput input{};
@@ -63,14 +65,21 @@ firmware::AxisInput Drives::ISR_measure(std::size_t axis, const stm32::CurrentSa
     ISR_take_serial(input);
   } else {
     ISR_read_quadrature(axis, settings, input);
-    if (settings.serial_encoder_axis < firmware::axis_count) ISR_begin_serial();
+    if (settings.serial_encoder_axis < firmware::axis_count) {
+      ISR_begin_serial();
+    } else if (serial_encoder_.under_way()) {
+      serial_encoder_.ISR_abandon();
+    }
   }
   input.motor.present = true;
   input.motor.supply_voltage = supply_.ISR_volts(sample.supply);
   input.motor.current_b = hardware.sense_b.ISR_amperes(sample.phase_b);
   input.motor.current_c = hardware.sense_c.ISR_amperes(sample.phase_c);
-  if (!sample.valid) {
+  // 2 triggers are 50 us: the converter of supply and temperatures stands still.
+  if (!sample.valid || sample.slow_age > 2) {
     input.condition = firmware::Fault::tick_missed;
+  } else if (supply_.ISR_saturated(sample.supply)) {
+    input.condition = firmware::Fault::over_voltage;
   } else if (hardware.driving && (hardware.sense_b.ISR_saturated(sample.phase_b) ||
                                   hardware.sense_c.ISR_saturated(sample.phase_c))) {
     input.condition = firmware::Fault::current_sense;
@@ -107,10 +116,43 @@ void Drives::ISR_calibrate(AxisHardware& hardware, const stm32::CurrentSample& s
 
 void Drives::ISR_housekeeping(std::size_t axis, float supply_voltage) {
   watchdog_gate_.ISR_ticked(axis);
+  axis_ticks_[axis].store(axis_ticks_[axis].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if (axis != 0) return;
-  const bool brake = brake_.update(handover_.ISR_current().brake, supply_voltage);
-  stm32::GpioPin{stm32::gpio(pins::brake_high_side.port), pins::brake_high_side.number}.write(brake);
+  // Motors brake while they are driven and a moment after; a supply that is too high for longer is not
+  // theirs.
+  constexpr std::uint32_t ticks_after_driving = firmware::tick_rate_hz / 5;
+  if (axes_[0].driving || axes_[1].driving) {
+    ISR_braking_for_ = ticks_after_driving;
+  } else if (ISR_braking_for_ != 0) {
+    --ISR_braking_for_;
+  }
+  const bool wanted = brake_.update(handover_.ISR_current().brake, supply_voltage);
+  const bool allowed = ISR_braking_for_ != 0 && !brake_inhibited_.load(std::memory_order_relaxed);
+  stm32::GpioPin{stm32::gpio(pins::brake_high_side.port), pins::brake_high_side.number}.write(wanted &&
+                                                                                              allowed);
   if ((++ISR_ticks_ & 3U) == 0) main_loop_due_.store(true, std::memory_order_relaxed);
+}
+
+void Drives::inhibit_brake(bool inhibited) {
+  brake_inhibited_.store(inhibited, std::memory_order_relaxed);
+  if (inhibited)
+    stm32::GpioPin{stm32::gpio(pins::brake_high_side.port), pins::brake_high_side.number}.write(false);
+}
+
+bool Drives::ISR_ticks_have_stopped() {
+  bool stopped = false;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const std::uint32_t ticks = axis_ticks_[axis].load(std::memory_order_relaxed);
+    stopped = stopped || ticks == axis_ticks_seen_[axis];
+    axis_ticks_seen_[axis] = ticks;
+  }
+  // Twice in a row: after an erase, in which the core stood still, this may come before the second axis'
+  // tick.
+  ISR_silent_calls_ = stopped ? ISR_silent_calls_ + 1 : 0;
+  if (ISR_silent_calls_ < 2) return false;
+  ISR_disarm();
+  main_loop_due_.store(true, std::memory_order_relaxed);
+  return true;
 }
 
 template <typename Stage>
@@ -119,22 +161,24 @@ template <typename Stage>
   Pwm& pwm = axis == 0 ? pwm0_ : pwm1_;
   AxisHardware& hardware = axes_[axis];
   firmware::AxisInput input = ISR_measure(axis, sampling_.ISR_read(static_cast<unsigned>(axis)));
+  // Before the condition: a line interrupt in between must be found as what it is.
+  const bool bridge_fell = hardware.arm_failed || (hardware.driving && !pwm.armed());
   if (const firmware::Fault condition = stage.ISR_condition(); condition != firmware::Fault::none)
     input.condition = condition;
-  // MOE fell without anybody saying why: the clock-failure break.
-  if (hardware.driving && input.condition == firmware::Fault::none && !pwm.armed())
-    input.condition = firmware::Fault::power_stage;
+  // MOE fell, or would not rise, without anybody saying why: the break input.
+  if (bridge_fell && input.condition == firmware::Fault::none) input.condition = firmware::Fault::power_stage;
 
   const firmware::AxisOutput& output = application.ISR_tick(axis, input);
   const bool has_duty =
       output.enabled && pwm.ISR_set_duty({output.motor.duty_a, output.motor.duty_b, output.motor.duty_c});
   if (!has_duty) {
     pwm.disarm();
-    hardware.driving = false;
+    hardware.driving = hardware.arm_failed = false;
     // The next arming begins without voltage.
     pwm.ISR_set_ticks({no_voltage_ticks, no_voltage_ticks, no_voltage_ticks});
   } else if (!hardware.driving) {
     hardware.driving = pwm.arm();
+    hardware.arm_failed = !hardware.driving;
     if (stage.ISR_condition() != firmware::Fault::none) pwm.disarm();
   }
   ISR_housekeeping(axis, input.motor.supply_voltage);
@@ -167,7 +211,12 @@ void Drives::apply(const firmware::ParameterValues& values) {
     }
   }
   settings.brake = control::BrakeChopper::prepare({.on_voltage = values.real<"supply.brake_voltage">()});
-  settings.generation = settings_.generation + 1;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const bool same = settings.has_index[axis] == settings_.has_index[axis] &&
+                      settings.index[axis].counts_per_turn == settings_.index[axis].counts_per_turn;
+    settings.index_generation[axis] = settings_.index_generation[axis] + (same ? 0U : 1U);
+  }
+  if (settings.serial_encoder_axis != settings_.serial_encoder_axis) serial_encoder_.restart();
   settings_ = settings;
   handover_.offer(settings_);
   gain_ = gain_for(largest_current);
@@ -205,8 +254,10 @@ OffsetProgress Drives::offset_progress() {
 firmware::BoardReadings Drives::readings() const {
   firmware::BoardReadings readings;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const drivers::NtcReading reading =
+        thermistor.ISR_read(temperature_code_[axis].load(std::memory_order_relaxed));
     readings.power_stage_temperature[axis] =
-        thermistor.ISR_read(temperature_code_[axis].load(std::memory_order_relaxed)).celsius;
+        reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
   }
   readings.supply_voltage = supply_.ISR_volts(supply_code_.load(std::memory_order_relaxed));
   const auto& counters = sampling_.counters();

@@ -67,6 +67,15 @@ class Drives {
   /// Main loop: for the application.
   firmware::BoardReadings readings() const;
 
+  /// Main loop: keeps the brake resistor off while the tick cannot look after it.
+  void inhibit_brake(bool inhibited);
+
+  /// SysTick: true when an axis has not ticked between three calls. Both bridges are off then.
+  bool ISR_ticks_have_stopped();
+
+  /// Main loop, when the power stage has become ready: the encoder on the bus starts anew.
+  void restart_serial_encoder() { serial_encoder_.restart(); }
+
   /// Both axes have ticked since the last call that said so.
   firmware::WatchdogGate& watchdog_gate() { return watchdog_gate_; }
 
@@ -82,13 +91,13 @@ class Drives {
   /// What the tick works by; made in the main loop.
   struct Settings {
     std::array<drivers::QuadratureIndexConfig, firmware::axis_count> index{};
+    std::array<std::uint32_t, firmware::axis_count> index_generation{};
     std::array<bool, firmware::axis_count> has_index{};
     /// The axis whose encoder is the AS5047P on the bus; axis_count: none.
     std::size_t serial_encoder_axis = firmware::axis_count;
     /// Asks for that chip too, and has none.
     std::array<bool, firmware::axis_count> without_encoder{};
     control::BrakeChopper::Coefficients brake{};
-    std::uint32_t generation = 0;
   };
 
   struct AxisHardware {
@@ -96,8 +105,8 @@ class Drives {
     drivers::OffsetCalibration offset_b{}, offset_c{};
     drivers::QuadratureIndexWatch index{};
     std::uint32_t count = 0;
-    std::uint32_t settings_generation = 0;
-    bool driving = false;
+    std::uint32_t index_generation = 0;
+    bool driving = false, arm_failed = false;
   };
 
   firmware::AxisInput ISR_measure(std::size_t axis, const drivers::stm32f4::CurrentSample& sample);
@@ -123,7 +132,10 @@ class Drives {
   std::array<firmware::MotorKind, firmware::axis_count> motors_{};
   std::atomic<bool> calibrating_{false};
   std::atomic<bool> main_loop_due_{false};
-  std::uint32_t ISR_ticks_ = 0;
+  std::atomic<bool> brake_inhibited_{false};
+  std::uint32_t ISR_ticks_ = 0, ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
+  std::array<std::atomic<std::uint32_t>, firmware::axis_count> axis_ticks_{};
+  std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{};
   // Words that the tick leaves for the main loop.
   std::atomic<std::uint16_t> supply_code_{0};
   std::array<std::atomic<std::uint16_t>, firmware::axis_count> temperature_code_{};

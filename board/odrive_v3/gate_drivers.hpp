@@ -25,7 +25,16 @@ class GateDrivers {
   /// Both control registers written and read back. False: the chip does not answer or does not keep them; see
   /// last_result().
   bool configure(std::size_t axis, drivers::CurrentSenseGain gain) {
-    if (!bus_.claim()) return false;
+    // The tick's frame holds the bus for 25 us.
+    bool claimed = bus_.claim();
+    for (unsigned attempt = 0; attempt < 10 && !claimed; ++attempt) {
+      delay_us(10);
+      claimed = bus_.claim();
+    }
+    if (!claimed) {
+      last_result_[axis] = drivers::Drv8301Result::bus_time_out;
+      return false;
+    }
     Selected chip{bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
     drivers::Drv8301<Selected> driver{chip};
     drivers::Drv8301Config config;
@@ -38,6 +47,17 @@ class GateDrivers {
   drivers::Drv8301Result last_result(std::size_t axis) const { return last_result_[axis]; }
 
  private:
+  static void delay_us(std::uint32_t microseconds) {
+    // By the cycle counter: at 168 MHz; longer on a slower clock, which these delays may be.
+    constexpr std::uint32_t cycles_per_us = 168;
+    drivers::stm32f4::CycleCounter counter{drivers::stm32f4::dwt(), drivers::stm32f4::core_debug()};
+    const std::uint32_t start = counter.now();
+    // Bounded in case the counter stands still.
+    for (std::uint32_t spins = 0;
+         counter.since(start) < microseconds * cycles_per_us && spins < 1000 * microseconds; ++spins) {
+    }
+  }
+
   /// One chip on the bus (drivers::SpiChip).
   class Selected {
    public:
@@ -46,16 +66,7 @@ class GateDrivers {
 
     void select(bool selected) { pin_.write(!selected); }
     std::optional<std::uint16_t> exchange(std::uint16_t word) { return bus_.exchange(word); }
-    void delay_us(std::uint32_t microseconds) {
-      // By the cycle counter: at 168 MHz; longer on a slower clock, which these delays may be.
-      constexpr std::uint32_t cycles_per_us = 168;
-      drivers::stm32f4::CycleCounter counter{drivers::stm32f4::dwt(), drivers::stm32f4::core_debug()};
-      const std::uint32_t start = counter.now();
-      // Bounded in case the counter stands still.
-      for (std::uint32_t spins = 0;
-           counter.since(start) < microseconds * cycles_per_us && spins < 1000 * microseconds; ++spins) {
-      }
-    }
+    void delay_us(std::uint32_t microseconds) { GateDrivers::delay_us(microseconds); }
 
    private:
     ChipBus& bus_;

@@ -1,6 +1,7 @@
 // Composition root of the ODrive v3.6: names the peripherals, gives them their pins and priorities, and hands
 // time, bytes, counts and currents to the application.
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -65,6 +66,8 @@ struct Power {
 std::optional<firmware::Application> application;
 std::optional<SerialLine> serial;
 std::optional<Power> power;
+/// Set by the clock's interrupt and never taken back: only a restart brings the ticks back.
+std::atomic<bool> ticks_have_stopped{false};
 bool power_runs = false;  ///< written before the interrupts that read it are enabled
 
 void apply(std::span<const PinState> states) {
@@ -144,6 +147,11 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
 
 /// What the main loop does for the power stage.
 void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
+  static bool was_ready = false;
+  if (power->stage.ready() != was_ready) {
+    was_ready = power->stage.ready();
+    if (was_ready) power->drives.restart_serial_encoder();
+  }
   if (!application->any_armed()) {
     if (application->parameter_changes() != applied_changes) {
       applied_changes = application->parameter_changes();
@@ -175,7 +183,10 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
   serial->start(*application);
 
   std::uint32_t applied_changes = application->parameter_changes();
-  if (!emulator_without_clocks) {
+  // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
+  // say that they have no encoder.
+  if (!emulator_without_clocks && clocks.source != stm32::ClockSource::unresponsive &&
+      clocks.core_hz == 168'000'000) {
     power.emplace(voltage_variant());
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
   }
@@ -183,7 +194,12 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
     const bool due = !power_runs || power->drives.main_loop_due() || serial->news();
     if (due) {
       const std::uint32_t now = system_tick.now_us();
-      if (power_runs) application->set_readings(power->drives.readings());
+      if (power_runs) {
+        firmware::BoardReadings readings = power->drives.readings();
+        readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
+        application->set_readings(readings);
+        power->drives.inhibit_brake(application->store_busy());
+      }
       application->poll(now);
       serial->poll(*application, now);
       if (power_runs) poll_power(now, applied_changes);
@@ -230,7 +246,12 @@ void ISR_exti4() {
 void ISR_system_tick() {
   using namespace kmax;
   board::system_tick.ISR_count();
-  if (board::power_runs) return;
+  if (board::power_runs) {
+    // Not before the first ticks: the power stage takes longer to become ready than this takes to settle.
+    if (board::power->stage.ready() && board::power->drives.ISR_ticks_have_stopped())
+      board::ticks_have_stopped.store(true, std::memory_order_relaxed);
+    return;
+  }
   // No encoder is read here, and none is claimed: the axes tick, and refuse to be armed.
   constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
   static_cast<void>(board::application->ISR_tick(input));

@@ -65,6 +65,8 @@ class PowerStage {
       stop_edge_.store(true, std::memory_order_relaxed);
     } else if (!any_armed) {
       stop_edge_.store(false, std::memory_order_relaxed);
+      // It may have been pressed after it was looked at; that edge has just been wiped out.
+      if (hardware_.emergency_stop_open()) stop_edge_.store(true, std::memory_order_relaxed);
     }
     if (!started_) {
       started_ = true;

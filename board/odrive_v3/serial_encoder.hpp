@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <optional>
 
 #include "board/odrive_v3/gate_drivers.hpp"
@@ -26,7 +27,24 @@ class SerialEncoder {
     if (!under_way_) end();
   }
 
+  /// Main loop: the next frame is the first. After the chips' configuration has held the bus for longer than
+  /// a missed frame is forgiven, and for another axis.
+  void restart() { restart_.store(true, std::memory_order_relaxed); }
+
+  bool under_way() const { return under_way_; }
+  /// Nobody wants the frame any more: it ended long ago.
+  void ISR_abandon() {
+    static_cast<void>(bus_.finish());
+    under_way_ = false;
+    end();
+  }
+
   drivers::As5047pSample ISR_take() {
+    if (restart_.exchange(false, std::memory_order_relaxed)) {
+      if (under_way_) ISR_abandon();
+      angle_.reset();
+      return {};
+    }
     if (!under_way_) return angle_.ISR_missed();
     const std::optional<std::uint16_t> reply = bus_.finish();
     under_way_ = false;
@@ -44,6 +62,7 @@ class SerialEncoder {
   drivers::stm32f4::GpioPin<> select_;
   drivers::As5047pAngle angle_;
   bool under_way_ = false;
+  std::atomic<bool> restart_{false};
 };
 
 }  // namespace kmax::board::odrive_v3

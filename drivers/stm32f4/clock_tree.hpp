@@ -68,7 +68,12 @@ class ClockTree {
     enable_peripheral_clock(rcc_.apb1enr, rcc_apb1enr::Power::mask);
     pwr_cr::VoltageScale1::set(pwr_.cr);
 
-    if (crystal_runs() && switch_to_pll(crystal_pll_set_up)) return full_speed(ClockSource::crystal_pll);
+    if (crystal_runs() && switch_to_pll(crystal_pll_set_up)) {
+      // A crystal that stops then raises the NMI, and the core goes on from the internal oscillator; without,
+      // it stops.
+      rcc_cr::ClockSecurity::set(rcc_.cr);
+      return full_speed(ClockSource::crystal_pll);
+    }
     rcc_cr::CrystalOn::clear(rcc_.cr);
     if (switch_to_pll(internal_pll_set_up)) return full_speed(ClockSource::internal_pll);
     return base_speed(ClockSource::internal);

@@ -176,26 +176,23 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     choice("motor.kind", group::motor, 1, names::motor_kind, 0,
            "Brushed DC motor or permanent-magnet synchronous.")
         .disarmed_only(),
-    real("motor.resistance", group::motor, 2, "ohm", 1e-4, 1000, 1,
-         "Winding (phase) resistance.")
+    real("motor.resistance", group::motor, 2, "ohm", 1e-4, 1000, 1, "Winding (phase) resistance.")
         .disarmed_only(),
-    real("motor.inductance", group::motor, 3, "H", 1e-7, 1, 1e-3,
-         "Winding (phase) inductance.")
+    real("motor.inductance", group::motor, 3, "H", 1e-7, 1, 1e-3, "Winding (phase) inductance.")
         .disarmed_only(),
     real("motor.torque_constant", group::motor, 4, "N m/A", 1e-5, 100, 0.05,
          "Torque per ampere (synchronous motor: of q current, amplitude).")
         .disarmed_only(),
-    whole("motor.pole_pairs", group::motor, 5, unsigned8, "", 1, 64, 7,
-          "Pole pairs of a synchronous motor.")
+    whole("motor.pole_pairs", group::motor, 5, unsigned8, "", 1, 64, 7, "Pole pairs of a synchronous motor.")
         .disarmed_only(),
     real("motor.electrical_offset", group::motor, 6, "rad", -7, 7, 0,
          "Electrical angle of a synchronous motor where the position is zero.")
         .disarmed_only(),
 
-    real("current.limit", group::current, 1, "A", 0, 120, 5,
-         "Largest motor current; a phase that carries half as much again trips the axis."),
-    real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000,
-         "Bandwidth of the current loop.")
+    real("current.limit", group::current, 1, "A", 0.1, 120, 5,
+         "Largest motor current; a phase that carries half as much again trips the axis.")
+        .disarmed_only(),
+    real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000, "Bandwidth of the current loop.")
         .disarmed_only(),
 
     choice("encoder.kind", group::encoder, 1, names::encoder_kind, 0,
@@ -211,7 +208,8 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
           "Count at which the position is zero.")
         .disarmed_only(),
     choice("encoder.index", group::encoder, 5, names::encoder_index, 0,
-           "Index line of a quadrature encoder. With one, a cable that comes off is found at once: all lines "
+           "Index line of a quadrature encoder. With one, a cable that comes off is found at once, when the "
+           "index has been passed once: all lines "
            "then read high away from the index.")
         .disarmed_only(),
 
@@ -257,8 +255,7 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
             "Haptic samples since arming."),
     reading("measured.current", group::measured, 14, float32, "A",
             "Motor current that makes torque, measured; 0 on a board without current sensors."),
-    reading("measured.current_reference", group::measured, 15, float32, "A",
-            "Motor current asked for."),
+    reading("measured.current_reference", group::measured, 15, float32, "A", "Motor current asked for."),
     reading("measured.temperature", group::measured, 16, float32, "degC",
             "Temperature of the axis' power stage."),
 });

@@ -32,6 +32,8 @@ struct Block {
   std::uint32_t cycles_if_taken = 0;  ///< more, when the block does not go on to the one behind it
   bool floating_point = false;
   std::uint32_t first_floating_point = 0;  ///< address
+  /// Cut by the end of a page (1 KiB) between an IT instruction and the last one that it governs.
+  bool ends_inside_if_then = false;
   std::vector<MemoryInstruction> memory;
 };
 

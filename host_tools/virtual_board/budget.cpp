@@ -58,15 +58,20 @@ std::string step_of(const std::vector<std::string>& frames) {
   for (const std::string& function : frames) {
     for (const StepPattern& pattern : patterns) {
       // Not in the types of its arguments.
-      if (function.substr(0, function.find('(')).find(pattern.function) != std::string::npos) return pattern.step;
+      if (function.substr(0, function.find('(')).find(pattern.function) != std::string::npos)
+        return pattern.step;
     }
   }
   return other_step;
 }
 
+std::uint16_t half_word(Bus& bus, std::uint32_t address) {
+  const auto bytes = bus.memory(address, 2);
+  return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
+}
+
 struct Tick {
   std::size_t axis = 0;
-  std::uint64_t cycles = 0;
   std::vector<std::uint32_t> addresses;
 };
 
@@ -78,20 +83,19 @@ class Recorder {
         handler_(image.required_symbol("ISR_adc").address),
         application_(
             image.required_symbol("_ZN4kmax8firmware11Application8ISR_tickEjRKNS0_4Axis5InputE").address) {
-    board.processor().on_instruction([this](std::uint32_t address, unsigned /*bytes*/) { note(address); });
+    board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
   }
 
   void start() { recording_ = true; }
   std::vector<Tick> take() { return std::move(ticks_); }
 
  private:
-  void note(std::uint32_t address) {
+  void note(std::uint32_t address, std::uint32_t size) {
     if (!recording_) return;
     const auto& exceptions = board_.core().exceptions;
     constexpr unsigned conversions = 16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::adc);
     if (address == handler_) {
       ticks_.emplace_back();
-      begin_cycles_ = board_.processor().cycles();
     }
     if (ticks_.empty() || !exceptions.active(conversions)) return;
     if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
@@ -99,24 +103,20 @@ class Recorder {
       return;
     Tick& tick = ticks_.back();
     if (address == application_) tick.axis = board_.processor().core_register(1);
-    tick.addresses.push_back(address);
-    tick.cycles = board_.processor().cycles() - begin_cycles_;
+    for (std::uint32_t at = address; at < address + size;) {
+      tick.addresses.push_back(at);
+      at += is_wide(half_word(board_.bus(), at)) ? 4 : 2;
+    }
   }
 
   VirtualBoard& board_;
   std::uint32_t handler_, application_;
-  std::uint64_t begin_cycles_ = 0;
   bool recording_ = false;
   std::vector<Tick> ticks_;
 };
 
 /// Entry, exit and the FP frame, PM0214; not part of what instructions cost.
-constexpr std::uint64_t exception_cycles = 12 + 12 + 2 * 17;
-
-std::uint16_t half_word(Bus& bus, std::uint32_t address) {
-  const auto bytes = bus.memory(address, 2);
-  return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
-}
+constexpr std::uint32_t exception_cycles = 12 + 12 + 2 * 17;
 
 void add_parameter(simulation::Scene& scene, const std::string& name, simulation::ParameterValue value) {
   scene.parameters.push_back({name, std::move(value), "budget"});
@@ -185,7 +185,9 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
       ++instructions;
       cycles += place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
     }
+    std::uint32_t cycles_of_tick = exception_cycles;
     for (const auto& [step, cost] : in_tick) {
+      cycles_of_tick += cost.second;
       StepSum& sum = sums[step];
       ++sum.ticks;
       sum.instructions += cost.first;
@@ -199,13 +201,12 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     }
     const std::size_t axis = tick.axis & 1U;
     estimate_worst[axis] = std::max(estimate_worst[axis], estimate);
-    const auto cycles = static_cast<std::uint32_t>(tick.cycles + exception_cycles);
     StepSum& total = totals[axis];
     ++total.ticks;
     total.instructions += tick.addresses.size();
-    total.cycles += cycles;
+    total.cycles += cycles_of_tick;
     total.worst = std::max(total.worst, static_cast<std::uint32_t>(tick.addresses.size()));
-    total.worst_cycles = std::max(total.worst_cycles, cycles);
+    total.worst_cycles = std::max(total.worst_cycles, cycles_of_tick);
   }
 
   BudgetReport report;

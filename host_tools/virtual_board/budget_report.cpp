@@ -20,7 +20,10 @@ std::string budget_table(const BudgetReport& report) {
                         line.name, line.value, line.bound, line.unit);
     if (!line.peers.empty()) text += fmt::format("         peers: {}\n", line.peers);
   }
-  text += "\nInstructions are exact. Cycles are a model (no wait states) that no board has confirmed.\n";
+  text +=
+      "\nInstructions are exact; one that an IT block skips counts as executed. Cycles are a model (no wait "
+      "states) that no\n"
+      "board has confirmed.\n";
   return text;
 }
 

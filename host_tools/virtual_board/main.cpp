@@ -60,6 +60,19 @@ int run(const Options& options) {
   const simulation::Scene scene = simulated_board::open_scene(options.scene);
   const auto image = virtual_board::ElfImage::load(options.elf);
   virtual_board::SceneWorld world(scene);
+  if (options.budget && !(world.has_drive(0) && world.has_drive(1))) {
+    fmt::print(
+        stderr,
+        "kmax-board: --budget needs a scene with a motor on both axes, such as 'motor_axes'; '{}' has not\n",
+        scene.name);
+    return cli::wrong_usage;
+  }
+  if (!world.has_drive(0) && !world.has_drive(1)) {
+    fmt::print(
+        stderr,
+        "kmax-board: scene '{}' has no motors: the board's connectors are open, and it will refuse to arm\n",
+        scene.name);
+  }
   virtual_board::VirtualBoardConfig config;
   config.identity.volts = static_cast<std::uint8_t>(options.volts);
   if (options.budget) {
@@ -102,7 +115,10 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  kmax-board build/stm32f405/kmax-odrive_v3.elf --serial /tmp/board &\n"
       "  kmax --device serial:/tmp/board info\n"
-      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --budget      instructions of each step of the tick");
+      "  kmax --device serial:/tmp/board arm --hold      the person of the scene presses; Ctrl-C disarms\n"
+      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --budget      instructions of each step of the "
+      "tick\n\n" +
+      std::string(cli::exit_code_text));
   Options options;
   app.add_option("ELF", options.elf, "The image, as linked")->required()->check(CLI::ExistingFile);
   app.add_option("--serial", options.serial, "Name under which USART2 appears as a pseudo-terminal")
@@ -110,10 +126,16 @@ int main(int argc, char** argv) {
   app.add_option("--can", options.can, "SocketCAN interface (not in this version)")->type_name("IFACE");
   app.add_option("--gpio", options.gpio, "GPIO chip for reset, E-stop and fault lines (not in this version)")
       ->type_name("CHIP");
-  app.add_option("--scene", options.scene, "TOML file or supplied scene; one with motors")
+  app.add_option("--scene", options.scene,
+                 "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
+                 "connector, its position stays 0")
       ->type_name("SCENE")
       ->capture_default_str();
-  app.add_option("--store", options.store, "File that keeps the parameter sectors (32 KiB, made if missing)")
+  app.add_option(
+         "--store", options.store,
+         "File that keeps what 'kmax save' saves (32 KiB, made if missing); written when this program "
+         "ends in order. What the scene says, its hardware and its [parameters], replaces the kept values "
+         "at each start")
       ->type_name("FILE");
   app.add_option("--voltage", options.volts, "Variant written into the board: 24 or 56")
       ->check(CLI::IsMember({24, 56}))
@@ -133,6 +155,10 @@ int main(int argc, char** argv) {
   try {
     if (!options.can.empty() || !options.gpio.empty()) {
       fmt::print(stderr, "kmax-board: --can and --gpio are not in this version; use --serial LINK\n");
+      return cli::wrong_usage;
+    }
+    if (options.json && !options.budget) {
+      fmt::print(stderr, "kmax-board: --json belongs to --budget\n");
       return cli::wrong_usage;
     }
     return run(options);

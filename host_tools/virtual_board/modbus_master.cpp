@@ -31,8 +31,9 @@ std::vector<std::uint8_t> ModbusMaster::exchange(std::vector<std::uint8_t> reque
       return reply;
     }
   }
-  throw std::runtime_error(fmt::format("the board does not answer function {}: {} of {} bytes", request[1],
-                                       reply.size(), reply_size));
+  throw std::runtime_error(fmt::format(
+      "at {:.3f} s the board does not answer function {}: {} of {} bytes; {} resets, {}",
+      seconds(board_.now()), request[1], reply.size(), reply_size, board_.resets() - 1, board_.where()));
 }
 
 void ModbusMaster::write_register(std::uint16_t address, std::uint16_t value) {

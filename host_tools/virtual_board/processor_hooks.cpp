@@ -30,10 +30,6 @@ struct ProcessorHooks {
   static void block(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
     static_cast<Processor*>(self)->begin_block(static_cast<std::uint32_t>(address), size);
   }
-  static void code(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
-    const auto* processor = static_cast<Processor*>(self);
-    processor->on_instruction_(static_cast<std::uint32_t>(address), size);
-  }
   static void interrupt(uc_engine* /*engine*/, std::uint32_t number, void* self) {
     static_cast<Processor*>(self)->interrupted(number);
   }
@@ -92,18 +88,11 @@ void Processor::add_hooks() {
   add(UC_HOOK_MEM_INVALID, &ProcessorHooks::invalid, "hooking invalid accesses");
 }
 
-void Processor::on_instruction(std::function<void(std::uint32_t, unsigned)> callback) {
-  if (started_ || on_instruction_) {
-    throw std::logic_error("Processor::on_instruction: once, and before the first run");
-  }
-  on_instruction_ = std::move(callback);
-  uc_hook hook{};
-  CoreEngine::check(uc_hook_add(engine_.handle(), &hook, UC_HOOK_CODE,
-                                reinterpret_cast<void*>(&ProcessorHooks::code), this, 1, 0),
-                    "hooking instructions");
-}
-
 void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
+  // Unicorn forgets the IT state when it is stopped between the two halves of an IT block that the end of a
+  // page cuts, and both ways would then be the same: interrupts wait for the block after.
+  const bool inside_if_then =
+      block_ != nullptr && block_->ends_inside_if_then && address == block_->address + block_->size;
   if (block_ != nullptr) {
     // Only here is it known which way the last block's branch went.
     if (block_->cycles_if_taken != 0 && address != block_->address + block_->size)
@@ -112,7 +101,7 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   }
   const bool interesting = attention_ || now_ >= limit_ || core_.exceptions.preempting() ||
                            stop_requested_.load(std::memory_order_relaxed);
-  if (interesting && must_stop()) {
+  if (interesting && !inside_if_then && must_stop()) {
     event_ = Event::block_end;
     uc_emu_stop(engine_.handle());
     return;
@@ -132,6 +121,7 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
       charge(lazy_frame_cycles);
     }
   }
+  if (on_block_) on_block_(address, size);
   block_ = block;
   locator_.begin_block(*block);
   instructions_ += block->instructions;

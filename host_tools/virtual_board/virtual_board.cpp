@@ -123,6 +123,9 @@ void VirtualBoard::wire() {
   rcc_->on_clock_failure([this](BoardTime now) {
     for (auto& timer : pwm_) timer->clock_failure_break(now);
   });
+  rcc_->on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
+    if (level) core_.exceptions.pend(exception_number::non_maskable);
+  });
   iwdg_->on_started([this](BoardTime /*now*/) { rcc_->note_low_speed_oscillator_running(); });
   iwdg_->on_reset([this](BoardTime /*now*/) {
     watchdog_fired_ = true;
@@ -267,6 +270,12 @@ void VirtualBoard::stall_until(BoardTime time) {
     events_.catch_up(next);
   }
   if (watchdog_fired_) reset(ResetCause::independent_watchdog);
+}
+
+std::string VirtualBoard::where() const {
+  const std::uint32_t address = processor_.program_counter();
+  return fmt::format("{} in {} (0x{:08X})", processor_.sleeping() ? "sleeping" : "running",
+                     image_.function_at(address), address);
 }
 
 void VirtualBoard::fail() const {

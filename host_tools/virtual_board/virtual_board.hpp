@@ -127,6 +127,8 @@ class VirtualBoard {
 
   bool bridge_armed(std::size_t axis) const { return pwm_[axis]->moe(); }
   std::uint64_t resets() const { return resets_; }
+  /// What the processor is about to execute, in words.
+  std::string where() const;
 
   // For tools and tests.
   Processor& processor() { return processor_; }

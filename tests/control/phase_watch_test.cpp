@@ -66,6 +66,12 @@ TEST(PhaseWatch, AFastMotorIsNotJudgedByCurrentThatDoesNotCome) {
   for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, dc(0.0f), dc(1.0f), false), PhaseCondition::good);
 }
 
+TEST(PhaseWatch, AFastMotorIsNotJudgedByCurrentThatVanishes) {
+  Watch watch;
+  ASSERT_EQ(watch.update(c, dc(1.0f), dc(1.0f), true), PhaseCondition::good);
+  EXPECT_EQ(watch.update(c, dc(0.0f), dc(1.0f), false), PhaseCondition::good);
+}
+
 // A release of the force: the reference goes first, the current follows.
 TEST(PhaseWatch, AReleaseOrAReversalIsNoOpenPhase) {
   Watch watch;

@@ -49,6 +49,9 @@ TEST(QuadratureIndexWatch, EveryTurnHasItsIndexAlsoBelowZero) {
   QuadratureIndexWatch watch = fresh();
   ASSERT_TRUE(watch.ISR_plausible(100, false));
   ASSERT_TRUE(watch.ISR_plausible(101, true));
+  ASSERT_FALSE(watch.learned());
+  ASSERT_TRUE(watch.ISR_plausible(102, false));
+  ASSERT_TRUE(watch.learned());
   for (int turn = -5; turn <= 5; ++turn) {
     const auto at = static_cast<std::uint32_t>(101 + turn * 8192);
     EXPECT_TRUE(watch.ISR_plausible(at + 4, true)) << turn;
@@ -81,10 +84,21 @@ TEST(QuadratureIndexWatch, AnIndexThatWasHighFromTheStartIsLearnedWhenItFalls) {
   EXPECT_FALSE(watch.ISR_plausible(0U - 1000U, true));
 }
 
+// A cable that comes off raises the line once and for all: its place must not be taken for the index.
+TEST(QuadratureIndexWatch, ALineThatNeverFallsIsNoIndex) {
+  QuadratureIndexWatch watch = fresh();
+  ASSERT_TRUE(watch.ISR_plausible(300, false));
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.ISR_plausible(300, true));
+  EXPECT_FALSE(watch.learned());
+  // Plugged in again elsewhere, the line falls far from there.
+  EXPECT_FALSE(watch.ISR_plausible(900, true));
+}
+
 TEST(QuadratureIndexWatch, ResetBelievesAgain) {
   QuadratureIndexWatch watch = fresh();
   (void)watch.ISR_plausible(0, false);
   (void)watch.ISR_plausible(1, true);
+  (void)watch.ISR_plausible(2, false);
   ASSERT_FALSE(watch.ISR_plausible(1000, true));
   watch.reset(config);
   EXPECT_TRUE(watch.ISR_plausible(1000, false));

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests {
@@ -158,6 +159,56 @@ TEST_F(ClosedLoop, ComesBackAfterTheFaultLineHasRisen) {
   const auto controlword = firmware::register_address(firmware::entry_of<"drive.controlword">(), 0);
   bench.master->write_register(controlword, 0x80);
   EXPECT_EQ(bench.fault(0), Fault::none);
+  bench.board->run_for(3.0);  // the person lets go
+  bench.master->arm(0);
+  bench.board->run_for(0.01);
+  EXPECT_TRUE(bench.board->bridge_armed(0));
+}
+
+// The clock security system: NMI, safe state, and a new start from the internal oscillator.
+TEST_F(ClosedLoop, ACrystalThatStopsTakesTheForceAtOnce) {
+  press();
+  const auto resets = bench.board->resets();
+  bench.board->rcc().fail_crystal(bench.board->now());
+  EXPECT_LE(ticks_until_off(0), 0.5);
+  EXPECT_LE(ticks_until_off(1), 0.5);
+  bench.board->run_for(0.1);
+  EXPECT_EQ(bench.board->resets(), resets + 1);
+  EXPECT_FALSE(bench.board->bridge_armed(0));
+}
+
+// Nothing but the clock's interrupt can tell that there are no ticks any more.
+TEST_F(ClosedLoop, TicksThatStopTakeTheForceWithinThreeMilliseconds) {
+  press();
+  bench.board->bus().write(drivers::stm32f4::adc_base + drivers::stm32f4::adc_stride + 0x08, 4, 0,
+                           bench.board->now());
+  bench.board->run_for(0.003);
+  EXPECT_FALSE(bench.board->bridge_armed(0));
+  EXPECT_FALSE(bench.board->bridge_armed(1));
+  bench.board->run_for(0.01);
+  EXPECT_EQ(bench.fault(0), Fault::tick_missed);
+}
+
+TEST_F(ClosedLoop, ABrokenThermistorIsTooHot) {
+  press();
+  bench.world.temperature(0).set_wiring(simulation::TemperatureSensor::Wiring::open);
+  bench.board->run_for(0.005);
+  EXPECT_FALSE(bench.board->bridge_armed(0));
+  EXPECT_TRUE(bench.board->bridge_armed(1));
+  EXPECT_EQ(bench.fault(0), Fault::over_temperature);
+}
+
+// A plug that is off is not forgotten because some parameter has changed.
+TEST_F(ClosedLoop, AnEncoderThatCameOffStaysWrong) {
+  press();
+  bench.world.connect_encoder(0, false);
+  bench.board->run_for(0.01);
+  ASSERT_EQ(bench.fault(0), Fault::encoder);
+  bench.master->write_registers(firmware::register_address(firmware::entry_of<"wall.damping">(), 0),
+                                {0x3F80, 0});
+  bench.master->write_register(firmware::register_address(firmware::entry_of<"drive.controlword">(), 0),
+                               0x80);
+  EXPECT_EQ(bench.fault(0), Fault::encoder);
 }
 
 }  // namespace

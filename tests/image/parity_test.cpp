@@ -22,7 +22,7 @@ class Companion {
  public:
   explicit Companion(virtual_board::VirtualBoard& board)
       : board_(board), entry_(image().required_symbol(tick_symbol).address) {
-    board.processor().on_instruction([this](std::uint32_t address, unsigned) {
+    board.processor().on_block([this](std::uint32_t address, std::uint32_t /*size*/) {
       if (address == entry_) enter();
       if (address == return_to_) leave();
     });

@@ -1,5 +1,5 @@
-"""The programs under test as context managers, and kmax as a function. Run by ctest with KMAX and, for the
-emulated board, KMAX_ELF and KMAX_QEMU_BOARD in the environment."""
+"""The programs under test as context managers, and kmax as a function. Run by ctest with KMAX, KMAX_BOARD and, for
+the image, KMAX_ELF and KMAX_QEMU_BOARD in the environment."""
 
 import json
 import os
@@ -10,6 +10,8 @@ import time
 from pathlib import Path
 
 KMAX = os.environ.get("KMAX", "build/native/kmax")
+BOARD = os.environ.get("KMAX_BOARD", "build/native/kmax-board")
+ELF = os.environ.get("KMAX_ELF", "build/stm32f405/kmax-odrive_v3.elf")
 
 
 def kmax(*arguments, device=None, check=True, timeout=60):
@@ -72,7 +74,14 @@ class QemuBoard(_Process):
     """The ARM image in QEMU."""
 
     def __init__(self):
-        super().__init__([os.environ["KMAX_QEMU_BOARD"], os.environ["KMAX_ELF"], "LINK"], 20)
+        super().__init__([os.environ["KMAX_QEMU_BOARD"], ELF, "LINK"], 20)
+
+
+class VirtualBoard(_Process):
+    """The ARM image on the virtual board, at real speed."""
+
+    def __init__(self, *options):
+        super().__init__([BOARD, ELF, "--serial", "LINK", *options], 20)
 
 
 def registers():
