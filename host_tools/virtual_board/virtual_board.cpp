@@ -7,6 +7,7 @@
 
 #include "board/odrive_v3/pins.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
+#include "drivers/stm32f4/registers/can.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/spi.hpp"
 #include "drivers/stm32f4/registers/syscfg.hpp"
@@ -60,6 +61,10 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
     return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
   });
   usart2_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::usart2);
+  uart4_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::uart4);
+  free_timers_[0] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim2, clocks_, core_.nvic);
+  free_timers_[1] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim5, clocks_, core_.nvic);
+  can1_ = std::make_unique<CanController>(clocks_, core_.nvic, can_bus_);
   spi3_ = std::make_unique<SpiModel>(clocks_);
 
   const auto attach = [this](std::uint32_t base, std::uint32_t size, std::string name, Peripheral& block,
@@ -72,12 +77,10 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
     }
     bus_.attach(base, size, std::move(name), block, std::move(clocked));
     peripherals_.push_back(&block);
-    events_.add(block);
   };
   constexpr std::size_t ahb1 = offsetof(chip::RccRegisters, ahb1enr),
                         apb1 = offsetof(chip::RccRegisters, apb1enr),
                         apb2 = offsetof(chip::RccRegisters, apb2enr);
-  // Timers first: events of one instant happen in this order, and an update event starts a conversion.
   constexpr std::uint32_t timer_size = sizeof(chip::TimerRegisters);
   attach(chip::tim1_base, timer_size, "TIM1", *pwm_[0], apb2, chip::rcc_apb2enr::Timer1::mask);
   attach(chip::tim8_base, timer_size, "TIM8", *pwm_[1], apb2, chip::rcc_apb2enr::Timer8::mask);
@@ -86,6 +89,10 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(chip::adc_base, 0x400, "ADC", *adc_, apb2,
          chip::rcc_apb2enr::Adc1::mask | chip::rcc_apb2enr::Adc2::mask | chip::rcc_apb2enr::Adc3::mask);
   attach(chip::usart2_base, UsartModel::size, "USART2", *usart2_, apb1, chip::rcc_apb1enr::Usart2::mask);
+  attach(chip::uart4_base, UsartModel::size, "UART4", *uart4_, apb1, chip::rcc_apb1enr::Uart4::mask);
+  attach(chip::tim2_base, timer_size, "TIM2", *free_timers_[0], apb1, chip::rcc_apb1enr::Timer2::mask);
+  attach(chip::tim5_base, timer_size, "TIM5", *free_timers_[1], apb1, chip::rcc_apb1enr::Timer5::mask);
+  attach(chip::can1_base, 0x400, "CAN1", *can1_, apb1, chip::rcc_apb1enr::Can1::mask);
   attach(chip::spi3_base, sizeof(chip::SpiRegisters), "SPI3", *spi3_, apb1, chip::rcc_apb1enr::Spi3::mask);
   constexpr std::uint32_t port_clocks[] = {chip::rcc_ahb1enr::GpioA::mask, chip::rcc_ahb1enr::GpioB::mask,
                                            chip::rcc_ahb1enr::GpioC::mask, chip::rcc_ahb1enr::GpioD::mask};
@@ -103,6 +110,14 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU", *dbgmcu_);
   attach(chip::dwt_base, DwtModel::size, "DWT", *dwt_);
   attach(DeviceIdentity::base, DeviceIdentity::size, "system memory", *identity_);
+  // Only those that do something by themselves: the loop asks each of them at every event. At one instant in
+  // this order: an update event comes before the conversions that it starts.
+  const std::array<Peripheral*, 13> with_events{
+      pwm_[0].get(),        pwm_[1].get(),      adc_.get(),         usart2_.get(),
+      uart4_.get(),         spi3_.get(),        rcc_.get(),         iwdg_.get(),
+      can1_.get(),          encoders_[0].get(), encoders_[1].get(), free_timers_[0].get(),
+      free_timers_[1].get()};
+  for (Peripheral* peripheral : with_events) events_.add(*peripheral);
   events_.add(core_.system_tick);
   events_.add(chip_events_);
   events_.add(flash_stall_);

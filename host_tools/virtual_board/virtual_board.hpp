@@ -13,6 +13,8 @@
 #include "host_tools/virtual_board/advanced_timer.hpp"
 #include "host_tools/virtual_board/as5047p_chip.hpp"
 #include "host_tools/virtual_board/board_world.hpp"
+#include "host_tools/virtual_board/can_bus.hpp"
+#include "host_tools/virtual_board/can_controller.hpp"
 #include "host_tools/virtual_board/core_peripherals.hpp"
 #include "host_tools/virtual_board/dbgmcu.hpp"
 #include "host_tools/virtual_board/device_identity.hpp"
@@ -137,6 +139,9 @@ class VirtualBoard {
   FlashInterface& flash() { return *flash_; }
   RccModel& rcc() { return *rcc_; }
   UsartModel& usart() { return *usart2_; }
+  /// GPIO1 and GPIO2 of J3; the image of today does not use it, nor the CAN bus.
+  UsartModel& uart4() { return *uart4_; }
+  CanBus& can_bus() { return can_bus_; }
   AdvancedTimerModel& pwm(std::size_t axis) { return *pwm_[axis]; }
   GeneralTimerModel& encoder_timer(std::size_t axis) { return *encoders_[axis]; }
   AdcModel& adc() { return *adc_; }
@@ -179,6 +184,10 @@ class VirtualBoard {
   std::array<std::unique_ptr<GeneralTimerModel>, 2> encoders_;
   std::unique_ptr<AdcModel> adc_;
   std::unique_ptr<UsartModel> usart2_;
+  std::unique_ptr<UsartModel> uart4_;
+  std::array<std::unique_ptr<GeneralTimerModel>, 2> free_timers_;  ///< TIM2 and TIM5
+  CanBus can_bus_;
+  std::unique_ptr<CanController> can1_;
   std::unique_ptr<SpiModel> spi3_;
   std::array<Drv8301Chip, 2> gate_drivers_;
   As5047pChip serial_encoder_{
