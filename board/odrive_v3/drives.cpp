@@ -196,10 +196,10 @@ void Drives::apply(const firmware::ParameterValues& values) {
     settings.has_index[axis] = values.whole<"encoder.index">(axis) != 0;
     const float trip = firmware::over_current_factor * values.real<"current.limit">(axis);
     if (trip > largest_current) largest_current = trip;
-    motors_[axis] = values.choice<firmware::MotorKind, "motor.kind">(axis);
+    const auto motor = values.choice<firmware::MotorKind, "motor.kind">(axis);
     Pwm& pwm = axis == 0 ? pwm0_ : pwm1_;
-    static_cast<void>(pwm.enable_legs(motors_[axis] == firmware::MotorKind::dc ? stm32::brushed_motor_legs
-                                                                               : stm32::PwmLegs{}));
+    static_cast<void>(
+        pwm.enable_legs(motor == firmware::MotorKind::dc ? stm32::brushed_motor_legs : stm32::PwmLegs{}));
   }
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (values.whole<"encoder.kind">(axis) != 1) continue;

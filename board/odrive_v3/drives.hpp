@@ -28,12 +28,14 @@ namespace kmax::board::odrive_v3 {
 /// Order of one tick, in the conversions' interrupt 0.7 us after the middle of the axis' low-side window:
 ///   1  which axis: TIM1 counts up after its underflow (axis 0), down after its overflow (axis 1)
 ///   2  currents and supply are read, the converters' lists set for the other axis
-///   3  the encoder's counter, and its index line if it has one; or the frame that the other axis' tick has
-///   begun 4  the application's tick: force, current reference, duty, trips 5  the duty is written; it
-///   becomes active at the timer's next over- or underflow, 25 us after the sample.
-///      A tick that may not drive clears MOE. MOE is set only when an axis begins to drive, and the power
-///      stage's condition is looked at once more after that: a line interrupt in between wins.
+///   3  the encoder's counter and its index line, or the frame that the other axis' tick has begun
+///   4  the application's tick: force, current reference, duty, trips
+///   5  the duty is written; it is active from the timer's next turn on, 25 us after the sample
 ///   6  offsets are averaged while that goes on; the brake, in axis 0's tick
+///
+/// A tick that may not drive clears MOE. MOE is set only when an axis begins to drive, and the power stage's
+/// condition is looked at once more after that: a line interrupt in between wins.
+///
 /// The two axes' ticks follow each other every 25 us and never overlap.
 class Drives {
  public:
@@ -54,7 +56,6 @@ class Drives {
     pwm0_.disarm();
     pwm1_.disarm();
   }
-  bool armed() const { return pwm0_.armed() || pwm1_.armed(); }
 
   /// Main loop: what the parameters say, when no axis is armed.
   void apply(const firmware::ParameterValues& values);
@@ -129,7 +130,6 @@ class Drives {
   firmware::WatchdogGate watchdog_gate_;
   Settings settings_{};
   firmware::Handover<Settings> handover_{Settings{}};
-  std::array<firmware::MotorKind, firmware::axis_count> motors_{};
   std::atomic<bool> calibrating_{false};
   std::atomic<bool> main_loop_due_{false};
   std::atomic<bool> brake_inhibited_{false};

@@ -65,7 +65,6 @@ class SerialLine {
 
   /// The interrupt has left something for the main loop since the last call.
   bool news() { return news_.exchange(false, std::memory_order_relaxed); }
-  bool transmitting() const { return usart_.transmitting(); }
 
  private:
   bool configure() {
