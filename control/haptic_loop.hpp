@@ -53,8 +53,10 @@ class HapticLoop {
     std::int64_t wall_count = 0;  ///< whole counts of the surface, rounded down
     Scalar wall_fraction{};       ///< counts, 0 <= fraction < 1
     Scalar count_length{};        ///< m
-    Scalar side{};                ///< +1 or -1
-    Scalar velocity_limit{};      ///< m/s; the largest number: none
+    Scalar
+        velocity_per_count{};  ///< m/s that one count in one tick is, for who follows the counts themselves
+    Scalar side{};             ///< +1 or -1
+    Scalar velocity_limit{};   ///< m/s; the largest number: none
     std::uint32_t divider = 1;
     Resampler::Coefficients resampler{};
     typename VelocityEstimator<Scalar>::Coefficients velocity{};
@@ -99,7 +101,7 @@ class HapticLoop {
   ///
   /// One tick. `external_force`: N along +x, added before the limiter (another axis' tangential force).
   [[gnu::noinline]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
-                     Scalar external_force = Scalar(0)) {
+                                       Scalar external_force = Scalar(0)) {
     if (ticks_until_sample_ != 0) {
       --ticks_until_sample_;
       held_.new_sample = false;
@@ -126,11 +128,18 @@ class HapticLoop {
     out.magnetic_coefficient = wall.magnetic_coefficient;
     out.tangential_force = disturbance.tangential;
 
-    const Scalar requested = saturate(c.side * saturate(wall.force + disturbance.normal) + external_force);
-    out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
-    out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
+    Scalar requested = c.side * (wall.force + disturbance.normal) + external_force;
+    // The same unless it overflows.
+    if (!is_finite(requested)) [[unlikely]]
+      requested = saturate(c.side * saturate(wall.force + disturbance.normal) + external_force);
+    // A velocity within the limit is finite, since the limit is.
+    const bool sound = magnitude(out.velocity) <= c.velocity_limit && is_finite(out.outside_distance) &&
+                       is_finite(requested);
+    out.over_speed = out.not_finite = false;
+    if (!sound) [[unlikely]]
+      tell(c, requested);
 
-    if (enabled && !out.over_speed && !out.not_finite) [[likely]] {
+    if (enabled && sound) [[likely]] {
       const auto limited = limiter_.update(c.force, requested);
       out.force = limited.force;
       out.limited = limited.limited;
@@ -141,6 +150,9 @@ class HapticLoop {
     }
     return held_;
   }
+
+  /// 0 to 1: the share of the force that the soft start lets pass; 0 while not enabled.
+  Scalar ramp() const { return limiter_.ramp(); }
 
   /// What the last tick() gave.
   const Output& output() const { return held_; }
@@ -155,6 +167,11 @@ class HapticLoop {
   }
 
  private:
+  [[gnu::noinline, gnu::cold]] void tell(const Coefficients& c, Scalar requested) {
+    Output& out = held_;
+    out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
+    out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
+  }
   void disable() {
     limiter_.reset();
     held_.force = Scalar(0);
@@ -182,9 +199,10 @@ typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const Hapt
   if (static_cast<double>(c.wall_count) > surface) --c.wall_count;
   c.wall_fraction = static_cast<Scalar>(surface - static_cast<double>(c.wall_count));
   c.count_length = static_cast<Scalar>(config.count_length);
+  c.velocity_per_count = static_cast<Scalar>(config.count_length * config.tick_rate);
   c.side = config.wall_side < 0 ? Scalar(-1) : Scalar(1);
-  c.velocity_limit =
-      config.velocity_limit > Scalar(0) ? config.velocity_limit : std::numeric_limits<Scalar>::max();
+  c.velocity_limit = config.velocity_limit > Scalar(0) ? saturate(config.velocity_limit)
+                                                       : std::numeric_limits<Scalar>::max();
   c.divider = config.divider < 1 ? 1 : config.divider;
 
   const std::int32_t step = resampler_step(config.position_resolution, config.count_length);

@@ -40,10 +40,12 @@ class MotorTransmission {
             Scalar(1) / config.transmission, config.current_limit};
   }
 
-  /// `force`: N at the handle. About 20 instructions.
+  /// `force`: N at the handle. About 10 instructions within the limit, 20 beyond.
   static Output update(const Coefficients& c, Scalar force) {
-    Output out;
     const Scalar wanted = force * c.current_per_force;
+    if (magnitude(wanted) < c.current_limit) [[likely]]
+      return {wanted, force, false, false};
+    Output out;
     if (!is_finite(wanted)) {
       out.not_finite = true;
       return out;

@@ -9,7 +9,7 @@
 //
 // Each tick: `ISR_command()` is the word to send, `ISR_decode(reply)` takes what came in with that frame, or
 // `ISR_missed()` says that there was no frame. The reply belongs to the command of the frame before, so the
-// angle is one tick old. This class keeps track of which is which; the first reply after reset() belongs to
+// angle is one tick old. This class keeps track of which is which; the first reply after restart() belongs to
 // nobody.
 //
 // What is not believed, and counted each under its own name: wrong parity; EF, after which the next command
@@ -21,9 +21,15 @@
 // the truth after it look wrong: what goes on from where the frame before that one was is accepted as well.
 //
 // For up to `maximum_held` frames in a row nothing is said about it: the count stays where it was and counts
-// as valid. Then it becomes invalid and stays so until reset(): a jump that lasts is an encoder that has
+// as valid. Then it becomes invalid and stays so until restart(): a jump that lasts is an encoder that has
 // slipped or a wire that is loose, and the position is no longer known, however plausible the frames become
 // again.
+//
+// The angle is absolute, the turns are counted. restart() keeps them if three frames agree within
+// `maximum_unseen` frames after the last angle that was believed: 100 frames are 5 ms at 20 kHz, in which a
+// handle would have to turn at 100 turns/s to get half a turn further, to where it would look as if it had
+// turned the other way. After longer nobody knows, and the count begins within one turn, as after power-up;
+// `reference_generation` rises, so that what was a difference of turns is not taken for motion.
 //
 // Stuck low reads as a good frame with the angle 0. Away from 0 that is a jump. At 0 it is not: after
 // `zeros_until_probe` zeros in a row the next command asks for the diagnostics instead, whose reply is never
@@ -40,6 +46,7 @@ struct As5047pAngleConfig {
   std::uint16_t maximum_step_change = 64;  ///< counts per frame and frame, 1 to 4096
   std::uint8_t maximum_held = 4;           ///< frames in a row; 0: the first bad one is final
   std::uint16_t zeros_until_probe = 32;    ///< frames in a row with angle 0; 0: never
+  std::uint16_t maximum_unseen = 100;      ///< frames over which restart() keeps the turns, below 65535
 };
 
 struct As5047pAngleCounters {
@@ -73,19 +80,17 @@ enum class As5047pFault : std::uint8_t {
 struct As5047pSample {
   std::uint32_t count = 0;  ///< free-running; 0 to 16383 at first
   bool valid = false;
-  bool held = true;  ///< the count is that of an earlier frame
+  bool held = true;                        ///< the count is that of an earlier frame
+  std::uint32_t reference_generation = 0;  ///< rises when turns have been lost: the count has another origin
 };
 
 class As5047pAngle {
  public:
   explicit constexpr As5047pAngle(const As5047pAngleConfig& config = {}) : config_(config) {}
 
-  /// Starts anew: the count begins within one turn, and is invalid until three frames agree. Counters go on.
-  constexpr void reset(const As5047pAngleConfig& config) {
-    config_ = config;
-    reset();
-  }
-  constexpr void reset() {
+  /// Starts anew: the count is invalid until three frames agree. It goes on from where it was if the turns
+  /// can be known (above), else it begins within one turn. Counters go on.
+  constexpr void restart() {
     fault_ = As5047pFault::starting;
     awaited_ = sent_ = As5047pRegister::no_operation;
     next_ = As5047pRegister::angle;
@@ -95,6 +100,10 @@ class As5047pAngle {
     zeros_ = 0;
     alive_ = false;
   }
+
+  /// Before restart(), when nobody has called ISR_decode() or ISR_missed() for a time: frames that nobody
+  /// counted.
+  constexpr void forget_turns() { unseen_ = 0xFFFF; }
 
   /// The word to send in the next frame. Once per frame.
   constexpr std::uint16_t ISR_command() {
@@ -106,6 +115,7 @@ class As5047pAngle {
 
   /// What came in with the frame that ISR_command() was sent in.
   constexpr As5047pSample ISR_decode(std::uint16_t reply) {
+    age();
     switch (as5047p_check(reply)) {
       case As5047pFrame::stuck_high:
         ++counters_.stuck_high;
@@ -133,6 +143,7 @@ class As5047pAngle {
   /// There was no frame: the bus was taken, or the frame did not end; whether or not ISR_command() has been
   /// called for it. The frame after brings a reply of unknown age and is left out too, so this costs two.
   constexpr As5047pSample ISR_missed() {
+    age();
     ++counters_.missed;
     sent_ = As5047pRegister::no_operation;
     return hold(As5047pFault::missed);
@@ -151,7 +162,11 @@ class As5047pAngle {
   };
 
   constexpr As5047pSample sample(bool held) const {
-    return {last_.count, fault_ == As5047pFault::none, held};
+    return {last_.count, fault_ == As5047pFault::none, held, reference_generation_};
+  }
+
+  constexpr void age() {
+    if (unseen_ != 0xFFFF) ++unseen_;
   }
 
   constexpr As5047pSample hold(As5047pFault reason) {
@@ -231,8 +246,28 @@ class As5047pAngle {
     // itself.
     if (agreeing_ >= frames_to_agree && (angle != 0 || config_.zeros_until_probe == 0 || alive_)) {
       fault_ = As5047pFault::none;
+      go_on();
     }
     return sample(false);
+  }
+
+  /// The turns of the angle with which it has started.
+  constexpr void go_on() {
+    if (believed_before_ && unseen_ <= config_.maximum_unseen) {
+      const std::uint32_t turns =
+          believed_ + static_cast<std::uint32_t>(step_to({believed_, 0}, angle_of(last_))) - last_.count;
+      last_.count += turns;
+      before_.count += turns;
+    } else if (believed_before_) {
+      ++reference_generation_;
+    }
+    believe();
+  }
+
+  constexpr void believe() {
+    believed_before_ = true;
+    believed_ = last_.count;
+    unseen_ = 0;
   }
 
   constexpr void accept(Movement from, std::uint16_t angle, std::int32_t frames) {
@@ -242,6 +277,7 @@ class As5047pAngle {
     last_ = {from.count + static_cast<std::uint32_t>(step), frames == 1 ? step : step / frames};
     held_ = 0;
     ++counters_.frames;
+    if (fault_ == As5047pFault::none) believe();
   }
 
   constexpr void watch_zeros(std::uint16_t angle) {
@@ -254,6 +290,10 @@ class As5047pAngle {
     if (next_ != As5047pRegister::angle) return;
     next_ = As5047pRegister::diagnostics;
     ++counters_.probes;
+  }
+
+  static constexpr std::uint16_t angle_of(const Movement& movement) {
+    return static_cast<std::uint16_t>(movement.count & as5047p::data_mask);
   }
 
   static constexpr std::int32_t step_to(const Movement& from, std::uint16_t angle) {
@@ -295,7 +335,11 @@ class As5047pAngle {
   std::int32_t frames_between_ = 1;  ///< of the two
   std::int32_t held_ = 0;
   std::uint16_t zeros_ = 0;
-  bool alive_ = false;  ///< has answered a probe since reset()
+  bool alive_ = false;  ///< has answered a probe since restart()
+  bool believed_before_ = false;
+  std::uint16_t unseen_ = 0;    ///< frames since then
+  std::uint32_t believed_ = 0;  ///< the last valid count of a frame
+  std::uint32_t reference_generation_ = 0;
   As5047pAngleCounters counters_{};
 };
 

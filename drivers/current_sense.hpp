@@ -28,7 +28,8 @@ struct CurrentSenseConfig {
   float shunt_ohm = 0.0005F;  // above 0
   CurrentSenseGain gain = CurrentSenseGain::x40;
   float reference_volt = 3.3F;  // of the converter and of the amplifier
-  // Codes outside say nothing about the current any more: the amplifier is linear from 0.3 V to 3.0 V.
+  // Codes outside say nothing about the current any more: the amplifier is linear from 0.3 V to 3.0 V. The
+  // highest is not below the lowest.
   std::uint16_t lowest_linear_code = 373;
   std::uint16_t highest_linear_code = 3723;
 };
@@ -41,7 +42,7 @@ class CurrentSense {
   constexpr explicit CurrentSense(const CurrentSenseConfig& config = {})
       : amperes_per_code_(config.reference_volt / 4096.0F / (gain_factor(config.gain) * config.shunt_ohm)),
         lowest_(config.lowest_linear_code),
-        highest_(config.highest_linear_code) {}
+        width_(static_cast<std::uint16_t>(config.highest_linear_code - config.lowest_linear_code)) {}
 
   constexpr float amperes_per_code() const { return amperes_per_code_; }
 
@@ -54,12 +55,15 @@ class CurrentSense {
     return (static_cast<float>(code) - offset_) * amperes_per_code_;
   }
 
-  /// The true current may be anything beyond what the code says: treat it as over-current.
-  constexpr bool ISR_saturated(std::uint16_t code) const { return code < lowest_ || code > highest_; }
+  /// The true current may be anything beyond what the code says: treat it as over-current. A code below the
+  /// lowest wraps, so one comparison is enough.
+  constexpr bool ISR_saturated(std::uint16_t code) const {
+    return std::uint32_t{code} - std::uint32_t{lowest_} > width_;
+  }
 
   /// The largest current that reads without saturation in both directions, A.
   constexpr float range() const {
-    const float up = (static_cast<float>(highest_) - offset_) * amperes_per_code_;
+    const float up = (static_cast<float>(lowest_ + width_) - offset_) * amperes_per_code_;
     const float down = (offset_ - static_cast<float>(lowest_)) * amperes_per_code_;
     return up < down ? up : down;
   }
@@ -67,9 +71,19 @@ class CurrentSense {
  private:
   float amperes_per_code_;
   std::uint16_t lowest_;
-  std::uint16_t highest_;
+  std::uint16_t width_;  ///< of the linear codes, less one
   float offset_ = middle_code;
 };
+
+/// The largest gain, and so the finest step, with which this current (A) is read without saturation; x10 when
+/// none is. Not for the interrupt path.
+constexpr CurrentSenseGain gain_for_current(float largest_current) {
+  for (unsigned code = static_cast<unsigned>(CurrentSenseGain::x80); code > 0; --code) {
+    const auto gain = static_cast<CurrentSenseGain>(code);
+    if (CurrentSense{{.gain = gain}}.range() >= largest_current) return gain;
+  }
+  return CurrentSenseGain::x10;
+}
 
 struct OffsetCalibrationConfig {
   std::uint8_t log2_samples = 10;  // 1024 samples: 51 ms at 20 kHz; 0 to 16

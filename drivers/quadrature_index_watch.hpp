@@ -6,50 +6,119 @@ namespace kmax::drivers {
 
 struct QuadratureIndexConfig {
   std::uint32_t counts_per_turn = 8192;  ///< >= 4
-  std::int32_t tolerance = 4;            ///< counts around the index in which the line may be high
+  std::int32_t tolerance = 4;            ///< counts beyond the index in which the line may still be high
+  std::int32_t widest = 16;              ///< counts, >= 1: no index is wider (one line is four counts)
 };
 
-/// Tells a quadrature encoder whose cable has come off from one that stands still.
+/// Where a quadrature encoder's index is, and whether the encoder's cable has come off.
 ///
-/// Its lines are pulled up on the board, so an open cable reads A = B = Z = 1: the count stays, which alone
-/// looks like a handle at rest, but the index line is high where no index is. Where the index is, is learned
-/// when the line has been high and falls again near the same count: a cable that comes off never does that.
-/// From then on a high line anywhere else is wrong at the first look. Before that, only a line that stays
-/// high while the count leaves the tolerance is.
+/// The lines are pulled up on the board, so an open cable reads A = B = Z = 1: the count stays, which alone
+/// looks like a handle at rest, but the index line is high where no index is.
 ///
-/// So a cable that comes off before the index has once been passed is not seen, and neither is one that comes
-/// off on the index.
+/// The index is learned from a full crossing: the line was low on one side, high in between, and falls on the
+/// other side. A handle that dips into the index and comes back, or that starts on it, has seen one edge
+/// only and teaches nothing. index() is the middle between the two edges, each taken half-way between the
+/// last look at one level and the first at the other: the same from both sides. At one count per look it is
+/// within half a count of the middle; at n counts per look within n/2, since the edges are known no better. A
+/// crossing in which the two low looks are more than twice `widest` apart is not used.
+///
+/// What a high line says of the cable:
+///   line never fallen yet          wrong when it has been high over more than `widest` counts
+///   fallen without a full crossing wrong when farther than `widest` + `tolerance` from where it was high
+///   learned                        wrong when more than `tolerance` beyond the index, whose width is known
+/// The last two find a cable that comes off at the first look. One that comes off before the line has once
+/// been high and fallen is not seen, and neither is one that comes off on the index.
 ///
 /// Once wrong it stays wrong until reset(): edges have been lost, and with them the position.
 ///
-/// Cost: 12 Cortex-M4 instructions while the line is low, 25 (one division) while it is high.
+/// Cost: about 10 Cortex-M4 instructions while the line is low, 30 (one division) while it is high.
 class QuadratureIndexWatch {
  public:
   explicit constexpr QuadratureIndexWatch(const QuadratureIndexConfig& config = {}) : config_(config) {}
 
-  constexpr void reset(const QuadratureIndexConfig& config) {
-    config_ = config;
-    learned_ = failed_ = high_ = false;
-  }
+  constexpr void reset(const QuadratureIndexConfig& config) { *this = QuadratureIndexWatch{config}; }
 
   /// `count`: free-running. `index_line`: its level at the same moment. False: the encoder is not to be
   /// believed.
   constexpr bool ISR_plausible(std::uint32_t count, bool index_line) {
     if (!index_line) {
-      if (high_ && !learned_ && !failed_ && distance_from(index_, count) <= config_.tolerance)
-        learned_ = true;
-      high_ = false;
+      if (high_) [[unlikely]]
+        fall(count);
+      low_at_ = count;
+      low_seen_ = true;
       return !failed_;
     }
-    if (!learned_ && !high_) index_ = count;
+    if (!learned_) [[unlikely]]
+      extend(count);
     high_ = true;
-    if (distance_from(index_, count) > config_.tolerance) failed_ = true;
+    if (zone_known_ && distance_from(index_, count) > reach_) failed_ = true;
     return !failed_;
   }
 
   constexpr bool learned() const { return learned_; }
 
+  /// Count at which the middle of the index is, once learned.
+  constexpr std::uint32_t index() const { return index_; }
+
+  /// Counts are given less `by` from now on.
+  constexpr void ISR_shift_counts(std::uint32_t by) {
+    index_ -= by;
+    low_at_ -= by;
+    rose_at_ -= by;
+  }
+
  private:
+  static constexpr std::int32_t lesser(std::int32_t a, std::int32_t b) { return a < b ? a : b; }
+  static constexpr std::int32_t greater(std::int32_t a, std::int32_t b) { return a < b ? b : a; }
+
+  /// The counts at which the line is high, before the index is known. Counts here are from where it rose: the
+  /// last low look, or the first look of all.
+  constexpr void extend(std::uint32_t count) {
+    if (!high_) {
+      from_low_ = low_seen_;
+      rose_at_ = low_seen_ ? low_at_ : count;
+      lowest_ = highest_ = static_cast<std::int32_t>(count - rose_at_);
+    }
+    const auto moved = static_cast<std::int32_t>(count - rose_at_);
+    lowest_ = lesser(lowest_, moved);
+    highest_ = greater(highest_, moved);
+    if (highest_ - lowest_ >= config_.widest) failed_ = true;
+  }
+
+  constexpr void fall(std::uint32_t count) {
+    high_ = false;
+    if (learned_ || failed_) return;
+    const auto out = static_cast<std::int32_t>(count - rose_at_);
+    if (from_low_ && is_crossing(out)) {
+      const std::int32_t below = lesser(0, out), above = greater(0, out);
+      // To the nearest count; a half goes up, from whichever side it is crossed.
+      const std::int32_t middle = (below + lowest_ + highest_ + above + 2) >> 2;
+      // All counts that can belong to the index, seen high or not seen at all.
+      const std::int32_t down = middle - lesser(lowest_, below + 1);
+      const std::int32_t up = greater(highest_, above - 1) - middle;
+      take(middle, greater(down, up));
+      learned_ = true;
+    } else if (!zone_known_) {
+      take((lowest_ + highest_) >> 1, config_.widest);
+    }
+  }
+
+  /// An edge may lie within a count, which is then seen low and high. If no other count was high, nothing
+  /// tells a crossing from a touch.
+  constexpr bool is_crossing(std::int32_t out) const {
+    if (greater(out, -out) > 2 * config_.widest) return false;
+    if (lowest_ > 0 && out > highest_) return true;
+    if (highest_ < 0 && out < lowest_) return true;
+    if (lowest_ == highest_) return false;
+    return (lowest_ >= 0 && out >= highest_) || (highest_ <= 0 && out <= lowest_);
+  }
+
+  constexpr void take(std::int32_t middle, std::int32_t half_width) {
+    index_ = rose_at_ + static_cast<std::uint32_t>(middle);
+    reach_ = half_width + config_.tolerance;
+    zone_known_ = true;
+  }
+
   /// Counts to the nearest whole number of turns from `origin`.
   constexpr std::int32_t distance_from(std::uint32_t origin, std::uint32_t count) const {
     const auto moved = static_cast<std::int32_t>(count - origin);
@@ -61,8 +130,13 @@ class QuadratureIndexWatch {
   }
 
   QuadratureIndexConfig config_;
-  std::uint32_t index_ = 0;
+  std::uint32_t index_ = 0;                ///< middle of where the line may be high
+  std::int32_t reach_ = 0;                 ///< counts from there in which it may be
+  std::uint32_t low_at_ = 0;               ///< of the last low look
+  std::uint32_t rose_at_ = 0;              ///< of the last low look before the line rose
+  std::int32_t lowest_ = 0, highest_ = 0;  ///< from rose_at_: counts with a high line
   bool learned_ = false, failed_ = false, high_ = false;
+  bool low_seen_ = false, from_low_ = false, zone_known_ = false;
 };
 
 }  // namespace kmax::drivers

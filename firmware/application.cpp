@@ -32,13 +32,15 @@ modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
 }
 }  // namespace
 
-Application::Application(const BoardIdentity& board)
+Application::Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory)
     : board_(board),
       bank_(*this),
       port_(bank_, port_configuration(registers_.values())),
       settings_(make_settings()),
-      handover_(settings_) {
+      handover_(settings_),
+      capture_(capture_memory) {
   for (AxisStateMachine& machine : machines_) machine.initialised();
+  configure_thermal();
   refresh_readings();
 }
 
@@ -59,7 +61,17 @@ Application::Settings Application::make_settings() const {
     // Near the position by the new origin: the resampler starts from there.
     const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
     settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
-    settings[axis].motor = MotorControl::prepare(motor_configuration(values, axis));
+    const Circumstances now = offered_[axis];
+    settings[axis].motor =
+        MotorControl::prepare(motor_configuration(values, axis, now.winding_temperature, now.current_share));
+    settings[axis].compensation =
+        control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
+    settings[axis].plausibility = control::MotionPlausibility<float>::prepare(
+        plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
+    settings[axis].watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
+    settings[axis].excitation = Excitation::prepare(excitation_configuration(values, axis));
+    settings[axis].mode = mode(axis);
+    settings[axis].commutated = now.commutated;
     settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
     settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
   }
@@ -67,7 +79,10 @@ Application::Settings Application::make_settings() const {
 }
 
 void Application::offer_settings_if_changed() {
-  if (registers_.changes() == offered_changes_) return;
+  const std::array<Circumstances, axis_count> now{circumstances_of(0), circumstances_of(1)};
+  if (registers_.changes() == offered_changes_ && now == offered_) return;
+  offered_ = now;
+  if (registers_.changes() != offered_changes_) configure_thermal();
   offered_changes_ = registers_.changes();
   if (registers_.restarting_changes() != offered_restarts_) {
     offered_restarts_ = registers_.restarting_changes();
@@ -91,9 +106,23 @@ bool Application::settled(std::size_t of_axis) const {
   return true;
 }
 
-bool Application::too_hot(std::size_t axis) const {
-  // Not a number: the sensor is broken.
-  return !(readings_.power_stage_temperature[axis] <= registers_.values().real<"temperature.limit">(axis));
+Application::Circumstances Application::circumstances_of(std::size_t axis) const {
+  return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis)};
+}
+
+void Application::configure_thermal() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    thermal_[axis].configure(thermal_configuration(registers_.values(), axis));
+}
+
+void Application::poll_temperatures() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    thermal_[axis].poll(now_us_, report_[axis].motor.current_square, readings_.power_stage_temperature[axis]);
+}
+
+bool Application::commutation_known(std::size_t axis) const {
+  return !readings_.has_power_stage ||
+         Commutation::known(registers_.values(), axis, report_[axis].referenced);
 }
 
 void Application::take_reports() {
@@ -106,8 +135,12 @@ void Application::take_reports() {
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
   if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
-  if (too_hot(axis)) return Refusal::too_hot;
+  if (thermal_[axis].power_stage_too_hot()) return Refusal::too_hot;
+  if (thermal_[axis].motor_too_hot()) return Refusal::motor_too_hot;
   if (!report_[axis].count_valid) return Refusal::encoder_invalid;
+  // Excitation begins without knowing anything of the rotor; what needs its angle is bounded in travel.
+  if (mode(axis) == DriveMode::excitation) return Refusal::none;
+  if (!commutation_known(axis)) return Refusal::commutation_unknown;
   const auto& haptic = report_[axis].haptic;
   const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
                            settings_[axis].haptic.interference.mode != control::InterferenceMode::none;
@@ -121,10 +154,29 @@ void Application::trip(std::size_t axis, Fault fault, float value, float bound) 
     return;
   fault_value_[axis] = value;
   fault_bound_[axis] = bound;
+  // Counts were lost, and with them the rotor's angle.
+  if (fault == Fault::encoder || fault == Fault::spin_out)
+    commutation_[axis].forget(registers_.values(), axis);
+  const AxisReport& report = report_[axis];
+  if (report.trip.fault == fault && report.fault == fault) {
+    trip_record_[axis] = report.trip;
+  } else {
+    // Found here and not in the tick: as the last report says.
+    trip_record_[axis] = {.position = Axis::position_of(report.counted, settings_[axis]),
+                          .tick = report.tick,
+                          .velocity = report.haptic.velocity,
+                          .force = report.force,
+                          .current = report.motor.current,
+                          .current_reference = report.motor.current_reference,
+                          .supply = readings_.supply_voltage,
+                          .value = value,
+                          .fault = fault};
+  }
+  fault_temperatures_[axis] = {readings_.power_stage_temperature[axis], thermal_[axis].winding_temperature()};
 }
 
-namespace {
-float bound_of(Fault fault, const ParameterValues& values, std::size_t axis) {
+float Application::bound_of(Fault fault, std::size_t axis) const {
+  const ParameterValues& values = registers_.values();
   switch (fault) {
     case Fault::over_speed:
       return values.real<"velocity.limit">(axis);
@@ -134,11 +186,16 @@ float bound_of(Fault fault, const ParameterValues& values, std::size_t axis) {
       return values.real<"supply.voltage_max">();
     case Fault::over_current:
       return over_current_factor * values.real<"current.limit">(axis);
+    case Fault::current_sum:
+      return settings_[axis].motor.watch.unbalanced;
+    case Fault::spin_out:
+      return plausibility_configuration(values, axis).tolerance;
+    case Fault::excitation_travel:
+      return values.real<"excitation.travel">(axis);
     default:
       return 0.0f;
   }
 }
-}  // namespace
 
 void Application::supervise(std::size_t axis) {
   AxisStateMachine& machine = machines_[axis];
@@ -148,11 +205,15 @@ void Application::supervise(std::size_t axis) {
   // Before the commands: a fault is reported even if the host disarms in the same moment.
   if (machine.armed()) {
     if (report.fault != Fault::none && enable_[axis].load(std::memory_order_relaxed)) {
-      trip(axis, report.fault, report.fault_value, bound_of(report.fault, values, axis));
+      trip(axis, report.fault, report.fault_value, bound_of(report.fault, axis));
     }
-    if (too_hot(axis)) {
+    if (thermal_[axis].power_stage_too_hot()) {
       trip(axis, Fault::over_temperature, readings_.power_stage_temperature[axis],
            values.real<"temperature.limit">(axis));
+    }
+    if (thermal_[axis].motor_too_hot()) {
+      trip(axis, Fault::motor_too_hot, thermal_[axis].winding_temperature(),
+           values.real<"temperature.motor_limit">(axis));
     }
     if (readings_.ticks_have_stopped) trip(axis, Fault::tick_missed, 0.0f, 0.0f);
     const float timeout = values.real<"link.timeout">();
@@ -174,9 +235,11 @@ void Application::supervise(std::size_t axis) {
     const std::uint16_t pending = pending_command_[axis];
     if (!machine.asks_to_enable(pending) || settled(axis)) {
       command_pending_[axis] = false;
-      const bool cause_remains = (machine.fault() == Fault::encoder && !report.count_valid) ||
-                                 (machine.fault() == Fault::over_temperature && too_hot(axis)) ||
-                                 (machine.fault() != Fault::none && machine.fault() == report.condition);
+      const bool cause_remains =
+          (machine.fault() == Fault::encoder && !report.count_valid) ||
+          (machine.fault() == Fault::over_temperature && thermal_[axis].power_stage_too_hot()) ||
+          (machine.fault() == Fault::motor_too_hot && thermal_[axis].motor_too_hot()) ||
+          (machine.fault() != Fault::none && machine.fault() == report.condition);
       machine.command(pending, obstacle_to_arming(axis), cause_remains);
     }
   }
@@ -185,6 +248,8 @@ void Application::supervise(std::size_t axis) {
 }
 
 void Application::act() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    commutation_[axis].follow(registers_.values(), axis, report_[axis].reference_generation);
   offer_settings_if_changed();
   for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
 }
@@ -202,6 +267,7 @@ void Application::poll(std::uint32_t now_us) {
   }
   take_reports();
   registers_.poll(now_us);
+  poll_temperatures();
 
   SerialByte received;
   while (serial_queue_.pop(received)) port_.receive(received.byte, received.line_error, received.time_us);

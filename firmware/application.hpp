@@ -8,6 +8,8 @@
 
 #include "firmware/axis.hpp"
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/capture.hpp"
+#include "firmware/commutation.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/device_registers.hpp"
 #include "firmware/handover.hpp"
@@ -15,6 +17,7 @@
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameter_keeper.hpp"
 #include "firmware/snapshot.hpp"
+#include "firmware/thermal_supervisor.hpp"
 #include "firmware/trace.hpp"
 
 namespace kmax::firmware {
@@ -52,6 +55,7 @@ struct BoardReadings {
   std::array<float, axis_count> power_stage_temperature{25.0f, 25.0f};  ///< degC
   float supply_voltage = 0.0f;                                          ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
+  bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
   bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
 };
 
@@ -64,14 +68,17 @@ struct BoardReadings {
 ///
 /// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
 /// What crosses: settings and enables main -> tick (Handover, atomics), reports and the trace tick -> main
-/// (Snapshot, Trace), bytes serial -> main (InterruptQueue). Nothing else is shared.
+/// (Snapshot, Trace), a capture's plan and its samples (Capture), bytes serial -> main (InterruptQueue).
+/// Nothing else is shared.
 ///
 /// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
 /// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
-/// or a counter, all of which a host can read. Memory: about 14 KiB, no heap.
+/// or a counter, all of which a host can read. Memory: about 27 KiB on the target, no heap.
 class Application {
  public:
-  explicit Application(const BoardIdentity& board);
+  /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
+  /// application.
+  explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {});
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 
@@ -131,6 +138,13 @@ class Application {
   };
 
   using Settings = std::array<AxisSetting, axis_count>;
+  /// What an axis' settings depend on beside the parameters.
+  struct Circumstances {
+    float current_share = 1.0f;         ///< of current.limit that the temperatures leave
+    float winding_temperature = 25.0f;  ///< degC, in steps
+    bool commutated = true;             ///< the rotor's angle is known
+    friend constexpr bool operator==(const Circumstances&, const Circumstances&) = default;
+  };
   struct SerialByte {
     std::uint32_t time_us;
     std::uint8_t byte;
@@ -147,10 +161,19 @@ class Application {
   void refresh_readings();
   void refresh_store_readings();
   DeviceRegisters::WriteResult command_store(std::uint16_t command);
+  DeviceRegisters::WriteResult command_capture(std::uint16_t command);
+  void refresh_capture_readings();
   void take_reports();
-  bool too_hot(std::size_t axis) const;
+  bool commutation_known(std::size_t axis) const;
+  DriveMode mode(std::size_t axis) const { return registers_.values().choice<DriveMode, "drive.mode">(axis); }
+  Circumstances circumstances_of(std::size_t axis) const;
+  void configure_thermal();
+  void poll_temperatures();
+  float bound_of(Fault fault, std::size_t axis) const;
   void ISR_supervise_main_loop();
   void ISR_trace(const control::HapticLoop<float>::Output& traced);
+  // Rare, and kept out of the tick's one function, whose registers it would take.
+  [[gnu::noinline]] void ISR_capture(std::size_t axis, const AxisInput& input, const AxisOutput& output);
 
   BoardIdentity board_;
   DeviceRegisters registers_;
@@ -160,6 +183,12 @@ class Application {
   std::array<bool, axis_count> command_pending_{};
   std::array<std::uint16_t, axis_count> pending_command_{};
   std::array<float, axis_count> fault_value_{}, fault_bound_{};
+  std::array<TripRecord, axis_count> trip_record_{};
+  /// When a fault was seen: power stage, winding.
+  std::array<std::array<float, 2>, axis_count> fault_temperatures_{};
+  std::array<ThermalSupervisor, axis_count> thermal_;
+  std::array<Commutation, axis_count> commutation_;
+  std::array<Circumstances, axis_count> offered_{};
   BoardReadings readings_;
   ParameterKeeper keeper_;
   // Before settings_, which is made from them.
@@ -173,6 +202,7 @@ class Application {
   std::array<Snapshot<AxisReport>, axis_count> snapshots_;
   InterruptQueue<SerialByte, 512> serial_queue_;
   Trace trace_;
+  Capture capture_;
   std::array<std::atomic<bool>, axis_count> enable_{};
   std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
   /// Asked for by the main loop, taken back by the tick that publishes.

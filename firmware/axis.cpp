@@ -1,92 +1,249 @@
 #include "firmware/axis.hpp"
 
+#include <bit>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
+
 namespace kmax::firmware {
+
+namespace {
+
+std::uint32_t low_word(std::int64_t count) {
+  return static_cast<std::uint32_t>(count);
+}
+
+/// m/s along +x in this very tick: the watch over the motion smooths by itself, and a velocity that lags
+/// behind the force, as the haptic loop's estimate does, would look like unexplained energy. `moved`: counts.
+float velocity_of_tick(const AxisSetting& setting, std::int32_t moved) {
+  const auto along = static_cast<std::int32_t>(static_cast<std::uint32_t>(moved) *
+                                               static_cast<std::uint32_t>(setting.encoder_direction));
+  return static_cast<float>(along) * setting.haptic.velocity_per_count;
+}
+
+/// Whole words, where an assignment would go around the padding byte by byte.
+[[gnu::always_inline]] inline void copy_words(void* to, const void* from, std::size_t size) {
+  std::memcpy(__builtin_assume_aligned(to, alignof(std::uint32_t)),
+              __builtin_assume_aligned(from, alignof(std::uint32_t)), size);
+}
+
+}  // namespace
 
 // Flattened: the calls between its parts cost a tenth of the tick.
 [[gnu::flatten]] const Axis::Output& Axis::ISR_tick(const AxisSetting& setting, const Input& input,
                                                     bool enable, float external_force, std::uint32_t tick) {
   if (!enable) trip_ = Fault::none;
-  if (input.count_valid && !started_) {
-    // What the counter held before its first valid count means nothing, and neither does the jump to it.
-    extender_.reset(input.count);
-    loop_.reset();
-    started_ = true;
-  }
-  if (input.count_valid) counted_ = extender_.update(input.count);
-  bool changed = false;
-  if (generation_ != setting.generation) {
-    generation_ = setting.generation;
-    loop_.reset();
-    changed = true;
-  }
-  Fault condition = input.condition;
-  if (condition == Fault::none && input.motor.present) {
-    if (!(input.motor.supply_voltage >= setting.supply_voltage_min)) condition = Fault::under_voltage;
-    if (!(input.motor.supply_voltage <= setting.supply_voltage_max)) condition = Fault::over_voltage;
-  }
-  const bool was_enabled = enable && trip_ == Fault::none;
-  const std::int64_t position = position_of(counted_, setting);
-  const auto& out = loop_.tick(setting.haptic, position, was_enabled && input.count_valid, external_force);
-  if (was_enabled) {
-    if (condition != Fault::none) {
-      const bool of_supply = condition == Fault::under_voltage || condition == Fault::over_voltage;
-      trip(condition, of_supply ? input.motor.supply_voltage : 0.0f);
-    } else if (!input.count_valid) {
-      trip(Fault::encoder, 0.0f);
-    } else if (out.not_finite) {
-      trip(Fault::not_finite, out.velocity);
-    } else if (out.over_speed) {
-      trip(Fault::over_speed, out.velocity);
-    }
-  }
-  bool driving = was_enabled && trip_ == Fault::none;
-  motor_.update(setting.motor, input.motor, out.force, static_cast<std::uint32_t>(position), out.velocity,
-                driving, output_.motor);
-  if (driving && output_.motor.fault != Fault::none) {
-    trip(output_.motor.fault, output_.motor.fault_value);
-    output_.motor.duty_a = output_.motor.duty_b = output_.motor.duty_c = 0.5f;
-    driving = false;
-  }
-  count_samples(out, enable);
   tick_ = tick;
-  const std::uint32_t state = state_word(trip_, condition, enable, input.count_valid);
-  changed_ = changed || state != state_;
-  state_ = state;
-
-  output_.enabled = driving;
-  output_.force = driving ? out.force : 0.0f;
-  output_.tangential_force = driving ? out.tangential_force : 0.0f;
-  output_.background_force = driving ? out.magnetic_force : 0.0f;
+  supply_ = input.motor.supply_voltage;
+  if (generation_ != setting.generation) [[unlikely]] {
+    generation_ = setting.generation;
+    start_afresh();
+  }
+  std::int32_t moved = 0;
+  if (input.count_valid) [[likely]] {
+    if (!started_ || reference_generation_ != input.reference_generation) [[unlikely]]
+      refer_anew(input, enable);
+    const std::uint32_t before = low_word(extender_.count());
+    moved = static_cast<std::int32_t>(low_word(extender_.update(input.count)) - before);
+  }
+  const std::int64_t position = position_of(extender_.count(), setting);
+  std::uint32_t state = state_word(trip_, condition_of(setting, input), enable, input);
+  const bool sound = (state & ~referenced_bit) == (enabled_bit | count_valid_bit);
+  const bool rendering = sound && setting.mode == DriveMode::haptic;
+  const auto& out = loop_.tick(setting.haptic, position, rendering, external_force);
+  // One question: asked as two, both answers would be kept in registers until there is a zero to store.
+  const bool wrong = static_cast<bool>(out.not_finite | out.over_speed);
+  if (rendering && !wrong) [[likely]] {
+    output_.enabled = render(setting, input, low_word(position), moved);
+  } else {
+    output_.enabled = do_otherwise(setting, input, state, moved);
+  }
+  if (!output_.enabled) [[unlikely]]
+    state |= static_cast<std::uint32_t>(trip_);
+  changes_ = state ^ state_;
+  if (changes_ != 0) [[unlikely]] {
+    if (enable && (state_ & enabled_bit) == 0) armed_samples_ = limited_samples_ = 0;
+    state_ = state;
+  }
+  if (enable && out.new_sample) [[likely]] {
+    ++armed_samples_;
+    if (out.limited) ++limited_samples_;
+  }
   return output_;
 }
 
-void Axis::ISR_fill(AxisReport& report) const {
-  report.haptic = loop_.output();
-  report.motor = output_.motor;
-  report.counted = counted_;
-  report.tick = tick_;
-  report.generation = generation_;
-  report.armed_samples = armed_samples_;
-  report.limited_samples = limited_samples_;
-  report.fault = trip_;
-  report.condition = static_cast<Fault>(state_ >> 8 & 0xFFU);
-  report.fault_value = trip_value_;
-  report.enabled = (state_ & enabled_bit) != 0;
-  report.count_valid = (state_ & count_valid_bit) != 0;
+/// As after power-up, for the estimators and for what the main loop has heard.
+void Axis::start_afresh() {
+  loop_.reset();
+  plausibility_.reset();
+  state_ |= unheard_bit;
 }
 
-void Axis::count_samples(const control::HapticLoop<float>::Output& out, bool enable) {
-  if (!enable) {
-    was_counting_ = false;
-    return;
+/// The counts mean something else from now on.
+void Axis::refer_anew(const Input& input, bool enable) {
+  // A force that jumps with the position must never be.
+  if (started_ && enable && trip_ == Fault::none) trip(Fault::encoder, 0.0f, loop_.output().position);
+  // What the counter held before its first valid count means nothing, and neither does the jump to it.
+  extender_.reset(input.count);
+  start_afresh();
+  reference_generation_ = input.reference_generation;
+  started_ = true;
+}
+
+/// What the board or the supply would keep the axis from being driven by.
+Fault Axis::condition_of(const AxisSetting& setting, const Input& input) {
+  if (input.condition != Fault::none || !input.motor.present) return input.condition;
+  const float supply = input.motor.supply_voltage;
+  // From 0 up numbers are ordered as their bits are; what is negative or not a number lies above all of them.
+  const auto bits = std::bit_cast<std::uint32_t>(supply);
+  if (bits >= std::bit_cast<std::uint32_t>(setting.supply_voltage_min) &&
+      bits <= std::bit_cast<std::uint32_t>(setting.supply_voltage_max)) [[likely]]
+    return Fault::none;
+  return supply > setting.supply_voltage_max ? Fault::over_voltage : Fault::under_voltage;
+}
+
+namespace {
+/// m along +x. A trip's value: what a handle moves in a tick is far within 32 bits.
+float travel_of(const AxisSetting& setting, std::int64_t moved) {
+  const auto counts = static_cast<float>(static_cast<std::int32_t>(moved));
+  return (setting.encoder_direction < 0 ? -counts : counts) * setting.excitation.count_length;
+}
+}  // namespace
+
+/// Where it is enabled and has not tripped yet.
+void Axis::find_trips(const AxisSetting& setting, const Input& input, Fault condition) {
+  const std::int64_t here = position_of(extender_.count(), setting);
+  const auto& out = loop_.output();
+  if (condition != Fault::none) {
+    const bool of_supply = condition == Fault::under_voltage || condition == Fault::over_voltage;
+    trip(condition, of_supply ? supply_ : 0.0f, here);
+  } else if (!input.count_valid) {
+    trip(Fault::encoder, 0.0f, here);
+  } else if (out.not_finite) {
+    trip(Fault::not_finite, out.velocity, here);
+  } else if (out.over_speed) {
+    trip(Fault::over_speed, out.velocity, here);
+  } else if (setting.mode == DriveMode::excitation) {
+    const std::int64_t moved = extender_.count() - armed_at_;
+    if (static_cast<std::uint64_t>(moved < 0 ? -moved : moved) > setting.excitation.travel_counts)
+      trip(Fault::excitation_travel, travel_of(setting, moved), here);
   }
-  if (!was_counting_) {
-    armed_samples_ = limited_samples_ = 0;
-    was_counting_ = true;
+}
+
+/// From the wall's force to duty. False: it has tripped, and there is neither.
+bool Axis::render(const AxisSetting& setting, const Input& input, std::uint32_t position,
+                  std::int32_t moved) {
+  const auto& out = loop_.output();
+  float force = out.force;
+  // Above 0, by its bits.
+  if (std::bit_cast<std::int32_t>(setting.compensation.limit) > 0) force = compensated(setting, position);
+  output_.force = force;
+  output_.tangential_force = out.tangential_force;
+  output_.background_force = out.magnetic_force;
+  motor_.update(setting.motor, input.motor, force, position, out.velocity, true, output_.motor);
+  if (output_.motor.fault != Fault::none) [[unlikely]]
+    return trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);
+  // A force source without a power stage commutates nothing that could run away.
+  if (setting.watch_motion && input.motor.present) [[likely]] {
+    if (plausibility_.update(setting.plausibility, output_.motor.force_made,
+                             velocity_of_tick(setting, moved))) [[unlikely]]
+      return trip_in_drive(Fault::spin_out, -plausibility_.reserve(setting.plausibility), setting);
   }
-  if (!out.new_sample) return;
-  ++armed_samples_;
-  if (out.limited) ++limited_samples_;
+  return true;
+}
+
+/// Excitation, a trip, or nothing at all. True: the axis is driven.
+bool Axis::do_otherwise(const AxisSetting& setting, const Input& input, std::uint32_t state,
+                        std::int32_t moved) {
+  const bool enable = (state & enabled_bit) != 0;
+  plausibility_.follow(setting.plausibility, velocity_of_tick(setting, moved));
+  if (enable && (state_ & enabled_bit) == 0) {
+    armed_at_ = extender_.count();
+    excitation_.stand_by(setting.excitation);
+  }
+  if (enable && trip_ == Fault::none) {
+    find_trips(setting, input, condition_in(state));
+    if (trip_ == Fault::none) {
+      output_.force = excite(setting, input);
+      output_.tangential_force = output_.background_force = 0.0f;
+      return output_.motor.fault == Fault::none ||
+             trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);
+    }
+  }
+  output_.force = output_.tangential_force = output_.background_force = 0.0f;
+  excitation_.stand_by(setting.excitation);
+  motor_.update(setting.motor, input.motor, 0.0f, 0, 0.0f, false, output_.motor);
+  return false;
+}
+
+/// What was measured stays to be seen; duty and force must never reach the bridge. Always false.
+bool Axis::trip_in_drive(Fault fault, float value, const AxisSetting& setting) {
+  trip(fault, value, position_of(extender_.count(), setting));
+  output_.motor.duty_a = output_.motor.duty_b = output_.motor.duty_c = 0.5f;
+  output_.force = output_.tangential_force = output_.background_force = 0.0f;
+  return false;
+}
+
+float Axis::excite(const AxisSetting& setting, const Input& input) {
+  const std::int64_t position = position_of(extender_.count(), setting);
+  const float velocity = loop_.output().velocity;
+  Excitation::Output asked = excitation_.update(setting.excitation, position, velocity);
+  const bool blind = setting.motor.kind == MotorKind::pmsm && !setting.commutated;
+  if (blind && (asked.kind == ExcitationKind::torque || asked.kind == ExcitationKind::position)) {
+    // No current, in the stator's frame. What would begin in the midst of a run when the angle is found is
+    // over.
+    excitation_.end();
+    asked = {};
+    asked.finished = true;
+  }
+  return motor_.excite(setting.motor, input.motor, asked, low_word(position), velocity, output_.motor);
+}
+
+/// The wall's force with what makes the handle lighter, which comes with the soft start like the wall's does;
+/// the sum keeps to the wall's limit.
+float Axis::compensated(const AxisSetting& setting, std::uint32_t position) const {
+  const auto& out = loop_.output();
+  const float added = control::ForceCompensation<float>::update(
+      setting.compensation, position * setting.motor.shaft_angle_per_count, out.velocity);
+  return control::clamp_magnitude(out.force + loop_.ramp() * added, setting.haptic.force.limit);
+}
+
+void Axis::trip(Fault fault, float value, std::int64_t position) {
+  trip_ = fault;
+  record_.position = position;
+  record_.tick = tick_;
+  record_.velocity = loop_.output().velocity;
+  record_.force = output_.force;
+  record_.current = output_.motor.current;
+  record_.current_reference = output_.motor.current_reference;
+  record_.supply = supply_;
+  record_.value = value;
+  record_.fault = fault;
+}
+
+void Axis::ISR_fill(AxisReport& report) const {
+  const control::HapticLoop<float>::Output& haptic = loop_.output();
+  const MotorControl::Report& motor = output_.motor;
+  static_assert(std::is_trivially_copyable_v<control::HapticLoop<float>::Output>);
+  static_assert(std::is_trivially_copyable_v<MotorControl::Report> && sizeof motor == 20);
+  copy_words(&report.haptic, &haptic, sizeof haptic);
+  copy_words(&report.motor, &motor, sizeof motor);
+  report.counted = extender_.count();
+  report.tick = tick_;
+  report.generation = generation_;
+  report.reference_generation = reference_generation_;
+  report.armed_samples = armed_samples_;
+  report.limited_samples = limited_samples_;
+  report.force = output_.force;
+  report.fault = trip_;
+  report.condition = condition_in(state_);
+  report.enabled = (state_ & enabled_bit) != 0;
+  report.count_valid = (state_ & count_valid_bit) != 0;
+  report.referenced = (state_ & referenced_bit) != 0;
+  if (trip_ != Fault::none) [[unlikely]] {
+    report.trip = record_;
+    report.fault_value = record_.value;
+  }
 }
 
 }  // namespace kmax::firmware

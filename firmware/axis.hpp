@@ -1,38 +1,72 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "control/count_extender.hpp"
+#include "control/force_compensation.hpp"
 #include "control/haptic_loop.hpp"
+#include "control/motion_plausibility.hpp"
+#include "firmware/excitation.hpp"
 #include "firmware/fault.hpp"
 #include "firmware/motor_control.hpp"
 
 namespace kmax::firmware {
 
+/// What an armed axis does; the numbers are those of drive.mode.
+enum class DriveMode : std::uint8_t {
+  haptic = 0,
+  excitation = 1,  ///< follows excitation.*, without a wall
+};
+
 /// What the tick of one axis works by; made in the main loop, handed over whole.
 struct AxisSetting {
   control::HapticLoop<float>::Coefficients haptic{};
   MotorControl::Coefficients motor{};
-  float supply_voltage_min = 0.0f, supply_voltage_max = 0.0f;  ///< V
+  control::ForceCompensation<float>::Coefficients compensation{};  ///< by the shaft's angle
+  control::MotionPlausibility<float>::Coefficients plausibility{};
+  Excitation::Coefficients excitation{};
+  float supply_voltage_min = 0.0f, supply_voltage_max = 0.0f;  ///< V, >= 0
   std::int32_t encoder_offset = 0;                             ///< counts
   std::int32_t encoder_direction = 1;                          ///< +1 or -1
   std::uint32_t generation = 0;  ///< differs from the last one: estimators start afresh
+  DriveMode mode = DriveMode::haptic;
+  bool watch_motion = false;  ///< `plausibility` trips, in mode haptic
+  /// False: nobody knows the rotor's angle yet. Excitations of a synchronous motor that need it then ask for
+  /// nothing; mode haptic is the main loop's to refuse.
+  bool commutated = true;
 };
 
-/// What the tick of one axis tells the main loop.
+/// What was when a trip happened. Before the motor was commanded in that tick (any fault but those of motor
+/// and motion), force and currents are those of the tick before: the last ones under force.
+struct TripRecord {
+  std::int64_t position = 0;  ///< counts, offset and direction applied
+  std::uint32_t tick = 0;
+  float velocity = 0.0f;           ///< m/s
+  float force = 0.0f;              ///< N, asked for
+  float current = 0.0f;            ///< A
+  float current_reference = 0.0f;  ///< A
+  float supply = 0.0f;             ///< V; 0 on a board that has none
+  float value = 0.0f;              ///< what the fault is about, in the unit that fault.hpp gives
+  Fault fault = Fault::none;
+};
+
+/// What the tick of one axis tells the main loop. To fill it is part of the tick: it costs 60 instructions.
 struct AxisReport {
   control::HapticLoop<float>::Output haptic{};
-  MotorControl::Output motor{};
+  MotorControl::Report motor{};
   std::int64_t counted = 0;  ///< the encoder's extended count, before offset and direction
+  TripRecord trip{};         ///< only while there is a `fault`, its; else whatever was
   std::uint32_t tick = 0;
-  std::uint32_t generation = 0;  ///< of the setting it was computed with
+  std::uint32_t generation = 0;            ///< of the setting it was computed with
+  std::uint32_t reference_generation = 0;  ///< of the counts
   std::uint32_t armed_samples = 0, limited_samples = 0;
+  float force = 0.0f;             ///< N asked for with all that is added; 0 unless driven
   Fault fault = Fault::none;      ///< kept until the axis has been disabled
   Fault condition = Fault::none;  ///< of the board: what would keep the axis from being driven now
-  float fault_value = 0.0f;
-  bool enabled = false;      ///< as the main loop had asked
-  bool count_valid = false;  ///< the encoder's last count
+  float fault_value = 0.0f;       ///< likewise, like `trip`
+  bool enabled = false;           ///< as the main loop had asked
+  bool count_valid = false;       ///< the encoder's last count
+  bool referenced = false;        ///< the counts are those from the encoder's index
 };
 
 /// One axis in the tick: from encoder counter to force and on to the motor's duty, with the trips that must
@@ -47,9 +81,14 @@ class Axis {
     bool count_valid;
     Fault condition = Fault::none;  ///< what the board has found wrong with power stage or lines
     MotorControl::Measured motor{};
+    /// Another number: the counts are referred to another origin from this tick on, as when the index was
+    /// passed first. Never while the axis is driven: that trips.
+    std::uint32_t reference_generation = 0;
+    bool referenced = false;  ///< the counts are those from the encoder's index
   };
   struct Output {
-    float force;             ///< N along +x; 0 unless enabled
+    /// N along +x, with compensation; 0 unless enabled. In mode haptic within force.limit.
+    float force;
     float tangential_force;  ///< N, to be made by the other axis
     float background_force;  ///< N, the field's share of the force while enabled, outwards
     bool enabled;            ///< false: the bridge must be off
@@ -63,7 +102,7 @@ class Axis {
 
   /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled.
   void ISR_trip(Fault fault) {
-    if (trip_ == Fault::none) trip(fault, 0.0f);
+    if (trip_ == Fault::none) trip(fault, 0.0f, loop_.output().position);
   }
 
   /// Where an encoder count is on the handle's axis, counts.
@@ -74,8 +113,11 @@ class Axis {
 
   /// Of the last tick: a fault, an enable, a validity or a condition has changed. The main loop must not act
   /// on what was before.
-  bool ISR_changed() const { return changed_; }
+  bool ISR_changed() const { return changes_ != 0; }
   const control::HapticLoop<float>::Output& ISR_haptic() const { return loop_.output(); }
+  /// Of the last tick: the encoder's extended count, before offset and direction.
+  std::int64_t ISR_counted() const { return extender_.count(); }
+  Fault ISR_fault() const { return trip_; }
   void ISR_fill(AxisReport& report) const;
   AxisReport ISR_report() const {
     AxisReport report;
@@ -84,34 +126,47 @@ class Axis {
   }
 
  private:
-  static constexpr std::uint32_t enabled_bit = 1U << 16, count_valid_bit = 1U << 17;
+  static constexpr std::uint32_t enabled_bit = 1U << 16, count_valid_bit = 1U << 17,
+                                 referenced_bit = 1U << 18, unheard_bit = 1U << 31;
 
   /// All that the main loop must hear of at once, in one word, since comparing words is what the tick can
   /// afford.
-  static constexpr std::uint32_t state_word(Fault trip, Fault condition, bool enabled, bool count_valid) {
+  static constexpr std::uint32_t state_word(Fault trip, Fault condition, bool enabled, const Input& input) {
     return static_cast<std::uint32_t>(trip) | static_cast<std::uint32_t>(condition) << 8 |
-           (enabled ? enabled_bit : 0U) | (count_valid ? count_valid_bit : 0U);
+           (enabled ? enabled_bit : 0U) | (input.count_valid ? count_valid_bit : 0U) |
+           (input.referenced ? referenced_bit : 0U);
   }
+  static constexpr Fault condition_in(std::uint32_t state) { return static_cast<Fault>(state >> 8 & 0xFFU); }
 
-  void trip(Fault fault, float value) {
-    trip_ = fault;
-    trip_value_ = value;
-  }
-
-  void count_samples(const control::HapticLoop<float>::Output& out, bool enable);
+  // What is rare, or for identification, is kept out of the tick's one function, whose registers it would
+  // take.
+  [[gnu::noinline, gnu::cold]] void start_afresh();
+  [[gnu::noinline, gnu::cold]] void refer_anew(const Input& input, bool enable);
+  [[gnu::noinline, gnu::cold]] void trip(Fault fault, float value, std::int64_t position);
+  [[gnu::noinline, gnu::cold]] bool trip_in_drive(Fault fault, float value, const AxisSetting& setting);
+  [[gnu::noinline]] bool do_otherwise(const AxisSetting& setting, const Input& input, std::uint32_t state,
+                                      std::int32_t moved);
+  void find_trips(const AxisSetting& setting, const Input& input, Fault condition);
+  float excite(const AxisSetting& setting, const Input& input);
+  [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
+  static Fault condition_of(const AxisSetting& setting, const Input& input);
+  bool render(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved);
 
   control::CountExtender<std::uint32_t> extender_;
   control::HapticLoop<float> loop_;
+  control::MotionPlausibility<float> plausibility_;
+  Excitation excitation_;
   MotorControl motor_;
   Output output_{};
-  std::int64_t counted_ = 0;
-  std::uint32_t tick_ = 0, generation_ = 0;
+  std::int64_t armed_at_ = 0;  ///< extended count where the axis was armed
+  TripRecord record_{};
+  std::uint32_t tick_ = 0, generation_ = 0, reference_generation_ = 0;
   std::uint32_t armed_samples_ = 0, limited_samples_ = 0;
-  float trip_value_ = 0.0f;
+  float supply_ = 0.0f;  ///< V, of the last tick
   Fault trip_ = Fault::none;
-  std::uint32_t state_ = 0;  ///< of the last tick, see state_word
-  bool changed_ = false;
-  bool started_ = false, was_counting_ = false;
+  std::uint32_t state_ = 0;    ///< of the last tick, see state_word
+  std::uint32_t changes_ = 0;  ///< its bits that the last tick has changed
+  bool started_ = false;
 };
 
 }  // namespace kmax::firmware

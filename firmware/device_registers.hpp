@@ -12,10 +12,10 @@ namespace kmax::firmware {
 /// The Modbus view of the dictionary: sorted places of all values, made when compiled.
 struct RegisterPlace {
   std::uint16_t address;
-  std::uint8_t words;
-  std::uint8_t slot;
+  std::uint16_t slot : 12;
+  std::uint16_t words : 4;
 };
-static_assert(slot_count <= 256);
+static_assert(slot_count <= 4096);
 
 template <bool writable>
 inline constexpr std::size_t register_place_count = [] {
@@ -32,9 +32,8 @@ inline constexpr auto register_places = [] {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     if (descriptors[entry].writable != writable) continue;
-    places[next++] = {modbus_address(entry, axis),
-                      static_cast<std::uint8_t>(words_of(descriptors[entry].type)),
-                      static_cast<std::uint8_t>(slot)};
+    places[next++] = {modbus_address(entry, axis), static_cast<std::uint16_t>(slot & 0xFFFu),
+                      static_cast<std::uint16_t>(words_of(descriptors[entry].type) & 0xFu)};
   }
   std::sort(places.begin(), places.end(),
             [](const RegisterPlace& a, const RegisterPlace& b) { return a.address < b.address; });

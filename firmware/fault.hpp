@@ -24,6 +24,10 @@ enum class Fault : std::uint8_t {
   over_temperature,
   power_stage,
   tick_missed,
+  current_sum,
+  spin_out,
+  motor_too_hot,
+  excitation_travel,
 };
 
 struct FaultText {
@@ -71,6 +75,20 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
      "check the supply; the gate driver needs it to answer"},
     {Fault::tick_missed, 0xFF03, "tick_missed", "", "a control tick was late or lost",
      "report it as a defect, with what was done before"},
+    {Fault::current_sum, 0x2330, "current_sum", "A",
+     "the phase currents did not add up to zero: current leaks to ground or a sensor is wrong",
+     "check the motor's insulation, its cable and the shunts; 'kmax selftest' tells which"},
+    {Fault::spin_out, 0xFF04, "spin_out", "J",
+     "the handle gained energy that neither the motor nor a hand can have given it: the motor runs away",
+     "the encoder slipped, or encoder.direction or motor.electrical_offset is wrong: run 'kmax calibrate'; "
+     "or a "
+     "hand pushed harder than device.hand_force"},
+    {Fault::motor_too_hot, 0x4210, "motor_too_hot", "degC",
+     "the winding was hotter than temperature.motor_limit",
+     "let it cool down; lower current.limit, or correct the motor's thermal values under temperature.*"},
+    {Fault::excitation_travel, 0xFF05, "excitation_travel", "m",
+     "the handle moved farther than excitation.travel while it was being excited",
+     "hold the handle's surroundings free, move it away from its stops, or allow it more travel"},
 });
 
 constexpr const FaultText& text_of(Fault fault) {

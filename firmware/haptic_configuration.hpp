@@ -1,8 +1,12 @@
 #pragma once
 
+#include "control/force_compensation.hpp"
 #include "control/haptic_loop.hpp"
+#include "control/motion_plausibility.hpp"
+#include "firmware/excitation.hpp"
 #include "firmware/motor_control.hpp"
 #include "firmware/parameter_values.hpp"
+#include "firmware/thermal_supervisor.hpp"
 
 namespace kmax::firmware {
 
@@ -62,19 +66,94 @@ constexpr control::HapticLoopConfig<float> haptic_configuration(const ParameterV
 }
 
 /// The motor's part of one axis' parameters.
-constexpr MotorControlConfig motor_configuration(const ParameterValues& v, std::size_t axis) {
+///
+/// `winding_temperature`: degC, which the controllers' resistance follows. `current_share`: what the
+/// temperatures leave of the current limit.
+constexpr MotorControlConfig motor_configuration(const ParameterValues& v, std::size_t axis,
+                                                 float winding_temperature = 25.0f,
+                                                 float current_share = 1.0f) {
   MotorControlConfig config;
+  config.winding_temperature = winding_temperature;
+  config.current_share = current_share;
   config.kind = v.choice<MotorKind, "motor.kind">(axis);
   config.transmission = v.real<"device.transmission">(axis);
   config.torque_constant = v.real<"motor.torque_constant">(axis);
   config.resistance = v.real<"motor.resistance">(axis);
   config.inductance = v.real<"motor.inductance">(axis);
+  config.inductance_q = v.real<"motor.inductance_q">(axis);
   config.pole_pairs = v.whole<"motor.pole_pairs">(axis);
   config.electrical_offset = v.real<"motor.electrical_offset">(axis);
   config.counts_per_turn = static_cast<std::uint32_t>(v.whole<"encoder.counts_per_turn">(axis));
   config.current_limit = v.real<"current.limit">(axis);
   config.bandwidth = v.real<"current.bandwidth">(axis);
+  config.dead_time = v.real<"compensation.dead_time">(axis);
+  config.dead_time_current = v.real<"compensation.dead_time_current">(axis);
   config.tick_rate = static_cast<float>(tick_rate_hz);
+  return config;
+}
+
+constexpr control::ForceCompensationConfig<float> compensation_configuration(const ParameterValues& v,
+                                                                             std::size_t axis) {
+  control::ForceCompensationConfig<float> config;
+  config.limit = v.real<"compensation.limit">(axis);
+  config.friction = v.real<"compensation.friction">(axis);
+  config.friction_velocity = v.real<"compensation.friction_velocity">(axis);
+  config.cogging_periods = static_cast<std::uint32_t>(v.whole<"compensation.cogging_periods">(axis));
+  config.cogging_cosine_1 = v.real<"compensation.cogging_cosine_1">(axis);
+  config.cogging_sine_1 = v.real<"compensation.cogging_sine_1">(axis);
+  config.cogging_cosine_2 = v.real<"compensation.cogging_cosine_2">(axis);
+  config.cogging_sine_2 = v.real<"compensation.cogging_sine_2">(axis);
+  config.gravity_constant = v.real<"compensation.gravity_constant">(axis);
+  config.gravity_cosine = v.real<"compensation.gravity_cosine">(axis);
+  config.gravity_sine = v.real<"compensation.gravity_sine">(axis);
+  return config;
+}
+
+constexpr control::MotionPlausibilityConfig<float> plausibility_configuration(const ParameterValues& v,
+                                                                              std::size_t axis) {
+  control::MotionPlausibilityConfig<float> config;
+  config.mass = v.real<"device.mass">(axis);
+  config.hand_force = v.real<"device.hand_force">(axis);
+  return config;
+}
+
+constexpr ExcitationConfig excitation_configuration(const ParameterValues& v, std::size_t axis) {
+  ExcitationConfig config;
+  config.kind = v.choice<ExcitationKind, "excitation.kind">(axis);
+  config.run = static_cast<std::uint32_t>(v.whole<"excitation.run">(axis));
+  config.bias = v.real<"excitation.bias">(axis);
+  config.alternation = v.real<"excitation.alternation">(axis);
+  config.half_period = static_cast<std::uint32_t>(v.whole<"excitation.half_period">(axis));
+  config.alternation_axis = v.choice<AlternationAxis, "excitation.alternation_axis">(axis);
+  config.angle = v.real<"excitation.angle">(axis);
+  config.angle_rate = v.real<"excitation.angle_rate">(axis);
+  config.angle_span = v.real<"excitation.angle_span">(axis);
+  config.ramp = v.real<"excitation.ramp">(axis);
+  config.duration = v.real<"excitation.duration">(axis);
+  config.travel = v.real<"excitation.travel">(axis);
+  config.stiffness = v.real<"excitation.stiffness">(axis);
+  config.damping = v.real<"excitation.damping">(axis);
+  config.speed = v.real<"excitation.speed">(axis);
+  config.stroke = v.real<"excitation.stroke">(axis);
+  config.force_limit = v.real<"force.limit">(axis);
+  config.count_length = count_length(v, axis);
+  config.tick_rate = static_cast<float>(tick_rate_hz);
+  return config;
+}
+
+constexpr ThermalSupervisorConfig thermal_configuration(const ParameterValues& v, std::size_t axis) {
+  ThermalSupervisorConfig config;
+  config.winding.resistance = v.real<"motor.resistance">(axis);
+  // Copper losses of three phases whose current's amplitude is the q current's.
+  config.winding.loss_factor = v.choice<MotorKind, "motor.kind">(axis) == MotorKind::dc ? 1.0f : 1.5f;
+  config.winding.winding_capacity = v.real<"temperature.winding_capacity">(axis);
+  config.winding.winding_to_case = v.real<"temperature.winding_resistance">(axis);
+  config.winding.case_capacity = v.real<"temperature.case_capacity">(axis);
+  config.winding.case_to_ambient = v.real<"temperature.case_resistance">(axis);
+  config.winding.ambient_temperature = v.real<"temperature.ambient">(axis);
+  config.motor_limit = v.real<"temperature.motor_limit">(axis);
+  config.power_stage_limit = v.real<"temperature.limit">(axis);
+  config.derating = v.real<"temperature.derating">(axis);
   return config;
 }
 

@@ -1,13 +1,14 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "control/dc_current_controller.hpp"
 #include "control/field_oriented_controller.hpp"
+#include "control/finite.hpp"
 #include "control/motor_transmission.hpp"
 #include "control/phase_watch.hpp"
 #include "control/sine_cosine.hpp"
+#include "firmware/excitation.hpp"
 #include "firmware/fault.hpp"
 
 namespace kmax::firmware {
@@ -18,20 +19,30 @@ struct MotorControlConfig {
   MotorKind kind = MotorKind::dc;
   float transmission = 0.05f;     ///< m/rad
   float torque_constant = 0.05f;  ///< N m/A
-  float resistance = 1.0f;   ///< ohm; between the terminals of a DC motor, of one phase of a synchronous one
-  float inductance = 1e-3f;  ///< H, likewise
+  /// ohm at reference_temperature; between the terminals of a DC motor, of one phase of a synchronous one
+  float resistance = 1.0f;
+  float winding_temperature = 25.0f;    ///< degC, now: the controllers work with the resistance it makes
+  float reference_temperature = 25.0f;  ///< degC
+  float inductance = 1e-3f;             ///< H, likewise; of the d axis of a synchronous motor
+  float inductance_q = 0.0f;            ///< H; 0: as inductance
   std::int32_t pole_pairs = 7;
   float electrical_offset = 0.0f;  ///< rad, electrical angle at position zero
   std::uint32_t counts_per_turn = 8192;
   float current_limit = 5.0f;  ///< A
+  float current_share = 1.0f;  ///< 0 .. 1 of current_limit that may be asked for: thermal derating
   float bandwidth = 3000.0f;   ///< rad/s
-  float modulation_limit =
-      0.88f;  ///< of the supply: leaves the low sides on for 6 % of the period, to be sampled
-  float tick_rate = 20000.0f;  ///< Hz
+  /// Of the supply: leaves the low sides on for 6 % of the period, to be sampled.
+  float modulation_limit = 0.88f;
+  float dead_time = 0.0f;          ///< s of the bridge that is made up for; 0: not
+  float dead_time_current = 0.1f;  ///< A, within it that goes smoothly through zero
+  float tick_rate = 20000.0f;      ///< Hz, also of the PWM
 };
 
 /// A phase current beyond current.limit times this trips the axis.
 inline constexpr float over_current_factor = 1.5f;
+
+/// Time constant of the low-pass behind MotorControl::Output::current_square.
+inline constexpr float current_square_time = 0.01f;  // s
 
 /// The motor's side of one axis in the tick: force to current reference, current to duty, and the watch over
 /// the phases.
@@ -42,6 +53,13 @@ inline constexpr float over_current_factor = 1.5f;
 /// motor.electrical_offset).
 ///
 /// Without measured currents (a board with an ideal force source, as on x86) only the reference is made.
+///
+/// Excitation (excitation.hpp) takes the force's place for identification. Its kinds voltage and current, and
+/// `off`, which is a current of zero, hold for a synchronous motor in the excitation's own frame: nothing
+/// needs to be known about rotor or encoder. References stay within the current limit, `along` first.
+/// The phases are watched as ever for over-current and for what leaks. An open phase is told where the
+/// current is steered by references that it can follow: with a voltage nobody knows yet what current should
+/// flow, and a square wave may be faster than the loop; there it is for the identification to find.
 class MotorControl {
  public:
   struct Coefficients {
@@ -51,8 +69,10 @@ class MotorControl {
     control::PhaseWatch<float>::Coefficients watch{};
     std::uint32_t angle_per_count = 0;  ///< electrical, 2^32 per turn
     std::uint32_t angle_offset = 0;
+    std::uint32_t shaft_angle_per_count = 0;     ///< 2^32 per turn of the shaft
     float electrical_speed_per_velocity = 0.0f;  ///< rad/m
-    float slow_speed = 0.0f;  ///< rad/s of the motor: with 8 V the back-EMF is then below half of it
+    float slow_velocity = 0.0f;        ///< m/s of the handle: with 8 V the back-EMF is then below half of it
+    float current_square_step = 0.0f;  ///< per tick
     MotorKind kind = MotorKind::dc;
   };
 
@@ -63,12 +83,27 @@ class MotorControl {
     float current_b = 0.0f, current_c = 0.0f;  ///< A, positive into the motor
   };
 
-  struct Output {
-    float current_reference = 0.0f;  ///< A, torque-making
-    float current = 0.0f;            ///< A, measured
-    float duty_a = 0.5f, duty_b = 0.5f, duty_c = 0.5f;
-    bool saturated = false;  ///< by the supply or by current.limit: less force than asked for
+  /// Of this tick: currents as sampled, voltages as asked of the bridge after their limits (active half a
+  /// tick later). The frame is the rotor's; with the excitation's kinds voltage and current its own, where
+  /// `current` and `voltage` are along and `_d` across.
+  ///
+  /// The part that the main loop is told, in whole words so that it is copied fast.
+  struct Report {
+    float current_reference = 0.0f;    ///< A, torque-making (along)
+    float current = 0.0f;              ///< A, measured, torque-making (along)
+    float force_made = 0.0f;           ///< N at the handle that the measured current makes
+    float current_square = 0.0f;       ///< A^2, of both components, low-passed over current_square_time
+    bool saturated = false;            ///< by the supply or by current.limit: less than asked for
+    bool excitation_started = false;   ///< this is the first tick of a run
+    bool excitation_finished = false;  ///< see Excitation::Output
     Fault fault = Fault::none;
+  };
+  struct Output : Report {
+    float current_d = 0.0f;                      ///< A, measured, the other component; 0 for a DC motor
+    float voltage = 0.0f;                        ///< V, like current
+    float voltage_d = 0.0f;                      ///< V, like current_d
+    control::TurnFraction electrical_angle = 0;  ///< of the frame; 0 for a DC motor
+    float duty_a = 0.5f, duty_b = 0.5f, duty_c = 0.5f;
     float fault_value = 0.0f;
   };
 
@@ -80,60 +115,97 @@ class MotorControl {
   void update(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
               float velocity, bool driving, Output& out);
 
+  /// Instead of update(), in a tick in which an excited axis is driven. Gives the force asked for, N at the
+  /// handle, as far as it is known: 0 for a voltage, and for a current in the stator's frame.
+  float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
+               std::uint32_t position, float velocity, Output& out);
+
  private:
-  void drive_dc(const Coefficients& c, const Measured& measured, float speed, Output& out);
-  void drive_pmsm(const Coefficients& c, const Measured& measured, std::uint32_t angle, float velocity,
-                  Output& out);
-  void judge(control::PhaseCondition condition, const Measured& measured, Output& out);
+  using FieldOriented = control::FieldOrientedController<float>;
+  using Dc = control::DcCurrentController<float>;
+  using Phases = control::PhaseCurrents<float>;
+
+  static Phases of_dc(const Measured& measured) { return {0.0f, measured.current_b, measured.current_c}; }
+  static Phases of_pmsm(const Measured& measured) {
+    return {-(measured.current_b + measured.current_c), measured.current_b, measured.current_c};
+  }
+
+  void follow_force(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
+                    float velocity, Output& out);
+  control::PhaseCondition drive_dc(const Coefficients& c, const Measured& measured, float velocity,
+                                   bool steady, Output& out);
+  control::PhaseCondition drive_pmsm(const Coefficients& c, const Measured& measured, std::uint32_t angle,
+                                     float velocity, bool steady, Output& out);
+  control::PhaseCondition excite_dc(const Coefficients& c, const Measured& measured,
+                                    const Excitation::Output& asked, float velocity, Output& out);
+  control::PhaseCondition excite_stator(const Coefficients& c, const Measured& measured,
+                                        const Excitation::Output& asked, std::uint32_t rotor_angle,
+                                        float velocity, Output& out);
+  static void take(const Dc::Output& made, Output& out);
+  static void take(const FieldOriented::Output& made, Output& out);
+  [[gnu::noinline, gnu::cold]] void tell(control::PhaseCondition condition, const Coefficients& c,
+                                         const Measured& measured, Output& out);
+  void settle(const Coefficients& c, float torque_current, float square, Output& out);
 
   control::DcCurrentController<float> dc_;
   control::FieldOrientedController<float> pmsm_;
   control::PhaseWatch<float> watch_;
+  float current_square_ = 0.0f;
+  ExcitationKind excited_ = ExcitationKind::off;
 };
 
 // Here and not in a file of its own, so that the tick becomes one function without calls.
 
 inline void MotorControl::update(const Coefficients& c, const Measured& measured, float force,
                                  std::uint32_t position, float velocity, bool driving, Output& out) {
-  out.fault = Fault::none;
   if (!driving) {
     out = {};
     dc_.reset();
     pmsm_.reset();
     watch_.reset();
+    excited_ = ExcitationKind::off;
+    settle(c, 0.0f, 0.0f, out);
     if (measured.present && c.kind == MotorKind::dc)
       out.current = 0.5f * (measured.current_b - measured.current_c);
     return;
   }
+  follow_force(c, measured, force, position, velocity, out);
+}
+
+inline void MotorControl::follow_force(const Coefficients& c, const Measured& measured, float force,
+                                       std::uint32_t position, float velocity, Output& out) {
   const auto wanted = control::MotorTransmission<float>::update(c.transmission, force);
   out.current_reference = wanted.current;
   out.saturated = wanted.limited;
-  if (wanted.not_finite) out.fault = Fault::not_finite;
-  if (!measured.present) return;
-  if (c.kind == MotorKind::dc) {
-    out.current = 0.5f * (measured.current_b - measured.current_c);
-    drive_dc(c, measured, control::MotorTransmission<float>::motor_speed(c.transmission, velocity), out);
-  } else {
-    drive_pmsm(c, measured, position * c.angle_per_count + c.angle_offset, velocity, out);
+  out.fault = wanted.not_finite ? Fault::not_finite : Fault::none;
+  if (!measured.present) {
+    out.force_made = wanted.force;
+    return;
   }
+  const auto condition =
+      c.kind == MotorKind::dc
+          ? drive_dc(c, measured, velocity, true, out)
+          : drive_pmsm(c, measured, position * c.angle_per_count + c.angle_offset, velocity, true, out);
+  if (condition != control::PhaseCondition::good) [[unlikely]]
+    tell(condition, c, measured, out);
 }
 
-inline void MotorControl::drive_dc(const Coefficients& c, const Measured& measured, float speed,
-                                   Output& out) {
-  const auto made = dc_.update(c.dc, out.current_reference, out.current, speed, measured.supply_voltage);
-  out.duty_b = made.duty_b;
-  out.duty_c = made.duty_c;
-  out.saturated = out.saturated || made.saturated;
-  if (made.not_finite) out.fault = Fault::not_finite;
-  const bool slow = speed < c.slow_speed && speed > -c.slow_speed;
-  judge(watch_.update(c.watch, {0.0f, measured.current_b, measured.current_c},
-                      {0.0f, out.current_reference, -out.current_reference}, slow),
-        measured, out);
+/// `steady`: the reference is one that the current can follow.
+inline control::PhaseCondition MotorControl::drive_dc(const Coefficients& c, const Measured& measured,
+                                                      float velocity, bool steady, Output& out) {
+  out.current = 0.5f * (measured.current_b - measured.current_c);
+  const float speed = control::MotorTransmission<float>::motor_speed(c.transmission, velocity);
+  take(dc_.update(c.dc, out.current_reference, out.current, speed, measured.supply_voltage), out);
+  const float expected = steady ? out.current_reference : 0.0f;
+  settle(c, out.current, out.current * out.current, out);
+  return watch_.update(c.watch, of_dc(measured), {0.0f, expected, -expected},
+                       control::magnitude(velocity) < c.slow_velocity);
 }
 
-inline void MotorControl::drive_pmsm(const Coefficients& c, const Measured& measured, std::uint32_t angle,
-                                     float velocity, Output& out) {
-  control::FieldOrientedController<float>::Input in;
+inline control::PhaseCondition MotorControl::drive_pmsm(const Coefficients& c, const Measured& measured,
+                                                        std::uint32_t angle, float velocity, bool steady,
+                                                        Output& out) {
+  FieldOriented::Input in;
   in.angle = angle;
   in.current_b = measured.current_b;
   in.current_c = measured.current_c;
@@ -141,32 +213,38 @@ inline void MotorControl::drive_pmsm(const Coefficients& c, const Measured& meas
   in.reference_q = out.current_reference;
   in.supply = measured.supply_voltage;
   const auto made = pmsm_.update(c.pmsm, in);
+  take(made, out);
   out.current = made.current_q;
+  out.current_d = made.current_d;
+  out.voltage = made.voltage_q;
+  out.voltage_d = made.voltage_d;
+  out.electrical_angle = angle;
+  settle(c, made.current_q, made.current_q * made.current_q + made.current_d * made.current_d, out);
+  return watch_.update<control::PhaseSum::implied>(c.watch, of_pmsm(measured),
+                                                   {made.reference_a, made.reference_b, made.reference_c},
+                                                   steady && control::magnitude(velocity) < c.slow_velocity);
+}
+
+inline void MotorControl::take(const Dc::Output& made, Output& out) {
+  out.voltage = made.voltage;
+  out.duty_b = made.duty_b;
+  out.duty_c = made.duty_c;
+  if (made.saturated) out.saturated = true;
+  if (made.not_finite) out.fault = Fault::not_finite;
+}
+
+inline void MotorControl::take(const FieldOriented::Output& made, Output& out) {
   out.duty_a = made.duty_a;
   out.duty_b = made.duty_b;
   out.duty_c = made.duty_c;
-  out.saturated = out.saturated || made.saturated;
+  if (made.saturated) out.saturated = true;
   if (made.not_finite) out.fault = Fault::not_finite;
-  // The reference in each phase, by inverse Park and Clarke with d = 0.
-  const auto [sine, cosine] = control::sine_cosine<float>(angle);
-  const float a = -(out.current_reference * sine);
-  constexpr float half_root_three = 0.866025404f;
-  const float beta = out.current_reference * cosine * half_root_three;
-  const float b = beta - 0.5f * a;
-  const float speed = control::MotorTransmission<float>::motor_speed(c.transmission, velocity);
-  const bool slow = speed < c.slow_speed && speed > -c.slow_speed;
-  judge(watch_.update(c.watch,
-                      {-(measured.current_b + measured.current_c), measured.current_b, measured.current_c},
-                      {a, b, -(a + b)}, slow),
-        measured, out);
 }
 
-inline void MotorControl::judge(control::PhaseCondition condition, const Measured& measured, Output& out) {
-  if (condition == control::PhaseCondition::good) return;
-  const float b = measured.current_b < 0.0f ? -measured.current_b : measured.current_b;
-  const float c = measured.current_c < 0.0f ? -measured.current_c : measured.current_c;
-  out.fault = condition == control::PhaseCondition::open ? Fault::phase_open : Fault::over_current;
-  out.fault_value = b > c ? b : c;
+inline void MotorControl::settle(const Coefficients& c, float torque_current, float square, Output& out) {
+  current_square_ += c.current_square_step * (square - current_square_);
+  out.current_square = current_square_;
+  out.force_made = control::MotorTransmission<float>::force(c.transmission, torque_current);
 }
 
 }  // namespace kmax::firmware

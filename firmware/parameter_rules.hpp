@@ -21,6 +21,9 @@ constexpr BrokenRule check_rules(const ParameterValues& values) {
       return {Refusal::rate_does_not_divide, slot_of(entry_of<"haptic.rate">(), axis)};
     if (values.real<"wall.adaptive_force_min">(axis) > values.real<"wall.adaptive_force_max">(axis))
       return {Refusal::adaptive_interval_empty, slot_of(entry_of<"wall.adaptive_force_min">(), axis)};
+    const float compensation = values.real<"compensation.limit">(axis);
+    if (compensation > 0.0f && !(compensation < values.real<"guard.friction">(axis)))
+      return {Refusal::compensation_beyond_friction, slot_of(entry_of<"compensation.limit">(), axis)};
   }
   if (!(values.real<"supply.voltage_min">() < values.real<"supply.voltage_max">()))
     return {Refusal::supply_interval_empty, slot_of(entry_of<"supply.voltage_min">(), 0)};

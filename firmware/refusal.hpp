@@ -33,6 +33,11 @@ enum class Refusal : std::uint16_t {
   store_busy = 21,
   store_missing = 22,
   too_hot = 23,
+  commutation_unknown = 24,
+  motor_too_hot = 25,
+  capture_without_channels = 26,
+  capture_missing = 27,
+  compensation_beyond_friction = 28,
 };
 
 struct RefusalText {
@@ -68,6 +73,14 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::store_busy, "the parameters are being saved; try again in a moment"},
     {Refusal::store_missing, "this device has no memory to keep parameters in"},
     {Refusal::too_hot, "the power stage is hotter than temperature.limit, or its sensor is broken"},
+    {Refusal::commutation_unknown,
+     "the synchronous motor's electrical angle is not known since the last start: move the handle past the "
+     "encoder's index, or run 'kmax calibrate'"},
+    {Refusal::motor_too_hot, "the winding is hotter than temperature.motor_limit; let it cool down"},
+    {Refusal::capture_without_channels, "no channel to capture is chosen; set capture.channel_1"},
+    {Refusal::capture_missing, "this device has no memory for captures"},
+    {Refusal::compensation_beyond_friction,
+     "compensation.limit must be 0 or below guard.friction, so that a handle at rest cannot be moved by it"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

@@ -25,6 +25,17 @@ concept SimulatedDevice = requires(Device device, std::size_t axis, const firmwa
   {device.advance(s)};
 };
 
+/// A device behind a power stage: what the board samples of it, and what its main loop does for it.
+template <typename Device>
+concept PoweredDevice = SimulatedDevice<Device> &&
+    requires(Device device, std::size_t axis, const firmware::Application& application,
+             std::uint32_t now_us) {
+  /// All that the board samples of an axis in this tick, by this call.
+  { device.sample(axis) } -> std::same_as<firmware::AxisInput>;
+  { device.readings() } -> std::same_as<firmware::BoardReadings>;
+  {device.poll(application, now_us)};
+};
+
 /// The firmware on x86: the same Application, fed by a simulated device, in virtual time.
 ///
 /// Time passes only in advance(), in ticks of 50 us, and everything in it is deterministic: the same calls
@@ -37,11 +48,13 @@ class NativeBoard {
 
   explicit NativeBoard(Device& device)
       : device_(device),
+        capture_memory_(firmware::capture_words),
         application_({.board_name = "native",
                       .serial_number = 1,
                       .core_clock_hz = 0,
                       .clock_source = 4,
-                      .reset_cause = firmware::ResetCause::native}) {}
+                      .reset_cause = firmware::ResetCause::native},
+                     capture_memory_) {}
 
   firmware::Application& application() { return application_; }
 
@@ -79,10 +92,20 @@ class NativeBoard {
     return firmware::modbus::rtu_timing(application_.serial_settings().baud_rate, {}).character_us;
   }
 
+  firmware::AxisInput sample(std::size_t axis) {
+    if constexpr (PoweredDevice<Device>) {
+      return device_.sample(axis);
+    } else {
+      firmware::AxisInput input{};
+      input.count = device_.count(axis);
+      input.count_valid = device_.count_valid(axis);
+      return input;
+    }
+  }
+
   void tick() {
     firmware::TickInput input;
-    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
-      input.axis[axis] = {device_.count(axis), device_.count_valid(axis)};
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) input.axis[axis] = sample(axis);
     output_ = application_.ISR_tick(input);
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) device_.drive(axis, output_.axis[axis]);
     device_.advance(static_cast<double>(tick_us) * 1e-6);
@@ -94,7 +117,9 @@ class NativeBoard {
                                    static_cast<std::uint32_t>(incoming_.front().time_us));
       incoming_.pop_front();
     }
+    if constexpr (PoweredDevice<Device>) application_.set_readings(device_.readings());
     application_.poll(now);
+    if constexpr (PoweredDevice<Device>) device_.poll(application_, now);
     if (sending_until_us_ != 0) {
       if (now_us_ < sending_until_us_) return;
       outgoing_.insert(outgoing_.end(), reply_.begin(), reply_.end());
@@ -108,6 +133,7 @@ class NativeBoard {
   }
 
   Device& device_;
+  std::vector<std::uint32_t> capture_memory_;
   firmware::Application application_;
   firmware::TickOutput output_{};
   std::uint64_t now_us_ = 0, line_free_us_ = 0, sending_until_us_ = 0;

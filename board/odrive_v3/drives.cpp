@@ -18,20 +18,11 @@ bool level(PinLocation pin) {
   return stm32::GpioPin{stm32::gpio(pin.port), pin.number}.read();
 }
 
-/// The largest gain whose range reaches the over-current trip: finest steps.
-drivers::CurrentSenseGain gain_for(float largest_current) {
-  using enum drivers::CurrentSenseGain;
-  for (const drivers::CurrentSenseGain gain : {x80, x40, x20}) {
-    if (drivers::CurrentSense{{.gain = gain}}.range() >= largest_current) return gain;
-  }
-  return x10;
-}
-
 }  // namespace
 
 Drives::Drives(VoltageVariant variant, ChipBus& bus)
     : supply_({.ratio = supply_divider_ratio(variant)}),
-      serial_encoder_(bus),
+      serial_encoder_(bus, {stm32::gpio(pins::encoder_select.port), pins::encoder_select.number}),
       pwm0_(stm32::tim1()),
       pwm1_(stm32::tim8()),
       encoder0_(stm32::tim3()),
@@ -49,63 +40,72 @@ bool Drives::start() {
   return stm32::start_phase_shifted(pwm0_, pwm1_);
 }
 
-bool Drives::ISR_index_line(std::size_t axis) const {
-  return level(axis == 0 ? pins::encoder0_index : pins::encoder1_index);
-}
-
-firmware::AxisInput Drives::ISR_measure(std::size_t axis, const stm32::CurrentSample& sample) {
+template <std::size_t axis>
+firmware::AxisInput Drives::ISR_measure(const Settings& settings, const stm32::CurrentSample& sample) {
   AxisHardware& hardware = axes_[axis];
-  const Settings& settings = axis == 0 ? handover_.ISR_take() : handover_.ISR_current();
-  if (hardware.index_generation != settings.index_generation[axis]) {
-    hardware.index_generation = settings.index_generation[axis];
-    hardware.index.reset(settings.index[axis]);
-  }
-  firmware::AxisInput input{};
-  if (settings.serial_encoder_axis == axis) {
-    ISR_take_serial(input);
-  } else {
-    ISR_read_quadrature(axis, settings, input);
-    if (settings.serial_encoder_axis < firmware::axis_count) {
-      ISR_begin_serial();
-    } else if (serial_encoder_.under_way()) {
-      serial_encoder_.ISR_abandon();
-    }
-  }
-  input.motor.present = true;
-  input.motor.supply_voltage = supply_.ISR_volts(sample.supply);
-  input.motor.current_b = hardware.sense_b.ISR_amperes(sample.phase_b);
-  input.motor.current_c = hardware.sense_c.ISR_amperes(sample.phase_c);
+  // Before anything is stored that may lie where the compiler takes the sample to be: they stay in registers.
+  const std::uint16_t phase_b = sample.phase_b, phase_c = sample.phase_c, supply = sample.supply;
+  const bool driving = hardware.driving;
+  firmware::Fault condition = firmware::Fault::none;
   // 2 triggers are 50 us: the converter of supply and temperatures stands still.
-  if (!sample.valid || sample.slow_age > 2) {
-    input.condition = firmware::Fault::tick_missed;
-  } else if (supply_.ISR_saturated(sample.supply)) {
-    input.condition = firmware::Fault::over_voltage;
-  } else if (hardware.driving && (hardware.sense_b.ISR_saturated(sample.phase_b) ||
-                                  hardware.sense_c.ISR_saturated(sample.phase_c))) {
-    input.condition = firmware::Fault::current_sense;
+  if (!sample.valid || sample.slow_age > 2) [[unlikely]] {
+    condition = firmware::Fault::tick_missed;
+  } else if (supply_.ISR_saturated(supply)) [[unlikely]] {
+    condition = firmware::Fault::over_voltage;
+  } else if (hardware.sense_b.ISR_saturated(phase_b) || hardware.sense_c.ISR_saturated(phase_c))
+      [[unlikely]] {
+    // Amplifiers of a bridge that is off may read anything.
+    if (driving) condition = firmware::Fault::current_sense;
   }
-  if (calibrating_.load(std::memory_order_relaxed)) ISR_calibrate(hardware, sample);
-  supply_code_.store(sample.supply, std::memory_order_relaxed);
-  temperature_code_[axis].store(sample.temperatures[axis], std::memory_order_relaxed);
-  return input;
+  if (calibrating_.load(std::memory_order_relaxed)) [[unlikely]]
+    ISR_calibrate(hardware, sample);
+  const float current_b = hardware.sense_b.ISR_amperes(phase_b);
+  const float current_c = hardware.sense_c.ISR_amperes(phase_c);
+  const Count count = ISR_read_count<axis>(settings, driving);
+  // Named in full: what is filled with zeros first is filled by a function of the library.
+  return {.count = count.count,
+          .count_valid = count.valid,
+          .condition = condition,
+          .motor = {.present = true,
+                    .supply_voltage = supply_.ISR_volts(supply),
+                    .current_b = current_b,
+                    .current_c = current_c},
+          .reference_generation = count.reference_generation,
+          .referenced = count.referenced};
 }
 
-void Drives::ISR_take_serial(firmware::AxisInput& input) {
+template <std::size_t axis>
+Drives::Count Drives::ISR_read_count(const Settings& settings, bool driving) {
+  if (axes_[axis].encoder_generation != settings.encoder_generation[axis]) [[unlikely]]
+    ISR_configure_encoder(axis, settings);
+  if (settings.role[axis] != EncoderRole::lines) [[unlikely]] {
+    if (settings.role[axis] == EncoderRole::chip) return ISR_take_serial();
+    ISR_begin_serial();
+    if (settings.role[axis] == EncoderRole::missing) return {};
+  }
+  return ISR_read_quadrature<axis>(driving);
+}
+
+Drives::Count Drives::ISR_take_serial() {
   const drivers::As5047pSample angle = serial_encoder_.ISR_take();
-  input.count = angle.count;
-  input.count_valid = angle.valid;
+  return {.count = angle.count,
+          .valid = angle.valid,
+          .referenced = false,
+          .reference_generation = serial_generations | angle.reference_generation};
 }
 
-void Drives::ISR_read_quadrature(std::size_t axis, const Settings& settings, firmware::AxisInput& input) {
-  AxisHardware& hardware = axes_[axis];
-  // The 16-bit counter's step since the last tick, signed.
+template <std::size_t axis>
+Drives::Count Drives::ISR_read_quadrature(bool driving) {
+  const auto index_line = [] { return level(axis == 0 ? pins::encoder0_index : pins::encoder1_index); };
   const std::uint16_t counter = axis == 0 ? encoder0_.count() : encoder1_.count();
-  const auto step = static_cast<std::int16_t>(static_cast<std::uint16_t>(counter - hardware.count));
-  hardware.count += static_cast<std::uint32_t>(static_cast<std::int32_t>(step));
-  input.count = hardware.count;
-  input.count_valid =
-      !settings.without_encoder[axis] &&
-      (!settings.has_index[axis] || hardware.index.ISR_plausible(hardware.count, ISR_index_line(axis)));
+  return axes_[axis].counter.ISR_read(counter, index_line, driving);
+}
+
+void Drives::ISR_configure_encoder(std::size_t axis, const Settings& settings) {
+  axes_[axis].encoder_generation = settings.encoder_generation[axis];
+  axes_[axis].counter.configure(settings.quadrature[axis]);
+  // Nobody would take the frame any more.
+  if (settings.role[axis] == EncoderRole::lines && serial_encoder_.under_way()) serial_encoder_.ISR_abandon();
 }
 
 void Drives::ISR_calibrate(AxisHardware& hardware, const stm32::CurrentSample& sample) {
@@ -114,10 +114,7 @@ void Drives::ISR_calibrate(AxisHardware& hardware, const stm32::CurrentSample& s
   hardware.offset_c.ISR_add(sample.phase_c);
 }
 
-void Drives::ISR_housekeeping(std::size_t axis, float supply_voltage) {
-  watchdog_gate_.ISR_ticked(axis);
-  axis_ticks_[axis].store(axis_ticks_[axis].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  if (axis != 0) return;
+void Drives::ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage) {
   // Motors brake while they are driven and a moment after; a supply that is too high for longer is not
   // theirs.
   constexpr std::uint32_t ticks_after_driving = firmware::tick_rate_hz / 5;
@@ -126,11 +123,10 @@ void Drives::ISR_housekeeping(std::size_t axis, float supply_voltage) {
   } else if (ISR_braking_for_ != 0) {
     --ISR_braking_for_;
   }
-  const bool wanted = brake_.update(handover_.ISR_current().brake, supply_voltage);
+  const bool wanted = brake_.update(coefficients, supply_voltage);
   const bool allowed = ISR_braking_for_ != 0 && !brake_inhibited_.load(std::memory_order_relaxed);
-  stm32::GpioPin{stm32::gpio(pins::brake_high_side.port), pins::brake_high_side.number}.write(wanted &&
-                                                                                              allowed);
-  if ((++ISR_ticks_ & 3U) == 0) main_loop_due_.store(true, std::memory_order_relaxed);
+  ISR_brake_on_ = wanted && allowed;
+  stm32::GpioPin{stm32::gpio(pins::brake_high_side.port), pins::brake_high_side.number}.write(ISR_brake_on_);
 }
 
 void Drives::inhibit_brake(bool inhibited) {
@@ -157,10 +153,20 @@ bool Drives::ISR_ticks_have_stopped() {
 
 template <typename Stage>
 [[gnu::flatten]] void Drives::ISR_tick(firmware::Application& application, const Stage& stage) {
-  const std::size_t axis = pwm0_.counting_down() ? 1 : 0;
+  if (pwm0_.counting_down()) {
+    ISR_tick_of<1>(application, stage);
+  } else {
+    ISR_tick_of<0>(application, stage);
+  }
+}
+
+template <std::size_t axis, typename Stage>
+void Drives::ISR_tick_of(firmware::Application& application, const Stage& stage) {
   Pwm& pwm = axis == 0 ? pwm0_ : pwm1_;
   AxisHardware& hardware = axes_[axis];
-  firmware::AxisInput input = ISR_measure(axis, sampling_.ISR_read(static_cast<unsigned>(axis)));
+  const Settings& settings = axis == 0 ? handover_.ISR_take() : handover_.ISR_current();
+  const stm32::CurrentSample& sample = sampling_.ISR_read(axis);
+  firmware::AxisInput input = ISR_measure<axis>(settings, sample);
   // Before the condition: a line interrupt in between must be found as what it is.
   const bool bridge_fell = hardware.arm_failed || (hardware.driving && !pwm.armed());
   if (const firmware::Fault condition = stage.ISR_condition(); condition != firmware::Fault::none)
@@ -181,7 +187,13 @@ template <typename Stage>
     hardware.arm_failed = !hardware.driving;
     if (stage.ISR_condition() != firmware::Fault::none) pwm.disarm();
   }
-  ISR_housekeeping(axis, input.motor.supply_voltage);
+  watchdog_gate_.ISR_ticked(axis);
+  axis_ticks_[axis].store(axis_ticks_[axis].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  if constexpr (axis == 0) {
+    if (settings.has_brake || ISR_brake_on_) ISR_brake(settings.brake, input.motor.supply_voltage);
+    if ((axis_ticks_[0].load(std::memory_order_relaxed) & 3U) == 0)
+      main_loop_due_.store(true, std::memory_order_relaxed);
+  }
 }
 
 // Instantiated here, where all that it calls can be seen and inlined.
@@ -191,9 +203,12 @@ void Drives::apply(const firmware::ParameterValues& values) {
   Settings settings;
   float largest_current = 0.0f;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    settings.index[axis].counts_per_turn =
-        static_cast<std::uint32_t>(values.whole<"encoder.counts_per_turn">(axis));
-    settings.has_index[axis] = values.whole<"encoder.index">(axis) != 0;
+    const bool has_index = values.whole<"encoder.index">(axis) != 0;
+    settings.quadrature[axis] = {
+        .has_index = has_index,
+        // A handle that starts at its rest has its origin there.
+        .from_index = has_index && values.whole<"encoder.start">(axis) == 0,
+        .counts_per_turn = static_cast<std::uint32_t>(values.whole<"encoder.counts_per_turn">(axis))};
     const float trip = firmware::over_current_factor * values.real<"current.limit">(axis);
     if (trip > largest_current) largest_current = trip;
     const auto motor = values.choice<firmware::MotorKind, "motor.kind">(axis);
@@ -201,25 +216,26 @@ void Drives::apply(const firmware::ParameterValues& values) {
     static_cast<void>(
         pwm.enable_legs(motor == firmware::MotorKind::dc ? stm32::brushed_motor_legs : stm32::PwmLegs{}));
   }
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    if (values.whole<"encoder.kind">(axis) != 1) continue;
-    // There is one chip select: the first axis that asks has the chip.
-    if (settings.serial_encoder_axis == firmware::axis_count) {
-      settings.serial_encoder_axis = axis;
-    } else {
-      settings.without_encoder[axis] = true;
-    }
+  // There is one chip select: the first axis that asks has the chip.
+  const auto asks = [&values](std::size_t axis) { return values.whole<"encoder.kind">(axis) == 1; };
+  if (asks(0)) {
+    settings.role = {EncoderRole::chip, asks(1) ? EncoderRole::missing : EncoderRole::lines_beside_chip};
+  } else if (asks(1)) {
+    settings.role = {EncoderRole::lines_beside_chip, EncoderRole::chip};
   }
   settings.brake = control::BrakeChopper::prepare({.on_voltage = values.real<"supply.brake_voltage">()});
+  settings.has_brake = settings.brake.on_voltage > 0.0f;
+  bool chip_moves = false;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    const bool same = settings.has_index[axis] == settings_.has_index[axis] &&
-                      settings.index[axis].counts_per_turn == settings_.index[axis].counts_per_turn;
-    settings.index_generation[axis] = settings_.index_generation[axis] + (same ? 0U : 1U);
+    const auto role = settings.role[axis], role_before = settings_.role[axis];
+    chip_moves = chip_moves || (role == EncoderRole::chip) != (role_before == EncoderRole::chip);
+    const bool same = role == role_before && settings.quadrature[axis] == settings_.quadrature[axis];
+    settings.encoder_generation[axis] = settings_.encoder_generation[axis] + (same ? 0U : 1U);
   }
-  if (settings.serial_encoder_axis != settings_.serial_encoder_axis) serial_encoder_.restart();
+  if (chip_moves) serial_encoder_.restart_anew();
   settings_ = settings;
   handover_.offer(settings_);
-  gain_ = gain_for(largest_current);
+  gain_ = drivers::gain_for_current(largest_current);
 }
 
 void Drives::restart_offset_calibration() {
@@ -253,13 +269,14 @@ OffsetProgress Drives::offset_progress() {
 
 firmware::BoardReadings Drives::readings() const {
   firmware::BoardReadings readings;
+  const stm32::CurrentSample& latest = sampling_.latest();
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    const drivers::NtcReading reading =
-        thermistor.ISR_read(temperature_code_[axis].load(std::memory_order_relaxed));
+    const drivers::NtcReading reading = thermistor.ISR_read(latest.temperatures[axis]);
     readings.power_stage_temperature[axis] =
         reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
   }
-  readings.supply_voltage = supply_.ISR_volts(supply_code_.load(std::memory_order_relaxed));
+  readings.has_power_stage = true;
+  readings.supply_voltage = supply_.ISR_volts(latest.supply);
   const auto& counters = sampling_.counters();
   readings.missed_ticks = counters.overruns + counters.axis_mismatches;
   return readings;

@@ -12,7 +12,7 @@
 #include "control/brake_chopper.hpp"
 #include "drivers/current_sense.hpp"
 #include "drivers/ntc_thermistor.hpp"
-#include "drivers/quadrature_index_watch.hpp"
+#include "drivers/referenced_quadrature_counter.hpp"
 #include "drivers/stm32f4/current_sampling.hpp"
 #include "drivers/stm32f4/phase_shifted_pwm.hpp"
 #include "drivers/stm32f4/quadrature_timer.hpp"
@@ -31,7 +31,8 @@ namespace kmax::board::odrive_v3 {
 ///   3  the encoder's counter and its index line, or the frame that the other axis' tick has begun
 ///   4  the application's tick: force, current reference, duty, trips
 ///   5  the duty is written; it is active from the timer's next turn on, 25 us after the sample
-///   6  offsets are averaged while that goes on; the brake, in axis 0's tick
+///   6  the brake, if there is one, in axis 0's tick
+/// Which axis is a constant of its code: there are two copies of the tick.
 ///
 /// A tick that may not drive clears MOE. MOE is set only when an axis begins to drive, and the power stage's
 /// condition is looked at once more after that: a line interrupt in between wins.
@@ -74,7 +75,7 @@ class Drives {
   /// SysTick: true when an axis has not ticked between three calls. Both bridges are off then.
   bool ISR_ticks_have_stopped();
 
-  /// Main loop, when the power stage has become ready: the encoder on the bus starts anew.
+  /// Main loop, when the power stage has become ready: the encoder on the bus starts again.
   void restart_serial_encoder() { serial_encoder_.restart(); }
 
   /// Both axes have ticked since the last call that said so.
@@ -86,41 +87,56 @@ class Drives {
  private:
   using Pwm = drivers::stm32f4::ThreePhasePwm<>;
   using Encoder = drivers::stm32f4::QuadratureTimer<>;
+  using QuadratureCounter = drivers::ReferencedQuadratureCounter<>;
+  using Count = QuadratureCounter::Reading;
+  /// Generations of the AS5047P's counts have the uppermost bit, so that a change of encoder.kind is one too.
+  static constexpr std::uint32_t serial_generations = 0x8000'0000U;
   static constexpr std::uint16_t no_voltage_ticks =
       drivers::stm32f4::ThreePhasePwmConfig{}.half_period_ticks / 2;
 
+  /// What an axis' tick does for its count.
+  enum class EncoderRole : std::uint8_t {
+    lines,              ///< quadrature
+    lines_beside_chip,  ///< the same, and begins the frame for the other axis, whose encoder is the AS5047P
+    chip,               ///< takes that frame
+    missing,            ///< asks for that chip too and has none; begins the frame for the other axis
+  };
+
   /// What the tick works by; made in the main loop.
   struct Settings {
-    std::array<drivers::QuadratureIndexConfig, firmware::axis_count> index{};
-    std::array<std::uint32_t, firmware::axis_count> index_generation{};
-    std::array<bool, firmware::axis_count> has_index{};
-    /// The axis whose encoder is the AS5047P on the bus; axis_count: none.
-    std::size_t serial_encoder_axis = firmware::axis_count;
-    /// Asks for that chip too, and has none.
-    std::array<bool, firmware::axis_count> without_encoder{};
+    std::array<EncoderRole, firmware::axis_count> role{};
+    std::array<drivers::ReferencedQuadratureConfig, firmware::axis_count> quadrature{};
+    /// Raised with each change of the above.
+    std::array<std::uint32_t, firmware::axis_count> encoder_generation{};
     control::BrakeChopper::Coefficients brake{};
+    bool has_brake = false;
   };
 
   struct AxisHardware {
     drivers::CurrentSense sense_b{}, sense_c{};
     drivers::OffsetCalibration offset_b{}, offset_c{};
-    drivers::QuadratureIndexWatch index{};
-    std::uint32_t count = 0;
-    std::uint32_t index_generation = 0;
+    QuadratureCounter counter{};
+    std::uint32_t encoder_generation = 0;  ///< of the settings that have been taken over
     bool driving = false, arm_failed = false;
   };
 
-  firmware::AxisInput ISR_measure(std::size_t axis, const drivers::stm32f4::CurrentSample& sample);
-  void ISR_read_quadrature(std::size_t axis, const Settings& settings, firmware::AxisInput& input);
-  bool ISR_index_line(std::size_t axis) const;
-  void ISR_housekeeping(std::size_t axis, float supply_voltage);
+  template <std::size_t axis, typename Stage>
+  void ISR_tick_of(firmware::Application& application, const Stage& stage);
+  template <std::size_t axis>
+  firmware::AxisInput ISR_measure(const Settings& settings, const drivers::stm32f4::CurrentSample& sample);
+  template <std::size_t axis>
+  Count ISR_read_count(const Settings& settings, bool driving);
+  template <std::size_t axis>
+  Count ISR_read_quadrature(bool driving);
+  void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
   // Rare, and kept out of the tick's one function, whose registers they would take.
   [[gnu::noinline]] void ISR_calibrate(AxisHardware& hardware, const drivers::stm32f4::CurrentSample& sample);
-  [[gnu::noinline]] void ISR_take_serial(firmware::AxisInput& input);
+  [[gnu::noinline]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
+  [[gnu::noinline]] Count ISR_take_serial();
   [[gnu::noinline]] void ISR_begin_serial() { serial_encoder_.ISR_begin(); }
 
   drivers::SupplyDivider supply_;
-  SerialEncoder serial_encoder_;
+  SerialEncoder<> serial_encoder_;
   Pwm pwm0_, pwm1_;
   Encoder encoder0_, encoder1_;
   drivers::stm32f4::CurrentSampling<> sampling_;
@@ -133,12 +149,10 @@ class Drives {
   std::atomic<bool> calibrating_{false};
   std::atomic<bool> main_loop_due_{false};
   std::atomic<bool> brake_inhibited_{false};
-  std::uint32_t ISR_ticks_ = 0, ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
+  bool ISR_brake_on_ = false;
+  std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
   std::array<std::atomic<std::uint32_t>, firmware::axis_count> axis_ticks_{};
   std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{};
-  // Words that the tick leaves for the main loop.
-  std::atomic<std::uint16_t> supply_code_{0};
-  std::array<std::atomic<std::uint16_t>, firmware::axis_count> temperature_code_{};
 };
 
 }  // namespace kmax::board::odrive_v3

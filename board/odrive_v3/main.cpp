@@ -1,6 +1,7 @@
 // Composition root of the ODrive v3.6: names the peripherals, gives them their pins and priorities, and hands
 // time, bytes, counts and currents to the application.
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -52,6 +53,9 @@ std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_se
       kmax_parameters_begin + index * ParameterFlash::words_per_sector, ParameterFlash::words_per_sector};
 }
 ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, parameter_sector(1)}}}};
+
+/// In the memory beside the buses' RAM, which emulators without clocks do not have.
+[[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
 /// All that drives motors. Made in main, once the clocks are known; no interrupt is enabled before.
 struct Power {
@@ -171,7 +175,7 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
   const bool emulator_without_clocks = clocks.source == stm32::ClockSource::unreadable;
-  application.emplace(identity(clocks));
+  application.emplace(identity(clocks), emulator_without_clocks ? std::span<std::uint32_t>{} : capture_memory);
   if (!emulator_without_clocks) application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
   interrupts.set_priority(stm32::SystemException::system_tick, priority::clock);

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "board/odrive_v3/gate_drivers.hpp"
-#include "board/odrive_v3/pins.hpp"
 #include "drivers/as5047p_angle.hpp"
 #include "drivers/stm32f4/gpio.hpp"
 
@@ -14,22 +13,33 @@ namespace kmax::board::odrive_v3 {
 /// begins a frame, which takes 6 us, and the axis' own tick, 25 us later, takes it. The angle is that of the
 /// frame before (50 us), since the chip answers one frame late.
 ///
-/// A bus that the main loop has claimed for the gate drivers costs a frame, which counts as missed.
+/// A bus that the main loop has claimed for the gate drivers costs a frame, which counts as missed. When that
+/// was longer than missed frames are forgiven, the encoder itself has done nothing wrong: reading starts
+/// again with the first frame after, which is soon enough to know the turns still (As5047pAngle).
+template <typename Bus = ChipBus, typename Select = drivers::stm32f4::GpioPin<>>
 class SerialEncoder {
  public:
-  explicit SerialEncoder(ChipBus& bus)
-      : bus_(bus), select_(drivers::stm32f4::gpio(pins::encoder_select.port), pins::encoder_select.number) {}
+  SerialEncoder(Bus& bus, Select select) : bus_(bus), select_(select) {}
 
   void ISR_begin() {
-    if (under_way_ || !bus_.claim()) return;
+    if (under_way_) return;
+    if (!bus_.claim()) {
+      bus_was_taken_ = true;
+      return;
+    }
     select_.write(false);
     under_way_ = bus_.start(angle_.ISR_command());
     if (!under_way_) end();
   }
 
-  /// Main loop: the next frame is the first. After the chips' configuration has held the bus for longer than
-  /// a missed frame is forgiven, and for another axis.
+  /// Main loop: whatever was wrong is forgotten, and the next frame is the first. The turns are kept if they
+  /// can be known.
   void restart() { restart_.store(true, std::memory_order_relaxed); }
+  /// Main loop: as restart(), for another axis or after a time in which nobody took frames.
+  void restart_anew() {
+    anew_.store(true, std::memory_order_relaxed);
+    restart();
+  }
 
   bool under_way() const { return under_way_; }
   /// Nobody wants the frame any more: it ended long ago.
@@ -41,11 +51,14 @@ class SerialEncoder {
 
   drivers::As5047pSample ISR_take() {
     if (restart_.exchange(false, std::memory_order_relaxed)) {
-      if (under_way_) ISR_abandon();
-      angle_.reset();
-      return {};
+      if (anew_.exchange(false, std::memory_order_relaxed)) angle_.forget_turns();
+      return ISR_start_again();
     }
     if (!under_way_) return angle_.ISR_missed();
+    if (bus_was_taken_) {
+      bus_was_taken_ = false;
+      if (angle_.fault() == drivers::As5047pFault::missed) return ISR_start_again();
+    }
     const std::optional<std::uint16_t> reply = bus_.finish();
     under_way_ = false;
     end();
@@ -53,16 +66,22 @@ class SerialEncoder {
   }
 
  private:
+  /// Without the frame under way: its reply answers a command that nobody remembers any more.
+  drivers::As5047pSample ISR_start_again() {
+    if (under_way_) ISR_abandon();
+    angle_.restart();
+    return angle_.ISR_missed();
+  }
   void end() {
     select_.write(true);
     bus_.release();
   }
 
-  ChipBus& bus_;
-  drivers::stm32f4::GpioPin<> select_;
+  Bus& bus_;
+  Select select_;
   drivers::As5047pAngle angle_;
-  bool under_way_ = false;
-  std::atomic<bool> restart_{false};
+  bool under_way_ = false, bus_was_taken_ = false;
+  std::atomic<bool> restart_{false}, anew_{false};
 };
 
 }  // namespace kmax::board::odrive_v3

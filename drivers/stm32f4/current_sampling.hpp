@@ -137,10 +137,11 @@ class CurrentSampling {
   }
 
   /// The body of the ADC interrupt. `axis` (0 or 1) is the one whose sampling point the latest trigger was,
-  /// by the timer's own direction bit and not by counting interrupts.
-  CurrentSample ISR_read(unsigned axis) {
+  /// by the timer's own direction bit and not by counting interrupts. The result is valid until the next
+  /// call.
+  const CurrentSample& ISR_read(unsigned axis) {
     axis &= 1U;
-    if (!finished(adc2_)) {
+    if (!finished(adc2_)) [[unlikely]] {
       ++counters_.spurious;
       latest_.valid = false;
       return latest_;
@@ -156,17 +157,24 @@ class CurrentSampling {
     const bool disturbed = (static_cast<std::uint32_t>(adc2_.sr) &
                             (adc_sr::InjectedStarted::mask | adc_sr::InjectedEnd::mask)) != 0;
     // That trigger may have come before or after its list was written: its sample belongs to nobody.
-    if (disturbed) axis_in_force_ = none;
+    if (disturbed) [[unlikely]]
+      axis_in_force_ = none;
 
-    if (disturbed || axis == last_axis_) ++counters_.overruns;
-    if (converted_axis != axis) ++counters_.axis_mismatches;
-    if (!phase_c_finished) ++counters_.missing_phase_c;
+    if (disturbed || axis == last_axis_) [[unlikely]]
+      ++counters_.overruns;
+    if (converted_axis != axis) [[unlikely]]
+      ++counters_.axis_mismatches;
+    if (!phase_c_finished) [[unlikely]]
+      ++counters_.missing_phase_c;
     last_axis_ = axis;
     latest_.valid = !disturbed && converted_axis == axis && phase_c_finished;
     read_slow();
     return latest_;
   }
 
+  /// Written by the interrupt; each is a half-word that another context may read, of different triggers.
+  /// Zeros before the first.
+  const CurrentSample& latest() const { return latest_; }
   /// Written by the interrupt; each is a word that another context may read.
   const CurrentSamplingCounters& counters() const { return counters_; }
 
@@ -222,7 +230,7 @@ class CurrentSampling {
   }
 
   void read_slow() {
-    if (!finished(adc1_)) {
+    if (!finished(adc1_)) [[unlikely]] {
       if (latest_.slow_age != 0xFF) ++latest_.slow_age;
       return;
     }

@@ -2,71 +2,9 @@
 
 #include <array>
 
-#include "control/haptic_loop.hpp"
-#include "firmware/fault.hpp"
-#include "firmware/object_dictionary/entry.hpp"
+#include "firmware/object_dictionary/axis_groups.hpp"
 
 namespace kmax::firmware {
-
-/// Records that exist once per axis. Holding registers for what is set, input registers for what is read.
-namespace group {
-inline constexpr Group wall{"wall", 0x2000, Scope::axis, 0x0000};
-inline constexpr Group interference{"interference", 0x2001, Scope::axis, 0x0040};
-inline constexpr Group position{"position", 0x2002, Scope::axis, 0x0060};
-inline constexpr Group velocity{"velocity", 0x2003, Scope::axis, 0x0070};
-inline constexpr Group haptic{"haptic", 0x2004, Scope::axis, 0x0080};
-inline constexpr Group force{"force", 0x2005, Scope::axis, 0x0090};
-inline constexpr Group passivity{"passivity", 0x2006, Scope::axis, 0x00A0};
-inline constexpr Group guard{"guard", 0x2007, Scope::axis, 0x00B0};
-inline constexpr Group device{"device", 0x2008, Scope::axis, 0x00D0};
-inline constexpr Group motor{"motor", 0x2009, Scope::axis, 0x00E0};
-inline constexpr Group current{"current", 0x200A, Scope::axis, 0x0100};
-inline constexpr Group encoder{"encoder", 0x200B, Scope::axis, 0x0110};
-inline constexpr Group temperature{"temperature", 0x200C, Scope::axis, 0x0130};
-inline constexpr Group drive{"drive", 0x2010, Scope::axis, 0x0200};
-inline constexpr Group drive_status{"drive", 0x2011, Scope::axis, 0x0000};
-inline constexpr Group measured{"measured", 0x2012, Scope::axis, 0x0020};
-}  // namespace group
-
-/// What each choice is called; the numbers are the enumerations' own.
-namespace names {
-template <typename Enumeration>
-constexpr NamedValue named(std::string_view name, Enumeration value) {
-  return {name, static_cast<std::int32_t>(value)};
-}
-using namespace control;
-inline constexpr NamedValue wall_law[] = {named("none", WallKind::none), named("plain", WallKind::plain),
-                                          named("magnetic", WallKind::magnetic),
-                                          named("adaptive", WallKind::adaptive)};
-inline constexpr NamedValue wall_side[] = {{"-1", -1}, {"+1", 1}};
-inline constexpr NamedValue adaptive_relation[] = {named("linear", AdaptiveRelation::linear),
-                                                   named("square", AdaptiveRelation::square),
-                                                   named("square_root", AdaptiveRelation::square_root)};
-inline constexpr NamedValue adaptive_velocity[] = {named("approach", AdaptiveVelocity::approach),
-                                                   named("speed", AdaptiveVelocity::speed)};
-inline constexpr NamedValue adaptive_mode[] = {named("instant", AdaptiveMode::instant),
-                                               named("latched", AdaptiveMode::latched),
-                                               named("peak_hold", AdaptiveMode::peak_hold)};
-inline constexpr NamedValue interference_mode[] = {named("none", InterferenceMode::none),
-                                                   named("perpendicular", InterferenceMode::perpendicular),
-                                                   named("parallel", InterferenceMode::parallel)};
-inline constexpr NamedValue rounding[] = {named("nearest", Rounding::nearest),
-                                          named("floor", Rounding::floor),
-                                          named("hysteresis", Rounding::hysteresis)};
-inline constexpr NamedValue velocity_estimator[] = {
-    named("difference", VelocityEstimatorKind::difference),
-    named("low_pass", VelocityEstimatorKind::low_pass), named("foaw", VelocityEstimatorKind::foaw),
-    named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
-    named("tracking", VelocityEstimatorKind::tracking)};
-// Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
-// ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
-inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
-inline constexpr NamedValue guard_mode[] = {{"off", 0}};
-inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
-inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
-inline constexpr NamedValue encoder_index[] = {{"none", 0}, {"once_per_turn", 1}};
-inline constexpr NamedValue encoder_direction[] = {{"-1", -1}, {"+1", 1}};
-}  // namespace names
 
 using enum Type;
 
@@ -160,7 +98,7 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
          "Viscous damping the stability check may count on. Not used by this version."),
     real("guard.friction", group::guard, 3, "N", 0, 100, 0,
-         "Coulomb friction the stability check may count on. Not used by this version."),
+         "Coulomb friction of the handle that may be counted on: compensation.limit must be below it."),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
          "Force F_h of the operator in paper 2's resolution criterion. Not used by this version."),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
@@ -170,7 +108,12 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
          "Handle travel per radian of the motor shaft.")
         .disarmed_only(),
     real("device.mass", group::device, 2, "kg", 1e-4, 100, 0.045,
-         "Mass felt at the handle. Not used by this version.")
+         "Mass felt at the handle, the rotor's inertia included. Used by the spin-out watch.")
+        .disarmed_only(),
+    real("device.hand_force", group::device, 3, "N", 0, 1000, 5,
+         "Largest force of a hand: a handle that gains more energy than the motor and such a hand can have "
+         "given it "
+         "has spun out (encoder slipped, wrong commutation) and trips. 0 turns the watch off.")
         .disarmed_only(),
 
     choice("motor.kind", group::motor, 1, names::motor_kind, 0,
@@ -189,10 +132,26 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
          "Electrical angle of a synchronous motor where the position is zero.")
         .disarmed_only(),
 
+    real("motor.inductance_q", group::motor, 7, "H", 0, 1, 0,
+         "Inductance of the torque-making (q) axis of a salient synchronous motor; 0: as motor.inductance.")
+        .disarmed_only(),
+    choice("motor.calibrated", group::motor, 8, names::no_or_yes, 0,
+           "Whether the values of motor and encoder have been identified; 'kmax calibrate' says yes. A "
+           "synchronous "
+           "motor is not armed otherwise, but after a calibration in this power cycle.")
+        .disarmed_only(),
+    choice("motor.commutation_known", group::motor, 9, names::no_or_yes, 0,
+           "Whether 'kmax calibrate' has found the rotor's electrical angle in this power cycle. Forgotten "
+           "when the "
+           "counts or their meaning change; see measured.commutation_known.")
+        .disarmed_only()
+        .volatile_value(),
+
     real("current.limit", group::current, 1, "A", 0.1, 120, 5,
          "Largest motor current; a phase that carries half as much again trips the axis.")
         .disarmed_only(),
-    real("current.bandwidth", group::current, 2, "rad/s", 1, 50000, 3000, "Bandwidth of the current loop.")
+    real("current.bandwidth", group::current, 2, "rad/s", 1, 15700, 3000,
+         "Bandwidth (-3 dB) of the current loop, up to an eighth of the tick rate.")
         .disarmed_only(),
 
     choice("encoder.kind", group::encoder, 1, names::encoder_kind, 0,
@@ -208,13 +167,35 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
           "Count at which the position is zero.")
         .disarmed_only(),
     choice("encoder.index", group::encoder, 5, names::encoder_index, 0,
-           "Index line of a quadrature encoder. With one, a cable that comes off is found at once, when the "
-           "index has been passed once: all lines "
-           "then read high away from the index.")
+           "Index line of a quadrature encoder. When it is first passed after a start, counts are referred "
+           "to it: the "
+           "index is at a whole number of turns. From then on a cable that comes off is found at once, since "
+           "all "
+           "lines read high away from the index.")
+        .disarmed_only(),
+    choice("encoder.start", group::encoder, 6, names::encoder_start, 0,
+           "Where the handle is when the device starts: anywhere, or always in the same rest, so that counts "
+           "from "
+           "there mean the same after every start.")
         .disarmed_only(),
 
     real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100,
          "Trip level of the power stage's temperature."),
+    real(
+        "temperature.derating", group::temperature, 2, "degC", 0, 100, 20,
+        "The current limit falls in proportion over this much below a trip level, of power stage and motor."),
+    real("temperature.motor_limit", group::temperature, 3, "degC", 0, 300, 120,
+         "Trip level of the winding's computed temperature; 0 turns it off."),
+    real("temperature.ambient", group::temperature, 4, "degC", -40, 100, 25,
+         "Temperature around the motor, at which it is taken to start."),
+    real("temperature.winding_capacity", group::temperature, 5, "J/K", 0.01, 1e5, 15,
+         "Heat capacity of the winding."),
+    real("temperature.winding_resistance", group::temperature, 6, "K/W", 0.01, 1000, 3,
+         "Thermal resistance from winding to case."),
+    real("temperature.case_capacity", group::temperature, 7, "J/K", 0.01, 1e6, 150,
+         "Heat capacity of the motor's case."),
+    real("temperature.case_resistance", group::temperature, 8, "K/W", 0.01, 1000, 8,
+         "Thermal resistance from case to ambient."),
 
     whole(
         "drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
@@ -222,6 +203,99 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
         "128 fault reset (rising edge).")
         .volatile_value()
         .at_standard_index(0x6040),
+    choice(
+        "drive.mode", group::drive_mode, 1, names::drive_mode, 0,
+        "What an armed axis does: render the wall, or follow excitation.* without a wall (identification and "
+        "self-test).")
+        .disarmed_only()
+        .volatile_value(),
+
+    choice("excitation.kind", group::excitation, 1, names::excitation_kind, 0,
+           "What is excited: a voltage or a current vector in the stator's frame, a torque-making current in "
+           "the "
+           "rotor's frame, or the handle's position through a spring and damper. A DC motor has magnitudes "
+           "only.")
+        .volatile_value(),
+    whole("excitation.run", group::excitation, 2, unsigned16, "", 0, 65535, 0,
+          "A number other than the one at arming starts the excitation, another one starts it anew.")
+        .volatile_value(),
+    real("excitation.bias", group::excitation, 3, "", -200, 200, 0, "Steady part, V or A.").volatile_value(),
+    real("excitation.alternation", group::excitation, 4, "", -200, 200, 0,
+         "Amplitude of a square wave, V or A.")
+        .volatile_value(),
+    whole("excitation.half_period", group::excitation, 5, unsigned32, "ticks", 0, 1e6, 0,
+          "Half a period of the square wave; 0: none.")
+        .volatile_value(),
+    choice("excitation.alternation_axis", group::excitation, 6, names::alternation_axis, 0,
+           "The square wave acts along the vector, or a quarter electrical turn ahead.")
+        .volatile_value(),
+    real("excitation.angle", group::excitation, 7, "rad", -7, 7, 0,
+         "Electrical angle of the vector at the start.")
+        .volatile_value(),
+    real("excitation.angle_rate", group::excitation, 8, "rad/s", -10000, 10000, 0,
+         "Electrical speed at which the vector turns.")
+        .volatile_value(),
+    real("excitation.angle_span", group::excitation, 9, "rad", 0, 10000, 0,
+         "The vector stands after having turned this far.")
+        .volatile_value(),
+    real("excitation.ramp", group::excitation, 10, "s", 0, 10, 0.05, "Time in which the amplitudes come up.")
+        .volatile_value(),
+    real("excitation.duration", group::excitation, 11, "s", 0, 60, 1,
+         "Nothing is excited any more after this time.")
+        .volatile_value(),
+    real("excitation.travel", group::excitation, 12, "m", 0, 1, 0.001,
+         "Trip level: how far the handle may be from where it was when the axis was armed.")
+        .volatile_value(),
+    real("excitation.stiffness", group::excitation, 13, "N/m", 0, 1e5, 200, "Spring of kind 'position'.")
+        .volatile_value(),
+    real("excitation.damping", group::excitation, 14, "N s/m", 0, 1000, 2, "Damper of kind 'position'.")
+        .volatile_value(),
+    real("excitation.speed", group::excitation, 15, "m/s", 0, 10, 0.005,
+         "Speed of the point that kind 'position' follows.")
+        .volatile_value(),
+    real("excitation.stroke", group::excitation, 16, "m", -1, 1, 0,
+         "How far that point moves from the start.")
+        .volatile_value(),
+
+    real("compensation.dead_time", group::compensation, 1, "s", 0, 5e-6, 0,
+         "Dead time of the bridge that is made up for; 0: not.")
+        .disarmed_only(),
+    real("compensation.dead_time_current", group::compensation, 2, "A", 0.001, 100, 0.1,
+         "Current within which that goes smoothly through zero.")
+        .disarmed_only(),
+    real("compensation.limit", group::compensation, 3, "N", 0, 100, 0,
+         "Bound on friction, cogging and gravity compensation together; 0: off. Must be below "
+         "guard.friction, so "
+         "that a handle at rest cannot be moved by it.")
+        .disarmed_only(),
+    real("compensation.friction", group::compensation, 4, "N", 0, 100, 0,
+         "Coulomb friction that is made up for.")
+        .disarmed_only(),
+    real("compensation.friction_velocity", group::compensation, 5, "m/s", 0.001, 10, 0.02,
+         "Velocity up to which friction compensation grows from zero.")
+        .disarmed_only(),
+    whole("compensation.cogging_periods", group::compensation, 6, unsigned16, "", 0, 1024, 0,
+          "Cogging periods in a turn of the shaft; 0: none.")
+        .disarmed_only(),
+    real("compensation.cogging_cosine_1", group::compensation, 7, "N", -100, 100, 0, "Cogging at the handle.")
+        .disarmed_only(),
+    real("compensation.cogging_sine_1", group::compensation, 8, "N", -100, 100, 0, "Cogging at the handle.")
+        .disarmed_only(),
+    real("compensation.cogging_cosine_2", group::compensation, 9, "N", -100, 100, 0,
+         "Second harmonic of the cogging.")
+        .disarmed_only(),
+    real("compensation.cogging_sine_2", group::compensation, 10, "N", -100, 100, 0,
+         "Second harmonic of the cogging.")
+        .disarmed_only(),
+    real("compensation.gravity_constant", group::compensation, 11, "N", -100, 100, 0,
+         "Force of gravity or of a spring on the handle, its constant part.")
+        .disarmed_only(),
+    real("compensation.gravity_cosine", group::compensation, 12, "N", -100, 100, 0,
+         "Its part with the cosine of the shaft's angle.")
+        .disarmed_only(),
+    real("compensation.gravity_sine", group::compensation, 13, "N", -100, 100, 0,
+         "Its part with the sine of the shaft's angle.")
+        .disarmed_only(),
 
     reading("drive.statusword", group::drive_status, 1, unsigned16, "", "CiA 402 statusword.")
         .at_standard_index(0x6041),
@@ -246,7 +320,9 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     reading("measured.magnetic_coefficient", group::measured, 7, float32, "N", "F_MC at work."),
     reading("measured.count", group::measured, 8, integer32, "counts", "Position, re-sampled (low 32 bits)."),
     reading("measured.flags", group::measured, 9, unsigned16, "",
-            "Bit 0 inside the wall, 1 force limited, 2 slew limited, 3 soft start, 4 armed."),
+            "Bit 0 inside the wall, 1 force limited, 2 slew limited, 3 soft start, 4 armed, 5 motor "
+            "saturated: less force "
+            "than asked for."),
     reading("measured.count_length", group::measured, 10, float32, "m", "Handle travel per encoder count."),
     reading("measured.resolution", group::measured, 11, float32, "m", "Position step that is really in use."),
     reading("measured.limited_samples", group::measured, 12, unsigned32, "samples",
@@ -258,6 +334,28 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
     reading("measured.current_reference", group::measured, 15, float32, "A", "Motor current asked for."),
     reading("measured.temperature", group::measured, 16, float32, "degC",
             "Temperature of the axis' power stage."),
+    reading("measured.winding_temperature", group::measured, 17, float32, "degC",
+            "Temperature of the motor's winding, computed from the current."),
+    reading("measured.current_limit", group::measured, 18, float32, "A",
+            "Current limit in force: current.limit less what the temperatures take."),
+    reading("measured.force_made", group::measured, 19, float32, "N",
+            "Force at the handle that the measured current makes."),
+    reading("measured.commutation_known", group::measured, 20, unsigned8, "",
+            "1: a synchronous motor's electrical angle is known, or none is needed."),
+    reading("measured.excitation_finished", group::measured, 21, unsigned8, "",
+            "1: the present excitation has ended."),
+
+    reading("trip.tick", group::trip, 1, unsigned32, "ticks", "Tick of the present fault."),
+    reading("trip.position", group::trip, 2, float32, "m", "Position in that tick."),
+    reading("trip.velocity", group::trip, 3, float32, "m/s", "Velocity in that tick."),
+    reading("trip.force", group::trip, 4, float32, "N", "Force asked for in that tick."),
+    reading("trip.current", group::trip, 5, float32, "A", "Motor current in that tick."),
+    reading("trip.current_reference", group::trip, 6, float32, "A", "Motor current asked for in that tick."),
+    reading("trip.supply", group::trip, 7, float32, "V", "Supply in that tick; 0 on a board that has none."),
+    reading("trip.temperature", group::trip, 8, float32, "degC",
+            "Power stage's temperature when the fault was seen."),
+    reading("trip.winding_temperature", group::trip, 9, float32, "degC",
+            "Winding's temperature when the fault was seen."),
 });
 
 }  // namespace kmax::firmware

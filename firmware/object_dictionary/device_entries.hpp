@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "firmware/capture_channel.hpp"
 #include "firmware/object_dictionary/entry.hpp"
 
 namespace kmax::firmware {
@@ -22,6 +23,10 @@ inline constexpr Group trace_state{"trace", 0x3014, Scope::device, 0x08A0};
 inline constexpr Group supply_state{"supply", 0x3015, Scope::device, 0x08B0};
 inline constexpr Group store{"store", 0x3016, Scope::device, 0x0910};
 inline constexpr Group store_status{"store", 0x3017, Scope::device, 0x08C0};
+inline constexpr Group capture{"capture", 0x3018, Scope::device, 0x0920};
+/// Apart from the settings, so that no write covers both.
+inline constexpr Group capture_command{"capture", 0x301A, Scope::device, 0x0940};
+inline constexpr Group capture_status{"capture", 0x3019, Scope::device, 0x08F0};
 }  // namespace group
 
 namespace names {
@@ -42,9 +47,8 @@ inline constexpr NamedValue baud_rate[] = {{"9600", 9600},     {"19200", 19200},
 }  // namespace names
 
 /// A choice whose numbers need 32 bits.
-template <std::size_t count>
 constexpr Entry rate_choice(std::string_view name, Group group, std::uint8_t subindex, std::string_view unit,
-                            const NamedValue (&values)[count], std::int32_t default_value,
+                            std::span<const NamedValue> values, std::int32_t default_value,
                             std::string_view help) {
   Entry e = choice(name, group, subindex, values, default_value, help);
   e.type = Type::unsigned32;
@@ -174,6 +178,49 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "First parameter that has its default, in the same form; 0: none."),
     reading("store.defaulted_2", group::store_status, 15, Type::unsigned32, "", "Second such parameter."),
     reading("store.defaulted_3", group::store_status, 16, Type::unsigned32, "", "Third such parameter."),
+
+    whole("capture.axis", group::capture, 1, Type::unsigned8, "", 0, 1, 0, "Axis that is captured.")
+        .volatile_value(),
+    choice("capture.channel_1", group::capture, 2, names::capture_channel, 0,
+           "What a capture records first; 'none' is left out. Positions are read as counts, angles as 2^-32 "
+           "turns, all else as it is named.")
+        .volatile_value(),
+    choice("capture.channel_2", group::capture, 3, names::capture_channel, 0,
+           "What a capture records second.")
+        .volatile_value(),
+    choice("capture.channel_3", group::capture, 4, names::capture_channel, 0, "What a capture records third.")
+        .volatile_value(),
+    choice("capture.channel_4", group::capture, 5, names::capture_channel, 0,
+           "What a capture records fourth.")
+        .volatile_value(),
+    whole("capture.interval", group::capture, 6, Type::unsigned32, "ticks", 1, 1e6, 1,
+          "Ticks from one sample to the next.")
+        .volatile_value(),
+    whole("capture.samples", group::capture, 7, Type::unsigned32, "samples", 0, 12288, 0,
+          "Samples to take; 0, or more than fit: as many as fit.")
+        .volatile_value(),
+    whole("capture.pre_trigger", group::capture, 8, Type::unsigned32, "samples", 0, 12288, 0,
+          "Samples of these from before the trigger.")
+        .volatile_value(),
+    choice("capture.trigger", group::capture, 9, names::capture_trigger, 0,
+           "What starts a capture that is armed.")
+        .volatile_value(),
+    real("capture.trigger_level", group::capture, 10, "", 0, 1e6, 1,
+         "Level of the triggers 'force' (N) and 'velocity' (m/s).")
+        .volatile_value(),
+    choice("capture.command", group::capture_command, 1, names::capture_command, 0,
+           "'arm' begins a capture with the settings above, 'stop' ends it.")
+        .volatile_value(),
+
+    named_reading("capture.state", group::capture_status, 1, names::capture_state,
+                  "Whether a capture waits for its trigger, runs, or can be read."),
+    reading("capture.taken", group::capture_status, 2, Type::unsigned32, "samples",
+            "Samples that can be read."),
+    reading("capture.trigger_sample", group::capture_status, 3, Type::unsigned32, "",
+            "Number of the sample at the trigger."),
+    reading("capture.first_tick", group::capture_status, 4, Type::unsigned32, "ticks",
+            "Tick of the first sample."),
+    reading("capture.channels", group::capture_status, 5, Type::unsigned8, "", "Words in a sample."),
 });
 
 }  // namespace kmax::firmware

@@ -121,9 +121,9 @@ constexpr Entry whole(std::string_view name, Group group, std::uint8_t subindex,
   return {name, group, subindex, type, unit, minimum, maximum, default_value, help};
 }
 
-template <std::size_t count>
 constexpr Entry choice(std::string_view name, Group group, std::uint8_t subindex,
-                       const NamedValue (&values)[count], std::int32_t default_value, std::string_view help) {
+                       std::span<const NamedValue> values, std::int32_t default_value,
+                       std::string_view help) {
   std::int32_t low = values[0].value, high = values[0].value;
   for (const NamedValue& v : values) {
     low = v.value < low ? v.value : low;
@@ -132,7 +132,7 @@ constexpr Entry choice(std::string_view name, Group group, std::uint8_t subindex
   Entry e{name, group,       subindex,     low < 0 ? Type::integer8 : Type::unsigned8,
           "",   double(low), double(high), double(default_value),
           help};
-  e.values = std::span<const NamedValue>(values, count);
+  e.values = values;
   return e;
 }
 
@@ -150,9 +150,8 @@ constexpr Entry reading(std::string_view name, Group group, std::uint8_t subinde
 }
 
 /// A reading that is one of a few named states.
-template <std::size_t count>
 constexpr Entry named_reading(std::string_view name, Group group, std::uint8_t subindex,
-                              const NamedValue (&values)[count], std::string_view help) {
+                              std::span<const NamedValue> values, std::string_view help) {
   Entry e = choice(name, group, subindex, values, values[0].value, help);
   e.access = Access::read_only;
   e.persistent = false;

@@ -24,6 +24,9 @@ void add_parameter_commands(CLI::App& app, Context& context);  // list, get, set
 void add_store_commands(CLI::App& app, Context& context);      // save, defaults
 void add_info_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
+void add_capture_command(CLI::App& app, Context& context);
+void add_calibrate_command(CLI::App& app, Context& context);
+void add_selftest_command(CLI::App& app, Context& context);
 void add_wall_command(CLI::App& app, Context& context);
 void add_simulate_command(CLI::App& app, Context& context);
 void add_experiment_command(CLI::App& app, Context& context);

@@ -67,11 +67,12 @@ const std::vector<double>& CsvTable::column(const std::string& name) const {
 }
 
 std::string label_of(const std::string& column) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> units = {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 11> units = {
       {{"_m_per_s", "m/s"},
        {"_n_per_m", "N/m"},
        {"_counts", "counts"},
        {"_hz", "Hz"},
+       {"_rad", "rad"},
        {"_mm", "mm"},
        {"_m", "m"},
        {"_n", "N"},

@@ -46,6 +46,26 @@ device::Assignment hardware(std::size_t axis, double number) {
   return {device::Parameter(entry, axis), firmware::raw_from_number(firmware::entry_at(entry).type, number)};
 }
 
+using Assignments = std::vector<device::Assignment>;
+
+void identify_dc(Assignments& all, std::size_t axis, const simulation::BrushedDcMotorConfig& motor,
+                 double leg_resistance) {
+  all.push_back(hardware<"motor.resistance">(axis, motor.resistance + 2.0 * leg_resistance));
+  all.push_back(hardware<"motor.inductance">(axis, motor.inductance));
+  all.push_back(hardware<"motor.torque_constant">(axis, motor.torque_constant));
+}
+
+void identify_pmsm(Assignments& all, std::size_t axis, const simulation::SynchronousMotorConfig& motor,
+                   double leg_resistance) {
+  all.push_back(hardware<"motor.resistance">(axis, motor.resistance + leg_resistance));
+  all.push_back(hardware<"motor.inductance">(axis, motor.inductance_d));
+  all.push_back(hardware<"motor.inductance_q">(axis, motor.inductance_q));
+  all.push_back(hardware<"motor.torque_constant">(axis, motor.torque_constant));
+  all.push_back(hardware<"motor.pole_pairs">(axis, motor.pole_pairs));
+  all.push_back(hardware<"motor.electrical_offset">(axis, motor.electrical_offset));
+  all.push_back(hardware<"motor.commutation_known">(axis, 1));
+}
+
 constexpr std::size_t transaction_entry = firmware::entry_of<"transaction.control">();
 
 }  // namespace
@@ -62,9 +82,34 @@ std::optional<std::string> check_parameter(const std::string& name, const simula
 std::vector<device::Assignment> hardware_assignments_of(const simulation::Scene& scene) {
   std::vector<device::Assignment> all;
   for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
-    all.push_back(hardware<"encoder.counts_per_turn">(axis, scene.axes[axis].encoder.counts_per_turn));
-    all.push_back(hardware<"device.transmission">(axis, scene.axes[axis].encoder.transmission));
-    all.push_back(hardware<"device.mass">(axis, scene.axes[axis].device.mass));
+    const simulation::SceneAxis& named = scene.axes[axis];
+    all.push_back(hardware<"encoder.counts_per_turn">(axis, named.encoder.counts_per_turn));
+    all.push_back(hardware<"device.transmission">(axis, named.encoder.transmission));
+    if (scene.identified) all.push_back(hardware<"device.mass">(axis, named.device.mass));
+    if (!named.motor) continue;
+    const bool brushed = std::holds_alternative<simulation::BrushedDcMotorConfig>(*named.motor);
+    const bool serial = named.encoder.kind == simulation::EncoderKind::as5047p;
+    all.push_back(hardware<"motor.kind">(axis, brushed ? 0 : 1));
+    all.push_back(hardware<"encoder.kind">(axis, serial ? 1 : 0));
+  }
+  if (!scene.identified) return all;
+  for (const device::Assignment& one : identified_assignments_of(scene)) all.push_back(one);
+  return all;
+}
+
+std::vector<device::Assignment> identified_assignments_of(const simulation::Scene& scene) {
+  std::vector<device::Assignment> all;
+  for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
+    const simulation::SceneAxis& named = scene.axes[axis];
+    if (!named.motor) continue;
+    const double leg = named.inverter.on_resistance;
+    if (const auto* dc = std::get_if<simulation::BrushedDcMotorConfig>(&*named.motor)) {
+      identify_dc(all, axis, *dc, leg);
+    } else {
+      identify_pmsm(all, axis, std::get<simulation::SynchronousMotorConfig>(*named.motor), leg);
+    }
+    all.push_back(hardware<"encoder.direction">(axis, named.encoder.reversed ? -1 : 1));
+    all.push_back(hardware<"motor.calibrated">(axis, 1));
   }
   return all;
 }

@@ -3,34 +3,50 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "firmware/application.hpp"
+#include "host_tools/simulated_board/simulated_power.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulated_board {
 
-/// The handles of a scene behind the encoders and forces of a board (board::SimulatedDevice).
+/// The axes of a scene behind a board (board::PoweredDevice).
 ///
-/// An axis that the scene does not have stands still at count 0 and costs nothing. A person begins the
-/// approach when the axis is armed, as one would who was told "now"; arming again begins another trial. A
-/// handle that nobody holds stays at its start until its axis is armed for the first time, and is let go
-/// then.
+/// An axis that names a motor is driven through it, with everything that lies between a duty and a force:
+/// simulated_power.hpp. An axis without a motor has an ideal force source and an ideal encoder. An axis that
+/// the scene does not have stands still at count 0 and costs nothing.
+///
+/// A person begins the approach when the axis is armed, as one would who was told "now"; arming again begins
+/// another trial. A handle that nobody holds stays at its start until its axis is armed for the first time,
+/// and is let go then.
 class SimulatedDevice {
  public:
   /// Throws std::invalid_argument for a scene whose parts are not allowed.
   explicit SimulatedDevice(const simulation::Scene& scene);
 
+  /// Once in a tick. Without a motor there are no currents, and nothing keeps the axis from being driven.
+  firmware::AxisInput sample(std::size_t axis);
+  /// With a motor: of the last sample().
   std::uint32_t count(std::size_t axis) const;
-  bool count_valid(std::size_t axis) const { return encoder_connected_[axis]; }
+  bool count_valid(std::size_t axis) const;
   void drive(std::size_t axis, const firmware::AxisOutput& output);
   void advance(double duration);
+  firmware::BoardReadings readings() const { return power_ ? power_->readings() : firmware::BoardReadings{}; }
+  void poll(const firmware::Application& application, std::uint32_t now_us) {
+    if (power_) power_->poll(application, now_us);
+  }
 
   /// Pulls the plug of an axis' encoder, or puts it back.
-  void connect_encoder(std::size_t axis, bool connected) { encoder_connected_[axis] = connected; }
+  void connect_encoder(std::size_t axis, bool connected);
 
   std::size_t axis_count() const { return axis_count_; }
-  const simulation::CoupledHandle& handle(std::size_t axis) const { return axes_[axis]->handle; }
+  const simulation::CoupledHandle& handle(std::size_t axis) const;
+  bool has_motor(std::size_t axis) const { return power_ && power_->has(axis); }
+  /// The motors' board and what is plugged into it, with its defects. Throws std::logic_error for a scene
+  /// without a motor.
+  SimulatedPower& power();
 
  private:
   struct Axis {
@@ -40,7 +56,9 @@ class SimulatedDevice {
     bool let_go = false;
   };
 
-  std::array<std::optional<Axis>, firmware::axis_count> axes_;
+  std::array<std::optional<Axis>, firmware::axis_count> axes_;       ///< without a motor
+  std::unique_ptr<SimulatedPower> power_;                            ///< those with
+  std::array<firmware::AxisInput, firmware::axis_count> samples_{};  ///< of the axes with a motor
   std::array<bool, firmware::axis_count> encoder_connected_{};
   std::size_t axis_count_ = 0;
 };

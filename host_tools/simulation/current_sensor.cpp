@@ -20,6 +20,7 @@ double CurrentSensor::sample(Channel channel, double shunt_current) {
     throw std::invalid_argument(fmt::format("shunt current = {} A: allowed is a number", shunt_current));
   const auto index = static_cast<std::size_t>(channel);
   double input = shorted_[index] ? 0.0 : config_.shunt * shunt_current;
+  if (inverted_[index]) input = -input;
   if (config_.noise > 0.0) input += config_.noise * noise_[index].gaussian();
   const double offset = channel == Channel::b ? config_.offset_b : config_.offset_c;
   return std::clamp(0.5 * reference + offset + config_.gain * input, 0.0, reference);

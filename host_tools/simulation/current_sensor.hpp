@@ -54,12 +54,15 @@ class CurrentSensor {
   double gain() const { return config_.gain; }
   // Shorts the amplifier's inputs (DC_CAL): the pin shows the offset and the noise alone.
   void short_inputs(Channel channel, bool shorted) { shorted_[static_cast<std::size_t>(channel)] = shorted; }
+  // Defect: the shunt's wires are exchanged, so that the current reads with the wrong sign.
+  void invert(Channel channel, bool inverted) { inverted_[static_cast<std::size_t>(channel)] = inverted; }
 
   const CurrentSensorConfig& config() const { return config_; }
 
  private:
   CurrentSensorConfig config_;
   std::array<bool, 2> shorted_{};
+  std::array<bool, 2> inverted_{};
   std::array<NoiseGenerator, 2> noise_;
 };
 

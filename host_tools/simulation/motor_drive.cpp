@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace kmax::simulation {
 namespace {
@@ -20,7 +21,8 @@ MotorDrive::MotorDrive(const MotorDriveConfig& config, const CoupledHandle& hand
       inverter_(config.inverter),
       sensor_(config.current_sensor, NoiseGenerator(config.seed).bits()),
       handle_(handle),
-      encoder_(config.encoder, handle.position(), config.seed),
+      coupling_(handle.position(), config.encoder.reversed),
+      encoder_(config.encoder, coupling_.disc(), config.seed),
       transmission_(config.encoder.transmission) {}
 
 void MotorDrive::advance(double duration, const InverterCommand& command, Supply& supply) {
@@ -31,6 +33,8 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
   const int pieces =
       duration <= longest_piece ? 1 : static_cast<int>(std::ceil(duration / longest_piece - 1e-9));
   const double piece = duration / pieces;
+  InverterCommand at_terminals = command;
+  for (std::size_t k = 0; k < terminal_count; ++k) at_terminals.legs[k] = command.legs[leg_of_[k]];
   double torque_sum = 0.0;
   for (int n = 0; n < pieces; ++n) {
     const double velocity = handle_.velocity();
@@ -39,7 +43,8 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
     double torque = 0.0;
     const Inverter::Flow flow = std::visit(
         [&](auto& motor) {
-          const Inverter::Flow from_legs = inverter_.advance(motor, command, supply.voltage(), shaft, piece);
+          const Inverter::Flow from_legs =
+              inverter_.advance(motor, at_terminals, supply.voltage(), shaft, piece);
           torque = from_legs.mean_torque + motor.cogging_torque(shaft.angle + 0.5 * piece * shaft.speed);
           return from_legs;
         },
@@ -49,7 +54,8 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
     const double force = torque / transmission_;
     handle_.advance(force, background_from_motor_ ? force : background_force_, piece);
     acceleration_ = (handle_.velocity() - velocity) / piece;
-    encoder_.update(handle_.position());
+    coupling_.update(handle_.position(), torque);
+    encoder_.update(coupling_.disc());
   }
   mean_torque_ = torque_sum / pieces;
   for (std::size_t k = 0; k < terminal_count; ++k) leg_on_[k] = command.legs[k].enabled;
@@ -61,13 +67,32 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
 
 double MotorDrive::current_pin(CurrentSensor::Channel channel, bool lower_fet_on) {
   const std::size_t leg = channel == CurrentSensor::Channel::b ? terminal_b : terminal_c;
-  const double current = currents()[leg];
+  const double current = leg_currents()[leg];
   const bool below = leg_on_[leg] ? lower_fet_on : current > 0.0;
   return sensor_.sample(channel, below ? current : 0.0);
 }
 
 void MotorDrive::open_terminal(std::size_t terminal, bool open) {
   std::visit([&](auto& motor) { motor.set_open(terminal, open); }, motor_);
+}
+
+void MotorDrive::swap_terminals(std::size_t one, std::size_t other) {
+  std::swap(leg_of_.at(one), leg_of_.at(other));
+}
+
+void MotorDrive::block(bool blocked) {
+  blocked_ = blocked;
+  handle_.block(blocked_ || held_);
+}
+
+void MotorDrive::hold(bool held) {
+  held_ = held;
+  handle_.block(blocked_ || held_);
+}
+
+void MotorDrive::update_encoder() {
+  coupling_.update(handle_.position(), mean_torque_);
+  encoder_.update(coupling_.disc());
 }
 
 void MotorDrive::set_background_force(double force) {
@@ -79,6 +104,13 @@ void MotorDrive::set_background_force(double force) {
 
 TerminalValues MotorDrive::currents() const {
   return std::visit([](const auto& motor) { return motor.currents(); }, motor_);
+}
+
+TerminalValues MotorDrive::leg_currents() const {
+  const TerminalValues into_motor = currents();
+  TerminalValues out_of_legs{};
+  for (std::size_t k = 0; k < terminal_count; ++k) out_of_legs[leg_of_[k]] = into_motor[k];
+  return out_of_legs;
 }
 
 double MotorDrive::magnetic_energy() const {

@@ -34,6 +34,7 @@
 #include "host_tools/simulation/brushed_dc_motor.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/current_sensor.hpp"
+#include "host_tools/simulation/encoder_coupling.hpp"
 #include "host_tools/simulation/inverter.hpp"
 #include "host_tools/simulation/quadrature_encoder.hpp"
 #include "host_tools/simulation/supply.hpp"
@@ -75,15 +76,26 @@ class MotorDrive {
   QuadratureEncoder& encoder() { return encoder_; }
   const QuadratureEncoder& encoder() const { return encoder_; }
   CurrentSensor& current_sensor() { return sensor_; }
+  EncoderCoupling& encoder_coupling() { return coupling_; }
+  // The encoder looks at the shaft; advance() does that in every piece, so this matters with edge noise only.
+  void update_encoder();
+  // rad, of the encoder's disc: the shaft's unless the encoder is reversed or has a defect.
+  double disc_angle() const { return coupling_.disc() / transmission_; }
 
-  // Faults. A blocked motor holds the handle where it is.
+  // Faults. Opens the wire of one of the motor's terminals, or closes it.
   void open_terminal(std::size_t terminal, bool open);
-  void block(bool blocked) { handle_.block(blocked); }
+  // The wires of two of the motor's terminals change places on the legs. Twice is as before.
+  void swap_terminals(std::size_t one, std::size_t other);
+  // A blocked motor holds the handle where it is.
+  void block(bool blocked);
+  // So does somebody's hand until it lets go. Apart from block(), so that letting go does not mend a motor.
+  void hold(bool held);
 
   void set_background_force(double force);  // N; throws std::invalid_argument unless finite
   void background_from_motor() { background_from_motor_ = true; }
 
-  TerminalValues currents() const;                                           // A, into the motor, now
+  TerminalValues currents() const;      // A, into the motor's terminals, now
+  TerminalValues leg_currents() const;  // A, out of the inverter's legs, now
   double shaft_angle() const { return handle_.position() / transmission_; }  // rad
   double shaft_speed() const { return handle_.velocity() / transmission_; }  // rad/s
   double mean_torque() const { return mean_torque_; }            // N m, with cogging, of the last advance
@@ -97,8 +109,11 @@ class MotorDrive {
   Inverter inverter_;
   CurrentSensor sensor_;
   CoupledHandle handle_;
+  EncoderCoupling coupling_;
   QuadratureEncoder encoder_;
   double transmission_;
+  std::array<std::size_t, terminal_count> leg_of_{terminal_a, terminal_b, terminal_c};  // of each terminal
+  bool blocked_ = false, held_ = false;
   std::array<bool, terminal_count> leg_on_{};
   double acceleration_ = 0.0;  // m/s2, of the last piece
   double background_force_ = 0.0;

@@ -30,15 +30,17 @@ class SceneReader : private SceneTables {
   SceneReader(std::string_view source, const ParameterCheck& check) : SceneTables(source), check_(check) {}
 
   Scene read(const toml::table& root) {
-    require_known(root, "",
-                  {"name", "description", "duration", "seed", "device", "operator", "motion", "encoder",
-                   "parameters", "measurement", "motor", "inverter", "current_sensor", "supply", "axis1"});
+    require_known(
+        root, "",
+        {"name", "description", "duration", "seed", "identified", "device", "operator", "motion", "encoder",
+         "parameters", "measurement", "motor", "inverter", "current_sensor", "supply", "axis1"});
     Scene scene;
     scene.name = std::filesystem::path(source()).stem().string();
     read_text(root, "name", scene.name);
     read_text(root, "description", scene.description);
     read_fields(root, "", scene_fields, scene);
     read_seed(root, scene);
+    read_truth(root, "", "identified", scene.identified);
     if (const toml::table* table = part(root, "", "measurement")) {
       require_known(*table, "measurement.", {"window", "threshold"});
       read_fields(*table, "measurement.", measurement_fields, scene.measurement);

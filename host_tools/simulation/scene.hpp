@@ -6,14 +6,18 @@
 //   description = "..."             optional
 //   duration = 5.0                  s, from the start of the motion
 //   seed = 1                        for parts with noise
+//   identified = true               whether a board starts with the values of the scene's motors, as after a
+//                                   calibration; false: with the factory's
 //
 //   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
 //   [operator]                      operator_model.hpp
 //   [motion]                        intended_motion.hpp; needs [operator]
-//   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p"
+//   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p", and
+//                                   reversed = true: it counts downwards
 //   [motor]                         kind = "dc" (brushed_dc_motor.hpp) or "pmsm" (synchronous_motor.hpp; also
 //                                   inductance for inductance_d and inductance_q); without it the axis has
-//                                   an ideal actuator and a force limit
+//                                   an ideal actuator and a force limit. Also defects = ["phase_b_open", ...]
+//                                   (defect.hpp), which are there from the beginning
 //   [inverter] [current_sensor]     inverter.hpp, current_sensor.hpp; need [motor]
 //   [supply]                        supply.hpp, one for all axes
 //   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
@@ -40,6 +44,7 @@
 #include <vector>
 
 #include "host_tools/simulation/coupled_handle.hpp"
+#include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/encoder_config.hpp"
 #include "host_tools/simulation/intended_motion.hpp"
@@ -76,6 +81,7 @@ struct SceneAxis {
   std::optional<MotorConfig> motor;
   InverterConfig inverter;
   CurrentSensorConfig current_sensor;
+  std::vector<Defect> defects;  // of the motor's axis, from the beginning
 
   CoupledHandle make_handle() const;
   // The handle behind its motor, without the device's force limit. Throws std::logic_error without a motor.
@@ -87,6 +93,7 @@ struct Scene {
   std::string description;
   double duration = 5.0;
   std::uint64_t seed = 1;
+  bool identified = true;
   std::vector<SceneAxis> axes;  // one or two
   std::vector<SceneParameter> parameters;
   Measurement measurement;

@@ -57,9 +57,28 @@ SynchronousMotorConfig read_synchronous(const SceneTables& tables, const toml::t
     tables.read_fields(table, prefix, both_inductances_fields, same);
     config.inductance_d = config.inductance_q = same.inductance;
   }
-  tables.read_model(table, prefix, synchronous_motor_fields, config, {"kind", "inductance"});
+  tables.read_model(table, prefix, synchronous_motor_fields, config, {"kind", "inductance", "defects"});
   require_valid(tables, table, axis, config);
   return config;
+}
+
+void read_defects(const SceneTables& tables, const toml::table& motor, const std::string& prefix,
+                  SceneAxis& axis) {
+  const toml::node* node = motor.get("defects");
+  if (node == nullptr) return;
+  const auto refuse = [&](const toml::node& what) {
+    std::string names;
+    for (const DefectName& one : defect_names)
+      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", one.name);
+    tables.fail(what.source(), fmt::format("{}motor.defects = {}: allowed is a list of {}", prefix,
+                                           SceneTables::text_of(what), names));
+  };
+  if (!node->is_array()) refuse(*node);
+  for (const toml::node& one : *node->as_array()) {
+    const auto defect = one.is_string() ? defect_named(one.as_string()->get()) : std::nullopt;
+    if (!defect) refuse(one);
+    axis.defects.push_back(*defect);
+  }
 }
 
 }  // namespace
@@ -68,7 +87,8 @@ void read_encoder_table(const SceneTables& tables, const toml::table& table, con
                         SceneAxis& axis) {
   const toml::table* encoder = tables.part(table, prefix, "encoder");
   if (encoder == nullptr) return;
-  tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder, {"kind"});
+  tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder, {"kind", "reversed"});
+  tables.read_truth(*encoder, prefix + "encoder.", "reversed", axis.encoder.reversed);
   if (is_second_kind(tables, *encoder, prefix + "encoder.", "quadrature", "as5047p", false))
     axis.encoder.kind = EncoderKind::as5047p;
   if (!(axis.encoder.count_length() >= 1e-12)) {
@@ -96,9 +116,10 @@ void read_motor_tables(const SceneTables& tables, const toml::table& table, cons
     axis.motor = read_synchronous(tables, *motor, prefix);
   } else {
     BrushedDcMotorConfig config;
-    tables.read_model(*motor, prefix + "motor.", brushed_dc_motor_fields, config, {"kind"});
+    tables.read_model(*motor, prefix + "motor.", brushed_dc_motor_fields, config, {"kind", "defects"});
     axis.motor = config;
   }
+  read_defects(tables, *motor, prefix, axis);
   if (inverter != nullptr) tables.read_model(*inverter, prefix + "inverter.", inverter_fields, axis.inverter);
   if (sensor != nullptr)
     tables.read_model(*sensor, prefix + "current_sensor.", current_sensor_fields, axis.current_sensor);

@@ -350,7 +350,9 @@ void AdcModel::settle() {
     }
     if (adc.injected_running) {
       const bool to_hold = adc.count == 1 && !adc.injected.held;
-      next_event_ = std::min(next_event_, to_hold ? adc.injected.held_at : adc.group_ends_at);
+      // A clock that became slower in between moves the end of the group behind what was reckoned.
+      const BoardTime ends_at = std::max(adc.group_ends_at, adc.injected.ends_at);
+      next_event_ = std::min(next_event_, to_hold ? adc.injected.held_at : ends_at);
     } else if (adc.regular_running) {
       next_event_ = std::min(next_event_, adc.regular.held ? adc.regular.ends_at : adc.regular.held_at);
     }

@@ -42,6 +42,11 @@ constexpr StepPattern patterns[] = {
     {"PMSM current", "FieldOrientedController<"},
     {"PMSM current", "sine_cosine"},
     {"phase watch", "PhaseWatch<"},
+    {"excitation", "Excitation::"},
+    {"force compensation", "ForceCompensation<"},
+    {"spin-out watch", "MotionPlausibility<"},
+    {"capture", "Application::ISR_capture"},
+    {"capture", "Capture::"},
     {"motor control, the rest", "MotorControl::"},
     {"report to the main loop", "ISR_fill"},
     {"axis, trips", "firmware::Axis::"},
@@ -50,6 +55,7 @@ constexpr StepPattern patterns[] = {
     {"PWM", "ThreePhasePwm<"},
     {"encoder, index", "ISR_read_quadrature"},
     {"encoder, index", "QuadratureIndexWatch"},
+    {"encoder, index", "ReferencedQuadratureCounter"},
     {"encoder, index", "SerialEncoder"},
 };
 constexpr const char* other_step = "board: conversion, housekeeping";

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
+#include <typeinfo>
 
 namespace kmax::virtual_board {
 namespace {
@@ -38,7 +40,8 @@ void EventLoop::catch_up(BoardTime now) {
     events_at_instant = at == instant ? events_at_instant + 1 : 0;
     instant = at;
     if (events_at_instant > most_events_at_one_instant) {
-      throw std::logic_error("a peripheral's next_event() does not move on after advance()");
+      throw std::logic_error(std::string(typeid(*due).name()) +
+                             ": next_event() does not move on after advance()");
     }
     due->advance(at);
   }

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
-#include "host_tools/simulation/scene.hpp"
-#include "host_tools/simulation/temperature_sensor.hpp"
+#include "host_tools/simulation/scene_drives.hpp"
 #include "host_tools/virtual_board/board_world.hpp"
 
 namespace kmax::virtual_board {
@@ -15,8 +13,7 @@ namespace kmax::virtual_board {
 /// some 25 us apart. An axis that the scene does not have, or has without a motor, is an open connector: no
 /// current, and an encoder that stands still at 0.
 ///
-/// As with the native board, a person begins the approach whenever the axis begins to be driven, and a handle
-/// that nobody holds stays at its start until then.
+/// When persons begin and handles are let go, and which defects can be planted: scene_drives.hpp.
 class SceneWorld final : public BoardWorld {
  public:
   /// Throws what the parts of the scene throw; std::invalid_argument for more than two axes or a second
@@ -25,35 +22,27 @@ class SceneWorld final : public BoardWorld {
 
   void set_bridge(std::size_t axis, const std::array<PwmLegOutput, 3>& legs, BoardTime now) override;
   void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) override;
-  double supply_voltage() const override { return supply_.voltage(); }
+  double supply_voltage() const override { return drives_.supply().voltage(); }
   void set_brake(bool on, BoardTime now) override;
   double analogue(unsigned channel, BoardTime now) override;
   EncoderSignals encoder(std::size_t axis, BoardTime now) override;
   SerialEncoderState serial_encoder(BoardTime now) override;
 
+  /// What is plugged in, with its defects, as it was when the board looked last, up to 25 us ago.
+  simulation::SceneDrives& drives() { return drives_; }
   /// Throws std::out_of_range for an axis without a motor.
-  simulation::MotorDrive& drive(std::size_t axis);
-  bool has_drive(std::size_t axis) const { return axes_[axis].drive.has_value(); }
-  simulation::Supply& supply() { return supply_; }
-  simulation::TemperatureSensor& temperature(std::size_t axis) { return axes_[axis].temperature; }
+  simulation::MotorDrive& drive(std::size_t axis) { return drives_.drive(axis); }
+  bool has_drive(std::size_t axis) const { return drives_.has(axis); }
+  simulation::Supply& supply() { return drives_.supply(); }
+  simulation::TemperatureSensor& temperature(std::size_t axis) { return drives_.temperature(axis); }
   /// Pulls the plug of an axis' encoder, or puts it back.
   void connect_encoder(std::size_t axis, bool connected);
 
  private:
-  struct Axis {
-    std::optional<simulation::MotorDrive> drive;
-    simulation::InverterCommand command;
-    simulation::EncoderKind encoder_kind = simulation::EncoderKind::quadrature;
-    simulation::TemperatureSensor temperature;
-    bool encoder_connected = true;
-    bool let_go = false;
-  };
-
   void advance_to(BoardTime now);
   double current_pin(std::size_t axis, simulation::CurrentSensor::Channel channel);
 
-  std::array<Axis, 2> axes_;
-  simulation::Supply supply_;
+  simulation::SceneDrives drives_;
   BoardTime time_ = 0;
 };
 

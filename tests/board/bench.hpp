@@ -22,11 +22,12 @@ using firmware::Refusal;
 using firmware::Words;
 using firmware::modbus::Bytes;
 
-class Bench {
+template <typename Device>
+class BenchWith {
  public:
-  Bench() : board_(std::make_unique<NativeBoard<ScriptedDevice>>(device)) {}
+  BenchWith() : board_(std::make_unique<NativeBoard<Device>>(device)) {}
 
-  NativeBoard<ScriptedDevice>& board() { return *board_; }
+  NativeBoard<Device>& board() { return *board_; }
   firmware::Application& application() { return board_->application(); }
 
   void run_ticks(std::uint64_t ticks) { board_->advance(ticks); }
@@ -118,7 +119,7 @@ class Bench {
 
   float force(std::size_t axis = 0) const { return device.last[axis].force; }
 
-  ScriptedDevice device;
+  Device device;
 
   static int exception_of(const Bytes& reply) {
     if (reply.size() < 2) return -1;
@@ -128,7 +129,9 @@ class Bench {
   static std::uint8_t low(std::uint16_t word) { return static_cast<std::uint8_t>(word); }
 
  private:
-  std::unique_ptr<NativeBoard<ScriptedDevice>> board_;
+  std::unique_ptr<NativeBoard<Device>> board_;
 };
+
+using Bench = BenchWith<ScriptedDevice>;
 
 }  // namespace kmax::board

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <numbers>
 
@@ -34,27 +35,54 @@ TEST(CurrentLoopGains, ApproachTheContinuousOnes) {
   EXPECT_NEAR(gains.proportional * gains.tracking / (resistance * bandwidth * period), 1.0, 1e-3);
 }
 
-// Under a plain zero-order hold without the half tick of delay the closed loop has the one pole e^(-w T).
-TEST(CurrentLoopGains, PlaceThePoleExactlyHoweverFastTheWinding) {
-  for (const double inductance : {1e-1, 1e-3, 1e-4, 1e-5, 1e-6, 0.0}) {
-    const double resistance = 2.0;
-    const double bandwidth = 2.0 * std::numbers::pi * 1000.0;
-    const auto gains = CurrentLoopGains<double>::prepare(resistance, inductance, bandwidth, period);
-    const double kept = inductance > 0.0 ? std::exp(-resistance * period / inductance) : 0.0;
-    double current = 0.0;
-    double drop = 0.0;
-    for (int k = 0; k < 50; ++k) {
-      ASSERT_NEAR(current, 1.0 - std::exp(-bandwidth * period * k), 1e-9) << inductance << " tick " << k;
-      const double voltage = gains.proportional * (1.0 - current) + drop;
-      drop += gains.tracking * (voltage - drop);
-      current = kept * current + (1.0 - kept) * voltage / resistance;
+TEST(CurrentLoopGains, OneMinusCosineAndTheSquareRootAreExactToTheLastPlaces) {
+  for (double x = 1e-9; x <= 1.0; x *= 1.31) {
+    const double half = std::sin(x / 2);
+    EXPECT_NEAR(one_minus_cosine(x) / (2 * half * half), 1.0, 1e-15) << x;
+    EXPECT_NEAR(static_cast<double>(one_minus_cosine(static_cast<float>(x))) / (2 * half * half), 1.0, 5e-7)
+        << x;
+  }
+  EXPECT_EQ(one_minus_cosine(0.0), 0.0);
+  for (double x = 1e-30; x < 1e30; x *= 7.3) {
+    EXPECT_NEAR(square_root_by_iteration(x) / std::sqrt(x), 1.0, 1e-15) << x;
+  }
+  EXPECT_EQ(square_root_by_iteration(0.0), 0.0);
+  EXPECT_EQ(square_root_by_iteration(-1.0), 0.0);
+  EXPECT_EQ(square_root_by_iteration(std::nan("")), 0.0);
+  static_assert(square_root_by_iteration(4.0F) == 2.0F);
+}
+
+// The closed loop's gain from the transfer function itself: sqrt(1/2) at the request, more below, less above.
+TEST(CurrentLoopGains, TheGainFallsThroughThreeDecibelsWhereItWasAskedTo) {
+  for (double h = 0.0; h <= 1.0; h += 0.05) {
+    for (double angle = 0.001; angle <= 0.786; angle *= 1.2) {
+      const double g = CurrentLoopGains<double>::loop_gain(angle, h);
+      const auto gain = [&](double at) {
+        const std::complex<double> z = std::polar(1.0, at);
+        const auto open = g / (1 + h) * (z + h) / (z * (z - 1.0));
+        return std::abs(open / (1.0 + open));
+      };
+      EXPECT_NEAR(gain(angle), std::sqrt(0.5), 1e-9) << h << " " << angle;
+      for (double share = 0.1; share < 0.99; share += 0.1) {
+        EXPECT_GT(gain(share * angle), std::sqrt(0.5)) << h << " " << angle << " at " << share;
+        EXPECT_LT(gain(share * angle), 1.03) << h << " " << angle << " at " << share;
+      }
+      for (double at = 1.01 * angle; at < 3.1; at += 0.1) {
+        EXPECT_LT(gain(at), std::sqrt(0.5)) << h << " " << angle << " at " << at;
+      }
+      EXPECT_NEAR(static_cast<double>(
+                      CurrentLoopGains<float>::loop_gain(static_cast<float>(angle), static_cast<float>(h))) /
+                      g,
+                  1.0, 2e-6);
     }
   }
 }
 
 TEST(CurrentLoopGains, AWindingWithoutResistanceHasAProportionalGainOnly) {
   const auto gains = CurrentLoopGains<double>::prepare(0.0, 1e-3, 1000.0, period);
-  EXPECT_NEAR(gains.proportional, 1e-3 / period * -std::expm1(-1000.0 * period), 1e-12);
+  EXPECT_NEAR(gains.proportional, 1e-3 / period * CurrentLoopGains<double>::loop_gain(0.05, 1.0), 1e-12);
+  const auto little = CurrentLoopGains<double>::prepare(1e-6, 1e-3, 1000.0, period);
+  EXPECT_NEAR(little.proportional / gains.proportional, 1.0, 1e-6);
   EXPECT_EQ(gains.tracking, 0.0);
   const auto nothing = CurrentLoopGains<double>::prepare(0.0, 0.0, 1000.0, period);
   EXPECT_EQ(nothing.proportional, 0.0);

@@ -1,8 +1,10 @@
 #include "control/phase_watch.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 namespace kmax::control {
 namespace {
@@ -99,6 +101,121 @@ TEST(PhaseWatch, OverCurrentAndNanTripWhateverTheReference) {
   EXPECT_EQ(watch.update(c, {0.0f, -7.6f, 0.0f}, {}, false), PhaseCondition::over_current);
   EXPECT_EQ(watch.update(c, {-7.6f, 3.0f, 3.0f}, {}, false), PhaseCondition::over_current);
   EXPECT_EQ(watch.update(c, {0.0f, std::nanf(""), 0.0f}, {}, true), PhaseCondition::over_current);
+}
+
+TEST(PhaseWatch, ALimitThatIsNoLimitLetsNoCurrentPass) {
+  for (const float limit : {std::nanf(""), -5.0f}) {
+    PhaseWatchConfig<float> broken = config;
+    broken.current_limit = limit;
+    Watch watch;
+    EXPECT_EQ(watch.update(Watch::prepare(broken), dc(0.01f), dc(0.0f), true), PhaseCondition::over_current);
+  }
+}
+
+// A leak to ground: what flows out of B does not come back through C.
+TEST(PhaseWatch, CurrentsThatDoNotAddUpAreFoundAfterThePatienceAtAnySpeed) {
+  ASSERT_FLOAT_EQ(c.unbalanced, 0.75f);
+  for (const bool slow : {true, false}) {
+    for (const float leak : {0.8f, -0.8f}) {
+      Watch watch;
+      const Currents leaking{0.0f, 2.0f + leak, -2.0f};
+      for (std::uint32_t i = 0; i < c.patience; ++i)
+        ASSERT_EQ(watch.update(c, leaking, dc(2.0f), slow), PhaseCondition::good) << i;
+      EXPECT_EQ(watch.update(c, leaking, dc(2.0f), slow), PhaseCondition::sum);
+    }
+  }
+}
+
+TEST(PhaseWatch, ThreeSensorsAreAddedUp) {
+  Watch watch;
+  const Currents flowing{2.0f, -1.0f, -1.0f}, leaking{2.0f, -1.0f, -0.2f};
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, flowing, flowing, true), PhaseCondition::good);
+  for (std::uint32_t i = 0; i < c.patience; ++i)
+    ASSERT_EQ(watch.update(c, leaking, flowing, true), PhaseCondition::good);
+  EXPECT_EQ(watch.update(c, leaking, flowing, true), PhaseCondition::sum);
+}
+
+TEST(PhaseWatch, AShortImbalanceOrOneWithinTheToleranceIsForgiven) {
+  Watch watch;
+  const Currents leaking{0.0f, 2.8f, -2.0f}, within{0.0f, 2.7f, -2.0f};
+  for (int round = 0; round < 20; ++round) {
+    for (std::uint32_t i = 0; i < c.patience; ++i)
+      ASSERT_EQ(watch.update(c, leaking, dc(2.0f), true), PhaseCondition::good);
+    ASSERT_EQ(watch.update(c, within, dc(2.0f), true), PhaseCondition::good);
+  }
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, within, dc(2.0f), true), PhaseCondition::good);
+}
+
+TEST(PhaseWatch, AnImpliedSumNeverSpeaks) {
+  Watch watch;
+  const Currents nonsense{5.0f, 5.0f, 5.0f};
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_EQ(watch.update<PhaseSum::implied>(c, nonsense, nonsense, true), PhaseCondition::good);
+    // Nor does one that is checked although the third was worked out.
+    const float b = 3.3333f * static_cast<float>(i % 7 - 3) / 3.0f, third = 1.1111f;
+    ASSERT_EQ(watch.update(c, {-(b + third), b, third}, {-(b + third), b, third}, true),
+              PhaseCondition::good);
+  }
+}
+
+// A wire that comes off loses the current in both phases of a DC motor; it is open, not unbalanced. A sensor
+// that fails loses it in one: with the current gone at once that is "open" too, the sum only confirms.
+TEST(PhaseWatch, AnOpenPhaseComesBeforeTheSum) {
+  Watch watch;
+  ASSERT_EQ(watch.update(c, dc(2.0f), dc(2.0f), true), PhaseCondition::good);
+  EXPECT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::open);
+  watch.reset();
+  for (std::uint32_t i = 0; i < c.patience; ++i)
+    ASSERT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::good);
+  EXPECT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::open);
+}
+
+// What update() was before its comparisons became integers, kept as the yardstick.
+class PlainWatch {
+ public:
+  PhaseCondition update(const Currents& measured, const Currents& reference, bool slow) {
+    const float m[] = {measured.a, measured.b, measured.c};
+    const float r[] = {reference.a, reference.b, reference.c};
+    for (const float current : m) {
+      if (!(std::fabs(current) <= c.over_current)) return PhaseCondition::over_current;
+    }
+    bool missing = false, vanished = false;
+    for (int i = 0; i < 3; ++i) {
+      if (std::fabs(r[i]) <= c.present || std::fabs(m[i]) >= c.absent) continue;
+      missing = true;
+      vanished = vanished || (before_[i] * r[i] > 0.0f && std::fabs(before_[i]) > c.present);
+    }
+    for (int i = 0; i < 3; ++i) before_[i] = m[i];
+    if (vanished && slow) return PhaseCondition::open;
+    starved_ = missing && slow ? starved_ + 1 : 0;
+    unbalanced_ = std::fabs(m[0] + m[1] + m[2]) > c.unbalanced ? unbalanced_ + 1 : 0;
+    if (starved_ > c.patience) return PhaseCondition::open;
+    return unbalanced_ > c.patience ? PhaseCondition::sum : PhaseCondition::good;
+  }
+
+ private:
+  float before_[3]{};
+  std::uint32_t starved_ = 0, unbalanced_ = 0;
+};
+
+RC_GTEST_PROP(PhaseWatch, AgreesWithItsPlainForm, ()) {
+  Watch watch;
+  PlainWatch plain;
+  // Currents stay for a while, as faults do, and lie at the thresholds as often as between them.
+  const auto pick = [] {
+    return *rc::gen::element(0.0f, -0.0f, c.absent, -c.absent, c.present, -c.present, 0.26f, 0.5f, 1.0f,
+                             -1.0f, 2.0f, -2.0f, c.over_current, -c.over_current, 7.6f, c.unbalanced, 1e-40f,
+                             std::numeric_limits<float>::infinity(),
+                             -std::numeric_limits<float>::quiet_NaN());
+  };
+  const auto stretches = *rc::gen::inRange(1, 8);
+  for (int stretch = 0; stretch < stretches; ++stretch) {
+    const Currents measured{pick(), pick(), pick()}, reference{pick(), pick(), pick()};
+    const bool slow = *rc::gen::arbitrary<bool>();
+    const auto samples = *rc::gen::element(1, 2, 20, 33, 34, 35, 100);
+    for (int i = 0; i < samples; ++i)
+      RC_ASSERT(watch.update(c, measured, reference, slow) == plain.update(measured, reference, slow));
+  }
 }
 
 TEST(PhaseWatch, ResetForgetsTheSampleBefore) {

@@ -24,6 +24,26 @@ TEST(SineCosine, FloatIsWithinOneAndAHalfUnitsOfTheLastPlace) {
   EXPECT_GT(worst * 16777216.0L, 0.5L) << "better than rounding alone allows: nothing was measured";
 }
 
+// Too long by r^2/2 at most, and in the right direction.
+TEST(SineCosine, TheFirstOrderIsRightToItsNextTerm) {
+  long double length_error = 0.0L;
+  long double direction_error = 0.0L;
+  for (std::uint64_t angle = 0; angle < (1ULL << 32); angle += 10007) {
+    const auto pair = sine_cosine_first_order<float>(static_cast<TurnFraction>(angle));
+    const long double truth = radians(static_cast<TurnFraction>(angle));
+    const auto sine = static_cast<long double>(pair.sine);
+    const auto cosine = static_cast<long double>(pair.cosine);
+    const long double length = std::hypot(sine, cosine);
+    ASSERT_GT(length, 1.0L - 2e-7L) << angle;
+    length_error = std::fmax(length_error, length - 1.0L);
+    direction_error =
+        std::fmax(direction_error, std::fabs(sine * std::cos(truth) - cosine * std::sin(truth)) / length);
+  }
+  EXPECT_LT(length_error, 1.91e-5L);
+  EXPECT_GT(length_error, 1.8e-5L) << "better than the formula allows: nothing was measured";
+  EXPECT_LT(direction_error, 2e-7L);
+}
+
 TEST(SineCosine, DoubleIsWithinAUnitOfItsLastPlace) {
   long double worst = 0.0L;
   for (std::uint64_t angle = 0; angle < (1ULL << 32); angle += 10007) {

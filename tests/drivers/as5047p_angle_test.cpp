@@ -124,7 +124,7 @@ TEST(As5047pAngle, HoldsAtMostAsLongAsItMayAndThenStaysInvalid) {
     EXPECT_EQ(encoder.tick(8000).valid, bad <= 4) << "good frames do not bring a lost position back";
     EXPECT_EQ(encoder.driver.counters().parity, static_cast<unsigned>(bad));
     EXPECT_EQ(encoder.driver.fault(), bad <= 4 ? As5047pFault::none : As5047pFault::parity);
-    encoder.driver.reset();
+    encoder.driver.restart();
     encoder.start(8000);
   }
 }
@@ -228,6 +228,70 @@ TEST(As5047pAngle, MissedFramesAreHeldLikeBadOnes) {
   for (int i = 0; i < 5; ++i) encoder.driver.ISR_missed();
   EXPECT_EQ(encoder.driver.fault(), As5047pFault::missed);
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(encoder.tick(8000).valid);
+}
+
+/// Nobody reads the chip for as many ticks as the main loop has the bus.
+As5047pSample after_unseen(Encoder& encoder, int ticks, std::int64_t position) {
+  for (int i = 0; i < ticks; ++i) encoder.driver.ISR_missed();
+  encoder.driver.restart();
+  As5047pSample sample;
+  for (int i = 0; i < 10; ++i) sample = encoder.tick(position);
+  return sample;
+}
+
+Encoder at_twenty_thousand() {
+  Encoder encoder;
+  for (std::int64_t position = 16'000; position <= 20'000; position += 50) encoder.tick(position);
+  EXPECT_EQ(encoder.tick(20'000).count, 20'000U);
+  return encoder;
+}
+
+TEST(As5047pAngle, ARestartThatTakesMillisecondsKeepsTheTurns) {
+  for (const std::int64_t moved : {0, 400, -400, 8000, -8000}) {
+    for (const int ticks : {0, 10, 80}) {
+      Encoder encoder = at_twenty_thousand();
+      const As5047pSample sample = after_unseen(encoder, ticks, 20'000 + moved);
+      ASSERT_TRUE(sample.valid);
+      EXPECT_EQ(sample.count, static_cast<std::uint32_t>(20'000 + moved)) << ticks;
+      EXPECT_EQ(sample.reference_generation, 0U);
+      // And it goes on from there.
+      EXPECT_TRUE(encoder.tick(20'000 + moved + 30).valid);
+      EXPECT_EQ(encoder.tick(20'000 + moved + 60).count, static_cast<std::uint32_t>(20'000 + moved + 30));
+    }
+  }
+}
+
+TEST(As5047pAngle, ARestartAfterLongerBeginsWithinATurnAndSaysSo) {
+  for (const int ticks : {101, 2000, 200'000}) {
+    Encoder encoder = at_twenty_thousand();
+    const As5047pSample sample = after_unseen(encoder, ticks, 20'000);
+    ASSERT_TRUE(sample.valid);
+    EXPECT_EQ(sample.count, 20'000U - 16'384U);
+    EXPECT_EQ(sample.reference_generation, 1U);
+    EXPECT_EQ(after_unseen(encoder, ticks, 20'000).reference_generation, 2U);
+  }
+}
+
+// The count after which the turns are known still.
+TEST(As5047pAngle, TheFramesThatAreNotBelievedCountAsUnseen) {
+  Encoder encoder = at_twenty_thousand();
+  for (int i = 0; i < 200; ++i) encoder.tick(25'000);
+  ASSERT_EQ(encoder.driver.fault(), As5047pFault::jump);
+  EXPECT_EQ(after_unseen(encoder, 0, 25'000).reference_generation, 1U);
+}
+
+TEST(As5047pAngle, TurnsThatNobodyCanKnowAreForgotten) {
+  Encoder encoder = at_twenty_thousand();
+  encoder.driver.forget_turns();
+  const As5047pSample sample = after_unseen(encoder, 0, 20'000);
+  EXPECT_EQ(sample.count, 3616U);
+  EXPECT_EQ(sample.reference_generation, 1U);
+}
+
+TEST(As5047pAngle, TheFirstStartIsNoNewReference) {
+  Encoder encoder;
+  for (int i = 0; i < 1000; ++i) encoder.driver.ISR_missed();
+  EXPECT_EQ(after_unseen(encoder, 1000, 20'000).reference_generation, 0U);
 }
 
 // A line that flips bits at random: no turn is ever lost, and when it is quiet again the count is the truth.

@@ -220,6 +220,8 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   EXPECT_EQ(sample.temperatures[0], 2222);
   EXPECT_EQ(sample.temperatures[1], 3333);
   EXPECT_EQ(sample.auxiliary_temperature, 444);
+  EXPECT_EQ(board.sampling.latest().supply, 1111) << "for another context";
+  EXPECT_EQ(board.sampling.latest().temperatures[1], 3333);
   board.adc1.jdr[0].value = 9;  // a new sequence is under way
   for (unsigned i = 0; i < 600; ++i) {
     board.trigger(1, 2);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -81,6 +82,18 @@ TEST(OffsetCalibration, TakesExactlyItsSamples) {
   for (int i = 0; i < 8; ++i) calibration.ISR_add(2040);
   EXPECT_EQ(calibration.offset(), 2040.0F) << "nothing of the first run is left";
   EXPECT_EQ(calibration.spread(), 0);
+}
+
+TEST(CurrentSense, TheGainIsTheLargestThatReadsTheCurrent) {
+  EXPECT_EQ(gain_for_current(0.0F), CurrentSenseGain::x80);
+  for (const auto gain : {CurrentSenseGain::x80, CurrentSenseGain::x40, CurrentSenseGain::x20}) {
+    const float range = CurrentSense{{.gain = gain}}.range();
+    EXPECT_EQ(gain_for_current(range), gain);
+    EXPECT_EQ(gain_for_current(range * 1.0001F),
+              static_cast<CurrentSenseGain>(static_cast<unsigned>(gain) - 1));
+  }
+  EXPECT_EQ(gain_for_current(1e6F), CurrentSenseGain::x10) << "beyond all of them";
+  EXPECT_EQ(gain_for_current(std::numeric_limits<float>::quiet_NaN()), CurrentSenseGain::x10);
 }
 
 TEST(OffsetCalibration, WindowIsInclusiveOnBothSides) {

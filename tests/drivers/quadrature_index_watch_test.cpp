@@ -4,6 +4,10 @@
 
 #include <rapidcheck/gtest.h>
 
+#include <cstdlib>
+#include <initializer_list>
+#include <utility>
+
 namespace kmax::drivers {
 namespace {
 
@@ -60,28 +64,89 @@ TEST(QuadratureIndexWatch, EveryTurnHasItsIndexAlsoBelowZero) {
   EXPECT_FALSE(watch.ISR_plausible(static_cast<std::uint32_t>(101 - 3 * 8192 + 5), true));
 }
 
-TEST(QuadratureIndexWatch, ALineThatWasHighFromTheStartIsBelievedUntilTheCountLeaves) {
-  QuadratureIndexWatch watch = fresh();
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.ISR_plausible(50, true));
-  EXPECT_TRUE(watch.ISR_plausible(54, true));
-  EXPECT_FALSE(watch.ISR_plausible(55, true));
+// Up to `widest` counts it may be an index, however wide.
+TEST(QuadratureIndexWatch, ALineThatWasHighFromTheStartIsBelievedUntilNoIndexIsThatWide) {
+  for (const std::uint32_t step : {1U, 0U - 1U}) {
+    QuadratureIndexWatch watch = fresh();
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.ISR_plausible(50, true));
+    std::uint32_t count = 50;
+    for (int i = 1; i < config.widest; ++i) ASSERT_TRUE(watch.ISR_plausible(count += step, true)) << i;
+    EXPECT_FALSE(watch.ISR_plausible(count + step, true));
+  }
 }
 
-TEST(QuadratureIndexWatch, StartingOnTheIndexAndLeavingItIsFine) {
+TEST(QuadratureIndexWatch, StartingOnTheIndexTeachesNothingUntilItIsCrossed) {
   QuadratureIndexWatch watch = fresh();
-  ASSERT_TRUE(watch.ISR_plausible(0xFFFF'FFFF, true));
-  for (std::uint32_t count = 0; count < 8191; ++count) ASSERT_TRUE(watch.ISR_plausible(count, false));
-  EXPECT_TRUE(watch.ISR_plausible(8191, true));
-  EXPECT_TRUE(watch.learned());
+  for (std::uint32_t count = 1000; count < 1003; ++count) ASSERT_TRUE(watch.ISR_plausible(count, true));
+  ASSERT_TRUE(watch.ISR_plausible(1003, false));
+  EXPECT_FALSE(watch.learned());
+  for (std::uint32_t count = 1004; count < 998 + 8192; ++count)
+    ASSERT_TRUE(watch.ISR_plausible(count, false));
+  for (std::uint32_t count = 998; count < 1003; ++count) ASSERT_TRUE(watch.ISR_plausible(count + 8192, true));
+  EXPECT_FALSE(watch.learned());
+  EXPECT_TRUE(watch.ISR_plausible(1003 + 8192, false));
+  ASSERT_TRUE(watch.learned());
+  EXPECT_EQ(watch.index(), 1000U + 8192U);
 }
 
 // A handle that is switched on where its index is, moves away, and loses its cable there.
-TEST(QuadratureIndexWatch, AnIndexThatWasHighFromTheStartIsLearnedWhenItFalls) {
+TEST(QuadratureIndexWatch, OneEdgeIsEnoughToSeeThatTheCableComesOffElsewhere) {
   QuadratureIndexWatch watch = fresh();
   ASSERT_TRUE(watch.ISR_plausible(0, true));
   for (std::uint32_t moved = 1; moved < 1000; ++moved) ASSERT_TRUE(watch.ISR_plausible(0 - moved, false));
-  EXPECT_TRUE(watch.learned());
+  EXPECT_FALSE(watch.learned());
   EXPECT_FALSE(watch.ISR_plausible(0U - 1000U, true));
+}
+
+// Index at 998 to 1002: one side's edge alone would put it at 998, the other's at 1002.
+TEST(QuadratureIndexWatch, ADipTeachesNothingFromEitherSide) {
+  for (const int depth : {1, 2, 5}) {
+    for (const bool from_below : {true, false}) {
+      QuadratureIndexWatch watch = fresh();
+      const auto place = [from_below](int inside) {
+        return static_cast<std::uint32_t>(from_below ? 997 + inside : 1003 - inside);
+      };
+      for (int dips = 0; dips < 3; ++dips) {
+        for (int inside = -50; inside <= depth; ++inside)
+          ASSERT_TRUE(watch.ISR_plausible(place(inside), inside >= 1));
+        for (int inside = depth; inside >= -50; --inside)
+          ASSERT_TRUE(watch.ISR_plausible(place(inside), inside >= 1));
+        ASSERT_FALSE(watch.learned()) << depth << (from_below ? " from below" : " from above");
+      }
+      for (int inside = -50; inside <= 50; ++inside)
+        ASSERT_TRUE(watch.ISR_plausible(place(inside), inside >= 1 && inside <= 5));
+      ASSERT_TRUE(watch.learned());
+      EXPECT_EQ(watch.index(), 1000U);
+    }
+  }
+}
+
+// The index line's edges need not coincide with the counts': a count is then seen low and high.
+TEST(QuadratureIndexWatch, ADipIsToldFromACrossingAlsoWhenTheEdgesLieWithinACount) {
+  const auto looks = [](std::initializer_list<std::pair<std::uint32_t, bool>> list) {
+    QuadratureIndexWatch watch = fresh();
+    for (const auto& [count, line] : list) EXPECT_TRUE(watch.ISR_plausible(count, line));
+    return watch;
+  };
+  EXPECT_FALSE(looks({{997, false}, {998, false}, {998, true}, {998, false}, {997, false}}).learned());
+  EXPECT_FALSE(looks({{998, false}, {998, true}, {997, false}}).learned());
+  EXPECT_FALSE(looks({{997, false}, {998, true}, {998, false}, {997, false}}).learned());
+  EXPECT_FALSE(looks({{998, false}, {998, true}, {1000, true}, {998, true}, {998, false}}).learned());
+  EXPECT_FALSE(looks({{1002, false}, {1002, true}, {1001, true}, {1002, true}, {1003, false}}).learned());
+  const auto up = looks({{998, false}, {998, true}, {1000, true}, {1002, true}, {1002, false}});
+  const auto down = looks({{1002, false}, {1002, true}, {1000, true}, {998, true}, {998, false}});
+  ASSERT_TRUE(up.learned() && down.learned());
+  EXPECT_EQ(up.index(), 1000U);
+  EXPECT_EQ(down.index(), 1000U);
+}
+
+TEST(QuadratureIndexWatch, ACableThatIsPluggedInAgainWhereItCameOffIsNoCrossing) {
+  QuadratureIndexWatch watch = fresh();
+  ASSERT_TRUE(watch.ISR_plausible(299, false));
+  ASSERT_TRUE(watch.ISR_plausible(300, false));
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.ISR_plausible(300, true));
+  ASSERT_TRUE(watch.ISR_plausible(300, false));
+  EXPECT_FALSE(watch.learned());
 }
 
 // A cable that comes off raises the line once and for all: its place must not be taken for the index.
@@ -90,8 +155,81 @@ TEST(QuadratureIndexWatch, ALineThatNeverFallsIsNoIndex) {
   ASSERT_TRUE(watch.ISR_plausible(300, false));
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.ISR_plausible(300, true));
   EXPECT_FALSE(watch.learned());
-  // Plugged in again elsewhere, the line falls far from there.
-  EXPECT_FALSE(watch.ISR_plausible(900, true));
+  EXPECT_FALSE(watch.ISR_plausible(900, true)) << "no index is that wide";
+}
+
+// What commutation relies on: the same place from either side. The widest here, 996 to 1003, is wider than
+// the tolerance.
+TEST(QuadratureIndexWatch, TheIndexIsAtItsMiddleFromBothSidesWhateverItsWidth) {
+  for (int width = 1; width <= 8; ++width) {
+    const int first = 1000 - width / 2, last = first + width - 1;
+    const auto at = [&](int count) { return count >= first && count <= last; };
+    for (const bool upwards : {true, false}) {
+      QuadratureIndexWatch watch = fresh();
+      for (int pass = 0; pass < 4; ++pass) {
+        for (int step = 0; step <= 200; ++step) {
+          const int count = upwards == (pass % 2 == 0) ? 900 + step : 1100 - step;
+          ASSERT_TRUE(watch.ISR_plausible(static_cast<std::uint32_t>(count), at(count)))
+              << width << " at " << count;
+        }
+        ASSERT_TRUE(watch.learned()) << width;
+        ASSERT_EQ(watch.index(), 1000U) << width << (upwards ? " upwards" : " downwards");
+      }
+      // The tolerance is what it may be beyond its width.
+      QuadratureIndexWatch below = watch, above = watch;
+      EXPECT_TRUE(below.ISR_plausible(static_cast<std::uint32_t>(first - 4), true)) << width;
+      EXPECT_FALSE(below.ISR_plausible(static_cast<std::uint32_t>(first - 6), true)) << width;
+      EXPECT_TRUE(above.ISR_plausible(static_cast<std::uint32_t>(last + 4), true)) << width;
+      EXPECT_FALSE(above.ISR_plausible(static_cast<std::uint32_t>(last + 6), true)) << width;
+    }
+  }
+}
+
+// Several counts per look: known to half a step, and no good encoder is doubted for what was not seen.
+TEST(QuadratureIndexWatch, AFastCrossingIsKnownToHalfAStep) {
+  for (int step = 2; step <= 8; ++step) {
+    for (int width = 1; width <= 8; ++width) {
+      for (int phase = 0; phase < step; ++phase) {
+        for (const int direction : {1, -1}) {
+          QuadratureIndexWatch watch = fresh();
+          const auto at = [&](int count) { return 2 * (count < 1000 ? 1000 - count : count - 1000) < width; };
+          bool seen = false;
+          for (int moved = phase; moved < 200; moved += step) {
+            const int count = 1000 + direction * (moved - 100);
+            seen = seen || at(count);
+            ASSERT_TRUE(watch.ISR_plausible(static_cast<std::uint32_t>(count), at(count)));
+          }
+          ASSERT_EQ(watch.learned(), seen) << step << " " << width << " " << phase;
+          if (seen) {
+            EXPECT_LE(2 * std::abs(static_cast<int>(watch.index()) - 1000), step + 1) << step << " " << width;
+          }
+          for (int count = 900; count < 1100; ++count)
+            ASSERT_TRUE(watch.ISR_plausible(static_cast<std::uint32_t>(count), at(count))) << step;
+        }
+      }
+    }
+  }
+}
+
+TEST(QuadratureIndexWatch, ACrossingThatIsTooFastToSayWhereIsNotUsed) {
+  QuadratureIndexWatch watch = fresh();
+  ASSERT_TRUE(watch.ISR_plausible(980, false));
+  ASSERT_TRUE(watch.ISR_plausible(1000, true));
+  ASSERT_TRUE(watch.ISR_plausible(1020, false));
+  EXPECT_FALSE(watch.learned());
+}
+
+TEST(QuadratureIndexWatch, CountsCanBeReferredToTheIndex) {
+  QuadratureIndexWatch watch = fresh();
+  for (std::uint32_t count = 0; count < 600; ++count)
+    ASSERT_TRUE(watch.ISR_plausible(count, line_at(count, 500)));
+  const std::uint32_t index = watch.index();
+  ASSERT_EQ(index, 500U);
+  watch.ISR_shift_counts(index);
+  EXPECT_EQ(watch.index(), 0U);
+  EXPECT_TRUE(watch.ISR_plausible(8191, false));
+  EXPECT_TRUE(watch.ISR_plausible(8192, true));
+  EXPECT_FALSE(watch.ISR_plausible(500, true));
 }
 
 TEST(QuadratureIndexWatch, ResetBelievesAgain) {

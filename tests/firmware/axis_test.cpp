@@ -143,7 +143,8 @@ TEST_F(AxisTest, TripsOnTheBoardsConditionAtOnce) {
   for (const Fault condition : {Fault::emergency_stop, Fault::gate_driver, Fault::power_stage}) {
     (void)tick(at(-1000), false);
     ASSERT_TRUE(tick(at(-1000), true).enabled);
-    const auto out = axis.ISR_tick(setting, {at(-1000), true, condition, {false, 24.0f, 0.0f, 0.0f}}, true, 0.0f, ++ticks);
+    const auto out =
+        axis.ISR_tick(setting, {at(-1000), true, condition, {false, 24.0f, 0.0f, 0.0f}}, true, 0.0f, ++ticks);
     EXPECT_FALSE(out.enabled);
     EXPECT_EQ(out.force, 0.0f);
     EXPECT_EQ(axis.ISR_report().fault, condition);

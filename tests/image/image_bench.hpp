@@ -41,8 +41,9 @@ class ImageBench {
   using Parameters = std::vector<std::pair<std::string, simulation::ParameterValue>>;
 
   /// `push`: N, how hard the persons press; 0: as the scene says.
-  explicit ImageBench(const Parameters& parameters = {}, double push = 0.0)
-      : scene(with(simulated_board::open_scene("motor_axes"), parameters, push)), world(scene) {
+  explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
+                      const std::string& scene_name = "motor_axes")
+      : scene(with(simulated_board::open_scene(scene_name), parameters, push)), world(scene) {
     virtual_board::VirtualBoardConfig config;
     config.identity.volts = 24;
     board = std::make_unique<virtual_board::VirtualBoard>(image(), &world, config);

@@ -98,6 +98,10 @@ std::vector<std::uint8_t> prepared(bool sector_full) {
     bool erased = false;
     for (std::size_t i = 0; i < after.size(); ++i) erased = erased || (after[i] & ~before[i]) != 0;
     if (erased && to_new) return before;
+    if (!erased) continue;
+    // Where a sector takes an even number of records, it is always the old set's save that erases.
+    bench.set({3333.5f, 1111.5f, 1, 0.5f});
+    EXPECT_TRUE(bench.save());
   }
   ADD_FAILURE() << "no save ever erased";
   return {};

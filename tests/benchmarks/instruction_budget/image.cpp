@@ -13,6 +13,7 @@ namespace {
 using namespace control;
 
 constexpr float period = 5e-5F;
+constexpr float dead_time = 119e-9F;
 
 Inputs inputs;
 
@@ -135,6 +136,7 @@ void measure_dc() {
   static Dc dc;
   static Dc::Output out;
   DcCurrentControllerConfig<float> config;
+  config.dead_time = dead_time;
   config.torque_constant = 0.05F;
   const auto c = Dc::prepare(config, period);
   std::uint32_t worst = 0;
@@ -157,8 +159,9 @@ void measure_dc() {
 void measure_field_oriented() {
   static FieldOriented controller;
   static FieldOriented::Output out;
-  static FieldOriented::Input in;
+  FieldOriented::Input in;
   FieldOrientedControllerConfig<float> config;
+  config.dead_time = dead_time;
   config.torque_constant = 0.05F;
   config.pole_pairs = 7;
   const auto c = FieldOriented::prepare(config, period);
@@ -175,7 +178,11 @@ void measure_field_oriented() {
           inputs.hard(size * inputs.unit()),
           inputs.hard(24.0F + 12.0F * inputs.unit())};
     if (i == 0) in = {0x12345678U, 0.1F, 0.1F, 10.0F, 0.0F, 0.2F, 24.0F};
-    const std::uint32_t counted = count(Registers{{&out, &controller, &c, &in}, {}}, &field_oriented_step);
+    Registers arguments{
+        {&out, &controller, &c, nullptr},
+        {in.current_b, in.current_c, in.electrical_speed, in.reference_d, in.reference_q, in.supply}};
+    arguments.integers[3] = reinterpret_cast<const void*>(in.angle);
+    const std::uint32_t counted = count(arguments, &field_oriented_step);
     if (i == 0) usual = counted;
     if (counted > worst) worst = counted;
   }
@@ -194,8 +201,53 @@ void measure_small_steps() {
     if (counted > worst) worst = counted;
   }
   report("force to current                       ", worst, usual, 0);
-  worst = count(Registers{}, &sine_cosine_step);
-  report("sine and cosine alone                  ", worst, worst, 0);
+}
+
+void measure_sine(const char* name, control::SineCosine<float> (*step)(std::uint32_t)) {
+  std::uint32_t worst = 0;
+  std::uint32_t usual = 0;
+  for (int i = 0; i < 5000; ++i) {
+    Registers arguments;
+    arguments.integers[0] = reinterpret_cast<const void*>(i == 0 ? 0x12345678U : inputs.random());
+    const std::uint32_t counted = count(arguments, step);
+    if (i == 0) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+  report(name, worst, usual, 0);
+}
+
+void measure_double() {
+  static DcDouble dc;
+  DcCurrentControllerConfig<double> dc_config;
+  dc_config.torque_constant = 0.05;
+  dc_config.dead_time = 119e-9;
+  const auto dc_c = DcDouble::prepare(dc_config, 5e-5);
+  static FieldOrientedDouble controller;
+  FieldOrientedControllerConfig<double> config;
+  config.torque_constant = 0.05;
+  config.pole_pairs = 7;
+  config.dead_time = 119e-9;
+  const auto c = FieldOrientedDouble::prepare(config, 5e-5);
+  std::uint32_t worst[2] = {};
+  std::uint32_t usual[2] = {};
+  static DcDouble::Output dc_out;
+  static FieldOrientedDouble::Output out;
+  const auto number = [](float scale) { return static_cast<double>(scale * inputs.unit()); };
+  for (int i = 0; i < 2000; ++i) {
+    const DcDoubleInput two = {number(1.0F), number(1.0F), number(100.0F), 24.0 + number(12.0F)};
+    const std::uint32_t one = count(Registers{{&dc, &dc_c, &two, &dc_out}, {}}, &dc_double_step);
+    const FieldOrientedDouble::Input three = {inputs.random(),     number(1.0F), number(1.0F),
+                                              number(1000.0F),     0.0,          number(1.0F),
+                                              24.0 + number(12.0F)};
+    const std::uint32_t other =
+        count(Registers{{&controller, &c, &three, &out}, {}}, &field_oriented_double_step);
+    if (i == 0) usual[0] = one;
+    if (i == 0) usual[1] = other;
+    if (one > worst[0]) worst[0] = one;
+    if (other > worst[1]) worst[1] = other;
+  }
+  report("DC current step in double              ", worst[0], usual[0], 0);
+  report("PMSM current step in double            ", worst[1], usual[1], 0);
 }
 
 }  // namespace
@@ -219,6 +271,11 @@ int main() {
   measure_dc();
   measure_field_oriented();
   measure_small_steps();
+  measure_sine("sine and cosine: nearest entry         ", &sine_cosine_nearest_step);
+  measure_sine("sine and cosine: first order           ", &sine_cosine_first_order_step);
+  measure_sine("sine and cosine: second order          ", &sine_cosine_step);
+  measure_sine("sine and cosine: polynomial            ", &sine_cosine_polynomial_step);
+  measure_double();
   const std::uint32_t fingerprint = Fingerprint{}.of_all();
   print("Fingerprint of the results ");
   print_number(fingerprint, 0);

@@ -17,7 +17,7 @@ inline void start_counter() {
 
 struct Registers {
   const void* integers[4] = {};  // r0 .. r3
-  float floats[4] = {};          // s0 .. s3
+  float floats[6] = {};          // s0 .. s5
 };
 
 // Calls `function` with these arguments and returns what the counter moved by between two reads of it. All

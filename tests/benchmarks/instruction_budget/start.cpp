@@ -50,6 +50,8 @@ extern std::uint32_t stack_top;
       "  vldr s1, [r0, #20]\n"
       "  vldr s2, [r0, #24]\n"
       "  vldr s3, [r0, #28]\n"
+      "  vldr s4, [r0, #32]\n"
+      "  vldr s5, [r0, #36]\n"
       "  ldm r0, {r0, r1, r2, r3}\n"
       "  ldr r5, [r4, #0x24]\n"
       "  blx r6\n"

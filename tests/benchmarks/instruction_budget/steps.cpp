@@ -36,8 +36,11 @@ Dc::Output dc_step(Dc& dc, const Dc::Coefficients& c, float reference, float cur
 }
 
 FieldOriented::Output field_oriented_step(FieldOriented& controller, const FieldOriented::Coefficients& c,
-                                          const FieldOriented::Input& in) {
-  return controller.update(c, in);
+                                          std::uint32_t angle, float current_b, float current_c,
+                                          float electrical_speed, float reference_d, float reference_q,
+                                          float supply) {
+  return controller.update(c,
+                           {angle, current_b, current_c, electrical_speed, reference_d, reference_q, supply});
 }
 
 Transmission::Output transmission_step(const Transmission::Coefficients& c, float force) {
@@ -50,6 +53,25 @@ const Haptic::Output& haptic_step(Haptic& loop, const Haptic::Coefficients& c, s
 
 control::SineCosine<float> sine_cosine_step(std::uint32_t angle) {
   return control::sine_cosine<float>(angle);
+}
+control::SineCosine<float> sine_cosine_first_order_step(std::uint32_t angle) {
+  return control::sine_cosine_first_order<float>(angle);
+}
+control::SineCosine<float> sine_cosine_nearest_step(std::uint32_t angle) {
+  return sine_cosine_nearest(angle);
+}
+control::SineCosine<float> sine_cosine_polynomial_step(std::uint32_t angle) {
+  return sine_cosine_polynomial(angle);
+}
+
+void dc_double_step(DcDouble& dc, const DcDouble::Coefficients& c, const DcDoubleInput& in,
+                    DcDouble::Output& out) {
+  out = dc.update(c, in.reference, in.current, in.speed, in.supply);
+}
+
+void field_oriented_double_step(FieldOrientedDouble& controller, const FieldOrientedDouble::Coefficients& c,
+                                const FieldOrientedDouble::Input& in, FieldOrientedDouble::Output& out) {
+  out = controller.update(c, in);
 }
 }
 

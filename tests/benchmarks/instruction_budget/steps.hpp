@@ -10,6 +10,7 @@
 #include "control/resampler.hpp"
 #include "control/velocity_estimator.hpp"
 #include "control/wall_law.hpp"
+#include "tests/benchmarks/instruction_budget/sine_variants.hpp"
 
 // The steps of the interrupt path as functions of their own, compiled apart from what calls them: nothing
 // about their arguments is known to the compiler, as in the tick. An argument that the step before leaves in
@@ -20,6 +21,11 @@ using Wall = control::WallLaw<float>;
 using Velocity = control::VelocityEstimator<float>;
 using Dc = control::DcCurrentController<float>;
 using FieldOriented = control::FieldOrientedController<float>;
+using DcDouble = control::DcCurrentController<double>;
+struct DcDoubleInput {
+  double reference, current, speed, supply;
+};
+using FieldOrientedDouble = control::FieldOrientedController<double>;
 using Haptic = control::HapticLoop<float>;
 using Transmission = control::MotorTransmission<float>;
 
@@ -51,10 +57,20 @@ void resample_step(Position<std::uint32_t>& position, const PositionCoefficients
 Dc::Output dc_step(Dc& dc, const Dc::Coefficients& c, float reference, float current, float speed,
                    float supply);
 FieldOriented::Output field_oriented_step(FieldOriented& controller, const FieldOriented::Coefficients& c,
-                                          const FieldOriented::Input& in);
+                                          std::uint32_t angle, float current_b, float current_c,
+                                          float electrical_speed, float reference_d, float reference_q,
+                                          float supply);
 Transmission::Output transmission_step(const Transmission::Coefficients& c, float force);
 const Haptic::Output& haptic_step(Haptic& loop, const Haptic::Coefficients& c, std::int64_t count);
 control::SineCosine<float> sine_cosine_step(std::uint32_t angle);
+control::SineCosine<float> sine_cosine_first_order_step(std::uint32_t angle);
+control::SineCosine<float> sine_cosine_nearest_step(std::uint32_t angle);
+control::SineCosine<float> sine_cosine_polynomial_step(std::uint32_t angle);
+// What the same steps cost in double, for which this processor has no instructions.
+void dc_double_step(DcDouble& dc, const DcDouble::Coefficients& c, const DcDoubleInput& in,
+                    DcDouble::Output& out);
+void field_oriented_double_step(FieldOrientedDouble& controller, const FieldOrientedDouble::Coefficients& c,
+                                const FieldOrientedDouble::Input& in, FieldOrientedDouble::Output& out);
 }
 
 }  // namespace kmax::instruction_budget

@@ -32,7 +32,8 @@ TEST(Resolve, SaysWhatIsWrong) {
                   "axes are 0 .. 1");
   EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("wall"); }), "is a group");
   EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis1.wall"); }), "'kmax list axis1.wall.'");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis1.stiffness"); }), "axis1.wall.stiffness?");
+  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis1.stiffness"); }),
+                  "axis1.wall.stiffness or axis1.excitation.stiffness?");
   EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("zzz"); }), "kmax list");
   for (const char* bad :
        {"", ".", "axis", "axis.", "axis1.", "axisx.wall.law", "wall.", "WALL.LAW", "wall.law "})

@@ -43,7 +43,9 @@ TEST_F(Simulate, ASuppliedSceneWithAPersonIsJudged) {
 
 TEST_F(Simulate, BadScenes) {
   expect_error({"simulate"}, wrong_usage, "scene is required");
-  expect_error({"simulate", "tuoch"}, wrong_usage, "supplied are free_handle, motor_axes, single_motor, touch, two_axes");
+  expect_error({"simulate", "tuoch"}, wrong_usage,
+               "supplied are dc_coreless_a, dc_coreless_b, drone, free_handle, gimbal_a, "
+               "gimbal_b, motor_axes, single_motor, touch, two_axes");
   expect_error({"simulate", scene("wall.stifness = 1\n")}, wrong_usage, "scene.toml:5:");
   expect_error({"simulate", scene("wall.stiffness = -1\n")}, wrong_usage, "scene.toml:5:");
   expect_error({"simulate", scene("measured.position = 0.0\n")}, wrong_usage, "can only be read");

@@ -52,7 +52,9 @@ TEST_F(SimLinkTest, LongestReadHasAllItsRegisters) {
 
 TEST_F(SimLinkTest, RefusalsCarryTheException) {
   expect_refused([&] { link->read_holding(0x7000, 1); }, 2, 3, 0x7000);
-  expect_refused([&] { link->read_input(0x7000, 1); }, 2, 4, 0x7000);
+  expect_refused([&] { link->read_input(0xC000, 1); }, 2, 4, 0xC000);
+  // Nothing has been captured.
+  expect_refused([&] { link->read_input(firmware::capture_window, 1); }, 6, 4, firmware::capture_window);
   expect_refused([&] { link->read_input(firmware::trace_window, 126); }, 3, 4, firmware::trace_window);
   expect_refused([&] { link->read_holding(0, 0); }, 3, 3, 0);
   const std::vector<std::uint16_t> nan = {0x7FC0, 0}, negative = {0xBF80, 0};

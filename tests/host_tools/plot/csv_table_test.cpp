@@ -62,6 +62,7 @@ TEST(CsvTable, LabelsHaveTheUnitOfTheName) {
       {"gap_mm", "gap (mm)"},
       {"position_m", "position (m)"},
       {"position_counts", "position (counts)"},
+      {"electrical_angle_rad", "electrical angle (rad)"},
       {"haptic_rate", "haptic rate"},
       {"_n", " n"},
       {"n", "n"},

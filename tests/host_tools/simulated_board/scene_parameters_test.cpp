@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <limits>
 
 #include "host_tools/simulated_board/simulated_board.hpp"
@@ -85,6 +86,50 @@ TEST(SceneParameters, ARefusedSetChangesNothing) {
   EXPECT_EQ(application.values().real<"wall.stiffness">(), 1000.0f);
   preset(application, assignments_of(scene_with({{"wall.stiffness", 7.0, ""}})));
   EXPECT_EQ(application.values().real<"wall.stiffness">(), 7.0f) << "the next set is not hindered";
+}
+
+float real(const std::vector<device::Assignment>& all, const std::string& name, float missing) {
+  for (const device::Assignment& one : all) {
+    if (one.parameter.name() == name) return std::bit_cast<float>(one.raw);
+  }
+  return missing;
+}
+
+TEST(SceneParameters, AnIdentifiedSceneTellsItsMotorAndAnotherDoesNot) {
+  simulation::Scene scene = open_scene("gimbal_b");
+  const auto told = [&](const char* name) { return real(hardware_assignments_of(scene), name, -1.0f); };
+  for (const char* name : {"motor.resistance", "motor.inductance", "motor.inductance_q",
+                           "motor.torque_constant", "motor.electrical_offset", "device.mass"})
+    EXPECT_EQ(told(name), -1.0f) << name;
+  EXPECT_EQ(told("device.transmission"), 0.015f);
+  scene.identified = true;
+  EXPECT_EQ(told("motor.resistance"), 10.402f) << "with the leg that the phase's current passes";
+  EXPECT_EQ(told("motor.inductance"), 3.1e-3f);
+  EXPECT_EQ(told("motor.inductance_q"), 4.35e-3f);
+  EXPECT_EQ(told("motor.torque_constant"), 0.093f);
+  EXPECT_EQ(told("motor.electrical_offset"), -1.3f);
+  EXPECT_EQ(told("device.mass"), 0.085f);
+  SimulatedBoard simulation(scene);
+  const auto& values = simulation.board().application().values();
+  EXPECT_EQ(values.whole<"motor.pole_pairs">(), 7);
+  EXPECT_EQ(values.whole<"encoder.direction">(), -1);
+  EXPECT_EQ(values.whole<"motor.calibrated">(), 1);
+  simulation::Scene dc = open_scene("dc_coreless_b");
+  EXPECT_EQ(real(identified_assignments_of(dc), "motor.resistance", 0.0f), 7.104f) << "and two legs";
+  SimulatedBoard unknown(dc);
+  EXPECT_EQ(unknown.board().application().values().real<"motor.resistance">(), 1.0f) << "the factory's";
+  EXPECT_EQ(unknown.board().application().values().whole<"motor.calibrated">(), 0);
+  EXPECT_EQ(unknown.board().application().values().whole<"encoder.direction">(), 1);
+}
+
+TEST(SceneParameters, TheKindsOfMotorAndEncoderAreKnownWithAMotorOnly) {
+  simulation::Scene scene = open_scene("gimbal_a");
+  scene.parameters.clear();
+  SimulatedBoard simulation(scene);
+  const auto& values = simulation.board().application().values();
+  EXPECT_EQ((values.choice<firmware::MotorKind, "motor.kind">()), firmware::MotorKind::pmsm);
+  EXPECT_EQ(values.whole<"encoder.kind">(), 1);
+  EXPECT_EQ(hardware_assignments_of(open_scene("touch")).size(), 3u);
 }
 
 // Commands are no settings: a scene can neither arm nor end its own transaction.

@@ -49,6 +49,31 @@ TEST(SceneRun, TheSameSceneGivesTheSameBits) {
       << "a test that must be able to fail";
 }
 
+// The whole way: counts, firmware, currents, motor, handle, and a person who presses 1 N against 2 N/mm.
+TEST(SceneRun, PersonsPressAgainstWallsThatMotorsMake) {
+  for (const char* name : {"motor_axes", "single_motor"}) {
+    const simulation::Scene scene = open_scene(name);
+    const RunResult result = run_scene(scene);
+    EXPECT_EQ(result.end_state, DriveState::operation_enabled) << name << firmware::words_of(result.refusal);
+    EXPECT_EQ(result.fault, firmware::Fault::none) << name;
+    ASSERT_TRUE(result.contact) << name;
+    EXPECT_LT(result.contact->peak_to_peak, 0.1e-3) << name;
+    EXPECT_NEAR(result.contact->deepest, 0.5e-3, 0.15e-3) << name;
+    EXPECT_EQ(result.clipped_share, 0.0) << "a motor has no clip of its own";
+    double asked = 0, made = 0, held = 0;
+    for (const RunSample& sample : result.samples) {
+      if (sample.time < result.judged_from || sample.time > result.judged_to) continue;
+      asked += sample.force;
+      made += sample.applied_force;
+      held += 1;
+    }
+    ASSERT_GT(held, 1000);
+    EXPECT_GT(asked / held, 0.7) << name;
+    // Without noise a steady current may stay half a code off: 10 mA are 0.05 N.
+    EXPECT_NEAR(made / held, asked / held, 0.06) << name;
+  }
+}
+
 TEST(SceneRun, HasEverySampleOfTheDurationAndTheFirmwaresNumbers) {
   const RunResult result = run_scene(touch(1.0));
   EXPECT_EQ(result.samples.size(), 500u);

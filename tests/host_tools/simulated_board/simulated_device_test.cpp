@@ -87,6 +87,43 @@ TEST(SimulatedDevice, ThePersonBeginsWhenTheAxisIsArmedAndAgainWhenArmedAgain) {
   EXPECT_NEAR(device.handle(0).intended_position(), start, 5e-3);
 }
 
+TEST(SimulatedDevice, AnAxisWithAMotorAndOneWithoutShareABoard) {
+  simulation::Scene scene = open_scene("two_axes");
+  scene.axes[1].motor = simulation::BrushedDcMotorConfig{};
+  SimulatedDevice device(scene);
+  EXPECT_FALSE(device.has_motor(0));
+  EXPECT_TRUE(device.has_motor(1));
+  EXPECT_FALSE(device.sample(0).motor.present);
+  EXPECT_EQ(device.sample(0).condition, firmware::Fault::none);
+  const auto sample = device.sample(1);
+  EXPECT_TRUE(sample.motor.present);
+  EXPECT_EQ(sample.condition, firmware::Fault::power_stage) << "nobody has powered it up";
+  EXPECT_EQ(device.count(1), sample.count);
+  EXPECT_NEAR(device.handle(1).position(), scene.axes[1].start.position, 1e-12);
+  EXPECT_NEAR(static_cast<double>(device.readings().supply_voltage), 24.0, 0.01);
+  device.drive(0, output(1.0f, true));
+  pass(device, 0.01);
+  EXPECT_NE(device.handle(0).position(), scene.axes[0].start.position);
+  EXPECT_EQ(device.handle(1).position(), scene.axes[1].start.position);
+}
+
+TEST(SimulatedDevice, WithoutAMotorThereIsNoPowerStage) {
+  SimulatedDevice device(open_scene("touch"));
+  EXPECT_FALSE(device.has_motor(0));
+  EXPECT_FALSE(device.has_motor(7));
+  EXPECT_THROW(device.power(), std::logic_error);
+  EXPECT_EQ(device.readings().supply_voltage, 0.0f);
+}
+
+TEST(SimulatedDevice, ThePlugOfAMotorsEncoder) {
+  SimulatedDevice device(open_scene("gimbal_a"));
+  EXPECT_TRUE(device.power().drives().drive(0).encoder().plugged());
+  device.connect_encoder(0, false);
+  EXPECT_TRUE(device.power().drives().planted(0, simulation::Defect::encoder_unplugged));
+  device.connect_encoder(0, true);
+  EXPECT_TRUE(device.power().drives().drive(0).encoder().plugged());
+}
+
 TEST(SimulatedDevice, ABoardHasTwoAxes) {
   simulation::Scene scene = open_scene("two_axes");
   scene.axes.push_back(scene.axes[0]);

@@ -74,6 +74,17 @@ TEST(CurrentSensor, TheSameSeedGivesTheSameNoiseOnEachChannel) {
   EXPECT_NE(one.sample(Channel::b, 1.0), one.sample(Channel::c, 1.0));
 }
 
+TEST(CurrentSensor, AnInvertedChannelReadsTheOtherSignAndKeepsItsOffset) {
+  CurrentSensorConfig config;
+  config.offset_b = 0.01;
+  CurrentSensor sensor(config);
+  sensor.invert(Channel::b, true);
+  EXPECT_NEAR(sensor.sample(Channel::b, 5.0), 1.65 + 0.01 - 0.1, 1e-12);
+  EXPECT_NEAR(sensor.sample(Channel::c, 5.0), 1.65 + 0.1, 1e-12);
+  sensor.invert(Channel::b, false);
+  EXPECT_NEAR(sensor.sample(Channel::b, 5.0), 1.65 + 0.01 + 0.1, 1e-12);
+}
+
 TEST(CurrentSensor, RefusesWhatIsNotANumberOrNoSensor) {
   CurrentSensor sensor;
   EXPECT_THROW(sensor.sample(Channel::b, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);

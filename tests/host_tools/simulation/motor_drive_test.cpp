@@ -194,6 +194,53 @@ TEST(MotorDrive, BlockedItStandsAndLetGoItMoves) {
   EXPECT_GT(drive.handle().position(), position);
 }
 
+TEST(MotorDrive, LettingGoAHandDoesNotMendABlockedMotor) {
+  MotorDrive drive = brushed_drive();
+  Supply supply;
+  drive.hold(true);
+  drive.block(true);
+  drive.hold(false);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_EQ(drive.handle().position(), 0.0);
+  drive.hold(true);
+  drive.block(false);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_EQ(drive.handle().position(), 0.0);
+  drive.hold(false);
+  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  EXPECT_GT(drive.handle().position(), 0.0);
+}
+
+TEST(MotorDrive, SwappedWiresExchangeWhatTheLegsSee) {
+  MotorDrive drive = synchronous_drive();
+  drive.block(true);
+  Supply supply;
+  drive.swap_terminals(terminal_a, terminal_c);
+  run(drive, supply, duties(0.55, 0.48, 0.47), 0.02);
+  EXPECT_EQ(drive.leg_currents()[terminal_a], drive.currents()[terminal_c]);
+  EXPECT_EQ(drive.leg_currents()[terminal_b], drive.currents()[terminal_b]);
+  EXPECT_EQ(drive.leg_currents()[terminal_c], drive.currents()[terminal_a]);
+  EXPECT_GT(drive.leg_currents()[terminal_a], 1.0) << "the leg with the highest voltage feeds the motor";
+  EXPECT_NEAR(drive.current_pin(Channel::c, true), 1.65 + 0.02 * drive.currents()[terminal_a], 1e-12);
+  EXPECT_THROW(drive.swap_terminals(terminal_a, 3), std::out_of_range);
+}
+
+TEST(MotorDrive, AReversedEncoderCountsDownAndItsIndexGoesWithIt) {
+  MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
+  config.encoder.reversed = true;
+  config.encoder.index_position = 4000;
+  MotorDrive drive(config, CoupledHandle(frictionless()));
+  Supply supply;
+  bool seen = false;
+  for (int n = 0; n < 3000; ++n) {
+    run(drive, supply, duties(0.0, 0.52, 0.48), interval);
+    ASSERT_EQ(drive.encoder().edges(),
+              static_cast<std::int64_t>(std::floor(-drive.shaft_angle() / 6.283185307179586 * 4096)));
+    seen = seen || (drive.encoder().lines().z && drive.encoder().edges() % 4096 == 4000 - 4096);
+  }
+  EXPECT_TRUE(seen);
+}
+
 TEST(MotorDrive, ABlockedHandleHoldsAgainstAPerson) {
   for (const double friction : {0.0, 0.1}) {
     IntendedMotionConfig motion;

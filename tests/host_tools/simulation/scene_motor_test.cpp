@@ -113,9 +113,10 @@ TEST(SceneMotor, RefusalsNamePlaceKeyValueAndWhatIsAllowed) {
             "bad.toml:3:8: motor.kind = 1: allowed is \"dc\" or \"pmsm\"");
   EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"dc\"\nresistance = 0\n"),
             "bad.toml:4:14: motor.resistance = 0: allowed is a number from 0.0001 to 1000 ohm");
-  EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"dc\"\npole_pairs = 7\n"),
-            "bad.toml:4:1: motor.pole_pairs = 7: unknown key; allowed here: kind, resistance, inductance, "
-            "torque_constant");
+  EXPECT_EQ(
+      refusal("[device]\n[motor]\nkind = \"dc\"\npole_pairs = 7\n"),
+      "bad.toml:4:1: motor.pole_pairs = 7: unknown key; allowed here: kind, defects, resistance, inductance, "
+      "torque_constant");
   EXPECT_EQ(refusal("[device]\n[axis1.device]\n[axis1.motor]\nkind = \"pmsm\"\npole_pairs = 6.5\n"),
             "bad.toml:3:1: axis1.motor.pole_pairs = 6.5: allowed is a whole number");
   EXPECT_EQ(
@@ -133,6 +134,18 @@ TEST(SceneMotor, RefusalsNamePlaceKeyValueAndWhatIsAllowed) {
       "remove the table");
   EXPECT_EQ(refusal("[device]\n[supply]\nabsorbs = 1\n"),
             "bad.toml:3:11: supply.absorbs = 1: allowed is true or false");
+  const std::string names =
+      "\"phase_a_open\", \"phase_b_open\", \"phase_c_open\", \"phases_swapped\", \"encoder_unplugged\", "
+      "\"encoder_stuck\", \"encoder_reversed\", \"encoder_slipping\", \"supply_low\", \"motor_blocked\", "
+      "\"current_b_inverted\", \"current_c_inverted\"";
+  EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"dc\"\ndefects = [\"smoke\"]\n"),
+            "bad.toml:4:12: motor.defects = 'smoke': allowed is a list of " + names);
+  EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"dc\"\ndefects = 3\n"),
+            "bad.toml:4:11: motor.defects = 3: allowed is a list of " + names);
+  EXPECT_EQ(refusal("[device]\n[encoder]\nreversed = 1\n"),
+            "bad.toml:3:12: encoder.reversed = 1: allowed is true or false");
+  EXPECT_EQ(refusal("identified = \"no\"\n[device]\n"),
+            "bad.toml:1:14: identified = 'no': allowed is true or false");
   EXPECT_EQ(refusal("[device]\n[encoder]\nkind = \"hall\"\n"),
             "bad.toml:3:8: encoder.kind = 'hall': allowed is \"quadrature\" or \"as5047p\"");
   EXPECT_EQ(
@@ -173,6 +186,40 @@ TEST(SceneMotor, ADriveHasNoForceLimitAndItsOwnSeed) {
   EXPECT_EQ(pin, same.current_pin(Channel::b, true) - 0.006);
   EXPECT_NE(pin, other.current_pin(Channel::b, true) + 0.003);
   EXPECT_THROW(scene.make_drive(2), std::out_of_range);
+}
+
+// What only a calibration can find is not among the parameters of a device that has none yet.
+TEST(SceneMotor, TheSuppliedDevicesToCalibrateDoNotTellTheirMotors) {
+  for (const char* name : {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"}) {
+    const Scene scene = supplied(name);
+    EXPECT_FALSE(scene.identified) << name;
+    ASSERT_EQ(scene.axes.size(), 1u);
+    const SceneAxis& axis = scene.axes[0];
+    ASSERT_TRUE(axis.motor) << name;
+    EXPECT_FALSE(axis.person) << name;
+    EXPECT_TRUE(axis.defects.empty()) << name;
+    EXPECT_TRUE(scene.supply) << name;
+    EXPECT_GT(axis.current_sensor.noise, 0.0) << name;
+    EXPECT_GT(axis.device.friction, 0.0) << name;
+    EXPECT_GT(axis.device.damping, 0.0) << name;
+    for (const SceneParameter& parameter : scene.parameters) {
+      const bool known = parameter.name == "motor.kind" || parameter.name.rfind("supply.", 0) == 0 ||
+                         parameter.name == "encoder.kind" || parameter.name == "encoder.counts_per_turn" ||
+                         parameter.name == "device.transmission" || parameter.name == "current.limit" ||
+                         parameter.name == "force.limit" || parameter.name == "wall.position" ||
+                         parameter.name == "link.timeout";
+      EXPECT_TRUE(known) << name << ": " << parameter.name;
+    }
+    const auto* pmsm = std::get_if<SynchronousMotorConfig>(&*axis.motor);
+    // A handle at rest must not be moved by its cogging, else it has no rest.
+    if (pmsm) {
+      EXPECT_GT(pmsm->cogging_torque, 0.0) << name;
+      EXPECT_LT(pmsm->cogging_torque / axis.encoder.transmission, axis.device.friction) << name;
+    }
+  }
+  const auto gimbal = supplied("gimbal_b");
+  const auto salient = std::get<SynchronousMotorConfig>(*gimbal.axes[0].motor);
+  EXPECT_GT(salient.inductance_q, 1.2 * salient.inductance_d);
 }
 
 // The supplied motors reach the force limit of their axis with about an ampere, and its parameters are

@@ -1,0 +1,79 @@
+#pragma once
+
+#include "control/haptic_loop.hpp"
+#include "firmware/object_dictionary/entry.hpp"
+
+namespace kmax::firmware {
+
+/// Records that exist once per axis. Holding registers for what is set, input registers for what is read.
+namespace group {
+inline constexpr Group wall{"wall", 0x2000, Scope::axis, 0x0000};
+inline constexpr Group interference{"interference", 0x2001, Scope::axis, 0x0040};
+inline constexpr Group position{"position", 0x2002, Scope::axis, 0x0060};
+inline constexpr Group velocity{"velocity", 0x2003, Scope::axis, 0x0070};
+inline constexpr Group haptic{"haptic", 0x2004, Scope::axis, 0x0080};
+inline constexpr Group force{"force", 0x2005, Scope::axis, 0x0090};
+inline constexpr Group passivity{"passivity", 0x2006, Scope::axis, 0x00A0};
+inline constexpr Group guard{"guard", 0x2007, Scope::axis, 0x00B0};
+inline constexpr Group device{"device", 0x2008, Scope::axis, 0x00D0};
+inline constexpr Group motor{"motor", 0x2009, Scope::axis, 0x00E0};
+inline constexpr Group current{"current", 0x200A, Scope::axis, 0x0100};
+inline constexpr Group encoder{"encoder", 0x200B, Scope::axis, 0x0110};
+inline constexpr Group temperature{"temperature", 0x200C, Scope::axis, 0x0130};
+inline constexpr Group drive{"drive", 0x2010, Scope::axis, 0x0200};
+/// Apart from the controlword, so that no write covers both.
+inline constexpr Group drive_mode{"drive", 0x2016, Scope::axis, 0x0208};
+inline constexpr Group drive_status{"drive", 0x2011, Scope::axis, 0x0000};
+inline constexpr Group measured{"measured", 0x2012, Scope::axis, 0x0020};
+inline constexpr Group excitation{"excitation", 0x2013, Scope::axis, 0x0210};
+inline constexpr Group compensation{"compensation", 0x2014, Scope::axis, 0x0240};
+inline constexpr Group trip{"trip", 0x2015, Scope::axis, 0x0080};
+}  // namespace group
+
+/// What each choice is called; the numbers are the enumerations' own.
+namespace names {
+template <typename Enumeration>
+constexpr NamedValue named(std::string_view name, Enumeration value) {
+  return {name, static_cast<std::int32_t>(value)};
+}
+using namespace control;
+inline constexpr NamedValue wall_law[] = {named("none", WallKind::none), named("plain", WallKind::plain),
+                                          named("magnetic", WallKind::magnetic),
+                                          named("adaptive", WallKind::adaptive)};
+inline constexpr NamedValue wall_side[] = {{"-1", -1}, {"+1", 1}};
+inline constexpr NamedValue adaptive_relation[] = {named("linear", AdaptiveRelation::linear),
+                                                   named("square", AdaptiveRelation::square),
+                                                   named("square_root", AdaptiveRelation::square_root)};
+inline constexpr NamedValue adaptive_velocity[] = {named("approach", AdaptiveVelocity::approach),
+                                                   named("speed", AdaptiveVelocity::speed)};
+inline constexpr NamedValue adaptive_mode[] = {named("instant", AdaptiveMode::instant),
+                                               named("latched", AdaptiveMode::latched),
+                                               named("peak_hold", AdaptiveMode::peak_hold)};
+inline constexpr NamedValue interference_mode[] = {named("none", InterferenceMode::none),
+                                                   named("perpendicular", InterferenceMode::perpendicular),
+                                                   named("parallel", InterferenceMode::parallel)};
+inline constexpr NamedValue rounding[] = {named("nearest", Rounding::nearest),
+                                          named("floor", Rounding::floor),
+                                          named("hysteresis", Rounding::hysteresis)};
+inline constexpr NamedValue velocity_estimator[] = {
+    named("difference", VelocityEstimatorKind::difference),
+    named("low_pass", VelocityEstimatorKind::low_pass), named("foaw", VelocityEstimatorKind::foaw),
+    named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
+    named("tracking", VelocityEstimatorKind::tracking)};
+// Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
+// ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
+inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
+inline constexpr NamedValue guard_mode[] = {{"off", 0}};
+inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
+inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
+inline constexpr NamedValue encoder_start[] = {{"anywhere", 0}, {"at_rest", 1}};
+inline constexpr NamedValue encoder_index[] = {{"none", 0}, {"once_per_turn", 1}};
+inline constexpr NamedValue encoder_direction[] = {{"-1", -1}, {"+1", 1}};
+inline constexpr NamedValue drive_mode[] = {{"haptic", 0}, {"excitation", 1}};
+inline constexpr NamedValue no_or_yes[] = {{"no", 0}, {"yes", 1}};
+inline constexpr NamedValue excitation_kind[] = {
+    {"off", 0}, {"voltage", 1}, {"current", 2}, {"torque", 3}, {"position", 4}};
+inline constexpr NamedValue alternation_axis[] = {{"along", 0}, {"across", 1}};
+}  // namespace names
+
+}  // namespace kmax::firmware

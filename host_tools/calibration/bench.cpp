@@ -1,0 +1,288 @@
+#include "host_tools/calibration/bench.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "host_tools/calibration/trip_diagnosis.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/value_text.hpp"
+
+namespace kmax::calibration {
+
+using std::chrono::microseconds;
+
+namespace {
+constexpr double longest_timeout = 1.0;      // s, of link.timeout during the procedure
+constexpr double longest_excitation = 70.0;  // s, longer than any plan's
+// Of different lengths: a handle that is shaken in step with the looks would be found at rest at its turning
+// point each time.
+constexpr microseconds between_looks[] = {microseconds(20'000), microseconds(12'700), microseconds(7'300)};
+constexpr microseconds power_stage_patience{2'000'000};
+
+microseconds of_seconds(double seconds) {
+  return microseconds(static_cast<std::int64_t>(std::llround(seconds * 1e6)));
+}
+}  // namespace
+
+Bench::Bench(device::Device& device, const CalibrationSettings& settings, ParameterJournal& journal,
+             Prompter* prompter, Tell tell)
+    : device_(device),
+      settings_(settings),
+      journal_(journal),
+      prompter_(prompter),
+      tell_(std::move(tell)),
+      drive_(device, settings.axis) {
+  // Noted before any capture changes them.
+  journal_.note(std::vector<std::string>{"capture.axis", "capture.channel_1", "capture.channel_2",
+                                         "capture.channel_3", "capture.channel_4", "capture.interval",
+                                         "capture.samples", "capture.pre_trigger", "capture.trigger",
+                                         "capture.trigger_level"});
+  double timeout = number("link.timeout");
+  if (!(timeout > 0.0 && timeout <= longest_timeout)) {
+    timeout = longest_timeout;
+    journal_.set_temporary({fmt::format("link.timeout={}", timeout)});
+  }
+  longest_silence_ = std::min(longest_silence_, timeout / 4.0);
+  run_ = static_cast<unsigned>(number("excitation.run"));
+  home_ = number("measured.position");
+}
+
+Bench::~Bench() {
+  try {
+    disarm();
+  } catch (const std::exception&) {
+    // The link is gone: link.timeout, which the constructor has seen to, removes the force on the device.
+  }
+}
+
+double Bench::number(const std::string& name) {
+  const device::Parameter parameter = device::resolve(name, settings_.axis);
+  return firmware::number_from_raw(parameter.definition().type, device_.read(parameter));
+}
+
+void Bench::set_temporary(const std::vector<std::string>& texts) {
+  disarm();
+  journal_.set_temporary(texts);
+}
+
+void Bench::set_result(const std::vector<std::string>& texts) {
+  disarm();
+  journal_.set_result(texts);
+}
+
+void Bench::set_result_at_end(const std::vector<std::string>& texts) {
+  // A value that the device could not hold is the step's failure, not that of the end.
+  device::parse_assignments(texts, settings_.axis);
+  results_at_end_.insert(results_at_end_.end(), texts.begin(), texts.end());
+}
+
+void Bench::apply_results_at_end() {
+  if (!results_at_end_.empty()) set_result(results_at_end_);
+  results_at_end_.clear();
+}
+
+double Bench::displacement() {
+  return number("measured.position") - home_;
+}
+
+void Bench::rehome(double displacement) {
+  home_ = number("measured.position") - displacement;
+}
+
+void Bench::wait(double seconds) {
+  const auto end = device_.link().now() + of_seconds(seconds);
+  for (;;) {
+    const auto left = end - device_.link().now();
+    if (left <= microseconds(0)) return;
+    device_.link().wait(
+        std::min<microseconds>(left, longest_still_ > 0.0 ? next_look() : of_seconds(longest_silence_)));
+    if (stands()) return;
+    // Both a sign of life for the device and a look whether there is still a reason to wait.
+    if (armed_ && drive_.status().faulty()) return;
+  }
+}
+
+std::optional<Trip> Bench::trip() {
+  const device::DriveStatus status = drive_.status();
+  if (status.armed()) return std::nullopt;
+  armed_ = false;
+  if (!status.faulty())
+    throw device::DeviceError(fmt::format("axis {}: somebody else has disarmed it: {}", settings_.axis,
+                                          device::words_of(status.state())));
+  return cleared(status);
+}
+
+Trip Bench::cleared(const device::DriveStatus& status) {
+  const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
+  Trip found{text != nullptr ? text->fault : firmware::Fault::none, status.fault_words()};
+  try {
+    drive_.clear();
+  } catch (const device::DeviceError&) {
+    found.remains = unusable_ = true;
+  }
+  return found;
+}
+
+std::optional<Trip> Bench::take_unseen_trip() {
+  return std::exchange(unseen_trip_, std::nullopt);
+}
+
+// A refusal because the power stage still starts is none for two seconds.
+void Bench::arm_when_ready() {
+  const auto end = device_.link().now() + power_stage_patience;
+  for (;;) {
+    try {
+      drive_.arm();
+      return;
+    } catch (const device::DeviceError&) {
+      const device::DriveStatus status = drive_.status();
+      if (status.armed() || status.faulty() || status.refusal != firmware::Refusal::power_stage_not_ready ||
+          device_.link().now() >= end)
+        throw;
+    }
+    tell_("");
+    device_.link().wait(of_seconds(longest_silence_));
+  }
+}
+
+void Bench::arm(double reach) {
+  if (armed_) return;
+  if (const auto trip = take_unseen_trip()) throw StepFailed(diagnosis_of(*trip));
+  // A tenth of a millimetre is left in any case: whoever is at the bound may still go back.
+  const double left = reach > 0.0 ? reach : std::max(settings_.travel - std::abs(displacement()), 1e-4);
+  // A voltage of zero, not 'off', which controls the current with gains that may not fit the motor yet.
+  std::vector<std::string> texts = ExcitationPlan{.kind = "voltage"}.assignments();
+  texts.push_back("drive.mode=excitation");
+  texts.push_back(fmt::format("excitation.travel={:.9g}", left));
+  journal_.set_temporary(texts);
+  try {
+    // Even an attempt that ends in an exception may have armed it.
+    armed_ = true;
+    arm_when_ready();
+  } catch (const device::DeviceError&) {
+    const device::DriveStatus status = drive_.status();
+    armed_ = status.armed();
+    if (armed_) throw;
+    if (status.faulty()) throw StepFailed(diagnosis_of(cleared(status)));
+    if (status.refusal == firmware::Refusal::none) throw;
+    unusable_ = true;
+    throw StepFailed(diagnosis_of(status.refusal, number("supply.voltage"), number("supply.voltage_min"),
+                                  number("supply.voltage_max")));
+    throw;
+  }
+}
+
+void Bench::disarm() {
+  if (!armed_) return;
+  drive_.disarm();
+  armed_ = false;
+  const device::DriveStatus status = drive_.status();
+  if (!status.faulty()) return;
+  const Trip found = cleared(status);
+  if (found.fault != firmware::Fault::excitation_travel || found.remains) unseen_trip_ = found;
+}
+
+void Bench::begin_still_watch(double longest_still) {
+  longest_still_ = longest_still;
+  if (longest_still <= 0.0) return;
+  still_count_ = number("measured.count");
+  still_since_ = device_.link().now();
+}
+
+microseconds Bench::next_look() {
+  looks_ = (looks_ + 1) % std::size(between_looks);
+  return between_looks[looks_];
+}
+
+bool Bench::stands() {
+  constexpr double fewest_counts = 2.0, slowest = 0.002;  // m/s
+  if (longest_still_ <= 0.0 || !armed_) return false;
+  const double count = number("measured.count");
+  const auto now = device_.link().now();
+  if (std::abs(count - still_count_) >= fewest_counts || std::abs(number("measured.velocity")) > slowest) {
+    still_count_ = count;
+    still_since_ = now;
+  }
+  return now - still_since_ > of_seconds(longest_still_);
+}
+
+void Bench::wait_until_finished(double longest_still) {
+  begin_still_watch(longest_still);
+  const auto end = device_.link().now() + of_seconds(longest_excitation);
+  while (armed_ && number("measured.excitation_finished") == 0.0) {
+    tell_("");
+    if (const auto tripped = trip()) throw StepFailed(diagnosis_of(*tripped));
+    if (stands()) return disarm();
+    if (device_.link().now() >= end)
+      throw device::DeviceError(
+          fmt::format("axis {}: the excitation does not end; look at excitation.duration", settings_.axis));
+    device_.link().wait(next_look());
+  }
+}
+
+Recording Bench::record(const ExcitationPlan& excitation, const RecordPlan& plan, double reach) {
+  arm(reach);
+  begin_still_watch(plan.longest_still);
+  device::CaptureReader reader(device_);
+  const bool from_start = plan.delay <= 0.0;
+  if (from_start) begin_capture(reader, plan, firmware::CaptureTrigger::excitation);
+  std::vector<std::string> texts = excitation.assignments();
+  run_ = (run_ + 1) % 65536;
+  texts.push_back(fmt::format("excitation.run={}", run_));
+  journal_.set_temporary(texts);
+  if (!from_start) {
+    wait(plan.delay);
+    begin_capture(reader, plan, firmware::CaptureTrigger::now);
+  }
+  return finish_capture(reader);
+}
+
+Recording Bench::watch(const RecordPlan& plan) {
+  begin_still_watch(0.0);
+  device::CaptureReader reader(device_);
+  begin_capture(reader, plan, firmware::CaptureTrigger::now);
+  return finish_capture(reader);
+}
+
+void Bench::begin_capture(device::CaptureReader& reader, const RecordPlan& plan,
+                          firmware::CaptureTrigger trigger) {
+  reader.arm({.axis = settings_.axis,
+              .channels = plan.channels,
+              .interval = static_cast<std::uint32_t>(plan.interval),
+              .samples = static_cast<std::uint32_t>(plan.samples),
+              .pre_trigger = 0,
+              .trigger = trigger});
+}
+
+Recording Bench::finish_capture(device::CaptureReader& reader) {
+  struct Ended {};
+  Recording recording;
+  try {
+    reader.wait(std::chrono::seconds(1), [&](const device::CaptureProgress&) {
+      tell_("");
+      if (armed_) recording.trip = trip();
+      recording.stood = stands();
+      if (recording.trip || recording.stood) throw Ended();
+    });
+  } catch (const Ended&) {
+    reader.stop();
+    if (recording.stood) disarm();
+  }
+  try {
+    const device::Captured captured = reader.read([&](const device::CaptureProgress&) { tell_(""); });
+    recording.interval = captured.interval / captured.tick_rate;
+    for (const device::CaptureColumn& column : captured.columns)
+      recording.channels[column.name] = column.values;
+  } catch (const device::DeviceError&) {
+    // Stopped before it began.
+    if (!recording.trip && !recording.stood) throw;
+  }
+  if (!recording.trip && armed_) recording.trip = trip();
+  return recording;
+}
+
+}  // namespace kmax::calibration

@@ -1,0 +1,40 @@
+#pragma once
+// The current that a winding would show, tick by tick, for given voltages: the equation of winding_fit.hpp.
+//
+// Every tick is two halves, the first under the voltage of the tick before. In each half the current
+// approaches its final value exponentially; dead time acts with the half's mean current, which is solved for
+// exactly (linear inside the band, constant outside).
+
+#include <span>
+
+namespace kmax::calibration {
+
+struct WindingParameters {
+  double resistance = 1.0;         // ohm
+  double inductance = 1e-3;        // H
+  double dead_time_voltage = 0.0;  // V
+  double dead_time_band = 0.0;     // A
+  double offset_voltage = 0.0;     // V
+  double motion_rate = 0.0;        // V/(A s)
+  double back_emf_constant = 0.0;  // V s/rad
+  double first_current = 0.0;      // A, of sample 1
+  double first_induced = 0.0;      // V at sample 1, of the motion
+};
+
+// Time constant with which the motion's voltage dies out, s: friction does that to a shaft. It also keeps the
+// integral of the current from collecting small offsets. Long against half a wave, short against a record.
+inline constexpr double motion_decay = 0.01;
+
+struct WindingInput {
+  std::span<const double> voltage;  // V, [k] acts from k + 1/2 to k + 3/2
+  std::span<const double> speed;    // rad/s, mean of the tick from k to k + 1; optional
+  double mean_current = 0.0;        // A, about which motion_rate integrates
+  double tick = 50e-6;              // s
+};
+
+// Writes samples 1 .. of `current` (as long as `voltage`); sample 0 is set to sample 1, since the voltage
+// that acted before it is not known.
+void simulate_winding(const WindingParameters& parameters, const WindingInput& input,
+                      std::span<double> current);
+
+}  // namespace kmax::calibration

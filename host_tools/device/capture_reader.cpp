@@ -1,0 +1,265 @@
+#include "host_tools/device/capture_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "firmware/capture.hpp"
+#include "firmware/haptic_configuration.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/suggestion.hpp"
+
+namespace kmax::device {
+
+using firmware::CaptureChannel;
+using firmware::CaptureCommand;
+using firmware::CaptureState;
+using firmware::CaptureTrigger;
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using Phase = CaptureProgress::Phase;
+
+namespace {
+constexpr milliseconds poll_interval{20};
+// The device acts in its next tick; this is for a line that is slow.
+constexpr milliseconds grace{1'000};
+
+CaptureChannel channel_of(std::string_view name) {
+  for (const auto& text : firmware::capture_channel_texts) {
+    if (text.name == name && text.channel != CaptureChannel::none) return text.channel;
+  }
+  const auto names = capture_channel_names();
+  const std::string meant = did_you_mean(name, names);
+  throw ValueError(
+      fmt::format("there is no channel '{}' to capture{}", name,
+                  meant.empty() ? fmt::format("; channels are {}", fmt::join(names, ", ")) : meant));
+}
+
+std::string_view name_of(CaptureTrigger trigger) {
+  return firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name;
+}
+
+/// Checked here against the dictionary, so that a wrong setting is found before anything is sent.
+template <firmware::FixedName name>
+Assignment assignment(double value) {
+  const Parameter parameter = Parameter::of<name>();
+  const firmware::Entry& entry = parameter.definition();
+  if (!(value >= entry.minimum && value <= entry.maximum))
+    throw ValueError(
+        fmt::format("{}: {} is not allowed; it can be {}", parameter.name(), value, allowed_text(parameter)));
+  return {parameter, firmware::raw_from_number(entry.type, value)};
+}
+
+std::uint32_t samples_that_fit(const CaptureSettings& settings) {
+  return static_cast<std::uint32_t>(firmware::capture_words / settings.channels.size());
+}
+
+std::uint32_t samples_of(const CaptureSettings& settings) {
+  return settings.samples == 0 ? samples_that_fit(settings) : settings.samples;
+}
+
+void check(const CaptureSettings& settings) {
+  if (settings.channels.empty() || settings.channels.size() > firmware::capture_channels_max)
+    throw ValueError(fmt::format("{} channels are to be captured; it can be 1 to {}",
+                                 settings.channels.size(), firmware::capture_channels_max));
+  if (settings.samples > samples_that_fit(settings))
+    throw ValueError(fmt::format(
+        "{} samples of {} channels do not fit into the device's {} values; at most {} do", settings.samples,
+        settings.channels.size(), firmware::capture_words, samples_that_fit(settings)));
+  if (settings.pre_trigger >= samples_of(settings))
+    throw ValueError(
+        fmt::format("{} samples before the trigger leave none for the trigger's own among {}; at most {} can "
+                    "be before it",
+                    settings.pre_trigger, samples_of(settings), samples_of(settings) - 1));
+}
+
+std::vector<Assignment> assignments_of(const CaptureSettings& settings,
+                                       std::vector<CaptureChannel> channels) {
+  channels.resize(firmware::capture_channels_max, CaptureChannel::none);
+  return {assignment<"capture.axis">(static_cast<double>(settings.axis)),
+          assignment<"capture.channel_1">(static_cast<double>(channels[0])),
+          assignment<"capture.channel_2">(static_cast<double>(channels[1])),
+          assignment<"capture.channel_3">(static_cast<double>(channels[2])),
+          assignment<"capture.channel_4">(static_cast<double>(channels[3])),
+          assignment<"capture.interval">(settings.interval),
+          assignment<"capture.samples">(settings.samples),
+          assignment<"capture.pre_trigger">(settings.pre_trigger),
+          assignment<"capture.trigger">(static_cast<double>(settings.trigger)),
+          assignment<"capture.trigger_level">(settings.level)};
+}
+
+void command(Device& device, CaptureCommand what) {
+  // Twice does no harm: the capture that nobody has heard of begins again.
+  device.write(Parameter::of<"capture.command">(), static_cast<std::uint32_t>(what), true);
+}
+
+void tell_if_asked(const CaptureReader::Tell& tell, const CaptureProgress& progress) {
+  if (tell) tell(progress);
+}
+}  // namespace
+
+std::vector<std::string> capture_channel_names() {
+  std::vector<std::string> names;
+  for (const auto& text : firmware::capture_channel_texts) {
+    if (text.channel != CaptureChannel::none) names.emplace_back(text.name);
+  }
+  return names;
+}
+
+std::string capture_channel_unit(std::string_view name) {
+  return std::string(text_of(channel_of(name)).unit);
+}
+
+const std::vector<double>& Captured::column(std::string_view name) const {
+  std::vector<std::string> names;
+  for (const CaptureColumn& one : columns) {
+    if (one.name == name) return one.values;
+    names.push_back(one.name);
+  }
+  throw ValueError(fmt::format("'{}' was not captured, but {}", name, fmt::join(names, ", ")));
+}
+
+CaptureReader::~CaptureReader() {
+  try {
+    if (running_) stop();
+  } catch (const std::exception&) {
+    // The link is gone; a capture that nobody reads does no harm.
+  }
+}
+
+void CaptureReader::arm(const CaptureSettings& settings) {
+  check(settings);
+  std::vector<CaptureChannel> channels;
+  for (const std::string& name : settings.channels) channels.push_back(channel_of(name));
+  const std::vector<Assignment> assignments = assignments_of(settings, channels);
+  // From the parameters, not from measured.count_length: that reading is rounded to float.
+  firmware::ParameterValues values;
+  for (const std::size_t entry :
+       {firmware::entry_of<"device.transmission">(), firmware::entry_of<"encoder.counts_per_turn">()})
+    values.set_raw(firmware::slot_of(entry, settings.axis), device_.read(Parameter(entry, settings.axis)));
+  count_length_ = firmware::count_length(values, settings.axis);
+  channels_ = channels;
+  settings_ = settings;
+  device_.apply(assignments);
+  running_ = true;
+  try {
+    command(device_, CaptureCommand::arm);
+  } catch (const link::RefusedError& error) {
+    running_ = false;
+    const firmware::Refusal reason = device_.last_refusal().reason;
+    throw DeviceError(fmt::format(
+        "{}: the capture could not be armed: {}", device_.description(),
+        reason == firmware::Refusal::none ? std::string_view(error.what()) : firmware::words_of(reason)));
+  }
+}
+
+void CaptureReader::stop() {
+  running_ = false;
+  command(device_, CaptureCommand::stop);
+}
+
+CaptureReader::Status CaptureReader::status() {
+  static constexpr Parameter asked[] = {Parameter::of<"capture.state">(), Parameter::of<"capture.taken">(),
+                                        Parameter::of<"capture.trigger_sample">(),
+                                        Parameter::of<"capture.first_tick">(),
+                                        Parameter::of<"capture.channels">()};
+  const auto raw = device_.read(asked);
+  return {static_cast<CaptureState>(raw[0]), raw[1], raw[2], raw[3], raw[4]};
+}
+
+void CaptureReader::wait(microseconds patience, const Tell& tell) {
+  const std::uint32_t all = samples_of(settings_);
+  const auto needed = microseconds(static_cast<std::int64_t>(
+      std::ceil(1e6 * static_cast<double>(all) * settings_.interval / firmware::tick_rate_hz)));
+  auto deadline = device_.link().now() + patience;
+  bool triggered = false;
+  for (;;) {
+    const Status now = status();
+    if (now.state == CaptureState::complete) {
+      running_ = false;
+      return;
+    }
+    if (now.state == CaptureState::idle) {
+      running_ = false;
+      throw DeviceError(fmt::format("{}: the capture was stopped by another program, or the device restarted",
+                                    device_.description()));
+    }
+    if (now.state == CaptureState::running && !triggered) {
+      triggered = true;
+      deadline = device_.link().now() + needed + grace;
+    }
+    tell_if_asked(tell, {triggered ? Phase::running : Phase::waiting, now.taken, all});
+    if (device_.link().now() >= deadline) {
+      stop();
+      if (!triggered) fail_without_trigger(patience);
+      throw DeviceError(fmt::format("{}: the capture stands still at {} of {} samples: the axis has no ticks",
+                                    device_.description(), now.taken, all));
+    }
+    device_.link().wait(std::min<microseconds>(poll_interval, deadline - device_.link().now()));
+  }
+}
+
+void CaptureReader::fail_without_trigger(microseconds patience) {
+  const double seconds = static_cast<double>(patience.count()) * 1e-6;
+  std::string level;
+  if (settings_.trigger == CaptureTrigger::force) level = fmt::format(" above {} N", settings_.level);
+  if (settings_.trigger == CaptureTrigger::velocity) level = fmt::format(" above {} m/s", settings_.level);
+  throw DeviceError(
+      fmt::format("{}: the trigger '{}'{} did not come within {} s; the capture has been stopped",
+                  device_.description(), name_of(settings_.trigger), level, seconds));
+}
+
+std::vector<std::uint16_t> CaptureReader::read_window(std::size_t registers, const Tell& tell) {
+  std::vector<std::uint16_t> all;
+  all.reserve(registers);
+  while (all.size() < registers) {
+    const std::size_t count = std::min<std::size_t>(registers - all.size(), link::Link::read_count_max);
+    const auto some = device_.link().read_input(
+        static_cast<std::uint16_t>(firmware::capture_window + all.size()), static_cast<std::uint16_t>(count));
+    all.insert(all.end(), some.begin(), some.end());
+    tell_if_asked(tell, {Phase::reading, static_cast<std::uint32_t>(all.size()),
+                         static_cast<std::uint32_t>(registers)});
+  }
+  return all;
+}
+
+Captured CaptureReader::read(const Tell& tell) {
+  const Status before = status();
+  if (before.state != CaptureState::complete)
+    throw DeviceError(fmt::format("{}: there is no complete capture to read, but one that is {}",
+                                  device_.description(),
+                                  firmware::names::capture_state[static_cast<std::size_t>(before.state) %
+                                                                 std::size(firmware::names::capture_state)]
+                                      .name));
+  const auto taken_away = [this] {
+    return DeviceError(
+        fmt::format("{}: another program has taken the device's capture; try again", device_.description()));
+  };
+  if (before.channels != channels_.size() || before.taken > samples_of(settings_)) throw taken_away();
+  std::vector<std::uint16_t> registers;
+  try {
+    registers = read_window(std::size_t{2} * before.taken * before.channels, tell);
+  } catch (const link::RefusedError&) {
+    throw taken_away();
+  }
+  if (status() != before) throw taken_away();
+
+  Captured captured;
+  captured.first_tick = before.first_tick;
+  captured.trigger_sample = before.trigger_sample;
+  captured.interval = settings_.interval;
+  captured.tick_rate = firmware::tick_rate_hz;
+  captured.count_length = count_length_;
+  for (const CaptureChannel channel : channels_)
+    captured.columns.push_back({std::string(text_of(channel).name), std::string(text_of(channel).unit), {}});
+  for (std::size_t i = 0; i < registers.size(); i += 2) {
+    const std::size_t c = i / 2 % channels_.size();
+    const std::uint32_t word = (std::uint32_t{registers[i]} << 16) | registers[i + 1];
+    captured.columns[c].values.push_back(firmware::capture_value(channels_[c], word, count_length_));
+  }
+  return captured;
+}
+
+}  // namespace kmax::device

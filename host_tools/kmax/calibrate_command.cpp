@@ -1,0 +1,201 @@
+// kmax calibrate.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iostream>
+#include <string>
+
+#include "host_tools/calibration/procedure.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+
+namespace kmax::cli {
+
+namespace {
+using calibration::CalibrationReport;
+using calibration::CalibrationSettings;
+using calibration::Diagnosis;
+using calibration::IdentifiedValue;
+using calibration::StepReport;
+
+struct CalibrateOptions {
+  CalibrationSettings settings;
+  std::vector<std::string> sets = {"electrical", "encoder", "mechanical"};
+  double current = 0.0;
+  bool no_save = false;
+  bool hand = false;
+};
+
+/// Asks on the messages' stream and waits for the Enter key.
+class TerminalPrompter final : public calibration::Prompter {
+ public:
+  /// `tell` is called while nobody answers and may throw to give up.
+  TerminalPrompter(Context& context, std::function<void()> tell)
+      : context_(context), tell_(std::move(tell)) {}
+  void ask(const std::string& what_to_do) override {
+    context_.note(fmt::format("{}, then press Enter", what_to_do));
+    std::string line;
+    // A read that waits would keep Ctrl-C from being seen.
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    while (std::cin.rdbuf()->in_avail() <= 0) {
+      if (const int ready = poll(&input, 1, 100); ready > 0) break;
+      tell_();
+    }
+    if (!std::getline(std::cin, line))
+      throw calibration::CalibrationInterrupted("nobody answered: --hand needs somebody at the terminal");
+  }
+
+ private:
+  Context& context_;
+  std::function<void()> tell_;
+};
+
+void choose_sets(CalibrationSettings& settings, const std::vector<std::string>& names) {
+  settings.sets.fill(false);
+  for (const std::string& name : names) {
+    for (std::size_t i = 0; i < settings.sets.size(); ++i)
+      settings.sets[i] = settings.sets[i] || name == "all" || name == calibration::step_set_names[i];
+  }
+}
+
+Json diagnosis_json(const Diagnosis& diagnosis) {
+  return {{"cause", diagnosis.cause}, {"message", diagnosis.words}, {"advice", diagnosis.advice}};
+}
+
+Json step_json(const StepReport& step) {
+  Json values = Json::array(), remarks = Json::array();
+  for (const IdentifiedValue& value : step.values)
+    values.push_back({{"name", value.name},
+                      {"value", value.value},
+                      {"spread", value.spread},
+                      {"unit", value.unit},
+                      {"previous", value.previous ? Json(*value.previous) : Json(nullptr)}});
+  for (const Diagnosis& remark : step.remarks) remarks.push_back(diagnosis_json(remark));
+  return {
+      {"name", step.name},       {"pass", step.pass},
+      {"skipped", step.skipped}, {"values", values},
+      {"remarks", remarks},      {"failure", step.failure ? diagnosis_json(*step.failure) : Json(nullptr)}};
+}
+
+void print_step(std::ostream& out, const StepReport& step) {
+  fmt::print(out, "{}: {}\n", step.name,
+             step.pass      ? "done"
+             : step.skipped ? "left out, a step before it has failed"
+                            : "FAILED");
+  for (const IdentifiedValue& value : step.values)
+    fmt::print(out, "  {:<32} {:>12.5g} +- {:<10.2g} {:<6} {}\n", value.name, value.value, value.spread,
+               value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : "");
+  for (const Diagnosis& remark : step.remarks)
+    fmt::print(out, "  {}: {}; {}\n", remark.cause, remark.words, remark.advice);
+  if (step.failure)
+    fmt::print(out, "  {}: {}\n  {}\n", step.failure->cause, step.failure->words, step.failure->advice);
+}
+
+void print_report(Context& context, const CalibrateOptions& options, const CalibrationReport& report) {
+  for (const StepReport& step : report.steps) print_step(context.out, step);
+  if (report.stored) {
+    fmt::print(context.out, "saved\n");
+  } else if (report.kept) {
+    fmt::print(context.out, "kept until the next restart; 'kmax save' keeps it for good\n");
+  } else if (options.settings.dry_run && report.pass()) {
+    fmt::print(context.out, "dry run: all parameters are as before\n");
+  } else {
+    fmt::print(context.out, "nothing was kept: all parameters are as before\n");
+  }
+}
+
+int run_calibrate(Context& context, const CalibrateOptions& options) {
+  const Interruption interruption;
+  CalibrationSettings settings = options.settings;
+  settings.axis = context.axis();
+  settings.save = !options.no_save;
+  if (options.current > 0.0) settings.current = options.current;
+  choose_sets(settings, options.sets);
+  device::Device device = context.connect();
+  const auto check_interruption = [&] {
+    if (interruption.requested()) throw calibration::CalibrationInterrupted("interrupted");
+  };
+  TerminalPrompter prompter(context, check_interruption);
+  CalibrationReport report;
+  {
+    Progress progress(context.messages());
+    const auto tell = [&](const std::string& text) {
+      check_interruption();
+      if (!text.empty()) progress.show(text);
+    };
+    report = calibration::calibrate(
+        device, settings, options.hand ? &prompter : nullptr, tell,
+        [&](std::string_view step) { context.note(fmt::format("calibrating: {}", step)); });
+  }
+  if (context.json) {
+    Json steps = Json::array();
+    for (const StepReport& step : report.steps) steps.push_back(step_json(step));
+    context.print({{"steps", steps},
+                   {"pass", report.pass()},
+                   {"dry_run", settings.dry_run},
+                   {"kept", report.kept},
+                   {"stored", report.stored}});
+  } else {
+    print_report(context, options, report);
+  }
+  return report.pass() ? done : verdict_is_no;
+}
+/// Ranges let a NaN pass.
+const CLI::Validator finite(
+    [](const std::string& text) {
+      double number = 0.0;
+      const bool good = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+      return good ? std::string() : fmt::format("'{}' is not a number", text);
+    },
+    "NUMBER");
+}  // namespace
+
+void add_calibrate_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"calibrate",
+       "Identifies motor, encoder and handle of an axis, names what is wrong with them, and saves them.",
+       "  kmax calibrate                                  everything that control needs\n"
+       "  kmax calibrate --steps electrical --dry-run     look at the motor, change nothing\n"
+       "  kmax calibrate --steps all --travel 0.03        cogging, friction and gravity as well\n"
+       "  kmax calibrate --hand                           also tells swapped phases from a reversed "
+       "encoder\n\n"
+       "Nobody may hold the handle, which trembles and moves by up to --travel to either side. Before: "
+       "motor.kind,\n"
+       "encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be right.\n"
+       "The parameters change only if every step passes; the axis is disarmed at the end and on Ctrl-C.\n"
+       "Exit code 3: a step failed; its cause has a name that docs/calibration.md explains."});
+  auto options = std::make_shared<CalibrateOptions>();
+  CalibrationSettings& settings = options->settings;
+  command->add_option("--steps", options->sets, "Which steps")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"electrical", "encoder", "mechanical", "compensation", "all"}))
+      ->capture_default_str();
+  command->add_option("--travel", settings.travel, "How far the handle may move to either side, m")
+      ->check(finite & CLI::Range(0.001, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--current", options->current,
+                   "Motor current to measure with, A; half of current.limit without it")
+      ->check(finite & CLI::Range(0.01, 120.0));
+  command->add_flag("--keep-pole-pairs", settings.keep_pole_pairs,
+                    "Fail if motor.pole_pairs is not what is measured, rather than correct it");
+  command->add_flag("--hand", options->hand,
+                    "Ask for a move of the handle by hand, which shows where positive is");
+  command->add_flag("--dry-run", settings.dry_run, "Measure, and put every parameter back");
+  command->add_flag("--no-save", options->no_save, "Keep the result until the next restart only");
+  command->callback([&context, options] {
+    context.action = [&context, options] { return run_calibrate(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,283 @@
+// kmax capture.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+
+namespace kmax::cli {
+
+using device::CaptureColumn;
+using device::Captured;
+using device::CaptureProgress;
+using device::CaptureSettings;
+using firmware::CaptureTrigger;
+
+namespace {
+struct CaptureOptions {
+  CaptureSettings settings{.channels = {"position", "velocity", "force", "current"}};
+  std::optional<double> level;
+  double timeout = 30;
+  std::string file;
+  bool arm = false;
+};
+
+class Interrupted : public std::runtime_error {
+ public:
+  explicit Interrupted(const std::string& what_became) : std::runtime_error("interrupted; " + what_became) {}
+};
+
+std::string trigger_name(CaptureTrigger trigger) {
+  return std::string(firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name);
+}
+
+/// "force_n", "velocity_m_per_s", "count": a name that says its unit.
+std::string heading_of(const CaptureColumn& column) {
+  static const std::map<std::string, std::string> endings = {
+      {"m", "_m"}, {"m/s", "_m_per_s"}, {"N", "_n"}, {"A", "_a"}, {"V", "_v"}, {"rad", "_rad"}};
+  if (column.name.starts_with("duty")) return column.name + "_ratio";
+  const auto ending = endings.find(column.unit);
+  return ending == endings.end() ? column.name : column.name + ending->second;
+}
+
+/// A float32 with no more digits than it has.
+std::string value_text(double value) {
+  const auto narrow = static_cast<float>(value);
+  return static_cast<double>(narrow) == value ? fmt::format("{}", narrow) : fmt::format("{}", value);
+}
+
+void write_csv(std::ostream& out, const Captured& captured) {
+  std::string line = "time_s,tick";
+  for (const CaptureColumn& column : captured.columns) line += "," + heading_of(column);
+  out << line << '\n';
+  for (std::size_t s = 0; s < captured.samples(); ++s) {
+    line = fmt::format("{},{}", captured.time(s), captured.tick(s));
+    for (const CaptureColumn& column : captured.columns) line += "," + value_text(column.values[s]);
+    out << line << '\n';
+  }
+}
+
+std::runtime_error cannot_write(const std::string& path) {
+  return std::runtime_error(
+      fmt::format("{}: cannot be written; does the folder exist, and may you write to it?", path));
+}
+
+/// Before anybody waits for a trigger. Leaves what is there.
+void check_writable(const std::string& path) {
+  const bool was_there = std::filesystem::exists(path);
+  if (!std::ofstream(path, std::ios::app)) throw cannot_write(path);
+  if (!was_there) std::filesystem::remove(path);
+}
+
+Json column_json(const CaptureColumn& column, bool with_values) {
+  double low = 0, high = 0, sum = 0;
+  if (!column.values.empty()) {
+    const auto [least, most] = std::minmax_element(column.values.begin(), column.values.end());
+    low = *least;
+    high = *most;
+    for (const double value : column.values) sum += value;
+    sum /= static_cast<double>(column.values.size());
+  }
+  Json json = {{"name", column.name}, {"unit", column.unit}, {"heading", heading_of(column)},
+               {"minimum", low},      {"maximum", high},     {"mean", sum}};
+  if (with_values) json["values"] = column.values;
+  return json;
+}
+
+Json capture_json(const Captured& captured, const CaptureOptions& options) {
+  Json columns = Json::array();
+  for (const CaptureColumn& column : captured.columns)
+    columns.push_back(column_json(column, options.file.empty()));
+  return {{"axis", options.settings.axis},
+          {"trigger", trigger_name(options.settings.trigger)},
+          {"samples", captured.samples()},
+          {"trigger_sample", captured.trigger_sample},
+          {"first_tick", captured.first_tick},
+          {"interval_ticks", captured.interval},
+          {"tick_rate_hz", captured.tick_rate},
+          {"channels", columns},
+          {"file", options.file.empty() ? Json(nullptr) : Json(options.file)}};
+}
+
+std::string progress_text(const CaptureProgress& progress, CaptureTrigger trigger) {
+  switch (progress.phase) {
+    case CaptureProgress::Phase::waiting:
+      return fmt::format("waiting for the trigger '{}'", trigger_name(trigger));
+    case CaptureProgress::Phase::running:
+      return fmt::format("{} of {} samples", progress.done, progress.all);
+    case CaptureProgress::Phase::reading:
+      break;
+  }
+  return fmt::format("reading, {} %", 100 * progress.done / progress.all);
+}
+
+/// The axis makes force while this exists.
+class Armed {
+ public:
+  Armed(Context& context, device::Device& device, std::size_t axis)
+      : context_(context), drive_(device, axis), link_timeout_(device.read_number("link.timeout")) {
+    drive_.arm();
+  }
+  ~Armed() {
+    try {
+      const device::DriveStatus status = drive_.status();
+      if (status.faulty()) context_.note(fmt::format("axis {}: {}", drive_.axis(), status.fault_words()));
+      drive_.disarm();
+    } catch (const std::exception& error) {
+      context_.note(fmt::format("the axis could not be disarmed: {}; {}", error.what(), what_then()));
+    }
+  }
+  Armed(const Armed&) = delete;
+  Armed& operator=(const Armed&) = delete;
+
+ private:
+  std::string what_then() const {
+    if (link_timeout_ > 0.0)
+      return fmt::format("link.timeout removes its force after {:g} s without a message", link_timeout_);
+    return "link.timeout is 0: its force MAY STILL BE ON, cut its power";
+  }
+
+  Context& context_;
+  device::Drive drive_;
+  double link_timeout_;  // s
+};
+
+/// What has become of the capture in the device, in words.
+std::string end_early(device::CaptureReader& reader, CaptureProgress::Phase phase) {
+  if (phase == CaptureProgress::Phase::reading) return "the capture is complete, but was not read to its end";
+  try {
+    reader.stop();
+    return "the capture has been stopped";
+  } catch (const std::exception& error) {
+    return fmt::format("the capture could not be stopped ({}): the device may still wait for its trigger",
+                       error.what());
+  }
+}
+
+Captured capture(Context& context, device::Device& device, const CaptureOptions& options) {
+  const Interruption interruption;
+  device::CaptureReader reader(device);
+  Progress progress(context.messages());
+  const auto tell = [&](const CaptureProgress& now) {
+    if (interruption.requested()) throw Interrupted(end_early(reader, now.phase));
+    progress.show(progress_text(now, options.settings.trigger));
+  };
+  reader.arm(options.settings);
+  {
+    std::optional<Armed> armed;
+    if (options.arm) armed.emplace(context, device, options.settings.axis);
+    reader.wait(std::chrono::microseconds(static_cast<std::int64_t>(options.timeout * 1e6)), tell);
+  }
+  return reader.read(tell);
+}
+
+CaptureOptions checked(const CaptureOptions& given, const Context& context) {
+  CaptureOptions options = given;
+  options.settings.axis = context.axis();
+  // CLI's ranges let a NaN pass.
+  if (!std::isfinite(options.timeout))
+    throw UsageError(fmt::format("--timeout: {} is not a number of seconds", options.timeout));
+  const CaptureTrigger trigger = options.settings.trigger;
+  const bool takes_level = trigger == CaptureTrigger::force || trigger == CaptureTrigger::velocity;
+  if (takes_level && !options.level)
+    throw UsageError(fmt::format("--trigger {} needs --level", trigger_name(trigger)));
+  if (!takes_level && options.level)
+    throw UsageError(fmt::format("--level belongs to the triggers force and velocity, not to '{}'",
+                                 trigger_name(trigger)));
+  if (options.level) options.settings.level = *options.level;
+  return options;
+}
+
+int run_capture(Context& context, const CaptureOptions& given) {
+  const CaptureOptions options = checked(given, context);
+  if (!options.file.empty()) check_writable(options.file);
+  device::Device device = context.connect();
+  const Captured captured = capture(context, device, options);
+  if (!options.file.empty()) {
+    std::ofstream file(options.file);
+    write_csv(file, captured);
+    file.close();
+    if (!file) throw cannot_write(options.file);
+  }
+  if (context.json) {
+    context.print(capture_json(captured, options));
+    return done;
+  }
+  const std::string summary =
+      fmt::format("{} samples of axis {}, {:g} ms apart, {} of them before the trigger '{}'",
+                  captured.samples(), options.settings.axis, 1e3 * captured.interval / captured.tick_rate,
+                  captured.trigger_sample, trigger_name(options.settings.trigger));
+  if (options.file.empty()) {
+    write_csv(context.out, captured);
+    context.note(summary);
+  } else {
+    fmt::print(context.out, "{}: {}\n", options.file, summary);
+  }
+  return done;
+}
+}  // namespace
+
+void add_capture_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"capture", "Records up to four channels of an axis at the full tick rate around an event.",
+       "  kmax capture --channels position,force --trigger contact --pre-trigger 1000 --out contact.csv\n"
+       "  kmax capture --channels current,current_reference,voltage --trigger excitation\n"
+       "  kmax capture --trigger force --level 2 --arm --json\n\n"
+       "The device holds 12288 values: 3072 samples of four channels last 0.15 s at 20 kHz, and an interval "
+       "of n\n"
+       "ticks makes it n times as long. Without --out the table goes to standard output, with --json it is "
+       "part of\n"
+       "the document. Times are the device's own and zero at the trigger. Ctrl-C stops the capture."});
+  auto options = std::make_shared<CaptureOptions>();
+  CaptureSettings& settings = options->settings;
+  command
+      ->add_option("--channels", settings.channels,
+                   fmt::format("One to four of {}", fmt::join(device::capture_channel_names(), ", ")))
+      ->delimiter(',')
+      ->type_name("NAME,...")
+      ->capture_default_str();
+  std::map<std::string, CaptureTrigger> triggers;
+  for (const auto& trigger : firmware::names::capture_trigger)
+    triggers.emplace(trigger.name, static_cast<CaptureTrigger>(trigger.value));
+  command
+      ->add_option(
+          "--trigger", settings.trigger,
+          "What starts it: now, contact with the wall, |force| or |velocity| above --level, a fault of the "
+          "axis, or the start of an excitation; default: now")
+      ->transform(CLI::CheckedTransformer(triggers))
+      ->type_name("now|contact|force|velocity|fault|excitation")
+      ->option_text("TRIGGER");
+  command->add_option("--level", options->level, "Level of the triggers force (N) and velocity (m/s)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--pre-trigger", settings.pre_trigger, "Samples from before the trigger")
+      ->capture_default_str();
+  command->add_option("--samples", settings.samples, "Samples in all; 0: as many as fit")
+      ->capture_default_str();
+  command->add_option("--interval", settings.interval, "Ticks of 50 us from one sample to the next")
+      ->capture_default_str();
+  command->add_option("--timeout", options->timeout, "How long to wait for the trigger, s")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--out", options->file, "CSV file to write")->type_name("FILE");
+  command->add_flag("--arm", options->arm, "Let the axis make force from the capture's start to its end");
+  command->callback([&context, options] {
+    context.action = [&context, options] { return run_capture(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,148 @@
+// kmax selftest.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+#include "host_tools/selftest/selftest.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct SelfTestOptions {
+  bool hand = false;
+  double patience = 20.0;
+  int exchanges = 50;
+};
+
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
+Json check_json(const selftest::CheckResult& check) {
+  Json values = Json::array();
+  for (const selftest::MeasuredValue& value : check.values)
+    values.push_back({{"name", value.name},
+                      {"value", std::isfinite(value.value) ? Json(value.value) : Json(nullptr)},
+                      {"unit", value.unit}});
+  return {{"name", check.name},
+          {"verdict", selftest::name_of(check.verdict)},
+          {"message", check.message},
+          {"values", values}};
+}
+
+Json fault_json(const std::optional<selftest::FaultAtStart>& before) {
+  if (!before) return nullptr;
+  return {{"name", before->fault == firmware::Fault::none
+                       ? Json(nullptr)
+                       : Json(std::string(firmware::text_of(before->fault).name))},
+          {"message", before->words},
+          {"cleared", before->cleared}};
+}
+
+void print_json(Context& context, const selftest::Report& report) {
+  Json checks = Json::array();
+  for (const selftest::CheckResult& check : report.checks) checks.push_back(check_json(check));
+  const selftest::CheckResult* failure = report.first_failure();
+  context.print({{"pass", report.pass()},
+                 {"fault_at_start", fault_json(report.fault_at_start)},
+                 {"checks", checks},
+                 {"faulty_part", failure == nullptr ? Json(nullptr) : Json(failure->part)},
+                 {"largest_displacement_m", report.largest_displacement},
+                 {"conclusion", selftest::conclusion(report)}});
+}
+
+/// `text` in lines of at most `width`, the further ones indented.
+std::string wrapped(const std::string& text, std::size_t width, std::size_t indent) {
+  std::string out, line;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    std::size_t end = text.find(' ', begin);
+    if (end == std::string::npos) end = text.size();
+    const std::string word = text.substr(begin, end - begin);
+    if (!line.empty() && line.size() + 1 + word.size() > width) {
+      out += line + "\n" + std::string(indent, ' ');
+      line.clear();
+    }
+    line += (line.empty() ? "" : " ") + word;
+    begin = end + 1;
+  }
+  return out + line;
+}
+
+void print_table(Context& context, const selftest::Report& report) {
+  constexpr std::size_t name_width = 23, verdict_width = 11, width = 108;
+  constexpr std::size_t indent = name_width + verdict_width;
+  if (report.fault_at_start)
+    fmt::print(context.out, "{:<{}}{}\n", "fault before the test", indent,
+               wrapped(fmt::format("{} ({})", report.fault_at_start->words,
+                                   report.fault_at_start->cleared ? "cleared" : "its cause remains"),
+                       width - indent, indent));
+  for (const selftest::CheckResult& check : report.checks)
+    fmt::print(context.out, "{:<{}}{:<{}}{}\n", check.name, name_width, selftest::name_of(check.verdict),
+               verdict_width, wrapped(check.message, width - indent, indent));
+  fmt::print(context.out, "The handle was moved by {:.2f} mm at most, by its encoder.\n{}\n",
+             report.largest_displacement * 1e3, selftest::conclusion(report));
+}
+
+int run_selftest_command(Context& context, const SelfTestOptions& options) {
+  // CLI's ranges let a NaN pass.
+  if (!std::isfinite(options.patience))
+    throw UsageError(fmt::format("--patience: {} is not a number of seconds", options.patience));
+  const Interruption interruption;
+  device::Device device = context.connect();
+  selftest::SelfTestSettings settings;
+  settings.axis = context.axis();
+  settings.link_exchanges = options.exchanges;
+  if (options.hand) {
+    settings.hand.emplace();
+    settings.hand->patience = options.patience;
+    settings.say = [&](const std::string& text) { context.note(text); };
+  }
+  selftest::Report report;
+  {
+    Progress progress(context.messages());
+    report = selftest::run_selftest(device, settings, [&](const std::string& text) {
+      if (interruption.requested()) throw Interrupted();
+      progress.show(text);
+    });
+  }
+  if (context.json) {
+    print_json(context, report);
+  } else {
+    print_table(context, report);
+  }
+  return report.pass() ? done : verdict_is_no;
+}
+}  // namespace
+
+void add_selftest_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"selftest", "Finds the faulty part of an axis: supply, gate driver, phases, sensors, encoder, lines.",
+       "  kmax selftest\n  kmax selftest --axis 1 --json\n  kmax selftest --hand\n\n"
+       "Gives small voltages that move the handle by well under 1 mm; keep it free. The axis is disarmed\n"
+       "afterwards and every parameter is as it was; a fault that it had before is shown and cleared.\n"
+       "Exit code 3: a check failed."});
+  auto options = std::make_shared<SelfTestOptions>();
+  command->add_flag("--hand", options->hand,
+                    "Also asks you to move the handle and to press the emergency stop");
+  command->add_option("--patience", options->patience, "How long --hand waits for each, s")
+      ->check(CLI::Range(1.0, 600.0))
+      ->capture_default_str();
+  command->add_option("--exchanges", options->exchanges, "Messages exchanged to test the link")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  command->callback([&context, options] {
+    context.action = [&context, options] { return run_selftest_command(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+
+#include "host_tools/selftest/bench.hpp"
+#include "host_tools/selftest/evidence.hpp"
+#include "host_tools/selftest/hand_checks.hpp"
+
+namespace kmax::selftest {
+
+struct SelfTestSettings {
+  std::size_t axis = 0;
+  int link_exchanges = 50;
+  std::optional<HandSettings> hand{};  ///< the user takes part
+  Bench::Tell say{};                   ///< how the user is asked; without it, as everything else is told
+};
+
+/// The test has ended before its end: why, and what has really become of the axis and its parameters.
+class SelfTestEnded : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Finds the faulty part of an axis without moving the handle by more than a millimetre.
+///
+///   1  link, supply, temperature, currents and counts with the bridge off
+///   2  arming with zero volts: what the device itself refuses, and why
+///   3  a ladder of single short periods of voltage, each at most twice the one before, from a tenth of what
+///      the claimed resistance asks for (0.05 V if the motor is not calibrated), until one sensor sees half
+///      the test current, 40 % of current.limit; then one along each phase at the last voltage: the circuit.
+///      They move a free handle without friction by at most 0.03 mm each
+///   4  if the circuit is healthy: a long even swing (80 ms) at the test current, a synchronous motor in two
+///      directions, planned to move a free handle by 0.25 mm at most; once more with twice the current if
+///      nothing has moved
+///   5  a pulse with the supply watched
+///
+/// The bounds go by the claimed mass and torque constant, or by the mobility that the pulses before have
+/// shown, whichever is larger (pulse_plan.hpp); and excitation.travel trips at 0.8 mm from the start.
+///
+/// It ends early where a result explains why going on would say nothing. A handle that something else has
+/// moved by more than a millimetre, or past excitation.travel, is a failed check.
+///
+/// Leaves the axis disarmed and every parameter as it was; a fault that was there before is cleared, if it
+/// can be, and is in the report. Errors: DeviceError if an axis is armed, and DeviceError or link::LinkError
+/// if not even that can be read; nothing has been changed then. SelfTestEnded for everything that comes
+/// later: a lost link, an exception from `tell`, parameters that could not be put back. What `tell` throws
+/// that is no std::exception passes through, after the attempt to leave the device in order.
+Report run_selftest(device::Device& device, const SelfTestSettings& settings, const Bench::Tell& tell);
+
+/// Steps 1 to 5, on a bench that stays usable.
+Evidence gather_evidence(Bench& bench, const SelfTestSettings& settings);
+
+}  // namespace kmax::selftest

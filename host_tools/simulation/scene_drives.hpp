@@ -1,0 +1,80 @@
+#pragma once
+// The motors, handles, persons and the supply of a scene behind the power stage of a board with two axes:
+// what the native board and the virtual board have in common.
+//
+// Time passes in advance() only, under the legs set last. An axis that the scene does not have, or has
+// without a motor, is an open connector.
+//
+// A person begins the approach whenever the axis begins to be driven, as one would who was told "now". A
+// handle that nobody holds stays at its start until its axis is driven for the first time, and is let go
+// then.
+//
+// Defects may be planted and mended at any time; finer ones (a share of slip, edges lost in the cable) are
+// set on the parts themselves: drive(axis).encoder_coupling(), supply(), temperature(axis).
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "host_tools/simulation/defect.hpp"
+#include "host_tools/simulation/scene.hpp"
+#include "host_tools/simulation/temperature_sensor.hpp"
+
+namespace kmax::simulation {
+
+class SceneDrives {
+ public:
+  static constexpr std::size_t most_axes = 2;
+
+  // Throws what the parts of the scene throw; std::invalid_argument for more than two axes, or a second
+  // AS5047P: a board has one chip select for it.
+  explicit SceneDrives(const Scene& scene);
+
+  bool has(std::size_t axis) const { return axis < axes_.size() && axes_[axis].drive.has_value(); }
+  bool any() const { return has(0) || has(1); }
+  // Throw std::out_of_range for an axis without a motor.
+  MotorDrive& drive(std::size_t axis);
+  const MotorDrive& drive(std::size_t axis) const;
+  Supply& supply() { return supply_; }
+  const Supply& supply() const { return supply_; }
+  TemperatureSensor& temperature(std::size_t axis) { return axes_.at(axis).temperature; }
+  const TemperatureSensor& temperature(std::size_t axis) const { return axes_.at(axis).temperature; }
+
+  // The bridge of an axis, from now on. An axis without a motor takes it without effect.
+  void set_bridge(std::size_t axis, const InverterCommand& command);
+  const InverterCommand& bridge(std::size_t axis) const { return axes_.at(axis).command; }
+
+  // s, above 0; in steps of at most 10 ms.
+  void advance(double duration);
+
+  EncoderKind encoder_kind(std::size_t axis) const { return axes_.at(axis).encoder_kind; }
+  // The AS5047P of an axis: what its angle would be without wrapping at the turn.
+  std::int64_t serial_angle(std::size_t axis) const;
+
+  // Throws std::out_of_range for an axis without a motor. Planting what is there already changes nothing.
+  void plant(std::size_t axis, Defect defect) { set(axis, defect, true); }
+  void mend(std::size_t axis, Defect defect) { set(axis, defect, false); }
+  bool planted(std::size_t axis, Defect defect) const {
+    return axes_.at(axis).defects[static_cast<std::size_t>(defect)];
+  }
+
+ private:
+  struct Axis {
+    std::optional<MotorDrive> drive;
+    InverterCommand command;
+    EncoderKind encoder_kind = EncoderKind::quadrature;
+    bool encoder_reversed = false;  // as it is mounted
+    TemperatureSensor temperature;
+    std::array<bool, defect_names.size()> defects{};
+    bool let_go = false;
+  };
+
+  void set(std::size_t axis, Defect defect, bool present);
+
+  std::array<Axis, most_axes> axes_;
+  Supply supply_;
+  double source_voltage_;  // V, without defect
+};
+
+}  // namespace kmax::simulation

@@ -1,0 +1,111 @@
+#include "board/odrive_v3/serial_encoder.hpp"
+
+#include <gtest/gtest.h>
+
+namespace kmax::board::odrive_v3 {
+namespace {
+
+/// An AS5047P on a bus that the main loop may take.
+struct Bus {
+  bool claim() {
+    if (taken) return false;
+    return taken = true;
+  }
+  void release() { taken = false; }
+  bool start(std::uint16_t command) {
+    EXPECT_TRUE(selected);
+    reply = pending;
+    pending = drivers::as5047p::with_parity(command == 0xFFFF ? static_cast<std::uint16_t>(position & 0x3FFF)
+                                                              : std::uint16_t{0});
+    return true;
+  }
+  std::optional<std::uint16_t> finish() { return reply; }
+
+  bool taken = false, selected = false;
+  std::uint16_t reply = 0, pending = 0;
+  int position = 0;
+};
+struct Select {
+  void write(bool level) { bus->selected = !level; }
+  Bus* bus;
+};
+
+struct Board {
+  drivers::As5047pSample tick(int position) {
+    bus.position = position;
+    encoder.ISR_begin();
+    return encoder.ISR_take();
+  }
+  drivers::As5047pSample ticks(int count, int position) {
+    drivers::As5047pSample sample;
+    for (int i = 0; i < count; ++i) sample = tick(position);
+    return sample;
+  }
+  /// More than a turn from where it began.
+  void start_at_twenty_thousand() {
+    for (int position = 16'000; position <= 20'000; position += 50) tick(position);
+    ASSERT_EQ(ticks(2, 20'000).count, 20'000U);
+  }
+  Bus bus;
+  SerialEncoder<Bus, Select> encoder{bus, Select{&bus}};
+};
+
+TEST(SerialEncoder, ABusThatWasTakenForMillisecondsCostsNoTurnAndNeedsNobody) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.bus.taken = true;
+  EXPECT_FALSE(board.ticks(60, 20'100).valid);
+  board.bus.taken = false;
+  const auto sample = board.ticks(10, 20'100);
+  EXPECT_TRUE(sample.valid);
+  EXPECT_EQ(sample.count, 20'100U);
+  EXPECT_EQ(sample.reference_generation, 0U);
+  EXPECT_FALSE(board.bus.taken);
+  EXPECT_FALSE(board.bus.selected);
+}
+
+TEST(SerialEncoder, ABusThatWasTakenForLongerCostsTheTurnsAndSaysSo) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.bus.taken = true;
+  board.ticks(1000, 20'000);
+  board.bus.taken = false;
+  const auto sample = board.ticks(10, 20'000);
+  EXPECT_TRUE(sample.valid);
+  EXPECT_EQ(sample.count, 3616U);
+  EXPECT_EQ(sample.reference_generation, 1U);
+}
+
+TEST(SerialEncoder, ARestartOfAnEncoderThatIsReadKeepsTheTurns) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.encoder.restart();
+  EXPECT_FALSE(board.tick(20'000).valid);
+  EXPECT_EQ(board.ticks(10, 20'000).count, 20'000U);
+}
+
+TEST(SerialEncoder, AfterATimeInWhichNobodyReadTheTurnsAreUnknown) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.encoder.restart_anew();
+  const auto sample = board.ticks(10, 20'000);
+  EXPECT_TRUE(sample.valid);
+  EXPECT_EQ(sample.count, 3616U);
+  EXPECT_EQ(sample.reference_generation, 1U);
+}
+
+// A jump is the encoder's own doing: only the main loop forgives it.
+TEST(SerialEncoder, AFaultOfTheEncoderStaysAlsoWhenTheBusWasTakenThen) {
+  Board board;
+  board.start_at_twenty_thousand();
+  EXPECT_FALSE(board.ticks(10, 25'000).valid);
+  board.bus.taken = true;
+  board.tick(25'000);
+  board.bus.taken = false;
+  EXPECT_FALSE(board.ticks(10, 25'000).valid);
+  board.encoder.restart();
+  EXPECT_TRUE(board.ticks(10, 25'000).valid);
+}
+
+}  // namespace
+}  // namespace kmax::board::odrive_v3

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host_tools/calibration/procedure.hpp"
+#include "host_tools/device/store.hpp"
+#include "host_tools/link/sim_link.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+
+namespace kmax::calibration_test {
+
+inline constexpr const char* scene_names[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b",
+                                              "drone"};
+
+/// A simulated board with one of the motor scenes, on a fast line, that can be calibrated.
+class CalibratedDevice {
+ public:
+  explicit CalibratedDevice(const std::string& scene_name, std::uint64_t seed = 0)
+      : scene_(open(scene_name, seed)),
+        link_(new link::SimLink(scene_)),
+        device_(std::unique_ptr<link::Link>(link_)) {
+    set({"modbus.baud_rate=921600"});
+    link_->wait(std::chrono::milliseconds(300));  // the power stage starts
+  }
+
+  void set(const std::vector<std::string>& texts) { device_.apply(device::parse_assignments(texts)); }
+  void plant(simulation::Defect defect) { drives().plant(0, defect); }
+  simulation::SceneDrives& drives() { return link_->simulation().device().power().drives(); }
+
+  calibration::CalibrationReport calibrate(const calibration::CalibrationSettings& settings = {},
+                                           calibration::Prompter* prompter = nullptr) {
+    return calibration::calibrate(device_, settings, prompter, [this](const std::string&) {
+      ++told;
+      if (interrupt_at != 0 && told == interrupt_at) throw calibration::CalibrationInterrupted("test");
+    });
+  }
+
+  /// All that is set, volatile or not, but commands.
+  std::vector<std::uint32_t> parameters() {
+    std::vector<device::Parameter> all;
+    for (const device::Parameter& parameter : device::all_parameters()) {
+      const std::string name(parameter.definition().name);
+      const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
+                           name == "transaction.control" || name == "store.command";
+      if (parameter.writable() && !passing) all.push_back(parameter);
+    }
+    return device_.read(all);
+  }
+  bool armed() { return device::Drive(device_, 0).status().armed(); }
+  std::uint32_t records() { return device::Store(device_).status().sequence; }
+
+  device::Device& device() { return device_; }
+  link::SimLink& link() { return *link_; }
+  const simulation::SceneAxis& axis() const { return scene_.axes[0]; }
+
+  int told = 0, interrupt_at = 0;
+
+ private:
+  static simulation::Scene open(const std::string& name, std::uint64_t seed) {
+    simulation::Scene scene = simulated_board::open_scene(name);
+    if (seed != 0) scene.seed = seed;
+    return scene;
+  }
+
+  simulation::Scene scene_;
+  link::SimLink* link_;
+  device::Device device_;
+};
+
+/// The first failure's cause, else the remarks' that say more than what every fresh device says, else "".
+inline std::string cause_of(const calibration::CalibrationReport& report) {
+  for (const calibration::StepReport& step : report.steps) {
+    if (step.failure) return step.failure->cause;
+  }
+  return "";
+}
+
+inline bool remarked(const calibration::CalibrationReport& report, const std::string& cause) {
+  for (const calibration::StepReport& step : report.steps) {
+    for (const calibration::Diagnosis& remark : step.remarks) {
+      if (remark.cause == cause) return true;
+    }
+  }
+  return false;
+}
+
+inline const calibration::IdentifiedValue* value_of(const calibration::CalibrationReport& report,
+                                                    const std::string& name) {
+  for (const calibration::StepReport& step : report.steps) {
+    for (const calibration::IdentifiedValue& value : step.values) {
+      if (value.name == name) return &value;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace kmax::calibration_test

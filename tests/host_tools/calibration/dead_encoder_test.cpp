@@ -1,0 +1,62 @@
+#include "tests/host_tools/calibration/calibrated_device.hpp"
+
+namespace kmax::calibration_test {
+namespace {
+
+using calibration::CalibrationSettings;
+using simulation::Defect;
+
+/// Where the handle really was while a defect came up, which a device with a dead encoder cannot know.
+struct Course {
+  std::string cause;
+  double farthest = 0.0;  // m from the beginning
+  int told = 0;
+};
+
+Course course_of(const std::string& scene, const CalibrationSettings& settings, int planted_at) {
+  CalibratedDevice device(scene);
+  Course course;
+  const auto& handle = device.drives().drive(0).handle();
+  const double start = handle.position();
+  const auto look = [&] { course.farthest = std::max(course.farthest, std::abs(handle.position() - start)); };
+  if (planted_at == 0) device.plant(Defect::encoder_stuck);
+  const auto report = calibration::calibrate(device.device(), settings, nullptr, [&](const std::string&) {
+    look();
+    if (++course.told == planted_at) device.plant(Defect::encoder_stuck);
+  });
+  // A handle that has been thrown still moves.
+  for (int i = 0; i < 20; ++i) {
+    device.link().wait(std::chrono::milliseconds(20));
+    look();
+  }
+  course.cause = cause_of(report);
+  return course;
+}
+
+class DeadEncoder : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(scene_names));
+
+TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
+  const CalibrationSettings settings;
+  const Course course = course_of(GetParam(), settings, 0);
+  EXPECT_EQ(course.cause, "encoder_dead");
+  EXPECT_LE(course.farthest, 2.0 * settings.travel);
+}
+
+TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
+  const CalibrationSettings settings;
+  const int whole = course_of(GetParam(), settings, -1).told;
+  constexpr int points = 9;
+  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation.
+  const double farthest = 4.0 * settings.travel;
+  for (int point = 1; point < points; ++point) {
+    const int at = whole * point / points;
+    const Course course = course_of(GetParam(), settings, at);
+    // It cannot always be told from a blocked motor or a slipping encoder by then.
+    EXPECT_NE(course.cause, "") << "at " << at << " of " << whole;
+    EXPECT_LE(course.farthest, farthest) << course.cause << " at " << at << " of " << whole;
+  }
+}
+
+}  // namespace
+}  // namespace kmax::calibration_test

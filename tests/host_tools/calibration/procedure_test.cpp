@@ -1,0 +1,156 @@
+#include "host_tools/calibration/procedure.hpp"
+
+#include <numbers>
+
+#include "host_tools/device/errors.hpp"
+#include "tests/host_tools/calibration/calibrated_device.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::calibration_test {
+namespace {
+
+using calibration::CalibrationSettings;
+using calibration::StepSet;
+
+TEST(Procedure, SavesOnceWhenAllStepsPass) {
+  CalibratedDevice device("dc_coreless_a");
+  const auto report = device.calibrate();
+  ASSERT_TRUE(report.pass()) << cause_of(report);
+  EXPECT_TRUE(report.stored);
+  EXPECT_TRUE(report.kept);
+  EXPECT_EQ(device.records(), 1u);
+  EXPECT_EQ(device::Store(device.device()).status().unsaved_parameters, 0u);
+  EXPECT_EQ(device.device().read_number("motor.calibrated"), 1);
+  EXPECT_EQ(device.device().read_number("drive.mode"), 0);
+  EXPECT_EQ(device.device().read_number("excitation.kind"), 0);
+  EXPECT_NEAR(device.device().read_number("motor.resistance"), value_of(report, "motor.resistance")->value,
+              1e-5);
+  EXPECT_GT(device.device().read_number("compensation.dead_time"), 0);
+  EXPECT_FALSE(device.armed());
+}
+
+TEST(Procedure, KeepsInMemoryOnlyWhenToldNotToSave) {
+  CalibratedDevice device("dc_coreless_a");
+  CalibrationSettings settings;
+  settings.save = false;
+  const auto report = device.calibrate(settings);
+  EXPECT_TRUE(report.kept);
+  EXPECT_FALSE(report.stored);
+  EXPECT_EQ(device.records(), 0u);
+  EXPECT_EQ(device.device().read_number("motor.calibrated"), 1);
+}
+
+TEST(Procedure, ADryRunChangesNothing) {
+  for (const char* scene : {"dc_coreless_b", "gimbal_b"}) {
+    CalibratedDevice device(scene);
+    const auto before = device.parameters();
+    CalibrationSettings settings;
+    settings.dry_run = true;
+    const auto report = device.calibrate(settings);
+    EXPECT_TRUE(report.pass()) << cause_of(report);
+    EXPECT_FALSE(report.kept);
+    EXPECT_EQ(device.parameters(), before);
+    EXPECT_EQ(device.records(), 0u);
+  }
+}
+
+// Interrupted at points spread over the whole procedure, each step among them.
+TEST(Procedure, AnInterruptionAnywherePutsEverythingBackAndDisarms) {
+  for (const char* scene : {"dc_coreless_b", "gimbal_a"}) {
+    CalibratedDevice whole(scene);
+    whole.calibrate();
+    constexpr int points = 12;
+    for (int point = 0; point < points; ++point) {
+      CalibratedDevice device(scene);
+      const auto before = device.parameters();
+      device.interrupt_at = 1 + whole.told * point / points;
+      EXPECT_THROW(device.calibrate(), calibration::CalibrationInterrupted);
+      EXPECT_FALSE(device.armed());
+      EXPECT_EQ(device.parameters(), before) << scene << " at " << device.interrupt_at;
+      EXPECT_EQ(device.records(), 0u);
+    }
+  }
+}
+
+TEST(Procedure, StepsThatNeedAFailedOneAreLeftOut) {
+  CalibratedDevice device("gimbal_a");
+  device.plant(simulation::Defect::phase_b_open);
+  const auto report = device.calibrate();
+  ASSERT_EQ(report.steps.size(), 5u);
+  EXPECT_TRUE(report.steps[0].pass);
+  EXPECT_EQ(report.steps[1].name, "winding");
+  EXPECT_TRUE(report.steps[1].failure.has_value());
+  for (std::size_t i = 2; i < report.steps.size(); ++i) {
+    EXPECT_TRUE(report.steps[i].skipped) << report.steps[i].name;
+    EXPECT_FALSE(report.steps[i].failure.has_value());
+  }
+}
+
+TEST(Procedure, AChosenSetRunsByItselfWithWhatTheDeviceKnows) {
+  CalibratedDevice device("gimbal_a");
+  CalibrationSettings electrical;
+  electrical.sets = {true, false, false, false};
+  EXPECT_EQ(device.calibrate(electrical).steps.size(), 2u);
+  EXPECT_EQ(device.device().read_number("motor.calibrated"), 0);
+  CalibrationSettings encoder;
+  encoder.sets = {false, true, false, false};
+  const auto report = device.calibrate(encoder);
+  EXPECT_TRUE(report.pass()) << cause_of(report);
+  EXPECT_EQ(device.device().read_number("motor.pole_pairs"), 11);
+}
+
+// On both: an encoder that is mounted against the motor counts the other way, and has its sine term turned.
+TEST(Procedure, CompensationFindsTheCogging) {
+  for (const bool turned : {false, true}) {
+    CalibratedDevice device("gimbal_b");
+    if (turned) device.plant(simulation::Defect::encoder_reversed);
+    CalibrationSettings settings;
+    settings.sets.fill(true);
+    const auto report = device.calibrate(settings);
+    ASSERT_TRUE(report.pass()) << cause_of(report);
+    const auto count_reads = device.device().read_number("measured.count");
+    const double counts = device.device().read_number("encoder.counts_per_turn");
+    EXPECT_EQ(value_of(report, "compensation.cogging_periods")->value, 84);
+    const auto& motor = std::get<simulation::SynchronousMotorConfig>(*device.axis().motor);
+    const double cogging = motor.cogging_torque / device.axis().encoder.transmission;
+    // What the map says at an angle of the count, against what the motor does there: -cogging sin(periods x
+    // shaft).
+    const double shaft = device.drives().drive(0).handle().position() / device.axis().encoder.transmission;
+    const double direction = device.device().read_number("encoder.direction") *
+                             (device.axis().encoder.reversed != turned ? -1 : 1);
+    EXPECT_EQ(direction, 1) << "positions are to grow with the motor's force";
+    const double origin = shaft - 2.0 * std::numbers::pi * count_reads / counts;
+    const double sine = -cogging * std::cos(84 * origin), cosine = -cogging * std::sin(84 * origin);
+    EXPECT_NEAR(value_of(report, "compensation.cogging_cosine_1")->value, cosine, 0.2 * cogging) << turned;
+    EXPECT_NEAR(value_of(report, "compensation.cogging_sine_1")->value, sine, 0.2 * cogging) << turned;
+    EXPECT_NEAR(value_of(report, "compensation.friction")->value, device.axis().device.friction,
+                0.15 * device.axis().device.friction);
+  }
+}
+
+TEST(Procedure, ADeviceWithoutMotorHasNothingToCalibrate) {
+  auto link = std::make_unique<link::SimLink>(simulated_board::factory_scene());
+  device::Device device(std::move(link));
+  EXPECT_CONTAINS(host_tools_test::thrown_message<calibration::NothingToCalibrate>(
+                      [&] { calibration::calibrate(device, {}, nullptr, [](const std::string&) {}); }),
+                  "nothing to calibrate");
+}
+
+TEST(Procedure, AnArmedAxisIsLeftAlone) {
+  CalibratedDevice device("dc_coreless_a");
+  device.set({"wall.position=-1", "link.timeout=0"});
+  device::Drive(device.device(), 0).arm();
+  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { device.calibrate(); }), "armed");
+  EXPECT_TRUE(device.armed());
+}
+
+// The device takes its force away when the host falls silent: the procedure never does.
+TEST(Procedure, KeepsAShortLinkTimeoutAlive) {
+  CalibratedDevice device("gimbal_a");
+  device.set({"link.timeout=0.25"});
+  const auto report = device.calibrate();
+  EXPECT_TRUE(report.pass()) << cause_of(report);
+}
+
+}  // namespace
+}  // namespace kmax::calibration_test

@@ -1,0 +1,286 @@
+#include "host_tools/device/capture_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numbers>
+
+#include "firmware/haptic_configuration.hpp"
+#include "host_tools/device/errors.hpp"
+#include "tests/host_tools/capturing_link.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::device {
+namespace {
+
+using firmware::CaptureChannel;
+using firmware::CaptureTrigger;
+using host_tools_test::CapturingLink;
+using std::chrono::seconds;
+
+/// A device that can be captured and whose contact, fault or excitation comes at a tick of one's choice.
+struct Bench {
+  Bench() : link(new CapturingLink), device(std::unique_ptr<link::Link>(link)) {}
+  void set(std::uint32_t flags, std::uint32_t from_tick) {
+    link->event_at = [flags, from_tick](std::uint32_t tick) {
+      return firmware::CaptureEvent{tick >= from_tick ? flags : 0u, 0.0f, 0.0f};
+    };
+  }
+  bool stopped() const { return !link->commands.empty() && link->commands.back() == 0; }
+
+  CapturingLink* link;
+  Device device;
+};
+
+template <typename Error, typename Call>
+void expect_thrown(Call call, const std::string& part) {
+  const std::string message = host_tools_test::thrown_message<Error>(call);
+  EXPECT_CONTAINS(message, part);
+}
+
+CaptureSettings settings_of(std::vector<std::string> channels, std::uint32_t samples,
+                            CaptureTrigger trigger = CaptureTrigger::now) {
+  CaptureSettings settings;
+  settings.channels = std::move(channels);
+  settings.samples = samples;
+  settings.trigger = trigger;
+  return settings;
+}
+
+TEST(CaptureReader, GivesEachChannelInItsUnitAndEachSampleItsTick) {
+  Bench bench;
+  bench.device.link().wait(seconds(1));
+  CaptureReader reader(bench.device);
+  CaptureSettings settings =
+      settings_of({"position", "force", "electrical_angle", "count"}, 100, CaptureTrigger::contact);
+  settings.interval = 3;
+  settings.pre_trigger = 30;
+  reader.arm(settings);
+  bench.set(firmware::capture_flag::inside, bench.link->tick + 500);
+  reader.wait(seconds(1));
+  const Captured captured = reader.read();
+  ASSERT_EQ(captured.columns.size(), 4u);
+  EXPECT_EQ(captured.samples(), 100u);
+  EXPECT_EQ(captured.trigger_sample, 30u);
+  EXPECT_EQ(captured.tick_rate, 20000.0);
+  EXPECT_EQ(captured.columns[0].name, "position");
+  EXPECT_EQ(captured.columns[0].unit, "m");
+  EXPECT_EQ(captured.columns[1].unit, "N");
+  EXPECT_EQ(captured.columns[2].unit, "rad");
+  EXPECT_EQ(captured.columns[3].unit, "counts");
+  // 5 cm per radian and 8192 counts per turn.
+  const double count_length = 2 * std::numbers::pi * static_cast<double>(0.05f) / 8192;
+  EXPECT_DOUBLE_EQ(captured.count_length, count_length);
+  for (std::size_t s = 0; s < captured.samples(); ++s) {
+    const std::uint32_t tick = captured.tick(s);
+    ASSERT_EQ(tick, captured.first_tick + 3 * s);
+    ASSERT_DOUBLE_EQ(
+        captured.column("position")[s],
+        static_cast<std::int32_t>(CapturingLink::word_of(tick, CaptureChannel::position)) * count_length);
+    ASSERT_EQ(captured.column("force")[s], static_cast<double>(tick) + 0.5);
+    ASSERT_DOUBLE_EQ(
+        captured.column("electrical_angle")[s],
+        CapturingLink::word_of(tick, CaptureChannel::electrical_angle) * std::numbers::pi / 2147483648.0);
+    ASSERT_EQ(captured.column("count")[s], CapturingLink::word_of(tick, CaptureChannel::count));
+  }
+  EXPECT_EQ(captured.time(30), 0.0);
+  EXPECT_DOUBLE_EQ(captured.time(0), -30 * 3 / 20000.0);
+  EXPECT_DOUBLE_EQ(captured.time(99), 69 * 3 / 20000.0);
+  expect_thrown<ValueError>([&] { captured.column("velocity"); }, "position, force, electrical_angle, count");
+}
+
+TEST(CaptureReader, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"velocity", "current", "voltage"}, 0));
+  reader.wait(seconds(1));
+  std::uint32_t told = 0, calls = 0;
+  const Captured captured = reader.read([&](const CaptureProgress& progress) {
+    EXPECT_EQ(progress.phase, CaptureProgress::Phase::reading);
+    EXPECT_EQ(progress.all, 2 * 12288u);
+    EXPECT_GT(progress.done, told);
+    told = progress.done;
+    ++calls;
+  });
+  EXPECT_EQ(captured.samples(), 4096u);
+  EXPECT_EQ(bench.link->window_requests, (2 * 12288 + 124) / 125);
+  EXPECT_EQ(calls, (2 * 12288u + 124) / 125);
+  EXPECT_EQ(told, 2 * 12288u);
+  EXPECT_EQ(captured.column("voltage").back(), captured.tick(4095) + 0.5);
+  EXPECT_EQ(bench.link->commands, (std::vector<std::uint16_t>{1}))
+      << "a complete capture need not be stopped";
+}
+
+TEST(CaptureReader, WithoutATriggerItSaysWhichAndStopsTheCapture) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"force"}, 10, CaptureTrigger::contact));
+  const auto began = bench.link->now();
+  int waiting = 0;
+  expect_thrown<DeviceError>(
+      [&] {
+        reader.wait(seconds(3), [&](const CaptureProgress& progress) {
+          waiting += progress.phase == CaptureProgress::Phase::waiting ? 1 : 0;
+        });
+      },
+      "'contact' did not come within 3 s");
+  EXPECT_NEAR(static_cast<double>((bench.link->now() - began).count()), 3e6, 0.1e6);
+  EXPECT_GT(waiting, 50);
+  EXPECT_TRUE(bench.stopped());
+  bench.link->wait(seconds(1));
+  EXPECT_EQ(bench.link->capture.readings().state, firmware::CaptureState::idle);
+
+  CaptureSettings level = settings_of({"force"}, 10, CaptureTrigger::force);
+  level.level = 2.5;
+  reader.arm(level);
+  expect_thrown<DeviceError>([&] { reader.wait(seconds(1)); }, "'force' above 2.5 N");
+}
+
+// The patience is for the trigger: 100 samples of 0.05 s each are waited for nevertheless.
+TEST(CaptureReader, ASlowCaptureIsWaitedForOnceItHasTriggered) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  CaptureSettings settings = settings_of({"force"}, 100);
+  settings.interval = 1000;
+  reader.arm(settings);
+  std::uint32_t most = 0;
+  reader.wait(std::chrono::milliseconds(100), [&](const CaptureProgress& progress) {
+    EXPECT_EQ(progress.all, 100u);
+    most = std::max(most, progress.done);
+  });
+  EXPECT_GT(most, 90u);
+  EXPECT_EQ(reader.read().samples(), 100u);
+}
+
+TEST(CaptureReader, AnAxisWithoutTicksIsNotWaitedForForever) {
+  Bench bench;
+  bench.link->ticking = false;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"force"}, 100));
+  expect_thrown<DeviceError>([&] { reader.wait(seconds(1)); }, "did not come");
+  bench.link->ticking = true;
+  CaptureSettings slow = settings_of({"force"}, 100);
+  slow.interval = 100;
+  reader.arm(slow);
+  expect_thrown<DeviceError>(
+      [&] {
+        reader.wait(seconds(1), [&](const CaptureProgress& progress) {
+          if (progress.phase == CaptureProgress::Phase::running) bench.link->ticking = false;
+        });
+      },
+      "stands still at");
+}
+
+TEST(CaptureReader, WhatTheCallbackThrowsComesThroughAndTheCaptureEnds) {
+  Bench bench;
+  {
+    CaptureReader reader(bench.device);
+    reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
+    EXPECT_THROW(reader.wait(seconds(3), [](const CaptureProgress&) { throw std::length_error("enough"); }),
+                 std::length_error);
+  }
+  EXPECT_TRUE(bench.stopped());
+}
+
+TEST(CaptureReader, ItsEndWithoutALinkIsQuiet) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
+  bench.link->lost = true;
+}
+
+TEST(CaptureReader, StoppedItHasWhatWasTakenSinceTheTrigger) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"force"}, 0));
+  bench.link->wait(std::chrono::milliseconds(50));
+  reader.stop();
+  const Captured captured = reader.read();
+  EXPECT_GT(captured.samples(), 1000u);
+  EXPECT_LT(captured.samples(), 2000u);
+  EXPECT_EQ(captured.column("force").front(), captured.first_tick + 0.5);
+}
+
+TEST(CaptureReader, ACaptureThatIsNotCompleteCannotBeRead) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  expect_thrown<DeviceError>([&] { reader.read(); }, "idle");
+  reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
+  expect_thrown<DeviceError>([&] { reader.read(); }, "waiting");
+}
+
+TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
+  {
+    Bench bench;
+    CaptureReader reader(bench.device);
+    reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
+    expect_thrown<DeviceError>(
+        [&] { reader.wait(seconds(3), [&](const CaptureProgress&) { bench.link->capture.stop(); }); },
+        "stopped by another program");
+  }
+  for (const bool completes : {true, false}) {
+    Bench bench;
+    CaptureReader reader(bench.device);
+    reader.arm(settings_of({"force"}, 300));
+    reader.wait(seconds(1));
+    // In the middle of reading; a capture of 300 samples lasts for three requests.
+    int left = completes ? 1 : 2;
+    expect_thrown<DeviceError>(
+        [&] {
+          reader.read([&](const CaptureProgress&) {
+            if (left-- == 1) bench.link->arm();
+            if (completes) bench.link->wait(seconds(1));
+          });
+        },
+        "another program");
+  }
+  Bench bench;
+  CaptureReader reader(bench.device);
+  reader.arm(settings_of({"force"}, 10));
+  firmware::CaptureConfig wider;
+  wider.channels = {CaptureChannel::force, CaptureChannel::flags};
+  wider.samples = 10;
+  bench.link->capture.arm(wider);
+  reader.wait(seconds(1));
+  expect_thrown<DeviceError>([&] { reader.read(); }, "another program");
+}
+
+TEST(CaptureReader, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSent) {
+  Bench bench;
+  CaptureReader reader(bench.device);
+  const int before = bench.link->requests;
+  const auto refused = [&](auto change, const std::string& part) {
+    CaptureSettings settings = settings_of({"force", "count"}, 100);
+    change(settings);
+    expect_thrown<ValueError>([&] { reader.arm(settings); }, part);
+  };
+  refused([](auto& s) { s.channels = {}; }, "0 channels");
+  refused([](auto& s) { s.channels.resize(5, "force"); }, "5 channels");
+  refused([](auto& s) { s.channels = {"forse"}; }, "did you mean force");
+  refused([](auto& s) { s.channels = {"none"}; }, "no channel 'none'");
+  refused([](auto& s) { s.samples = 6145; }, "at most 6144");
+  refused([](auto& s) { s.pre_trigger = 100; }, "at most 99");
+  refused([](auto& s) { s.samples = 0, s.pre_trigger = 6144; }, "at most 6143");
+  refused([](auto& s) { s.axis = 2; }, "capture.axis");
+  refused([](auto& s) { s.interval = 0; }, "capture.interval");
+  refused([](auto& s) { s.level = -1; }, "capture.trigger_level");
+  refused([](auto& s) { s.level = std::numeric_limits<double>::quiet_NaN(); }, "capture.trigger_level");
+  EXPECT_EQ(bench.link->requests, before);
+}
+
+TEST(CaptureReader, ADeviceThatRefusesSaysWhy) {
+  Bench bench;
+  bench.link->refuses = true;
+  CaptureReader reader(bench.device);
+  expect_thrown<DeviceError>([&] { reader.arm(settings_of({"force"}, 10)); }, "could not be armed");
+}
+
+TEST(CaptureChannels, HaveUnitsAndNoneIsNotOne) {
+  EXPECT_EQ(capture_channel_names().size(), firmware::capture_channel_count - 1);
+  EXPECT_EQ(capture_channel_unit("velocity"), "m/s");
+  EXPECT_EQ(capture_channel_unit("duty_a"), "");
+  expect_thrown<ValueError>([&] { capture_channel_unit("dutty_a"); }, "duty_a");
+}
+
+}  // namespace
+}  // namespace kmax::device

@@ -1,0 +1,94 @@
+#include "host_tools/link/sim_link.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "tests/host_tools/kmax/simulated_command_line.hpp"
+
+namespace kmax::cli {
+namespace {
+
+/// The program with a device that has a motor, fresh for every call.
+class Calibrate : public SimulatedCommandLine {
+ protected:
+  int on_scene(const std::string& scene, std::vector<std::string> arguments,
+               std::optional<simulation::Defect> defect = {}) {
+    std::ostringstream out, messages;
+    Context context(out, messages, [&](const std::string&, const link::Notice&) {
+      auto link = std::make_unique<link::SimLink>(simulated_board::open_scene(scene));
+      link->wait(std::chrono::milliseconds(300));
+      if (defect) link->simulation().device().power().drives().plant(0, *defect);
+      return link;
+    });
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+};
+
+TEST_F(Calibrate, ADocumentHasEveryStepWithItsValues) {
+  ASSERT_EQ(on_scene("dc_coreless_a", {"calibrate", "--steps", "electrical", "--json"}), done) << said;
+  EXPECT_EQ(keys(), (std::vector<std::string>{"steps", "pass", "dry_run", "kept", "stored"}));
+  const Json all = document();
+  EXPECT_EQ(all["stored"], true);
+  EXPECT_EQ(all["pass"], true);
+  EXPECT_EQ(all["kept"], true);
+  EXPECT_EQ(all["dry_run"], false);
+  ASSERT_EQ(all["steps"].size(), 2u);
+  EXPECT_EQ(all["steps"][0]["name"], "current_offsets");
+  const Json& winding = all["steps"][1];
+  EXPECT_EQ(winding["name"], "winding");
+  EXPECT_EQ(winding["pass"], true);
+  EXPECT_TRUE(winding["failure"].is_null());
+  bool found = false;
+  for (const Json& value : winding["values"]) {
+    if (value["name"] != "motor.resistance") continue;
+    found = true;
+    EXPECT_NEAR(value["value"].get<double>(), 2.304, 0.07);
+    EXPECT_GT(value["spread"].get<double>(), 0.0);
+    EXPECT_EQ(value["unit"], "ohm");
+    EXPECT_EQ(value["previous"], 1);
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST_F(Calibrate, ADefectIsAVerdictWithItsName) {
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--json"}, simulation::Defect::phase_b_open), verdict_is_no)
+      << said;
+  const Json all = document();
+  EXPECT_EQ(all["stored"], false);
+  EXPECT_EQ(all["pass"], false);
+  EXPECT_EQ(all["kept"], false);
+  EXPECT_EQ(all["steps"][1]["failure"]["cause"], "phase_b_open");
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate"}, simulation::Defect::phase_b_open), verdict_is_no);
+  EXPECT_CONTAINS(output, "phase_b_open");
+  EXPECT_CONTAINS(output, "nothing was kept");
+}
+
+TEST_F(Calibrate, TheTableSaysWhatWasBefore) {
+  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--dry-run"}), done) << said;
+  EXPECT_CONTAINS(output, "motor.resistance");
+  EXPECT_CONTAINS(output, "was 1");
+  EXPECT_CONTAINS(output, "dry run");
+  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--no-save"}), done) << said;
+  EXPECT_CONTAINS(output, "kmax save");
+}
+
+TEST_F(Calibrate, WithoutAMotorThereIsNothingToDo) {
+  expect_error({"calibrate"}, failed, "nothing to calibrate");
+  expect_error({"calibrate"}, failed, "kmax serve --scene gimbal_a");
+}
+
+TEST_F(Calibrate, BadOptionsAreWrongUsage) {
+  for (const std::vector<std::string>& bad : std::vector<std::vector<std::string>>{{"--steps", "nothing"},
+                                                                                   {"--travel", "0"},
+                                                                                   {"--travel", "nan"},
+                                                                                   {"--current", "-1"},
+                                                                                   {"--current", "x"},
+                                                                                   {"extra"}}) {
+    std::vector<std::string> arguments = {"calibrate"};
+    arguments.insert(arguments.end(), bad.begin(), bad.end());
+    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << ": " << said;
+  }
+}
+
+}  // namespace
+}  // namespace kmax::cli

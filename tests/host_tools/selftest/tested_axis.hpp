@@ -1,0 +1,181 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware/modbus/crc.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/link/link.hpp"
+#include "host_tools/selftest/selftest.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+
+namespace kmax::selftest {
+
+/// A link to the simulated board that looks at the true handle in every tick.
+class WatchedLink final : public link::Link {
+ public:
+  WatchedLink(const simulation::Scene& scene, std::size_t axis) : board_(scene), axis_(axis) {
+    start_ = position();
+    // Until the power stage is ready.
+    wait(std::chrono::milliseconds(200));
+  }
+
+  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
+    return read(3, address, count);
+  }
+  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
+    return read(4, address, count);
+  }
+  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
+    std::vector<std::uint16_t> words{address, static_cast<std::uint16_t>(values.size())};
+    std::vector<std::uint8_t> request = start_of(16, words);
+    request.push_back(static_cast<std::uint8_t>(2 * values.size()));
+    for (const std::uint16_t value : values) push(request, value);
+    exchange(request, address);
+  }
+  std::chrono::microseconds now() const override {
+    return std::chrono::microseconds(board_.board().now_us());
+  }
+  void wait(std::chrono::microseconds duration) override {
+    for (auto passed = duration.count(); passed > 0; passed -= 50) tick();
+  }
+  std::string description() const override { return "sim"; }
+
+  simulated_board::SimulatedDevice& hardware() { return board_.device(); }
+  double position() { return hardware().handle(axis_).position(); }
+  double largest_displacement() const { return largest_; }
+  /// Loses every n-th message; 0: none.
+  void lose_every(int nth) { lose_every_ = nth; }
+  /// Loses every message from now on: the cable is pulled, or the program killed.
+  void cut() { cut_ = true; }
+  /// Called before every tick.
+  std::function<void()> before_tick;
+
+ private:
+  static void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
+  }
+  static std::vector<std::uint8_t> start_of(std::uint8_t function, const std::vector<std::uint16_t>& words) {
+    std::vector<std::uint8_t> request{1, function};
+    for (const std::uint16_t word : words) push(request, word);
+    return request;
+  }
+  void tick() {
+    if (before_tick) before_tick();
+    board_.board().advance(1);
+    largest_ = std::max(largest_, std::abs(position() - start_));
+  }
+  std::vector<std::uint8_t> exchange(std::vector<std::uint8_t> frame, std::uint16_t address) {
+    const std::uint8_t function = frame[1];
+    if (cut_) {
+      wait(std::chrono::milliseconds(100));
+      throw link::LinkError("no answer");
+    }
+    if (lose_every_ != 0 && ++messages_ % lose_every_ == 0) {
+      wait(std::chrono::milliseconds(100));
+      throw link::LinkError("lost");
+    }
+    const std::uint16_t crc = firmware::modbus::crc_of(frame);
+    frame.push_back(static_cast<std::uint8_t>(crc & 0xFF));
+    frame.push_back(static_cast<std::uint8_t>(crc >> 8));
+    board_.board().receive(frame);
+    for (int tries = 0; tries < 20000; ++tries) {
+      tick();
+      const std::vector<std::uint8_t> reply = board_.board().transmitted();
+      if (reply.size() <= 3) continue;
+      if (reply[1] != function) throw link::RefusedError(reply[2], function, address);
+      return reply;
+    }
+    throw link::LinkError("no answer");
+  }
+  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
+    const auto reply = exchange(start_of(function, {address, count}), address);
+    std::vector<std::uint16_t> words;
+    for (std::size_t i = 0; i < count; ++i)
+      words.push_back(static_cast<std::uint16_t>((reply.at(3 + 2 * i) << 8) | reply.at(4 + 2 * i)));
+    return words;
+  }
+
+  simulated_board::SimulatedBoard board_;
+  std::size_t axis_;
+  double start_ = 0.0, largest_ = 0.0;
+  int lose_every_ = 0, messages_ = 0;
+  bool cut_ = false;
+};
+
+/// One axis of a scene on the simulated board, with defects to plant, and the self-test run on it.
+class TestedAxis {
+ public:
+  explicit TestedAxis(const std::string& scene, bool identified = true, std::size_t tested_axis = 0)
+      : TestedAxis(opened(scene, identified), tested_axis) {}
+  TestedAxis(const simulation::Scene& scene, std::size_t tested_axis) : axis(tested_axis) {
+    auto made = std::make_unique<WatchedLink>(scene, axis);
+    link = made.get();
+    device = std::make_unique<device::Device>(std::move(made));
+  }
+
+  static simulation::Scene opened(const std::string& name, bool identified) {
+    simulation::Scene scene = simulated_board::open_scene(name);
+    scene.identified = identified;
+    // The person of some scenes would begin to move when the axis is armed.
+    for (simulation::SceneAxis& one : scene.axes) {
+      one.motion.reset();
+      one.person.reset();
+    }
+    return scene;
+  }
+
+  simulation::SceneDrives& drives() { return link->hardware().power().drives(); }
+  void plant(simulation::Defect defect) { drives().plant(axis, defect); }
+
+  std::map<std::string, std::uint32_t> settings() {
+    std::map<std::string, std::uint32_t> all;
+    for (const device::Parameter& parameter : device::all_parameters()) {
+      const auto name = parameter.name();
+      const bool command = name == "store.command" || name == "capture.command" ||
+                           name == "transaction.control" || name.ends_with("drive.controlword");
+      if (parameter.writable() && !command) all[name] = device->read(parameter);
+    }
+    return all;
+  }
+
+  Report run() {
+    SelfTestSettings settings;
+    settings.axis = axis;
+    return run_selftest(*device, settings, [](const std::string&) {});
+  }
+
+  bool disarmed() {
+    for (std::size_t any = 0; any < firmware::axis_count; ++any) {
+      if (device::Drive(*device, any).status().armed()) return false;
+    }
+    return true;
+  }
+
+  std::size_t axis;
+  WatchedLink* link = nullptr;
+  std::unique_ptr<device::Device> device;
+};
+
+inline std::string told(const Report& report) {
+  std::string text;
+  for (const CheckResult& check : report.checks)
+    text += check.name + ": " + name_of(check.verdict) + (check.part.empty() ? "" : " [" + check.part + "]") +
+            ": " + check.message + "\n";
+  return text;
+}
+
+inline std::string faulty_part(const Report& report) {
+  const CheckResult* failure = report.first_failure();
+  return failure == nullptr ? "" : failure->part;
+}
+
+}  // namespace kmax::selftest

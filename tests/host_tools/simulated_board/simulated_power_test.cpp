@@ -1,0 +1,239 @@
+#include "host_tools/simulated_board/simulated_power.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/host_tools/simulated_board/motor_bench.hpp"
+
+namespace kmax::simulated_board {
+namespace {
+
+using firmware::DriveState;
+using firmware::Fault;
+using firmware::Refusal;
+using simulation::Defect;
+
+// The whole loop of each supplied motor, told the truth: the force that the wall asks for arrives, within the
+// steps of the converter, and so fast as current.bandwidth says.
+TEST(SimulatedPower, TheForceOfTheWallArrivesThroughEveryMotor) {
+  for (const char* name : calibration_scenes) {
+    MotorBench bench(identified(name));
+    bench.drives().plant(0, Defect::motor_blocked);
+    bench.prepare_wall();
+    ASSERT_TRUE(bench.arm()) << name << ": " << firmware::words_of(bench.application().refusal(0));
+    bench.run(0.01);
+    EXPECT_NEAR(bench.current_force(), 0.0, 0.12) << name;
+    for (const double force : {2.0, 0.5, 3.0}) {
+      bench.set_wall_force(force);
+      bench.run(0.01);
+      double sum = 0.0, squares = 0.0;
+      constexpr int ticks = 4000;
+      for (int n = 0; n < ticks; ++n) {
+        bench.tick();
+        const double made = bench.current_force();
+        sum += made;
+        squares += made * made;
+      }
+      const double mean = sum / ticks;
+      EXPECT_NEAR(static_cast<double>(bench.report().haptic.force), force, 1e-3) << name;
+      EXPECT_NEAR(mean, force, 0.015) << name;
+      EXPECT_LT(squares / ticks - mean * mean, 0.05 * 0.05) << name << ": ripple";
+    }
+    EXPECT_TRUE(bench.armed()) << name;
+  }
+}
+
+TEST(SimulatedPower, AStepOfTheForceRisesWithTheBandwidth) {
+  for (const char* name : calibration_scenes) {
+    MotorBench bench(identified(name));
+    bench.drives().plant(0, Defect::motor_blocked);
+    bench.set<"current.bandwidth">(2000.0);
+    // Without it the drone motor's current crosses the dead time's band slowly: 17 ticks.
+    bench.set<"compensation.dead_time">(125e-9);
+    bench.prepare_wall();
+    ASSERT_TRUE(bench.arm()) << name;
+    bench.run(0.01);
+    const double begin = bench.current_force();
+    bench.set_wall_force(3.0);
+    bench.tick();  // the tick that still knows the old settings
+    int ticks = 0;
+    while (bench.current_force() < begin + 0.632 * (3.0 - begin) && ticks < 1000) bench.tick(), ++ticks;
+    // 1 / bandwidth is 10 ticks; sampling, the half tick of the PWM and the mean of the last half tick are
+    // two.
+    EXPECT_NEAR(ticks, 11, 3) << name;
+  }
+}
+
+TEST(SimulatedPower, TheSameSceneGivesTheSameBits) {
+  const auto record = [](std::uint64_t seed) {
+    simulation::Scene scene = identified("gimbal_b");
+    scene.seed = seed;
+    MotorBench bench(scene);
+    bench.prepare_wall();
+    EXPECT_TRUE(bench.arm());
+    bench.set_wall_force(1.0);
+    std::vector<double> forces;
+    for (int n = 0; n < 2000; ++n) {
+      bench.tick();
+      forces.push_back(bench.drive().force());
+    }
+    return forces;
+  };
+  const auto first = record(14);
+  EXPECT_EQ(first, record(14));
+  EXPECT_NE(first, record(15)) << "the noise has another seed";
+}
+
+TEST(SimulatedPower, IsReadyWhenTheOffsetsAreMeasured) {
+  MotorBench bench(identified("gimbal_a"));
+  bench.run(0.07);
+  EXPECT_FALSE(bench.arm());
+  EXPECT_EQ(bench.application().refusal(0), Refusal::power_stage_not_ready);
+  bench.set<"wall.law">(0);
+  bench.run(0.01);
+  EXPECT_TRUE(bench.arm());
+}
+
+TEST(SimulatedPower, AnotherGainIsTakenThroughTheWholeSequence) {
+  MotorBench bench(identified("drone"));
+  bench.set<"wall.law">(0);
+  bench.run(0.1);
+  EXPECT_EQ(bench.power().gain(), drivers::CurrentSenseGain::x80);
+  bench.set<"current.limit">(60.0);
+  bench.run(0.01);
+  EXPECT_EQ(bench.power().gain(), drivers::CurrentSenseGain::x20);
+  EXPECT_FALSE(bench.arm());
+  bench.run(0.1);
+  EXPECT_EQ(bench.drive().current_sensor().gain(), 20.0);
+  EXPECT_TRUE(bench.arm());
+}
+
+class PowerLines : public testing::Test {
+ protected:
+  PowerLines() : bench(identified("gimbal_a")) {
+    bench.drives().plant(0, Defect::motor_blocked);
+    bench.prepare_wall();
+    EXPECT_TRUE(bench.arm());
+    bench.set_wall_force(2.0);
+    bench.run(0.02);
+    EXPECT_NEAR(bench.current_force(), 2.0, 0.1);
+  }
+  bool legs_off() {
+    const auto& legs = bench.drives().bridge(0).legs;
+    return std::none_of(legs.begin(), legs.end(), [](const auto& leg) { return leg.enabled; });
+  }
+  void expect_trip(Fault fault) {
+    bench.run(0.005);
+    EXPECT_FALSE(bench.armed());
+    EXPECT_EQ(bench.application().fault(0), fault);
+    EXPECT_TRUE(legs_off());
+    EXPECT_NEAR(bench.current_force(), 0.0, 1e-6);
+  }
+  void expect_recovery() {
+    bench.run(0.3);
+    bench.clear();
+    bench.set_wall_force(0.0);
+    EXPECT_TRUE(bench.arm()) << firmware::words_of(bench.application().refusal(0));
+  }
+
+  MotorBench bench;
+};
+
+TEST_F(PowerLines, EmergencyStop) {
+  bench.power().press_emergency_stop(true);
+  bench.tick();
+  EXPECT_TRUE(legs_off()) << "without waiting for the tick";
+  expect_trip(Fault::emergency_stop);
+  bench.run(0.1);
+  bench.clear();
+  EXPECT_FALSE(bench.arm()) << "it is still pressed";
+  bench.power().press_emergency_stop(false);
+  expect_recovery();
+}
+
+TEST_F(PowerLines, GateDriverFault) {
+  bench.power().set_gate_driver_fault(true);
+  expect_trip(Fault::gate_driver);
+  bench.run(0.5);
+  bench.clear();
+  EXPECT_FALSE(bench.arm()) << "the line is still low";
+  EXPECT_EQ(bench.application().fault(0), Fault::gate_driver) << "a cause that remains cannot be cleared";
+  bench.power().set_gate_driver_fault(false);
+  expect_recovery();
+}
+
+TEST_F(PowerLines, SupplyLoss) {
+  bench.drives().supply().disconnect();
+  bench.run(0.5);
+  EXPECT_EQ(bench.application().fault(0), Fault::under_voltage);
+  EXPECT_TRUE(legs_off());
+  // Empty, the gate drivers have no supply either.
+  bench.drives().supply().set_voltage(3.0);
+  bench.run(0.01);
+  bench.clear();
+  EXPECT_FALSE(bench.arm());
+  bench.drives().supply().connect();
+  expect_recovery();
+}
+
+TEST_F(PowerLines, SupplyTooLow) {
+  bench.drives().plant(0, Defect::supply_low);
+  expect_trip(Fault::under_voltage);
+  bench.drives().mend(0, Defect::supply_low);
+  expect_recovery();
+}
+
+TEST_F(PowerLines, SupplyTooHigh) {
+  bench.drives().supply().set_source(40.0);
+  bench.drives().supply().set_voltage(40.0);
+  expect_trip(Fault::over_voltage);
+}
+
+TEST_F(PowerLines, HotPowerStage) {
+  bench.drives().temperature(0).set_temperature(110.0);
+  expect_trip(Fault::over_temperature);
+  bench.clear();
+  EXPECT_FALSE(bench.arm());
+  EXPECT_EQ(bench.application().fault(0), Fault::over_temperature);
+  bench.drives().temperature(0).set_temperature(40.0);
+  expect_recovery();
+}
+
+TEST_F(PowerLines, ASerialEncoderThatFallsSilent) {
+  bench.drives().plant(0, Defect::encoder_unplugged);
+  expect_trip(Fault::encoder);
+  bench.drives().mend(0, Defect::encoder_unplugged);
+  expect_recovery();
+}
+
+TEST_F(PowerLines, AnOpenPhase) {
+  bench.drives().plant(0, Defect::phase_b_open);
+  bench.run(0.1);
+  EXPECT_FALSE(bench.armed());
+  EXPECT_EQ(bench.application().fault(0), Fault::phase_open);
+}
+
+TEST(SimulatedPower, AMotorThatBrakesIsTakenByTheBrakeResistor) {
+  simulation::Scene scene = identified("dc_coreless_a");
+  scene.axes[0].start.velocity = 0.0;
+  const auto highest = [&](double brake_voltage) {
+    MotorBench bench(scene);
+    bench.set<"supply.brake_voltage">(brake_voltage);
+    bench.prepare_wall();
+    EXPECT_TRUE(bench.arm());
+    double most = 0.0;
+    bench.drives().supply().set_voltage(27.0);
+    for (int n = 0; n < 2000; ++n) {
+      bench.tick();
+      if (n > 1000) most = std::max(most, bench.drives().supply().voltage());
+    }
+    return std::pair{most, bench.drives().supply().brake_energy()};
+  };
+  EXPECT_GT(highest(0.0).first, 26.5) << "no resistor is fitted";
+  EXPECT_LT(highest(25.0).first, 25.1);
+  EXPECT_GT(highest(25.0).second, 0.01);
+}
+
+}  // namespace
+}  // namespace kmax::simulated_board

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "firmware/modbus/crc.hpp"
+#include "host_tools/link/link.hpp"
+#include "host_tools/virtual_board/virtual_board.hpp"
+
+namespace kmax::tests {
+
+/// What host tools say to the image: Modbus RTU on the virtual board's serial line, in board time.
+class BoardLink final : public link::Link {
+ public:
+  explicit BoardLink(virtual_board::VirtualBoard& board) : board_(board) {}
+
+  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
+    return read(3, address, count);
+  }
+  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
+    return read(4, address, count);
+  }
+  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
+    const auto count = static_cast<std::uint16_t>(values.size());
+    std::vector<std::uint8_t> request = begin(16, address, count);
+    request.push_back(static_cast<std::uint8_t>(2 * count));
+    for (const std::uint16_t value : values) push(request, value);
+    static_cast<void>(exchange(std::move(request), address, 8));
+  }
+  std::chrono::microseconds now() const override {
+    return std::chrono::microseconds(static_cast<std::int64_t>(virtual_board::seconds(board_.now()) * 1e6));
+  }
+  void wait(std::chrono::microseconds duration) override {
+    if (duration.count() > 0) board_.run_for(static_cast<double>(duration.count()) * 1e-6);
+  }
+  std::string description() const override { return "the virtual board"; }
+
+ private:
+  static void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
+  }
+  static std::vector<std::uint8_t> begin(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
+    std::vector<std::uint8_t> request{1, function};
+    push(request, address);
+    push(request, count);
+    return request;
+  }
+
+  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
+    const auto reply = exchange(begin(function, address, count), address, 5U + 2U * count);
+    std::vector<std::uint16_t> words;
+    for (std::size_t i = 0; i < count; ++i)
+      words.push_back(static_cast<std::uint16_t>(reply[3 + 2 * i] << 8 | reply[4 + 2 * i]));
+    return words;
+  }
+
+  std::vector<std::uint8_t> exchange(std::vector<std::uint8_t> request, std::uint16_t address,
+                                     std::size_t expected) {
+    const std::uint8_t function = request[1];
+    const std::uint16_t crc = firmware::modbus::crc_of(request);
+    request.push_back(static_cast<std::uint8_t>(crc & 0xFF));
+    request.push_back(static_cast<std::uint8_t>(crc >> 8));
+    static_cast<void>(board_.transmitted());
+    board_.receive(request);
+    std::vector<std::uint8_t> reply;
+    // An erase of the parameters' memory stops the processor for up to 0.5 s.
+    for (int tenths_of_ms = 0; tenths_of_ms < 10'000; ++tenths_of_ms) {
+      board_.run_for(0.0001);
+      const auto bytes = board_.transmitted();
+      reply.insert(reply.end(), bytes.begin(), bytes.end());
+      const bool refused = reply.size() >= 2 && (reply[1] & 0x80U) != 0;
+      if (reply.size() < (refused ? 5U : expected)) continue;
+      if (firmware::modbus::crc_of(reply) != 0) throw link::LinkError("the board's reply has a wrong CRC");
+      board_.run_for(0.002);  // the silence between two frames is 1.75 ms
+      if (refused) throw link::RefusedError(reply[2], function, address);
+      return reply;
+    }
+    throw link::LinkError("the board does not answer within 1 s");
+  }
+
+  virtual_board::VirtualBoard& board_;
+};
+
+}  // namespace kmax::tests
