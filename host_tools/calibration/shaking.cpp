@@ -112,7 +112,9 @@ Recording Shaking::record(const std::vector<std::string>& channels, std::size_t 
     centre_handle(bench_, known_);
     // The link takes up to a tenth of a second until the capture begins.
     const ExcitationPlan plan = wave(ticks + 6000);
-    const double still = std::max(0.1, 4.0 * half_period_ * known_.tick);
+    // A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by
+    // the record.
+    const double still = known_.brushed() ? 0.0 : std::max(0.1, 4.0 * half_period_ * known_.tick);
     Recording seen = bench_.record(plan, {channels, samples, interval, plan.ramp, still});
     // A long record may drift out of the travel: a shorter wave drifts less.
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel && attempt < attempts) {
