@@ -36,7 +36,6 @@ InducedVoltage induced_in_waves(const Recording& seen, const MotorKnowledge& kno
     const double early = mean_over(begin + 3 * half_period / 10, begin + 6 * half_period / 10);
     const double late = mean_over(begin + 7 * half_period / 10, begin + half_period);
     // Their middles are four tenths of a half wave apart.
-    // Their middles are four tenths of a half wave apart.
     rises.push_back(direction * (late - early) / 0.4);
   }
   if (rises.size() < 2) return none;

@@ -34,8 +34,7 @@ InducedVoltage induced_in_push(const Recording& seen, const MotorKnowledge& know
 bool stands(std::span<const double> count);
 
 // The diagnosis of a handle whose encoder stands: encoder_dead if a voltage is induced, else motor_blocked.
-// A synchronous motor that seems to
-// stand is first dragged along by a turning field, half an electrical turn.
+// A synchronous motor that seems to stand is first dragged along by a turning field, half an electrical turn.
 [[noreturn]] void throw_standing(Bench& bench, const MotorKnowledge& known, bool induced,
                                  const std::string& evidence);
 
