@@ -122,6 +122,24 @@ RC_GTEST_PROP(WindingTemperature, SettlesWhereTheClosedFormSays, ()) {
   RC_ASSERT(std::fabs(static_cast<double>(model.motor_case()) - end.motor_case) < 1e-4 * rise + 2e-3);
 }
 
+// A winding of 0.1 J/K in a case of 5 kJ/K: the step's terms are 10^5 times the temperatures they leave behind.
+TEST(WindingTemperature, ALongStepIsRightForAFastWindingInASlowCase) {
+  Config config;
+  config.winding_capacity = 0.1;
+  config.winding_to_case = 0.05;
+  config.case_capacity = 5000.0;
+  config.case_to_ambient = 50.0;
+  for (const double rise : {10.0, 94.0, 290.0}) {
+    const double current = current_for(config, rise);
+    Model model;
+    model.reset(static_cast<float>(config.ambient_temperature));
+    const float winding = model.update(Model::prepare(as<float>(config)), 1e8f, static_cast<float>(current));
+    const auto end = steady(config, current);
+    EXPECT_NEAR(static_cast<double>(winding), end.winding, 1e-5 * rise);
+    EXPECT_NEAR(static_cast<double>(model.motor_case()), end.motor_case, 1e-5 * rise);
+  }
+}
+
 // 20 minutes in steps of 1 ms: each adds less than a float at 60 degC resolves.
 TEST(WindingTemperature, ManySmallStepsAreAsGoodAsOne) {
   const Config config;
