@@ -114,9 +114,9 @@ class WindingTemperature {
     const Scalar larger = middle > Scalar(0) ? middle + spread : middle - spread;
     const Scalar smaller = determinant / larger;
 
-    // A - larger, each element without a cancellation: the two on the diagonal have the product a12 a21. Taken
-    // from the slow eigenvalue instead, or as differences, a winding 10,000 times faster than its case would
-    // end up 0.1 K off after an hour in one step.
+    // A - larger, each element without a cancellation: the two on the diagonal have the product a12 a21.
+    // Taken from the slow eigenvalue instead, or as differences, a winding 10,000 times faster than its case
+    // would end up 0.1 K off after an hour in one step.
     const Scalar away = middle > Scalar(0) ? -spread : spread;
     const Scalar sum = away + half_difference, difference = away - half_difference;
     const bool same_sign = (away < Scalar(0)) == (half_difference < Scalar(0));
