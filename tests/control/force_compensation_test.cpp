@@ -268,8 +268,8 @@ RC_GTEST_PROP(ForceCompensation, AMovingHandleAlwaysLosesEnergy, ()) {
     RC_ASSERT(handle.kinetic() <= before - 0.999 * (friction - limit) * moved + 1e-15);
     RC_ASSERT(path <= start / (friction - limit) * 1.001 + 1e-12);
   }
-  // The brake is at least friction - limit.
-  RC_ASSERT(n <= std::sqrt(2 * start * handle.mass) / (friction - limit) / tick + 1.0);
+  // The brake is at least friction - limit; where it is just that, only rounding decides.
+  RC_ASSERT(n <= std::sqrt(2 * start * handle.mass) / (friction - limit) / tick * (1.0 + 1e-9) + 1.0);
 }
 
 // Point 3 of the header's proof: the device really cogs, the map is shifted by half a period and so doubles
