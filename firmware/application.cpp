@@ -38,9 +38,16 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
       port_(bank_, port_configuration(registers_.values())),
       settings_(make_settings()),
       handover_(settings_),
+      objects_(*this),
+      node_(objects_, {.vendor = vendor_id,
+                       .product = product_code,
+                       .revision = firmware_version,
+                       .serial = board.serial_number}),
       capture_(capture_memory) {
   for (AxisStateMachine& machine : machines_) machine.initialised();
   configure_thermal();
+  make_scales();
+  start_communication(true);
   refresh_readings();
 }
 
@@ -60,7 +67,14 @@ Application::Settings Application::make_settings() const {
     settings[axis].generation = generation_;
     // Near the position by the new origin: the resampler starts from there.
     const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
-    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
+    control::HapticLoopConfig<float> haptic = haptic_configuration(values, axis);
+    if (mode(axis) == DriveMode::torque) {
+      // No wall: the force is what the host asks for, with all limits, trips and the soft start of the
+      // others.
+      haptic.wall.kind = control::WallKind::none;
+      haptic.interference.mode = control::InterferenceMode::none;
+    }
+    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic, position);
     const Circumstances now = offered_[axis];
     settings[axis].motor =
         MotorControl::prepare(motor_configuration(values, axis, now.winding_temperature, now.current_share));
@@ -70,7 +84,7 @@ Application::Settings Application::make_settings() const {
         plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
     settings[axis].watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
     settings[axis].excitation = Excitation::prepare(excitation_configuration(values, axis));
-    settings[axis].mode = mode(axis);
+    settings[axis].mode = mode(axis) == DriveMode::excitation ? DriveMode::excitation : DriveMode::haptic;
     settings[axis].commutated = now.commutated;
     settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
     settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
@@ -78,11 +92,24 @@ Application::Settings Application::make_settings() const {
   return settings;
 }
 
+void Application::make_scales() {
+  const ParameterValues& values = registers_.values();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const double length = count_length(values, axis);
+    const double step =
+        control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), length);
+    scale_[axis] = {length, static_cast<float>(step * length)};
+  }
+}
+
 void Application::offer_settings_if_changed() {
   const std::array<Circumstances, axis_count> now{circumstances_of(0), circumstances_of(1)};
   if (registers_.changes() == offered_changes_ && now == offered_) return;
   offered_ = now;
-  if (registers_.changes() != offered_changes_) configure_thermal();
+  if (registers_.changes() != offered_changes_) {
+    configure_thermal();
+    make_scales();
+  }
   offered_changes_ = registers_.changes();
   if (registers_.restarting_changes() != offered_restarts_) {
     offered_restarts_ = registers_.restarting_changes();
@@ -217,12 +244,14 @@ void Application::supervise(std::size_t axis) {
     }
     if (readings_.ticks_have_stopped) trip(axis, Fault::tick_missed, 0.0f, 0.0f);
     const float timeout = values.real<"link.timeout">();
-    const auto last = port_.last_valid_request_time();
+    const auto last = last_heard_us(axis);
     if (timeout > 0.0f && last.has_value()) {
       const auto silent_us = modbus::elapsed_us(now_us_, *last);
       if (static_cast<float>(silent_us) > timeout * 1e6f)
         trip(axis, Fault::link_silent, static_cast<float>(silent_us) * 1e-6f, timeout);
     }
+    if (commander_[axis] == Commander::can && can_.state == CanState::bus_off)
+      trip(axis, Fault::bus_off, 0.0f, 0.0f);
   }
 
   std::uint16_t word = 0;
@@ -240,7 +269,9 @@ void Application::supervise(std::size_t axis) {
           (machine.fault() == Fault::over_temperature && thermal_[axis].power_stage_too_hot()) ||
           (machine.fault() == Fault::motor_too_hot && thermal_[axis].motor_too_hot()) ||
           (machine.fault() != Fault::none && machine.fault() == report.condition);
-      machine.command(pending, obstacle_to_arming(axis), cause_remains);
+      const bool stays = registers_.values().whole<"profile.quick_stop_option">(axis) == 6;
+      machine.command(pending, obstacle_to_arming(axis), cause_remains, {.stay_in_quick_stop = stays});
+      halted_[axis] = halted(pending);
     }
   }
   enable_[axis].store(machine.armed(), std::memory_order_relaxed);
@@ -252,6 +283,7 @@ void Application::act() {
     commutation_[axis].follow(registers_.values(), axis, report_[axis].reference_generation);
   offer_settings_if_changed();
   for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
+  publish_torques();
 }
 
 void Application::poll(std::uint32_t now_us) {
@@ -272,6 +304,7 @@ void Application::poll(std::uint32_t now_us) {
   SerialByte received;
   while (serial_queue_.pop(received)) port_.receive(received.byte, received.line_error, received.time_us);
   port_.poll(now_us);
+  poll_can();
   act();
   keeper_.poll();
 }

@@ -6,8 +6,12 @@
 #include <span>
 #include <string_view>
 
+#include "drivers/can_frame.hpp"
+#include "firmware/application_objects.hpp"
 #include "firmware/axis.hpp"
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/can_port.hpp"
+#include "firmware/canopen/node.hpp"
 #include "firmware/capture.hpp"
 #include "firmware/commutation.hpp"
 #include "firmware/crash_record.hpp"
@@ -34,6 +38,7 @@ struct BoardIdentity {
 
 inline constexpr std::uint32_t firmware_version = 0x000100;  ///< 0.1.0
 inline constexpr std::string_view firmware_version_text = "0.1.0";
+inline constexpr std::uint32_t vendor_id = 0;  ///< none assigned by CiA
 inline constexpr std::uint32_t product_code = 1;
 
 using AxisInput = Axis::Input;
@@ -67,13 +72,16 @@ struct BoardReadings {
 /// both and counts the ticks. Half a tick apart or one right after the other makes no difference.
 ///
 /// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
-/// What crosses: settings and enables main -> tick (Handover, atomics), reports and the trace tick -> main
-/// (Snapshot, Trace), a capture's plan and its samples (Capture), bytes serial -> main (InterruptQueue).
-/// Nothing else is shared.
+/// What crosses: settings, enables and torques main -> tick (Handover, atomics), reports and the trace tick
+/// -> main (Snapshot, Trace), a capture's plan and its samples (Capture), serial bytes and CAN frames -> main
+/// (InterruptQueue). Nothing else is shared.
+///
+/// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines. Whoever wrote
+/// an axis' controlword last commands it: that link's silence, bus-off or NMT stop takes the force away.
 ///
 /// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
 /// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
-/// or a counter, all of which a host can read. Memory: about 27 KiB on the target, no heap.
+/// or a counter, all of which a host can read. Memory: about 36 KiB on the target, no heap.
 class Application {
  public:
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
@@ -101,6 +109,18 @@ class Application {
   /// What the line must be set to; changes only while no reply is under way.
   SerialSettings serial_settings() const { return {port_.config().baud_rate}; }
 
+  /// A data frame with an 11-bit identifier; the CAN receive interrupt, which the tick may preempt.
+  void ISR_can_frame(const drivers::CanFrame& frame) { can_queue_.ISR_push(frame); }
+  /// Before poll(), as often as they change.
+  void set_can(const CanReadings& readings) { can_ = readings; }
+  /// The next frame to send; called while there is room for it, after poll(). A frame that is taken counts as
+  /// sent.
+  bool next_can_frame(drivers::CanFrame& frame);
+  /// What the controller must be set to; a bit rate changes only when the communication is reset.
+  CanSettings can_settings() const { return node_.settings(); }
+  /// A host has asked for a restart (NMT reset node), and no axis is driven any more.
+  bool restart_wanted() const { return restart_wanted_; }
+
   /// Parameters a board or a scene starts with, before the first tick. Refused like a host's write, and
   /// then nothing changes.
   DeviceRegisters::WriteResult preset(std::size_t entry, std::size_t axis, std::uint32_t raw);
@@ -123,6 +143,11 @@ class Application {
   AxisReport ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
 
  private:
+  friend class ApplicationObjects;
+
+  /// Whose controlword an axis obeyed last.
+  enum class Commander : std::uint8_t { serial, can };
+
   /// The registers as the Modbus server sees them.
   class Bank {
    public:
@@ -154,13 +179,25 @@ class Application {
   bool settled(std::size_t axis) const;
   Settings make_settings() const;
   void offer_settings_if_changed();
+  void make_scales();
   void act();
   void supervise(std::size_t axis);
   Refusal obstacle_to_arming(std::size_t axis) const;
   void trip(std::size_t axis, Fault fault, float value, float bound);
   void refresh_readings();
+  /// Of the axis, or of the device, that this slot belongs to.
+  void refresh_reading(std::size_t slot);
+  void refresh_axis_readings(std::size_t axis);
+  void refresh_device_readings();
+  std::uint32_t flags_of(std::size_t axis) const;
+  bool saturated(std::size_t axis) const;
   void refresh_store_readings();
+  void refresh_crash_readings();
+  DeviceRegisters::WriteResult write_registers(std::uint16_t address, std::span<const std::uint16_t> words,
+                                               Commander by);
   DeviceRegisters::WriteResult command_store(std::uint16_t command);
+  /// The next start has all parameters at their defaults; the present ones stay.
+  DeviceRegisters::WriteResult save_defaults();
   DeviceRegisters::WriteResult command_capture(std::uint16_t command);
   void refresh_capture_readings();
   void take_reports();
@@ -169,6 +206,14 @@ class Application {
   Circumstances circumstances_of(std::size_t axis) const;
   void configure_thermal();
   void poll_temperatures();
+  void start_communication(bool power_on);
+  void poll_can();
+  void act_on(const canopen::NodeEvents& events);
+  void tell_emergencies();
+  void refresh_can_readings();
+  void publish_torques();
+  void disarm_all();
+  std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
   float bound_of(Fault fault, std::size_t axis) const;
   void ISR_supervise_main_loop();
   void ISR_trace(const control::HapticLoop<float>::Output& traced);
@@ -190,6 +235,23 @@ class Application {
   std::array<Commutation, axis_count> commutation_;
   std::array<Circumstances, axis_count> offered_{};
   BoardReadings readings_;
+  CanReadings can_;
+  std::array<Commander, axis_count> commander_{};
+  std::array<Fault, axis_count> told_fault_{};
+  CanState told_can_state_ = CanState::absent;
+  std::uint32_t told_overruns_ = 0, told_conflicts_ = 0;
+  std::optional<std::uint32_t> heard_on_can_us_;
+  /// CANopen's own settings as the last start brought them: what a reset of the communication brings back.
+  std::array<std::uint32_t, communication_entries.size()> power_on_communication_{};
+  std::uint32_t configured_communication_ = 0;
+  std::array<bool, axis_count> halted_{};
+  /// Of the settings in force; to work it out takes a division in double.
+  struct Scale {
+    double count_length = 0.0;  ///< m
+    float resolution = 0.0f;    ///< m
+  };
+  std::array<Scale, axis_count> scale_{};
+  bool restart_wanted_ = false, restarting_ = false;
   ParameterKeeper keeper_;
   // Before settings_, which is made from them.
   std::array<AxisReport, axis_count> report_;  ///< main loop's copies
@@ -201,9 +263,15 @@ class Application {
   Handover<Settings> handover_;
   std::array<Snapshot<AxisReport>, axis_count> snapshots_;
   InterruptQueue<SerialByte, 512> serial_queue_;
+  InterruptQueue<drivers::CanFrame, 64> can_queue_;
+  ApplicationObjects objects_;
+  canopen::Node<ApplicationObjects> node_;
   Trace trace_;
   Capture capture_;
   std::array<std::atomic<bool>, axis_count> enable_{};
+  /// N at the handle, of mode torque; 0 in all others.
+  std::array<std::atomic<float>, axis_count> commanded_force_{};
+  std::array<std::atomic<bool>, axis_count> takes_command_{};
   std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
   /// Asked for by the main loop, taken back by the tick that publishes.
   std::array<std::atomic<bool>, axis_count> report_wanted_{};

@@ -8,6 +8,7 @@ const LoadReport& Application::attach_store(AnyFlashSectors flash) {
   keeper_.attach(flash, stored);
   registers_.set_all(stored, false);
   offer_settings_if_changed();
+  start_communication(true);
   refresh_readings();
   return keeper_.loaded();
 }
@@ -35,9 +36,20 @@ DeviceRegisters::WriteResult Application::command_store(std::uint16_t command) {
   return registers_.refuse(Refusal::out_of_range, address);
 }
 
+DeviceRegisters::WriteResult Application::save_defaults() {
+  ParameterValues defaults = registers_.values();
+  set_defaults(defaults);
+  return registers_.refuse(keeper_.save(defaults, any_armed()),
+                           register_address(entry_of<"store.command">(), 0));
+}
+
 void Application::refresh_store_readings() {
   ParameterValues& v = registers_.values();
   keeper_.publish(v);
+}
+
+void Application::refresh_crash_readings() {
+  ParameterValues& v = registers_.values();
   v.set_whole<"info.reset_cause">(static_cast<std::uint32_t>(board_.reset_cause));
   const CrashRecord& crash = board_.crash;
   v.set_whole<"info.crash_count">(crash.count);

@@ -11,9 +11,13 @@ const AxisOutput& Application::ISR_tick(std::size_t axis, const AxisInput& input
   }
   const bool enable = enable_[axis].load(std::memory_order_relaxed);
   if (ISR_main_loop_stands_ && enable) axes_[axis].ISR_trip(Fault::main_loop);
-  // The force along one axis' wall belongs to the other axis; each takes what the other made last.
+  // The force along one axis' wall belongs to the other axis; each takes what the other made last. In mode
+  // torque there is no wall, and what the host asks for takes that place.
   Axis& ticked = axes_[axis];
-  const AxisOutput& output = ticked.ISR_tick(settings[axis], input, enable, tangential_[1 - axis], ISR_tick_);
+  const float external = takes_command_[axis].load(std::memory_order_relaxed)
+                             ? commanded_force_[axis].load(std::memory_order_relaxed)
+                             : tangential_[1 - axis];
+  const AxisOutput& output = ticked.ISR_tick(settings[axis], input, enable, external, ISR_tick_);
   tangential_[axis] = output.tangential_force;
   if (ticked.ISR_changed() || report_wanted_[axis].load(std::memory_order_relaxed)) {
     report_wanted_[axis].store(false, std::memory_order_relaxed);

@@ -16,6 +16,7 @@ namespace kmax::firmware {
 enum class DriveMode : std::uint8_t {
   haptic = 0,
   excitation = 1,  ///< follows excitation.*, without a wall
+  torque = 2,      ///< makes profile.target_torque, without a wall
 };
 
 /// What the tick of one axis works by; made in the main loop, handed over whole.

@@ -26,13 +26,22 @@ inline constexpr std::uint16_t enable_voltage = 1u << 1;
 inline constexpr std::uint16_t quick_stop = 1u << 2;  // active low
 inline constexpr std::uint16_t enable_operation = 1u << 3;
 inline constexpr std::uint16_t fault_reset = 1u << 7;
+inline constexpr std::uint16_t halt = 1u << 8;
 }  // namespace controlword
 
-/// Base patterns of the statusword, 0x6041, and the extra bits that are shown.
+/// The force is to go to zero while the axis stays armed; mode torque only. No matter to the automaton.
+constexpr bool halted(std::uint16_t word) {
+  return (word & controlword::halt) != 0;
+}
+
+/// Base patterns of the statusword, 0x6041, and its other bits; see statusword.hpp.
 namespace statusword {
 inline constexpr std::uint16_t voltage_enabled = 1u << 4;
+inline constexpr std::uint16_t warning = 1u << 7;
 inline constexpr std::uint16_t remote = 1u << 9;
+inline constexpr std::uint16_t target_reached = 1u << 10;
 inline constexpr std::uint16_t internal_limit_active = 1u << 11;
+inline constexpr std::uint16_t follows_command_value = 1u << 12;  // in mode torque
 
 constexpr std::uint16_t base_of(DriveState state) {
   switch (state) {
@@ -69,6 +78,12 @@ constexpr DriveState state_of(std::uint16_t word) {
 }
 }  // namespace statusword
 
+/// The option codes that the automaton depends on.
+struct DriveOptions {
+  /// profile.quick_stop_option: 6, or 0 where a quick stop leads straight to "switch on disabled".
+  bool stay_in_quick_stop = true;
+};
+
 /// The CiA 402 automaton of one axis, pure: commands and events in, state out.
 ///
 /// Decisions where the standard leaves a choice, each on the side of the hand on the device:
@@ -76,8 +91,9 @@ constexpr DriveState state_of(std::uint16_t word) {
 ///   wall, say) a repeated 0x0F does nothing; the host must show a word without bit 3 first. So a held
 ///   controlword never makes force appear later, when the handle happens to leave the wall.
 /// - Fault reset is a rising edge of bit 7, and is refused while the cause remains.
-/// - Quick stop removes the force and stays in "quick stop active" until the voltage is disabled;
-///   operation cannot be re-enabled from there (the optional transition 16 is not offered).
+/// - Quick stop removes the force. As DriveOptions says, it stays in "quick stop active" until the voltage is
+///   disabled, or leads on to "switch on disabled" (transitions 11 and 12 in one). Operation cannot be
+///   re-enabled from "quick stop active" (the optional transition 16 is not offered).
 /// - 0x0F in "ready to switch on" switches on and enables in one command (the standard's footnote).
 class AxisStateMachine {
  public:
@@ -99,8 +115,9 @@ class AxisStateMachine {
   }
 
   /// A controlword was written. `obstacle`: why operation cannot be enabled now (none: it can).
-  /// `cause_remains`: the present fault's cause is still there.
-  void command(std::uint16_t word, Refusal obstacle, bool cause_remains) {
+  /// `cause_remains`: the present fault's cause is still there. `options`: as they are now; one that changes
+  /// in "quick stop active" does not move the state.
+  void command(std::uint16_t word, Refusal obstacle, bool cause_remains, const DriveOptions& options = {}) {
     const bool reset_edge = rising(word, controlword::fault_reset);
     const bool enable_edge = rising(word, controlword::enable_operation);
     previous_word_ = word;
@@ -132,9 +149,9 @@ class AxisStateMachine {
         if (command == Command::enable_operation && enable_edge) enable(obstacle);    // 4
         break;
       case DriveState::operation_enabled:
-        if (command == Command::switch_on) state_ = DriveState::switched_on;         // 5
-        if (command == Command::shutdown) state_ = DriveState::ready_to_switch_on;   // 8
-        if (command == Command::quick_stop) state_ = DriveState::quick_stop_active;  // 11
+        if (command == Command::switch_on) state_ = DriveState::switched_on;        // 5
+        if (command == Command::shutdown) state_ = DriveState::ready_to_switch_on;  // 8
+        if (command == Command::quick_stop) state_ = after_quick_stop(options);     // 11
         break;
       case DriveState::not_ready_to_switch_on:
       case DriveState::quick_stop_active:
@@ -185,6 +202,10 @@ class AxisStateMachine {
   void enable(Refusal obstacle) {
     refusal_ = obstacle;
     if (obstacle == Refusal::none) state_ = DriveState::operation_enabled;
+  }
+
+  static constexpr DriveState after_quick_stop(const DriveOptions& options) {
+    return options.stay_in_quick_stop ? DriveState::quick_stop_active : DriveState::switch_on_disabled;
   }
 
   void leave_to(DriveState target) {

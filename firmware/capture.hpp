@@ -114,6 +114,9 @@ class Capture {
     return address >= capture_window && address < capture_window + 2 * capture_words;
   }
 
+  /// Main loop: one value; 0 where nothing has been captured, and while not readable().
+  std::uint32_t value_at(std::uint32_t word) const;
+
   /// Main loop: one register of the window; 0 where nothing has been captured, and while not readable().
   std::uint16_t word_at(std::uint16_t address) const;
 
@@ -245,14 +248,18 @@ inline CaptureReadings Capture::readings() const {
   return now;
 }
 
-inline std::uint16_t Capture::word_at(std::uint16_t address) const {
-  if (!readable() || !contains(address)) return 0;
-  const std::uint32_t word = static_cast<std::uint32_t>(address - capture_window) / 2;
+inline std::uint32_t Capture::value_at(std::uint32_t word) const {
+  if (!readable()) return 0;
   if (word >= taken_.load(std::memory_order_relaxed) * channels_.load(std::memory_order_relaxed)) return 0;
   const std::uint32_t end = ring_words_.load(std::memory_order_relaxed);
   std::uint32_t at = begin_.load(std::memory_order_relaxed) + word;
   if (at >= end) at -= end;
-  const std::uint32_t value = storage_[at];
+  return storage_[at];
+}
+
+inline std::uint16_t Capture::word_at(std::uint16_t address) const {
+  if (!contains(address)) return 0;
+  const std::uint32_t value = value_at(static_cast<std::uint32_t>(address - capture_window) / 2);
   return static_cast<std::uint16_t>(address % 2 == capture_window % 2 ? value >> 16 : value);
 }
 

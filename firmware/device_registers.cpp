@@ -1,5 +1,7 @@
 #include "firmware/device_registers.hpp"
 
+#include "firmware/linked_parameters.hpp"
+
 namespace kmax::firmware {
 
 namespace {
@@ -10,18 +12,38 @@ constexpr std::uint16_t address_of_slot(std::size_t slot) {
 constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 constexpr std::size_t transaction_entry = entry_of<"transaction.control">();
 constexpr std::size_t store_entry = entry_of<"store.command">();
+constexpr std::array setpoint_entries = {entry_of<"profile.target_torque">(),
+                                         entry_of<"profile.max_torque">()};
+
+constexpr bool is_setpoint(std::size_t entry) {
+  return std::find(setpoint_entries.begin(), setpoint_entries.end(), entry) != setpoint_entries.end();
+}
+// No part of a set of parameters: they act when they are written.
+constexpr bool acts_at_once(std::size_t entry) {
+  return entry == controlword_entry || is_setpoint(entry);
+}
+static_assert(
+    [] {
+      for (const std::size_t entry : setpoint_entries) {
+        const SlotDescriptor& d = descriptors[entry];
+        if (words_of(d.type) != 1 || d.disarmed_only || !d.writable || !d.per_axis) return false;
+      }
+      return true;
+    }(),
+    "setpoints are taken word by word, whatever the axes do");
 
 // A signed 8-bit value in one register may come with its sign extended (0xFFFF) or as the bare byte (0x00FF).
 std::uint32_t pattern_of(Type type, std::uint16_t word) {
-  if (type != Type::integer8) return word;
-  if (word <= 0xFF)
+  if (type != Type::integer8 && type != Type::integer16) return word;
+  if (type == Type::integer8 && word <= 0xFF)
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int8_t>(word)));
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int16_t>(word)));
 }
 }  // namespace
 
-DeviceRegisters::WriteResult DeviceRegisters::check_and_set(ParameterValues& target, std::uint16_t address,
-                                                            std::span<const std::uint16_t> in, bool armed) {
+DeviceRegisters::WriteResult DeviceRegisters::check_and_set(Staged& target, std::uint16_t address,
+                                                            std::span<const std::uint16_t> in,
+                                                            bool armed) const {
   for (std::size_t i = 0; i < in.size();) {
     const auto a = static_cast<std::uint16_t>(address + i);
     const RegisterPlace* place = find(true, a);
@@ -32,31 +54,82 @@ DeviceRegisters::WriteResult DeviceRegisters::check_and_set(ParameterValues& tar
         place->words == 2 ? (std::uint32_t{in[i]} << 16) | in[i + 1] : pattern_of(entry.type, in[i]);
     if (const Refusal refusal = check_value(entry, raw); refusal != Refusal::none) return {refusal, a};
     if (armed && entry.disarmed_only && raw != values_.raw(place->slot)) return {Refusal::while_armed, a};
-    target.set_raw(place->slot, raw);
+    target.values.set_raw(place->slot, raw);
+    target.written[place->slot] = true;
+    if (const auto partner = set_partner(target.values, place->slot)) target.written[*partner] = true;
     i += place->words;
   }
   return {};
 }
 
+bool DeviceRegisters::only_setpoints(std::uint16_t address, std::size_t count) const {
+  for (std::size_t i = 0; i < count; ++i) {
+    const RegisterPlace* place = find(true, static_cast<std::uint16_t>(address + i));
+    if (place == nullptr || !is_setpoint(owner_of(place->slot).entry)) return false;
+  }
+  return count != 0;
+}
+
+DeviceRegisters::WriteResult DeviceRegisters::take_setpoints(std::uint16_t address,
+                                                             std::span<const std::uint16_t> in) {
+  // Twice the same way: nothing is taken before everything has been checked.
+  for (const bool take : {false, true}) {
+    for (std::size_t i = 0; i < in.size(); ++i) {
+      const std::size_t slot = find(true, static_cast<std::uint16_t>(address + i))->slot;
+      const SlotDescriptor& entry = descriptors[owner_of(slot).entry];
+      const std::uint32_t raw = pattern_of(entry.type, in[i]);
+      if (take) {
+        values_.set_raw(slot, raw);
+      } else if (const Refusal refusal = check_value(entry, raw); refusal != Refusal::none) {
+        return refuse(refusal, static_cast<std::uint16_t>(address + i));
+      }
+    }
+  }
+  return last_ = {};
+}
+
 DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wanted, bool armed) {
   if (const BrokenRule broken = check_rules(wanted); broken.refusal != Refusal::none)
     return refuse(broken.refusal, address_of_slot(broken.slot));
-  bool changed = false, restarts = false;
+  bool changed = false, restarts = false, communication_changed = false;
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
-    const SlotDescriptor& entry = descriptors[owner_of(slot).entry];
-    if (!entry.writable || wanted.raw(slot) == values_.raw(slot)) continue;
+    const std::size_t of = owner_of(slot).entry;
+    const SlotDescriptor& entry = descriptors[of];
+    if (!entry.kept || acts_at_once(of) || wanted.raw(slot) == values_.raw(slot)) continue;
     // An axis may have been armed since the value was put aside.
     if (armed && entry.disarmed_only) return refuse(Refusal::while_armed, address_of_slot(slot));
-    changed = true;
+    (entry.writable ? changed : communication_changed) = true;
     restarts = restarts || entry.disarmed_only;
   }
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
-    if (descriptors[owner_of(slot).entry].writable) values_.set_raw(slot, wanted.raw(slot));
+    if (descriptors[owner_of(slot).entry].kept) values_.set_raw(slot, wanted.raw(slot));
   }
   if (changed) ++changes_;
   if (restarts) ++restarting_changes_;
-  last_ = {};
-  return {};
+  if (communication_changed) ++communication_changes_;
+  return last_ = {};
+}
+
+DeviceRegisters::WriteResult DeviceRegisters::set_all(const ParameterValues& wanted, bool armed) {
+  if (staging_) return refuse(Refusal::transaction_open, register_address(transaction_entry, 0));
+  // Where a transaction would be put aside, instead of as much stack again.
+  ParameterValues& set = staged_.values;
+  set = wanted;
+  make_partners_agree(set, values_);
+  for (std::size_t slot = 0; slot < slot_count; ++slot) {
+    if (acts_at_once(owner_of(slot).entry)) set.set_raw(slot, values_.raw(slot));
+  }
+  return apply(set, armed);
+}
+
+DeviceRegisters::WriteResult DeviceRegisters::write_communication(std::size_t slot, std::uint32_t raw) {
+  const SlotDescriptor& entry = descriptors[owner_of(slot).entry];
+  if (!entry.kept || entry.writable) return refuse(Refusal::read_only, address_of_slot(slot));
+  if (const Refusal refusal = check_value(entry, raw); refusal != Refusal::none)
+    return refuse(refusal, address_of_slot(slot));
+  if (values_.raw(slot) != raw) ++communication_changes_;
+  values_.set_raw(slot, raw);
+  return last_ = {};
 }
 
 DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t address,
@@ -69,20 +142,19 @@ DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t 
       return last_ = {};
     case 1:
       if (staging_) return refuse(Refusal::transaction_open, address);
-      staged_ = values_;
+      staged_.values = values_;
+      staged_.written.reset();
       staging_ = true;
       last_staged_us_ = now_us;
       return last_ = {};
-    case 2: {
+    case 2:
       if (!staging_) return refuse(Refusal::no_transaction, address);
       staging_ = false;
-      // Commands act when written and are not part of a set.
-      for (std::size_t axis = 0; axis < axis_count; ++axis) {
-        const std::size_t slot = slot_of(controlword_entry, axis);
-        staged_.set_raw(slot, values_.raw(slot));
+      // What was not written here may have changed since the transaction began.
+      for (std::size_t slot = 0; slot < slot_count; ++slot) {
+        if (!staged_.written[slot]) staged_.values.set_raw(slot, values_.raw(slot));
       }
-      return apply(staged_, armed);
-    }
+      return apply(staged_.values, armed);
     default:
       return refuse(Refusal::out_of_range, address);
   }
@@ -106,16 +178,25 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
     }
   }
 
+  if (only_setpoints(address, in.size())) return take_setpoints(address, in);
+
   if (dropped_) return refuse(Refusal::no_transaction, address);
-  ParameterValues wanted = staging_ ? staged_ : values_;
+  Staged wanted{staging_ ? staged_.values : values_, {}};
   const WriteResult checked = check_and_set(wanted, address, in, armed);
   if (checked.refusal != Refusal::none) return refuse(checked.refusal, checked.address);
-  if (staging_) {
-    staged_ = wanted;
-    last_staged_us_ = now_us;
-    return last_ = {};
+  if (!staging_) return apply(wanted.values, armed);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    for (const std::size_t entry : setpoint_entries) {
+      const std::size_t slot = slot_of(entry, axis);
+      if (!wanted.written[slot]) continue;
+      values_.set_raw(slot, wanted.values.raw(slot));
+      wanted.written[slot] = false;
+    }
   }
-  return apply(wanted, armed);
+  wanted.written |= staged_.written;
+  staged_ = wanted;
+  last_staged_us_ = now_us;
+  return last_ = {};
 }
 
 }  // namespace kmax::firmware

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bitset>
 #include <cstdint>
 #include <span>
 
@@ -47,9 +49,20 @@ inline constexpr auto register_places = [] {
 /// 1) values are kept aside and take effect together with transaction.control = 2, which checks the rules
 /// over the whole set. A transaction in which nothing is written for 2 s is dropped, so a host that dies
 /// half way leaves nothing behind; for 30 s, or until transaction.control is written, no value is taken
-/// outside a transaction then, lest a message of that host that was held up takes effect by itself. Reading
-/// always gives the values in force, not those put aside. Why a write was refused stays in refusal.reason and
-/// refusal.register.
+/// outside a transaction then, lest a message of that host that was held up takes effect by itself. A
+/// transaction changes what was written in it and nothing else: a value that others change meanwhile keeps
+/// theirs. Reading always gives the values in force, not those put aside. Why a write was refused stays in
+/// refusal.reason and refusal.register.
+///
+/// Commands (drive.controlword) and setpoints (profile.target_torque, profile.max_torque) are no part of a
+/// set: they act when they are written, in a transaction too, and are no change of parameters. So a setpoint
+/// may come with every message: it costs a search and a comparison.
+///
+/// Of two parameters that are one thing in two standards' numbers (linked_parameters.hpp), writing either
+/// sets both; the last one written wins.
+///
+/// CANopen's own settings (Access::communication) are read here like readings; write_communication() sets
+/// them one by one, at once.
 class DeviceRegisters {
  public:
   static constexpr std::uint32_t transaction_timeout_us = 2'000'000;
@@ -61,6 +74,8 @@ class DeviceRegisters {
   /// Rises with every change of a parameter; restarting_changes() only with those that restart the axes.
   std::uint32_t changes() const { return changes_; }
   std::uint32_t restarting_changes() const { return restarting_changes_; }
+  /// Rises with every change of CANopen's own settings, which count nowhere else.
+  std::uint32_t communication_changes() const { return communication_changes_; }
 
   struct WriteResult {
     Refusal refusal = Refusal::none;
@@ -102,8 +117,15 @@ class DeviceRegisters {
 
   bool transaction_open() const { return staging_; }
 
-  /// Takes every writable value of `wanted` at once, outside any transaction: a stored set, the defaults.
-  WriteResult set_all(const ParameterValues& wanted, bool armed) { return apply(wanted, armed); }
+  /// Takes every setting of `wanted` at once, outside any transaction: a stored set, the defaults. Commands
+  /// and setpoints stay. Of two linked parameters the one that differs from now wins; if both differ, the one
+  /// that save keeps. Refused while a transaction is open.
+  WriteResult set_all(const ParameterValues& wanted, bool armed);
+
+  /// One of CANopen's own settings, at once; read_only for any other slot. Rules of CANopen between them are
+  /// the caller's.
+  WriteResult write_communication(std::size_t slot, std::uint32_t raw);
+
   /// What a request that others carry out came to; last_refusal() tells it from now on.
   WriteResult refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
 
@@ -131,16 +153,23 @@ class DeviceRegisters {
     return address < std::uint32_t{place.address} + place.words ? &place : nullptr;
   }
 
-  WriteResult check_and_set(ParameterValues& target, std::uint16_t address, std::span<const std::uint16_t> in,
-                            bool armed);
+  struct Staged {
+    ParameterValues values;
+    std::bitset<slot_count> written;
+  };
+
+  WriteResult check_and_set(Staged& target, std::uint16_t address, std::span<const std::uint16_t> in,
+                            bool armed) const;
+  bool only_setpoints(std::uint16_t address, std::size_t count) const;
+  WriteResult take_setpoints(std::uint16_t address, std::span<const std::uint16_t> in);
   WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed,
                                   std::uint32_t now_us);
   WriteResult apply(const ParameterValues& wanted, bool armed);
 
   ParameterValues values_;
-  ParameterValues staged_;
+  Staged staged_;
   WriteResult last_;
-  std::uint32_t changes_ = 0, restarting_changes_ = 0;
+  std::uint32_t changes_ = 0, restarting_changes_ = 0, communication_changes_ = 0;
   std::uint32_t last_staged_us_ = 0, dropped_us_ = 0;
   bool staging_ = false, dropped_ = false;
   std::array<bool, axis_count> commanded_{};

@@ -28,6 +28,8 @@ enum class Fault : std::uint8_t {
   spin_out,
   motor_too_hot,
   excitation_travel,
+  bus_off,
+  heartbeat_lost,
 };
 
 struct FaultText {
@@ -89,10 +91,27 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::excitation_travel, 0xFF05, "excitation_travel", "m",
      "the handle moved farther than excitation.travel while it was being excited",
      "hold the handle's surroundings free, move it away from its stops, or allow it more travel"},
+    {Fault::bus_off, 0x8140, "bus_off", "",
+     "the CAN controller went off the bus while CAN commanded the axis",
+     "check the CAN cable, its two terminations of 120 ohm, and that all nodes have the same bit rate"},
+    {Fault::heartbeat_lost, 0xFF06, "heartbeat_lost", "",
+     "the heartbeat of a node that is watched (heartbeat_consumer.*) stayed away",
+     "check the program or node that sends it, and the time it is given"},
 });
 
 constexpr const FaultText& text_of(Fault fault) {
   return fault_texts[static_cast<std::size_t>(fault)];
+}
+
+/// Without the texts, which stay on the host.
+inline constexpr auto error_codes = [] {
+  std::array<std::uint16_t, fault_texts.size()> codes{};
+  for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = fault_texts[i].error_code;
+  return codes;
+}();
+
+constexpr std::uint16_t error_code_of(Fault fault) {
+  return error_codes[static_cast<std::size_t>(fault)];
 }
 
 constexpr const FaultText* fault_by_error_code(std::uint16_t error_code) {

@@ -31,12 +31,16 @@ class ParameterMigration {
   explicit ParameterMigration(const ParameterValues& before) : before_(before), result_(before) {}
 
   void take(std::uint32_t identity, std::uint32_t raw) {
-    const auto known = std::find_if(persistent_parameters.begin(), persistent_parameters.end(),
-                                    [identity](const auto& p) { return p.identity == identity; });
+    const auto is_wanted = [identity](const auto& p) { return p.identity == identity; };
+    // A set is stored in the order of the dictionary: the next one is nearly always the one wanted.
+    auto known = std::find_if(persistent_parameters.begin() + next_, persistent_parameters.end(), is_wanted);
+    if (known == persistent_parameters.end())
+      known = std::find_if(persistent_parameters.begin(), persistent_parameters.end(), is_wanted);
     if (known == persistent_parameters.end()) {
       note(identity, report_.dropped, report_.first_dropped);
       return;
     }
+    next_ = known - persistent_parameters.begin() + 1;
     if (check_value(descriptors[owner_of(known->slot).entry], raw) != Refusal::none) return;
     result_.set_raw(known->slot, raw);
     taken_[static_cast<std::size_t>(known - persistent_parameters.begin())] = true;
@@ -103,6 +107,7 @@ class ParameterMigration {
   ParameterValues result_;
   std::array<bool, persistent_count> taken_{};
   MigrationReport report_;
+  std::ptrdiff_t next_ = 0;  ///< behind the parameter that was taken last
 };
 
 }  // namespace kmax::firmware

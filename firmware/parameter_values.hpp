@@ -13,7 +13,8 @@ namespace kmax::firmware {
 struct SlotDescriptor {
   std::uint16_t address;  ///< first register of axis 0 or of the device
   Type type;
-  bool writable;
+  bool writable;  ///< through Modbus
+  bool kept;      ///< a setting, whoever may write it: part of a set of parameters
   bool disarmed_only;
   bool per_axis;
   std::uint8_t first_choice, choice_count;        ///< in listed_choices; 0 choices: any value in range
@@ -43,6 +44,7 @@ inline constexpr auto descriptors = [] {
     all[i] = {modbus_addresses[i],
               e.type,
               e.access == Access::read_write,
+              e.access != Access::read_only,
               e.change == Change::disarmed_only,
               e.scope() == Scope::axis,
               static_cast<std::uint8_t>(next_choice),
@@ -76,7 +78,7 @@ constexpr Refusal check_value(const SlotDescriptor& entry, std::uint32_t raw) {
     const auto value = std::bit_cast<float>(raw);
     if (!(value - value == 0.0f)) return Refusal::not_finite;
     inside = std::bit_cast<float>(entry.minimum) <= value && value <= std::bit_cast<float>(entry.maximum);
-  } else if (entry.type == Type::integer8 || entry.type == Type::integer32) {
+  } else if (is_signed(entry.type)) {
     const auto value = static_cast<std::int32_t>(raw);
     inside = static_cast<std::int32_t>(entry.minimum) <= value &&
              value <= static_cast<std::int32_t>(entry.maximum);

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,23 +42,37 @@ concept PoweredDevice = SimulatedDevice<Device> &&
 ///
 /// Time passes only in advance(), in ticks of 50 us, and everything in it is deterministic: the same calls
 /// give the same bits. Serial characters take their time on the line, so replies come as late as they would
-/// on a wire of modbus.baud_rate; whoever wants real time calls advance() at the pace of a clock.
+/// on a wire of modbus.baud_rate, and so do CAN frames, each as long as on a bus without other traffic;
+/// whoever wants real time calls advance() at the pace of a clock.
+///
+/// A restart that a host asks for (NMT reset node) makes a new Application in the place of the old one.
 template <SimulatedDevice Device>
 class NativeBoard {
  public:
   static constexpr std::uint32_t tick_us = 1'000'000 / firmware::tick_rate_hz;
 
-  explicit NativeBoard(Device& device)
-      : device_(device),
-        capture_memory_(firmware::capture_words),
-        application_({.board_name = "native",
-                      .serial_number = 1,
-                      .core_clock_hz = 0,
-                      .clock_source = 4,
-                      .reset_cause = firmware::ResetCause::native},
-                     capture_memory_) {}
+  /// `prepare` is called with the application at the start and at each restart, before the first tick.
+  explicit NativeBoard(Device& device, std::function<void(firmware::Application&)> prepare = {})
+      : device_(device), capture_memory_(firmware::capture_words), prepare_(std::move(prepare)) {
+    start(firmware::ResetCause::native);
+  }
 
-  firmware::Application& application() { return application_; }
+  firmware::Application& application() { return *application_; }
+
+  /// Somebody else is on the CAN bus, or nobody: then nothing is sent.
+  void connect_can(bool connected) {
+    can_.state = connected ? firmware::CanState::active : firmware::CanState::absent;
+  }
+  /// Frames from the bus, all of which arrive in the next tick.
+  void receive_can(std::span<const drivers::CanFrame> frames) {
+    can_incoming_.insert(can_incoming_.end(), frames.begin(), frames.end());
+  }
+  /// Frames that have left since the last call.
+  std::vector<drivers::CanFrame> transmitted_can() {
+    std::vector<drivers::CanFrame> out;
+    out.swap(can_outgoing_);
+    return out;
+  }
 
   /// Bytes from the host; each takes its character time from now on, one after the other.
   void receive(std::span<const std::uint8_t> bytes) {
@@ -89,7 +105,7 @@ class NativeBoard {
   };
 
   std::uint64_t character_us() const {
-    return firmware::modbus::rtu_timing(application_.serial_settings().baud_rate, {}).character_us;
+    return firmware::modbus::rtu_timing(application_->serial_settings().baud_rate, {}).character_us;
   }
 
   firmware::AxisInput sample(std::size_t axis) {
@@ -103,30 +119,68 @@ class NativeBoard {
     }
   }
 
+  void start(firmware::ResetCause cause) {
+    application_.emplace(firmware::BoardIdentity{.board_name = "native",
+                                                 .serial_number = 1,
+                                                 .core_clock_hz = 0,
+                                                 .clock_source = 4,
+                                                 .reset_cause = cause},
+                         capture_memory_);
+    if (prepare_) prepare_(*application_);
+  }
+
+  void exchange_can() {
+    for (const drivers::CanFrame& frame : can_incoming_) {
+      if (frame.extended || frame.remote) continue;  // as the controller's filters
+      ++can_.received;
+      application_->ISR_can_frame(frame);
+    }
+    can_incoming_.clear();
+    application_->set_can(can_);
+  }
+
+  void send_can() {
+    drivers::CanFrame frame;
+    while (can_.state == firmware::CanState::active && can_free_us_ <= now_us_ &&
+           application_->next_can_frame(frame)) {
+      // 47 bits around the data, and a stuff bit for every ten or so.
+      const std::uint64_t bits = (47U + 8U * frame.length) * 11U / 10U;
+      can_free_us_ = now_us_ + bits * 1'000'000U / application_->can_settings().bit_rate;
+      ++can_.sent;
+      can_outgoing_.push_back(frame);
+    }
+  }
+
   void tick() {
     firmware::TickInput input;
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) input.axis[axis] = sample(axis);
-    output_ = application_.ISR_tick(input);
+    output_ = application_->ISR_tick(input);
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) device_.drive(axis, output_.axis[axis]);
     device_.advance(static_cast<double>(tick_us) * 1e-6);
     now_us_ += tick_us;
 
     const auto now = static_cast<std::uint32_t>(now_us_);
     while (!incoming_.empty() && incoming_.front().time_us <= now_us_) {
-      application_.ISR_serial_byte(incoming_.front().byte, false,
-                                   static_cast<std::uint32_t>(incoming_.front().time_us));
+      application_->ISR_serial_byte(incoming_.front().byte, false,
+                                    static_cast<std::uint32_t>(incoming_.front().time_us));
       incoming_.pop_front();
     }
-    if constexpr (PoweredDevice<Device>) application_.set_readings(device_.readings());
-    application_.poll(now);
-    if constexpr (PoweredDevice<Device>) device_.poll(application_, now);
+    if constexpr (PoweredDevice<Device>) application_->set_readings(device_.readings());
+    exchange_can();
+    application_->poll(now);
+    send_can();
+    if (application_->restart_wanted()) {
+      sending_until_us_ = 0;
+      start(firmware::ResetCause::native);
+    }
+    if constexpr (PoweredDevice<Device>) device_.poll(*application_, now);
     if (sending_until_us_ != 0) {
       if (now_us_ < sending_until_us_) return;
       outgoing_.insert(outgoing_.end(), reply_.begin(), reply_.end());
-      application_.serial_reply_sent(static_cast<std::uint32_t>(sending_until_us_));
+      application_->serial_reply_sent(static_cast<std::uint32_t>(sending_until_us_));
       sending_until_us_ = 0;
     }
-    const auto reply = application_.serial_reply_due(now);
+    const auto reply = application_->serial_reply_due(now);
     if (reply.empty()) return;
     reply_.assign(reply.begin(), reply.end());
     sending_until_us_ = now_us_ + reply.size() * character_us();
@@ -134,11 +188,15 @@ class NativeBoard {
 
   Device& device_;
   std::vector<std::uint32_t> capture_memory_;
-  firmware::Application application_;
+  std::function<void(firmware::Application&)> prepare_;
+  std::optional<firmware::Application> application_;
   firmware::TickOutput output_{};
   std::uint64_t now_us_ = 0, line_free_us_ = 0, sending_until_us_ = 0;
   std::deque<TimedByte> incoming_;
   std::vector<std::uint8_t> reply_, outgoing_;
+  firmware::CanReadings can_;
+  std::vector<drivers::CanFrame> can_incoming_, can_outgoing_;
+  std::uint64_t can_free_us_ = 0;
 };
 
 }  // namespace kmax::board

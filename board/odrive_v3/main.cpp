@@ -7,11 +7,13 @@
 #include <optional>
 #include <span>
 
+#include "board/odrive_v3/can_line.hpp"
 #include "board/odrive_v3/pins.hpp"
 #include "board/odrive_v3/power_hardware.hpp"
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
 #include "board/stm32f405/crash_record.hpp"
+#include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/stm32f4/core_instructions.hpp"
@@ -69,6 +71,7 @@ struct Power {
 
 std::optional<firmware::Application> application;
 std::optional<SerialLine> serial;
+std::optional<CanLine> can_line;
 std::optional<Power> power;
 /// Set by the clock's interrupt and never taken back: only a restart brings the ticks back.
 std::atomic<bool> ticks_have_stopped{false};
@@ -171,11 +174,18 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
   if (power->drives.watchdog_gate().may_feed()) watchdog.feed();
 }
 
+/// A reset by software: the bridges are off before it, and every pin is what it is at power-on.
+[[noreturn]] void restart() {
+  enter_safe_state();
+  reset_core();
+}
+
 [[noreturn]] void run() {
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
   const bool emulator_without_clocks = clocks.source == stm32::ClockSource::unreadable;
-  application.emplace(identity(clocks), emulator_without_clocks ? std::span<std::uint32_t>{} : capture_memory);
+  application.emplace(identity(clocks),
+                      emulator_without_clocks ? std::span<std::uint32_t>{} : capture_memory);
   if (!emulator_without_clocks) application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
   interrupts.set_priority(stm32::SystemException::system_tick, priority::clock);
@@ -185,6 +195,11 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
   apply(serial_pins);
   serial.emplace(interrupts, clocks.apb1_hz);
   serial->start(*application);
+  if (!emulator_without_clocks) {
+    stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Can1::mask);
+    apply(can_pins);
+    can_line.emplace(interrupts, clocks.apb1_hz);
+  }
 
   std::uint32_t applied_changes = application->parameter_changes();
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
@@ -195,7 +210,8 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
   }
   for (;;) {
-    const bool due = !power_runs || power->drives.main_loop_due() || serial->news();
+    const bool due =
+        !power_runs || power->drives.main_loop_due() || serial->news() || (can_line && can_line->news());
     if (due) {
       const std::uint32_t now = system_tick.now_us();
       if (power_runs) {
@@ -204,8 +220,11 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
         application->set_readings(readings);
         power->drives.inhibit_brake(application->store_busy());
       }
+      if (can_line) can_line->poll(*application, now);
       application->poll(now);
       serial->poll(*application, now);
+      if (can_line) can_line->send(*application);
+      if (application->restart_wanted()) restart();
       if (power_runs) poll_power(now, applied_changes);
     }
     // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
@@ -259,6 +278,19 @@ void ISR_system_tick() {
   // No encoder is read here, and none is claimed: the axes tick, and refuse to be armed.
   constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
   static_cast<void>(board::application->ISR_tick(input));
+}
+
+void ISR_can1_tx() {
+  kmax::board::can_line->ISR_serve_transmit();
+}
+
+void ISR_can1_rx0() {
+  using namespace kmax::board;
+  can_line->ISR_receive(0, *application);
+}
+
+void ISR_can1_sce() {
+  kmax::board::can_line->ISR_serve_status();
 }
 
 void ISR_usart2() {

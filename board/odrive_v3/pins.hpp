@@ -52,6 +52,9 @@ inline constexpr PinLocation emergency_stop{GpioPort::c, 4};
 inline constexpr PinLocation healthy{GpioPort::b, 3};
 /// GPIO7 of connector J3, pulled up during reset: chip select of an AS5047P on the bus.
 inline constexpr PinLocation encoder_select{GpioPort::a, 15};
+/// The CAN transceiver; it has no standby pin.
+inline constexpr PinLocation can_receive{GpioPort::b, 8};
+inline constexpr PinLocation can_transmit{GpioPort::b, 9};
 /// GPIO3 and GPIO4 of connector J3.
 inline constexpr PinLocation serial_transmit{GpioPort::a, 2};
 inline constexpr PinLocation serial_receive{GpioPort::a, 3};
@@ -92,6 +95,13 @@ inline constexpr std::array serial_pins = {
              {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 7}},
     PinState{pins::serial_receive,
              {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 7}},
+};
+
+/// CAN1, alternate function 9. The pull-up keeps a receive line without a transceiver recessive.
+inline constexpr std::array can_pins = {
+    PinState{pins::can_receive, {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 9}},
+    PinState{pins::can_transmit,
+             {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 9}},
 };
 
 /// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides. The pull-downs hold a leg off that
@@ -164,6 +174,7 @@ constexpr bool names_no_pin_twice(const std::array<PinState, count>& table) {
 }  // namespace detail
 static_assert(detail::names_no_pin_twice(power_stage_off));
 static_assert(detail::names_no_pin_twice(serial_pins));
+static_assert(detail::names_no_pin_twice(can_pins));
 static_assert(detail::names_no_pin_twice(gate_pins));
 static_assert(detail::names_no_pin_twice(encoder_pins));
 static_assert(detail::names_no_pin_twice(analog_pins));

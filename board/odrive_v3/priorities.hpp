@@ -8,7 +8,7 @@
 //                tick; if that tick is just about to set MOE, it sees the flag and clears MOE again
 //   1  tick      the conversions' end: the control of one axis, 40,000 times a second
 //   4  clock     SysTick at 1 kHz, the microsecond clock and the main loop's heartbeat
-//   8  serial    one byte in, one byte out
+//   8  serial    one byte in, one byte out; CAN: one frame in, the next ones out
 //
 // The microsecond clock is exact only in contexts that do not outrank it: the lines and the tick never ask
 // for the time.

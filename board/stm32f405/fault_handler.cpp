@@ -14,8 +14,6 @@ namespace kmax::board {
 
 [[gnu::section(".noinit")]] FaultRecord fault_record;
 
-namespace {
-
 [[noreturn, gnu::section(".boot.reset")]] void reset_core() {
   data_synchronization_barrier();
   scb().aircr = scb_aircr::Key::bits(scb_aircr::key) | scb_aircr::SystemResetRequest::mask;
@@ -23,6 +21,8 @@ namespace {
   for (;;) {
   }
 }
+
+namespace {
 
 [[gnu::section(".boot.record")]] void begin_record(FaultCause cause) {
   const bool first = fault_record.magic != FaultRecord::valid_magic;

@@ -40,6 +40,9 @@ extern FaultRecord fault_record;
 /// stack, possibly before main and with peripheral clocks off.
 void enter_safe_state();
 
+/// Restarts the processor and its peripherals. Outputs should be in their safe state.
+[[noreturn]] void reset_core();
+
 /// For a handler of an interrupt that should never come. Does not return.
 [[noreturn]] void stop_on_unexpected_interrupt();
 

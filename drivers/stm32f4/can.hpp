@@ -117,6 +117,32 @@ class Can {
                : CanConfigureResult::waiting_for_idle_bus;
   }
 
+  /// Other filters without leaving the bus; what arrives in the same moment may be lost. At most
+  /// can1_filter_banks.
+  void set_filters(std::span<const CanFilter> filters) {
+    can_fmr::FilterInitialization::set(registers_.fmr);
+    std::uint32_t lists = 0;
+    std::uint32_t second_fifo = 0;
+    const std::uint32_t active = (1U << filters.size()) - 1;
+    registers_.fa1r = 0;
+    for (std::size_t i = 0; i < filters.size(); ++i) {
+      registers_.bank[i].fr1 = filters[i].first;
+      registers_.bank[i].fr2 = filters[i].second;
+      if (filters[i].list) lists |= 1U << i;
+      if (filters[i].fifo != 0) second_fifo |= 1U << i;
+    }
+    registers_.fm1r = lists;
+    registers_.fs1r = active;
+    registers_.ffa1r = second_fifo;
+    registers_.fa1r = active;
+    can_fmr::FilterInitialization::clear(registers_.fmr);
+  }
+
+  /// Main loop: send() would find a free slot.
+  bool has_room() const {
+    return !transmitter_.halted() && bus_off_.may_send() && transmitter_.has_room();
+  }
+
   /// Main loop.
   [[nodiscard]] CanSendResult send(const CanFrame& frame) {
     if (!frame.valid()) return CanSendResult::bad_frame;
@@ -206,25 +232,6 @@ class Can {
   /// debugger if DBGMCU says so too.
   static constexpr std::uint32_t mode = can_mcr::DebugFreeze::mask;
   static constexpr std::uint32_t release_polls = 8;
-
-  void set_filters(std::span<const CanFilter> filters) {
-    can_fmr::FilterInitialization::set(registers_.fmr);
-    std::uint32_t lists = 0;
-    std::uint32_t second_fifo = 0;
-    const std::uint32_t active = (1U << filters.size()) - 1;
-    registers_.fa1r = 0;
-    for (std::size_t i = 0; i < filters.size(); ++i) {
-      registers_.bank[i].fr1 = filters[i].first;
-      registers_.bank[i].fr2 = filters[i].second;
-      if (filters[i].list) lists |= 1U << i;
-      if (filters[i].fifo != 0) second_fifo |= 1U << i;
-    }
-    registers_.fm1r = lists;
-    registers_.fs1r = active;
-    registers_.ffa1r = second_fifo;
-    registers_.fa1r = active;
-    can_fmr::FilterInitialization::clear(registers_.fmr);
-  }
 
   /// What an earlier life has left.
   void clear() {

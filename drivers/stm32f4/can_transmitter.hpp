@@ -55,6 +55,13 @@ class CanTransmitter {
     halted_.store(false, std::memory_order_relaxed);
   }
 
+  bool has_room() const {
+    for (const Slot& slot : slots_) {
+      if (slot.state.load(std::memory_order_acquire) == State::free) return true;
+    }
+    return false;
+  }
+
   /// False: all slots are taken, or the frame is not valid. The caller pends the interrupt afterwards.
   [[nodiscard]] bool send(const CanFrame& frame) {
     if (!frame.valid()) return false;

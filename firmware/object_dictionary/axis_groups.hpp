@@ -28,6 +28,9 @@ inline constexpr Group measured{"measured", 0x2012, Scope::axis, 0x0020};
 inline constexpr Group excitation{"excitation", 0x2013, Scope::axis, 0x0210};
 inline constexpr Group compensation{"compensation", 0x2014, Scope::axis, 0x0240};
 inline constexpr Group trip{"trip", 0x2015, Scope::axis, 0x0080};
+inline constexpr Group profile{"profile", 0x2017, Scope::axis, 0x0280};
+inline constexpr Group profile_actual{"profile", 0x2018, Scope::axis, 0x00C0};
+inline constexpr Group telemetry{"telemetry", 0x2019, Scope::axis, 0x00E0};
 }  // namespace group
 
 /// What each choice is called; the numbers are the enumerations' own.
@@ -69,7 +72,15 @@ inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}}
 inline constexpr NamedValue encoder_start[] = {{"anywhere", 0}, {"at_rest", 1}};
 inline constexpr NamedValue encoder_index[] = {{"none", 0}, {"once_per_turn", 1}};
 inline constexpr NamedValue encoder_direction[] = {{"-1", -1}, {"+1", 1}};
-inline constexpr NamedValue drive_mode[] = {{"haptic", 0}, {"excitation", 1}};
+inline constexpr NamedValue drive_mode[] = {{"haptic", 0}, {"excitation", 1}, {"torque", 2}};
+/// In the numbers of CiA 402, which has no names for them. 10 is cyclic synchronous torque, negative modes
+/// are the manufacturer's.
+inline constexpr NamedValue operation_mode[] = {{"-1", -1}, {"-2", -2}, {"10", 10}};
+inline constexpr NamedValue polarity[] = {{"0", 0}, {"192", 192}};
+/// Of CiA 402's options those that a device whose stop is to make no force can have.
+inline constexpr NamedValue quick_stop_option[] = {{"0", 0}, {"6", 6}};
+inline constexpr NamedValue disable_drive[] = {{"0", 0}};
+inline constexpr NamedValue halt_option[] = {{"1", 1}};
 inline constexpr NamedValue no_or_yes[] = {{"no", 0}, {"yes", 1}};
 inline constexpr NamedValue excitation_kind[] = {
     {"off", 0}, {"voltage", 1}, {"current", 2}, {"torque", 3}, {"position", 4}};

@@ -27,6 +27,8 @@ inline constexpr Group capture{"capture", 0x3018, Scope::device, 0x0920};
 /// Apart from the settings, so that no write covers both.
 inline constexpr Group capture_command{"capture", 0x301A, Scope::device, 0x0940};
 inline constexpr Group capture_status{"capture", 0x3019, Scope::device, 0x08F0};
+inline constexpr Group can_status{"can", 0x301B, Scope::device, 0x0960};
+inline constexpr Group telemetry_state{"telemetry", 0x301C, Scope::device, 0x09C0};
 }  // namespace group
 
 namespace names {
@@ -38,6 +40,8 @@ inline constexpr NamedValue reset_cause[] = {
     {"unknown", 0},         {"power_on", 1},  {"pin", 2},       {"software", 3}, {"independent_watchdog", 4},
     {"window_watchdog", 5}, {"low_power", 6}, {"brown_out", 7}, {"native", 8}};
 inline constexpr NamedValue crash_cause[] = {{"none", 0}, {"fault", 1}, {"unexpected_interrupt", 2}};
+inline constexpr NamedValue can_state[] = {{"absent", 0}, {"stopped", 1},       {"joining", 2},
+                                           {"active", 3}, {"error_passive", 4}, {"bus_off", 5}};
 inline constexpr NamedValue store_state[] = {{"idle", 0},     {"busy", 1},    {"saved", 2},
                                              {"failed", 3},   {"refused", 4}, {"defaults_set", 5},
                                              {"no_memory", 6}};
@@ -68,9 +72,9 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
          "Host silence after which an armed axis loses its force with a fault; 0 turns it off."),
 
     whole("node.id", group::node, 1, Type::unsigned8, "", 1, 127, 1,
-          "CANopen node ID. Not used by this version."),
+          "CANopen node ID; takes effect at the next start or NMT reset."),
     rate_choice("can.bit_rate", group::can, 1, "bit/s", names::can_bit_rate, 1000000,
-                "CAN bit rate. Not used by this version."),
+                "CAN bit rate; takes effect at the next start or NMT reset of the communication."),
     whole("modbus.unit", group::modbus, 1, Type::unsigned8, "", 1, 247, 1,
           "Modbus unit; takes effect after the reply to the request that set it."),
     rate_choice("modbus.baud_rate", group::modbus, 2, "baud", names::baud_rate, 115200,
@@ -88,11 +92,15 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
           "A transaction that sees no write for 2 s is dropped.")
         .volatile_value(),
 
-    reading("info.vendor_id", group::info, 1, Type::unsigned32, "", "CiA vendor ID; 0: none assigned."),
-    reading("info.product_code", group::info, 2, Type::unsigned32, "", "Product code."),
+    reading("info.vendor_id", group::info, 1, Type::unsigned32, "", "CiA vendor ID; 0: none assigned.")
+        .at_standard_index(0x1018, 1),
+    reading("info.product_code", group::info, 2, Type::unsigned32, "", "Product code.")
+        .at_standard_index(0x1018, 2),
     reading("info.firmware_version", group::info, 3, Type::unsigned32, "",
-            "Firmware version: major x 65536 + minor x 256 + patch."),
-    reading("info.serial_number", group::info, 4, Type::unsigned32, "", "Serial number."),
+            "Firmware version: major x 65536 + minor x 256 + patch.")
+        .at_standard_index(0x1018, 3),
+    reading("info.serial_number", group::info, 4, Type::unsigned32, "", "Serial number.")
+        .at_standard_index(0x1018, 4),
     reading("info.dictionary_checksum", group::info, 5, Type::unsigned32, "",
             "Checksum of this dictionary: host and device must agree on it."),
     reading("info.tick_rate", group::info, 6, Type::unsigned32, "Hz", "Ticks per second."),
@@ -221,6 +229,46 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     reading("capture.first_tick", group::capture_status, 4, Type::unsigned32, "ticks",
             "Tick of the first sample."),
     reading("capture.channels", group::capture_status, 5, Type::unsigned8, "", "Words in a sample."),
+
+    named_reading("can.state", group::can_status, 1, names::can_state, "Condition of the CAN controller."),
+    reading("can.node_state", group::can_status, 2, Type::unsigned8, "",
+            "CANopen NMT state: 0 initialising, 4 stopped, 5 operational, 127 pre-operational."),
+    reading("can.node_in_use", group::can_status, 3, Type::unsigned8, "", "Node ID that is answered to."),
+    reading("can.transmit_errors", group::can_status, 4, Type::unsigned8, "",
+            "Transmit error counter; from 128 the controller is error passive, beyond 255 bus-off."),
+    reading("can.receive_errors", group::can_status, 5, Type::unsigned8, "", "Receive error counter."),
+    reading("can.received", group::can_status, 6, Type::unsigned32, "", "Frames taken from the bus."),
+    reading("can.sent", group::can_status, 7, Type::unsigned32, "", "Frames that have left."),
+    reading("can.overruns", group::can_status, 8, Type::unsigned32, "",
+            "Times that frames were lost in the controller because it was not emptied in time."),
+    reading("can.queue_overflows", group::can_status, 9, Type::unsigned32, "",
+            "Frames lost between interrupt and main loop: more than 64 waited."),
+    reading("can.bus_offs", group::can_status, 10, Type::unsigned32, "",
+            "Times that the controller went bus-off."),
+    reading("can.discarded", group::can_status, 11, Type::unsigned32, "",
+            "Frames thrown away unsent at bus-off."),
+    reading("can.sdo_aborts", group::can_status, 12, Type::unsigned32, "",
+            "SDO transfers that the device aborted."),
+    reading("can.sdo_timeouts", group::can_status, 13, Type::unsigned32, "",
+            "Of these, for the host's silence."),
+    reading("can.rpdo_refused", group::can_status, 14, Type::unsigned32, "",
+            "Values in received PDOs that were not taken: out of range, or not allowed while armed."),
+    reading("can.pdo_length_errors", group::can_status, 15, Type::unsigned32, "",
+            "Received PDOs shorter than what is mapped."),
+    reading("can.tpdo_held_back", group::can_status, 16, Type::unsigned32, "",
+            "PDOs due that were not sent since the one before had not left yet."),
+    reading("can.emergencies_lost", group::can_status, 17, Type::unsigned32, "",
+            "Emergency messages that found their queue full."),
+    reading("can.heartbeats_lost", group::can_status, 18, Type::unsigned32, "",
+            "Times that a watched node fell silent."),
+    reading("can.identity_conflicts", group::can_status, 19, Type::unsigned32, "",
+            "Frames that only this node may send, heard from another: two nodes have one ID."),
+    reading("can.bit_rate_in_use", group::can_status, 20, Type::unsigned32, "bit/s", "Bit rate at work."),
+
+    reading("telemetry.flags", group::telemetry_state, 1, Type::unsigned16, "",
+            "measured.flags of both axes: axis 0 in the low byte, axis 1 in the high one."),
+    reading("telemetry.tick", group::telemetry_state, 2, Type::unsigned16, "ticks",
+            "Low 16 bits of the tick at which the values of the PDOs were taken."),
 });
 
 }  // namespace kmax::firmware

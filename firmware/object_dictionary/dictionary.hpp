@@ -5,8 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
-#include "firmware/object_dictionary/axis_entries.hpp"
+#include "firmware/object_dictionary/axis_readings.hpp"
+#include "firmware/object_dictionary/axis_settings.hpp"
+#include "firmware/object_dictionary/communication_entries.hpp"
 #include "firmware/object_dictionary/device_entries.hpp"
 
 namespace kmax::firmware {
@@ -18,11 +21,22 @@ inline constexpr std::uint32_t tick_rate_hz = 20000;
 inline constexpr std::uint16_t axis_index_offset = 0x800;
 inline constexpr std::uint16_t axis_modbus_offset = 0x400;
 
-inline constexpr std::size_t entry_count = axis_entries.size() + device_entries.size();
+/// All that exists once per axis: settings, then readings.
+inline constexpr auto axis_entries = []<std::size_t... i>(std::index_sequence<i...>) {
+  return std::array<Entry, sizeof...(i)>{
+      (i < axis_settings.size() ? axis_settings[i] : axis_readings[i - axis_settings.size()])...};
+}
+(std::make_index_sequence<axis_settings.size() + axis_readings.size()>{});
 
-/// Both tables behind one index: the axis entries, then the device's.
+inline constexpr std::size_t entry_count =
+    axis_entries.size() + device_entries.size() + communication_entries.size();
+
+/// All tables behind one index: the axis entries, then the device's, then CANopen's own, which are the
+/// device's too.
 constexpr const Entry& entry_at(std::size_t i) {
-  return i < axis_entries.size() ? axis_entries[i] : device_entries[i - axis_entries.size()];
+  if (i < axis_entries.size()) return axis_entries[i];
+  if (i - axis_entries.size() < device_entries.size()) return device_entries[i - axis_entries.size()];
+  return communication_entries[i - axis_entries.size() - device_entries.size()];
 }
 
 /// entry_count if there is none.
@@ -48,8 +62,8 @@ consteval std::size_t entry_of() {
   return found;
 }
 
-/// Address of every entry's first register in its table (holding when it can be written, input when it is
-/// read only), axis 0. Entries of one group follow each other without a gap.
+/// Address of every entry's first register in its table (holding when it can be written through Modbus,
+/// input otherwise), axis 0. Entries of one group follow each other without a gap.
 inline constexpr auto modbus_addresses = [] {
   std::array<std::uint16_t, entry_count> addresses{};
   for (std::size_t i = 0; i < entry_count; ++i) {
@@ -70,7 +84,7 @@ constexpr std::uint16_t modbus_address(std::size_t entry, std::size_t axis) {
 }
 
 /// Values are kept in one array: axis 0's, axis 1's, the device's.
-inline constexpr std::size_t slot_count = axis_count * axis_entries.size() + device_entries.size();
+inline constexpr std::size_t slot_count = (axis_count - 1) * axis_entries.size() + entry_count;
 
 constexpr std::size_t slot_of(std::size_t entry, std::size_t axis) {
   return entry < axis_entries.size() ? axis * axis_entries.size() + entry
@@ -101,6 +115,7 @@ inline constexpr std::uint32_t dictionary_checksum = [] {
     mix(entry.index());
     mix(entry.object_subindex());
     mix(static_cast<std::uint32_t>(entry.type));
+    mix(static_cast<std::uint32_t>(entry.access));
     mix(raw_from_number(entry.type, entry.minimum));
     mix(raw_from_number(entry.type, entry.maximum));
     for (const NamedValue& choice : entry.values) {

@@ -17,13 +17,12 @@ constexpr bool names_and_places_are_unique() {
   return true;
 }
 
-constexpr bool subindices_count_up() {
+constexpr bool subindices_rise() {
   for (std::size_t i = 0; i < entry_count; ++i) {
-    std::uint8_t expected = 1;
     for (std::size_t j = 0; j < i; ++j) {
-      if (entry_at(j).group.index == entry_at(i).group.index) ++expected;
+      if (entry_at(j).group.index == entry_at(i).group.index && entry_at(j).subindex >= entry_at(i).subindex)
+        return false;
     }
-    if (entry_at(i).subindex != expected) return false;
   }
   return true;
 }
@@ -33,9 +32,11 @@ constexpr bool registers_do_not_overlap() {
     const auto a = owner_of(i);
     for (std::size_t j = i + 1; j < slot_count; ++j) {
       const auto b = owner_of(j);
-      if (entry_at(a.entry).access != entry_at(b.entry).access) continue;
+      const bool a_held = entry_at(a.entry).access == Access::read_write;
+      if (a_held != (entry_at(b.entry).access == Access::read_write)) continue;
       const int first = modbus_address(a.entry, a.axis), second = modbus_address(b.entry, b.axis);
-      if (first < second + words_of(entry_at(b.entry).type) && second < first + words_of(entry_at(a.entry).type))
+      if (first < second + words_of(entry_at(b.entry).type) &&
+          second < first + words_of(entry_at(a.entry).type))
         return false;
     }
   }
@@ -66,7 +67,7 @@ constexpr bool defaults_are_allowed() {
 }
 
 static_assert(names_and_places_are_unique());
-static_assert(subindices_count_up());
+static_assert(subindices_rise());
 static_assert(groups_hold_one_access());
 static_assert(defaults_are_allowed());
 static_assert(registers_do_not_overlap());

@@ -8,10 +8,21 @@
 namespace kmax::firmware {
 
 /// How a value is stored and sent. Every value fits 32 bits; a Modbus register holds 16 of them.
-enum class Type : std::uint8_t { unsigned8, integer8, unsigned16, unsigned32, integer32, float32 };
+/// The numbers are in stored parameters: only ever appended to.
+enum class Type : std::uint8_t {
+  unsigned8,
+  integer8,
+  unsigned16,
+  unsigned32,
+  integer32,
+  float32,
+  integer16,
+};
 
-/// read_only values are measured or fixed; command values act when written (a controlword).
-enum class Access : std::uint8_t { read_only, read_write };
+/// read_only values are measured or fixed; command values act when written (a controlword). communication
+/// values are CANopen's own settings: any link reads them, CANopen alone writes them, in the order that CiA
+/// 301 asks for.
+enum class Access : std::uint8_t { read_only, read_write, communication };
 
 /// When a value may be written: disarmed_only ones would make the force jump or the scale change under
 /// the hand.
@@ -50,10 +61,14 @@ struct Entry {
   Change change = Change::any_time;
   bool persistent = true;                ///< part of what save keeps, dump writes and defaults restores
   std::span<const NamedValue> values{};  ///< not empty: a choice, and only these values are allowed
-  std::uint16_t standard_index = 0;      ///< not 0: a CiA 402 object at this index, sub-index 0
+  std::uint16_t standard_index = 0;      ///< not 0: an object of CiA 301 or 402 at this index
+  std::uint8_t standard_subindex = 0;    ///< its sub-index
+  bool node_relative = false;            ///< a COB-ID whose default has the node ID added
 
   constexpr std::uint16_t index() const { return standard_index != 0 ? standard_index : group.index; }
-  constexpr std::uint8_t object_subindex() const { return standard_index != 0 ? std::uint8_t{0} : subindex; }
+  constexpr std::uint8_t object_subindex() const {
+    return standard_index != 0 ? standard_subindex : subindex;
+  }
   constexpr Scope scope() const { return group.scope; }
 
   constexpr Entry disarmed_only() const {
@@ -66,9 +81,20 @@ struct Entry {
     e.persistent = false;
     return e;
   }
-  constexpr Entry at_standard_index(std::uint16_t index) const {
+  constexpr Entry at_standard_index(std::uint16_t index, std::uint8_t sub = 0) const {
     Entry e = *this;
     e.standard_index = index;
+    e.standard_subindex = sub;
+    return e;
+  }
+  constexpr Entry plus_node_id() const {
+    Entry e = *this;
+    e.node_relative = true;
+    return e;
+  }
+  constexpr Entry of_communication() const {
+    Entry e = *this;
+    e.access = Access::communication;
     return e;
   }
 };
@@ -77,12 +103,23 @@ constexpr std::uint16_t words_of(Type type) {
   return type == Type::unsigned32 || type == Type::integer32 || type == Type::float32 ? 2 : 1;
 }
 
+/// Bytes of a value as a CANopen object.
+constexpr std::uint8_t bytes_of(Type type) {
+  if (words_of(type) == 2) return 4;
+  return type == Type::unsigned8 || type == Type::integer8 ? 1 : 2;
+}
+
+constexpr bool is_signed(Type type) {
+  return type == Type::integer8 || type == Type::integer16 || type == Type::integer32;
+}
+
 /// A value as its 32-bit pattern, as it is stored and sent. The number must fit the type.
 constexpr std::uint32_t raw_from_number(Type type, double number) {
   switch (type) {
     case Type::float32:
       return std::bit_cast<std::uint32_t>(static_cast<float>(number));
     case Type::integer8:
+    case Type::integer16:
     case Type::integer32:
       return static_cast<std::uint32_t>(static_cast<std::int32_t>(number));
     case Type::unsigned8:
@@ -98,6 +135,7 @@ constexpr double number_from_raw(Type type, std::uint32_t raw) {
     case Type::float32:
       return static_cast<double>(std::bit_cast<float>(raw));
     case Type::integer8:
+    case Type::integer16:
     case Type::integer32:
       return static_cast<double>(static_cast<std::int32_t>(raw));
     case Type::unsigned8:
@@ -141,6 +179,8 @@ constexpr Entry reading(std::string_view name, Group group, std::uint8_t subinde
   double low = 0, high = 4294967295.0;
   if (type == Type::float32) low = -3.4028234663852886e38, high = 3.4028234663852886e38;
   if (type == Type::integer32) low = -2147483648.0, high = 2147483647.0;
+  if (type == Type::integer16) low = -32768, high = 32767;
+  if (type == Type::integer8) low = -128, high = 127;
   if (type == Type::unsigned16) high = 65535;
   if (type == Type::unsigned8) high = 255;
   Entry e{name, group, subindex, type, unit, low, high, 0, help};

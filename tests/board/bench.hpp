@@ -73,7 +73,7 @@ class BenchWith {
   }
   double get(std::string_view name, std::size_t axis = 0) {
     const firmware::Entry& entry = firmware::entry_at(firmware::entry_named(name));
-    const std::uint8_t function = entry.access == firmware::Access::read_only ? 4 : 3;
+    const std::uint8_t function = entry.access == firmware::Access::read_write ? 3 : 4;
     const Words words = read(function, firmware::address_of(name, axis),
                              static_cast<std::uint8_t>(firmware::words_of(entry.type)));
     if (words.empty()) {

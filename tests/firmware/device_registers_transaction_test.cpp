@@ -183,5 +183,38 @@ TEST_F(Transaction, ReadingsThatChangeMeanwhileAreNotWrittenBack) {
   EXPECT_EQ(registers.values().real<"measured.force">(), 2.5f);
 }
 
+TEST_F(Transaction, AWholeSetMustWaitForItsEnd) {
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  ParameterValues wanted;
+  wanted.set_real<"wall.damping">(3.0f);
+  EXPECT_EQ(registers.set_all(wanted, false).refusal, Refusal::transaction_open);
+  EXPECT_EQ(get("wall.damping"), 0);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("wall.stiffness"), 5000);
+  EXPECT_EQ(registers.set_all(wanted, false).refusal, Refusal::none);
+  EXPECT_EQ(get("wall.damping"), 3);
+  EXPECT_EQ(get("wall.stiffness"), 1000);
+}
+
+// What the device itself takes back meanwhile, for one: a rotor's angle that is lost must not be known again.
+TEST_F(Transaction, ChangesOnlyWhatWasWrittenInIt) {
+  EXPECT_EQ(set("motor.commutation_known", 1), Refusal::none);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
+  EXPECT_EQ(set("wall.damping", 1), Refusal::none);
+  registers.values().set_whole<"motor.commutation_known">(0);
+  registers.values().set_real<"wall.damping">(2.0f);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("motor.commutation_known"), 0);
+  EXPECT_EQ(get("wall.stiffness"), 5000);
+  EXPECT_EQ(get("wall.damping"), 1) << "what was written wins";
+  // Nothing of it is left for the next one.
+  registers.values().set_real<"wall.stiffness">(3000.0f);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(control(2), Refusal::none);
+  EXPECT_EQ(get("wall.stiffness"), 3000);
+}
+
 }  // namespace
 }  // namespace kmax::firmware

@@ -60,7 +60,8 @@ TEST(CheckValue, EveryEntryTakesItsBoundsAndItsDefaultAndNothingBeyond) {
       for (const std::uint32_t nan : {0x7FC00000u, 0xFFC00000u, 0x7F800001u, 0xFFFFFFFFu, 0x7FFFFFFFu})
         EXPECT_EQ(check_value(d, nan), Refusal::not_finite) << e.name;
     } else {
-      const bool is_signed = e.type == Type::integer32 || e.type == Type::integer8;
+      const bool is_signed =
+          e.type == Type::integer32 || e.type == Type::integer16 || e.type == Type::integer8;
       const double least = is_signed ? -2147483648.0 : 0.0, most = is_signed ? 2147483647.0 : 4294967295.0;
       if (e.minimum > least) {
         EXPECT_EQ(check(e.minimum - 1), Refusal::out_of_range) << e.name;
@@ -94,6 +95,17 @@ TEST(CheckValue, ChoicesAreTheListedOnesAndNothingBetween) {
   }
 }
 
+// A pattern of 16 bits whose sign was not extended is another, far number.
+TEST(CheckValue, SignedNumbersOf16BitsAreTakenWithTheirSignExtended) {
+  const SlotDescriptor& target = descriptors[entry_of<"profile.target_torque">()];
+  EXPECT_EQ(check_value(target, static_cast<std::uint32_t>(-32768)), Refusal::none);
+  EXPECT_EQ(check_value(target, static_cast<std::uint32_t>(-1)), Refusal::none);
+  EXPECT_EQ(check_value(target, 0x7FFF), Refusal::none);
+  EXPECT_EQ(check_value(target, 0x8000), Refusal::out_of_range);
+  EXPECT_EQ(check_value(target, 0xFFFF), Refusal::out_of_range);
+  EXPECT_EQ(check_value(target, static_cast<std::uint32_t>(-32769)), Refusal::out_of_range);
+}
+
 RC_GTEST_PROP(CheckValue, AcceptsExactlyTheFiniteNumbersInRange, (std::uint32_t raw)) {
   const auto i = *rc::gen::inRange<std::size_t>(0, entry_count);
   const Entry& e = entry_at(i);
@@ -116,6 +128,7 @@ TEST(Descriptors, AgreeWithTheTable) {
     const SlotDescriptor& d = descriptors[i];
     EXPECT_EQ(d.type, e.type);
     EXPECT_EQ(d.writable, e.access == Access::read_write);
+    EXPECT_EQ(d.kept, e.access == Access::read_write || e.access == Access::communication);
     EXPECT_EQ(d.choice_count, e.values.size());
     for (std::size_t c = 0; c < e.values.size(); ++c)
       EXPECT_EQ(listed_choices[d.first_choice + c], e.values[c].value) << e.name;

@@ -43,7 +43,8 @@ inline double number_in(std::string_view name, const Words& words) {
   const Type type = entry_at(entry_named(name)).type;
   std::uint32_t raw = words.at(0);
   if (words_of(type) == 2) raw = raw << 16 | words.at(1);
-  if (type == Type::integer8) raw = static_cast<std::uint32_t>(static_cast<std::int16_t>(words.at(0)));
+  if (words_of(type) == 1 && is_signed(type))
+    raw = static_cast<std::uint32_t>(static_cast<std::int16_t>(words.at(0)));
   return number_from_raw(type, raw);
 }
 

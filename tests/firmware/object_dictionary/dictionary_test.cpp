@@ -129,10 +129,11 @@ TEST(Dictionary, HasEveryNameOfTheVocabularyWithItsUnitAndChoices) {
   }
 }
 
-// A setting that is kept and is not in the vocabulary would be an undocumented name.
+// A setting that is kept and is not in the vocabulary would be an undocumented name. CANopen's own settings
+// are named by CiA 301.
 TEST(Dictionary, HasNoPersistentNameOutsideTheVocabulary) {
   for (std::size_t i = 0; i < entry_count; ++i) {
-    if (!entry_at(i).persistent) continue;
+    if (!entry_at(i).persistent || entry_at(i).access == Access::communication) continue;
     EXPECT_TRUE(std::any_of(vocabulary.begin(), vocabulary.end(), [&](const Word& w) {
       return w.name == entry_at(i).name;
     })) << entry_at(i).name;
@@ -174,6 +175,22 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"encoder.counts_per_turn", 0x0111, 0x0511},
       {"encoder.offset", 0x0114, 0x0514},
       {"drive.controlword", 0x0200, 0x0600},
+      {"drive.mode", 0x0208, 0x0608},
+      {"profile.operation_mode", 0x0280, 0x0680},
+      {"profile.target_torque", 0x0281, 0x0681},
+      {"profile.max_torque", 0x0282, 0x0682},
+      {"profile.polarity", 0x0283, 0x0683},
+      {"profile.quick_stop_option", 0x0284, 0x0684},
+      {"profile.fault_option", 0x0288, 0x0688},
+      {"profile.operation_mode_display", 0x00C0, 0x04C0},
+      {"profile.velocity", 0x00C1, 0x04C1},
+      {"profile.torque", 0x00C7, 0x04C7},
+      {"profile.device_type", 0x00CB, 0x04CB},
+      {"telemetry.current", 0x00E0, 0x04E0},
+      {"canopen.sync_cob_id", 0x1000, 0x1000},
+      {"rpdo1.cob_id", 0x1100, 0x1100},
+      {"rpdo1.mapped_count", 0x1110, 0x1110},
+      {"tpdo4.mapped_8", 0x13DF, 0x13DF},
       {"drive.statusword", 0x0000, 0x0400},
       {"drive.error_code", 0x0001, 0x0401},
       {"drive.refusal", 0x0002, 0x0402},
@@ -208,11 +225,72 @@ TEST(Dictionary, ModbusAddressesArePinned) {
   }
 }
 
-TEST(Dictionary, Cia402ObjectsStandAtTheStandardsIndex) {
-  EXPECT_EQ(named("drive.controlword").index(), 0x6040);
-  EXPECT_EQ(named("drive.statusword").index(), 0x6041);
-  EXPECT_EQ(named("drive.error_code").index(), 0x603F);
-  EXPECT_EQ(named("drive.statusword").object_subindex(), 0);
+// CiA 402-2's object dictionary: index, type and access, each a VAR.
+TEST(Dictionary, Cia402ObjectsStandAtTheStandardsIndexWithItsTypeAndAccess) {
+  struct Object {
+    std::string_view name;
+    int index;
+    Type type;
+    bool written;
+  };
+  constexpr Object objects[] = {
+      {"drive.error_code", 0x603F, Type::unsigned16, false},
+      {"drive.controlword", 0x6040, Type::unsigned16, true},
+      {"drive.statusword", 0x6041, Type::unsigned16, false},
+      {"profile.quick_stop_option", 0x605A, Type::integer16, true},
+      {"profile.shutdown_option", 0x605B, Type::integer16, true},
+      {"profile.disable_option", 0x605C, Type::integer16, true},
+      {"profile.halt_option", 0x605D, Type::integer16, true},
+      {"profile.fault_option", 0x605E, Type::integer16, true},
+      {"profile.operation_mode", 0x6060, Type::integer8, true},
+      {"profile.operation_mode_display", 0x6061, Type::integer8, false},
+      {"measured.count", 0x6064, Type::integer32, false},
+      {"profile.velocity", 0x606C, Type::integer32, false},
+      {"profile.target_torque", 0x6071, Type::integer16, true},
+      {"profile.max_torque", 0x6072, Type::unsigned16, true},
+      {"profile.rated_current", 0x6075, Type::unsigned32, false},
+      {"profile.rated_torque", 0x6076, Type::unsigned32, false},
+      {"profile.torque", 0x6077, Type::integer16, false},
+      {"profile.current", 0x6078, Type::integer16, false},
+      {"profile.polarity", 0x607E, Type::unsigned8, true},
+      {"profile.supported_modes", 0x6502, Type::unsigned32, false},
+      {"profile.device_type", 0x67FF, Type::unsigned32, false},
+  };
+  std::set<int> listed;
+  for (const Object& object : objects) {
+    const Entry& entry = named(object.name);
+    EXPECT_EQ(entry.index(), object.index) << object.name;
+    EXPECT_EQ(entry.object_subindex(), 0) << object.name;
+    EXPECT_EQ(entry.type, object.type) << object.name;
+    EXPECT_EQ(entry.access, object.written ? Access::read_write : Access::read_only) << object.name;
+    EXPECT_FALSE(entry.persistent) << object.name;
+    EXPECT_EQ(entry.scope(), Scope::axis) << object.name;
+    listed.insert(object.index);
+  }
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    if (entry_at(i).index() >= 0x6000) {
+      EXPECT_TRUE(listed.contains(entry_at(i).index())) << entry_at(i).name;
+    }
+  }
+}
+
+// They are kept, any link may read them and only CANopen writes them: no register of theirs can be written.
+TEST(Dictionary, CommunicationSettingsAreKeptReadAndNeverWrittenThroughModbus) {
+  int count = 0;
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    const Entry& entry = entry_at(i);
+    if (entry.access != Access::communication) continue;
+    ++count;
+    EXPECT_TRUE(entry.persistent) << entry.name;
+    EXPECT_EQ(entry.scope(), Scope::device) << entry.name;
+    EXPECT_EQ(entry.change, Change::any_time) << entry.name;
+    EXPECT_GE(entry.index(), 0x1000) << entry.name;
+    EXPECT_LT(entry.index(), 0x1C00) << entry.name;
+    EXPECT_GE(modbus_address(i, 0), 0x1000) << entry.name;
+    EXPECT_LT(modbus_address(i, 0), 0x1400) << entry.name;
+  }
+  // SYNC, emergency, heartbeat, error behaviour; 4 nodes watched; 4 RPDOs of 2 + 9, 4 TPDOs of 4 + 9.
+  EXPECT_EQ(count, 5 + 4 + 4 * 11 + 4 * 13);
 }
 
 TEST(Dictionary, NoTwoObjectsShareAnIndexOnEitherAxis) {

@@ -14,21 +14,32 @@ constexpr Group plain_group{"group", 0x2000, Scope::axis, 0x10};
 TEST(Entry, WordsOfEveryType) {
   EXPECT_EQ(words_of(Type::unsigned8), 1);
   EXPECT_EQ(words_of(Type::integer8), 1);
+  EXPECT_EQ(words_of(Type::integer16), 1);
   EXPECT_EQ(words_of(Type::unsigned16), 1);
   EXPECT_EQ(words_of(Type::unsigned32), 2);
   EXPECT_EQ(words_of(Type::integer32), 2);
   EXPECT_EQ(words_of(Type::float32), 2);
 }
 
+TEST(Entry, BytesOfEveryTypeAsAnObject) {
+  for (const Type type : {Type::unsigned8, Type::integer8}) EXPECT_EQ(bytes_of(type), 1);
+  for (const Type type : {Type::unsigned16, Type::integer16}) EXPECT_EQ(bytes_of(type), 2);
+  for (const Type type : {Type::unsigned32, Type::integer32, Type::float32}) EXPECT_EQ(bytes_of(type), 4);
+}
+
 TEST(Entry, PatternsOfTheEdgesOfEveryType) {
   EXPECT_EQ(raw_from_number(Type::integer8, -1), 0xFFFFFFFFu);
   EXPECT_EQ(raw_from_number(Type::integer8, -128), 0xFFFFFF80u);
+  EXPECT_EQ(raw_from_number(Type::integer16, -1), 0xFFFFFFFFu);
+  EXPECT_EQ(raw_from_number(Type::integer16, -32768), 0xFFFF8000u);
+  EXPECT_EQ(raw_from_number(Type::integer16, 32767), 0x7FFFu);
   EXPECT_EQ(raw_from_number(Type::integer32, -2147483648.0), 0x80000000u);
   EXPECT_EQ(raw_from_number(Type::unsigned32, 4294967295.0), 0xFFFFFFFFu);
   EXPECT_EQ(raw_from_number(Type::unsigned16, 65535), 0xFFFFu);
   EXPECT_EQ(raw_from_number(Type::float32, 1.0), 0x3F800000u);
   EXPECT_EQ(raw_from_number(Type::float32, -0.0), 0x80000000u);
   EXPECT_EQ(number_from_raw(Type::integer8, 0xFFFFFFFFu), -1.0);
+  EXPECT_EQ(number_from_raw(Type::integer16, 0xFFFF8000u), -32768.0);
   EXPECT_EQ(number_from_raw(Type::unsigned32, 0xFFFFFFFFu), 4294967295.0);
   EXPECT_EQ(number_from_raw(Type::float32, 0x7F7FFFFFu),
             static_cast<double>(std::numeric_limits<float>::max()));
@@ -64,6 +75,15 @@ TEST(Entry, WordsOfARowSetWhatTheySay) {
       whole("group.command", plain_group, 2, Type::unsigned16, "", 0, 9, 0, "h").volatile_value();
   EXPECT_FALSE(command.persistent);
   EXPECT_EQ(command.access, Access::read_write);
+  constexpr Entry id =
+      whole("group.id", plain_group, 4, Type::unsigned32, "", 0, 9, 0, "h").of_communication().plus_node_id();
+  EXPECT_EQ(id.access, Access::communication);
+  EXPECT_TRUE(id.persistent);
+  EXPECT_TRUE(id.node_relative);
+  EXPECT_FALSE(command.node_relative);
+  constexpr Entry torque = reading("group.torque", plain_group, 5, Type::integer16, "", "h");
+  EXPECT_EQ(torque.minimum, -32768);
+  EXPECT_EQ(torque.maximum, 32767);
 }
 
 }  // namespace

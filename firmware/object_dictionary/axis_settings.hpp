@@ -8,7 +8,17 @@ namespace kmax::firmware {
 
 using enum Type;
 
-inline constexpr std::array axis_entries = std::to_array<Entry>({
+/// A CiA 402 option code: 16 bits signed, whatever its choices.
+constexpr Entry stop_option(std::string_view name, std::uint8_t subindex, std::span<const NamedValue> values,
+                            std::int32_t default_value, std::uint16_t index, std::string_view help) {
+  Entry e = choice(name, group::profile, subindex, values, default_value, help).at_standard_index(index);
+  e.type = integer16;
+  e.persistent = false;
+  return e;
+}
+
+/// What can be set of an axis.
+inline constexpr std::array axis_settings = std::to_array<Entry>({
     choice("wall.law", group::wall, 1, names::wall_law, 1,
            "Wall law: no force, plain spring (paper 1 eq. 3), magnetic field of constant coefficient (eqs. "
            "5-6), "
@@ -205,8 +215,8 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
         .at_standard_index(0x6040),
     choice(
         "drive.mode", group::drive_mode, 1, names::drive_mode, 0,
-        "What an armed axis does: render the wall, or follow excitation.* without a wall (identification and "
-        "self-test).")
+        "What an armed axis does: render the wall, follow excitation.* without a wall (identification and "
+        "self-test), or make profile.target_torque. profile.operation_mode is the same in CiA 402's numbers.")
         .disarmed_only()
         .volatile_value(),
 
@@ -297,65 +307,40 @@ inline constexpr std::array axis_entries = std::to_array<Entry>({
          "Its part with the sine of the shaft's angle.")
         .disarmed_only(),
 
-    reading("drive.statusword", group::drive_status, 1, unsigned16, "", "CiA 402 statusword.")
-        .at_standard_index(0x6041),
-    reading("drive.error_code", group::drive_status, 2, unsigned16, "",
-            "CiA 402 error code of the present fault; 0: none.")
-        .at_standard_index(0x603F),
-    reading("drive.refusal", group::drive_status, 3, unsigned16, "",
-            "Why the last request to enable operation was refused; 0: it was not."),
-    reading("drive.fault_value", group::drive_status, 4, float32, "",
-            "The number that tripped the present fault."),
-    reading("drive.fault_bound", group::drive_status, 5, float32, "", "The bound it passed."),
-
-    reading("measured.tick", group::measured, 1, unsigned32, "ticks",
-            "Tick at which these values were taken."),
-    reading("measured.position", group::measured, 2, float32, "m", "Position, re-sampled."),
-    reading("measured.velocity", group::measured, 3, float32, "m/s", "Estimated velocity."),
-    reading("measured.force", group::measured, 4, float32, "N", "Force asked of the device."),
-    reading("measured.distance", group::measured, 5, float32, "m",
-            "Distance outside the wall; negative inside."),
-    reading("measured.magnetic_force", group::measured, 6, float32, "N",
-            "Force of the magnetic field, outwards."),
-    reading("measured.magnetic_coefficient", group::measured, 7, float32, "N", "F_MC at work."),
-    reading("measured.count", group::measured, 8, integer32, "counts", "Position, re-sampled (low 32 bits)."),
-    reading("measured.flags", group::measured, 9, unsigned16, "",
-            "Bit 0 inside the wall, 1 force limited, 2 slew limited, 3 soft start, 4 armed, 5 motor "
-            "saturated: less force "
-            "than asked for."),
-    reading("measured.count_length", group::measured, 10, float32, "m", "Handle travel per encoder count."),
-    reading("measured.resolution", group::measured, 11, float32, "m", "Position step that is really in use."),
-    reading("measured.limited_samples", group::measured, 12, unsigned32, "samples",
-            "Haptic samples since arming whose force was limited."),
-    reading("measured.armed_samples", group::measured, 13, unsigned32, "samples",
-            "Haptic samples since arming."),
-    reading("measured.current", group::measured, 14, float32, "A",
-            "Motor current that makes torque, measured; 0 on a board without current sensors."),
-    reading("measured.current_reference", group::measured, 15, float32, "A", "Motor current asked for."),
-    reading("measured.temperature", group::measured, 16, float32, "degC",
-            "Temperature of the axis' power stage."),
-    reading("measured.winding_temperature", group::measured, 17, float32, "degC",
-            "Temperature of the motor's winding, computed from the current."),
-    reading("measured.current_limit", group::measured, 18, float32, "A",
-            "Current limit in force: current.limit less what the temperatures take."),
-    reading("measured.force_made", group::measured, 19, float32, "N",
-            "Force at the handle that the measured current makes."),
-    reading("measured.commutation_known", group::measured, 20, unsigned8, "",
-            "1: a synchronous motor's electrical angle is known, or none is needed."),
-    reading("measured.excitation_finished", group::measured, 21, unsigned8, "",
-            "1: the present excitation has ended."),
-
-    reading("trip.tick", group::trip, 1, unsigned32, "ticks", "Tick of the present fault."),
-    reading("trip.position", group::trip, 2, float32, "m", "Position in that tick."),
-    reading("trip.velocity", group::trip, 3, float32, "m/s", "Velocity in that tick."),
-    reading("trip.force", group::trip, 4, float32, "N", "Force asked for in that tick."),
-    reading("trip.current", group::trip, 5, float32, "A", "Motor current in that tick."),
-    reading("trip.current_reference", group::trip, 6, float32, "A", "Motor current asked for in that tick."),
-    reading("trip.supply", group::trip, 7, float32, "V", "Supply in that tick; 0 on a board that has none."),
-    reading("trip.temperature", group::trip, 8, float32, "degC",
-            "Power stage's temperature when the fault was seen."),
-    reading("trip.winding_temperature", group::trip, 9, float32, "degC",
-            "Winding's temperature when the fault was seen."),
+    choice("profile.operation_mode", group::profile, 1, names::operation_mode, -1,
+           "CiA 402 modes of operation: -1 haptic, -2 excitation, 10 cyclic synchronous torque. drive.mode "
+           "in the standard's numbers; writing either sets both.")
+        .disarmed_only()
+        .volatile_value()
+        .at_standard_index(0x6060),
+    whole("profile.target_torque", group::profile, 2, integer16, "1/1000", -32768, 32767, 0,
+          "Torque asked for in mode torque, in thousandths of profile.rated_torque, along +x; within "
+          "profile.max_torque and force.limit. 0 whenever the axis is not armed.")
+        .volatile_value()
+        .at_standard_index(0x6071),
+    whole("profile.max_torque", group::profile, 3, unsigned16, "1/1000", 0, 32767, 1000,
+          "Bound on profile.target_torque.")
+        .volatile_value()
+        .at_standard_index(0x6072),
+    choice("profile.polarity", group::profile, 4, names::polarity, 0,
+           "CiA 402 polarity: 192 (bits 7 and 6) turns position and velocity round. encoder.direction in the "
+           "standard's numbers; writing either sets both.")
+        .disarmed_only()
+        .volatile_value()
+        .at_standard_index(0x607E),
+    stop_option("profile.quick_stop_option", 5, names::quick_stop_option, 6, 0x605A,
+                "After a quick stop, which removes the force at once: 0 goes on to 'switch on disabled', 6 "
+                "stays in 'quick stop active' until the voltage is disabled."),
+    stop_option("profile.shutdown_option", 6, names::disable_drive, 0, 0x605B,
+                "0: shutdown removes the force at once."),
+    stop_option("profile.disable_option", 7, names::disable_drive, 0, 0x605C,
+                "0: disabling the operation removes the force at once."),
+    stop_option("profile.halt_option", 8, names::halt_option, 1, 0x605D,
+                "1: controlword bit 8 in mode torque; the torque goes to zero within force.slew_limit, the "
+                "axis stays "
+                "armed."),
+    stop_option("profile.fault_option", 9, names::disable_drive, 0, 0x605E,
+                "0: a fault removes the force at once."),
 });
 
 }  // namespace kmax::firmware

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+#include "board/odrive_v3/priorities.hpp"
+#include "drivers/stm32f4/can.hpp"
+#include "drivers/stm32f4/clock_tree.hpp"
+#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "firmware/application.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+/// CAN1 on connector J2, between its interrupts and the application.
+///
+/// Follows the application's wish for a bit rate and for the identifiers to receive. All CAN interrupts have
+/// the serial line's priority: they and the main loop never wait for each other.
+class CanLine {
+ public:
+  CanLine(drivers::stm32f4::InterruptController<>& interrupts, std::uint32_t peripheral_clock_hz)
+      : interrupts_(interrupts),
+        peripheral_clock_hz_(peripheral_clock_hz),
+        can_(drivers::stm32f4::can1(), PendTransmit{interrupts}) {
+    for (const auto interrupt : all_interrupts) interrupts.set_priority(interrupt, priority::serial);
+  }
+
+  /// Main loop, before the application's poll().
+  void poll(firmware::Application& application, std::uint32_t now_us) {
+    if (now_us - looked_us_ >= status_interval_us) {
+      looked_us_ = now_us;
+      static_cast<void>(can_.poll(now_us));
+      const drivers::stm32f4::CanErrors errors = can_.errors();
+      readings_.transmit_errors = errors.transmit;
+      readings_.receive_errors = errors.receive;
+      readings_.state = state_of(errors);
+    }
+    readings_.received = can_.receive_counters().received;
+    readings_.overruns = can_.receive_counters().overruns;
+    readings_.sent = can_.transmit_counters().sent;
+    readings_.discarded = can_.transmit_counters().discarded;
+    readings_.bus_offs = can_.bus_off_counters().bus_offs;
+    application.set_can(readings_);
+  }
+
+  /// Main loop, after the application's poll().
+  void send(firmware::Application& application) {
+    const firmware::CanSettings wanted = application.can_settings();
+    if (!(wanted == settings_)) configure(wanted);
+    if (!configured_) return;
+    // As many as there is room for; a frame that is taken out of the application is on its way.
+    drivers::CanFrame frame;
+    while (can_.has_room() && application.next_can_frame(frame)) static_cast<void>(can_.send(frame));
+  }
+
+  void ISR_serve_transmit() {
+    can_.ISR_serve_transmit();
+    news_.store(true, std::memory_order_relaxed);
+  }
+  void ISR_receive(unsigned fifo, firmware::Application& application) {
+    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) {
+      application.ISR_can_frame(frame);
+      news_.store(true, std::memory_order_relaxed);
+    });
+  }
+  void ISR_serve_status() { static_cast<void>(can_.ISR_serve_status()); }
+
+  /// An interrupt has left something for the main loop since the last call.
+  bool news() { return news_.exchange(false, std::memory_order_relaxed); }
+
+ private:
+  struct PendTransmit {
+    drivers::stm32f4::InterruptController<>& interrupts;
+    void operator()() const { interrupts.pend(drivers::stm32f4::Interrupt::can1_tx); }
+  };
+  static constexpr std::array all_interrupts = {
+      drivers::stm32f4::Interrupt::can1_tx, drivers::stm32f4::Interrupt::can1_rx0,
+      drivers::stm32f4::Interrupt::can1_rx1, drivers::stm32f4::Interrupt::can1_sce};
+  static constexpr std::uint32_t status_interval_us = 1'000;
+
+  firmware::CanState state_of(const drivers::stm32f4::CanErrors& errors) const {
+    using drivers::stm32f4::CanBusState;
+    if (!configured_) return absent_ ? firmware::CanState::absent : firmware::CanState::stopped;
+    switch (can_.state()) {
+      case CanBusState::off:
+        return firmware::CanState::stopped;
+      case CanBusState::joining:
+        return firmware::CanState::joining;
+      case CanBusState::on_bus:
+        return errors.passive ? firmware::CanState::error_passive : firmware::CanState::active;
+      default:
+        return firmware::CanState::bus_off;
+    }
+  }
+
+  struct Filters {
+    std::array<drivers::stm32f4::CanFilter, firmware::CanSettings::identifiers_max / 2> bank{};
+    std::size_t count = 0;
+    std::span<const drivers::stm32f4::CanFilter> span() const { return std::span(bank).first(count); }
+  };
+  static Filters filters_of(const firmware::CanSettings& wanted) {
+    Filters filters;
+    for (std::size_t i = 0; i < wanted.identifier_count; i += 2) {
+      const std::size_t second = i + 1 < wanted.identifier_count ? i + 1 : i;
+      filters.bank[filters.count++] =
+          drivers::stm32f4::can_filter_standard_list(wanted.identifiers[i], wanted.identifiers[second]);
+    }
+    return filters;
+  }
+
+  /// A bit rate that this clock cannot make, or a controller that does not answer, leaves the node off the
+  /// bus. Other identifiers alone do not interrupt what is under way.
+  void configure(const firmware::CanSettings& wanted) {
+    using namespace drivers::stm32f4;
+    const bool same_rate = configured_ && wanted.bit_rate == settings_.bit_rate;
+    settings_ = wanted;
+    const Filters filters = filters_of(wanted);
+    if (same_rate) {
+      can_.set_filters(filters.span());
+      return;
+    }
+    const CanBitTimingSolution solution = solve_can_bit_timing(peripheral_clock_hz_, wanted.bit_rate);
+    for (const auto interrupt : all_interrupts) interrupts_.disable(interrupt);
+    configured_ = false;
+    if (!solution.usable) return;
+    CanConfig config;
+    config.timing = solution.timing;
+    const CanConfigureResult result = can_.configure(config, filters.span());
+    absent_ = result == CanConfigureResult::no_initialization_mode;
+    configured_ = result == CanConfigureResult::ok || result == CanConfigureResult::waiting_for_idle_bus;
+    if (!configured_) return;
+    for (const auto interrupt : all_interrupts) interrupts_.enable(interrupt);
+  }
+
+  drivers::stm32f4::InterruptController<>& interrupts_;
+  std::uint32_t peripheral_clock_hz_;
+  drivers::stm32f4::Can<PendTransmit> can_;
+  firmware::CanSettings settings_{.bit_rate = 0};
+  firmware::CanReadings readings_{};
+  std::uint32_t looked_us_ = 0;
+  bool configured_ = false, absent_ = false;
+  std::atomic<bool> news_{false};
+};
+
+}  // namespace kmax::board::odrive_v3

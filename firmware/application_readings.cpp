@@ -1,0 +1,134 @@
+// What a host can read.
+#include "firmware/application.hpp"
+#include "firmware/haptic_configuration.hpp"
+#include "firmware/profile_readings.hpp"
+#include "firmware/statusword.hpp"
+
+namespace kmax::firmware {
+
+void Application::refresh_readings() {
+  take_reports();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) refresh_axis_readings(axis);
+  refresh_device_readings();
+  refresh_store_readings();
+}
+
+void Application::refresh_reading(std::size_t slot) {
+  take_reports();
+  const auto [entry, axis] = owner_of(slot);
+  if (descriptors[entry].per_axis) return refresh_axis_readings(axis);
+  // Apart, since it compares every parameter with what is kept.
+  if (entry >= entry_of<"store.state">() && entry <= entry_of<"store.defaulted_3">())
+    return refresh_store_readings();
+  refresh_device_readings();
+}
+
+bool Application::saturated(std::size_t axis) const {
+  // A force source without a motor has no limits of one.
+  return report_[axis].motor.saturated && readings_.has_power_stage;
+}
+
+std::uint32_t Application::flags_of(std::size_t axis) const {
+  const auto& haptic = report_[axis].haptic;
+  return (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) | (haptic.slew_limited ? 4u : 0u) |
+         (haptic.ramping ? 8u : 0u) | (machines_[axis].armed() ? 16u : 0u) | (saturated(axis) ? 32u : 0u);
+}
+
+void Application::refresh_axis_readings(std::size_t axis) {
+  ParameterValues& v = registers_.values();
+  const AxisReport& report = report_[axis];
+  const auto& haptic = report.haptic;
+  const AxisStateMachine& machine = machines_[axis];
+  const bool supply_fault =
+      report.condition == Fault::under_voltage || report.condition == Fault::over_voltage;
+  const DriveStatus status{.state = machine.state(),
+                           .mode = mode(axis),
+                           .supplied = !supply_fault,
+                           .power_stage_on = machine.armed(),
+                           .warning = thermal_[axis].allowance() < 1.0f,
+                           .limited = haptic.limited || haptic.slew_limited || saturated(axis),
+                           .halted = halted_[axis],
+                           .force_is_zero = report.force == 0.0f,
+                           .excitation_finished = report.motor.excitation_finished};
+  v.set_whole<"drive.statusword">(statusword_of(status), axis);
+  v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
+  v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
+  const bool faulty = machine.fault() != Fault::none;
+  v.set_real<"drive.fault_value">(faulty ? fault_value_[axis] : 0.0f, axis);
+  v.set_real<"drive.fault_bound">(faulty ? fault_bound_[axis] : 0.0f, axis);
+
+  const double length = scale_[axis].count_length;
+  const TripRecord& record = trip_record_[axis];
+  v.set_whole<"trip.tick">(faulty ? record.tick : 0U, axis);
+  const auto of_trip = [faulty](float value) { return faulty ? value : 0.0f; };
+  v.set_real<"trip.position">(of_trip(static_cast<float>(static_cast<double>(record.position) * length)),
+                              axis);
+  v.set_real<"trip.velocity">(of_trip(record.velocity), axis);
+  v.set_real<"trip.force">(of_trip(record.force), axis);
+  v.set_real<"trip.current">(of_trip(record.current), axis);
+  v.set_real<"trip.current_reference">(of_trip(record.current_reference), axis);
+  v.set_real<"trip.supply">(of_trip(record.supply), axis);
+  v.set_real<"trip.temperature">(of_trip(fault_temperatures_[axis][0]), axis);
+  v.set_real<"trip.winding_temperature">(of_trip(fault_temperatures_[axis][1]), axis);
+
+  v.set_whole<"measured.tick">(report.tick, axis);
+  v.set_real<"measured.position">(static_cast<float>(static_cast<double>(haptic.position) * length), axis);
+  v.set_real<"measured.velocity">(haptic.velocity, axis);
+  v.set_real<"measured.force">(report.force, axis);
+  v.set_real<"measured.distance">(haptic.outside_distance, axis);
+  v.set_real<"measured.magnetic_force">(haptic.magnetic_force, axis);
+  v.set_real<"measured.magnetic_coefficient">(haptic.magnetic_coefficient, axis);
+  v.set_whole<"measured.count">(static_cast<std::uint32_t>(haptic.position), axis);
+  v.set_whole<"measured.flags">(flags_of(axis), axis);
+  publish_profile(v, axis, report);
+  v.set_real<"measured.count_length">(static_cast<float>(length), axis);
+  v.set_real<"measured.resolution">(scale_[axis].resolution, axis);
+  v.set_whole<"measured.limited_samples">(report.limited_samples, axis);
+  v.set_whole<"measured.armed_samples">(report.armed_samples, axis);
+  v.set_real<"measured.current">(report.motor.current, axis);
+  v.set_real<"measured.current_reference">(report.motor.current_reference, axis);
+  v.set_real<"measured.temperature">(readings_.power_stage_temperature[axis], axis);
+  v.set_real<"measured.winding_temperature">(thermal_[axis].winding_temperature(), axis);
+  v.set_real<"measured.current_limit">(v.real<"current.limit">(axis) * thermal_[axis].allowance(), axis);
+  v.set_real<"measured.force_made">(report.motor.force_made, axis);
+  v.set_whole<"measured.commutation_known">(commutation_known(axis) ? 1U : 0U, axis);
+  v.set_whole<"measured.excitation_finished">(report.motor.excitation_finished ? 1U : 0U, axis);
+}
+
+void Application::refresh_device_readings() {
+  ParameterValues& v = registers_.values();
+  publish_telemetry(v, {flags_of(0), flags_of(1)}, report_[0].tick);
+  v.set_whole<"info.vendor_id">(vendor_id);
+  v.set_whole<"info.product_code">(product_code);
+  v.set_whole<"info.firmware_version">(firmware_version);
+  v.set_whole<"info.serial_number">(board_.serial_number);
+  v.set_whole<"info.dictionary_checksum">(dictionary_checksum);
+  v.set_whole<"info.tick_rate">(tick_rate_hz);
+  v.set_whole<"info.core_clock">(board_.core_clock_hz);
+  v.set_whole<"info.clock_source">(board_.clock_source);
+  v.set_whole<"info.uptime">(uptime_s_);
+  v.set_whole<"info.tick">(report_[0].tick);
+
+  const modbus::RtuPortCounters& port = port_.counters();
+  const modbus::RtuReceiverCounters& line = port_.receiver_counters();
+  v.set_whole<"counters.frames_received">(line.frames_received);
+  v.set_whole<"counters.replies_sent">(port.replies);
+  v.set_whole<"counters.exceptions_sent">(port.exceptions);
+  v.set_whole<"counters.crc_errors">(line.crc_errors);
+  v.set_whole<"counters.line_errors">(line.line_errors);
+  v.set_whole<"counters.gap_errors">(line.gap_errors);
+  v.set_whole<"counters.length_errors">(line.undersize + line.oversize);
+  v.set_whole<"counters.other_units">(port.other_units);
+  v.set_whole<"counters.queue_overflows">(serial_queue_.overflows());
+  v.set_whole<"counters.missed_ticks">(readings_.missed_ticks);
+  v.set_real<"supply.voltage">(readings_.supply_voltage);
+
+  refresh_crash_readings();
+  refresh_capture_readings();
+  refresh_can_readings();
+  v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers_.last_refusal().refusal));
+  v.set_whole<"refusal.register">(registers_.last_refusal().address);
+  v.set_whole<"trace.next">(trace_.next());
+}
+
+}  // namespace kmax::firmware

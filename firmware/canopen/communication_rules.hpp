@@ -1,0 +1,167 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "firmware/canopen/heartbeat_consumer.hpp"
+#include "firmware/canopen/pdo_settings.hpp"
+#include "firmware/canopen/sync.hpp"
+
+// What CiA 301 (7.5.2) asks of a value before it becomes a setting of CANopen. The order it asks for, for a
+// PDO: set bit 31 of the COB-ID; set the number of mapped objects to 0; set the objects; set their number;
+// clear bit 31.
+//
+// 0609 0030  the value is never allowed there
+// 0800 0022  it would be allowed, but not now: the PDO or the emergency message exists, or the number of
+//            mapped objects is not 0. (CiA 301 says that it must not be, without an abort code.)
+// others     see find_mapped() and compile_mapping(); HeartbeatConsumer::check()
+//
+// Where CiA 301 leaves it open:
+//   - a COB-ID with bit 31 set may hold any 11-bit identifier, and may be written at any time: nothing uses
+//   it
+//   - bit 30 of a PDO's COB-ID is free: remote requests are never answered, as most masters write it as 0
+//   - a PDO without a mapped object cannot be made to exist (0609 0030)
+//   - an identifier equal to a predefined one without its node ID (0x280 for TPDO 2) is refused, since it
+//     stands for the predefined one in the stored values; it belongs to no node
+//   - the number of mapped objects may change from one to another without being 0 between
+//   - a time that is written as it is, is not a change
+//
+// Cost: constant; at most 8 searches of the object list. Device (main loop) and host.
+
+namespace kmax::firmware::canopen {
+
+enum class CommunicationRule : std::uint8_t {
+  bounds,
+  sync_cob_id,
+  emergency_cob_id,
+  heartbeat_consumer,
+  pdo_cob_id,
+  transmission_type,
+  inhibit_time,
+  mapped_count,
+  mapped_object,
+};
+
+struct CommunicationRow {
+  CommunicationRule rule = CommunicationRule::bounds;
+  PdoKind kind = PdoKind::receive;
+  std::uint8_t number = 0;       ///< PDO or heartbeat consumer, from 0
+  std::uint32_t predefined = 0;  ///< COB-ID without the node ID
+};
+
+/// CANopen's entries are the last of the dictionary.
+inline constexpr std::size_t first_communication_slot = slot_count - communication_entries.size();
+
+inline constexpr auto communication_rows = [] {
+  std::array<CommunicationRow, communication_entries.size()> rows{};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Entry& entry = communication_entries[i];
+    const std::uint16_t index = entry.index();
+    const std::uint8_t subindex = entry.object_subindex();
+    CommunicationRow& row = rows[i];
+    if (index == 0x1005) row.rule = CommunicationRule::sync_cob_id;
+    if (index == 0x1014) {
+      row.rule = CommunicationRule::emergency_cob_id;
+      row.predefined = cob_id::emergency;
+    }
+    if (index == 0x1016) {
+      row.rule = CommunicationRule::heartbeat_consumer;
+      row.number = static_cast<std::uint8_t>(subindex - 1);
+    }
+    if (index < 0x1400 || index >= 0x1C00) continue;
+    row.kind = index >= 0x1800 ? PdoKind::transmit : PdoKind::receive;
+    row.number = static_cast<std::uint8_t>(index & 0xFF);
+    if ((index & 0x200) != 0) {
+      row.rule = subindex == 0 ? CommunicationRule::mapped_count : CommunicationRule::mapped_object;
+    } else if (subindex == 1) {
+      row.rule = CommunicationRule::pdo_cob_id;
+      row.predefined = (row.kind == PdoKind::transmit ? cob_id::tpdo : cob_id::rpdo)[row.number];
+    } else if (subindex == 2) {
+      row.rule = CommunicationRule::transmission_type;
+    } else if (subindex == 3) {
+      row.rule = CommunicationRule::inhibit_time;
+    }
+  }
+  return rows;
+}();
+
+constexpr bool is_communication(std::size_t slot) {
+  return slot >= first_communication_slot && slot < slot_count;
+}
+
+/// What is kept for a value that a host writes, and what a host reads for what is kept: a predefined COB-ID
+/// is kept without the node ID, so that it follows it. Any other value is kept as it is.
+constexpr std::uint32_t stored_communication(std::size_t slot, std::uint32_t written, std::uint8_t node_id) {
+  const CommunicationRow& row = communication_rows[slot - first_communication_slot];
+  return row.predefined != 0 ? stored_cob_id(written, row.predefined, node_id) : written;
+}
+constexpr std::uint32_t shown_communication(std::size_t slot, std::uint32_t raw, std::uint8_t node_id) {
+  const CommunicationRow& row = communication_rows[slot - first_communication_slot];
+  return row.predefined != 0 ? resolved_cob_id(raw, row.predefined, node_id) : raw;
+}
+
+/// May this entry of Access::communication be set to `written` (a COB-ID: with the node ID) while the values
+/// are `now`? It checks the entry's bounds too. Other entries: 0601 0000.
+constexpr Abort check_communication(const ParameterValues& now, std::size_t slot, std::uint32_t written,
+                                    std::uint8_t node_id) {
+  if (!is_communication(slot)) return Abort::unsupported_access;
+  const CommunicationRow& row = communication_rows[slot - first_communication_slot];
+  const PdoSlots& pdo = slots_of(row.kind, row.number % pdo_count);
+  const bool exists = (now.raw(pdo.cob_id) & cob_id::invalid) == 0;
+  const bool in_bounds = written <= descriptors[owner_of(slot).entry].maximum;
+
+  switch (row.rule) {
+    case CommunicationRule::bounds:
+      return in_bounds ? Abort::none : Abort::value_range;
+
+    case CommunicationRule::sync_cob_id:
+      return Sync::check(written);
+
+    case CommunicationRule::heartbeat_consumer: {
+      std::array<std::uint32_t, watched_node_count> entries{};
+      for (std::size_t i = 0; i < entries.size(); ++i) entries[i] = now.raw(slot - row.number + i);
+      return HeartbeatConsumer::check(row.number, written, entries);
+    }
+
+    case CommunicationRule::emergency_cob_id:
+    case CommunicationRule::pdo_cob_id: {
+      const bool is_pdo = row.rule == CommunicationRule::pdo_cob_id;
+      const std::uint32_t flags = cob_id::invalid | (is_pdo ? cob_id::no_remote : 0U);
+      const std::uint32_t identifier = written & cob_id::identifier;
+      if ((written & ~(flags | cob_id::identifier)) != 0 || identifier == row.predefined)
+        return Abort::value_range;
+      if ((written & cob_id::invalid) != 0) return Abort::none;
+      if (cob_id::restricted(identifier)) return Abort::value_range;
+      const std::uint32_t present = resolved_cob_id(now.raw(slot), row.predefined, node_id);
+      if ((present & cob_id::invalid) == 0)
+        return (present & cob_id::identifier) == identifier ? Abort::none : Abort::device_state;
+      if (!is_pdo) return Abort::none;
+      PdoMapping mapping;
+      const Abort abort = compile_mapping(row.kind, row.number, now, now.raw(pdo.mapped_count), mapping);
+      return abort == Abort::none && mapping.count == 0 ? Abort::value_range : abort;
+    }
+
+    case CommunicationRule::transmission_type:
+      return transmission_type_allowed(written) ? Abort::none : Abort::value_range;
+
+    case CommunicationRule::inhibit_time:
+      if (!in_bounds) return Abort::value_range;
+      return exists && written != now.raw(slot) ? Abort::device_state : Abort::none;
+
+    case CommunicationRule::mapped_count: {
+      if (exists) return Abort::device_state;
+      PdoMapping mapping;
+      return compile_mapping(row.kind, row.number, now, written, mapping);
+    }
+
+    case CommunicationRule::mapped_object: {
+      if (exists || now.raw(pdo.mapped_count) != 0) return Abort::device_state;
+      MappedObject object;
+      return written == 0 ? Abort::none : find_mapped(row.kind, written, object);
+    }
+  }
+  return Abort::general;
+}
+
+}  // namespace kmax::firmware::canopen

@@ -1,0 +1,323 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "drivers/can_frame.hpp"
+#include "firmware/can_port.hpp"
+#include "firmware/canopen/emergency.hpp"
+#include "firmware/canopen/heartbeat_consumer.hpp"
+#include "firmware/canopen/lss_slave.hpp"
+#include "firmware/canopen/nmt.hpp"
+#include "firmware/canopen/rpdo.hpp"
+#include "firmware/canopen/sdo_server.hpp"
+#include "firmware/canopen/sync.hpp"
+#include "firmware/canopen/tpdo.hpp"
+#include "firmware/parameter_values.hpp"
+
+namespace kmax::firmware::canopen {
+
+/// First manufacturer byte of emergencies about the bus and, plus the node ID, about other nodes; axes are 0
+/// and 1.
+inline constexpr std::uint8_t bus_source = 0x7F, watched_source = 0x80;
+
+/// What the owner of a node has to do; several at a time.
+struct NodeEvents {
+  bool remove_force = false;         ///< NMT stop or a reset: no axis may be driven
+  bool reset_node = false;           ///< restart the whole device
+  bool reset_communication = false;  ///< put the settings back, then call start()
+  bool start_node = false;           ///< the first node ID has been given: call start()
+  bool store_identity = false;       ///< keep the pending node ID and bit rate, then call lss().finish()
+  bool heartbeat_lost = false;       ///< of a watched node
+};
+
+/// A CANopen node (CiA 301): all services of one device on one bus, behind one function for frames in and one
+/// for frames out.
+///
+///   states and services     initialising   pre-operational   operational   stopped
+///   NMT, heartbeat, LSS          (LSS)             x               x           x
+///   SDO, SYNC, emergency                           x               x
+///   PDO                                                            x
+///
+/// `Objects`: ObjectAccess, PdoSource, and `bool take(slot, raw)` for what PDOs bring. Frames are sent in the
+/// order boot-up and heartbeat, emergency, PDO, SDO, LSS; the controller sorts them by identifier.
+///
+/// After bus-off a transfer under way is dropped and the state follows canopen.error_behaviour.
+///
+/// Time: microseconds, wraps at 2^32; poll() at least every 100 ms. Main loop only.
+template <typename Objects>
+class Node {
+ public:
+  Node(Objects& objects, const LssIdentity& identity) : objects_(objects), lss_(identity), sdo_(objects) {}
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+  /// Power-on and after a reset of the node: node ID and bit rate are those of the parameters.
+  void power_on(const ParameterValues& values, std::uint32_t now_us) {
+    node_parameters_ = {values.whole<"node.id">(), values.whole<"can.bit_rate">()};
+    lss_.start(static_cast<std::uint8_t>(node_parameters_[0]),
+               static_cast<std::uint32_t>(node_parameters_[1]));
+    start(values, now_us);
+  }
+
+  /// NMT's initialising: ends with the boot-up message. Node ID and bit rate are those that LSS was told, or
+  /// those of the parameters if these have changed since.
+  void start(const ParameterValues& values, std::uint32_t now_us) {
+    const std::array<std::int32_t, 2> wanted{values.whole<"node.id">(), values.whole<"can.bit_rate">()};
+    if (wanted != node_parameters_)
+      lss_.start(static_cast<std::uint8_t>(wanted[0]), static_cast<std::uint32_t>(wanted[1]));
+    node_parameters_ = wanted;
+    lss_.reset_communication();
+    heartbeat_ms_ = static_cast<std::uint16_t>(values.whole<"canopen.heartbeat_time">());
+    nmt_.start(lss_.active_node_id(), heartbeat_ms_, now_us);
+    emergency_.start();
+    heartbeats_.start();
+    stop_pdos();
+    configure(values, now_us);
+    sdo_silent_ = !nmt_.configured();
+    if (sdo_silent_) {
+      sdo_.stop();
+    } else {
+      sdo_.start(node_id());
+    }
+  }
+
+  /// CANopen's own settings have changed.
+  void configure(const ParameterValues& values, std::uint32_t now_us) {
+    const auto setting = [&](std::size_t entry) { return values.raw(slot_of(entry, 0)); };
+    const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
+    sync_.configure(setting(entry_of<"canopen.sync_cob_id">()));
+    const std::uint32_t emergency = setting(entry_of<"canopen.emergency_cob_id">());
+    emergency_.configure(
+        resolved_cob_id(emergency, descriptors[entry_of<"canopen.emergency_cob_id">()].default_value, id),
+        static_cast<std::uint16_t>(setting(entry_of<"canopen.emergency_inhibit_time">())));
+    const auto heartbeat_ms = static_cast<std::uint16_t>(setting(entry_of<"canopen.heartbeat_time">()));
+    if (heartbeat_ms != heartbeat_ms_) nmt_.set_heartbeat(heartbeat_ms, now_us);
+    heartbeat_ms_ = heartbeat_ms;
+    for (std::size_t i = 0; i < watched_node_count; ++i) {
+      const std::uint32_t raw = setting(entry_of<"heartbeat_consumer.node_1">() + i);
+      if (raw != watched_[i]) {
+        if (const auto forgotten = heartbeats_.configure(i, raw))
+          emergency_.clear(0x8130, source_of(*forgotten));
+      }
+      watched_[i] = raw;
+    }
+    error_behaviour_ = static_cast<std::uint8_t>(setting(entry_of<"canopen.error_behaviour">()));
+    rpdos_.configure(values, id);
+    if (nmt_.state() == NmtState::operational) tpdos_.configure(values, id, lss_.active_bit_rate(), now_us);
+    list_identifiers(id);
+  }
+
+  [[nodiscard]] NodeEvents receive(const drivers::CanFrame& frame, const ParameterValues& values,
+                                   std::uint32_t now_us) {
+    NodeEvents events;
+    if (frame.extended || frame.remote) return events;
+    const std::uint32_t id = frame.identifier;
+    if (id == cob_id::nmt) {
+      follow(nmt_.receive(frame), values, now_us, events);
+    } else if (id == cob_id::lss_request) {
+      act_on(lss_.receive(frame, now_us), events);
+    } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
+      if (speaks()) {
+        sdo_.receive(frame, now_us);
+        heard_us_ = now_us;
+      }
+    } else if (nmt_.configured() && only_ours(id)) {
+      ++identity_conflicts_;
+    } else {
+      receive_data(frame, now_us);
+    }
+    return events;
+  }
+
+  [[nodiscard]] NodeEvents poll(std::uint32_t now_us) {
+    NodeEvents events;
+    while (const auto lost = heartbeats_.poll(now_us)) {
+      emergency_.raise({0x8130, error_register::communication, {source_of(*lost)}});
+      events.heartbeat_lost = true;
+    }
+    if (events.heartbeat_lost) communication_error(events);
+    act_on(lss_.poll(now_us), events);
+    sdo_.poll(now_us);
+    if (nmt_.state() == NmtState::operational) tpdos_.poll(now_us);
+    return events;
+  }
+
+  /// The next frame to send, if there is one; it counts as sent.
+  [[nodiscard]] bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
+    if (lss_.quiet()) return false;
+    return nmt_.next_frame(out, now_us) || emergency_.next_frame(out, nmt_.state(), now_us) ||
+           (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, now_us)) ||
+           (speaks() && sdo_.next_frame(out, now_us)) || lss_.next_frame(out);
+  }
+
+  /// The controller has gone off the bus.
+  [[nodiscard]] NodeEvents bus_off() {
+    NodeEvents events;
+    if (nmt_.configured()) sdo_.start(node_id());
+    communication_error(events);
+    return events;
+  }
+
+  Emergency& emergency() { return emergency_; }
+  const Emergency& emergency() const { return emergency_; }
+  LssSlave& lss() { return lss_; }
+  NmtState state() const { return nmt_.state(); }
+  /// 1 to 127, or 255 while there is none.
+  std::uint8_t node_id() const { return nmt_.node_id(); }
+  const CanSettings& settings() const { return settings_; }
+  /// When a host last said something to this node: a transfer, a PDO, a watched heartbeat.
+  std::optional<std::uint32_t> heard_us() const { return heard_us_; }
+
+  const SdoCounters& sdo_counters() const { return sdo_.counters(); }
+  const HeartbeatConsumerCounters& heartbeat_counters() const { return heartbeats_.counters(); }
+  const TpdoCounters& tpdo_counters() const { return tpdos_.counters(); }
+  const RpdoCounters& rpdo_counters() const { return rpdos_.counters(); }
+  std::uint32_t identity_conflicts() const { return identity_conflicts_; }
+
+ private:
+  static constexpr std::uint8_t source_of(std::uint8_t other_node) {
+    return static_cast<std::uint8_t>(watched_source + other_node);
+  }
+
+  bool speaks() const {
+    return nmt_.state() == NmtState::pre_operational || nmt_.state() == NmtState::operational;
+  }
+
+  bool only_ours(std::uint32_t id) const {
+    return id == cob_id::heartbeat + node_id() || id == cob_id::sdo_response + node_id();
+  }
+
+  void receive_data(const drivers::CanFrame& frame, std::uint32_t now_us) {
+    const auto write = [this](std::size_t slot, std::uint32_t raw) { return objects_.take(slot, raw); };
+    if (frame.identifier > cob_id::heartbeat && frame.identifier <= cob_id::heartbeat + highest_node_id) {
+      const std::uint32_t before = heartbeats_.counters().heartbeats;
+      if (const auto back = heartbeats_.receive(frame, now_us)) emergency_.clear(0x8130, source_of(*back));
+      if (heartbeats_.counters().heartbeats != before) heard_us_ = now_us;
+    } else if (speaks() && sync_.receive(frame)) {
+      if (nmt_.state() != NmtState::operational) return;
+      rpdos_.on_sync(write);
+      tpdos_.on_sync();
+    } else if (nmt_.state() == NmtState::operational) {
+      take_pdo(rpdos_.receive(frame, write), now_us);
+    }
+  }
+
+  void take_pdo(RpdoResult result, std::uint32_t now_us) {
+    if (result == RpdoResult::ignored) return;
+    heard_us_ = now_us;
+    report(result == RpdoResult::too_short, 0x8210);
+    report(result == RpdoResult::too_long, 0x8220);
+  }
+
+  /// An error of the host's PDOs, until one is right again.
+  void report(bool present, std::uint16_t code) {
+    if (present) {
+      emergency_.raise({code, error_register::communication, {bus_source}});
+    } else {
+      emergency_.clear(code, bus_source);
+    }
+  }
+
+  void follow(NmtEvent event, const ParameterValues& values, std::uint32_t now_us, NodeEvents& events) {
+    switch (event) {
+      case NmtEvent::none:
+        break;
+      case NmtEvent::entered_operational:
+        sdo_start_if_silent();
+        rpdos_.configure(values, node_id());
+        tpdos_.configure(values, node_id(), lss_.active_bit_rate(), now_us);
+        break;
+      case NmtEvent::entered_pre_operational:
+        sdo_start_if_silent();
+        stop_pdos();
+        break;
+      case NmtEvent::entered_stopped:
+        events.remove_force = true;
+        stop_pdos();
+        sdo_.stop();
+        sdo_silent_ = true;
+        break;
+      case NmtEvent::reset_node:
+        events.remove_force = events.reset_node = true;
+        break;
+      case NmtEvent::reset_communication:
+        events.remove_force = events.reset_communication = true;
+        break;
+    }
+  }
+
+  void stop_pdos() {
+    tpdos_.stop();
+    rpdos_.drop_kept();
+  }
+
+  void sdo_start_if_silent() {
+    if (sdo_silent_) sdo_.start(node_id());
+    sdo_silent_ = false;
+  }
+
+  void act_on(LssAction action, NodeEvents& events) {
+    if (action == LssAction::switch_bit_rate) settings_.bit_rate = lss_.active_bit_rate();
+    if (action == LssAction::store) events.store_identity = true;
+    if (action == LssAction::start_node) events.start_node = true;
+  }
+
+  /// Object 0x1029.
+  void communication_error(NodeEvents& events) {
+    if (error_behaviour_ == 0 && nmt_.state() == NmtState::operational) {
+      if (nmt_.enter(NmtState::pre_operational) != NmtEvent::none) stop_pdos();
+    } else if (error_behaviour_ == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
+      stop_pdos();
+      sdo_.stop();
+      sdo_silent_ = true;
+      events.remove_force = true;
+    }
+  }
+
+  /// All that this node listens to.
+  void list_identifiers(std::uint8_t id) {
+    CanSettings settings;
+    settings.bit_rate = lss_.active_bit_rate();
+    const auto listen = [&settings](std::uint32_t identifier) {
+      if (settings.identifier_count < CanSettings::identifiers_max)
+        settings.identifiers[settings.identifier_count++] = static_cast<std::uint16_t>(identifier);
+    };
+    listen(cob_id::nmt);
+    listen(cob_id::lss_request);
+    if (id != 0) {
+      listen(sync_.identifier());
+      listen(cob_id::sdo_request + id);
+      listen(cob_id::sdo_response + id);
+      listen(cob_id::heartbeat + id);
+      for (std::size_t i = 0; i < pdo_count; ++i) {
+        if (const auto identifier = rpdos_.identifier(i)) listen(*identifier);
+      }
+      for (const std::uint32_t watched : watched_) {
+        const std::uint32_t node = watched >> 16 & 0x7F;
+        if (node != 0 && (watched & 0xFFFF) != 0) listen(cob_id::heartbeat + node);
+      }
+    }
+    settings_ = settings;
+  }
+
+  Objects& objects_;
+  LssSlave lss_;
+  Nmt nmt_;
+  Emergency emergency_;
+  HeartbeatConsumer heartbeats_;
+  Sync sync_;
+  SdoServer<Objects> sdo_;
+  Tpdos tpdos_;
+  Rpdos rpdos_;
+  CanSettings settings_;
+  std::array<std::uint32_t, watched_node_count> watched_{};
+  std::array<std::int32_t, 2> node_parameters_{};  // node.id and can.bit_rate as last taken over
+  std::optional<std::uint32_t> heard_us_;
+  std::uint32_t identity_conflicts_ = 0;
+  std::uint16_t heartbeat_ms_ = 0;
+  std::uint8_t error_behaviour_ = 0;
+  bool sdo_silent_ = false;
+};
+
+}  // namespace kmax::firmware::canopen

@@ -1,0 +1,221 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/can_frame.hpp"
+#include "firmware/canopen/pdo_settings.hpp"
+
+namespace kmax::firmware::canopen {
+
+/// Where the values come from. refresh() brings all readings up to date together; value() is the pattern of a
+/// slot as of then.
+template <typename T>
+concept PdoSource = requires(T source, std::size_t slot) {
+  source.refresh();
+  { source.value(slot) } -> std::convertible_to<std::uint32_t>;
+};
+
+/// They wrap.
+struct TpdoCounters {
+  std::uint32_t sent = 0;
+  std::uint32_t held_back = 0;  ///< due again before the bus had room for it: its newer values were sent
+  std::uint32_t left_out = 0;   ///< not there since its stored settings break the rules, at a configure()
+};
+
+/// The PDOs that this device sends (CiA 301, 7.2.2; objects 0x1800 to 0x1803 and 0x1A00 to 0x1A03). They go
+/// in the NMT state operational: between configure() and stop().
+///
+///   transmission type   due
+///   0                   at a SYNC, if what is in it has changed since it was last sent
+///   1..240              at every nth SYNC
+///   254, 255            every event time; if that is 0, when what is in it has changed, which is looked at
+///                       every millisecond
+///
+/// The event time, and the millisecond, are at least 1 ms x 1 Mbit/s / bit rate: four PDOs then take about
+/// half of the bus. The event times are a fixed grid, which neither late calls nor a busy bus shift. PDOs
+/// with the same event time have one grid, those with multiples of it meet there; a change of one PDO's
+/// settings leaves the others' grid.
+///
+/// All PDOs that are due at one moment are read together when the first of them is fetched, and go in the
+/// order 1 to 4. If one is due again before it was fetched, it goes once, with newer values; and on a bus
+/// that never has room for all of them each gets its turn.
+///
+/// The inhibit time (types 254 and 255) is the least time between two frames of a PDO as they are fetched.
+/// One that is due earlier waits, and is then sent with the values of that moment. An inhibit time as long as
+/// the event time delays frames more and more, until one is left out: make it shorter.
+///
+/// Each PDO is sent once after the start whatever its values: by event or change at once, with SYNC at the
+/// first one that its type counts.
+///
+/// `now_us` wraps at 2^32; call poll() at least every 100 ms, and poll() before next_frame(). Main loop only.
+/// Cost: poll() and next_frame() with nothing to do: 4 and 8 comparisons. A batch: one refresh(), and one
+/// value() for each object of the PDOs that are due. Memory: 368 bytes.
+class Tpdos {
+ public:
+  /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were go
+  /// on undisturbed.
+  void configure(const ParameterValues& values, std::uint8_t node_id, std::uint32_t bit_rate,
+                 std::uint32_t now_us) {
+    const std::uint32_t slowest = std::max<std::uint32_t>(bit_rate, 1000);
+    const std::uint32_t least_us = std::max<std::uint32_t>(1000, 1'000'000'000U / slowest);
+    std::array<bool, pdo_count> starts{};
+    for (std::size_t i = 0; i < pdo_count; ++i) {
+      PdoSettings settings;
+      if (!read_pdo(PdoKind::transmit, i, values, node_id, settings)) ++counters_.left_out;
+      const std::uint32_t period_us = std::max(settings.event_us, least_us);
+      Pdo& pdo = pdos_[i];
+      if (settings == pdo.settings && period_us == pdo.period_us) continue;
+      starts[i] = true;
+      pdo = {.settings = settings,
+             .period_us = period_us,
+             .sent_us = pdo.sent_us,
+             .inhibited = pdo.inhibited && settings.exists && !settings.synchronous() &&
+                          settings.identifier == pdo.settings.identifier};
+    }
+    for (std::size_t i = 0; i < pdo_count; ++i) {
+      if (!starts[i]) continue;
+      pdos_[i].due_us = first_due(pdos_[i].period_us, starts, now_us);
+      starts[i] = false;
+    }
+  }
+
+  /// Nothing is sent any more, and what waits is dropped.
+  void stop() {
+    pdos_ = {};
+    next_ = 0;
+  }
+
+  void on_sync() {
+    for (Pdo& pdo : pdos_) {
+      if (!pdo.settings.exists || !pdo.settings.synchronous()) continue;
+      if (pdo.settings.transmission_type == 0) {
+        want(pdo, State::look);
+      } else if (++pdo.syncs >= pdo.settings.transmission_type) {
+        pdo.syncs = 0;
+        want(pdo, State::due);
+      }
+    }
+  }
+
+  void poll(std::uint32_t now_us) {
+    for (Pdo& pdo : pdos_) {
+      if (!pdo.timed()) continue;
+      release(pdo, now_us);
+      const std::uint32_t late_us = now_us - pdo.due_us;
+      if (late_us >> 31 != 0) continue;
+      const std::uint32_t missed = late_us < pdo.period_us ? 0 : late_us / pdo.period_us;
+      pdo.due_us += (missed + 1) * pdo.period_us;
+      const bool by_time = pdo.settings.event_us != 0;
+      if (by_time && !pdo.inhibited) counters_.held_back += missed;
+      want(pdo, by_time ? State::due : State::look);
+    }
+  }
+
+  /// True and the next frame, if there is one to send; it counts as sent. Call it when there is room for one.
+  template <PdoSource Source>
+  bool next_frame(drivers::CanFrame& out, Source& source, std::uint32_t now_us) {
+    bool anything = false, to_read = false;
+    for (Pdo& pdo : pdos_) {
+      if (pdo.state == State::idle) continue;
+      if (pdo.timed()) release(pdo, now_us);
+      anything = anything || !pdo.inhibited;
+      to_read = to_read || (!pdo.inhibited && !pdo.read);
+    }
+    if (!anything) return false;
+    if (to_read) read_all(source);
+    for (std::size_t i = 0; i < pdo_count; ++i) {
+      const std::size_t n = (next_ + i) % pdo_count;
+      if (!pdos_[n].ready()) continue;
+      fill(out, pdos_[n], now_us);
+      const bool more = std::any_of(pdos_.begin(), pdos_.end(), [](const Pdo& pdo) { return pdo.ready(); });
+      next_ = more ? n + 1 : 0;
+      return true;
+    }
+    next_ = 0;
+    return false;
+  }
+
+  const TpdoCounters& counters() const { return counters_; }
+
+ private:
+  // look: it is due if it has changed.
+  enum class State : std::uint8_t { idle, look, due };
+
+  struct Pdo {
+    PdoSettings settings{};
+    std::uint32_t period_us = 0;
+    std::uint32_t due_us = 0;   // the next time on the grid
+    std::uint32_t sent_us = 0;  // the latest frame, if inhibited
+    std::array<std::uint8_t, 8> data{};
+    std::array<std::uint8_t, 8> sent_data{};
+    State state = State::idle;
+    bool read = false;  // data are of the moment it became due
+    bool sent = false;
+    bool inhibited = false;
+    std::uint8_t syncs = 0;
+
+    bool timed() const { return settings.exists && !settings.synchronous(); }
+    bool ready() const { return state == State::due && read && !inhibited; }
+  };
+
+  void want(Pdo& pdo, State state) {
+    if (pdo.state == State::due && !pdo.inhibited) ++counters_.held_back;
+    if (pdo.state != State::due) pdo.state = state;
+    pdo.read = false;
+  }
+
+  static void release(Pdo& pdo, std::uint32_t now_us) {
+    if (pdo.inhibited && now_us - pdo.sent_us >= pdo.settings.inhibit_us) pdo.inhibited = false;
+  }
+
+  // On the grid of a PDO of the same period that goes already, else on that of any other, else now.
+  std::uint32_t first_due(std::uint32_t period_us, const std::array<bool, pdo_count>& starts,
+                          std::uint32_t now_us) const {
+    const Pdo* other = nullptr;
+    for (std::size_t i = 0; i < pdo_count; ++i) {
+      if (starts[i] || !pdos_[i].timed()) continue;
+      if (other == nullptr || pdos_[i].period_us == period_us) other = &pdos_[i];
+    }
+    if (other == nullptr) return now_us;
+    const std::uint32_t wait_us = other->due_us - now_us;
+    return wait_us >> 31 != 0 ? other->due_us : now_us + wait_us % period_us;
+  }
+
+  template <typename Source>
+  void read_all(Source& source) {
+    source.refresh();
+    for (Pdo& pdo : pdos_) {
+      if (pdo.state == State::idle || pdo.inhibited || pdo.read) continue;
+      std::size_t at = 0;
+      for (std::size_t i = 0; i < pdo.settings.mapping.count; ++i) {
+        const MappedObject& object = pdo.settings.mapping.objects[i];
+        const std::uint32_t raw = source.value(object.slot);
+        for (unsigned bit = 0; bit < object.bits; bit += 8)
+          pdo.data[at++] = static_cast<std::uint8_t>(raw >> bit);
+      }
+      pdo.read = true;
+      if (pdo.state == State::look)
+        pdo.state = pdo.sent && pdo.data == pdo.sent_data ? State::idle : State::due;
+    }
+  }
+
+  void fill(drivers::CanFrame& out, Pdo& pdo, std::uint32_t now_us) {
+    out = {.identifier = pdo.settings.identifier, .length = pdo.settings.mapping.bytes(), .data = pdo.data};
+    pdo.sent_data = pdo.data;
+    pdo.sent = true;
+    pdo.state = State::idle;
+    pdo.sent_us = now_us;
+    pdo.inhibited = pdo.timed() && pdo.settings.inhibit_us != 0;
+    ++counters_.sent;
+  }
+
+  std::array<Pdo, pdo_count> pdos_{};
+  std::size_t next_ = 0;  // looked at first: goes on where a batch was left
+  TpdoCounters counters_;
+};
+
+}  // namespace kmax::firmware::canopen

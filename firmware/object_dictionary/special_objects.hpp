@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "firmware/capture.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
+#include "firmware/trace.hpp"
+
+namespace kmax::firmware {
+
+/// Objects of CANopen that are no values of the dictionary: they act when they are accessed, or are longer
+/// than four bytes. With the entries and each record's sub-index 0 they are all that SDO reaches and the EDS
+/// lists.
+enum class SpecialObject : std::uint8_t {
+  device_type,          ///< 0x1000: CiA 402, several devices in one (CiA 301: 0xFFFF, see 0x67FF and 0x6FFF)
+  error_register,       ///< 0x1001
+  error_history_count,  ///< 0x1003:0; writing 0 erases
+  error_history,        ///< 0x1003:1 to 8, newest first; those beyond the count are not there
+  device_name,          ///< 0x1008
+  hardware_version,     ///< 0x1009
+  software_version,     ///< 0x100A
+  store_parameters,     ///< 0x1010:1, writes 'save' to
+  restore_defaults,     ///< 0x1011:1, writes 'load' to; takes effect at the next reset
+  trace_records,        ///< 0x3020:1 to 64, eight records of the trace window each, little-endian
+  capture_samples,      ///< 0x3021:1, all values of a complete capture, 32 bits each
+  scratch,              ///< 0x3022:1, keeps what is written, for trying transfers
+};
+
+enum class ObjectType : std::uint8_t { unsigned8, unsigned32, visible_string, domain };
+enum class ObjectAccessKind : std::uint8_t { constant, read_only, read_write };
+
+struct SpecialObjectRow {
+  SpecialObject what;
+  std::string_view name;
+  std::uint16_t index;
+  std::uint8_t first_subindex, last_subindex;
+  ObjectType type;
+  ObjectAccessKind access;
+  std::uint32_t default_value;  ///< of numbers
+  std::string_view help;
+};
+
+inline constexpr std::uint32_t device_type_of_several_axes = 0xFFFF'0192;
+inline constexpr std::uint32_t device_type_of_axis = 0x0002'0192;  ///< CiA 402, servo drive
+inline constexpr std::uint32_t signature_save = 0x6576'6173;       ///< "save"
+inline constexpr std::uint32_t signature_load = 0x6461'6F6C;       ///< "load"
+inline constexpr std::uint8_t error_history_length = 8;
+inline constexpr std::uint8_t trace_records_per_object = 8;
+inline constexpr std::uint8_t trace_objects = trace_capacity / trace_records_per_object;
+inline constexpr std::uint32_t trace_object_bytes = 2 * trace_words_per_record * trace_records_per_object;
+inline constexpr std::size_t scratch_bytes = 2048;
+
+inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
+    {SpecialObject::device_type, "Device type", 0x1000, 0, 0, ObjectType::unsigned32,
+     ObjectAccessKind::constant, device_type_of_several_axes,
+     "CiA 402, one device per axis; their types are at 0x67FF and 0x6FFF."},
+    {SpecialObject::error_register, "Error register", 0x1001, 0, 0, ObjectType::unsigned8,
+     ObjectAccessKind::read_only, 0,
+     "Bit 0 any error, 1 current, 2 voltage, 3 temperature, 4 communication, 5 device."},
+    {SpecialObject::error_history_count, "Number of errors", 0x1003, 0, 0, ObjectType::unsigned8,
+     ObjectAccessKind::read_write, 0, "Errors since start, at most 8; writing 0 erases them."},
+    {SpecialObject::error_history, "Error", 0x1003, 1, error_history_length, ObjectType::unsigned32,
+     ObjectAccessKind::read_only, 0, "Error code, and axis x 65536; newest first."},
+    {SpecialObject::device_name, "Device name", 0x1008, 0, 0, ObjectType::visible_string,
+     ObjectAccessKind::constant, 0, "Name of this device."},
+    {SpecialObject::hardware_version, "Hardware version", 0x1009, 0, 0, ObjectType::visible_string,
+     ObjectAccessKind::constant, 0, "Name of the board."},
+    {SpecialObject::software_version, "Software version", 0x100A, 0, 0, ObjectType::visible_string,
+     ObjectAccessKind::constant, 0, "Version of the firmware."},
+    {SpecialObject::store_parameters, "Save all parameters", 0x1010, 1, 1, ObjectType::unsigned32,
+     ObjectAccessKind::read_write, 1, "Writing 'save' (0x65766173) saves; reads 1: on command."},
+    {SpecialObject::restore_defaults, "Restore all default parameters", 0x1011, 1, 1, ObjectType::unsigned32,
+     ObjectAccessKind::read_write, 1,
+     "Writing 'load' (0x64616F6C): all parameters are at their defaults after the "
+     "next reset; reads 1."},
+    {SpecialObject::trace_records, "Trace records", 0x3020, 1, trace_objects, ObjectType::domain,
+     ObjectAccessKind::read_only, 0, "Eight records each of tick, count, force, magnetic coefficient."},
+    {SpecialObject::capture_samples, "Capture samples", 0x3021, 1, 1, ObjectType::domain,
+     ObjectAccessKind::read_only, 0, "All values of a complete capture, 32 bits each."},
+    {SpecialObject::scratch, "Scratch pad", 0x3022, 1, 1, ObjectType::domain, ObjectAccessKind::read_write, 0,
+     "Keeps up to 2048 bytes in RAM, for trying a bus and its transfers."},
+});
+
+}  // namespace kmax::firmware
