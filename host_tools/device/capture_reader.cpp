@@ -211,20 +211,6 @@ void CaptureReader::fail_without_trigger(microseconds patience) {
                   device_.description(), name_of(settings_.trigger), level, seconds));
 }
 
-std::vector<std::uint16_t> CaptureReader::read_window(std::size_t registers, const Tell& tell) {
-  std::vector<std::uint16_t> all;
-  all.reserve(registers);
-  while (all.size() < registers) {
-    const std::size_t count = std::min<std::size_t>(registers - all.size(), link::Link::read_count_max);
-    const auto some = device_.link().read_input(
-        static_cast<std::uint16_t>(firmware::capture_window + all.size()), static_cast<std::uint16_t>(count));
-    all.insert(all.end(), some.begin(), some.end());
-    tell_if_asked(tell, {Phase::reading, static_cast<std::uint32_t>(all.size()),
-                         static_cast<std::uint32_t>(registers)});
-  }
-  return all;
-}
-
 Captured CaptureReader::read(const Tell& tell) {
   const Status before = status();
   if (before.state != CaptureState::complete)
@@ -238,9 +224,13 @@ Captured CaptureReader::read(const Tell& tell) {
         fmt::format("{}: another program has taken the device's capture; try again", device_.description()));
   };
   if (before.channels != channels_.size() || before.taken > samples_of(settings_)) throw taken_away();
+  const std::size_t all = std::size_t{2} * before.taken * before.channels;
   std::vector<std::uint16_t> registers;
   try {
-    registers = read_window(std::size_t{2} * before.taken * before.channels, tell);
+    registers = device_.link().read_input_window(firmware::capture_window, all, [&](std::size_t done) {
+      tell_if_asked(tell,
+                    {Phase::reading, static_cast<std::uint32_t>(done), static_cast<std::uint32_t>(all)});
+    });
   } catch (const link::RefusedError&) {
     throw taken_away();
   }

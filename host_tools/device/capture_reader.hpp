@@ -93,8 +93,8 @@ class CaptureReader {
   /// Ends the capture: what has been taken since the trigger can be read.
   void stop();
 
-  /// All samples, 62 values in a request: 12288 values take 6 s at 115200 baud. DeviceError if the capture is
-  /// not complete.
+  /// All samples. On a serial line 62 values in a request: 12288 values take 6 s at 115200 baud. DeviceError
+  /// if the capture is not complete.
   Captured read(const Tell& tell = {});
 
  private:
@@ -105,7 +105,6 @@ class CaptureReader {
   };
   Status status();
   [[noreturn]] void fail_without_trigger(std::chrono::microseconds patience);
-  std::vector<std::uint16_t> read_window(std::size_t registers, const Tell& tell);
 
   Device& device_;
   std::vector<firmware::CaptureChannel> channels_;

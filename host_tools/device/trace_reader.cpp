@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "firmware/haptic_configuration.hpp"
 #include "firmware/trace.hpp"
+#include "host_tools/device/count_length.hpp"
 
 namespace kmax::device {
 
@@ -28,12 +28,7 @@ TraceReader::TraceReader(Device& device, std::size_t axis, std::uint16_t interva
   const double rate = static_cast<double>(
       std::bit_cast<float>(device_.read(Parameter(firmware::entry_of<"haptic.rate">(), axis))));
   ticks_per_record_ = static_cast<std::uint32_t>(firmware::tick_rate_hz / rate + 0.5) * interval;
-  // From the parameters, not from measured.count_length: that reading is rounded to float.
-  firmware::ParameterValues values;
-  for (const std::size_t entry :
-       {firmware::entry_of<"device.transmission">(), firmware::entry_of<"encoder.counts_per_turn">()})
-    values.set_raw(firmware::slot_of(entry, axis), device_.read(Parameter(entry, axis)));
-  count_length_ = firmware::count_length(values, axis);
+  count_length_ = count_length(device_, axis);
   set_interval(device_, interval);
 }
 

@@ -133,6 +133,11 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
     if (equals == std::string::npos)
       throw ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
     const Parameter parameter = resolve(trimmed(std::string_view(text).substr(0, equals)), default_axis);
+    if (parameter.definition().access == firmware::Access::communication)
+      fail(parameter,
+           fmt::format("it is one of CANopen's own settings, which a CANopen master writes by SDO to object "
+                       "0x{:04X}:{}; here it can only be read",
+                       parameter.index(), parameter.definition().object_subindex()));
     if (!parameter.writable()) fail(parameter, "it is measured or fixed and can only be read");
     if (parameter.entry() == firmware::entry_of<"drive.controlword">())
       fail(parameter, "it is a command, not a value; use 'kmax arm', 'disarm', 'stop' or 'clear'");

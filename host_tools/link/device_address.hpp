@@ -25,7 +25,8 @@ constexpr Number factory_default() {
 ///
 ///   sim                              a simulated device in this process
 ///   serial:PATH[?unit=1&baud=115200] Modbus RTU on a serial port, 8 data bits, even parity, 1 stop bit
-///   can:IFACE[?node=1]               CANopen on a SocketCAN interface
+///   can:IFACE[?node=1]               CANopen on a SocketCAN interface, or on a bus at a Unix socket whose
+///                                    path is written with a '/' in it
 ///
 /// Left-out options are what a device has from the factory (modbus.unit, modbus.baud_rate, node.id).
 struct DeviceAddress {

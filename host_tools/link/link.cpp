@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace kmax::link {
 
 namespace {
@@ -32,5 +34,19 @@ RefusedError::RefusedError(std::uint8_t exception, std::uint8_t function, std::u
       exception_(exception),
       function_(function),
       address_(address) {}
+
+std::vector<std::uint16_t> Link::read_input_window(std::uint16_t address, std::size_t registers,
+                                                   const Progress& tell) {
+  std::vector<std::uint16_t> all;
+  all.reserve(registers);
+  while (all.size() < registers) {
+    const std::size_t count = std::min<std::size_t>(registers - all.size(), read_count_max);
+    const auto some =
+        read_input(static_cast<std::uint16_t>(address + all.size()), static_cast<std::uint16_t>(count));
+    all.insert(all.end(), some.begin(), some.end());
+    if (tell) tell(all.size());
+  }
+  return all;
+}
 
 }  // namespace kmax::link

@@ -20,10 +20,14 @@ class LinkError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The device answered with a Modbus exception: it understood the request and did not carry it out.
+/// The device answered with a Modbus exception, or what stands for one on another link: it understood the
+/// request and did not carry it out.
 class RefusedError : public std::runtime_error {
  public:
   RefusedError(std::uint8_t exception, std::uint8_t function, std::uint16_t address);
+  /// For a link that knows more than the exception.
+  RefusedError(std::uint8_t exception, std::uint8_t function, std::uint16_t address, const std::string& words)
+      : std::runtime_error(words), exception_(exception), function_(function), address_(address) {}
 
   std::uint8_t exception() const { return exception_; }  ///< Modbus exception code, 1..
   std::uint8_t function() const { return function_; }    ///< Modbus function of the request
@@ -55,6 +59,15 @@ class Link {
   /// Exactly `count` registers, 1..read_count_max.
   virtual std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) = 0;
   virtual std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) = 0;
+
+  /// How many of the registers asked for have been read; rises up to all of them. What it throws ends the
+  /// reading and comes through.
+  using Progress = std::function<void(std::size_t done)>;
+
+  /// Any number of input registers, in as many requests as that takes: the values may come from different
+  /// moments.
+  virtual std::vector<std::uint16_t> read_input_window(std::uint16_t address, std::size_t registers,
+                                                       const Progress& tell);
 
   /// 1..write_count_max registers; whole or not at all. Never sent twice: after a LinkError it is unknown
   /// whether the device carried it out.

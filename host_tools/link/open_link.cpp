@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "host_tools/link/can/can_link.hpp"
 #include "host_tools/link/serial_link.hpp"
 #include "host_tools/link/sim_link.hpp"
 
@@ -14,12 +15,9 @@ std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& noti
     case DeviceAddress::Kind::serial:
       return std::make_unique<SerialLink>(address, notice);
     case DeviceAddress::Kind::can:
-      break;
+      return std::make_unique<CanLink>(address, notice);
   }
-  throw AddressError(
-      fmt::format("{}: this version has no CAN link yet; use the device's serial port (serial:PATH) or the "
-                  "simulated device (sim)",
-                  text_of(address)));
+  throw AddressError(fmt::format("{}: no such kind of device", text_of(address)));
 }
 
 }  // namespace kmax::link

@@ -10,7 +10,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <thread>
 
 namespace kmax::link {
 
@@ -41,62 +40,47 @@ bool is_pseudo_terminal(int descriptor) {
 }
 }  // namespace
 
-SerialPortLock::SerialPortLock(const std::string& path, const Notice& notice) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
-  bool noticed = false;
-  for (;;) {
-    // Non-blocking: without it the open would wait for a modem's carrier.
-    if (descriptor_ < 0) descriptor_ = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (descriptor_ < 0 && errno != EBUSY) fail_to_open(path, errno);
-    if (descriptor_ >= 0) {
-      if (isatty(descriptor_) == 0) {
-        close(descriptor_);
-        throw LinkError(fmt::format("{}: this is not a serial port", path));
-      }
-      if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) break;
-    }
-    const auto waited = Clock::now() - start;
-    if (waited > patience) {
-      if (descriptor_ >= 0) close(descriptor_);
-      throw LinkError(fmt::format(
-          "{}: the port is in use by another program ('fuser -v {}' names it); end that one and try again",
-          path, path));
-    }
-    if (!noticed && notice && waited > std::chrono::milliseconds(300)) {
-      notice(fmt::format("waiting for another program to release {}", path));
-      noticed = true;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  pseudo_terminal_ = is_pseudo_terminal(descriptor_);
+SerialPortLock::SerialPortLock(const std::string& path, const Notice& notice) : path_(path) {
+  take(notice);
+  pseudo_terminal_ = is_pseudo_terminal(descriptor_.number());
 }
 
 SerialPortLock::~SerialPortLock() {
   admit_others();
-  close(descriptor_);
 }
 
-void SerialPortLock::lend(std::chrono::microseconds duration) {
-  const bool excluded = excluding_;
-  admit_others();
-  flock(descriptor_, LOCK_UN);
-  std::this_thread::sleep_for(duration);
-  const auto start = std::chrono::steady_clock::now();
-  while (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-    if (std::chrono::steady_clock::now() - start > patience)
-      throw LinkError("another program took the serial port and did not give it back");
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+bool SerialPortLock::try_take() {
+  if (!descriptor_) {
+    // Non-blocking: without it the open would wait for a modem's carrier.
+    FileDescriptor opened(open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    if (!opened && errno == EBUSY) return false;  // its holder excludes others
+    if (!opened) fail_to_open(path_, errno);
+    if (isatty(opened.number()) == 0) throw LinkError(fmt::format("{}: this is not a serial port", path_));
+    descriptor_ = std::move(opened);
   }
-  if (excluded) exclude_others();
+  if (flock(descriptor_.number(), LOCK_EX | LOCK_NB) != 0) return false;
+  if (excluded_before_lending_) exclude_others();
+  excluded_before_lending_ = false;
+  return true;
+}
+
+void SerialPortLock::give_back() {
+  excluded_before_lending_ = excluding_;
+  admit_others();
+  flock(descriptor_.number(), LOCK_UN);
+}
+
+std::string SerialPortLock::words_for_in_use() const {
+  return fmt::format(
+      "the port is in use by another program ('fuser -v {}' names it); end that one and try again", path_);
 }
 
 void SerialPortLock::exclude_others() {
-  if (!pseudo_terminal_) excluding_ = ioctl(descriptor_, TIOCEXCL) == 0;
+  if (!pseudo_terminal_) excluding_ = ioctl(descriptor_.number(), TIOCEXCL) == 0;
 }
 
 void SerialPortLock::admit_others() {
-  if (excluding_) ioctl(descriptor_, TIOCNXCL);
+  if (excluding_) ioctl(descriptor_.number(), TIOCNXCL);
   excluding_ = false;
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <chrono>
 #include <string>
 
-#include "host_tools/link/link.hpp"
+#include "host_tools/link/exclusive_use.hpp"
+#include "host_tools/link/file_descriptor.hpp"
 
 namespace kmax::link {
 
@@ -15,29 +15,28 @@ namespace kmax::link {
 ///
 /// On a real port TIOCEXCL is added (exclude_others()), which keeps out programs that do not lock. Not on a
 /// pseudo-terminal: the mark would outlive this process as long as the other end is open.
-class SerialPortLock {
+class SerialPortLock final : public ExclusiveUse {
  public:
-  static constexpr std::chrono::milliseconds patience{2000};  ///< how long another kmax is waited for
-
   /// Errors: LinkError if the port is missing, is no serial port, may not be opened, or stays in use.
   SerialPortLock(const std::string& path, const Notice& notice);
-  ~SerialPortLock();
-  SerialPortLock(const SerialPortLock&) = delete;
-  SerialPortLock& operator=(const SerialPortLock&) = delete;
+  ~SerialPortLock() override;
 
   bool pseudo_terminal() const { return pseudo_terminal_; }
 
   void exclude_others();
   void admit_others();
 
-  /// Lets others have the port for `duration` and takes it back: a program that keeps an axis armed must not
-  /// keep out the one that stops it. Errors: LinkError if another program does not give it back.
-  void lend(std::chrono::microseconds duration);
-
  private:
-  int descriptor_ = -1;
+  bool try_take() override;
+  void give_back() override;
+  std::string name() const override { return path_; }
+  std::string words_for_in_use() const override;
+
+  std::string path_;
+  FileDescriptor descriptor_;
   bool pseudo_terminal_ = false;
   bool excluding_ = false;
+  bool excluded_before_lending_ = false;
 };
 
 }  // namespace kmax::link

@@ -25,6 +25,8 @@ class PseudoTerminal {
   void write(std::span<const std::uint8_t> bytes);
 
   const std::filesystem::path& device() const { return device_; }
+  /// Readable when read() has something to give.
+  int descriptor() const { return controlling_.number; }
 
  private:
   struct Descriptor {

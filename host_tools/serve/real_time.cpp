@@ -5,7 +5,7 @@
 
 namespace kmax::serve {
 
-PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, PseudoTerminal& line,
+PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, const HostSide& host,
                             const std::function<bool()>& stop) {
   using Clock = std::chrono::steady_clock;
   using std::chrono::microseconds;
@@ -14,11 +14,16 @@ PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, PseudoT
   constexpr auto rest = microseconds(500);
 
   auto& board = simulation.board();
+  board.connect_can(host.can != nullptr);
   PaceReport report;
   auto reached = Clock::now();
   while (!stop()) {
-    const auto received = line.read(rest.count());
-    if (!received.empty()) board.receive(received);
+    wait_for_host(host, rest);
+    if (host.line != nullptr) {
+      const auto received = host.line->read(0);
+      if (!received.empty()) board.receive(received);
+    }
+    if (host.can != nullptr) board.receive_can(host.can->received());
     const auto now = Clock::now();
     if (now - reached > most_behind) {
       report.behind_s += std::chrono::duration<double>(now - reached - most_behind).count();
@@ -29,7 +34,8 @@ PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, PseudoT
     reached += ticks * tick;
     report.ticks += static_cast<std::uint64_t>(ticks);
     const auto reply = board.transmitted();
-    if (!reply.empty()) line.write(reply);
+    if (host.line != nullptr && !reply.empty()) host.line->write(reply);
+    for (const drivers::CanFrame& frame : board.transmitted_can()) host.can->send(frame);
   }
   return report;
 }

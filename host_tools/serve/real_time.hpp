@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "host_tools/serve/pseudo_terminal.hpp"
+#include "host_tools/serve/host_side.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::serve {
@@ -12,13 +12,13 @@ struct PaceReport {
   double behind_s = 0;  ///< real time that was given up because the process had been held up
 };
 
-/// Runs a simulated board at the pace of the real clock, its serial line on a pseudo-terminal, until `stop`
-/// says so (asked about every millisecond).
+/// Runs a simulated board at the pace of the real clock, connected to `host`, until `stop` says so (asked
+/// about every millisecond).
 ///
 /// A process that is held up catches up as long as it is less than 50 ms behind; beyond, the simulated time
 /// stands still for the rest and that is counted. Bytes that arrive together are put on the line one after
 /// the other at its baud rate, so a frame never falls apart because the host was busy.
-PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, PseudoTerminal& line,
+PaceReport run_in_real_time(simulated_board::SimulatedBoard& simulation, const HostSide& host,
                             const std::function<bool()>& stop);
 
 }  // namespace kmax::serve

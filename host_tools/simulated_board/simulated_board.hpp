@@ -18,11 +18,13 @@ class SimulatedBoard {
   /// `store`: where parameters are kept; without it, in memory for the life of this object. Throws
   /// simulation::SceneError or std::invalid_argument.
   explicit SimulatedBoard(const simulation::Scene& scene, firmware::AnyFlashSectors store = {})
-      : device_(scene), board_(device_) {
-    preset(board_.application(), hardware_assignments_of(scene));
-    board_.application().attach_store(store.present() ? store : firmware::AnyFlashSectors::of(memory_));
-    preset(board_.application(), own_assignments_of(scene));
-  }
+      : device_(scene),
+        board_(device_, [this, hardware = hardware_assignments_of(scene), own = own_assignments_of(scene),
+                         store](firmware::Application& application) {
+          preset(application, hardware);
+          application.attach_store(store.present() ? store : firmware::AnyFlashSectors::of(memory_));
+          preset(application, own);
+        }) {}
 
   SimulatedDevice& device() { return device_; }
   board::NativeBoard<SimulatedDevice>& board() { return board_; }

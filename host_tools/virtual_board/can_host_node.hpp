@@ -41,6 +41,11 @@ class CanHostNode final : public CanBusNode {
     connected_ = connected;
     bus_.request(now);
   }
+  void set_bit_time(BoardTime bit_time, BoardTime now) {
+    if (bit_time == bit_time_) return;
+    bit_time_ = bit_time;
+    bus_.request(now);
+  }
   /// Back from bus-off, at once.
   void restart(BoardTime now) {
     errors_.reset();

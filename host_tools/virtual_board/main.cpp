@@ -85,16 +85,27 @@ int run(const Options& options) {
   if (!options.store.empty()) store.emplace(options.store, board);
   virtual_board::store_parameters(board, simulated_board::assignments_of(scene));
   std::optional<serve::PseudoTerminal> line;
+  std::optional<serve::CanConnection> can;
+  std::optional<virtual_board::GpioBridge> gpio;
+  std::vector<std::string> addresses;
   if (!options.serial.empty()) {
     line.emplace(options.serial);
-    fmt::print(
-        "{} on the virtual board with scene '{}', as serial:{}\nset KMAX_DEVICE to that; Ctrl-C ends\n",
-        options.elf, scene.name, options.serial);
+    addresses.push_back("serial:" + options.serial);
+  }
+  if (!options.can.empty()) {
+    can.emplace(options.can);
+    addresses.push_back("can:" + options.can);
+  }
+  if (!options.gpio.empty())
+    gpio.emplace(board, options.gpio, [](const std::string& text) { fmt::print(stderr, "{}\n", text); });
+  if (!addresses.empty()) {
+    fmt::print("{} on the virtual board with scene '{}', as {}\nset KMAX_DEVICE to that; Ctrl-C ends\n",
+               options.elf, scene.name, fmt::join(addresses, " and "));
     std::cout.flush();
   }
-  const auto report =
-      virtual_board::run_board(board, line ? &*line : nullptr, options.duration, options.free_running,
-                               [&] { return interruption.requested(); });
+  const auto report = virtual_board::run_board(
+      board, {line ? &*line : nullptr, can ? &*can : nullptr}, gpio ? &*gpio : nullptr, options.duration,
+      options.free_running, [&] { return interruption.requested(); });
   fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", report.simulated_s,
              board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
   if (report.behind_s > 0.0)
@@ -123,8 +134,14 @@ int main(int argc, char** argv) {
   app.add_option("ELF", options.elf, "The image, as linked")->required()->check(CLI::ExistingFile);
   app.add_option("--serial", options.serial, "Name under which USART2 appears as a pseudo-terminal")
       ->type_name("LINK");
-  app.add_option("--can", options.can, "SocketCAN interface (not in this version)")->type_name("IFACE");
-  app.add_option("--gpio", options.gpio, "GPIO chip for reset, E-stop and fault lines (not in this version)")
+  app.add_option(
+         "--can", options.can,
+         "SocketCAN interface that CAN1 is bridged to; a name with a '/' is a bus that is served at that "
+         "Unix domain socket")
+      ->type_name("IFACE");
+  app.add_option(
+         "--gpio", options.gpio,
+         "Simulated GPIO chip (gpio-sim) whose lines 0 to 4 are NRST, BOOT0, ESTOP, FAULT and HEALTHY")
       ->type_name("CHIP");
   app.add_option("--scene", options.scene,
                  "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
@@ -153,10 +170,6 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? cli::done : cli::wrong_usage;
   }
   try {
-    if (!options.can.empty() || !options.gpio.empty()) {
-      fmt::print(stderr, "kmax-board: --can and --gpio are not in this version; use --serial LINK\n");
-      return cli::wrong_usage;
-    }
     if (options.json && !options.budget) {
       fmt::print(stderr, "kmax-board: --json belongs to --budget\n");
       return cli::wrong_usage;

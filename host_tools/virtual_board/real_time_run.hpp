@@ -2,7 +2,8 @@
 
 #include <functional>
 
-#include "host_tools/serve/pseudo_terminal.hpp"
+#include "host_tools/serve/host_side.hpp"
+#include "host_tools/virtual_board/gpio_bridge.hpp"
 #include "host_tools/virtual_board/virtual_board.hpp"
 
 namespace kmax::virtual_board {
@@ -13,11 +14,12 @@ struct PaceReport {
 };
 
 /// Runs the board at the pace of the real clock, or as fast as it goes (`free_running`), until `stop` says so
-/// or `duration_s` of board time have passed (0: no end). USART2 is on `line`, if there is one.
+/// or `duration_s` of board time have passed (0: no end). USART2 and CAN are connected to `host`, the lines
+/// of the connector to `gpio`, if there is one.
 ///
 /// A process that is held up catches up as long as it is less than 50 ms behind; beyond, the board's time
 /// stands still for the rest and that is counted.
-PaceReport run_board(VirtualBoard& board, serve::PseudoTerminal* line, double duration_s, bool free_running,
-                     const std::function<bool()>& stop);
+PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, double duration_s,
+                     bool free_running, const std::function<bool()>& stop);
 
 }  // namespace kmax::virtual_board

@@ -320,6 +320,11 @@ bool VirtualBoard::healthy() const {
   return ports_[static_cast<std::size_t>(pins::healthy.port)]->level(pins::healthy.number);
 }
 
+bool VirtualBoard::fault_line() const {
+  return ports_[static_cast<std::size_t>(pins::gate_driver_fault.port)]->level(
+      pins::gate_driver_fault.number);
+}
+
 void VirtualBoard::hold_fault_line(bool low) {
   fault_line_held_ = low;
   show_fault_line(now());

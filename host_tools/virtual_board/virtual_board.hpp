@@ -126,6 +126,8 @@ class VirtualBoard {
   void cycle_power();
   /// The gate drivers' wired fault line, pulled low from outside.
   void hold_fault_line(bool low);
+  /// Its level; low is a fault.
+  bool fault_line() const;
 
   bool bridge_armed(std::size_t axis) const { return pwm_[axis]->moe(); }
   std::uint64_t resets() const { return resets_; }
@@ -139,9 +141,10 @@ class VirtualBoard {
   FlashInterface& flash() { return *flash_; }
   RccModel& rcc() { return *rcc_; }
   UsartModel& usart() { return *usart2_; }
-  /// GPIO1 and GPIO2 of J3; the image of today does not use it, nor the CAN bus.
+  /// GPIO1 and GPIO2 of J3; the image of today does not use it.
   UsartModel& uart4() { return *uart4_; }
   CanBus& can_bus() { return can_bus_; }
+  const CanBusNode& can_node() const { return *can1_->node(); }
   AdvancedTimerModel& pwm(std::size_t axis) { return *pwm_[axis]; }
   GeneralTimerModel& encoder_timer(std::size_t axis) { return *encoders_[axis]; }
   AdcModel& adc() { return *adc_; }

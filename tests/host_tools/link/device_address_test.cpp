@@ -29,6 +29,16 @@ TEST(DeviceAddress, TheThreeForms) {
   EXPECT_EQ(can.node, 5);
 }
 
+TEST(DeviceAddress, ABusMayBeAPath) {
+  for (const std::string path : {"./bus", "/run/user/1000/bus:1", "/tmp/a=b&c"}) {
+    const auto address = parse_device_address("can:" + path + "?node=127");
+    EXPECT_EQ(address.path, path);
+    EXPECT_EQ(address.node, 127);
+    EXPECT_EQ(text_of(address), "can:" + path + "?node=127");
+    EXPECT_EQ(parse_device_address("can:" + path).node, 1);
+  }
+}
+
 TEST(DeviceAddress, LeftOutOptionsAreTheFactorys) {
   const auto address = parse_device_address("serial:/tmp/link");
   EXPECT_EQ(address.unit, 1);

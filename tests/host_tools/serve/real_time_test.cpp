@@ -30,7 +30,7 @@ TEST(RealTime, AnswersWhatComesOverTheLine) {
   ASSERT_EQ(write(served.other, request, sizeof request), 8);
   std::vector<std::uint8_t> reply;
   const auto patience = Clock::now() + std::chrono::seconds(30);
-  run_in_real_time(served.simulation, served.line, [&] {
+  run_in_real_time(served.simulation, {.line = &served.line}, [&] {
     std::uint8_t byte = 0;
     while (read(served.other, &byte, 1) == 1) reply.push_back(byte);
     return reply.size() >= 7 || Clock::now() > patience;
@@ -45,7 +45,7 @@ TEST(RealTime, SimulatedAndGivenUpTimeNeverExceedTheRealTime) {
   Served served;
   int asked = 0;
   const auto begin = Clock::now();
-  const PaceReport report = run_in_real_time(served.simulation, served.line, [&] {
+  const PaceReport report = run_in_real_time(served.simulation, {.line = &served.line}, [&] {
     if (++asked == 10) std::this_thread::sleep_for(milliseconds(150));
     return asked >= 20;
   });
@@ -59,7 +59,7 @@ TEST(RealTime, SimulatedAndGivenUpTimeNeverExceedTheRealTime) {
 
 TEST(RealTime, StopsBeforeItBegins) {
   Served served;
-  EXPECT_EQ(run_in_real_time(served.simulation, served.line, [] { return true; }).ticks, 0u);
+  EXPECT_EQ(run_in_real_time(served.simulation, {.line = &served.line}, [] { return true; }).ticks, 0u);
 }
 
 }  // namespace

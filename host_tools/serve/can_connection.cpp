@@ -1,0 +1,66 @@
+#include "host_tools/serve/can_connection.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/link/link.hpp"
+
+namespace kmax::serve {
+
+using std::chrono::microseconds;
+
+CanConnection::CanConnection(const std::string& name) : name_(name) {
+  if (link::is_socket_path(name)) {
+    hub_ = std::make_unique<link::UnixCanHub>(name);
+  } else {
+    port_ = link::open_can_port(name);
+  }
+}
+
+bool CanConnection::connected() {
+  if (hub_ || port_) return true;
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_attempt_) return false;
+  next_attempt_ = now + std::chrono::milliseconds(200);
+  try {
+    port_ = link::open_can_port(name_);
+  } catch (const link::LinkError&) {
+  }
+  return port_ != nullptr;
+}
+
+std::vector<drivers::CanFrame> CanConnection::received() {
+  if (hub_) return hub_->poll();
+  std::vector<drivers::CanFrame> frames;
+  if (!connected()) return frames;
+  try {
+    while (frames.size() < link::UnixCanHub::frames_per_client) {
+      const auto received = port_->receive(microseconds(0));
+      if (!received) break;
+      frames.push_back(received->frame);
+    }
+  } catch (const link::LinkError&) {
+    port_.reset();
+  }
+  return frames;
+}
+
+void CanConnection::send(const drivers::CanFrame& frame) {
+  if (hub_) return hub_->send(frame);
+  if (!connected()) return;
+  try {
+    port_->send(frame);
+  } catch (const link::LinkError&) {
+    port_.reset();
+  }
+}
+
+int CanConnection::descriptor() const {
+  if (hub_) return hub_->descriptor();
+  return port_ ? port_->descriptor() : -1;
+}
+
+std::string CanConnection::address(unsigned node_id) const {
+  return fmt::format("can:{}?node={}", name_, node_id);
+}
+
+}  // namespace kmax::serve

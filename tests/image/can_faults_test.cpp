@@ -1,0 +1,156 @@
+// A bus that fails under an armed axis: the control tick never misses, the axis loses its force, and the link
+// is there again without a power cycle.
+#include <gtest/gtest.h>
+
+#include "firmware/axis_state_machine.hpp"
+#include "firmware/can_port.hpp"
+#include "tests/image/can_bench.hpp"
+
+namespace kmax::tests {
+namespace {
+
+using firmware::DriveState;
+using firmware::Fault;
+using firmware::statusword::state_of;
+using virtual_board::CanOutcome;
+
+/// Axis 0 armed over CAN, far from its wall, so that it may be armed again wherever the hand has moved it.
+class BusFaults : public testing::Test {
+ protected:
+  BusFaults() : bench({{"axis0.wall.law", std::string("plain")}, {"axis0.wall.position", -1.0}}, 1.0) {
+    bench.start();
+    state = state_of(static_cast<std::uint16_t>(bench.arm()));
+  }
+
+  /// By way of the serial line, which has nothing to do with the bus.
+  std::uint32_t serial_number(std::string_view name) {
+    const std::size_t entry = firmware::find_entry(name);
+    const auto words = firmware::words_of(firmware::entry_at(entry).type);
+    const auto read = bench.master->read_input(firmware::register_address(entry, 0), words);
+    return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
+  }
+
+  /// Force is gone, named; no tick was missed.
+  void expect_safe(Fault fault) {
+    EXPECT_FALSE(bench.board->bridge_armed(0));
+    EXPECT_FALSE(bench.board->bridge_armed(1));
+    EXPECT_EQ(firmware::text_of(bench.fault(0)).name, firmware::text_of(fault).name);
+    expect_no_tick_missed();
+  }
+  void expect_no_tick_missed() {
+    EXPECT_EQ(serial_number("counters.missed_ticks"), 0U);
+    EXPECT_EQ(bench.board->resets(), 1U);
+  }
+
+  /// A transfer, and the axis can be armed again.
+  void expect_link_is_back() {
+    bench.port.forget();
+    EXPECT_EQ(bench.number(0x1018, 2), 1U);
+    bench.write(0x6040, 0, 0x00, 2);
+    bench.write(0x6040, 0, 0x80, 2);
+    EXPECT_EQ(state_of(static_cast<std::uint16_t>(bench.arm())), DriveState::operation_enabled);
+    expect_no_tick_missed();
+  }
+
+  CanBench bench;
+  DriveState state{};
+};
+
+TEST_F(BusFaults, NobodyAcknowledges) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.nmt(0x01);
+  bench.board->run_for(0.01);
+  bench.port.node().set_connected(false, bench.board->now());
+  bench.board->run_for(1.2);
+  expect_safe(Fault::link_silent);
+  // Error passive and not bus-off: a node that is alone may not silence itself (ISO 11898-1, fault
+  // confinement).
+  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::error_passive));
+  EXPECT_EQ(serial_number("can.bus_offs"), 0U);
+  EXPECT_GT(serial_number("can.tpdo_held_back"), 1000U);
+  bench.port.node().set_connected(true, bench.board->now());
+  bench.board->run_for(0.1);
+  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
+  expect_link_is_back();
+}
+
+TEST_F(BusFaults, BusOffAndBack) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.nmt(0x01);
+  bench.board->run_for(0.01);
+  // Every frame of this node is destroyed: 32 attempts later it is off the bus.
+  bench.board->can_bus().destroy_frames_of(&bench.board->can_node());
+  bench.board->can_bus().destroy_frames(40);
+  bench.board->run_for(0.02);
+  expect_safe(Fault::bus_off);
+  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::bus_off));
+  EXPECT_EQ(serial_number("can.bus_offs"), 1U);
+  bench.board->can_bus().destroy_frames(0);
+  bench.port.forget();
+  bench.board->run_for(0.3);
+  EXPECT_EQ(serial_number("can.node_state"), 127U) << "the error behaviour's default";
+  // The axis' fault and the bus-off itself are told when that is possible again.
+  bool told = false;
+  while (const auto emergency = bench.next(0x081, 0.001)) told = told || (emergency->frame.data[1] == 0x81);
+  EXPECT_TRUE(told);
+  expect_link_is_back();
+}
+
+TEST_F(BusFaults, ABabblingNodeTakesTheWholeBus) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  virtual_board::CanHostNode babbler(bench.board->can_bus(), 1'000'000);
+  // The most urgent identifier there is, addressed to another node: heard by this one, 20,000 times a second.
+  babbler.babble(drivers::CanFrame{.identifier = 0, .length = 2, .data = {1, 99}}, bench.board->now());
+  const double busy_before = virtual_board::seconds(bench.board->can_bus().busy_time());
+  bench.board->run_for(1.2);
+  EXPECT_GT(virtual_board::seconds(bench.board->can_bus().busy_time()) - busy_before, 1.19) << "full load";
+  expect_safe(Fault::link_silent);
+  babbler.babble(std::nullopt, bench.board->now());
+  bench.board->run_for(0.05);
+  expect_link_is_back();
+}
+
+TEST_F(BusFaults, SegmentsAreLostAndRepeated) {
+  std::vector<std::uint8_t> bytes(2000);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(i * 7);
+  bench.sdo.download({0x3022, 1}, bytes, true);
+  // Destroyed frames are repeated by the controllers; nobody above notices.
+  for (const std::uint64_t every : {1, 3, 7}) {
+    bench.board->can_bus().destroy_frames_of(nullptr);
+    bench.board->can_bus().destroy_frames(every, CanOutcome::crc_error);
+    EXPECT_EQ(bench.sdo.upload({0x3022, 1}, bytes.size()), bytes);
+  }
+  expect_no_tick_missed();
+}
+
+TEST_F(BusFaults, TwoNodesHaveOneIdentifier) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  virtual_board::CanHostNode twin(bench.board->can_bus(), 1'000'000);
+  bench.port.forget();
+  for (int i = 0; i < 20; ++i) {
+    twin.send({.identifier = 0x701, .length = 1, .data = {0x05}}, bench.board->now());
+    bench.board->run_for(0.01);
+  }
+  EXPECT_EQ(serial_number("can.identity_conflicts"), 20U);
+  const auto told = bench.next(0x081, 0.1);
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->frame.data[0] | told->frame.data[1] << 8, 0x8100);
+  // Its answers come beside this node's.
+  twin.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime now) {
+    if (frame.identifier == 0x601)
+      twin.send({.identifier = 0x581, .length = 8, .data = {0x43, 0x18, 0x10, 2, 9, 9, 9, 9}}, now);
+  });
+  for (int i = 0; i < 50; ++i) {
+    bench.port.send({.identifier = 0x601, .length = 8, .data = {0x40, 0x18, 0x10, 2}});
+    bench.board->run_for(0.002);
+  }
+  expect_no_tick_missed();
+  twin.on_frame({});
+  twin.set_connected(false, bench.board->now());
+  bench.board->run_for(1.5);
+  EXPECT_FALSE(bench.board->bridge_armed(0)) << "the host is silent";
+  expect_link_is_back();
+}
+
+}  // namespace
+}  // namespace kmax::tests
