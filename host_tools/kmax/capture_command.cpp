@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "host_tools/device/errors.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/output_file.hpp"
 #include "host_tools/kmax/progress.hpp"
 
 namespace kmax::cli {
@@ -69,18 +69,6 @@ void write_csv(std::ostream& out, const Captured& captured) {
     for (const CaptureColumn& column : captured.columns) line += "," + value_text(column.values[s]);
     out << line << '\n';
   }
-}
-
-std::runtime_error cannot_write(const std::string& path) {
-  return std::runtime_error(
-      fmt::format("{}: cannot be written; does the folder exist, and may you write to it?", path));
-}
-
-/// Before anybody waits for a trigger. Leaves what is there.
-void check_writable(const std::string& path) {
-  const bool was_there = std::filesystem::exists(path);
-  if (!std::ofstream(path, std::ios::app)) throw cannot_write(path);
-  if (!was_there) std::filesystem::remove(path);
 }
 
 Json column_json(const CaptureColumn& column, bool with_values) {

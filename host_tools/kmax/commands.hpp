@@ -25,6 +25,9 @@ void add_store_commands(CLI::App& app, Context& context);      // save, defaults
 void add_info_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
 void add_capture_command(CLI::App& app, Context& context);
+void add_record_command(CLI::App& app, Context& context);
+void add_watch_command(CLI::App& app, Context& context);
+void add_devices_command(CLI::App& app, Context& context);
 void add_calibrate_command(CLI::App& app, Context& context);
 void add_selftest_command(CLI::App& app, Context& context);
 void add_wall_command(CLI::App& app, Context& context);
@@ -32,6 +35,9 @@ void add_simulate_command(CLI::App& app, Context& context);
 void add_experiment_command(CLI::App& app, Context& context);
 void add_plot_command(CLI::App& app, Context& context);
 void add_serve_command(CLI::App& app, Context& context);
+void add_parameter_file_commands(CLI::App& app, Context& context);  ///< dump, load, diff
+void add_lines_commands(CLI::App& app, Context& context);           ///< lines, reset, bootloader
+void add_flash_command(CLI::App& app, Context& context);
 void add_describe_command(CLI::App& app, Context& context);
 
 /// All of them, in the order the help shows.

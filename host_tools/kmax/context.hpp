@@ -10,6 +10,7 @@
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/kmax/exit_code.hpp"
+#include "host_tools/link/can/can_port.hpp"
 #include "host_tools/link/link.hpp"
 
 namespace kmax::cli {
@@ -57,6 +58,9 @@ class Context {
   bool json = false;
   std::string device_option;
   std::optional<std::size_t> axis_option;
+  /// How a CAN bus is reached, besides the link to one device on it.
+  std::function<std::unique_ptr<link::CanPort>(const std::string& bus, const link::CanPortOptions&)>
+      open_bus = link::open_can_port;
   std::function<int()> action;  ///< what the chosen command does; returns an exit code
 
  private:

@@ -3,8 +3,12 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
+#include <cstdlib>
+#include <ctime>
 #include <map>
 
+#include "host_tools/description/dbc.hpp"
+#include "host_tools/description/eds.hpp"
 #include "host_tools/device/suggestion.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -17,6 +21,11 @@ using device::Table;
 
 namespace {
 const std::vector<std::string> formats = {"markdown", "json", "modbus", "eds", "dbc"};
+
+struct DescribeOptions {
+  std::string format;
+  std::optional<unsigned> node;
+};
 
 void describe_json(Context& context) {
   Json objects = Json::array();
@@ -44,6 +53,12 @@ void describe_modbus(Context& context) {
   }
 }
 
+/// Now, or what makes two runs give the same file (reproducible-builds.org, SOURCE_DATE_EPOCH).
+std::time_t time_of_file() {
+  const char* epoch = std::getenv("SOURCE_DATE_EPOCH");
+  return epoch == nullptr ? std::time(nullptr) : static_cast<std::time_t>(std::strtoll(epoch, nullptr, 10));
+}
+
 /// What a bar would be in a cell of a Markdown table.
 std::string escaped(std::string_view text) {
   std::string result;
@@ -54,6 +69,28 @@ std::string escaped(std::string_view text) {
   return result;
 }
 
+std::string kind_of(const firmware::Entry& entry) {
+  switch (entry.access) {
+    case firmware::Access::read_only:
+      return "readings";
+    case firmware::Access::communication:
+      return "settings over CANopen, readings over other links";
+    case firmware::Access::read_write:
+      break;
+  }
+  return "settings";
+}
+
+std::string default_text(const Parameter& parameter) {
+  const auto& entry = parameter.definition();
+  if (entry.access == firmware::Access::read_only) return "";
+  if (entry.node_relative) return fmt::format("0x{:X} + node ID", parameter.default_raw());
+  // An identifier, or an object in a PDO.
+  if (entry.access == firmware::Access::communication && entry.maximum > 4e9)
+    return fmt::format("0x{:X}", parameter.default_raw());
+  return value_text(parameter, parameter.default_raw());
+}
+
 void describe_markdown(Context& context) {
   fmt::print(
       context.out,
@@ -61,7 +98,7 @@ void describe_markdown(Context& context) {
       "Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis\n"
       "parameters again: index + 0x{:X}, Modbus address + 0x{:X}, name with the prefix `axisN.`. Values of "
       "two\n"
-      "registers have the high word first.\n",
+      "registers have the high word first. What is set over CANopen only can be read over every link.\n",
       firmware::axis_index_offset, firmware::axis_modbus_offset);
   std::uint16_t group = 0;
   for (const Parameter& parameter : device::all_parameters()) {
@@ -69,8 +106,7 @@ void describe_markdown(Context& context) {
     const auto& entry = parameter.definition();
     if (entry.group.index != group) {
       group = entry.group.index;
-      fmt::print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name,
-                 parameter.writable() ? "settings" : "readings",
+      fmt::print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
                  parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
       fmt::print(context.out,
                  "| name | unit | allowed | default | type | object | register | help "
@@ -79,28 +115,34 @@ void describe_markdown(Context& context) {
     std::string help = escaped(entry.help);
     if (entry.change == firmware::Change::disarmed_only) help += " Changes only while disarmed.";
     if (parameter.writable() && !entry.persistent) help += " Not saved.";
+    const bool settable = entry.access != firmware::Access::read_only;
     const Json type = description_json(parameter)["type"];
     fmt::print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name,
-               entry.unit, parameter.writable() ? escaped(allowed_text(parameter)) : "read only",
-               parameter.writable() ? value_text(parameter, parameter.default_raw()) : "",
+               entry.unit, settable ? escaped(allowed_text(parameter)) : "read only", default_text(parameter),
                type.get<std::string>(), parameter.index(), entry.object_subindex(), parameter.address(),
                help);
   }
 }
 
-int run_describe(Context& context, std::string format) {
+int run_describe(Context& context, const DescribeOptions& options) {
+  std::string format = options.format;
   if (format.empty()) format = context.json ? "json" : "markdown";
-  if (format == "eds" || format == "dbc")
-    throw UsageError(
-        fmt::format("--format {} is not in this version; there are markdown, json and modbus", format));
   if (std::find(formats.begin(), formats.end(), format) == formats.end())
-    throw UsageError(fmt::format("there is no format '{}'{}; there are markdown, json and modbus", format,
-                                 device::did_you_mean(format, formats)));
+    throw UsageError(fmt::format("there is no format '{}'{}; there are {}", format,
+                                 device::did_you_mean(format, formats), fmt::join(formats, ", ")));
   if (context.json && format != "json")
     throw UsageError(fmt::format("--json and --format {} exclude each other", format));
+  if (options.node && format != "dbc")
+    throw UsageError(fmt::format("--node belongs to --format dbc; {} is the same for every node", format));
   if (format == "json") describe_json(context);
   if (format == "modbus") describe_modbus(context);
   if (format == "markdown") describe_markdown(context);
+  if (format == "eds")
+    description::write_eds(context.out,
+                           {.file_name = "kmax.eds", .version = KMAX_VERSION, .created = time_of_file()});
+  if (format == "dbc")
+    description::write_dbc(context.out, static_cast<std::uint8_t>(
+                                            options.node.value_or(Parameter::of<"node.id">().default_raw())));
   return done;
 }
 }  // namespace
@@ -111,12 +153,20 @@ void add_describe_command(CLI::App& app, Context& context) {
       {"describe", "Writes the object dictionary: every parameter, its range, object and register.",
        "  kmax describe --format markdown > parameters.md\n"
        "  kmax describe --format modbus      register map as CSV\n"
-       "  kmax describe --format json        {\"objects\": [...]}"},
+       "  kmax describe --format json        {\"objects\": [...]}\n"
+       "  kmax describe --format eds > kmax.eds             for CANopen masters and configuration tools\n"
+       "  kmax describe --format dbc --node 5 > kmax.dbc    for programs that show a CAN bus by name"},
       Takes::nothing);
-  auto format = std::make_shared<std::string>();
-  describe->add_option("--format", *format, "markdown (default), json or modbus")->type_name("FORMAT");
-  describe->callback(
-      [&context, format] { context.action = [&context, format] { return run_describe(context, *format); }; });
+  auto options = std::make_shared<DescribeOptions>();
+  describe->add_option("--format", options->format, "markdown (default), json, modbus, eds or dbc")
+      ->type_name("FORMAT");
+  describe
+      ->add_option("--node", options->node, "Node ID of the messages in a dbc file; default: the factory's")
+      ->type_name("N")
+      ->check(CLI::Range(1, 127));
+  describe->callback([&context, options] {
+    context.action = [&context, options] { return run_describe(context, *options); };
+  });
 }
 
 }  // namespace kmax::cli

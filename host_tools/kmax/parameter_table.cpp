@@ -23,6 +23,7 @@ struct Cells {
 
 std::string range_text(const firmware::Entry& entry) {
   if (entry.access == firmware::Access::read_only) return "read only";
+  if (entry.access == firmware::Access::communication) return "set over CANopen";
   if (!entry.values.empty()) {
     std::vector<std::string_view> names;
     for (const auto& value : entry.values) names.push_back(value.name);

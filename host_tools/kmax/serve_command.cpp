@@ -16,9 +16,11 @@ struct ServeOptions {
 };
 
 int run_serve(Context& context, const ServeOptions& options) {
-  if (!options.can.empty()) throw UsageError("--can: this version has no CAN link yet; use --serial LINK");
-  if (options.serial.empty())
-    throw UsageError("--serial LINK is needed: the name under which the serial line appears");
+  if (options.serial.empty() && options.can.empty())
+    throw UsageError(
+        "--serial LINK or --can IFACE is needed: the name under which the serial line appears, or the bus to "
+        "be a "
+        "node on");
   const Interruption interruption;
   const simulation::Scene scene =
       options.scene.empty() ? simulated_board::factory_scene() : simulated_board::open_scene(options.scene);
@@ -26,19 +28,29 @@ int run_serve(Context& context, const ServeOptions& options) {
   if (!options.store.empty()) flash.emplace(options.store);
   simulated_board::SimulatedBoard simulation(
       scene, flash ? firmware::AnyFlashSectors::of(*flash) : firmware::AnyFlashSectors{});
-  serve::PseudoTerminal line(options.serial);
+  std::optional<serve::PseudoTerminal> line;
+  std::optional<serve::CanConnection> can;
+  std::vector<std::string> addresses;
   const auto& values = simulation.board().application().values();
-  const std::string address = fmt::format("serial:{}?unit={}&baud={}", options.serial,
-                                          values.whole<"modbus.unit">(), values.whole<"modbus.baud_rate">());
+  if (!options.serial.empty()) {
+    line.emplace(options.serial);
+    addresses.push_back(fmt::format("serial:{}?unit={}&baud={}", options.serial,
+                                    values.whole<"modbus.unit">(), values.whole<"modbus.baud_rate">()));
+  }
+  if (!options.can.empty()) {
+    can.emplace(options.can);
+    addresses.push_back(can->address(static_cast<unsigned>(values.whole<"node.id">())));
+  }
   if (context.json) {
-    context.print({{"device", address}, {"scene", scene.name}});
+    context.print({{"device", addresses.front()}, {"devices", addresses}, {"scene", scene.name}});
   } else {
     fmt::print(context.out,
                "serving scene '{}' as {}\nset KMAX_DEVICE to that, or give it with --device; Ctrl-C ends\n",
-               scene.name, address);
+               scene.name, fmt::join(addresses, " and "));
   }
   context.out.flush();
-  const auto report = serve::run_in_real_time(simulation, line, [&] { return interruption.requested(); });
+  const auto report = serve::run_in_real_time(simulation, {line ? &*line : nullptr, can ? &*can : nullptr},
+                                              [&] { return interruption.requested(); });
   if (report.behind_s > 0)
     context.note(
         fmt::format("this process was held up: {:.3f} s of real time were not simulated", report.behind_s));
@@ -49,10 +61,14 @@ int run_serve(Context& context, const ServeOptions& options) {
 void add_serve_command(CLI::App& app, Context& context) {
   auto* command = add_command(
       app, context,
-      {"serve", "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line.",
+      {"serve",
+       "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line or on a CAN bus.",
        "  kmax serve --serial /tmp/kmax &\n"
        "  export KMAX_DEVICE=serial:/tmp/kmax\n"
        "  kmax info\n"
+       "  kmax serve --can vcan0 &                 kmax --device can:vcan0 info\n"
+       "  kmax serve --can /tmp/bus &              kmax --device can:/tmp/bus info, without any CAN "
+       "interface\n"
        "  kmax serve --serial /tmp/kmax --store ~/kmax.store    what 'kmax save' keeps outlasts the "
        "process\n\n"
        "The person of the scene presses against the wall whenever axis 0 is armed."},
@@ -62,7 +78,11 @@ void add_serve_command(CLI::App& app, Context& context) {
       ->add_option("--serial", options->serial,
                    "Name under which the serial line (a pseudo-terminal) appears")
       ->type_name("LINK");
-  command->add_option("--can", options->can, "SocketCAN interface (not in this version)")->type_name("IFACE");
+  command
+      ->add_option("--can", options->can,
+                   "SocketCAN interface to be a CANopen node on; a name with a '/' is a bus that is "
+                   "served at that Unix domain socket")
+      ->type_name("IFACE");
   command
       ->add_option("--scene", options->scene,
                    "TOML file or supplied scene (default: touch, factory parameters)")

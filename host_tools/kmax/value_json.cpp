@@ -27,8 +27,22 @@ std::string_view type_name(Type type) {
       return "integer32";
     case Type::float32:
       return "float32";
+    case Type::integer16:
+      return "integer16";
   }
   return "unknown";
+}
+
+std::string_view access_name(firmware::Access access) {
+  switch (access) {
+    case firmware::Access::read_only:
+      return "ro";
+    case firmware::Access::communication:
+      return "rw over CANopen";
+    case firmware::Access::read_write:
+      break;
+  }
+  return "rw";
 }
 }  // namespace
 
@@ -59,7 +73,7 @@ Json description_json(const device::Parameter& parameter) {
       {"subindex", entry.object_subindex()},
       {"type", std::string(type_name(entry.type))},
       {"unit", std::string(entry.unit)},
-      {"access", parameter.writable() ? "rw" : "ro"},
+      {"access", std::string(access_name(entry.access))},
       {"min", number_json(entry.minimum)},
       {"max", number_json(entry.maximum)},
       {"default", value_json(parameter, parameter.default_raw())},

@@ -92,6 +92,12 @@ TEST_F(CommandLine, ASetWithOneBadValueSendsNothing) {
   EXPECT_CONTAINS(said, "wall.damping: -1 N s/m is below");
 }
 
+TEST_F(CommandLine, CanopensOwnSettingsAreNotSetHere) {
+  EXPECT_EQ(kmax({"set", "tpdo1.event_time=5"}), wrong_usage);
+  EXPECT_CONTAINS(said, "a CANopen master writes by SDO to object 0x1800:5");
+  EXPECT_EQ(opened, "");
+}
+
 TEST_F(CommandLine, ExitCodesTellWhoseFaultItIs) {
   EXPECT_EQ(kmax({"set", "haptic.rate=333"}), wrong_usage);  // only the device can tell
   EXPECT_EQ(kmax({"get", "wall.stifness"}), wrong_usage);
@@ -175,7 +181,8 @@ TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
     for (const auto& item : object.items()) found.push_back(item.key());
     EXPECT_EQ(found, keys);
     EXPECT_TRUE(object["values"].is_null() || object["values"].is_array());
-    EXPECT_TRUE(object["access"] == "rw" || object["access"] == "ro");
+    EXPECT_TRUE(object["access"] == "rw" || object["access"] == "ro" ||
+                object["access"] == "rw over CANopen");
     // A client that has only the names can tell the numbers: a name that is a number stands for it, any
     // other for its position.
     if (object["values"].is_null()) continue;
@@ -196,13 +203,18 @@ TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
 TEST_F(CommandLine, DescribeInOtherFormats) {
   EXPECT_EQ(kmax({"describe"}), done);
   EXPECT_CONTAINS(output, "| `wall.stiffness` | N/m | 0 .. 1e6 N/m | 1000 |");
+  EXPECT_CONTAINS(output,
+                  "## canopen: settings over CANopen, readings over other links (per device, Modbus input");
+  EXPECT_CONTAINS(output, "| 0x40000180 + node ID |");
   EXPECT_EQ(kmax({"describe", "--format", "modbus"}), done);
   EXPECT_CONTAINS(output, "\nholding,0x0404,2,float32,rw,axis1.wall.stiffness,N/m,");
   EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), static_cast<long>(firmware::slot_count) + 1);
-  for (const char* later : {"eds", "dbc"}) {
-    EXPECT_EQ(kmax({"describe", "--format", later}), wrong_usage);
-    EXPECT_CONTAINS(said, "not in this version");
-  }
+  EXPECT_EQ(kmax({"describe", "--format", "eds"}), done);
+  EXPECT_CONTAINS(output, "[1800sub1]\nParameterName=tpdo1.cob_id\n");
+  EXPECT_EQ(kmax({"describe", "--format", "dbc", "--node", "5"}), done);
+  EXPECT_CONTAINS(output, "BO_ 389 TPDO1: 8 Kmax\n");
+  EXPECT_EQ(kmax({"describe", "--format", "dbc", "--node", "128"}), wrong_usage);
+  EXPECT_EQ(kmax({"describe", "--format", "eds", "--node", "5"}), wrong_usage);
   EXPECT_EQ(kmax({"describe", "--format", "markdwon"}), wrong_usage);
   EXPECT_CONTAINS(said, "did you mean markdown?");
 }

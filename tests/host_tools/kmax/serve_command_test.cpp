@@ -11,8 +11,8 @@ namespace {
 using Serve = SimulatedCommandLine;
 
 TEST_F(Serve, WhatCannotBeServedIsSaidAtOnce) {
-  expect_error({"serve"}, wrong_usage, "--serial LINK is needed");
-  expect_error({"serve", "--can", "can0"}, wrong_usage, "no CAN link yet");
+  expect_error({"serve"}, wrong_usage, "--serial LINK or --can IFACE is needed");
+  expect_error({"serve", "--can", "no_such_interface"}, failed, "no_such_interface");
   expect_error({"serve", "--serial", in("line"), "--scene", "tuoch"}, wrong_usage, "supplied are");
   folder.write("line", "precious");
   expect_error({"serve", "--serial", in("line")}, failed, "something else has this name");

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "host_tools/flash/board_profile.hpp"
+#include "host_tools/flash/usb_devices.hpp"
+#include "host_tools/kmax/context.hpp"
+#include "host_tools/lines/board_reset.hpp"
+#include "host_tools/lines/gpio_lines.hpp"
+#include "host_tools/lines/lines_config.hpp"
+
+// What the commands for GPIO lines and flashing reach of this computer; tests put their own in.
+
+namespace kmax::cli {
+
+struct BoardServices {
+  std::function<std::unique_ptr<lines::GpioLines>()> open_gpio = lines::kernel_gpio_lines;
+  lines::Sleep sleep = lines::sleep_for;
+  std::filesystem::path usb_devices = flash::kernel_usb_devices;
+};
+
+/// lines, reset, bootloader
+void add_lines_commands(CLI::App& app, Context& context, const BoardServices& services);
+void add_flash_command(CLI::App& app, Context& context, const BoardServices& services);
+
+/// Adds --lines.
+void add_lines_option(CLI::App& command, std::string& file);
+
+/// lines::find_lines_config(); what is wrong with the file is wrong usage.
+lines::LinesConfig read_lines_config(const std::string& file);
+
+/// The board of --board, or of the configuration, or the ODrive. UsageError.
+const flash::BoardProfile& chosen_board(const std::string& option, const lines::LinesConfig& config);
+
+}  // namespace kmax::cli

@@ -1,0 +1,64 @@
+// kmax devices.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <memory>
+
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/reachable_devices.hpp"
+
+namespace kmax::cli {
+
+namespace {
+void append(std::vector<ReachableDevice>& all, const std::vector<ReachableDevice>& more) {
+  all.insert(all.end(), more.begin(), more.end());
+}
+
+int run_devices(Context& context, const std::vector<std::string>& buses) {
+  std::vector<ReachableDevice> devices{{"sim", "a simulated device in this program"}};
+  append(devices, serial_ports("/dev"));
+  append(devices, can_interfaces("/sys/class/net"));
+  for (const std::string& bus : buses) {
+    const auto nodes = nodes_on(bus, link::discover_nodes(bus));
+    if (nodes.empty())
+      context.note(
+          fmt::format("{}: no node answered; is the device powered, the bus terminated, and its "
+                      "bit rate the device's can.bit_rate?",
+                      bus));
+    append(devices, nodes);
+  }
+  if (context.json) {
+    Json list = Json::array();
+    for (const ReachableDevice& device : devices)
+      list.push_back({{"address", device.address.empty() ? Json(nullptr) : Json(device.address)},
+                      {"description", device.description}});
+    context.print({{"devices", list}});
+    return done;
+  }
+  std::size_t width = 0;
+  for (const ReachableDevice& device : devices) width = std::max(width, device.address.size());
+  for (const ReachableDevice& device : devices)
+    fmt::print(context.out, "{:<{}}  {}\n", device.address.empty() ? "-" : device.address, width,
+               device.description);
+  return done;
+}
+}  // namespace
+
+void add_devices_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"devices", "Lists what can be reached: simulated, serial ports, CAN interfaces and the nodes on them.",
+       "  kmax devices\n  kmax devices --can can0     with the nodes on can0\n\n"
+       "The first column is what --device takes. Serial ports are listed, not opened. Nodes are asked for\n"
+       "their identity over SDO, which takes a second for each bus."},
+      Takes::nothing);
+  auto buses = std::make_shared<std::vector<std::string>>();
+  command->add_option("--can", *buses, "Look for nodes on this interface; more than once for several")
+      ->type_name("IFACE");
+  command->callback(
+      [&context, buses] { context.action = [&context, buses] { return run_devices(context, *buses); }; });
+}
+
+}  // namespace kmax::cli

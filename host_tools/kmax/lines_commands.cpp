@@ -1,0 +1,366 @@
+// kmax lines, reset, bootloader.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+
+#include "host_tools/kmax/board_services.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+
+namespace kmax::cli {
+
+using lines::LineRole;
+using lines::LinesConfig;
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+struct LinesOptions {
+  std::string file;
+  std::vector<std::string> texts;
+  double duration = 0;
+};
+
+constexpr milliseconds look_around{100};
+
+/// A line that the configuration lacks is wrong usage; whatever else goes wrong is not.
+template <typename Call>
+int with_lines(const LinesOptions& options, Call call) {
+  const LinesConfig config = read_lines_config(options.file);
+  try {
+    return call(config);
+  } catch (const lines::LinesConfigError& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void require_some(const LinesConfig& config) {
+  if (!config.lines.empty()) return;
+  throw UsageError(
+      fmt::format("no lines are configured{}; write into {} which line is wired to what, for example\n"
+                  "  [lines.reset]\n  chip = \"gpiochip0\"\n  line = 17",
+                  config.file.empty() ? "" : " in " + config.file,
+                  config.file.empty() ? lines::default_lines_file().string() : "it"));
+}
+
+/// End of --for, or never.
+std::function<bool()> until(const LinesOptions& options, const Interruption& interruption) {
+  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                      std::chrono::duration<double>(options.duration));
+  const bool limited = options.duration > 0;
+  return [=, &interruption] { return interruption.requested() || (limited && Clock::now() >= end); };
+}
+
+int list_lines(Context& context, const BoardServices& services, const LinesConfig& config) {
+  require_some(config);
+  const auto gpio = services.open_gpio();
+  Json document = Json::object();
+  std::exception_ptr first_error;
+  for (const auto& [role, settings] : config.lines) {
+    const std::string name(lines::facts_of(role).name);
+    try {
+      const lines::LineFacts facts = gpio->describe(settings);
+      const std::string state =
+          facts.active ? std::string(lines::state_word(role, *facts.active)) : "unknown";
+      if (context.json) {
+        document[name] = {{"chip", facts.chip},
+                          {"label", facts.label},
+                          {"line", facts.offset},
+                          {"name", facts.name},
+                          {"direction", facts.output ? "output" : "input"},
+                          {"held_by", facts.consumer.empty() ? Json(nullptr) : Json(facts.consumer)},
+                          {"level", facts.high ? Json(*facts.high ? "high" : "low") : Json(nullptr)},
+                          {"active", facts.active ? Json(*facts.active) : Json(nullptr)},
+                          {"state", facts.active ? Json(state) : Json(nullptr)}};
+        continue;
+      }
+      fmt::print(context.out, "{:15} {} line {}{}, {}: {}\n", name, facts.chip, facts.offset,
+                 facts.name.empty() ? "" : fmt::format(" \"{}\"", facts.name),
+                 facts.output ? "output" : "input",
+                 facts.high ? fmt::format("{}, {}", *facts.high ? "high" : "low", state)
+                            : fmt::format("held by {}", facts.consumer));
+    } catch (const lines::LineError& error) {
+      // The others are still worth seeing.
+      if (!first_error) first_error = std::current_exception();
+      if (context.json) {
+        document[name] = {{"error", error.what()}};
+      } else {
+        fmt::print(context.out, "{:15} {}\n", name, error.what());
+      }
+    }
+  }
+  if (context.json) context.print(document);
+  if (first_error && !context.json) std::rethrow_exception(first_error);
+  return first_error ? failed : done;
+}
+
+LineRole role_of(const std::string& name) {
+  if (const auto role = lines::role_named(name)) return *role;
+  std::string names;
+  for (const auto& facts : lines::all_roles) names += (names.empty() ? "" : ", ") + std::string(facts.name);
+  throw UsageError(fmt::format("there is no line '{}'; lines are {}", name, names));
+}
+
+std::string seconds_text(std::chrono::nanoseconds time) {
+  return fmt::format("{}.{:09}", time.count() / 1'000'000'000, time.count() % 1'000'000'000);
+}
+
+int watch_lines(Context& context, const BoardServices& services, const LinesOptions& options,
+                const LinesConfig& config) {
+  std::vector<LineRole> roles;
+  for (const std::string& name : options.texts) roles.push_back(role_of(name));
+  if (options.texts.empty()) {
+    require_some(config);
+    for (const auto& [role, settings] : config.lines) {
+      if (lines::facts_of(role).from_board) roles.push_back(role);
+    }
+    if (roles.empty())
+      throw UsageError(
+          "neither fault nor healthy is configured; name the lines to watch, as in 'kmax lines watch --line "
+          "reset'");
+  }
+  std::vector<lines::LineSettings> settings;
+  for (const LineRole role : roles) settings.push_back(config.required(role));
+
+  const Interruption interruption;
+  const auto gpio = services.open_gpio();
+  const auto watch = gpio->watch(settings);
+  const auto over = until(options, interruption);
+  Json start = Json::object(), edges = Json::array();
+  const std::vector<bool> states = watch->states();
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    const std::string word(lines::state_word(roles[i], states[i]));
+    start[std::string(lines::facts_of(roles[i]).name)] = word;
+    if (!context.json)
+      fmt::print(context.out, "{:>20}  {:15} {}\n", "now", lines::facts_of(roles[i]).name, word);
+  }
+  context.out.flush();
+  // The wait ends at an edge; its limit is only for the end of the whole.
+  while (!over()) {
+    for (const lines::Edge& edge : watch->wait(look_around)) {
+      const std::string name(lines::facts_of(roles[edge.line]).name);
+      const std::string word(lines::state_word(roles[edge.line], edge.active));
+      if (context.json) {
+        edges.push_back(
+            {{"line", name}, {"state", word}, {"active", edge.active}, {"time_ns", edge.time.count()}});
+      } else {
+        fmt::print(context.out, "{:>20}  {:15} {}\n", seconds_text(edge.time), name, word);
+      }
+    }
+    context.out.flush();
+  }
+  if (context.json) context.print({{"start", start}, {"edges", edges}});
+  return done;
+}
+
+struct Assignment {
+  LineRole role;
+  bool active;
+};
+
+Assignment parsed(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos)
+    throw UsageError(fmt::format("'{}': write NAME=STATE, as in emergency_stop=stop", text));
+  const LineRole role = role_of(text.substr(0, equals));
+  const auto& facts = lines::facts_of(role);
+  if (role != LineRole::emergency_stop && role != LineRole::boot0 && role != LineRole::reset)
+    throw UsageError(
+        fmt::format("'{}': {}; lines to set are reset, boot0 and emergency_stop", text,
+                    facts.from_board ? "the board drives this line" : "this line is the debug port's"));
+  const std::string word = text.substr(equals + 1);
+  for (const bool active : {true, false}) {
+    if (word == lines::state_word(role, active)) return {role, active};
+  }
+  throw UsageError(
+      fmt::format("'{}': {} is set to {} or {}", text, facts.name, facts.active, facts.inactive));
+}
+
+/// Where a line is left: the board stops, and starts its application.
+bool final_state(LineRole role) {
+  return role == LineRole::emergency_stop;
+}
+
+int set_lines(Context& context, const BoardServices& services, const LinesOptions& options,
+              const LinesConfig& config) {
+  if (options.texts.empty()) throw UsageError("write NAME=STATE, as in 'kmax lines set emergency_stop=stop'");
+  std::vector<Assignment> assignments;
+  for (const std::string& text : options.texts) {
+    const Assignment one = parsed(text);
+    if (std::ranges::any_of(assignments, [&](const auto& other) { return other.role == one.role; }))
+      throw UsageError(fmt::format("'{}': {} is named twice", text, lines::facts_of(one.role).name));
+    config.required(one.role);
+    assignments.push_back(one);
+  }
+  const Interruption interruption;
+  const auto gpio = services.open_gpio();
+  std::vector<std::unique_ptr<lines::OutputLine>> held;
+  Json document = Json::object();
+  for (const auto& [role, active] : assignments) {
+    held.push_back(gpio->drive(config.required(role), active));
+    const std::string name(lines::facts_of(role).name), word(lines::state_word(role, active));
+    document[name] = word;
+    if (!context.json) fmt::print(context.out, "{} = {}\n", name, word);
+  }
+  context.out.flush();
+  if (std::ranges::any_of(assignments, [](const auto& one) { return one.role == LineRole::emergency_stop; }))
+    context.note(
+        "the emergency stop is a normally closed contact to ground: open is stop. This line must lie in "
+        "series "
+        "with the button, never beside it, where it would bridge it");
+  context.note(fmt::format(
+      "holding {}; then the lines are let go and fall back to their pulls",
+      options.duration > 0 ? fmt::format("for {} s", options.duration) : std::string("until Ctrl-C")));
+  const auto over = until(options, interruption);
+  while (!over()) services.sleep(milliseconds(20));
+  // Driven first: some GPIO drivers leave a released line at its last level.
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    const auto& [role, active] = assignments[i];
+    if (active != final_state(role)) {
+      held[i]->set(final_state(role));
+      context.note(
+          fmt::format("{} = {}", lines::facts_of(role).name, lines::state_word(role, final_state(role))));
+    }
+  }
+  if (context.json) context.print(document);
+  return done;
+}
+
+int run_reset(Context& context, const BoardServices& services, const LinesConfig& config) {
+  config.required(LineRole::reset);
+  const auto gpio = services.open_gpio();
+  lines::pulse_reset(*gpio, config, services.sleep);
+  if (context.json) {
+    context.print({{"reset", true}});
+  } else {
+    fmt::print(context.out, "the board was reset\n");
+  }
+  return done;
+}
+
+int run_bootloader(Context& context, const BoardServices& services, const std::string& board_option,
+                   const LinesConfig& config) {
+  const flash::BoardProfile& board = chosen_board(board_option, config);
+  if (board.boot0_is_switch && config.find(LineRole::boot0) == nullptr)
+    throw std::runtime_error(fmt::format(
+        "BOOT0 of {} is a switch that no line can move. To start the ROM bootloader: {}. To go back: "
+        "{}",
+        board.title, board.to_bootloader, board.to_application));
+  const auto gpio = services.open_gpio();
+  lines::enter_bootloader(*gpio, config, services.sleep);
+  if (context.json) {
+    context.print({{"bootloader", true}});
+  } else {
+    fmt::print(context.out, "the ROM bootloader runs until the next reset ('kmax reset')\n");
+  }
+  return done;
+}
+
+CLI::App* add_watch(CLI::App& app, Context& context) {
+  return add_command(app, context,
+                     {"watch", "Prints every edge of a line with the kernel's time of it.",
+                      "  kmax lines watch                 fault and healthy, until Ctrl-C\n"
+                      "  kmax lines watch --line healthy --for 10\n\n"
+                      "Sleeps until the kernel reports an edge. Times are seconds of the kernel's monotonic "
+                      "clock; with\n--json the edges come as one document at the end."},
+                     Takes::nothing);
+}
+
+CLI::App* add_set(CLI::App& app, Context& context) {
+  return add_command(
+      app, context,
+      {"set", "Drives lines for as long as the command runs.",
+       "  kmax lines set emergency_stop=stop\n  kmax lines set emergency_stop=run --for 60\n"
+       "  kmax lines set reset=reset --for 1\n\n"
+       "The emergency stop is a normally closed contact to ground: open is stop, closed is run. At the end\n"
+       "it goes to stop, reset to run and BOOT0 to application; then the lines are let go."},
+      Takes::nothing);
+}
+}  // namespace
+
+void add_lines_commands(CLI::App& app, Context& context, const BoardServices& given) {
+  const auto services = std::make_shared<BoardServices>(given);
+  const auto options = std::make_shared<LinesOptions>();
+  const auto add_duration = [options](CLI::App* command) {
+    command->add_option("--for", options->duration, "Ends after so many seconds instead of at Ctrl-C")
+        ->type_name("S")
+        ->check(CLI::Range(0.001, 1e6));
+  };
+
+  auto* list = add_command(app, context,
+                           {"lines", "Shows the GPIO lines to the board and their levels.",
+                            "  kmax lines\n  kmax lines watch\n  kmax lines set emergency_stop=stop\n\n"
+                            "Nothing is changed: a line is looked at as it is."},
+                           Takes::nothing);
+  add_lines_option(*list, options->file);
+  list->callback([&context, services, options, list] {
+    if (!list->get_subcommands().empty()) return;
+    context.action = [&context, services, options] {
+      return with_lines(*options, [&](const auto& config) { return list_lines(context, *services, config); });
+    };
+  });
+
+  auto* watch = add_watch(*list, context);
+  add_lines_option(*watch, options->file);
+  // Not positional: `reset` would be taken for the command of that name.
+  watch
+      ->add_option("--line", options->texts,
+                   "Line as in the configuration, may be repeated (default: fault and healthy)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  add_duration(watch);
+  watch->callback([&context, services, options] {
+    context.action = [&context, services, options] {
+      return with_lines(
+          *options, [&](const auto& config) { return watch_lines(context, *services, *options, config); });
+    };
+  });
+
+  auto* set = add_set(*list, context);
+  add_lines_option(*set, options->file);
+  set->add_option("assignments", options->texts,
+                  "emergency_stop=stop|run, reset=reset|run, "
+                  "boot0=bootloader|application")
+      ->option_text("NAME=STATE ...");
+  add_duration(set);
+  set->callback([&context, services, options] {
+    context.action = [&context, services, options] {
+      return with_lines(*options,
+                        [&](const auto& config) { return set_lines(context, *services, *options, config); });
+    };
+  });
+
+  auto* reset =
+      add_command(app, context, {"reset", "Resets the board's processor by its NRST line.", "  kmax reset"},
+                  Takes::nothing);
+  add_lines_option(*reset, options->file);
+  reset->callback([&context, services, options] {
+    context.action = [&context, services, options] {
+      return with_lines(*options, [&](const auto& config) { return run_reset(context, *services, config); });
+    };
+  });
+
+  auto* bootloader =
+      add_command(app, context,
+                  {"bootloader", "Starts the ROM bootloader of the board's processor by BOOT0 and NRST.",
+                   "  kmax bootloader\n\n'kmax flash' does this by itself where it needs it."},
+                  Takes::nothing);
+  const auto board = std::make_shared<std::string>();
+  add_lines_option(*bootloader, options->file);
+  bootloader->add_option("--board", *board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
+  bootloader->callback([&context, services, options, board] {
+    context.action = [&context, services, options, board] {
+      return with_lines(
+          *options, [&](const auto& config) { return run_bootloader(context, *services, *board, config); });
+    };
+  });
+}
+
+void add_lines_commands(CLI::App& app, Context& context) {
+  add_lines_commands(app, context, BoardServices{});
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,139 @@
+// kmax watch.
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <optional>
+#include <thread>
+
+#include "host_tools/device/drive.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/watch_view.hpp"
+
+namespace kmax::cli {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+namespace {
+struct WatchOptions {
+  std::optional<double> seconds;
+  double rate = 10;
+};
+
+WatchedAxis read_axis(device::Device& device, std::size_t axis) {
+  const device::DriveStatus status = device::Drive(device, axis).status();
+  return {.axis = axis, .status = status, .measured = record::read_measurements(device, {&axis, 1}).front()};
+}
+
+/// Of the terminal on standard output.
+std::size_t terminal_width() {
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
+/// Shows readings in place on a terminal, and elsewhere a line a second. Nothing with --json, whose document
+/// comes at the end.
+class Display {
+ public:
+  Display(Context& context, std::string device)
+      : context_(context),
+        device_(std::move(device)),
+        terminal_(&context.out == &std::cout && isatty(STDOUT_FILENO) == 1),
+        live_(context.out) {}
+
+  void show(double seconds, double rate, const std::vector<WatchedAxis>& axes) {
+    if (context_.json) return;
+    if (terminal_) {
+      const std::size_t width = terminal_width();
+      std::vector<std::string> lines = watch_table(axes, width);
+      std::string title =
+          fmt::format("{}   {:.1f} s   {:.1f} readings/s   Ctrl-C ends", device_, seconds, rate);
+      if (title.size() > width) title.resize(width);
+      lines.insert(lines.begin(), title);
+      live_.show(lines);
+    } else if (seconds >= next_line_) {
+      context_.out << watch_line(seconds, axes) << std::endl;
+      next_line_ = std::floor(seconds) + 1;
+    }
+  }
+
+ private:
+  Context& context_;
+  std::string device_;
+  bool terminal_;
+  LiveLines live_;
+  double next_line_ = 0;
+};
+
+std::vector<std::size_t> watched_axes(const Context& context) {
+  if (context.axis_option) return {*context.axis_option};
+  std::vector<std::size_t> axes;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) axes.push_back(axis);
+  return axes;
+}
+
+int run_watch(Context& context, const WatchOptions& options) {
+  if (options.seconds && !(std::isfinite(*options.seconds) && *options.seconds >= 0))
+    throw UsageError(fmt::format("--for: {} is not a number of seconds", *options.seconds));
+  if (!(options.rate >= 0.1 && options.rate <= 50))
+    throw UsageError(fmt::format("--rate: {} is not within 0.1 .. 50 Hz", options.rate));
+  const Interruption interruption;
+  device::Device device = context.connect();
+  link::Link& link = device.link();
+  Display display(context, device.description());
+  const microseconds interval(static_cast<std::int64_t>(1e6 / options.rate));
+  const microseconds start = link.now();
+  const auto real_start = std::chrono::steady_clock::now();
+  std::vector<WatchedAxis> axes;
+  std::uint64_t readings = 0;
+  double seconds = 0;
+  for (microseconds next = start; !interruption.requested();) {
+    axes.clear();
+    for (const std::size_t axis : watched_axes(context)) axes.push_back(read_axis(device, axis));
+    ++readings;
+    seconds = std::chrono::duration<double>(link.now() - start).count();
+    display.show(seconds, seconds > 0 ? static_cast<double>(readings) / seconds : 0, axes);
+    if (options.seconds && seconds >= *options.seconds) break;
+    next = std::max(next + interval, link.now());
+    // In pieces, so that Ctrl-C is not waited for.
+    while (link.now() < next && !interruption.requested())
+      link.wait(std::min(next - link.now(), microseconds(milliseconds(100))));
+    // A simulated device's time may pass faster than the user's.
+    std::this_thread::sleep_until(real_start + (link.now() - start));
+  }
+  if (context.json) {
+    Json list = Json::array();
+    for (const WatchedAxis& axis : axes) list.push_back(watch_json(axis));
+    context.print(
+        {{"device", device.description()}, {"duration_s", seconds}, {"readings", readings}, {"axes", list}});
+  }
+  return done;
+}
+}  // namespace
+
+void add_watch_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"watch", "Shows state, position, velocity, force, current and faults of the axes as they change.",
+       "  kmax watch                        until Ctrl-C\n"
+       "  kmax watch --for 10 > watch.log   not on a terminal: a line a second\n"
+       "  kmax watch --for 0 --json         one reading\n\n"
+       "With --json one document at the end: the last reading, and how many there were."});
+  auto options = std::make_shared<WatchOptions>();
+  command->add_option("--for", options->seconds, "How long; without it until Ctrl-C")->type_name("S");
+  command->add_option("--rate", options->rate, "Readings a second, 0.1 .. 50")
+      ->type_name("HZ")
+      ->capture_default_str();
+  command->callback(
+      [&context, options] { context.action = [&context, options] { return run_watch(context, *options); }; });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,93 @@
+#include "host_tools/record/can_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "firmware/canopen/cob_id.hpp"
+#include "host_tools/device/errors.hpp"
+
+namespace kmax::record {
+
+using std::chrono::steady_clock;
+namespace cob_id = firmware::canopen::cob_id;
+
+namespace {
+/// CiA 301, NMT commands and states.
+constexpr std::uint8_t start_node = 1, enter_pre_operational = 128;
+constexpr std::uint8_t operational = 5;
+}  // namespace
+
+link::CanPortOptions port_options(const PdoPlan& plan) {
+  link::CanPortOptions options;
+  for (const std::uint32_t identifier : plan.identifiers) options.filters.push_back({identifier});
+  options.filters.push_back({cob_id::heartbeat + plan.node});
+  return options;
+}
+
+CanSource::CanSource(link::CanPort& port, const PdoPlan& plan) : port_(port), plan_(plan), rows_(plan) {
+  if (plan.node_state == operational) return;
+  command(start_node);
+  started_ = true;
+}
+
+CanSource::~CanSource() {
+  try {
+    stop();
+  } catch (const std::exception&) {
+    // The bus is gone; a device that goes on sending PDOs does no harm.
+  }
+}
+
+void CanSource::stop() {
+  if (!started_) return;
+  started_ = false;
+  command(enter_pre_operational);
+}
+
+std::optional<Row> CanSource::next(std::chrono::microseconds wait) {
+  const auto end = steady_clock::now() + wait;
+  while (true) {
+    const auto left = std::chrono::duration_cast<std::chrono::microseconds>(end - steady_clock::now());
+    const auto received = port_.receive(std::max(left, std::chrono::microseconds(0)));
+    const auto now = steady_clock::now();
+    if (received) {
+      const drivers::CanFrame& frame = received->frame;
+      if (frame.identifier == cob_id::heartbeat + plan_.node && !frame.extended && !frame.remote &&
+          frame.length == 1 && frame.data[0] == 0) {
+        started_ = false;
+        throw device::DeviceError(fmt::format("{}: node {} has restarted, so that its ticks began again",
+                                              port_.description(), plan_.node));
+      }
+      const auto row = rows_.take(frame, received->time);
+      last_frame_ = now;
+      ++frames_since_row_;
+      if (row) {
+        frames_since_row_ = 0;
+        return row;
+      }
+    }
+    const auto sets =
+        static_cast<std::uint64_t>(patience.count()) * (firmware::tick_rate_hz / 1000) / plan_.period_ticks;
+    if (now - last_frame_ > patience || frames_since_row_ > plan_.identifiers.size() * (sets + 1))
+      fail_silent();
+    if (now >= end) return std::nullopt;
+  }
+}
+
+void CanSource::command(std::uint8_t command) {
+  port_.send({.identifier = cob_id::nmt, .length = 2, .data = {command, plan_.node}});
+}
+
+void CanSource::fail_silent() const {
+  const std::string trouble = port_.trouble();
+  const std::string malformed =
+      rows_.malformed() == 0 ? "" : fmt::format("; {} PDOs had the wrong length", rows_.malformed());
+  throw link::LinkError(
+      fmt::format("{}: no complete set of PDOs from node {} for {} s{}; {}", port_.description(), plan_.node,
+                  std::chrono::duration_cast<std::chrono::seconds>(patience).count(), malformed,
+                  trouble.empty() ? "was it stopped by another NMT master, unplugged, or is the bus too busy?"
+                                  : trouble));
+}
+
+}  // namespace kmax::record

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "host_tools/link/can/can_port.hpp"
+#include "host_tools/record/pdo_plan.hpp"
+#include "host_tools/record/pdo_rows.hpp"
+#include "host_tools/record/row_source.hpp"
+
+namespace kmax::record {
+
+/// What a port must let pass for a CanSource.
+link::CanPortOptions port_options(const PdoPlan& plan);
+
+/// Rows from the TPDOs that a CANopen device sends by itself: one every millisecond by default.
+///
+/// They are sent in the NMT state operational only: a device in another state is started, and put back by
+/// stop() or the destructor. Anybody else on the bus can send NMT commands too; then the rows cease.
+class CanSource final : public RowSource {
+ public:
+  /// Silence that ends a recording, and how long PDOs may come without a complete set among them. This
+  /// program's own absence (it was stopped, or the computer slept) does not count.
+  static constexpr std::chrono::milliseconds patience{1000};
+
+  /// `port` must outlive this. `plan` is fresh: at most a second old. Nobody need talk to the device by SDO
+  /// meanwhile, so others may.
+  CanSource(link::CanPort& port, const PdoPlan& plan);
+  ~CanSource() override;
+
+  std::optional<Row> next(std::chrono::microseconds wait) override;
+  void stop() override;
+  std::optional<Losses> losses() const override { return rows_.losses(); }
+  bool axes_apart() const override { return false; }
+
+ private:
+  void command(std::uint8_t command);
+  [[noreturn]] void fail_silent() const;
+
+  link::CanPort& port_;
+  PdoPlan plan_;
+  bool started_ = false;
+  PdoRows rows_;
+  std::chrono::steady_clock::time_point last_frame_ = std::chrono::steady_clock::now();
+  std::uint64_t frames_since_row_ = 0;
+};
+
+}  // namespace kmax::record

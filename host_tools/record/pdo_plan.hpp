@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
+#include "host_tools/device/device.hpp"
+
+namespace kmax::record {
+
+/// How a device sends its measurements, as far as a recording needs it.
+struct PdoPlan {
+  std::uint8_t node = 1;
+  std::array<std::uint32_t, firmware::canopen::pdo_count> identifiers{};
+  std::uint32_t period_ticks = 20;                           ///< from one row to the next
+  std::array<double, firmware::axis_count> count_lengths{};  ///< m
+  std::uint8_t node_state = 0;                               ///< NMT state
+  std::uint32_t tick = 0;                                    ///< at the time of reading
+  /// PDOs so far that were due again before the bus had room for them: their newer values were sent instead,
+  /// so that a row may have values of two moments.
+  std::uint32_t held_back = 0;
+};
+
+/// Reads from the device how its four TPDOs are set up. They must have the factory's mapping and be sent
+/// together by one event time; identifiers and event time may be others.
+/// Errors: device::DeviceError with the first setting that does not fit and how to get the factory's back,
+/// link::LinkError.
+PdoPlan read_pdo_plan(device::Device& device, std::uint8_t node);
+
+}  // namespace kmax::record

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "host_tools/device/device.hpp"
+#include "host_tools/record/row_source.hpp"
+
+namespace kmax::record {
+
+/// Rows read over any link as fast as it goes: one request for each axis. Twice a second the link is lent to
+/// other programs for 25 ms, since one that stops the device must not be kept out.
+///
+/// The values of one axis are of one tick; those of the next axis are one request later and say so with
+/// their own tick. Only the axes that are asked for are read, the rest of a row is zero.
+class PolledSource final : public RowSource {
+ public:
+  /// `device` must outlive this. At least one axis.
+  PolledSource(device::Device& device, std::vector<std::size_t> axes);
+
+  /// Waits for the replies, whatever `wait` is. None if the values are still those of the row
+  /// before.
+  std::optional<Row> next(std::chrono::microseconds wait) override;
+  void stop() override {}
+  std::optional<Losses> losses() const override { return std::nullopt; }
+  bool axes_apart() const override { return axes_.size() > 1; }
+
+ private:
+  std::uint64_t unwrapped(std::uint32_t tick, std::uint64_t reference) const;
+
+  void lend();
+
+  device::Device& device_;
+  std::vector<std::size_t> axes_;
+  std::optional<std::uint64_t> last_tick_;
+  std::chrono::microseconds lent_;
+};
+
+}  // namespace kmax::record

@@ -1,0 +1,55 @@
+#include "host_tools/description/dbc.hpp"
+
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::description {
+namespace {
+std::string dbc(std::uint8_t node) {
+  std::ostringstream out;
+  write_dbc(out, node);
+  return out.str();
+}
+
+TEST(Dbc, MessagesHaveTheNodesIdentifiers) {
+  const std::string text = dbc(5);
+  for (const char* line :
+       {"BO_ 128 SYNC: 0 Host\n", "BO_ 133 EMERGENCY: 8 Kmax\n", "BO_ 389 TPDO1: 8 Kmax\n",
+        "BO_ 645 TPDO2: 8 Kmax\n", "BO_ 901 TPDO3: 8 Kmax\n", "BO_ 1157 TPDO4: 8 Kmax\n",
+        "BO_ 517 RPDO1: 4 Host\n", "BO_ 773 RPDO2: 4 Host\n", "BO_ 1797 HEARTBEAT: 1 Kmax\n"})
+    EXPECT_CONTAINS(text, line);
+  EXPECT_EQ(text.find("RPDO3"), std::string::npos);
+}
+
+TEST(Dbc, SignalsAreWhatIsMappedLittleEndian) {
+  const std::string text = dbc(1);
+  for (const char* line :
+       {" SG_ axis0_measured_count : 0|32@1- (1,0) [-2147483648|2147483647] \"counts\" Host\n",
+        " SG_ axis1_measured_velocity : 32|32@1- (1,0) [0|0] \"m/s\" Host\n",
+        " SG_ axis1_telemetry_current : 16|16@1- (1,0) [-32768|32767] \"mA\" Host\n",
+        " SG_ telemetry_tick : 48|16@1+ (1,0) [0|65535] \"ticks\" Host\n",
+        "SIG_VALTYPE_ 385 axis0_measured_force : 1;\n", "SIG_VALTYPE_ 897 axis0_measured_velocity : 1;\n",
+        "BA_ \"GenMsgCycleTime\" BO_ 385 1;\n", "VAL_ 1793 nmt_state 0 \"initialising\""})
+    EXPECT_CONTAINS(text, line);
+}
+
+TEST(Dbc, NamesAreUniqueAndShortEnough) {
+  const std::string text = dbc(127);
+  const std::regex signal(R"( SG_ (\w+) : (\d+)\|(\d+)@)");
+  std::set<std::string> names;
+  for (std::sregex_iterator found(text.begin(), text.end(), signal), end; found != end; ++found) {
+    const std::string name = (*found)[1];
+    EXPECT_LE(name.size(), 32u) << name;
+    EXPECT_TRUE(names.insert(name).second) << name;
+    EXPECT_LE(std::stoi((*found)[2]) + std::stoi((*found)[3]), 64) << name;
+  }
+  EXPECT_EQ(names.size(), 19u);
+}
+
+}  // namespace
+}  // namespace kmax::description

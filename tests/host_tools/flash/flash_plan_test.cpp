@@ -1,0 +1,110 @@
+#include "host_tools/flash/flash_plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "host_tools/flash/program.hpp"
+#include "tests/host_tools/flash/made_elf.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::flash {
+namespace {
+
+class FlashPlanText : public testing::Test {
+ protected:
+  std::vector<std::string> steps(Method method) {
+    const FlashPlan plan = plan_flash(method, image, target);
+    std::vector<std::string> texts;
+    for (const Step& step : plan.steps) texts.push_back(command_text(step.arguments));
+    for (const Step& step : plan.start) texts.push_back("start: " + command_text(step.arguments));
+    return texts;
+  }
+  host_tools_test::TemporaryFolder folder;
+  FlashImage image = FlashImage::load(folder.write("image.elf", made_elf(made_image())));
+  FlashTarget target{.program = "tool",
+                     .swdio = {.chip_number = 0, .offset = 24},
+                     .swclk = {.chip_number = 1, .offset = 25},
+                     .serial_port = "/dev/ttyS0"};
+};
+
+TEST_F(FlashPlanText, OpenOcdOverGpioLines) {
+  const auto texts = steps(Method::openocd_gpio);
+  ASSERT_EQ(texts.size(), 2u);
+  EXPECT_EQ(
+      texts[0],
+      "tool -c 'gdb_port disabled' -c 'tcl_port disabled' -c 'telnet_port disabled' -c 'adapter driver "
+      "linuxgpiod' -c 'adapter gpio swclk 25 -chip 1' -c 'adapter gpio swdio 24 -chip 0' -c 'transport "
+      "select "
+      "swd' -f target/stm32f4x.cfg -c 'adapter speed 1000' -c init -c 'reset halt' -c 'dump_image "
+      "parameters_before.bin 0x08004000 32768' -c 'flash erase_address 0x08000000 16384' -c 'flash "
+      "write_image erase image_0800c000.bin 0x0800c000 bin' -c 'verify_image image_0800c000.bin 0x0800c000 "
+      "bin' -c 'flash write_image erase image_08000000.bin 0x08000000 bin' -c 'verify_image "
+      "image_08000000.bin 0x08000000 bin' -c 'dump_image read_08000000.bin 0x08000000 400' -c 'dump_image "
+      "read_0800c000.bin 0x0800c000 20408' -c 'dump_image parameters_after.bin 0x08004000 32768' -c "
+      "shutdown");
+  EXPECT_CONTAINS(texts[1], "start: tool ");
+  EXPECT_CONTAINS(texts[1], "-c init -c 'reset run' -c shutdown");
+}
+
+// OpenOCD user's guide, "adapter gpio" and "reset_config": srst is active low unless said otherwise, and how
+// it is driven belongs to reset_config.
+TEST_F(FlashPlanText, OpenOcdWithAResetLine) {
+  target.reset = AdapterLine{.chip_number = 2, .offset = 7, .active_low = true};
+  EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "-c 'adapter gpio srst 7 -chip 2' -c");
+  EXPECT_CONTAINS(steps(Method::openocd_gpio)[0],
+                  "-f target/stm32f4x.cfg -c 'reset_config srst_only srst_nogate srst_open_drain' -c");
+  target.reset = AdapterLine{.chip_number = 2, .offset = 7, .active_low = false, .push_pull = true};
+  EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "-c 'adapter gpio srst 7 -chip 2 -active-high' -c");
+  EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "srst_push_pull");
+}
+
+TEST_F(FlashPlanText, OpenOcdWithAnStLink) {
+  target.usb_serial = "066CFF53";
+  target.adapter_kilohertz = 500;
+  target.reset = AdapterLine{.chip_number = 2, .offset = 7};
+  const std::string text = steps(Method::openocd_stlink)[0];
+  EXPECT_CONTAINS(
+      text,
+      "-f interface/stlink.cfg -c 'adapter serial 066CFF53' -f target/stm32f4x.cfg -c 'adapter speed 500'");
+  EXPECT_EQ(text.find("gpio"), std::string::npos);
+  EXPECT_EQ(text.find("srst"), std::string::npos) << "the ST-Link has its own";
+}
+
+TEST_F(FlashPlanText, DfuUtil) {
+  target.usb_serial = "3572";
+  const auto texts = steps(Method::dfu);
+  const std::string tool = "tool -d 0483:df11 -a 0 -S 3572 -s ";
+  EXPECT_EQ(texts,
+            (std::vector<std::string>{
+                tool + "0x08004000:32768 -U parameters_before.bin", tool + "0x08000000 -D blank.bin",
+                tool + "0x0800c000 -D image_0800c000.bin", tool + "0x08000000 -D image_08000000.bin",
+                tool + "0x08000000:400 -U read_08000000.bin", tool + "0x0800c000:20408 -U read_0800c000.bin",
+                tool + "0x08004000:32768 -U parameters_after.bin"}));
+}
+
+TEST_F(FlashPlanText, Stm32Flash) {
+  const auto texts = steps(Method::serial);
+  const std::string tool = "tool -b 115200 -m 8e1 ";
+  EXPECT_EQ(texts,
+            (std::vector<std::string>{tool + "-r parameters_before.bin -S 0x08004000:32768 /dev/ttyS0",
+                                      tool + "-o -S 0x08000000:16384 /dev/ttyS0",
+                                      tool + "-w image_0800c000.bin -v -S 0x0800c000:20408 /dev/ttyS0",
+                                      tool + "-w image_08000000.bin -v -S 0x08000000:400 /dev/ttyS0",
+                                      tool + "-r read_08000000.bin -S 0x08000000:400 /dev/ttyS0",
+                                      tool + "-r read_0800c000.bin -S 0x0800c000:20408 /dev/ttyS0",
+                                      tool + "-r parameters_after.bin -S 0x08004000:32768 /dev/ttyS0"}));
+}
+
+TEST_F(FlashPlanText, TheFirstStepsChangeNothingWhereStepsAreSeparate) {
+  for (const Method method : {Method::dfu, Method::serial}) {
+    const FlashPlan plan = plan_flash(method, image, target);
+    EXPECT_FALSE(plan.steps.front().changes_flash);
+    EXPECT_TRUE(plan.steps[1].changes_flash);
+    EXPECT_FALSE(plan.steps.back().changes_flash);
+  }
+}
+
+}  // namespace
+}  // namespace kmax::flash
