@@ -161,6 +161,8 @@ void Application::take_reports() {
 
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
+  if (restarting_) return Refusal::restarting;
+  if (commander_[axis] == Commander::can && node_.any_heartbeat_lost()) return Refusal::heartbeat_missing;
   if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
   if (thermal_[axis].power_stage_too_hot()) return Refusal::too_hot;
   if (thermal_[axis].motor_too_hot()) return Refusal::motor_too_hot;
@@ -250,8 +252,10 @@ void Application::supervise(std::size_t axis) {
       if (static_cast<float>(silent_us) > timeout * 1e6f)
         trip(axis, Fault::link_silent, static_cast<float>(silent_us) * 1e-6f, timeout);
     }
-    if (commander_[axis] == Commander::can && can_.state == CanState::bus_off)
-      trip(axis, Fault::bus_off, 0.0f, 0.0f);
+    // Off the bus, or never on it again after a bit rate that failed.
+    const bool off =
+        can_.state == CanState::bus_off || can_.state == CanState::stopped || can_.state == CanState::absent;
+    if (commander_[axis] == Commander::can && off) trip(axis, Fault::bus_off, 0.0f, 0.0f);
   }
 
   std::uint16_t word = 0;
@@ -268,6 +272,7 @@ void Application::supervise(std::size_t axis) {
           (machine.fault() == Fault::encoder && !report.count_valid) ||
           (machine.fault() == Fault::over_temperature && thermal_[axis].power_stage_too_hot()) ||
           (machine.fault() == Fault::motor_too_hot && thermal_[axis].motor_too_hot()) ||
+          (machine.fault() == Fault::heartbeat_lost && node_.any_heartbeat_lost()) ||
           (machine.fault() != Fault::none && machine.fault() == report.condition);
       const bool stays = registers_.values().whole<"profile.quick_stop_option">(axis) == 6;
       machine.command(pending, obstacle_to_arming(axis), cause_remains, {.stay_in_quick_stop = stays});
@@ -307,6 +312,7 @@ void Application::poll(std::uint32_t now_us) {
   poll_can();
   act();
   keeper_.poll();
+  finish_saves();
 }
 
 DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {

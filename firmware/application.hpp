@@ -212,7 +212,10 @@ class Application {
   void tell_emergencies();
   void refresh_can_readings();
   void publish_torques();
-  void disarm_all();
+  void disarm(std::size_t axis);
+  bool save_identity();
+  void finish_saves();
+  void note_saving(const ParameterValues& values);
   std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
   float bound_of(Fault fault, std::size_t axis) const;
   void ISR_supervise_main_loop();
@@ -239,10 +242,12 @@ class Application {
   std::array<Commander, axis_count> commander_{};
   std::array<Fault, axis_count> told_fault_{};
   CanState told_can_state_ = CanState::absent;
-  std::uint32_t told_overruns_ = 0, told_conflicts_ = 0;
+  std::uint32_t told_overruns_ = 0, told_conflicts_ = 0, overrun_us_ = 0, conflict_us_ = 0;
   std::optional<std::uint32_t> heard_on_can_us_;
   /// CANopen's own settings as the last start brought them: what a reset of the communication brings back.
   std::array<std::uint32_t, communication_entries.size()> power_on_communication_{};
+  std::optional<std::array<std::uint32_t, communication_entries.size()>> saving_communication_;
+  bool identity_saving_ = false;
   std::uint32_t configured_communication_ = 0;
   std::array<bool, axis_count> halted_{};
   /// Of the settings in force; to work it out takes a division in double.

@@ -33,6 +33,10 @@ std::array<std::uint8_t, 5> bytes_of(std::uint8_t source, float value) {
           static_cast<std::uint8_t>(word >> 16), static_cast<std::uint8_t>(word >> 24)};
 }
 
+constexpr int frames_per_poll = 16;
+/// What lies behind us for so long is over.
+constexpr std::uint32_t overrun_over_us = 1'000'000, conflict_over_us = 5'000'000;
+
 }  // namespace
 
 /// At a start, and when a host resets the communication, which then has the settings of the last start again.
@@ -54,8 +58,10 @@ void Application::start_communication(bool power_on) {
 }
 
 void Application::poll_can() {
+  // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
-  while (can_queue_.pop(frame)) act_on(node_.receive(frame, registers_.values(), now_us_));
+  for (int i = 0; i < frames_per_poll && can_queue_.pop(frame); ++i)
+    act_on(node_.receive(frame, registers_.values(), now_us_));
   if (registers_.communication_changes() != configured_communication_) {
     configured_communication_ = registers_.communication_changes();
     node_.configure(registers_.values(), now_us_);
@@ -81,33 +87,56 @@ void Application::poll_can() {
 }
 
 void Application::act_on(const canopen::NodeEvents& events) {
-  if (events.remove_force) disarm_all();
-  if (events.heartbeat_lost) {
-    for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      if (machines_[axis].armed() && commander_[axis] == Commander::can)
-        trip(axis, Fault::heartbeat_lost, 0.0f, 0.0f);
-    }
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (!machines_[axis].armed() || commander_[axis] != Commander::can) continue;
+    if (events.heartbeat_lost) trip(axis, Fault::heartbeat_lost, 0.0f, 0.0f);
+    // Nobody can change the target any more.
+    if (events.pdos_ended && mode(axis) == DriveMode::torque) disarm(axis);
+  }
+  if (events.remove_force) {
+    for (std::size_t axis = 0; axis < axis_count; ++axis) disarm(axis);
   }
   if (events.store_identity) {
-    const auto result = preset(entry_of<"node.id">(), 0, node_.lss().pending_node_id());
-    const bool rate_taken =
-        preset(entry_of<"can.bit_rate">(), 0, node_.lss().pending_bit_rate()).refusal == Refusal::none;
-    const bool saved = result.refusal == Refusal::none && rate_taken &&
-                       keeper_.save(registers_.values(), any_armed()) == Refusal::none;
-    node_.lss().finish(saved ? canopen::LssStore::stored : canopen::LssStore::failed);
+    identity_saving_ = save_identity();
+    if (!identity_saving_) node_.lss().finish(canopen::LssStore::failed);
   }
   if (events.start_node) node_.start(registers_.values(), now_us_);
   if (events.reset_communication) start_communication(false);
   if (events.reset_node) restarting_ = true;
 }
 
-/// As a host's "disable voltage" for both axes, at once.
-void Application::disarm_all() {
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    command_pending_[axis] = false;
-    machines_[axis].command(0, Refusal::none, true);
-    enable_[axis].store(machines_[axis].armed(), std::memory_order_relaxed);
-  }
+bool Application::save_identity() {
+  if (registers_.transaction_open() || any_armed()) return false;
+  const auto set = [this](std::size_t entry, std::uint32_t raw) {
+    return preset(entry, 0, raw).refusal == Refusal::none;
+  };
+  return set(entry_of<"node.id">(), node_.lss().pending_node_id()) &&
+         set(entry_of<"can.bit_rate">(), node_.lss().pending_bit_rate()) &&
+         keeper_.save(registers_.values(), any_armed()) == Refusal::none;
+}
+
+/// The communication's part of a set that is being saved.
+void Application::note_saving(const ParameterValues& values) {
+  saving_communication_.emplace();
+  for (std::size_t i = 0; i < saving_communication_->size(); ++i)
+    (*saving_communication_)[i] = values.raw(first_communication_slot + i);
+}
+
+/// After the keeper's step: what waits for the end of a save.
+void Application::finish_saves() {
+  if (keeper_.busy()) return;
+  const bool saved = keeper_.state() == StoreState::saved;
+  if (identity_saving_) node_.lss().finish(saved ? canopen::LssStore::stored : canopen::LssStore::failed);
+  identity_saving_ = false;
+  if (saving_communication_ && saved) power_on_communication_ = *saving_communication_;
+  saving_communication_.reset();
+}
+
+/// At once, and without a controlword.
+void Application::disarm(std::size_t axis) {
+  command_pending_[axis] = false;
+  machines_[axis].disable();
+  enable_[axis].store(machines_[axis].armed(), std::memory_order_relaxed);
 }
 
 /// Every fault of an axis, when it comes and when it goes.
@@ -125,12 +154,16 @@ void Application::tell_emergencies() {
   }
   if (node_.identity_conflicts() != told_conflicts_) {
     told_conflicts_ = node_.identity_conflicts();
+    conflict_us_ = now_us_;
     emergency.raise({0x8100, canopen::error_register::communication, {canopen::bus_source}});
+  } else if (now_us_ - conflict_us_ > conflict_over_us) {
+    emergency.clear(0x8100, canopen::bus_source);
   }
   if (can_.overruns + can_queue_.overflows() != told_overruns_) {
     told_overruns_ = can_.overruns + can_queue_.overflows();
+    overrun_us_ = now_us_;
     emergency.raise({0x8110, canopen::error_register::communication, {canopen::bus_source}});
-  } else {
+  } else if (now_us_ - overrun_us_ > overrun_over_us) {
     emergency.clear(0x8110, canopen::bus_source);
   }
 }

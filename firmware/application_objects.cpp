@@ -258,7 +258,17 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
   }
 }
 
+/// A value that is taken is a sign of life of whoever commands; before it acts, since the command to arm
+/// needs it.
 Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw) {
+  const auto before = app_.node_.heard_us();
+  app_.node_.set_heard(app_.now_us_);
+  const Abort abort = set_slot(slot, raw);
+  if (abort != Abort::none) app_.node_.set_heard(before);
+  return abort;
+}
+
+Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
   const auto [entry, axis] = owner_of(slot);
   const SlotDescriptor& descriptor = descriptors[entry];
   if (!descriptor.writable) {

@@ -79,7 +79,13 @@ DeviceRegisters::WriteResult Application::write_registers(std::uint16_t address,
     }
   }
   // At once: a poll that comes late finds several requests, and each must act as if it had come alone.
-  act();
+  // Settings that came over CAN, where one value is one message and thousands may come in a second, are made
+  // once per poll for all, or before the next controlword.
+  const bool commands = registers_.controlword_waits();
+  if (by == Commander::serial || commands)
+    act();
+  else
+    publish_torques();
   return result;
 }
 

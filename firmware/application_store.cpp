@@ -16,8 +16,11 @@ const LoadReport& Application::attach_store(AnyFlashSectors flash) {
 DeviceRegisters::WriteResult Application::command_store(std::uint16_t command) {
   const std::uint16_t address = register_address(entry_of<"store.command">(), 0);
   switch (static_cast<StoreCommand>(command)) {
-    case StoreCommand::save:
-      return registers_.refuse(keeper_.save(registers_.values(), any_armed()), address);
+    case StoreCommand::save: {
+      const Refusal refusal = keeper_.save(registers_.values(), any_armed());
+      if (refusal == Refusal::none) note_saving(registers_.values());
+      return registers_.refuse(refusal, address);
+    }
     case StoreCommand::defaults: {
       DeviceRegisters::WriteResult result = registers_.refuse(Refusal::none, address);
       if (any_armed()) {
@@ -39,8 +42,9 @@ DeviceRegisters::WriteResult Application::command_store(std::uint16_t command) {
 DeviceRegisters::WriteResult Application::save_defaults() {
   ParameterValues defaults = registers_.values();
   set_defaults(defaults);
-  return registers_.refuse(keeper_.save(defaults, any_armed()),
-                           register_address(entry_of<"store.command">(), 0));
+  const Refusal refusal = keeper_.save(defaults, any_armed());
+  if (refusal == Refusal::none) note_saving(defaults);
+  return registers_.refuse(refusal, register_address(entry_of<"store.command">(), 0));
 }
 
 void Application::refresh_store_readings() {

@@ -161,6 +161,12 @@ class AxisStateMachine {
     }
   }
 
+  /// The device itself disables the voltage, as when the network stops it. No controlword: bits that the host
+  /// holds stay held.
+  void disable() {
+    if (state_ != DriveState::fault) leave_to(DriveState::switch_on_disabled);
+  }
+
   /// Something failed (transition 13). The first fault is kept until it is reset.
   void trip(Fault fault) {
     if (fault == Fault::none || state_ == DriveState::fault || state_ == DriveState::fault_reaction_active)

@@ -12,6 +12,7 @@ constexpr std::uint16_t address_of_slot(std::size_t slot) {
 constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 constexpr std::size_t transaction_entry = entry_of<"transaction.control">();
 constexpr std::size_t store_entry = entry_of<"store.command">();
+constexpr std::size_t sign_of_life_entry = entry_of<"link.sign_of_life">();
 constexpr std::array setpoint_entries = {entry_of<"profile.target_torque">(),
                                          entry_of<"profile.max_torque">()};
 
@@ -179,6 +180,11 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
   }
 
   if (only_setpoints(address, in.size())) return take_setpoints(address, in);
+  // That it was written is all that it says.
+  if (in.size() == 1 && address == register_address(sign_of_life_entry, 0)) {
+    values_.set_raw(slot_of(sign_of_life_entry, 0), in[0]);
+    return last_ = {};
+  }
 
   if (dropped_) return refuse(Refusal::no_transaction, address);
   Staged wanted{staging_ ? staged_.values : values_, {}};

@@ -131,6 +131,7 @@ class DeviceRegisters {
 
   WriteResult last_refusal() const { return last_; }
 
+  bool controlword_waits() const { return commanded_[0] || commanded_[1]; }
   /// Controlwords written since they were last fetched, per axis.
   bool fetch_controlword(std::size_t axis, std::uint16_t& word) {
     if (!commanded_[axis]) return false;

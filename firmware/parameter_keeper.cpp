@@ -18,6 +18,11 @@ Refusal ParameterKeeper::save(const ParameterValues& values, bool armed) {
     state_ = StoreState::refused;
     return Refusal::while_armed;
   }
+  // A master that saves at each of its starts must not wear the flash out.
+  if (survey_.newest && state_ != StoreState::failed && persistent_part(values) == kept_) {
+    state_ = StoreState::saved;
+    return Refusal::none;
+  }
   store_.begin(values);
   state_ = StoreState::busy;
   return Refusal::none;

@@ -38,6 +38,8 @@ enum class Refusal : std::uint16_t {
   capture_without_channels = 26,
   capture_missing = 27,
   compensation_beyond_friction = 28,
+  heartbeat_missing = 29,
+  restarting = 30,
 };
 
 struct RefusalText {
@@ -81,6 +83,9 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::capture_missing, "this device has no memory for captures"},
     {Refusal::compensation_beyond_friction,
      "compensation.limit must be 0 or below guard.friction, so that a handle at rest cannot be moved by it"},
+    {Refusal::heartbeat_missing,
+     "a node that is watched (heartbeat_consumer.*) is silent; start it, or stop watching it"},
+    {Refusal::restarting, "the device is about to restart"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

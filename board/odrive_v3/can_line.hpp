@@ -47,7 +47,11 @@ class CanLine {
   /// Main loop, after the application's poll().
   void send(firmware::Application& application) {
     const firmware::CanSettings wanted = application.can_settings();
-    if (!(wanted == settings_)) configure(wanted);
+    const bool again = !configured_ && looked_us_ - tried_us_ >= retry_interval_us;
+    if (!(wanted == settings_) || again) {
+      tried_us_ = looked_us_;
+      configure(wanted);
+    }
     if (!configured_) return;
     // As many as there is room for; a frame that is taken out of the application is on its way.
     drivers::CanFrame frame;
@@ -78,6 +82,9 @@ class CanLine {
       drivers::stm32f4::Interrupt::can1_tx, drivers::stm32f4::Interrupt::can1_rx0,
       drivers::stm32f4::Interrupt::can1_rx1, drivers::stm32f4::Interrupt::can1_sce};
   static constexpr std::uint32_t status_interval_us = 1'000;
+  /// Initialization waits for the end of the frame that is on the bus, 1.2 ms at 125 kbit/s.
+  static constexpr std::uint32_t initialization_polls = 100'000;
+  static constexpr std::uint32_t retry_interval_us = 100'000;
 
   firmware::CanState state_of(const drivers::stm32f4::CanErrors& errors) const {
     using drivers::stm32f4::CanBusState;
@@ -126,6 +133,7 @@ class CanLine {
     if (!solution.usable) return;
     CanConfig config;
     config.timing = solution.timing;
+    config.polls = initialization_polls;
     const CanConfigureResult result = can_.configure(config, filters.span());
     absent_ = result == CanConfigureResult::no_initialization_mode;
     configured_ = result == CanConfigureResult::ok || result == CanConfigureResult::waiting_for_idle_bus;
@@ -138,7 +146,7 @@ class CanLine {
   drivers::stm32f4::Can<PendTransmit> can_;
   firmware::CanSettings settings_{.bit_rate = 0};
   firmware::CanReadings readings_{};
-  std::uint32_t looked_us_ = 0;
+  std::uint32_t looked_us_ = 0, tried_us_ = 0;
   bool configured_ = false, absent_ = false;
   std::atomic<bool> news_{false};
 };

@@ -29,6 +29,7 @@ struct NodeEvents {
   bool start_node = false;           ///< the first node ID has been given: call start()
   bool store_identity = false;       ///< keep the pending node ID and bit rate, then call lss().finish()
   bool heartbeat_lost = false;       ///< of a watched node
+  bool pdos_ended = false;           ///< operational was left: what PDOs asked for is no longer wanted
 };
 
 /// A CANopen node (CiA 301): all services of one device on one bus, behind one function for frames in and one
@@ -118,10 +119,7 @@ class Node {
     } else if (id == cob_id::lss_request) {
       act_on(lss_.receive(frame, now_us), events);
     } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
-      if (speaks()) {
-        sdo_.receive(frame, now_us);
-        heard_us_ = now_us;
-      }
+      if (speaks()) sdo_.receive(frame, now_us);
     } else if (nmt_.configured() && only_ours(id)) {
       ++identity_conflicts_;
     } else {
@@ -166,8 +164,11 @@ class Node {
   /// 1 to 127, or 255 while there is none.
   std::uint8_t node_id() const { return nmt_.node_id(); }
   const CanSettings& settings() const { return settings_; }
-  /// When a host last said something to this node: a transfer, a PDO, a watched heartbeat.
+  /// When a host last commanded this node: wrote a value by a transfer or a PDO, or a watched heartbeat came.
+  /// Reading is not commanding: a second program that only looks must not keep a dead one's force alive.
   std::optional<std::uint32_t> heard_us() const { return heard_us_; }
+  void set_heard(std::optional<std::uint32_t> at_us) { heard_us_ = at_us; }
+  bool any_heartbeat_lost() const { return heartbeats_.any_lost(); }
 
   const SdoCounters& sdo_counters() const { return sdo_.counters(); }
   const HeartbeatConsumerCounters& heartbeat_counters() const { return heartbeats_.counters(); }
@@ -196,16 +197,15 @@ class Node {
       if (heartbeats_.counters().heartbeats != before) heard_us_ = now_us;
     } else if (speaks() && sync_.receive(frame)) {
       if (nmt_.state() != NmtState::operational) return;
-      rpdos_.on_sync(write);
+      rpdos_.on_sync(write, now_us);
       tpdos_.on_sync();
     } else if (nmt_.state() == NmtState::operational) {
-      take_pdo(rpdos_.receive(frame, write), now_us);
+      tell_pdo(rpdos_.receive(frame, write, now_us));
     }
   }
 
-  void take_pdo(RpdoResult result, std::uint32_t now_us) {
+  void tell_pdo(RpdoResult result) {
     if (result == RpdoResult::ignored) return;
-    heard_us_ = now_us;
     report(result == RpdoResult::too_short, 0x8210);
     report(result == RpdoResult::too_long, 0x8220);
   }
@@ -231,6 +231,7 @@ class Node {
       case NmtEvent::entered_pre_operational:
         sdo_start_if_silent();
         stop_pdos();
+        events.pdos_ended = true;
         break;
       case NmtEvent::entered_stopped:
         events.remove_force = true;
@@ -266,7 +267,10 @@ class Node {
   /// Object 0x1029.
   void communication_error(NodeEvents& events) {
     if (error_behaviour_ == 0 && nmt_.state() == NmtState::operational) {
-      if (nmt_.enter(NmtState::pre_operational) != NmtEvent::none) stop_pdos();
+      if (nmt_.enter(NmtState::pre_operational) != NmtEvent::none) {
+        stop_pdos();
+        events.pdos_ended = true;
+      }
     } else if (error_behaviour_ == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
       stop_pdos();
       sdo_.stop();

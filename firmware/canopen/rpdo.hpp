@@ -25,6 +25,7 @@ struct RpdoCounters {
   std::uint32_t too_long = 0;  ///< of these
   std::uint32_t too_short = 0;
   std::uint32_t replaced = 0;  ///< kept for a SYNC, but a newer one came first
+  std::uint32_t stale = 0;     ///< kept for a SYNC that came too late
   std::uint32_t refused = 0;   ///< values that were not taken
   std::uint32_t left_out = 0;  ///< not there since its stored settings break the rules, at a configure()
 };
@@ -33,15 +34,18 @@ struct RpdoCounters {
 /// NMT state operational: between configure() and stop().
 ///
 /// Transmission types 254 and 255 are written at once; 0 to 240 are kept until the next SYNC, the newest one
-/// if there were several. The values are written in the order in which they are mapped, and PDOs with the
-/// same identifier or at the same SYNC in the order 1 to 4. `write(slot, raw) -> bool` takes a value (a
-/// pattern as the dictionary has it: signed numbers are extended to 32 bits) or refuses it; the others of the
-/// PDO are written all the same. It must not call back into this object.
+/// if there were several, but not longer than longest_kept_us: what a host wanted then it need not want now.
+/// The values are written in the order in which they are mapped, and PDOs with the same identifier or at the
+/// same SYNC in the order 1 to 4. `write(slot, raw) -> bool` takes a value (a pattern as the dictionary has
+/// it: signed numbers are extended to 32 bits) or refuses it; the others of the PDO are written all the same.
+/// It must not call back into this object.
 ///
 /// Extended and remote frames are ignored. Main loop only. Cost: 4 comparisons for a frame, and one write()
 /// for each object of a PDO. Memory: 280 bytes.
 class Rpdos {
  public:
+  static constexpr std::uint32_t longest_kept_us = 100'000;
+
   /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were
   /// still have what they keep for the next SYNC.
   void configure(const ParameterValues& values, std::uint8_t node_id) {
@@ -61,7 +65,7 @@ class Rpdos {
   }
 
   template <typename Write>
-  RpdoResult receive(const drivers::CanFrame& frame, Write write) {
+  RpdoResult receive(const drivers::CanFrame& frame, Write write, std::uint32_t now_us = 0) {
     auto result = RpdoResult::ignored;
     if (frame.extended || frame.remote || frame.length > 8) return result;
     for (Pdo& pdo : pdos_) {
@@ -72,6 +76,7 @@ class Rpdos {
       if (pdo.settings.synchronous()) {
         if (pdo.kept) ++counters_.replaced;
         pdo.kept = true;
+        pdo.kept_us = now_us;
         pdo.data = frame.data;
       } else {
         write_all(pdo.settings.mapping, frame.data, write);
@@ -81,10 +86,14 @@ class Rpdos {
   }
 
   template <typename Write>
-  void on_sync(Write write) {
+  void on_sync(Write write, std::uint32_t now_us = 0) {
     for (Pdo& pdo : pdos_) {
       if (!pdo.kept) continue;
       pdo.kept = false;
+      if (now_us - pdo.kept_us > longest_kept_us) {
+        ++counters_.stale;
+        continue;
+      }
       write_all(pdo.settings.mapping, pdo.data, write);
     }
   }
@@ -102,6 +111,7 @@ class Rpdos {
     PdoSettings settings{};
     std::array<std::uint8_t, 8> data{};
     bool kept = false;
+    std::uint32_t kept_us = 0;
   };
 
   RpdoResult length_of(const drivers::CanFrame& frame, const Pdo& pdo) {

@@ -118,7 +118,10 @@ StoreStatus Store::save() {
     }
   }
   const StoreStatus after = wait_until_done(before);
-  if (after.state == StoreState::failed || after.sequence == before.sequence)
+  // A set that is kept already is not written again.
+  const bool kept =
+      after.state == StoreState::saved && after.unsaved_parameters == 0 && after.saved_parameters != 0;
+  if (after.state == StoreState::failed || (after.sequence == before.sequence && !kept))
     throw DeviceError(fmt::format(
         "the memory did not take the parameters ({} words did not read back); {}; save again, and if that "
         "fails too the board's flash is worn out",

@@ -30,6 +30,7 @@ using firmware::CaptureTrigger;
 namespace {
 struct CaptureOptions {
   CaptureSettings settings{.channels = {"position", "velocity", "force", "current"}};
+  std::string trigger{firmware::names::capture_trigger[0].name};
   std::optional<double> level;
   double timeout = 30;
   std::string file;
@@ -43,6 +44,13 @@ class Interrupted : public std::runtime_error {
 
 std::string trigger_name(CaptureTrigger trigger) {
   return std::string(firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name);
+}
+
+CaptureTrigger trigger_of(const std::string& name) {
+  for (const auto& trigger : firmware::names::capture_trigger) {
+    if (trigger.name == name) return static_cast<CaptureTrigger>(trigger.value);
+  }
+  throw UsageError(fmt::format("--trigger: there is no '{}'", name));
 }
 
 /// "force_n", "velocity_m_per_s", "count": a name that says its unit.
@@ -179,7 +187,7 @@ CaptureOptions checked(const CaptureOptions& given, const Context& context) {
   // CLI's ranges let a NaN pass.
   if (!std::isfinite(options.timeout))
     throw UsageError(fmt::format("--timeout: {} is not a number of seconds", options.timeout));
-  const CaptureTrigger trigger = options.settings.trigger;
+  const CaptureTrigger trigger = options.settings.trigger = trigger_of(options.trigger);
   const bool takes_level = trigger == CaptureTrigger::force || trigger == CaptureTrigger::velocity;
   if (takes_level && !options.level)
     throw UsageError(fmt::format("--trigger {} needs --level", trigger_name(trigger)));
@@ -239,15 +247,14 @@ void add_capture_command(CLI::App& app, Context& context) {
       ->delimiter(',')
       ->type_name("NAME,...")
       ->capture_default_str();
-  std::map<std::string, CaptureTrigger> triggers;
-  for (const auto& trigger : firmware::names::capture_trigger)
-    triggers.emplace(trigger.name, static_cast<CaptureTrigger>(trigger.value));
+  std::vector<std::string> triggers;
+  for (const auto& trigger : firmware::names::capture_trigger) triggers.emplace_back(trigger.name);
   command
       ->add_option(
-          "--trigger", settings.trigger,
+          "--trigger", options->trigger,
           "What starts it: now, contact with the wall, |force| or |velocity| above --level, a fault of the "
           "axis, or the start of an excitation; default: now")
-      ->transform(CLI::CheckedTransformer(triggers))
+      ->check(CLI::IsMember(triggers))
       ->type_name("now|contact|force|velocity|fault|excitation")
       ->option_text("TRIGGER");
   command->add_option("--level", options->level, "Level of the triggers force (N) and velocity (m/s)")

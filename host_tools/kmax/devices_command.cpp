@@ -17,11 +17,22 @@ void append(std::vector<ReachableDevice>& all, const std::vector<ReachableDevice
 }
 
 int run_devices(Context& context, const std::vector<std::string>& buses) {
+  if (std::find(buses.begin(), buses.end(), "") != buses.end())
+    throw UsageError("--can: the name of a CAN interface is needed, as in --can can0");
   std::vector<ReachableDevice> devices{{"sim", "a simulated device in this program"}};
   append(devices, serial_ports("/dev"));
   append(devices, can_interfaces("/sys/class/net"));
+  int code = done;
   for (const std::string& bus : buses) {
-    const auto nodes = nodes_on(bus, link::discover_nodes(bus));
+    std::vector<ReachableDevice> nodes;
+    try {
+      nodes = nodes_on(bus, link::discover_nodes(bus));
+    } catch (const link::LinkError& error) {
+      // What else can be reached is still worth seeing.
+      context.note(error.what());
+      code = failed;
+      continue;
+    }
     if (nodes.empty())
       context.note(
           fmt::format("{}: no node answered; is the device powered, the bus terminated, and its "
@@ -35,14 +46,14 @@ int run_devices(Context& context, const std::vector<std::string>& buses) {
       list.push_back({{"address", device.address.empty() ? Json(nullptr) : Json(device.address)},
                       {"description", device.description}});
     context.print({{"devices", list}});
-    return done;
+    return code;
   }
   std::size_t width = 0;
   for (const ReachableDevice& device : devices) width = std::max(width, device.address.size());
   for (const ReachableDevice& device : devices)
     fmt::print(context.out, "{:<{}}  {}\n", device.address.empty() ? "-" : device.address, width,
                device.description);
-  return done;
+  return code;
 }
 }  // namespace
 

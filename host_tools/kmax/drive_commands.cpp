@@ -104,6 +104,7 @@ int run_on_axes(Context& context, Act act) {
 void disarm_after_failure(Context& context, Drive& drive, double link_timeout) {
   try {
     drive.disarm();
+    context.note("disarmed");
   } catch (const std::exception&) {
     context.note(
         link_timeout > 0
@@ -114,9 +115,8 @@ void disarm_after_failure(Context& context, Drive& drive, double link_timeout) {
   }
 }
 
-/// Keeps talking to the device until the user interrupts or the axis loses its force. Returns the exit code.
-int hold(Context& context, Device& device, Drive& drive, const Interruption& interruption) {
-  const double timeout = device.read_number("link.timeout");
+/// Keeps talking to the device until the user interrupts or the axis loses its force.
+void hold(Context& context, Device& device, Drive& drive, double timeout, const Interruption& interruption) {
   const auto interval = timeout > 0
                             ? std::min(milliseconds(200), milliseconds(static_cast<int>(timeout * 250)))
                             : milliseconds(200);
@@ -135,35 +135,39 @@ int hold(Context& context, Device& device, Drive& drive, const Interruption& int
   }
   drive.disarm();
   context.note("disarmed");
-  return done;
+}
+
+/// What is worth saying of an axis that makes force and is left alone.
+void note_what_ends_the_force(Context& context, double link_timeout) {
+  if (link_timeout > 0)
+    context.note(fmt::format(
+        "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps "
+        "it alive",
+        device::number_text(static_cast<float>(link_timeout))));
+  if (link_timeout == 0)
+    context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
 }
 
 int run_arm(Context& context, bool holding) {
   const Interruption interruption;
   Device device = context.connect();
   Drive drive(device, context.axis());
-  drive.arm();
   const double timeout = device.read_number("link.timeout");
-  if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status()));
-  context.out.flush();
-  if (!holding && timeout > 0)
-    context.note(fmt::format(
-        "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps "
-        "it alive",
-        device::number_text(static_cast<float>(timeout))));
-  if (!holding && timeout == 0)
-    context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
-  int code = done;
-  if (holding) {
-    try {
-      code = hold(context, device, drive, interruption);
-    } catch (const std::exception&) {
-      disarm_after_failure(context, drive, timeout);
-      throw;
-    }
+  drive.arm();
+  try {
+    if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status()));
+    context.out.flush();
+    if (!holding) note_what_ends_the_force(context, timeout);
+    if (holding) hold(context, device, drive, timeout, interruption);
+    const DriveStatus status = drive.status();
+    // Ctrl-C while it was being armed was meant to end that.
+    if (!holding && interruption.requested()) throw std::runtime_error("interrupted");
+    if (context.json) context.print({{"axes", Json::array({status_json(drive.axis(), status)})}});
+  } catch (const std::exception&) {
+    disarm_after_failure(context, drive, timeout);
+    throw;
   }
-  if (context.json) context.print({{"axes", Json::array({status_json(drive.axis(), drive.status())})}});
-  return code;
+  return done;
 }
 
 int run_clear(Context& context) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 
 #include "host_tools/device/drive.hpp"
@@ -209,6 +210,9 @@ int carry_out(Context& context, const BoardServices& services, const lines::Line
 }
 
 int run_flash(Context& context, const BoardServices& services, const FlashOptions& options) try {
+  // CLI's ranges let a NaN pass.
+  if (!std::isfinite(options.at_most))
+    throw UsageError(fmt::format("--timeout: {} is not a number of seconds", options.at_most));
   const lines::LinesConfig config = read_lines_config(options.lines);
   const BoardProfile& board = chosen_board(options.board, config);
   const flash::FlashImage image = flash::FlashImage::load(chosen_image(options, board));

@@ -62,10 +62,12 @@ Json reading_json(const Parameter& parameter, std::uint32_t raw) {
 int run_info(Context& context) {
   device::Device device = context.connect();
   const auto texts = device.identify();
+  // The link's own counters.
+  const std::string_view counters = device.description().starts_with("can:") ? "can" : "counters";
   std::vector<Parameter> parameters;
   for (const Parameter& parameter : device::all_parameters()) {
     const std::string_view group = parameter.definition().group.name;
-    if (group == "info" || group == "counters") parameters.push_back(parameter);
+    if (group == "info" || (group == counters && !parameter.writable())) parameters.push_back(parameter);
   }
   const auto raw = device.read(parameters);
   const std::string crash = crash_text(device);

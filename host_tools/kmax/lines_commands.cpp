@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "host_tools/kmax/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/held_lines.hpp"
 #include "host_tools/kmax/interruption.hpp"
 
 namespace kmax::cli {
@@ -52,6 +54,12 @@ std::function<bool()> until(const LinesOptions& options, const Interruption& int
                                       std::chrono::duration<double>(options.duration));
   const bool limited = options.duration > 0;
   return [=, &interruption] { return interruption.requested() || (limited && Clock::now() >= end); };
+}
+
+/// CLI's ranges let a NaN pass.
+void check_duration(const LinesOptions& options) {
+  if (!std::isfinite(options.duration))
+    throw UsageError(fmt::format("--for: {} is not a number of seconds", options.duration));
 }
 
 int list_lines(Context& context, const BoardServices& services, const LinesConfig& config) {
@@ -110,6 +118,7 @@ std::string seconds_text(std::chrono::nanoseconds time) {
 
 int watch_lines(Context& context, const BoardServices& services, const LinesOptions& options,
                 const LinesConfig& config) {
+  check_duration(options);
   std::vector<LineRole> roles;
   for (const std::string& name : options.texts) roles.push_back(role_of(name));
   if (options.texts.empty()) {
@@ -179,13 +188,9 @@ Assignment parsed(const std::string& text) {
       fmt::format("'{}': {} is set to {} or {}", text, facts.name, facts.active, facts.inactive));
 }
 
-/// Where a line is left: the board stops, and starts its application.
-bool final_state(LineRole role) {
-  return role == LineRole::emergency_stop;
-}
-
 int set_lines(Context& context, const BoardServices& services, const LinesOptions& options,
               const LinesConfig& config) {
+  check_duration(options);
   if (options.texts.empty()) throw UsageError("write NAME=STATE, as in 'kmax lines set emergency_stop=stop'");
   std::vector<Assignment> assignments;
   for (const std::string& text : options.texts) {
@@ -197,10 +202,10 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
   }
   const Interruption interruption;
   const auto gpio = services.open_gpio();
-  std::vector<std::unique_ptr<lines::OutputLine>> held;
+  HeldLines held(context, *gpio);
   Json document = Json::object();
   for (const auto& [role, active] : assignments) {
-    held.push_back(gpio->drive(config.required(role), active));
+    held.drive(config.required(role), role, active);
     const std::string name(lines::facts_of(role).name), word(lines::state_word(role, active));
     document[name] = word;
     if (!context.json) fmt::print(context.out, "{} = {}\n", name, word);
@@ -216,21 +221,15 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
       options.duration > 0 ? fmt::format("for {} s", options.duration) : std::string("until Ctrl-C")));
   const auto over = until(options, interruption);
   while (!over()) services.sleep(milliseconds(20));
-  // Driven first: some GPIO drivers leave a released line at its last level.
-  for (std::size_t i = 0; i < held.size(); ++i) {
-    const auto& [role, active] = assignments[i];
-    if (active != final_state(role)) {
-      held[i]->set(final_state(role));
-      context.note(
-          fmt::format("{} = {}", lines::facts_of(role).name, lines::state_word(role, final_state(role))));
-    }
-  }
+  held.end();
   if (context.json) context.print(document);
   return done;
 }
 
 int run_reset(Context& context, const BoardServices& services, const LinesConfig& config) {
   config.required(LineRole::reset);
+  // A reset that is torn would leave the board in it.
+  const Interruption interruption;
   const auto gpio = services.open_gpio();
   lines::pulse_reset(*gpio, config, services.sleep);
   if (context.json) {
@@ -249,6 +248,8 @@ int run_bootloader(Context& context, const BoardServices& services, const std::s
         "BOOT0 of {} is a switch that no line can move. To start the ROM bootloader: {}. To go back: "
         "{}",
         board.title, board.to_bootloader, board.to_application));
+  // Likewise.
+  const Interruption interruption;
   const auto gpio = services.open_gpio();
   lines::enter_bootloader(*gpio, config, services.sleep);
   if (context.json) {

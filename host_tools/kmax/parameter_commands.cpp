@@ -111,6 +111,21 @@ void note_line_settings(Context& context, const std::vector<Assignment>& assignm
     context.note(fmt::format("from now on: --device '{}'", device.description()));
 }
 
+/// Node ID and bit rate are taken over when the node starts to communicate (CiA 301, NMT reset).
+void note_can_settings(Context& context, const std::vector<Assignment>& assignments) {
+  for (const auto& [parameter, raw] : assignments) {
+    if (parameter == Parameter::of<"node.id">())
+      context.note(fmt::format(
+          "node.id takes effect at the next start ('kmax save' first) or NMT reset; then --device "
+          "'can:IFACE?node={}'",
+          raw));
+    if (parameter == Parameter::of<"can.bit_rate">())
+      context.note(
+          "can.bit_rate takes effect at the next start ('kmax save' first) or NMT reset; then the interface "
+          "must have it, too: 'sudo ip link set IFACE type can bitrate RATE'");
+  }
+}
+
 int run_set(Context& context, const std::vector<std::string>& texts) {
   if (texts.empty())
     throw UsageError("write NAME=VALUE, as in 'kmax set wall.stiffness=3580'; 'kmax list' shows all names");
@@ -121,6 +136,7 @@ int run_set(Context& context, const std::vector<std::string>& texts) {
   const auto before = device.read(parameters);
   device.apply(assignments);
   note_line_settings(context, assignments, device);
+  note_can_settings(context, assignments);
 
   Json document = Json::object();
   for (std::size_t i = 0; i < assignments.size(); ++i) {

@@ -127,6 +127,11 @@ Finished record_pdos(Context& context, const link::DeviceAddress& address, const
                     .source = fmt::format("{}, a PDO set every {:g} ms", link::text_of(address),
                                           1000.0 * plan.period_ticks / firmware::tick_rate_hz)};
   write_rows(context, source, options, interruption, finished.progress);
+  if (source.restarts() != 0)
+    context.note(fmt::format(
+        "the PDOs ceased and the node was started again {} time{}: another program, perhaps a recording that "
+        "ended, had taken it out of the state operational",
+        source.restarts(), source.restarts() == 1 ? "" : "s"));
   finished.held_back = held_back_since(context, plan);
   if (finished.held_back.value_or(0) != 0)
     context.note(fmt::format(

@@ -54,6 +54,10 @@ int run_serve(Context& context, const ServeOptions& options) {
   if (report.behind_s > 0)
     context.note(
         fmt::format("this process was held up: {:.3f} s of real time were not simulated", report.behind_s));
+  if (can && can->lost() != 0)
+    context.note(fmt::format(
+        "{} CAN frames were lost on their way to other programs, whose queues (or the interface's) were full",
+        can->lost()));
   return done;
 }
 }  // namespace

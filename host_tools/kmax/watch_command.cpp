@@ -15,6 +15,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/watch_view.hpp"
+#include "host_tools/link/regular_loan.hpp"
 
 namespace kmax::cli {
 
@@ -32,11 +33,18 @@ WatchedAxis read_axis(device::Device& device, std::size_t axis) {
   return {.axis = axis, .status = status, .measured = record::read_measurements(device, {&axis, 1}).front()};
 }
 
+struct TerminalSize {
+  std::size_t columns = 80, rows = 24;
+};
+
 /// Of the terminal on standard output.
-std::size_t terminal_width() {
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
-  return 80;
+TerminalSize terminal_size() {
+  TerminalSize size;
+  winsize told{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &told) != 0) return size;
+  if (told.ws_col > 0) size.columns = told.ws_col;
+  if (told.ws_row > 0) size.rows = told.ws_row;
+  return size;
 }
 
 /// Shows readings in place on a terminal, and elsewhere a line a second. Nothing with --json, whose document
@@ -52,13 +60,13 @@ class Display {
   void show(double seconds, double rate, const std::vector<WatchedAxis>& axes) {
     if (context_.json) return;
     if (terminal_) {
-      const std::size_t width = terminal_width();
+      const auto [width, rows] = terminal_size();
       std::vector<std::string> lines = watch_table(axes, width);
       std::string title =
           fmt::format("{}   {:.1f} s   {:.1f} readings/s   Ctrl-C ends", device_, seconds, rate);
       if (title.size() > width) title.resize(width);
       lines.insert(lines.begin(), title);
-      live_.show(lines);
+      live_.show(std::move(lines), rows);
     } else if (seconds >= next_line_) {
       context_.out << watch_line(seconds, axes) << std::endl;
       next_line_ = std::floor(seconds) + 1;
@@ -89,6 +97,7 @@ int run_watch(Context& context, const WatchOptions& options) {
   device::Device device = context.connect();
   link::Link& link = device.link();
   Display display(context, device.description());
+  link::RegularLoan loan(link);
   const microseconds interval(static_cast<std::int64_t>(1e6 / options.rate));
   const microseconds start = link.now();
   const auto real_start = std::chrono::steady_clock::now();
@@ -102,6 +111,8 @@ int run_watch(Context& context, const WatchOptions& options) {
     seconds = std::chrono::duration<double>(link.now() - start).count();
     display.show(seconds, seconds > 0 ? static_cast<double>(readings) / seconds : 0, axes);
     if (options.seconds && seconds >= *options.seconds) break;
+    // What is left of an interval may be too short for anybody to take the link.
+    loan.lend();
     next = std::max(next + interval, link.now());
     // In pieces, so that Ctrl-C is not waited for.
     while (link.now() < next && !interruption.requested())

@@ -120,7 +120,8 @@ Json watch_json(const WatchedAxis& axis) {
           {"trouble", trouble.empty() ? Json(nullptr) : Json(trouble)}};
 }
 
-void LiveLines::show(const std::vector<std::string>& lines) {
+void LiveLines::show(std::vector<std::string> lines, std::size_t rows) {
+  lines.resize(std::min(lines.size(), std::max<std::size_t>(rows, 2) - 1));
   if (shown_ > 0) terminal_ << fmt::format("\x1b[{}F", shown_);
   for (const std::string& line : lines) terminal_ << line << "\x1b[K\n";
   terminal_ << "\x1b[J" << std::flush;

@@ -37,7 +37,9 @@ Json watch_json(const WatchedAxis& axis);
 class LiveLines {
  public:
   explicit LiveLines(std::ostream& terminal) : terminal_(terminal) {}
-  void show(const std::vector<std::string>& lines);
+  /// Of a terminal with `rows` rows: only the first rows - 1 lines, since what has been scrolled away cannot
+  /// be replaced.
+  void show(std::vector<std::string> lines, std::size_t rows);
 
  private:
   std::ostream& terminal_;

@@ -47,7 +47,8 @@ class ExclusiveUse {
         notice("waiting for another program to release " + name());
         noticed = true;
       }
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      // A loan may be as short as a few ms.
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
   }
 

@@ -15,7 +15,7 @@ namespace cob_id = firmware::canopen::cob_id;
 namespace {
 /// CiA 301, NMT commands and states.
 constexpr std::uint8_t start_node = 1, enter_pre_operational = 128;
-constexpr std::uint8_t operational = 5;
+constexpr std::uint8_t stopped = 4, operational = 5;
 }  // namespace
 
 link::CanPortOptions port_options(const PdoPlan& plan) {
@@ -27,8 +27,7 @@ link::CanPortOptions port_options(const PdoPlan& plan) {
 
 CanSource::CanSource(link::CanPort& port, const PdoPlan& plan) : port_(port), plan_(plan), rows_(plan) {
   if (plan.node_state == operational) return;
-  command(start_node);
-  started_ = true;
+  start();
 }
 
 CanSource::~CanSource() {
@@ -53,11 +52,13 @@ std::optional<Row> CanSource::next(std::chrono::microseconds wait) {
     const auto now = steady_clock::now();
     if (received) {
       const drivers::CanFrame& frame = received->frame;
-      if (frame.identifier == cob_id::heartbeat + plan_.node && !frame.extended && !frame.remote &&
-          frame.length == 1 && frame.data[0] == 0) {
-        started_ = false;
-        throw device::DeviceError(fmt::format("{}: node {} has restarted, so that its ticks began again",
-                                              port_.description(), plan_.node));
+      const bool heartbeat = frame.identifier == cob_id::heartbeat + plan_.node && !frame.extended &&
+                             !frame.remote && frame.length == 1;
+      if (heartbeat) {
+        hear_state(static_cast<std::uint8_t>(frame.data[0] & 0x7F));
+      } else {
+        last_pdo_ = now;
+        start_again_ = true;
       }
       const auto row = rows_.take(frame, received->time);
       last_frame_ = now;
@@ -67,12 +68,34 @@ std::optional<Row> CanSource::next(std::chrono::microseconds wait) {
         return row;
       }
     }
+    const std::chrono::milliseconds periods(3 * plan_.period_ticks / (firmware::tick_rate_hz / 1000));
+    if (!received && now - last_pdo_ > std::max(silence, periods)) start_again();
     const auto sets =
         static_cast<std::uint64_t>(patience.count()) * (firmware::tick_rate_hz / 1000) / plan_.period_ticks;
     if (now - last_frame_ > patience || frames_since_row_ > plan_.identifiers.size() * (sets + 1))
       fail_silent();
     if (now >= end) return std::nullopt;
   }
+}
+
+void CanSource::hear_state(std::uint8_t state) {
+  stopped_ = state == stopped;
+  if (state != 0) return;
+  started_ = false;
+  throw device::DeviceError(fmt::format("{}: node {} has restarted, so that its ticks began again",
+                                        port_.description(), plan_.node));
+}
+
+void CanSource::start() {
+  command(start_node);
+  started_ = true;
+}
+
+void CanSource::start_again() {
+  if (!start_again_ || stopped_) return;
+  start_again_ = false;
+  ++restarts_;
+  start();
 }
 
 void CanSource::command(std::uint8_t command) {

@@ -16,12 +16,16 @@ link::CanPortOptions port_options(const PdoPlan& plan);
 /// Rows from the TPDOs that a CANopen device sends by itself: one every millisecond by default.
 ///
 /// They are sent in the NMT state operational only: a device in another state is started, and put back by
-/// stop() or the destructor. Anybody else on the bus can send NMT commands too; then the rows cease.
+/// stop() or the destructor. Anybody else on the bus can send NMT commands too, such as another recording
+/// that ends and puts the node back: when the PDOs cease, the node is started again, once until some come. A
+/// node whose heartbeat says "stopped" was stopped by somebody who meant it, and stays so.
 class CanSource final : public RowSource {
  public:
   /// Silence that ends a recording, and how long PDOs may come without a complete set among them. This
   /// program's own absence (it was stopped, or the computer slept) does not count.
   static constexpr std::chrono::milliseconds patience{1000};
+  /// Without a PDO, or three of their periods if that is longer: then the node is started again.
+  static constexpr std::chrono::milliseconds silence{100};
 
   /// `port` must outlive this. `plan` is fresh: at most a second old. Nobody need talk to the device by SDO
   /// meanwhile, so others may.
@@ -32,16 +36,25 @@ class CanSource final : public RowSource {
   void stop() override;
   std::optional<Losses> losses() const override { return rows_.losses(); }
   bool axes_apart() const override { return false; }
+  /// How often the node was started again.
+  std::uint64_t restarts() const { return restarts_; }
 
  private:
   void command(std::uint8_t command);
+  void hear_state(std::uint8_t state);
+  void start();
+  void start_again();
   [[noreturn]] void fail_silent() const;
 
   link::CanPort& port_;
   PdoPlan plan_;
   bool started_ = false;
+  bool start_again_ = true;  ///< not yet since the last PDO
+  bool stopped_ = false;     ///< says its last heartbeat
+  std::uint64_t restarts_ = 0;
   PdoRows rows_;
   std::chrono::steady_clock::time_point last_frame_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point last_pdo_ = last_frame_;
   std::uint64_t frames_since_row_ = 0;
 };
 

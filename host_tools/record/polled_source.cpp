@@ -7,17 +7,11 @@
 
 namespace kmax::record {
 
-namespace {
-constexpr std::chrono::milliseconds own_time{500};
-/// Longer than from one attempt of a program that waits to the next (link::ExclusiveUse).
-constexpr std::chrono::milliseconds others_time{25};
-}  // namespace
-
 PolledSource::PolledSource(device::Device& device, std::vector<std::size_t> axes)
-    : device_(device), axes_(std::move(axes)), lent_(device.link().now()) {}
+    : device_(device), axes_(std::move(axes)), loan_(device.link()) {}
 
 std::optional<Row> PolledSource::next(std::chrono::microseconds /*wait*/) {
-  lend();
+  loan_.lend();
   const std::vector<Measurement> measured = read_measurements(device_, axes_);
   const std::uint32_t tick = measured.front().tick;
   Row row;
@@ -36,13 +30,6 @@ std::optional<Row> PolledSource::next(std::chrono::microseconds /*wait*/) {
   }
   last_tick_ = row.tick;
   return row;
-}
-
-void PolledSource::lend() {
-  link::Link& link = device_.link();
-  if (link.now() - lent_ < own_time) return;
-  link.wait(others_time);
-  lent_ = link.now();
 }
 
 std::uint64_t PolledSource::unwrapped(std::uint32_t tick, std::uint64_t reference) const {

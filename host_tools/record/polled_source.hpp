@@ -4,12 +4,13 @@
 #include <vector>
 
 #include "host_tools/device/device.hpp"
+#include "host_tools/link/regular_loan.hpp"
 #include "host_tools/record/row_source.hpp"
 
 namespace kmax::record {
 
-/// Rows read over any link as fast as it goes: one request for each axis. Twice a second the link is lent to
-/// other programs for 25 ms, since one that stops the device must not be kept out.
+/// Rows read over any link as fast as it goes: one request for each axis. Now and then the link is lent to
+/// other programs (link::RegularLoan).
 ///
 /// The values of one axis are of one tick; those of the next axis are one request later and say so with
 /// their own tick. Only the axes that are asked for are read, the rest of a row is zero.
@@ -28,12 +29,10 @@ class PolledSource final : public RowSource {
  private:
   std::uint64_t unwrapped(std::uint32_t tick, std::uint64_t reference) const;
 
-  void lend();
-
   device::Device& device_;
   std::vector<std::size_t> axes_;
   std::optional<std::uint64_t> last_tick_;
-  std::chrono::microseconds lent_;
+  link::RegularLoan loan_;
 };
 
 }  // namespace kmax::record

@@ -159,12 +159,17 @@ void Bench::clear_fault() {
 }
 
 LinkTrial Bench::try_link(int exchanges) {
-  static constexpr const char* counters[] = {"counters.crc_errors",      "counters.line_errors",
-                                             "counters.gap_errors",      "counters.length_errors",
-                                             "counters.queue_overflows", "counters.missed_ticks"};
   LinkTrial trial;
+  trial.over_can = device_.description().starts_with("can:");
+  const std::vector<std::string> counters =
+      trial.over_can
+          ? std::vector<std::string>{"can.overruns",  "can.queue_overflows", "can.bus_offs",
+                                     "can.discarded", "can.sdo_timeouts",    "counters.missed_ticks"}
+          : std::vector<std::string>{"counters.crc_errors",      "counters.line_errors",
+                                     "counters.gap_errors",      "counters.length_errors",
+                                     "counters.queue_overflows", "counters.missed_ticks"};
   std::vector<Parameter> asked;
-  for (const char* name : counters) asked.push_back(device::resolve(name));
+  for (const std::string& name : counters) asked.push_back(device::resolve(name));
   const auto before = device_.read(asked);
   const auto uptime = Parameter::of<"info.tick">();
   for (int i = 0; i < exchanges; ++i) {

@@ -23,6 +23,7 @@ struct LinkTrial {
     double rise = 0.0;  ///< during the exchanges
   };
   std::vector<Counter> risen;  ///< error counters that rose
+  bool over_can = false;       ///< or over a serial line
 };
 
 /// An attempt to arm the axis with zero volts.

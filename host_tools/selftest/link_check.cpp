@@ -34,9 +34,10 @@ CheckResult check_link(const Evidence& evidence) {
     return result;
   }
   result.part = "link";
-  result.message = measured +
-                   "; none is allowed: check the cable, its shield and ground, the baud rate, and what else "
-                   "talks on the line";
+  result.message =
+      measured + "; none is allowed: check the cable, its shield and ground, " +
+      (link.over_can ? "the bit rate, the termination (120 ohm at both ends), and what else talks on the bus"
+                     : "the baud rate, and what else talks on the line");
   return result;
 }
 

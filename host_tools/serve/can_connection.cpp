@@ -8,11 +8,16 @@ namespace kmax::serve {
 
 using std::chrono::microseconds;
 
+namespace {
+/// A full queue must not hold the simulation.
+const link::CanPortOptions options{.send_patience = std::chrono::milliseconds(0)};
+}  // namespace
+
 CanConnection::CanConnection(const std::string& name) : name_(name) {
   if (link::is_socket_path(name)) {
     hub_ = std::make_unique<link::UnixCanHub>(name);
   } else {
-    port_ = link::open_can_port(name);
+    port_ = link::open_can_port(name, options);
   }
 }
 
@@ -22,7 +27,7 @@ bool CanConnection::connected() {
   if (now < next_attempt_) return false;
   next_attempt_ = now + std::chrono::milliseconds(200);
   try {
-    port_ = link::open_can_port(name_);
+    port_ = link::open_can_port(name_, options);
   } catch (const link::LinkError&) {
   }
   return port_ != nullptr;
@@ -49,6 +54,8 @@ void CanConnection::send(const drivers::CanFrame& frame) {
   if (!connected()) return;
   try {
     port_->send(frame);
+  } catch (const link::SendQueueFull&) {
+    ++lost_;
   } catch (const link::LinkError&) {
     port_.reset();
   }

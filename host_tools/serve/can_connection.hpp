@@ -15,7 +15,8 @@ namespace kmax::serve {
 /// a bus that is served at that Unix domain socket. Belongs to one thread.
 ///
 /// Errors: link::LinkError, at the start only. An interface that goes down later is a cable that is pulled
-/// out: frames are lost until it is up again, which is looked for five times a second.
+/// out: frames are lost until it is up again, which is looked for five times a second. A bus that takes no
+/// frame now (nobody acknowledges, a client that does not fetch) loses it: the simulation does not wait.
 class CanConnection {
  public:
   explicit CanConnection(const std::string& name);
@@ -25,6 +26,9 @@ class CanConnection {
   /// What others have sent since the last call; does not wait.
   std::vector<drivers::CanFrame> received();
   void send(const drivers::CanFrame& frame);
+
+  /// Frames that were not sent: the queue was full.
+  std::uint64_t lost() const { return hub_ ? hub_->counters().lost : lost_; }
 
   /// Readable when received() has something to give; -1 while the interface is down.
   int descriptor() const;
@@ -38,6 +42,7 @@ class CanConnection {
   std::unique_ptr<link::UnixCanHub> hub_;  // one of the two
   std::unique_ptr<link::CanPort> port_;    // null while the interface is down
   std::chrono::steady_clock::time_point next_attempt_;
+  std::uint64_t lost_ = 0;
 };
 
 }  // namespace kmax::serve

@@ -83,6 +83,9 @@ void GpioBridge::follow_emergency_stop(bool low) {
   while ((board_.bridge_armed(0) || board_.bridge_armed(1)) && elapsed_us < longest_us) {
     board_.run_until(then + static_cast<BoardTime>(++elapsed_us) * (units_per_second / 1'000'000));
   }
+  if (board_.bridge_armed(0) || board_.bridge_armed(1))
+    return tell_(
+        fmt::format("{:.6f} s: ESTOP low, and a bridge is STILL ON {} us later", seconds(then), elapsed_us));
   tell_(armed ? fmt::format("{:.6f} s: ESTOP low, both bridges off {} us later", seconds(then), elapsed_us)
               : fmt::format("{:.6f} s: ESTOP low, no bridge was on", seconds(then)));
 }

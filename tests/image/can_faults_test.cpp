@@ -2,6 +2,8 @@
 // is there again without a power cycle.
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "firmware/axis_state_machine.hpp"
 #include "firmware/can_port.hpp"
 #include "tests/image/can_bench.hpp"
@@ -149,6 +151,72 @@ TEST_F(BusFaults, TwoNodesHaveOneIdentifier) {
   twin.set_connected(false, bench.board->now());
   bench.board->run_for(1.5);
   EXPECT_FALSE(bench.board->bridge_armed(0)) << "the host is silent";
+  expect_link_is_back();
+}
+
+TEST_F(BusFaults, AFloodOfWritesDoesNotStarveTheMainLoop) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.port.node().on_frame({});
+  // Each of them changes a parameter and so the settings of the tick.
+  for (std::uint32_t i = 0; i < 12'000; ++i) {
+    const auto value = std::bit_cast<std::uint32_t>(i % 2 == 0 ? 1000.0f : 1001.0f);
+    bench.port.send({.identifier = 0x601,
+                     .length = 8,
+                     .data = {0x23, 0x00, 0x20, 4, static_cast<std::uint8_t>(value),
+                              static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value >> 16),
+                              static_cast<std::uint8_t>(value >> 24)}});
+  }
+  bench.board->run_for(1.6);
+  EXPECT_TRUE(bench.board->bridge_armed(0)) << firmware::text_of(bench.fault(0)).name;
+  expect_no_tick_missed();
+}
+
+TEST_F(BusFaults, ParametersInPdosAtAKilohertzDoNotStarveTheMainLoop) {
+  ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.write(0x1402, 1, 0x80000401, 4);
+  bench.write(0x1602, 0, 0, 1);
+  bench.write(0x1602, 1, 0x20000420, 4);
+  bench.write(0x1602, 2, 0x28000420, 4);
+  bench.write(0x1602, 0, 2, 1);
+  bench.write(0x1402, 1, 0x401, 4);
+  bench.nmt(0x01);
+  for (int i = 0; i < 1000; ++i) {
+    bench.port.send({.identifier = 0x401,
+                     .length = 8,
+                     .data = {0, static_cast<std::uint8_t>(i % 2 * 0x80), 0x7A, 0x44, 0,
+                              static_cast<std::uint8_t>(i % 2 * 0x80), 0x7A, 0x44}});
+    bench.board->run_for(1e-3);
+  }
+  EXPECT_TRUE(bench.board->bridge_armed(0)) << firmware::text_of(bench.fault(0)).name;
+  expect_no_tick_missed();
+}
+
+// Initialization waits for the end of the frame on the bus, which at 125 kbit/s lasts a millisecond.
+TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
+  const auto set_rate = [&](std::uint32_t rate) {
+    bench.master->write_registers(firmware::register_address(firmware::entry_of<"can.bit_rate">(), 0),
+                                  {static_cast<std::uint16_t>(rate >> 16), static_cast<std::uint16_t>(rate)});
+  };
+  const auto follow = [&](std::uint32_t rate) {
+    bench.port.node().set_bit_time(virtual_board::units_per_second / rate, bench.board->now());
+  };
+  set_rate(125'000);
+  bench.nmt(0x82);
+  bench.board->run_for(0.00015);
+  follow(125'000);
+  bench.board->run_for(3.0);
+  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
+  virtual_board::CanHostNode other(bench.board->can_bus(), 125'000);
+  set_rate(1'000'000);
+  for (int i = 0; i < 40; ++i)
+    other.send({.identifier = 0x1FFFFFFF, .extended = true, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}},
+               bench.board->now());
+  bench.nmt(0x82);
+  bench.board->run_for(0.2);
+  other.set_connected(false, bench.board->now());
+  follow(1'000'000);
+  bench.board->run_for(3.0);
+  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
   expect_link_is_back();
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/sdo_frame.hpp"
@@ -70,6 +71,7 @@ class Search {
     request.data = canopen::sdo_bytes(upload_request, device_type);
     port_->send(request);
     locks_[id] = std::move(lock);
+    ever_asked_.insert(id);
     asked_.emplace(id, Clock::now() + settings_.response_timeout);
   }
 
@@ -109,11 +111,18 @@ class Search {
   void hear_answer(std::uint8_t id, const drivers::CanFrame& frame) {
     FoundNode& node = found(id);
     const bool mine = frame.length == 8 && canopen::sdo_address(frame.data) == device_type;
-    if (!asked_.contains(id) || !mine) {
+    // An answer that comes after the waiting for it is still one.
+    if (!ever_asked_.contains(id) || !mine) {
       node.in_use = true;
       return;
     }
     asked_.erase(id);
+    // The node was given up meanwhile.
+    if (!locks_.contains(id)) locks_[id] = CanNodeLock::try_to_take(bus_, id);
+    if (!locks_[id]) {
+      node.in_use = true;
+      return;
+    }
     if ((frame.data[0] & 0xE0U) == canopen::sdo_response::initiate_upload)
       node.device_type = canopen::sdo_word(frame.data);
   }
@@ -122,9 +131,8 @@ class Search {
     CanPortOptions options;
     options.filters = SdoClient::filters_for(node.node);
     const auto port = open_can_port(bus_, options);
-    SdoSettings sdo_settings;
-    sdo_settings.response_timeout = settings_.response_timeout;
-    SdoClient sdo(*port, node.node, sdo_settings);
+    // It is there: however slow it is, its answers are waited for.
+    SdoClient sdo(*port, node.node);
     try {
       std::array<std::uint32_t, 4> identity{};
       for (std::uint8_t i = 0; i < identity.size(); ++i) {
@@ -147,6 +155,7 @@ class Search {
   std::unique_ptr<CanPort> port_;
   std::map<std::uint8_t, FoundNode> found_;
   std::map<std::uint8_t, Clock::time_point> asked_;  ///< until when the answer is waited for
+  std::set<std::uint8_t> ever_asked_;
   std::map<std::uint8_t, std::unique_ptr<CanNodeLock>> locks_;
 };
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "firmware/axis_state_machine.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/link/can/register_objects.hpp"
 
@@ -97,6 +98,7 @@ std::vector<std::uint16_t> CanLink::read(std::uint8_t function, std::uint16_t ad
   const auto table = function == read_holding_function ? RegisterTable::holding : RegisterTable::input;
   const auto values = objects_in(table, address, count);
   if (!values) throw RefusedError(illegal_address, function, address);
+  keep_alive();
   std::vector<std::uint16_t> registers;
   for (const RegisterObject& value : *values) {
     SdoClient::Bytes bytes;
@@ -118,6 +120,7 @@ std::vector<std::uint16_t> CanLink::read(std::uint8_t function, std::uint16_t ad
 
 std::vector<std::uint16_t> CanLink::read_object(std::uint16_t address, SdoClient::Object object,
                                                 std::size_t bytes, const SdoClient::Tell& tell) {
+  keep_alive();
   try {
     return registers_of(sdo_.upload(object, bytes, tell));
   } catch (const SdoAborted& aborted) {
@@ -174,6 +177,27 @@ std::vector<std::uint16_t> CanLink::read_input_window(std::uint16_t address, std
   return {first, first + static_cast<std::ptrdiff_t>(registers)};
 }
 
+void CanLink::note_command(const SdoClient::Object& object, const SdoClient::Bytes& value) {
+  last_write_ = Clock::now();
+  constexpr std::uint16_t controlword = firmware::entry_at(firmware::entry_of<"drive.controlword">()).index();
+  for (std::size_t axis = 0; axis < commands_.size(); ++axis) {
+    if (object.index == controlword + axis * firmware::axis_index_offset)
+      commands_[axis] = (value.at(0) & firmware::controlword::enable_operation) != 0;
+  }
+}
+
+void CanLink::keep_alive() {
+  constexpr auto interval = std::chrono::milliseconds(100);
+  const bool commands = std::find(commands_.begin(), commands_.end(), true) != commands_.end();
+  if (!commands || Clock::now() - last_write_ < interval) return;
+  constexpr const firmware::Entry& entry = firmware::entry_at(firmware::entry_of<"link.sign_of_life">());
+  ++signs_of_life_;
+  const std::uint8_t value[] = {static_cast<std::uint8_t>(signs_of_life_),
+                                static_cast<std::uint8_t>(signs_of_life_ >> 8)};
+  sdo_.download({entry.index(), entry.object_subindex()}, value, true);
+  last_write_ = Clock::now();
+}
+
 void CanLink::write_holding(std::uint16_t address, std::span<const std::uint16_t> values) {
   write(address, values, false);
 }
@@ -198,6 +222,7 @@ void CanLink::write(std::uint16_t address, std::span<const std::uint16_t> values
         i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, targets->size());
     try {
       sdo_.download(target.object, bytes[i], idempotent);
+      note_command(target.object, bytes[i]);
     } catch (const SdoAborted& aborted) {
       throw refusal(aborted, write_function, target.address, name_of(target), more);
     } catch (const LinkError& error) {

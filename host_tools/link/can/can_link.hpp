@@ -19,6 +19,10 @@ namespace kmax::link {
 /// The windows of the trace and of a capture are read in long pieces: 0x3020:k has 64 registers of the
 /// former, 0x3021:1 all of the latter.
 ///
+/// For the device only writing is a sign of life on CAN (link.timeout). From a controlword that enables an
+/// axis on, until one that does not, reading through this link therefore writes link.sign_of_life ten times a
+/// second.
+///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
 ///
 /// A refusal is a RefusedError whose exception() is the Modbus exception nearest to the SDO abort:
@@ -49,10 +53,17 @@ class CanLink final : public Link {
   std::vector<std::uint16_t> read_trace(std::uint16_t address, std::size_t count);
   void write(std::uint16_t address, std::span<const std::uint16_t> values, bool idempotent);
 
+  void note_command(const SdoClient::Object& object, const SdoClient::Bytes& value);
+  void keep_alive();
+
+  using Clock = std::chrono::steady_clock;
   DeviceAddress address_;
   std::unique_ptr<CanPort> port_;
   CanNodeLock lock_;
   SdoClient sdo_;
+  std::array<bool, firmware::axis_count> commands_{};  ///< axes that this program has enabled
+  Clock::time_point last_write_{};
+  std::uint16_t signs_of_life_ = 0;
 };
 
 /// The Modbus exception nearest to an SDO abort; see CanLink.

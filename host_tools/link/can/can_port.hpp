@@ -8,8 +8,15 @@
 #include <vector>
 
 #include "drivers/can_frame.hpp"
+#include "host_tools/link/link.hpp"
 
 namespace kmax::link {
+
+/// The bus can be used, but there was no room for a frame within CanPortOptions::send_patience.
+class SendQueueFull : public LinkError {
+ public:
+  using LinkError::LinkError;
+};
 
 /// A frame and when it was received, since 1970 (CLOCK_REALTIME).
 struct Received {
@@ -49,7 +56,7 @@ class CanPort {
   virtual ~CanPort() = default;
 
   /// Hands the frame to the bus; it may still be waiting there when this returns. Waits while the queue is
-  /// full, up to CanPortOptions::send_patience. The frame must be valid().
+  /// full, up to CanPortOptions::send_patience; then SendQueueFull. The frame must be valid().
   virtual void send(const drivers::CanFrame& frame) = 0;
 
   /// The next frame that passes the filters; none if there is none within `wait` (0: does not wait).

@@ -75,9 +75,10 @@ bool SdoClient::receive_block(Object object, Bytes& bytes, const Tell& tell) {
   using enum canopen::SdoBlockUploadRequest;
   unsigned good = 0, seen = 0;
   bool last = false;
+  // Only what brings the block on puts it off.
+  auto until = Clock::now() + settings_.response_timeout;
   for (unsigned frames = 0; frames < frames_per_block_max; ++frames) {
-    const auto segment =
-        next(object, Clock::now() + (seen == 0 ? settings_.response_timeout : settings_.block_silence));
+    const auto segment = next(object, until);
     if (!segment) {
       // Nothing at all: the acknowledgement was lost, or the whole block. Nobody can tell which.
       if (seen == 0) {
@@ -92,6 +93,7 @@ bool SdoClient::receive_block(Object object, Bytes& bytes, const Tell& tell) {
       ++counters_.foreign;
       continue;
     }
+    if (number > seen) until = Clock::now() + settings_.block_silence;
     seen = number;
     if (number == good + 1) {
       ++good;

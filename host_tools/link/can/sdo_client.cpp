@@ -185,7 +185,9 @@ void SdoClient::fail(Object object, const Failed& last, int attempts) {
                                 port_.description(), node_, text_of(object), tried, last.why,
                                 trouble.empty() ? "" : "; " + trouble));
   std::string check =
-      "check that the device is powered, the wiring, and that node ID and bit rate are the device's";
+      "check that the device is powered, the wiring, and that node ID and bit rate are the device's, or it "
+      "was "
+      "stopped by an NMT master";
   if (state_) check = fmt::format("the device is there, its state is {}", words_of_state(*state_));
   if (!trouble.empty()) check = trouble;
   throw LinkError(fmt::format("{}: no answer from node {} within {} ms (object {}, {}); {}",

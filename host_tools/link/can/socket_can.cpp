@@ -141,7 +141,7 @@ void SocketCan::send(const drivers::CanFrame& frame) {
     if (error != ENOBUFS && error != EAGAIN) fail("cannot send", error);
     if (Clock::now() >= deadline) {
       const std::string reason = trouble();
-      throw LinkError(fmt::format(
+      throw SendQueueFull(fmt::format(
           "{}: the interface took no frame for {} ms (its queue is full): {}", interface_,
           options_.send_patience.count(),
           reason.empty()

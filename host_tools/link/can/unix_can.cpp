@@ -70,7 +70,7 @@ void UnixCan::send(const drivers::CanFrame& frame) {
       throw LinkError(fmt::format("{}: cannot send: {}", path_, std::strerror(error)));
     const auto left = std::chrono::duration_cast<microseconds>(deadline - Clock::now());
     if (left <= microseconds(0))
-      throw LinkError(
+      throw SendQueueFull(
           fmt::format("{}: the bus took no frame for {} ms; look whether the program that serves it hangs",
                       path_, options_.send_patience.count()));
     if (!waited) ++counters_.send_waits;

@@ -266,6 +266,53 @@ TEST_F(CommandLine, ArmTellsWhenTheForceGoesAway) {
   EXPECT_FALSE(fake->armed());
 }
 
+TEST_F(CommandLine, ANewNodeIdIsSaidToWaitForTheNextStart) {
+  EXPECT_EQ(kmax({"set", "node.id=5"}), done) << said;
+  EXPECT_CONTAINS(said, "takes effect at the next start ('kmax save' first) or NMT reset");
+  EXPECT_CONTAINS(said, "can:IFACE?node=5");
+}
+
+TEST_F(CommandLine, ABusThatIsNotThereHidesNothingElse) {
+  EXPECT_EQ(kmax({"devices", "--can", "nope0"}), failed);
+  EXPECT_CONTAINS(output, "a simulated device in this program");
+  EXPECT_CONTAINS(said, "nope0");
+  EXPECT_EQ(kmax({"devices", "--can", ""}), wrong_usage);
+}
+
+TEST_F(CommandLine, AWrongTriggerIsSaidInPlainText) {
+  EXPECT_EQ(kmax({"capture", "--trigger", "contakt"}), wrong_usage);
+  EXPECT_CONTAINS(said, "excitation");
+  for (const char letter : said) EXPECT_TRUE(letter == '\n' || letter >= ' ') << int{letter};
+}
+
+TEST_F(CommandLine, CtrlCWhileArmingDisarms) {
+  prepare = [&](FakeLink& link) {
+    link.after_request = [&](int) {
+      if (fake->armed()) raise(SIGINT);
+    };
+  };
+  EXPECT_EQ(kmax({"arm"}), failed);
+  EXPECT_CONTAINS(said, "interrupted");
+  EXPECT_CONTAINS(said, "disarmed");
+  EXPECT_FALSE(fake->armed());
+  EXPECT_EQ(kmax({"arm", "--json"}), failed);
+  EXPECT_CONTAINS(document()["error"].get<std::string>(), "interrupted");
+  EXPECT_FALSE(fake->armed());
+}
+
+// `kmax stop` must find room between the readings, however fast they come.
+TEST_F(CommandLine, WatchLendsTheLinkAtAnyPace) {
+  std::uint64_t longest = 0;
+  prepare = [&](FakeLink& link) {
+    link.before_request = [&, ended = std::uint64_t{0}](int) mutable {
+      if (ended != 0) longest = std::max(longest, fake->now_us - ended);
+      ended = fake->now_us + 5'000;
+    };
+  };
+  EXPECT_EQ(kmax({"watch", "--rate", "50", "--for", "1.5", "--json"}), done);
+  EXPECT_GE(longest, 25'000u);
+}
+
 TEST_F(CommandLine, StopAndDisarmActOnEveryAxis) {
   EXPECT_EQ(kmax({"arm", "--axis", "1"}), done);
   EXPECT_EQ(kmax({"stop"}), done);

@@ -107,6 +107,22 @@ TEST_F(LinesCommands, TheEmergencyStopEndsAtStop) {
   EXPECT_EQ(turns, 3);
 }
 
+TEST_F(LinesCommands, ALineThatCannotBeDrivenLeavesNoOtherAtRun) {
+  configure(
+      "lines.emergency_stop = {chip = \"gpiochip0\", line = 2}\n"
+      "lines.reset = {chip = \"gpiochip0\", line = 9}\n");
+  gpio.broken = "gpiochip0 line 9";
+  EXPECT_EQ(kmax({"lines", "set", "emergency_stop=run", "reset=reset"}), failed);
+  EXPECT_CONTAINS(said, "busy");
+  EXPECT_EQ(gpio.history,
+            (Words{"gpiochip0 line 2 low", "gpiochip0 line 2 high", "gpiochip0 line 2 released"}));
+}
+
+TEST_F(LinesCommands, NoNumberIsNoDuration) {
+  EXPECT_EQ(kmax({"lines", "set", "emergency_stop=stop", "--for", "nan"}), wrong_usage);
+  EXPECT_TRUE(gpio.history.empty());
+}
+
 TEST_F(LinesCommands, TheResetLineEndsAtRun) {
   ASSERT_EQ(kmax({"lines", "set", "reset=reset", "emergency_stop=stop", "--for", "0.01", "--json"}), done)
       << said;

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <thread>
 
+#include "host_tools/link/can/unix_can.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
 namespace kmax::cli {
@@ -52,6 +53,27 @@ TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
   EXPECT_EQ(document()["scene"], "touch");
   EXPECT_CONTAINS(document()["device"].get<std::string>(), "serial:" + in("line") + "?unit=1&baud=");
   EXPECT_EQ(folder.entries(), 0u);
+}
+
+// The device's PDOs and emergencies do not wait for a client that hangs.
+TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
+  std::thread user([&] {
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!std::filesystem::exists(folder / "bus") && std::chrono::steady_clock::now() < patience)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    {
+      link::UnixCan sleeping(in("bus")), sender(in("bus"));
+      drivers::CanFrame frame;
+      frame.identifier = 0x700;
+      for (int i = 0; i < 50'000; ++i) sender.send(frame);
+    }
+    kill(getpid(), SIGTERM);
+  });
+  const auto previous = std::signal(SIGTERM, SIG_IGN);
+  EXPECT_EQ(kmax({"serve", "--can", in("bus")}), done) << said;
+  user.join();
+  std::signal(SIGTERM, previous);
+  EXPECT_CONTAINS(said, "CAN frames were lost");
 }
 
 }  // namespace

@@ -83,6 +83,9 @@ TEST_F(StoreCommands, SaveSaysWhatItDidInWords) {
   EXPECT_EQ(said, "");
   ASSERT_EQ(kmax({"info"}), done);
   EXPECT_CONTAINS(output, all + " parameters as record 1\n");
+  ASSERT_EQ(kmax({"save", "--json"}), done) << "nothing has changed";
+  EXPECT_EQ(document()["record"], 1);
+  ASSERT_EQ(kmax({"set", "wall.stiffness=112"}), done);
   ASSERT_EQ(kmax({"save", "--json"}), done);
   EXPECT_EQ(document()["record"], 2);
   EXPECT_EQ(document()["read_back_equal"], true);
@@ -94,6 +97,7 @@ TEST_F(StoreCommands, SavingGoesOnOverTheEndOfASector) {
   std::uint32_t last_free = 1000;
   int erases = 0;
   for (int i = 1; i <= 40; ++i) {
+    ASSERT_EQ(kmax({"set", "wall.stiffness=" + std::to_string(i)}), done);
     ASSERT_EQ(kmax({"save", "--json"}), done);
     const Json saved = document();
     EXPECT_EQ(saved["record"], i);
@@ -150,6 +154,9 @@ TEST_F(StoreCommands, ALostRequestIsRepeatedAndALostAnswerIsNot) {
   loss = Wire::Loss::request;
   ASSERT_EQ(kmax({"save", "--json"}), done) << said;
   EXPECT_EQ(document()["record"], 1);
+  lost_write = 0;
+  ASSERT_EQ(kmax({"set", "wall.stiffness=110"}), done);
+  lost_write = 1;
   loss = Wire::Loss::reply;
   ASSERT_EQ(kmax({"save", "--json"}), done) << said;
   EXPECT_EQ(document()["record"], 2);

@@ -56,14 +56,24 @@ TEST(WatchView, Document) {
 TEST(LiveLines, ReplaceTheLinesBefore) {
   std::ostringstream terminal;
   LiveLines live(terminal);
-  live.show({"a", "b", "c"});
+  live.show({"a", "b", "c"}, 4);
   EXPECT_EQ(terminal.str(), "a\x1b[K\nb\x1b[K\nc\x1b[K\n\x1b[J");
   terminal.str("");
-  live.show({"d"});
+  live.show({"d"}, 4);
   EXPECT_EQ(terminal.str(), "\x1b[3Fd\x1b[K\n\x1b[J");
   terminal.str("");
-  live.show({"e", "f"});
+  live.show({"e", "f"}, 4);
   EXPECT_EQ(terminal.str(), "\x1b[1Fe\x1b[K\nf\x1b[K\n\x1b[J");
+}
+
+TEST(LiveLines, NoneScrollsAwayOnASmallTerminal) {
+  std::ostringstream terminal;
+  LiveLines live(terminal);
+  live.show({"a", "b", "c"}, 3);
+  EXPECT_EQ(terminal.str(), "a\x1b[K\nb\x1b[K\n\x1b[J");
+  terminal.str("");
+  live.show({"d"}, 1);
+  EXPECT_EQ(terminal.str(), "\x1b[2Fd\x1b[K\n\x1b[J");
 }
 
 }  // namespace

@@ -119,6 +119,33 @@ TEST(CanSource, SilenceEndsTheRecordingAndSaysWhatTheBusSays) {
   EXPECT_CONTAINS(message, "nobody acknowledges");
 }
 
+// Another recording that started the node has ended, and put it back.
+TEST(CanSource, ANodeThatIsPutBackByAnotherIsStartedAgain) {
+  FakePort port;
+  {
+    CanSource source(port, plan_in(5));
+    for (int round = 0; round < 2; ++round) {
+      port.arrive_row(static_cast<std::uint16_t>(1000 + 20 * round));
+      source.next(microseconds(1000));
+      port.arrive(0x705, 1, {127});
+      const auto end = std::chrono::steady_clock::now() + 2 * CanSource::silence;
+      while (std::chrono::steady_clock::now() < end) source.next(microseconds(10'000));
+    }
+    EXPECT_EQ(source.restarts(), 2u);
+    EXPECT_EQ(port.sent, (std::vector<CanFrame>{nmt(1), nmt(1)})) << "once for each silence";
+  }
+  EXPECT_EQ(port.sent.back(), nmt(128)) << "the last one puts it back";
+}
+
+TEST(CanSource, AStoppedNodeStaysStopped) {
+  FakePort port;
+  CanSource source(port, plan_in(5));
+  port.arrive(0x705, 1, {4});
+  const auto end = std::chrono::steady_clock::now() + 2 * CanSource::silence;
+  while (std::chrono::steady_clock::now() < end) source.next(microseconds(10'000));
+  EXPECT_TRUE(port.sent.empty());
+}
+
 TEST(CanSource, PdosThatNeverMakeASetEndItToo) {
   FakePort port;
   CanSource source(port, plan_in(127));

@@ -77,6 +77,20 @@ TEST(CanDiscovery, ANodeThatRefusesEvenItsTypeIsFound) {
   EXPECT_FALSE(found[0].device_type);
 }
 
+TEST(CanDiscovery, ASlowNodeIsNotTakenForOneInUse) {
+  FakeSdoNode node([](int, const CanFrame& answer) {
+    std::this_thread::sleep_for(100ms);
+    return Frames{answer};
+  });
+  identify(node);
+  node.start();
+  const auto found = discover_nodes(node.path(), quick());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_FALSE(found[0].in_use);
+  EXPECT_TRUE(found[0].device_type);
+  EXPECT_TRUE(found[0].identity);
+}
+
 /// A bus with somebody else on it, who says something again and again.
 struct Chatter {
   Chatter(const std::string& path, Frames frames)

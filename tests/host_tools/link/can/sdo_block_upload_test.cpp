@@ -191,6 +191,23 @@ TEST(SdoBlockUpload, ANodeThatNeverSendsTheFirstSegmentIsGivenUp) {
                   "again and again");
 }
 
+// Frames with the number 0 are no segments, and no sign of one to come.
+TEST(SdoBlockUpload, FramesThatAreNoSegmentsDoNotPutOffTheEndOfWaiting) {
+  SdoSettings settings = quick_sdo();
+  settings.attempts = 1;
+  SdoBench bench(
+      [](int number, CanFrame answer) {
+        if (number == 1) return Frames{answer};
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        answer.data[0] = 0;
+        return Frames{answer};
+      },
+      settings);
+  bench.node.put(object, some_bytes(700));  // 100 segments: 1 s
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { bench.client().upload(object, 700); }), "no answer");
+  EXPECT_LT(bench.client().counters().foreign, 100u);
+}
+
 TEST(SdoBlockUpload, AnInterruptionEndsTheTransferInTheNode) {
   struct Interrupted {};
   SdoBench bench;

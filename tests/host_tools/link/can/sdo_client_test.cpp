@@ -232,6 +232,7 @@ TEST(SdoClient, ASilentNodeIsNamedWithWhatToCheck) {
   EXPECT_CONTAINS(message, "0x2000:04");
   EXPECT_CONTAINS(message, "sent 3 times");
   EXPECT_CONTAINS(message, "check that the device is powered");
+  EXPECT_CONTAINS(message, "stopped by an NMT master");
 }
 
 TEST(SdoClient, AStoppedNodeIsTold) {

@@ -1,0 +1,205 @@
+// The application on a CAN bus: who commands, and what takes the force away.
+#include <gtest/gtest.h>
+
+#include "firmware/object_dictionary/special_objects.hpp"
+#include "tests/board/canopen_host.hpp"
+
+namespace kmax::board {
+namespace {
+
+using firmware::Fault;
+
+class OnCan : public testing::Test, public CanOpenHost {
+ protected:
+  OnCan() {
+    bench.set_up_plain_wall();
+    bench.set("wall.law", 0);
+    bench.set("link.timeout", 0.5);
+  }
+};
+
+TEST_F(OnCan, TorqueModeMakesWhatPdosAskForAndNothingWhenDisarmed) {
+  nmt(1);
+  EXPECT_EQ(write(0x6060, 0, 10, 1), 0U);
+  rpdo(0, 700);
+  EXPECT_EQ(read(0x6071, 0), 0U) << "a target is not kept for later";
+  rpdo(6, 0);
+  rpdo(7, 0);
+  rpdo(15, 0);
+  ASSERT_TRUE(armed());
+  rpdo(15, 300, 300.0);
+  const double force = bench.force();
+  EXPECT_GT(force, 0.01);
+  rpdo(15, -300, 5.0);
+  EXPECT_NEAR(bench.force(), -force, 1e-3 * force);
+  rpdo(15 | 0x100, 300, 5.0);
+  EXPECT_EQ(bench.force(), 0.0) << "halt";
+  EXPECT_TRUE(armed());
+  rpdo(6, 300, 5.0);
+  EXPECT_EQ(bench.force(), 0.0);
+  rpdo(15, 0);
+  EXPECT_EQ(bench.force(), 0.0) << "armed again, and nothing asked for";
+}
+
+// The one who commands has gone; a second program reads on.
+TEST_F(OnCan, ReadingKeepsNobodysForceAlive) {
+  arm_torque(300);
+  ASSERT_TRUE(armed());
+  for (int i = 0; i < 30; ++i) {
+    read(0x6041, 0);
+    run_ms(18);
+  }
+  EXPECT_EQ(fault(), Fault::link_silent);
+  EXPECT_EQ(bench.force(), 0.0);
+}
+
+TEST_F(OnCan, NeitherDoPdosThatAreTooShort) {
+  nmt(1);
+  arm_torque(300);
+  for (int i = 0; i < 30; ++i) send({.identifier = 0x201, .length = 1}, 20);
+  EXPECT_EQ(fault(), Fault::link_silent);
+}
+
+TEST_F(OnCan, WritingIsASignOfLife) {
+  arm_torque(300);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(write(0x3001, 2, i, 2), 0U);
+    run_ms(18);
+  }
+  EXPECT_TRUE(armed());
+}
+
+TEST_F(OnCan, LeavingOperationalDisarmsAnAxisWhoseTargetNobodyCanChange) {
+  nmt(1);
+  arm_torque(300);
+  ASSERT_TRUE(armed());
+  nmt(0x80);
+  EXPECT_FALSE(armed());
+  EXPECT_EQ(bench.force(), 0.0);
+}
+
+TEST_F(OnCan, NmtStopAndBothResetsTakeTheForce) {
+  for (const unsigned command : {0x02U, 0x81U, 0x82U}) {
+    CanOpenHost host;
+    host.bench.set_up_plain_wall();
+    host.bench.set("wall.law", 0);
+    host.arm_torque(300);
+    ASSERT_TRUE(host.armed());
+    host.nmt(static_cast<std::uint8_t>(command));
+    EXPECT_FALSE(host.armed()) << command;
+    EXPECT_EQ(host.bench.force(), 0.0);
+  }
+}
+
+TEST_F(OnCan, ASynchronousPdoIsNotKeptForLater) {
+  EXPECT_EQ(write(0x6060, 0, 10, 1), 0U);
+  EXPECT_EQ(write(0x1400, 2, 1, 1), 0U);
+  nmt(1);
+  command(6);
+  command(7);
+  rpdo(15, 100, 5000.0);
+  send({.identifier = 0x80}, 20);
+  EXPECT_FALSE(armed());
+  rpdo(7, 0);
+  send({.identifier = 0x80}, 5);
+  rpdo(15, 100);
+  send({.identifier = 0x80}, 20);
+  EXPECT_TRUE(armed());
+}
+
+TEST_F(OnCan, AWatchedNodeThatIsLostTripsAndMustBeBackFirst) {
+  EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+  heartbeat_of(5);
+  command(6);
+  command(15);
+  ASSERT_TRUE(armed());
+  run_ms(200);
+  EXPECT_EQ(fault(), Fault::heartbeat_lost);
+  command(0);
+  command(0x80);
+  EXPECT_EQ(fault(), Fault::heartbeat_lost) << "the cause remains";
+  heartbeat_of(5);
+  command(0);
+  command(0x80);
+  EXPECT_EQ(fault(), Fault::none);
+  run_ms(200);
+  command(6);
+  command(15);
+  EXPECT_FALSE(armed());
+  EXPECT_EQ(bench.refusal(), Refusal::heartbeat_missing);
+}
+
+TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
+  EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+  heartbeat_of(5);
+  command(6);
+  command(15);
+  command(0x8F);
+  run_ms(200);
+  ASSERT_EQ(fault(), Fault::heartbeat_lost);
+  heartbeat_of(5);
+  command(0x8F);
+  EXPECT_EQ(fault(), Fault::heartbeat_lost);
+  nmt(2);
+  nmt(0x80);
+  command(0x8F);
+  EXPECT_EQ(fault(), Fault::heartbeat_lost);
+}
+
+TEST_F(OnCan, ResetCommunicationBringsBackWhatWasSaved) {
+  EXPECT_EQ(write(0x1017, 0, 50, 2), 0U);
+  EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);
+  run_ms(500);
+  EXPECT_EQ(write(0x1017, 0, 70, 2), 0U);
+  nmt(0x82);
+  EXPECT_EQ(read(0x1017, 0), 50U);
+}
+
+TEST_F(OnCan, SavingTheSameAgainDoesNotWearTheFlash) {
+  EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);
+  run_ms(500);
+  const double sequence = bench.get("store.sequence");
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);
+    run_ms(50);
+    EXPECT_EQ(bench.get("store.state"), 2) << "saved";
+  }
+  EXPECT_EQ(bench.get("store.sequence"), sequence);
+}
+
+TEST_F(OnCan, LssStoresNothingWhileATransactionIsOpen) {
+  bench.set("transaction.control", 1);
+  send({.identifier = 0x7E5, .length = 8, .data = {4, 1}});
+  send({.identifier = 0x7E5, .length = 8, .data = {0x11, 42}});
+  heard.clear();
+  send({.identifier = 0x7E5, .length = 8, .data = {0x17}});
+  ASSERT_FALSE(heard.empty());
+  EXPECT_EQ(heard.back().data[0], 0x17);
+  EXPECT_EQ(heard.back().data[1], 2) << "failed";
+  bench.set("transaction.control", 0);
+  heard.clear();
+  send({.identifier = 0x7E5, .length = 8, .data = {0x17}}, 500);
+  ASSERT_FALSE(heard.empty());
+  EXPECT_EQ(heard.back().data[1], 0);
+  EXPECT_EQ(bench.get("node.id"), 42);
+  EXPECT_EQ(bench.get("store.state"), 2);
+}
+
+TEST_F(OnCan, TheFirstWordOverCanDoesNotTripWhatSerialHasArmed) {
+  nmt(1);
+  EXPECT_EQ(write(0x3001, 2, 1, 2), 0U);
+  run_ms(1500);
+  ASSERT_TRUE(bench.arm());
+  rpdo(15, 0);
+  EXPECT_TRUE(armed());
+}
+
+TEST_F(OnCan, ATwinIsToldAndForgotten) {
+  heartbeat_of(1);
+  EXPECT_EQ(read(0x1001, 0), 0x11U);
+  run_ms(6000);
+  EXPECT_EQ(read(0x1001, 0), 0U);
+}
+
+}  // namespace
+}  // namespace kmax::board
