@@ -51,12 +51,21 @@ class BoardCanPort final : public link::CanPort {
   std::deque<link::Received> received_;
 };
 
+/// The client's own clock is the real one, which a busy machine makes short.
+inline link::SdoSettings patient_sdo() {
+  link::SdoSettings settings;
+  settings.response_timeout = std::chrono::seconds(20);
+  settings.block_silence = std::chrono::seconds(10);
+  settings.attempts = 1;
+  return settings;
+}
+
 /// ImageBench with a CANopen host beside the serial one.
 class CanBench : public ImageBench {
  public:
   explicit CanBench(const Parameters& parameters = {}, double push = 0.0,
                     const std::string& scene_name = "motor_axes")
-      : ImageBench(parameters, push, scene_name), port(*board), sdo(port, 1, patient()) {}
+      : ImageBench(parameters, push, scene_name), port(*board), sdo(port, 1, patient_sdo()) {}
 
   void nmt(std::uint8_t command, std::uint8_t node = 1) {
     port.send({.identifier = firmware::canopen::cob_id::nmt, .length = 2, .data = {command, node}});
@@ -96,16 +105,6 @@ class CanBench : public ImageBench {
 
   BoardCanPort port;
   link::SdoClient sdo;
-
- private:
-  /// The client's own clock is the real one, which a busy machine makes short.
-  static link::SdoSettings patient() {
-    link::SdoSettings settings;
-    settings.response_timeout = std::chrono::seconds(20);
-    settings.block_silence = std::chrono::seconds(10);
-    settings.attempts = 1;
-    return settings;
-  }
 };
 
 }  // namespace kmax::tests

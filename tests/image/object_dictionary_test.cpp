@@ -17,15 +17,7 @@ using firmware::canopen::Abort;
 /// A board as from the factory, with open connectors.
 class Dictionary : public testing::Test {
  protected:
-  Dictionary() : board(image(), nullptr), port(board), sdo(port, 1, settings()) { board.run_for(0.05); }
-
-  static link::SdoSettings settings() {
-    link::SdoSettings settings;
-    settings.response_timeout = std::chrono::seconds(20);
-    settings.block_silence = std::chrono::seconds(10);
-    settings.attempts = 1;
-    return settings;
-  }
+  Dictionary() : board(image(), nullptr), port(board), sdo(port, 1, patient_sdo()) { board.run_for(0.05); }
 
   std::vector<std::uint8_t> read(const DescribedObject& object) {
     return sdo.upload({object.index, object.subindex}, object.length);
