@@ -1,6 +1,7 @@
 """kmax-board, its bxCAN on the guest's CAN interface and its pins on the GPIO chip's lines; and kmax holding an axis of
 it."""
 
+import json
 import os
 import re
 import signal
@@ -15,6 +16,8 @@ from kmax_under_test import KMAX, VirtualBoard, kmax, kmax_json
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = ROOT / "host_tools" / "simulation" / "scenes" / "motor_axes.toml"
+
+POWER_STAGE_READY = 6000  # ticks, of which 20,000 are a second
 
 
 class BoardOnBus(VirtualBoard):
@@ -39,10 +42,11 @@ class BoardOnBus(VirtualBoard):
     def wait_until_it_answers(self):
         end = time.monotonic() + 20
         while True:
-            done = kmax("get", "info.serial_number", device=self.can_device, check=False)
-            if done.returncode == 0:
+            done = kmax("get", "info.tick", "--json", device=self.can_device, check=False)
+            # The power stage takes a tenth of a second of the board's own time to start.
+            if done.returncode == 0 and json.loads(done.stdout)["info.tick"]["value"] > POWER_STAGE_READY:
                 return
-            if time.monotonic() > end or "no answer" not in done.stderr:
+            if time.monotonic() > end or (done.returncode != 0 and "no answer" not in done.stderr):
                 self.process.kill()
                 raise AssertionError(f"the board does not answer: {done.stderr}{self.process.communicate()[0]}")
 
