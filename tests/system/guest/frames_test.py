@@ -30,11 +30,16 @@ def sdo_upload(capture, index, subindex):
 
 def sdo_download(capture, index, subindex, value):
     """Writes 16 bits."""
-    before = len(capture.frames(0x580 + NODE))
     request = bytes([0x2B, index & 0xFF, index >> 8, subindex, value & 0xFF, value >> 8, 0, 0])
+
+    def answers(frame):
+        # Replies of somebody else's transfer just before may still be on their way here.
+        return frame.id == 0x580 + NODE and frame.data[1:4] == request[1:4]
+
+    before = len([frame for frame in capture.frames() if answers(frame)])
     send(f"{0x600 + NODE:03X}#{request.hex()}")
-    capture.wait_for(lambda frame: frame.id == 0x580 + NODE, count=before + 1)
-    reply = capture.frames(0x580 + NODE)[before]
+    capture.wait_for(answers, count=before + 1)
+    reply = [frame for frame in capture.frames() if answers(frame)][before]
     if reply.data != bytes([0x60]) + request[1:4] + bytes(4):
         raise AssertionError(f"{request.hex()} is answered with {reply.data.hex()}")
 
