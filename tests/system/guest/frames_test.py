@@ -18,10 +18,14 @@ HOST = {0x000, 0x600 + NODE}
 
 def sdo_upload(capture, index, subindex):
     """The bytes of an expedited upload, by hand."""
-    reply_id, before = 0x580 + NODE, len(capture.frames(0x580 + NODE))
     request = bytes([0x40, index & 0xFF, index >> 8, subindex])
+
+    def answers(frame):
+        return frame.id == 0x580 + NODE and frame.data[1:4] == request[1:4]
+
+    before = len([frame for frame in capture.frames() if answers(frame)])
     send(f"{0x600 + NODE:03X}#{request.hex()}00000000")
-    reply = capture.wait_for(lambda frame: frame.id == reply_id, count=before + 1)
+    reply = capture.wait_for(answers, count=before + 1)
     reply = reply[-1] if before else reply
     if reply.data[1:4] != request[1:4] or reply.data[0] & 0xE3 != 0x43:
         raise AssertionError(f"{index:04X}:{subindex} is answered with {reply.data.hex()}")
