@@ -1,0 +1,77 @@
+#pragma once
+
+#include "control/abbott_okamura_criterion.hpp"
+#include "control/colgate_criterion.hpp"
+#include "control/diolaiti_criterion.hpp"
+#include "control/field_criterion.hpp"
+#include "control/gil_criterion.hpp"
+#include "control/resolution_criterion.hpp"
+#include "control/saturation_depth.hpp"
+#include "control/stability_case.hpp"
+
+namespace kmax::control {
+
+/// All criteria but the sampled eigenvalues, which need a search; for the target (1 KB of code).
+///
+///   criterion         value                    bound                           passes  applies with
+///   colgate           K, N/m                   (b - |B|)/(T/2 + Td)            <       a wall (K or B not 0)
+///   gil               K, N/m                   (b + B)/(T/2 + Td)              <       a wall
+///   abbott_okamura    K, N/m                   min(2 b/T, 2 f_c/Delta)         <=      K > 0
+///   diolaiti          v, m/s                   f_c/(K T/2 - b)                 <       K > 0, v > 0
+///   resolution        K max(eta, delta v T), N F_h                             <=      K > 0, F_h > 0
+///   resolution_speed  v, m/s                   F_h/(K delta T)                 <=      K, F_h, v > 0
+///   field_slope       2 F_MC/x_0, N/m          (b - |B|)/(T/2 + Td)            <       F_MC > 0
+///   saturation_depth  (F_limit - F_MC)/K, m    3 Delta                         >=      F_limit, K > 0
+///
+/// Finite inputs give finite values and bounds; what is not a number never passes where it is read. Float is
+/// enough: a handful of roundings, 1e-6 of the bound. Outside the interrupt: one or two divisions each.
+template <typename Scalar>
+constexpr CriterionResult<Scalar> judge_closed_form(Criterion criterion, const StabilityCase<Scalar>& c) {
+  const auto below = [criterion](Scalar value, Scalar bound) {
+    return CriterionResult<Scalar>{criterion, true, value < bound, false, value, bound};
+  };
+  const auto up_to = [criterion](Scalar value, Scalar bound) {
+    return CriterionResult<Scalar>{criterion, true, value <= bound, false, value, bound};
+  };
+  // Written so that a NaN counts as something: it must reach the comparison and fail there.
+  constexpr auto none = [](Scalar amount) { return amount <= Scalar(0); };
+  const bool no_spring = none(c.stiffness);
+
+  switch (criterion) {
+    case Criterion::colgate:
+      if (no_spring && c.wall_damping == Scalar(0)) break;
+      return below(c.stiffness, colgate_stiffness_limit(c.damping, c.wall_damping, c.period, c.delay));
+    case Criterion::gil:
+      if (no_spring && c.wall_damping == Scalar(0)) break;
+      return below(c.stiffness, gil_stiffness_limit(c.damping, c.wall_damping, c.period, c.delay));
+    case Criterion::abbott_okamura:
+      if (no_spring) break;
+      return up_to(c.stiffness, abbott_okamura_stiffness_limit(c.damping, c.friction, c.period, c.quantum));
+    case Criterion::diolaiti:
+      if (no_spring || none(c.operator_speed)) break;
+      return below(c.operator_speed, escape_speed(c.stiffness, c.damping, c.friction, c.period, c.quantum));
+    case Criterion::resolution:
+      if (no_spring || none(c.operator_force)) break;
+      return up_to(force_step(c.stiffness, c.quantum, c.detection_share, c.operator_speed, c.period),
+                   c.operator_force);
+    case Criterion::resolution_speed:
+      if (no_spring || none(c.operator_force) || none(c.operator_speed)) break;
+      return up_to(c.operator_speed,
+                   contact_speed_limit(c.stiffness, c.detection_share, c.period, c.operator_force));
+    case Criterion::field_slope:
+      if (none(c.magnetic_coefficient)) break;
+      return below(steepest_field_slope(c.magnetic_coefficient, c.magnetic_length),
+                   colgate_stiffness_limit(c.damping, c.wall_damping, c.period, c.delay));
+    case Criterion::saturation_depth: {
+      if (no_spring || none(c.force_limit)) break;
+      const Scalar depth = saturation_depth(c.stiffness, c.magnetic_coefficient, c.force_limit);
+      const Scalar least = saturate(c.quantum * Scalar(saturation_quanta));
+      return {criterion, true, depth >= least, true, depth, least};
+    }
+    case Criterion::sampled_eigenvalues:
+      break;
+  }
+  return {criterion, false, true, criterion == Criterion::saturation_depth, Scalar(0), Scalar(0)};
+}
+
+}  // namespace kmax::control

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+
+#include "control/closed_form_criteria.hpp"
+#include "control/sampled_stability.hpp"
+#include "control/stability_case.hpp"
+
+namespace kmax::control {
+
+/// One criterion for one case: those of closed_form_criteria.hpp, and
+///
+///   criterion            value   bound                                                    passes
+///   sampled_eigenvalues  K, N/m  the smallest K at which the exact sampled loop, with      <
+///                                the hand, is not stable (sampled_stability.hpp)
+///
+/// which applies with a wall, a mass, a period, and a delay of no more than 8 samples. A stiffness beyond the
+/// bound does not pass even if it is stable again. Firmware includes closed_form_criteria.hpp instead, which
+/// leaves the search (4 KB) out of the image.
+template <typename Scalar>
+constexpr CriterionResult<Scalar> judge(Criterion criterion, const StabilityCase<Scalar>& c) {
+  if (criterion != Criterion::sampled_eigenvalues) return judge_closed_form(criterion, c);
+  const SampledLoop<Scalar> loop{c.mass, c.damping, c.wall_damping, c.period, c.delay, c.hand};
+  const bool wall = !(c.stiffness <= Scalar(0)) || c.wall_damping != Scalar(0);
+  if (!wall || !can_be_judged(loop)) return {criterion, false, true, false, Scalar(0), Scalar(0)};
+  const Scalar bound = largest_stable_stiffness(loop);
+  return {criterion, true, c.stiffness < bound, false, c.stiffness, bound};
+}
+
+/// All of them, in the order of their numbers.
+template <typename Scalar>
+constexpr std::array<CriterionResult<Scalar>, criterion_count> judge_all(const StabilityCase<Scalar>& c) {
+  std::array<CriterionResult<Scalar>, criterion_count> results{};
+  for (std::size_t i = 0; i < criterion_count; ++i) results[i] = judge(static_cast<Criterion>(i), c);
+  return results;
+}
+
+}  // namespace kmax::control
