@@ -51,11 +51,10 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
   refresh_readings();
 }
 
-bool Application::any_armed() const {
-  for (const AxisStateMachine& machine : machines_) {
-    if (machine.armed()) return true;
-  }
-  return false;
+ArmedAxes Application::armed_axes() const {
+  ArmedAxes armed;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) armed.axis[axis] = machines_[axis].armed();
+  return armed;
 }
 
 Application::Settings Application::make_settings() const {
@@ -124,6 +123,14 @@ void Application::offer_settings_if_changed() {
                         std::memory_order_relaxed);
 }
 
+/// So that readings and arming never go by an older set, and nothing is worked out twice.
+void Application::judge_if_changed() {
+  if (registers_.changes() == judged_changes_) return;
+  judged_changes_ = registers_.changes();
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    guard_[axis] = guard_finding(registers_.values(), axis);
+}
+
 /// The tick works by the present settings, and knows of the axis' last disarming.
 bool Application::settled(std::size_t of_axis) const {
   if (!handover_.taken() || report_[of_axis].enabled) return false;
@@ -170,6 +177,9 @@ Refusal Application::obstacle_to_arming(std::size_t axis) const {
   // Excitation begins without knowing anything of the rotor; what needs its angle is bounded in travel.
   if (mode(axis) == DriveMode::excitation) return Refusal::none;
   if (!commutation_known(axis)) return Refusal::commutation_unknown;
+  if (guard_[axis].verdict == GuardFinding::Verdict::fail &&
+      registers_.values().choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
+    return Refusal::guard_refused;
   const auto& haptic = report_[axis].haptic;
   const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
                            settings_[axis].haptic.interference.mode != control::InterferenceMode::none;
@@ -287,6 +297,7 @@ void Application::act() {
   for (std::size_t axis = 0; axis < axis_count; ++axis)
     commutation_[axis].follow(registers_.values(), axis, report_[axis].reference_generation);
   offer_settings_if_changed();
+  judge_if_changed();
   for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
   publish_torques();
 }
@@ -322,7 +333,7 @@ DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t 
   std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
   const auto needed = words_of(descriptors[entry].type);
   const auto result =
-      registers_.write(register_address(entry, axis), std::span(words).last(needed), any_armed(), now_us_);
+      registers_.write(register_address(entry, axis), std::span(words).last(needed), armed_axes(), now_us_);
   offer_settings_if_changed();
   return result;
 }

@@ -21,6 +21,7 @@
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameter_keeper.hpp"
 #include "firmware/snapshot.hpp"
+#include "firmware/stability_guard.hpp"
 #include "firmware/thermal_supervisor.hpp"
 #include "firmware/trace.hpp"
 
@@ -133,7 +134,8 @@ class Application {
   const ParameterValues& values() const { return registers_.values(); }
   /// Rises with every change of a parameter.
   std::uint32_t parameter_changes() const { return registers_.changes(); }
-  bool any_armed() const;
+  ArmedAxes armed_axes() const;
+  bool any_armed() const { return armed_axes().any(); }
   /// A save is under way; its next step may stop the processor for half a second.
   bool store_busy() const { return keeper_.busy(); }
   DriveState state(std::size_t axis) const { return machines_[axis].state(); }
@@ -179,6 +181,7 @@ class Application {
   bool settled(std::size_t axis) const;
   Settings make_settings() const;
   void offer_settings_if_changed();
+  void judge_if_changed();
   void make_scales();
   void act();
   void supervise(std::size_t axis);
@@ -260,6 +263,8 @@ class Application {
   ParameterKeeper keeper_;
   // Before settings_, which is made from them.
   std::array<AxisReport, axis_count> report_;  ///< main loop's copies
+  std::array<GuardFinding, axis_count> guard_{};
+  std::uint32_t judged_changes_ = 0;
   std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
   Settings settings_;
   std::uint32_t now_us_ = 0, uptime_second_us_ = 0, uptime_s_ = 0;

@@ -35,6 +35,7 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
       return Abort::maximum_below_minimum;
     case Refusal::rate_does_not_divide:
     case Refusal::compensation_beyond_friction:
+    case Refusal::guard_refused:
       return Abort::incompatible;
     case Refusal::capture_without_channels:
       return Abort::incompatible_inside;

@@ -35,9 +35,13 @@ std::uint32_t Application::flags_of(std::size_t axis) const {
 }
 
 void Application::refresh_axis_readings(std::size_t axis) {
+  judge_if_changed();
   ParameterValues& v = registers_.values();
   const AxisReport& report = report_[axis];
   const auto& haptic = report.haptic;
+  const GuardFinding& guard = guard_[axis];
+  const bool guard_warns = guard.verdict == GuardFinding::Verdict::fail &&
+                           v.choice<GuardMode, "guard.mode">(axis) == GuardMode::warn;
   const AxisStateMachine& machine = machines_[axis];
   const bool supply_fault =
       report.condition == Fault::under_voltage || report.condition == Fault::over_voltage;
@@ -45,7 +49,7 @@ void Application::refresh_axis_readings(std::size_t axis) {
                            .mode = mode(axis),
                            .supplied = !supply_fault,
                            .power_stage_on = machine.armed(),
-                           .warning = thermal_[axis].allowance() < 1.0f,
+                           .warning = thermal_[axis].allowance() < 1.0f || guard_warns,
                            .limited = haptic.limited || haptic.slew_limited || saturated(axis),
                            .halted = halted_[axis],
                            .force_is_zero = report.force == 0.0f,
@@ -93,6 +97,12 @@ void Application::refresh_axis_readings(std::size_t axis) {
   v.set_real<"measured.force_made">(report.motor.force_made, axis);
   v.set_whole<"measured.commutation_known">(commutation_known(axis) ? 1U : 0U, axis);
   v.set_whole<"measured.excitation_finished">(report.motor.excitation_finished ? 1U : 0U, axis);
+
+  v.set_whole<"guard.verdict">(static_cast<std::uint32_t>(guard.verdict), axis);
+  v.set_whole<"guard.failed">(guard.failed, axis);
+  v.set_whole<"guard.criterion">(static_cast<std::uint32_t>(guard.criterion), axis);
+  v.set_real<"guard.value">(guard.value, axis);
+  v.set_real<"guard.bound">(guard.bound, axis);
 }
 
 void Application::refresh_device_readings() {

@@ -73,7 +73,7 @@ DeviceRegisters::WriteResult Application::write_registers(std::uint16_t address,
   } else if (is_single(entry_of<"capture.command">(), 0)) {
     result = command_capture(in[0]);
   } else {
-    result = registers_.write(address, in, any_armed(), now_us_);
+    result = registers_.write(address, in, armed_axes(), now_us_);
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       if (is_single(entry_of<"drive.controlword">(), axis)) commander_[axis] = by;
     }

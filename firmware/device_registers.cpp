@@ -1,6 +1,7 @@
 #include "firmware/device_registers.hpp"
 
 #include "firmware/linked_parameters.hpp"
+#include "firmware/stability_guard.hpp"
 
 namespace kmax::firmware {
 
@@ -89,7 +90,7 @@ DeviceRegisters::WriteResult DeviceRegisters::take_setpoints(std::uint16_t addre
   return last_ = {};
 }
 
-DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wanted, bool armed) {
+DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wanted, const ArmedAxes& armed) {
   if (const BrokenRule broken = check_rules(wanted); broken.refusal != Refusal::none)
     return refuse(broken.refusal, address_of_slot(broken.slot));
   bool changed = false, restarts = false, communication_changed = false;
@@ -98,9 +99,13 @@ DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wante
     const SlotDescriptor& entry = descriptors[of];
     if (!entry.kept || acts_at_once(of) || wanted.raw(slot) == values_.raw(slot)) continue;
     // An axis may have been armed since the value was put aside.
-    if (armed && entry.disarmed_only) return refuse(Refusal::while_armed, address_of_slot(slot));
+    if (armed.any() && entry.disarmed_only) return refuse(Refusal::while_armed, address_of_slot(slot));
     (entry.writable ? changed : communication_changed) = true;
     restarts = restarts || entry.disarmed_only;
+  }
+  if (changed) {
+    if (const BrokenRule broken = check_guard(wanted, values_, armed); broken.refusal != Refusal::none)
+      return refuse(broken.refusal, address_of_slot(broken.slot));
   }
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     if (descriptors[owner_of(slot).entry].kept) values_.set_raw(slot, wanted.raw(slot));
@@ -111,7 +116,7 @@ DeviceRegisters::WriteResult DeviceRegisters::apply(const ParameterValues& wante
   return last_ = {};
 }
 
-DeviceRegisters::WriteResult DeviceRegisters::set_all(const ParameterValues& wanted, bool armed) {
+DeviceRegisters::WriteResult DeviceRegisters::set_all(const ParameterValues& wanted, const ArmedAxes& armed) {
   if (staging_) return refuse(Refusal::transaction_open, register_address(transaction_entry, 0));
   // Where a transaction would be put aside, instead of as much stack again.
   ParameterValues& set = staged_.values;
@@ -134,7 +139,8 @@ DeviceRegisters::WriteResult DeviceRegisters::write_communication(std::size_t sl
 }
 
 DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t address,
-                                                                  std::uint32_t request, bool armed,
+                                                                  std::uint32_t request,
+                                                                  const ArmedAxes& armed,
                                                                   std::uint32_t now_us) {
   if (request <= 1) dropped_ = false;
   switch (request) {
@@ -162,7 +168,7 @@ DeviceRegisters::WriteResult DeviceRegisters::control_transaction(std::uint16_t 
 }
 
 DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::span<const std::uint16_t> in,
-                                                    bool armed, std::uint32_t now_us) {
+                                                    const ArmedAxes& armed, std::uint32_t now_us) {
   poll(now_us);
   if (in.size() == 1 && address == register_address(transaction_entry, 0))
     return control_transaction(address, in[0], armed, now_us);
@@ -188,7 +194,7 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
 
   if (dropped_) return refuse(Refusal::no_transaction, address);
   Staged wanted{staging_ ? staged_.values : values_, {}};
-  const WriteResult checked = check_and_set(wanted, address, in, armed);
+  const WriteResult checked = check_and_set(wanted, address, in, armed.any());
   if (checked.refusal != Refusal::none) return refuse(checked.refusal, checked.address);
   if (!staging_) return apply(wanted.values, armed);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {

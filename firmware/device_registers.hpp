@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "firmware/armed_axes.hpp"
 #include "firmware/parameter_rules.hpp"
 #include "firmware/parameter_values.hpp"
 
@@ -44,15 +45,15 @@ inline constexpr auto register_places = [] {
 
 /// Parameters as registers: reading, checked writing, and transactions.
 ///
-/// A write is whole or nothing: every value in the range is checked, then the rules between parameters, and
-/// only then anything changes. Outside a transaction it takes effect at once; inside (transaction.control =
-/// 1) values are kept aside and take effect together with transaction.control = 2, which checks the rules
-/// over the whole set. A transaction in which nothing is written for 2 s is dropped, so a host that dies
-/// half way leaves nothing behind; for 30 s, or until transaction.control is written, no value is taken
-/// outside a transaction then, lest a message of that host that was held up takes effect by itself. A
-/// transaction changes what was written in it and nothing else: a value that others change meanwhile keeps
-/// theirs. Reading always gives the values in force, not those put aside. Why a write was refused stays in
-/// refusal.reason and refusal.register.
+/// A write is whole or nothing: every value in the range is checked, then the rules between parameters and,
+/// for an axis that is armed, the stability guard's, and only then anything changes. Outside a transaction it
+/// takes effect at once; inside (transaction.control = 1) values are kept aside and take effect together with
+/// transaction.control = 2, which checks the rules over the whole set. A transaction in which nothing is
+/// written for 2 s is dropped, so a host that dies half way leaves nothing behind; for 30 s, or until
+/// transaction.control is written, no value is taken outside a transaction then, lest a message of that host
+/// that was held up takes effect by itself. A transaction changes what was written in it and nothing else: a
+/// value that others change meanwhile keeps theirs. Reading always gives the values in force, not those put
+/// aside. Why a write was refused stays in refusal.reason and refusal.register.
 ///
 /// Commands (drive.controlword) and setpoints (profile.target_torque, profile.max_torque) are no part of a
 /// set: they act when they are written, in a transaction too, and are no change of parameters. So a setpoint
@@ -101,8 +102,8 @@ class DeviceRegisters {
     }
   }
 
-  /// `armed`: some axis is. `now_us` drives the transaction's time-out.
-  WriteResult write(std::uint16_t address, std::span<const std::uint16_t> in, bool armed,
+  /// `now_us` drives the transaction's time-out.
+  WriteResult write(std::uint16_t address, std::span<const std::uint16_t> in, const ArmedAxes& armed,
                     std::uint32_t now_us);
 
   /// Call at least every 2^31 us.
@@ -120,7 +121,7 @@ class DeviceRegisters {
   /// Takes every setting of `wanted` at once, outside any transaction: a stored set, the defaults. Commands
   /// and setpoints stay. Of two linked parameters the one that differs from now wins; if both differ, the one
   /// that save keeps. Refused while a transaction is open.
-  WriteResult set_all(const ParameterValues& wanted, bool armed);
+  WriteResult set_all(const ParameterValues& wanted, const ArmedAxes& armed);
 
   /// One of CANopen's own settings, at once; read_only for any other slot. Rules of CANopen between them are
   /// the caller's.
@@ -163,9 +164,9 @@ class DeviceRegisters {
                             bool armed) const;
   bool only_setpoints(std::uint16_t address, std::size_t count) const;
   WriteResult take_setpoints(std::uint16_t address, std::span<const std::uint16_t> in);
-  WriteResult control_transaction(std::uint16_t address, std::uint32_t request, bool armed,
+  WriteResult control_transaction(std::uint16_t address, std::uint32_t request, const ArmedAxes& armed,
                                   std::uint32_t now_us);
-  WriteResult apply(const ParameterValues& wanted, bool armed);
+  WriteResult apply(const ParameterValues& wanted, const ArmedAxes& armed);
 
   ParameterValues values_;
   Staged staged_;

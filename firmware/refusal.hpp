@@ -40,6 +40,7 @@ enum class Refusal : std::uint16_t {
   compensation_beyond_friction = 28,
   heartbeat_missing = 29,
   restarting = 30,
+  guard_refused = 31,
 };
 
 struct RefusalText {
@@ -86,6 +87,9 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::heartbeat_missing,
      "a node that is watched (heartbeat_consumer.*) is silent; start it, or stop watching it"},
     {Refusal::restarting, "the device is about to restart"},
+    {Refusal::guard_refused,
+     "the stability check fails: the device could not render this wall stably (guard.mode is refuse); 'kmax "
+     "check' explains it"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

@@ -31,6 +31,7 @@ inline constexpr Group trip{"trip", 0x2015, Scope::axis, 0x0080};
 inline constexpr Group profile{"profile", 0x2017, Scope::axis, 0x0280};
 inline constexpr Group profile_actual{"profile", 0x2018, Scope::axis, 0x00C0};
 inline constexpr Group telemetry{"telemetry", 0x2019, Scope::axis, 0x00E0};
+inline constexpr Group guard_status{"guard", 0x201A, Scope::axis, 0x0100};
 }  // namespace group
 
 /// What each choice is called; the numbers are the enumerations' own.
@@ -66,7 +67,13 @@ inline constexpr NamedValue velocity_estimator[] = {
 // Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
 // ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
 inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
-inline constexpr NamedValue guard_mode[] = {{"off", 0}};
+inline constexpr NamedValue guard_mode[] = {{"off", 0}, {"warn", 1}, {"refuse", 2}};
+inline constexpr NamedValue guard_verdict[] = {{"not_judged", 0}, {"pass", 1}, {"fail", 2}};
+/// In the numbers of control::Criterion.
+inline constexpr NamedValue guard_criterion[] = {
+    {"colgate", 0},          {"gil", 1},         {"sampled_eigenvalues", 2},
+    {"abbott_okamura", 3},   {"diolaiti", 4},    {"resolution", 5},
+    {"resolution_speed", 6}, {"field_slope", 7}, {"saturation_depth", 8}};
 inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
 inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
 inline constexpr NamedValue encoder_start[] = {{"anywhere", 0}, {"at_rest", 1}};

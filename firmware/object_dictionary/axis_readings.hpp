@@ -98,6 +98,19 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
 
     reading("telemetry.current", group::telemetry, 1, integer16, "mA",
             "measured.current, for a PDO; beyond +-32.767 A it stays there."),
+
+    named_reading(
+        "guard.verdict", group::guard_status, 1, names::guard_verdict,
+        "Stability check of the present parameters. Not judged: guard.mode is off, or nothing renders "
+        "a wall."),
+    reading("guard.failed", group::guard_status, 2, unsigned16, "",
+            "Criteria that fail: bit n stands for number n of guard.criterion."),
+    named_reading("guard.criterion", group::guard_status, 3, names::guard_criterion,
+                  "Criterion with the least margin: among those that fail, or among all when none does."),
+    reading("guard.value", group::guard_status, 4, float32, "",
+            "What this criterion judges: a stiffness, N/m; for resolution a force, N; for resolution_speed a "
+            "speed, m/s."),
+    reading("guard.bound", group::guard_status, 5, float32, "", "Its bound, in the same unit."),
 });
 
 }  // namespace kmax::firmware

@@ -103,16 +103,21 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
 
     choice("guard.mode", group::guard, 1, names::guard_mode, 0,
-           "Stability check before arming. This firmware offers only 'off'.")
+           "Stability check of the wall against the device: off; warn arms all the same and sets the "
+           "statusword's warning; refuse does not arm and, while armed, takes no parameters that would fail. "
+           "guard.verdict tells.")
         .disarmed_only(),
     real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
-         "Viscous damping the stability check may count on. Not used by this version."),
+         "Viscous damping b at the handle that the stability check may count on."),
     real("guard.friction", group::guard, 3, "N", 0, 100, 0,
-         "Coulomb friction of the handle that may be counted on: compensation.limit must be below it."),
+         "Coulomb friction f_c of the handle that may be counted on, by the stability check too: "
+         "compensation.limit must be below it."),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
-         "Force F_h of the operator in paper 2's resolution criterion. Not used by this version."),
+         "Force F_h of the operator in paper 2's resolution criteria; 0: not known, they are not judged."),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
-         "Speed v of the operator in paper 2's resolution criterion. Not used by this version."),
+         "Speed v of the operator in paper 2's resolution criteria; 0: not known."),
+    real("guard.delay", group::guard, 6, "s", 0, 1, 0,
+         "Delay from a command to its force at the handle, beyond the current loop's 1 / current.bandwidth."),
 
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,
          "Handle travel per radian of the motor shaft.")

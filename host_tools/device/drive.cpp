@@ -6,6 +6,7 @@
 
 #include "firmware/fault.hpp"
 #include "host_tools/device/errors.hpp"
+#include "host_tools/device/guard_words.hpp"
 #include "host_tools/device/number_text.hpp"
 
 namespace kmax::device {
@@ -98,6 +99,18 @@ DriveStatus Drive::status() {
           static_cast<Refusal>(raw[2]), std::bit_cast<float>(raw[3]), std::bit_cast<float>(raw[4])};
 }
 
+firmware::GuardFinding Drive::guard() {
+  const Parameter asked[] = {Parameter::of<"guard.verdict">(axis_), Parameter::of<"guard.failed">(axis_),
+                             Parameter::of<"guard.criterion">(axis_), Parameter::of<"guard.value">(axis_),
+                             Parameter::of<"guard.bound">(axis_)};
+  const auto raw = device_.read(asked);
+  return {.verdict = static_cast<firmware::GuardFinding::Verdict>(raw[0]),
+          .criterion = static_cast<control::Criterion>(raw[2]),
+          .failed = static_cast<std::uint16_t>(raw[1]),
+          .value = std::bit_cast<float>(raw[3]),
+          .bound = std::bit_cast<float>(raw[4])};
+}
+
 void Drive::command(std::uint16_t controlword, bool idempotent) {
   try {
     device_.write(Parameter::of<"drive.controlword">(axis_), controlword, idempotent);
@@ -136,6 +149,11 @@ void Drive::enable() {
   });
   if (seen.armed()) return;
   if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
+  if (seen.refusal == Refusal::guard_refused) {
+    // Empty if somebody has mended it meanwhile.
+    if (const std::string words = guard_words(guard()); !words.empty())
+      throw DeviceError(fmt::format("axis {} was not armed: refused: stability check: {}", axis_, words));
+  }
   if (seen.refusal != Refusal::none)
     throw DeviceError(fmt::format("axis {} was not armed: {}", axis_, firmware::words_of(seen.refusal)));
   throw DeviceError(

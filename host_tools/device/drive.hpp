@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/stability_guard.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::device {
@@ -25,6 +26,8 @@ struct DriveStatus {
   bool faulty() const {
     return state() == firmware::DriveState::fault || state() == firmware::DriveState::fault_reaction_active;
   }
+  /// Nothing is wrong, but something is to be looked at: derating, or a stability check that fails.
+  bool warning() const { return (statusword & firmware::statusword::warning) != 0; }
   /// One or two sentences: what happened, the number that tripped it and its bound, what to check.
   std::string fault_words() const;
 };
@@ -38,6 +41,9 @@ class Drive {
   Drive(Device& device, std::size_t axis) : device_(device), axis_(axis) {}
 
   DriveStatus status();
+
+  /// What the device's stability check says of the present parameters (guard_words.hpp says it in words).
+  firmware::GuardFinding guard();
 
   /// Shutdown, switch on, enable operation. If the device refuses, the axis is left disabled. Already armed:
   /// nothing happens. A lost link ends in an attempt to disable.

@@ -10,6 +10,7 @@
 #include "firmware/fault.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/errors.hpp"
+#include "host_tools/device/guard_words.hpp"
 #include "host_tools/device/number_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
@@ -21,6 +22,8 @@ using device::DeviceError;
 using device::Drive;
 using device::DriveStatus;
 using firmware::DriveState;
+using firmware::GuardFinding;
+using firmware::Refusal;
 using std::chrono::milliseconds;
 
 namespace {
@@ -44,34 +47,56 @@ Json fault_json(const DriveStatus& status) {
           {"message", status.fault_words()}};
 }
 
-Json status_json(std::size_t axis, const DriveStatus& status) {
-  const bool refused = status.refusal != firmware::Refusal::none;
+Json guard_json(const GuardFinding& guard) {
+  if (guard.verdict == GuardFinding::Verdict::not_judged) return nullptr;
+  Json failed = Json::array();
+  for (const firmware::NamedValue& criterion : firmware::names::guard_criterion) {
+    if ((guard.failed >> criterion.value & 1U) != 0) failed.push_back(std::string(criterion.name));
+  }
+  return {{"pass", guard.verdict == GuardFinding::Verdict::pass},
+          {"failed", failed},
+          {"criterion", std::string(device::name_of(guard.criterion))},
+          {"value", device::shortest_double(guard.value)},
+          {"bound", device::shortest_double(guard.bound)},
+          {"unit", std::string(device::unit_of(guard.criterion))},
+          {"message", device::guard_words(guard)}};
+}
+
+Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
+  const bool refused = status.refusal != Refusal::none;
   return {{"axis", axis},
           {"state", std::string(device::name_of(status.state()))},
           {"armed", status.armed()},
           {"statusword", status.statusword},
+          {"warning", status.warning()},
+          {"stability_check", guard_json(guard)},
           {"fault", fault_json(status)},
           {"refusal", refused ? Json(std::string(firmware::words_of(status.refusal))) : Json(nullptr)}};
 }
 
-std::string status_line(std::size_t axis, const DriveStatus& status) {
+std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
   std::string line = fmt::format("axis {}: {}", axis, device::words_of(status.state()));
   if (status.armed()) line += " (armed: force is on)";
   if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";
   if (status.faulty()) line += fmt::format(": {}; then 'kmax clear --axis {}'", status.fault_words(), axis);
-  if (!status.armed() && status.refusal != firmware::Refusal::none)
+  const std::string check = device::guard_words(guard);
+  if (!status.armed() && status.refusal == Refusal::guard_refused && !check.empty())
+    return line + fmt::format("; the last attempt to arm was refused: stability check: {}", check);
+  if (!status.armed() && status.refusal != Refusal::none)
     line += fmt::format("; the last attempt to arm was refused: {}", firmware::words_of(status.refusal));
+  if (!check.empty()) line += fmt::format("; stability check: {}", check);
   return line;
 }
 
 int print_states(Context& context, Device& device, const std::vector<std::size_t>& axes) {
   Json list = Json::array();
   for (const std::size_t axis : axes) {
-    const DriveStatus status = Drive(device, axis).status();
+    Drive drive(device, axis);
+    const DriveStatus status = drive.status();
     if (context.json) {
-      list.push_back(status_json(axis, status));
+      list.push_back(status_json(axis, status, drive.guard()));
     } else {
-      fmt::print(context.out, "{}\n", status_line(axis, status));
+      fmt::print(context.out, "{}\n", status_line(axis, status, drive.guard()));
     }
   }
   if (context.json) context.print({{"axes", list}});
@@ -127,7 +152,7 @@ void hold(Context& context, Device& device, Drive& drive, double timeout, const 
     const DriveStatus status = drive.status();
     if (!status.armed()) {
       // Never re-armed: whoever took the force away had a reason.
-      throw DeviceError(fmt::format("the force is off: {}", status_line(drive.axis(), status)));
+      throw DeviceError(fmt::format("the force is off: {}", status_line(drive.axis(), status, {})));
     }
     device.link().wait(interval);
     // A simulated device's time may pass faster than the user's.
@@ -148,6 +173,12 @@ void note_what_ends_the_force(Context& context, double link_timeout) {
     context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
 }
 
+/// An axis that is armed although its check fails: guard.mode is warn.
+void note_a_warning(Context& context, Drive& drive) {
+  if (const std::string words = device::guard_words(drive.guard()); !words.empty())
+    context.note(fmt::format("armed with a warning: stability check: {}", words));
+}
+
 int run_arm(Context& context, bool holding) {
   const Interruption interruption;
   Device device = context.connect();
@@ -155,14 +186,16 @@ int run_arm(Context& context, bool holding) {
   const double timeout = device.read_number("link.timeout");
   drive.arm();
   try {
-    if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status()));
+    if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status(), {}));
     context.out.flush();
+    note_a_warning(context, drive);
     if (!holding) note_what_ends_the_force(context, timeout);
     if (holding) hold(context, device, drive, timeout, interruption);
     const DriveStatus status = drive.status();
     // Ctrl-C while it was being armed was meant to end that.
     if (!holding && interruption.requested()) throw std::runtime_error("interrupted");
-    if (context.json) context.print({{"axes", Json::array({status_json(drive.axis(), status)})}});
+    if (context.json)
+      context.print({{"axes", Json::array({status_json(drive.axis(), status, drive.guard())})}});
   } catch (const std::exception&) {
     disarm_after_failure(context, drive, timeout);
     throw;
@@ -189,7 +222,8 @@ void add_drive_commands(CLI::App& app, Context& context) {
       {"arm", "Lets an axis make force.",
        "  kmax arm --hold           until Ctrl-C\n  kmax arm --axis 1\n\n"
        "The device removes the force, with a fault, when the host has been silent for link.timeout.\n"
-       "Refused while the handle is inside the wall or a fault is present."});
+       "Refused while the handle is inside the wall, while a fault is present, and, with guard.mode=refuse,\n"
+       "when the stability check fails ('kmax check' explains it)."});
   auto holding = std::make_shared<bool>(false);
   arm->add_flag("--hold", *holding,
                 "Keep the link alive until Ctrl-C, then disarm; ends with code 1 on a fault");

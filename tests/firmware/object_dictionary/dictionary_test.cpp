@@ -54,11 +54,12 @@ const std::vector<Word> vocabulary = {
     {"force.slew_limit", "N/s"},
     {"force.ramp_time", "s"},
     {"passivity.mode", "", {"off"}},  // 'observe' and 'control' when the firmware has them
-    {"guard.mode", "", {"off"}},      // 'warn' and 'refuse' when the firmware has them
+    {"guard.mode", "", {"off", "warn", "refuse"}},
     {"guard.damping", "N s/m"},
     {"guard.friction", "N"},
     {"guard.operator_force", "N"},
     {"guard.operator_speed", "m/s"},
+    {"guard.delay", "s"},
     {"device.transmission", "m/rad"},
     {"device.mass", "kg"},
     {"motor.kind", "", {"dc", "pmsm"}},
@@ -172,6 +173,11 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"haptic.rate", 0x0080, 0x0480},
       {"force.limit", 0x0090, 0x0490},
       {"force.ramp_time", 0x0094, 0x0494},
+      {"guard.mode", 0x00B0, 0x04B0},
+      {"guard.operator_speed", 0x00B7, 0x04B7},
+      {"guard.delay", 0x00B9, 0x04B9},
+      {"guard.verdict", 0x0100, 0x0500},
+      {"guard.bound", 0x0105, 0x0505},
       {"encoder.counts_per_turn", 0x0111, 0x0511},
       {"encoder.offset", 0x0114, 0x0514},
       {"drive.controlword", 0x0200, 0x0600},
@@ -350,7 +356,7 @@ TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
        {"wall.law", "wall.position", "wall.side", "interference.mode", "position.resolution",
         "position.rounding", "velocity.estimator", "velocity.window", "velocity.bandwidth", "haptic.rate",
         "device.transmission", "encoder.counts_per_turn", "encoder.direction", "encoder.offset",
-        "encoder.kind", "motor.kind"})
+        "encoder.kind", "motor.kind", "guard.mode"})
     EXPECT_EQ(named(name).change, Change::disarmed_only) << name;
   for (const std::string_view name :
        {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit", "link.timeout",

@@ -1,0 +1,94 @@
+// Compiled for size: it runs when parameters change, and flash is what it costs.
+#include "firmware/stability_guard.hpp"
+
+#include "control/resampler.hpp"
+#include "firmware/axis.hpp"
+#include "firmware/haptic_configuration.hpp"
+
+namespace kmax::firmware {
+
+namespace {
+using control::Criterion;
+using control::CriterionResult;
+using control::WallKind;
+
+/// Whether the axis renders a wall at all.
+bool renders_a_wall(const ParameterValues& values, std::size_t axis) {
+  return values.choice<DriveMode, "drive.mode">(axis) == DriveMode::haptic &&
+         values.choice<WallKind, "wall.law">(axis) != WallKind::none;
+}
+
+/// Whether `a` is farther beyond its bound, or nearer to it, than `b` is to its own: value / bound compared
+/// without a division. Of two bounds that no value can keep, the greater value.
+bool has_less_margin(const CriterionResult<float>& a, const CriterionResult<float>& b) {
+  if (a.bound <= 0.0f && b.bound <= 0.0f) return a.value > b.value;
+  return a.value * b.bound > b.value * a.bound;
+}
+
+/// A failed one before any that passes.
+bool is_worse(const CriterionResult<float>& a, const CriterionResult<float>& b) {
+  return a.pass == b.pass ? has_less_margin(a, b) : b.pass;
+}
+}  // namespace
+
+float largest_magnetic_coefficient(const ParameterValues& values, std::size_t axis) {
+  const auto wall = wall_configuration<float>(values, axis);
+  if (wall.kind == WallKind::magnetic) return wall.magnetic_coefficient;
+  if (wall.kind != WallKind::adaptive) return 0.0f;
+  return control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most;
+}
+
+control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis) {
+  const double length = count_length(values, axis);
+  const double step =
+      control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), length);
+  control::StabilityCase<float> judged;
+  judged.stiffness = values.real<"wall.stiffness">(axis);
+  judged.wall_damping = values.real<"wall.damping">(axis);
+  judged.magnetic_coefficient = largest_magnetic_coefficient(values, axis);
+  judged.magnetic_length = values.real<"wall.magnetic_length">(axis);
+  judged.period = 1.0f / values.real<"haptic.rate">(axis);
+  judged.delay = values.real<"guard.delay">(axis) + 1.0f / values.real<"current.bandwidth">(axis);
+  judged.quantum = static_cast<float>(step * length);
+  judged.mass = values.real<"device.mass">(axis);
+  judged.damping = values.real<"guard.damping">(axis);
+  judged.friction = values.real<"guard.friction">(axis);
+  judged.operator_force = values.real<"guard.operator_force">(axis);
+  judged.operator_speed = values.real<"guard.operator_speed">(axis);
+  judged.force_limit = values.real<"force.limit">(axis);
+  return judged;
+}
+
+GuardFinding guard_finding(const ParameterValues& values, std::size_t axis) {
+  GuardFinding finding;
+  if (values.choice<GuardMode, "guard.mode">(axis) == GuardMode::off || !renders_a_wall(values, axis))
+    return finding;
+  const auto judged = stability_case(values, axis);
+  CriterionResult<float> worst;
+  for (const Criterion criterion : guard_criteria) {
+    const auto result = control::judge_closed_form(criterion, judged);
+    if (!result.applies) continue;
+    if (!result.pass)
+      finding.failed = static_cast<std::uint16_t>(finding.failed | 1U << static_cast<unsigned>(criterion));
+    if (!worst.applies || is_worse(result, worst)) worst = result;
+  }
+  if (!worst.applies) return finding;
+  finding.verdict = finding.failed == 0 ? GuardFinding::Verdict::pass : GuardFinding::Verdict::fail;
+  finding.criterion = worst.criterion;
+  finding.value = worst.value;
+  finding.bound = worst.bound;
+  return finding;
+}
+
+BrokenRule check_guard(const ParameterValues& wanted, const ParameterValues& now, const ArmedAxes& armed) {
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (!armed.axis[axis] || wanted.choice<GuardMode, "guard.mode">(axis) != GuardMode::refuse) continue;
+    if (guard_finding(wanted, axis).verdict != GuardFinding::Verdict::fail) continue;
+    std::size_t slot = slot_of(0, axis);
+    while (slot < slot_of(axis_entries.size() - 1, axis) && wanted.raw(slot) == now.raw(slot)) ++slot;
+    return {Refusal::guard_refused, slot};
+  }
+  return {};
+}
+
+}  // namespace kmax::firmware

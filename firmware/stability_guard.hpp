@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "control/closed_form_criteria.hpp"
+#include "firmware/armed_axes.hpp"
+#include "firmware/parameter_rules.hpp"
+
+namespace kmax::firmware {
+
+/// guard.mode, in its numbers.
+enum class GuardMode : std::uint8_t { off = 0, warn = 1, refuse = 2 };
+
+/// What the stability check says of an axis' parameters; its members are the readings guard.*.
+struct GuardFinding {
+  enum class Verdict : std::uint8_t { not_judged = 0, pass = 1, fail = 2 };
+
+  Verdict verdict = Verdict::not_judged;
+  /// The one with the least margin: among the failed ones, or among all that apply when none failed.
+  control::Criterion criterion = control::Criterion::colgate;
+  std::uint16_t failed = 0;  ///< bit n: criterion number n
+  float value = 0.0f;        ///< in the criterion's unit, see control/closed_form_criteria.hpp
+  float bound = 0.0f;
+
+  friend constexpr bool operator==(const GuardFinding&, const GuardFinding&) = default;
+};
+
+/// The criteria that are judged before arming: the closed ones that say something of stability. Those that
+/// need to know the hand or eigenvalues are the host's ('kmax check').
+inline constexpr std::array guard_criteria = {
+    control::Criterion::colgate, control::Criterion::abbott_okamura, control::Criterion::resolution,
+    control::Criterion::resolution_speed, control::Criterion::field_slope};
+
+/// The largest coefficient F_MC, N, that the present law can command, at whatever velocity and in whichever
+/// adaptive mode and relation: eq. 7 at V_max within the adaptive interval. 0 for the laws without a field.
+float largest_magnetic_coefficient(const ParameterValues& values, std::size_t axis);
+
+/// An axis' parameters as the criteria take them: b = guard.damping, f_c = guard.friction, T = 1 /
+/// haptic.rate, delay = guard.delay + 1 / current.bandwidth, quantum = measured.resolution, F_h and v of
+/// guard.operator_*. Nobody holds the handle: the damping of a hand is not counted on.
+control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis);
+
+/// The stability check of one axis. Not judged where guard.mode is off, where drive.mode renders no wall, and
+/// for a law that makes no force. Value and bound are finite for every set of allowed parameters.
+///
+/// Main loop: two divisions in double, a dozen in float. No failure.
+GuardFinding guard_finding(const ParameterValues& values, std::size_t axis);
+
+/// The rule for armed axes whose guard.mode is refuse: no change from `now` may break a criterion, or the
+/// check before arming could be walked round. Reported on the axis' first parameter that would change.
+BrokenRule check_guard(const ParameterValues& wanted, const ParameterValues& now, const ArmedAxes& armed);
+
+static_assert(
+    [] {
+      for (const NamedValue& name : names::guard_criterion) {
+        if (static_cast<std::size_t>(name.value) >= control::criterion_count) return false;
+      }
+      return std::size(names::guard_criterion) == control::criterion_count;
+    }(),
+    "guard.criterion names every criterion");
+
+}  // namespace kmax::firmware

@@ -1,0 +1,115 @@
+// What `kmax arm` and `kmax state` say of the stability guard, with the whole firmware behind them.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/kmax/context.hpp"
+#include "tests/host_tools/bench_link.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::cli {
+namespace {
+
+/// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.1 N s/m allow 4000 N/m.
+class GuardOnCommandLine : public testing::Test {
+ protected:
+  GuardOnCommandLine() {
+    bench->set_up_plain_wall();
+    bench->device.stand_at(1000);
+    bench->device.stand_at(1000, 1);
+    bench->preset("current.bandwidth", 4000);
+    bench->preset("guard.damping", 1.1);
+    bench->preset("guard.friction", 1);
+    bench->run_ms(5);
+  }
+
+  int kmax(std::vector<std::string> arguments) {
+    std::ostringstream out, messages;
+    Context context(out, messages, [this](const std::string&, const link::Notice&) {
+      return std::make_unique<host_tools_test::BenchLink>(bench);
+    });
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+  Json document() {
+    Json parsed = Json::parse(output, nullptr, false);
+    EXPECT_FALSE(parsed.is_discarded()) << output;
+    return parsed;
+  }
+  Json axis_0() { return document()["axes"][0]; }
+  bool armed() const { return bench->application().any_armed(); }
+
+  std::shared_ptr<board::Bench> bench = std::make_shared<board::Bench>();
+  std::string output, said;
+};
+
+TEST_F(GuardOnCommandLine, ARefusalToArmTellsTheNumbersAndWhatToDo) {
+  ASSERT_EQ(kmax({"set", "guard.mode=refuse", "wall.stiffness=5500"}), done) << said;
+  EXPECT_EQ(kmax({"arm"}), failed);
+  EXPECT_FALSE(armed());
+  EXPECT_CONTAINS(said, "axis 0 was not armed: refused: stability check: wall.stiffness 5500 N/m exceeds ");
+  EXPECT_CONTAINS(said, "(Colgate");
+  EXPECT_CONTAINS(said, "lower wall.stiffness");
+  EXPECT_CONTAINS(said, "guard.damping if the device has more");
+  EXPECT_CONTAINS(said, "'kmax check' explains");
+  EXPECT_EQ(kmax({"arm", "--json"}), failed);
+  EXPECT_CONTAINS(document()["error"].get<std::string>(), "wall.stiffness 5500 N/m exceeds ");
+
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_CONTAINS(output, "the last attempt to arm was refused: stability check: wall.stiffness 5500 N/m");
+  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(axis_0()["warning"], false);
+  const Json check = axis_0()["stability_check"];
+  EXPECT_EQ(check["pass"], false);
+  EXPECT_EQ(check["failed"], Json::parse(R"(["colgate"])"));
+  EXPECT_EQ(check["criterion"], "colgate");
+  EXPECT_EQ(check["value"], 5500);
+  EXPECT_NEAR(check["bound"].get<double>(), 4000, 0.01);
+  EXPECT_EQ(check["unit"], "N/m");
+  EXPECT_EQ(document()["axes"][1]["stability_check"], nullptr) << "not judged";
+
+  ASSERT_EQ(kmax({"set", "wall.stiffness=3000"}), done);
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_CONTAINS(output, "the last attempt to arm was refused: the stability check fails");
+  EXPECT_EQ(kmax({"arm"}), done) << said;
+  EXPECT_TRUE(armed());
+  EXPECT_EQ(said.find("stability"), std::string::npos) << said;
+  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(axis_0()["stability_check"]["pass"], true);
+  EXPECT_EQ(axis_0()["stability_check"]["message"], "");
+}
+
+TEST_F(GuardOnCommandLine, AWarningArmsAndIsSaidOnceBesideTheResult) {
+  ASSERT_EQ(kmax({"set", "guard.mode=warn", "wall.stiffness=5500"}), done) << said;
+  EXPECT_EQ(kmax({"arm", "--json"}), done);
+  EXPECT_TRUE(armed());
+  EXPECT_CONTAINS(said, "armed with a warning: stability check: wall.stiffness 5500 N/m exceeds ");
+  EXPECT_EQ(axis_0()["warning"], true);
+  EXPECT_EQ(axis_0()["stability_check"]["pass"], false);
+  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_CONTAINS(output, "(armed: force is on); stability check: wall.stiffness 5500 N/m exceeds ");
+}
+
+TEST_F(GuardOnCommandLine, OffSaysNothing) {
+  ASSERT_EQ(kmax({"set", "wall.stiffness=1e6"}), done) << said;
+  EXPECT_EQ(kmax({"arm"}), done);
+  EXPECT_EQ((said + output).find("stability"), std::string::npos) << said << output;
+  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(axis_0()["stability_check"], nullptr);
+}
+
+TEST_F(GuardOnCommandLine, ASetThatIsRefusedWhileArmedNamesTheParameterAndChangesNothing) {
+  ASSERT_EQ(kmax({"set", "guard.mode=refuse"}), done) << said;
+  ASSERT_EQ(kmax({"arm"}), done) << said;
+  EXPECT_EQ(kmax({"set", "force.limit=2", "wall.stiffness=5500"}), failed);
+  EXPECT_CONTAINS(said, "wall.stiffness = 5500 N/m: the device refused: the stability check fails");
+  EXPECT_CONTAINS(said, "nothing was changed");
+  EXPECT_EQ(bench->get("wall.stiffness"), 1000);
+  EXPECT_TRUE(armed());
+}
+
+}  // namespace
+}  // namespace kmax::cli
