@@ -3,6 +3,8 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 
 #include "host_tools/device/drive.hpp"
@@ -10,6 +12,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulated_board/scene_run.hpp"
+#include "host_tools/simulation/scene_parts.hpp"
 
 namespace kmax::cli {
 
@@ -21,22 +24,61 @@ struct SimulateOptions {
   std::string scene, csv, picture;
 };
 
-void write_csv(const RunResult& result, const std::string& path) {
+/// What the table has of an axis; the time stands before.
+struct Column {
+  const char* name;
+  double RunSample::*member;
+};
+constexpr std::array columns{
+    Column{"true_position_m", &RunSample::true_position},
+    Column{"true_velocity_m_per_s", &RunSample::true_velocity},
+    Column{"hand_position_m", &RunSample::hand_position},
+    Column{"intended_position_m", &RunSample::intended_position},
+    Column{"position_m", &RunSample::position},
+    Column{"velocity_m_per_s", &RunSample::velocity},
+    Column{"force_n", &RunSample::force},
+    Column{"applied_force_n", &RunSample::applied_force},
+    Column{"magnetic_coefficient_n", &RunSample::magnetic_coefficient},
+};
+constexpr Column tip_column{"tip_position_m", &RunSample::tip_position};
+
+/// The rows of both axes are those of the same samples as long as both have the same haptic.rate; else axis 1
+/// stands with its last sample.
+void write_csv(const simulation::Scene& scene, const RunResult& result, const std::string& path) {
+  struct Cell {
+    bool second;
+    Column column;
+  };
+  std::vector<Cell> cells;
+  std::string head = "time_s";
+  for (const bool second : {false, true}) {
+    if (second && result.second_samples.empty()) break;
+    std::vector<Column> of_axis(columns.begin(), columns.end());
+    if (scene.axes[second ? 1 : 0].device.structure) of_axis.push_back(tip_column);
+    for (const Column& column : of_axis) {
+      cells.push_back({second, column});
+      head += fmt::format(",{}{}", second ? "axis1_" : "", column.name);
+    }
+  }
   std::ofstream file(path);
-  file << "time_s,true_position_m,true_velocity_m_per_s,hand_position_m,intended_position_m,position_m,"
-          "velocity_m_per_s,force_n,applied_force_n,magnetic_coefficient_n\n";
-  for (const RunSample& s : result.samples)
-    file << fmt::format("{},{},{},{},{},{},{},{},{},{}\n", s.time, s.true_position, s.true_velocity,
-                        s.hand_position, s.intended_position, s.position, s.velocity, s.force,
-                        s.applied_force, s.magnetic_coefficient);
+  file << head << '\n';
+  std::size_t other = 0;
+  for (const RunSample& sample : result.samples) {
+    while (other + 1 < result.second_samples.size() && result.second_samples[other + 1].time <= sample.time)
+      ++other;
+    file << fmt::format("{}", sample.time);
+    for (const Cell& cell : cells)
+      file << fmt::format(",{}", (cell.second ? result.second_samples[other] : sample).*cell.column.member);
+    file << '\n';
+  }
   file.close();
   if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", path));
 }
 
-plot::Series series(const RunResult& result, double RunSample::*member, double scale, const char* label,
-                    bool held) {
+plot::Series series(const std::vector<RunSample>& samples, double RunSample::*member, double scale,
+                    const char* label, bool held) {
   plot::Series s{label, {}, {}, held};
-  for (const RunSample& sample : result.samples) {
+  for (const RunSample& sample : samples) {
     s.x.push_back(sample.time);
     s.y.push_back(sample.*member * scale);
   }
@@ -49,14 +91,42 @@ void write_picture(const simulation::Scene& scene, const RunResult& result, cons
   figure.x_label = "time since arming (s)";
   std::vector<plot::Mark> judged;
   if (result.contact) judged = {{result.judged_from, true, "judged"}, {result.judged_to, true, ""}};
-  plot::Panel position{
-      "position (mm)", {series(result, &RunSample::true_position, 1e3, "handle", false)}, judged};
-  if (scene.axes[0].person)
-    position.series.push_back(series(result, &RunSample::hand_position, 1e3, "hand", false));
-  figure.panels = {position,
-                   {"force (N)", {series(result, &RunSample::applied_force, 1, "", true)}, judged},
-                   {"F_{MC} (N)", {series(result, &RunSample::magnetic_coefficient, 1, "", true)}, judged}};
+  const auto position = [&scene](const std::vector<RunSample>& samples, std::size_t axis, const char* label) {
+    plot::Panel panel{label, {series(samples, &RunSample::true_position, 1e3, "handle", false)}, {}};
+    if (scene.axes[axis].device.structure) {
+      panel.series[0].label = "encoder";
+      panel.series.push_back(series(samples, &RunSample::tip_position, 1e3, "handle", false));
+    }
+    if (scene.axes[axis].person)
+      panel.series.push_back(series(samples, &RunSample::hand_position, 1e3, "hand", false));
+    return panel;
+  };
+  const auto force = [](const std::vector<RunSample>& samples, const char* label) {
+    return plot::Panel{label, {series(samples, &RunSample::applied_force, 1, "", true)}, {}};
+  };
+  figure.panels = {position(result.samples, 0, "position (mm)"), force(result.samples, "force (N)")};
+  const bool field = std::any_of(result.samples.begin(), result.samples.end(),
+                                 [](const RunSample& sample) { return sample.magnetic_coefficient != 0.0; });
+  if (field) {
+    figure.panels.push_back(
+        {"F_{MC} (N)", {series(result.samples, &RunSample::magnetic_coefficient, 1, "", true)}, {}});
+  }
+  if (!result.second_samples.empty()) {
+    figure.panels.push_back(position(result.second_samples, 1, "axis 1: position (mm)"));
+    figure.panels.push_back(force(result.second_samples, "axis 1: force (N)"));
+  }
+  for (plot::Panel& panel : figure.panels) {
+    panel.marks = judged;
+    // Said once; in the others it would stand on the lines.
+    if (!judged.empty()) judged.front().label.clear();
+  }
   plot::write_figure(figure, path);
+}
+
+Json parts_json(const simulation::Scene& scene) {
+  Json axes = Json::array();
+  for (const simulation::SceneAxis& axis : scene.axes) axes.push_back(simulation::integrated_parts(axis));
+  return axes;
 }
 
 Json result_json(const simulation::Scene& scene, const RunResult& result) {
@@ -69,12 +139,15 @@ Json result_json(const simulation::Scene& scene, const RunResult& result) {
                {"judged_to_s", result.judged_to}};
   }
   return {{"scene", scene.name},
+          {"integrator", simulation::words_of(scene.integrator)},
+          {"parts", parts_json(scene)},
           {"state", std::string(device::name_of(result.end_state))},
           {"fault", std::string(firmware::text_of(result.fault).name)},
           {"samples", result.samples.size()},
           {"contact", contact},
           {"limited_share", result.limited_share},
           {"clipped_share", result.clipped_share},
+          {"lost_edges", result.lost_edges},
           {"simulated_s", result.simulated_s},
           {"simulated_per_real_s", result.simulated_s / result.real_s}};
 }
@@ -82,10 +155,11 @@ Json result_json(const simulation::Scene& scene, const RunResult& result) {
 int run_simulate(Context& context, const SimulateOptions& options) {
   const simulation::Scene scene = simulated_board::open_scene(options.scene);
   const RunResult result = simulated_board::run_scene(scene);
+  const std::string axis = scene.axes.size() > 1 ? fmt::format("axis {}", result.axis) : "the axis";
   if (result.samples.empty())
     throw std::runtime_error(
-        fmt::format("{}: the axis could not be armed: {}", scene.name, firmware::words_of(result.refusal)));
-  if (!options.csv.empty()) write_csv(result, options.csv);
+        fmt::format("{}: {} could not be armed: {}", scene.name, axis, firmware::words_of(result.refusal)));
+  if (!options.csv.empty()) write_csv(scene, result, options.csv);
   if (!options.picture.empty()) write_picture(scene, result, options.picture);
   if (context.json) {
     context.print(result_json(scene, result));
@@ -93,6 +167,10 @@ int run_simulate(Context& context, const SimulateOptions& options) {
     fmt::print(context.out, "{}: {}\n", scene.name, scene.description);
     fmt::print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
                result.simulated_s / result.real_s);
+    fmt::print(context.out, "  integrator: {}\n", simulation::words_of(scene.integrator));
+    for (std::size_t n = 0; n < scene.axes.size(); ++n)
+      fmt::print(context.out, "  axis {} integrates: {}\n", n,
+                 fmt::join(simulation::integrated_parts(scene.axes[n]), ", "));
     if (result.contact)
       fmt::print(
           context.out,
@@ -101,13 +179,14 @@ int run_simulate(Context& context, const SimulateOptions& options) {
           result.judged_from, result.judged_to, result.contact->deepest * 1e3);
     fmt::print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
                result.limited_share * 100, result.clipped_share * 100);
+    if (result.lost_edges > 0) fmt::print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
     fmt::print(context.out, "  at the end: {}\n", device::words_of(result.end_state));
     for (const std::string& file : {options.csv, options.picture}) {
       if (!file.empty()) fmt::print(context.out, "  {}\n", file);
     }
   }
   if (result.fault == firmware::Fault::none) return done;
-  context.note(fmt::format("the run ended in a fault: {}", firmware::text_of(result.fault).what));
+  context.note(fmt::format("the run ended in a fault of {}: {}", axis, firmware::text_of(result.fault).what));
   return failed;
 }
 }  // namespace
@@ -120,8 +199,9 @@ void add_simulate_command(CLI::App& app, Context& context) {
       {"simulate", "Runs one scene through the firmware on a simulated device.",
        "  kmax simulate touch\n"
        "  kmax simulate my_scene.toml --csv run.csv --picture run.svg\n\n"
-       "A scene names its parts: device, operator, motion, encoder, parameters, measurement. The axis\n"
-       "is armed at time 0 and the person begins to move; everything goes through the firmware."},
+       "A scene names its parts: device, structure, operator, motion, encoder, motor, parameters,\n"
+       "measurement, integrator. Its axes are armed at time 0 and the person begins to move; everything\n"
+       "goes through the firmware."},
       Takes::nothing);
   auto options = std::make_shared<SimulateOptions>();
   command->add_option("scene", options->scene, "TOML file, or a supplied scene:" + names)

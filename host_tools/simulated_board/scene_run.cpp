@@ -1,5 +1,6 @@
 #include "host_tools/simulated_board/scene_run.hpp"
 
+#include <array>
 #include <chrono>
 
 #include "firmware/haptic_configuration.hpp"
@@ -9,13 +10,41 @@ namespace kmax::simulated_board {
 namespace {
 constexpr std::size_t controlword_entry = firmware::entry_of<"drive.controlword">();
 
-/// Lets the settings arrive, then walks to "operation enabled".
-void arm(SimulatedBoard& simulation) {
+/// Lets the settings arrive, then walks all axes of the scene to "operation enabled" together.
+void arm(SimulatedBoard& simulation, std::size_t axes) {
   simulation.board().advance(firmware::tick_rate_hz / 10);
   for (const std::uint32_t word : {0x06u, 0x07u, 0x0Fu}) {
-    simulation.board().application().preset(controlword_entry, 0, word);
+    for (std::size_t axis = 0; axis < axes; ++axis)
+      simulation.board().application().preset(controlword_entry, axis, word);
     simulation.board().advance(1);
   }
+}
+
+/// The true handle, before the tick that samples it.
+RunSample seen(const simulation::CoupledHandle& handle, double time) {
+  RunSample sample{};
+  sample.time = time;
+  sample.true_position = handle.position();
+  sample.tip_position = handle.tip_position();
+  sample.true_velocity = handle.velocity();
+  sample.hand_position = handle.hand_position();
+  sample.intended_position = handle.intended_position();
+  return sample;
+}
+
+void add_report(RunSample& sample, const control::HapticLoop<float>::Output& haptic, double count_length) {
+  sample.position = static_cast<double>(haptic.position) * count_length;
+  sample.velocity = static_cast<double>(haptic.velocity);
+  sample.force = static_cast<double>(haptic.force);
+  sample.magnetic_coefficient = static_cast<double>(haptic.magnetic_coefficient);
+}
+
+/// The axis that the run's end is about.
+std::size_t axis_to_tell(const firmware::Application& application, std::size_t axes) {
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    if (application.state(axis) != firmware::DriveState::operation_enabled) return axis;
+  }
+  return 0;
 }
 
 std::optional<simulation::ContactMeasure> judge(const simulation::Scene& scene, const RunResult& result) {
@@ -40,32 +69,39 @@ RunResult run_scene(const simulation::Scene& scene) {
   // Nobody talks to this board; its link supervision would take the force away.
   application.preset(firmware::entry_of<"link.timeout">(), 0, 0);
   RunResult result;
-  arm(simulation);
-  if (application.state(0) != firmware::DriveState::operation_enabled) {
-    result.end_state = application.state(0);
-    result.refusal = application.refusal(0);
-    return result;
-  }
-  const double length = firmware::count_length(application.values(), 0);
+  const std::size_t axes = scene.axes.size();
+  arm(simulation, axes);
+  result.axis = axis_to_tell(application, axes);
+  result.end_state = application.state(result.axis);
+  result.refusal = application.refusal(result.axis);
+  if (result.end_state != firmware::DriveState::operation_enabled) return result;
+  std::array<double, firmware::axis_count> lengths{};
+  for (std::size_t axis = 0; axis < axes; ++axis)
+    lengths[axis] = firmware::count_length(application.values(), axis);
   const auto ticks = static_cast<std::uint64_t>(scene.duration * firmware::tick_rate_hz + 0.5);
   const simulation::CoupledHandle& handle = simulation.device().handle(0);
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
-    const double true_position = handle.position(), true_velocity = handle.velocity();
-    const double hand = handle.hand_position(), intended = handle.intended_position();
+    std::array<RunSample, firmware::axis_count> samples{};
+    const double time = static_cast<double>(tick) / firmware::tick_rate_hz;
+    for (std::size_t axis = 0; axis < axes; ++axis)
+      samples[axis] = seen(simulation.device().handle(axis), time);
     simulation.board().advance(1);
-    const auto& haptic = application.ISR_report(0).haptic;
-    if (!haptic.new_sample) continue;
-    result.samples.push_back({static_cast<double>(tick) / firmware::tick_rate_hz, true_position,
-                              true_velocity, hand, intended, static_cast<double>(haptic.position) * length,
-                              static_cast<double>(haptic.velocity), static_cast<double>(haptic.force),
-                              handle.applied_force(), static_cast<double>(haptic.magnetic_coefficient)});
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      const auto& haptic = application.ISR_report(axis).haptic;
+      if (!haptic.new_sample) continue;
+      add_report(samples[axis], haptic, lengths[axis]);
+      samples[axis].applied_force = simulation.device().handle(axis).applied_force();
+      (axis == 0 ? result.samples : result.second_samples).push_back(samples[axis]);
+    }
   }
   const auto& report = application.ISR_report(0);
-  result.end_state = application.state(0);
-  result.fault = application.fault(0);
+  result.axis = axis_to_tell(application, axes);
+  result.end_state = application.state(result.axis);
+  result.fault = application.fault(result.axis);
   result.limited_share =
       report.armed_samples == 0 ? 0.0 : static_cast<double>(report.limited_samples) / report.armed_samples;
   result.clipped_share = handle.clipped_share();
+  result.lost_edges = simulation.device().lost_edges(0);
   if (handle.has_operator() && handle.motion().hold_end()) {
     result.judged_to = *handle.motion().hold_end();
     result.judged_from = result.judged_to - scene.measurement.window;

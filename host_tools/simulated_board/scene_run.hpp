@@ -8,10 +8,11 @@
 
 namespace kmax::simulated_board {
 
-/// What is known at one haptic sample of axis 0: the true handle, and what the firmware made of it.
+/// What is known at one haptic sample of an axis: the true handle, and what the firmware made of it.
 struct RunSample {
   double time;                  ///< s since arming
-  double true_position;         ///< m
+  double true_position;         ///< m, where the encoder is
+  double tip_position;          ///< m, where the person holds it; without a structure the same
   double true_velocity;         ///< m/s
   double hand_position;         ///< m; without a person the handle's start
   double intended_position;     ///< m
@@ -23,18 +24,23 @@ struct RunSample {
 };
 
 struct RunResult {
-  std::vector<RunSample> samples;
+  std::vector<RunSample> samples;         ///< of axis 0
+  std::vector<RunSample> second_samples;  ///< of axis 1, if the scene has it
+  /// Of the first axis that could not be armed or ended in a fault; else of axis 0.
+  std::size_t axis = 0;
   firmware::DriveState end_state{};
   firmware::Refusal refusal{};  ///< why it could not be armed
   firmware::Fault fault{};
+  // What follows is axis 0's.
   std::optional<simulation::ContactMeasure> contact;  ///< if there is a person whose hold was long enough
   double judged_from = 0, judged_to = 0;              ///< s
   double limited_share = 0;                           ///< of the haptic samples, by force.limit
   double clipped_share = 0;                           ///< of the ticks, by the device
+  std::int64_t lost_edges = 0;                        ///< by an encoder without a motor that loses some
   double simulated_s = 0, real_s = 0;
 };
 
-/// Powers the scene's board up, arms axis 0 and lets the scene's duration pass. Everything goes through the
+/// Powers the scene's board up, arms its axes and lets the scene's duration pass. Everything goes through the
 /// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers.
 RunResult run_scene(const simulation::Scene& scene);
 

@@ -1,5 +1,6 @@
 #include "host_tools/simulated_board/simulated_device.hpp"
 
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -14,8 +15,9 @@ SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(s
       if (!power_) power_ = std::make_unique<SimulatedPower>(scene);
       continue;
     }
-    axes_[i].emplace(
-        Axis{axis.make_handle(), simulation::EncoderModel(axis.encoder.count_length()), {}, false});
+    simulation::CoupledHandle handle = scene.make_handle(i);
+    const simulation::AxisEncoder encoder(axis.encoder, handle.position(), scene.seed_of(i));
+    axes_[i].emplace(Axis{std::move(handle), encoder, {}, axis.motion.has_value(), axis.same_person, false});
   }
   encoder_connected_.fill(true);
 }
@@ -23,7 +25,7 @@ SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(s
 firmware::AxisInput SimulatedDevice::sample(std::size_t axis) {
   if (has_motor(axis)) return samples_[axis] = power_->sample(axis);
   firmware::AxisInput input{};
-  input.count = count(axis);
+  if (axes_[axis]) input.count = axes_[axis]->encoder.sample(axes_[axis]->handle.position());
   input.count_valid = count_valid(axis);
   return input;
 }
@@ -43,16 +45,22 @@ void SimulatedDevice::drive(std::size_t axis, const firmware::AxisOutput& output
   const bool armed_now = output.enabled && !axes_[axis]->output.enabled;
   axes_[axis]->output = output;
   axes_[axis]->let_go = axes_[axis]->let_go || armed_now;
-  if (armed_now && axes_[axis]->handle.has_operator()) axes_[axis]->handle.begin_motion();
+  if (armed_now && axes_[axis]->moves) axes_[axis]->handle.begin_motion();
 }
 
 void SimulatedDevice::advance(double duration) {
   for (auto& axis : axes_) {
     if (!axis || (!axis->let_go && !axis->handle.has_operator())) continue;
-    axis->handle.advance(static_cast<double>(axis->output.force),
-                         static_cast<double>(axis->output.background_force), duration);
+    axis->handle.advance(static_cast<double>(axis->output.force), background_force(*axis), duration);
   }
   if (power_) power_->advance(duration);
+}
+
+/// What the hand on the axis answers to: the two axes stand at right angles.
+double SimulatedDevice::background_force(const Axis& axis) const {
+  const auto own = static_cast<double>(axis.output.background_force);
+  if (!axis.same_person || !axes_[0]) return own;
+  return std::hypot(own, static_cast<double>(axes_[0]->output.background_force));
 }
 
 void SimulatedDevice::connect_encoder(std::size_t axis, bool connected) {

@@ -8,6 +8,7 @@
 
 #include "firmware/application.hpp"
 #include "host_tools/simulated_board/simulated_power.hpp"
+#include "host_tools/simulation/axis_encoder.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulated_board {
@@ -15,12 +16,13 @@ namespace kmax::simulated_board {
 /// The axes of a scene behind a board (board::PoweredDevice).
 ///
 /// An axis that names a motor is driven through it, with everything that lies between a duty and a force:
-/// simulated_power.hpp. An axis without a motor has an ideal force source and an ideal encoder. An axis that
-/// the scene does not have stands still at count 0 and costs nothing.
+/// simulated_power.hpp. An axis without a motor has an ideal force source and an encoder that is ideal unless
+/// the scene gives it noise or dropouts. An axis that the scene does not have stands still at count 0 and
+/// costs nothing.
 ///
-/// A person begins the approach when the axis is armed, as one would who was told "now"; arming again begins
-/// another trial. A handle that nobody holds stays at its start until its axis is armed for the first time,
-/// and is let go then.
+/// A person who has a motion begins the approach when the axis is armed, as one would who was told "now";
+/// arming again begins another trial. A handle that nobody holds stays at its start until its axis is armed
+/// for the first time, and is let go then.
 class SimulatedDevice {
  public:
   /// Throws std::invalid_argument for a scene whose parts are not allowed.
@@ -28,7 +30,7 @@ class SimulatedDevice {
 
   /// Once in a tick. Without a motor there are no currents, and nothing keeps the axis from being driven.
   firmware::AxisInput sample(std::size_t axis);
-  /// With a motor: of the last sample().
+  /// With a motor, or with an encoder that has defects: of the last sample().
   std::uint32_t count(std::size_t axis) const;
   bool count_valid(std::size_t axis) const;
   void drive(std::size_t axis, const firmware::AxisOutput& output);
@@ -43,6 +45,10 @@ class SimulatedDevice {
 
   std::size_t axis_count() const { return axis_count_; }
   const simulation::CoupledHandle& handle(std::size_t axis) const;
+  /// Edges lost in the cable of an axis without a motor, number of.
+  std::int64_t lost_edges(std::size_t axis) const {
+    return axes_[axis] ? axes_[axis]->encoder.lost_edges() : 0;
+  }
   bool has_motor(std::size_t axis) const { return power_ && power_->has(axis); }
   /// The motors' board and what is plugged into it, with its defects. Throws std::logic_error for a scene
   /// without a motor.
@@ -51,10 +57,14 @@ class SimulatedDevice {
  private:
   struct Axis {
     simulation::CoupledHandle handle;
-    simulation::EncoderModel encoder;
+    simulation::AxisEncoder encoder;
     firmware::AxisOutput output{};
+    bool moves = false;        ///< somebody holds it who has a motion
+    bool same_person = false;  ///< as axis 0's
     bool let_go = false;
   };
+
+  double background_force(const Axis& axis) const;
 
   std::array<std::optional<Axis>, firmware::axis_count> axes_;       ///< without a motor
   std::unique_ptr<SimulatedPower> power_;                            ///< those with

@@ -1,46 +1,53 @@
 #pragma once
-// One axis of a simulated haptic device with, if wanted, a person holding it:
+// One axis of a simulated haptic device with, if wanted, a structure that bends and a person who holds it:
 //
 //   m x'' = F - b x' - f_c sgn(x') + k1 (y - x) + b1 (y' - x')
 //   M y'' = k1 (x - y) + b1 (x' - y') + k2 (u - y) + b2 (u' - y')
 //
 // x handle, y hand, u intended position (intended_motion.hpp); k1, b1, k2, b2 already carry the activation g
-// (operator_model.hpp). Friction is Coulomb's with true stick: at x' = 0 the handle stays while the other
-// forces sum to no more than f_c. F is the commanded force, held between calls (zero-order hold) and clipped
-// at the force limit.
+// (operator_model.hpp). A structure puts one more mass, the tip, between handle and hand
+// (structure_model.hpp); x is then the motor's side. Friction is Coulomb's with true stick: at x' = 0 the
+// handle stays while the other forces sum to no more than f_c. F is the commanded force, held between calls
+// (zero-order hold), clipped at the force limit and late by the device's delay (force_delay.hpp). A part that
+// is not named is no mass of the chain and costs nothing.
 //
-// Method: within an interval everything is linear with constant coefficients between events, and the inputs
-// are polynomials of time, so the solution is its Taylor series: with s' = A s + f, c[n+1] = h (A c[n] +
-// f[n]) / (n + 1) over a step h. The order is chosen from ||A|| h so that the truncated rest is below 1e-13
-// of the state, and h is divided so that ||A|| h stays below 1.25: nothing is approximated but rounding. The
-// series also is x'(t), and the net force on a stuck handle as a polynomial, so stops, reversals and
-// break-aways are located inside the interval (first_crossing.hpp) and the rest of it continues from there. A
-// general-purpose integrator with a fixed step misses these: in this problem semi-implicit Euler with 10
-// steps per sample reads K_max 0.6 N/mm wrong.
+// Method. Within an interval everything is linear with constant coefficients between events, and the inputs
+// are polynomials of time: the solution is a matrix times the state, and nothing is approximated but
+// rounding. Intervals that are proven to hold no event, or one reversal, use matrices computed once
+// (chain_propagator.hpp); all others the Taylor series, in which stops, reversals and break-aways are located
+// (chain_motion.hpp). A general-purpose integrator with a fixed step misses these: in this problem
+// semi-implicit Euler with 10 steps per sample reads K_max 0.6 N/mm wrong. set_integrator() puts one in this
+// one's place, to compare (reference_integrators.hpp).
 //
 // Two things are constant over pieces of at most 2 ms instead of exact: the activation g (its value in the
 // middle of the piece; its time constant is 200 times longer) and the rate at which the push target moves.
 //
-// Events. Every event happens at x' = 0. Break-away needs a net force of f_c plus 1e-13 of the forces
-// involved, so it always has a direction and coinciding events resolve one after the other. After 64 events
-// in one step of the series the handle is held for the rest of that step (at most 2 ms); that can only remove
-// energy, and is counted.
-//
-// Cost per call, -O2, one core of an AMD EPYC: held 45 ns (sticking) to 110 ns (oscillating in a wall) for 2
-// ms, 35 to 45 ns for 50 us; alone 8 ns (sticking) or 33 ns. tests/benchmarks/simulation_benchmark.cpp
-// measures it. No heap.
+// Cost per call, -O2, one core of an AMD EPYC at 3.7 GHz, for 2 ms and for 50 us alike: device alone 5 ns
+// sticking, 10 ns sliding; held 9 and 12 ns; held, structure and delay at 50 us 17 and 20 ns. A stiff
+// structure divides an interval of 2 ms into several steps. In a wall that oscillates a call with a reversal
+// costs about 60 ns. A background force changes the gain in every piece: then a call costs 130 to 220 ns (2
+// ms) or 50 ns (50 us) without a table and 20 to 70 ns with one (share()).
+// tests/benchmarks/simulation_benchmark.cpp measures it. No heap, but for matrices when a duration or gain is
+// met again and a delay's memory as it fills.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
+#include <variant>
 
+#include "host_tools/simulation/chain_motion.hpp"
 #include "host_tools/simulation/device_model.hpp"
+#include "host_tools/simulation/force_delay.hpp"
+#include "host_tools/simulation/integrator_config.hpp"
 #include "host_tools/simulation/intended_motion.hpp"
 #include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/simulation/propagator_table.hpp"
 
 namespace kmax::simulation {
 
-// Where the handle is at time 0, and how fast; the hand starts at the same place, at rest.
+// Where the handle is at time 0, and how fast; a tip moves with it; the hand starts at the
+// same place, at rest.
 struct HandleStart {
   double position = 0.0;  // m
   double velocity = 0.0;  // m/s
@@ -57,6 +64,16 @@ class CoupledHandle {
   CoupledHandle(const DeviceModel& device, const OperatorModel& person, const IntendedMotionConfig& motion,
                 const HandleStart& start);
 
+  // Takes matrices from a table that other handles of the same person with the same device use too, one after
+  // the other, in one thread. The activation is rounded to the table's grid from now on; propagator_table.hpp
+  // gives the error. For who runs many trials with a background force. Throws std::invalid_argument for a
+  // table of another person or device, std::logic_error without a person.
+  void share(std::shared_ptr<PropagatorTable> table);
+
+  // Another method than the exact one, from now on. Throws std::invalid_argument.
+  void set_integrator(const IntegratorConfig& integrator);
+  const IntegratorConfig& integrator() const { return integrator_; }
+
   // Starts approach, hold and release now. Throws std::logic_error without a person.
   void begin_motion();
 
@@ -68,14 +85,19 @@ class CoupledHandle {
 
   // Holds the handle where it is, at once and against any force, or lets it go again; the person goes on.
   void block(bool blocked);
-  bool blocked() const { return blocked_; }
+  bool blocked() const { return chain_.blocked; }
 
-  double position() const { return x_; }       // m
-  double velocity() const { return v_; }       // m/s; exactly 0 while sticking
-  double hand_position() const { return y_; }  // m; without a person the start position
-  double hand_velocity() const { return w_; }  // m/s
-  double intended_position() const { return has_operator_ ? motion_.position() : x_; }
-  bool sticking() const { return sticking_; }
+  double position() const { return chain_.state.position[0]; }  // m, the motor's side: what the encoder sees
+  double velocity() const { return chain_.state.velocity[0]; }  // m/s; exactly 0 while sticking
+  double tip_position() const { return chain_.state.position[tip_]; }  // m, where the person holds the device
+  double tip_velocity() const { return chain_.state.velocity[tip_]; }  // m/s
+  // m; without a person the start position.
+  double hand_position() const {
+    return has_operator_ ? chain_.state.position[tip_ + 1] : motion_.position();
+  }
+  double hand_velocity() const { return has_operator_ ? chain_.state.velocity[tip_ + 1] : 0.0; }  // m/s
+  double intended_position() const { return has_operator_ ? motion_.position() : position(); }
+  bool sticking() const { return chain_.sticking; }
   bool has_operator() const { return has_operator_; }
   // Throws std::logic_error without a person.
   const IntendedMotion& motion() const;
@@ -83,10 +105,10 @@ class CoupledHandle {
   double activation() const { return activation_; }  // a, N
   double gain() const { return gain_; }              // g of the last piece
 
-  // Kinetic energy plus energy in the springs of grip and arm, J.
+  // Kinetic energy plus energy in the springs of structure, grip and arm, J.
   double energy() const;
 
-  // Force on the handle in the last interval, after clipping, N.
+  // Force on the handle at the end of the last interval, clipped and delayed, N.
   double applied_force() const { return applied_force_; }
   std::uint64_t samples() const { return samples_; }
   std::uint64_t clipped_samples() const { return clipped_samples_; }
@@ -94,77 +116,62 @@ class CoupledHandle {
     return samples_ == 0 ? 0.0 : static_cast<double>(clipped_samples_) / static_cast<double>(samples_);
   }
   // How often the limit of 64 events was met. 0 in every known scene.
-  std::uint64_t event_limit_hits() const { return event_limit_hits_; }
+  std::uint64_t event_limit_hits() const { return chain_.event_limit_hits; }
 
  private:
-  static constexpr int max_order = 22;
-  using Series = std::array<double, max_order + 1>;
-  struct State {
-    double x;
-    double v;
-    double y;
-    double w;
+  // What a piece's duration decides, kept for the last few durations.
+  struct Pace {
+    double duration = 0.0;
+    double half_decay = 1.0;
+    double decay = 1.0;
+    double push_decay = 1.0;
   };
+  using Motion = std::variant<ChainMotion<1>, ChainMotion<2>, ChainMotion<3>>;
+  static constexpr std::size_t paces = ChainMotion<1>::durations;
 
-  void set_piece(double piece);
-  void set_gain(double gain);
-  void propagate(double duration, double force, double intended, double intended_rate);
-  void step(double step, double force, double intended, double intended_rate);
-  bool leaves_stick(double force);
-  void expand_alone(double h, int order, double force);
-  void expand_sliding(double h, int order, double force, double intended, double rate);
-  void expand_stuck(double h, int order, double intended, double rate);
-  double stop_time(int order) const;
-  double break_away_time(int order, double force);
-  double stick_limit(double force) const;
-  double grip_force() const { return k1_ * (y_ - x_) + b1_ * (w_ - v_); }
+  CoupledHandle(const DeviceModel& device, const OperatorModel* person, const IntendedMotionConfig& motion,
+                const HandleStart& start);
+  static Motion motion_of(const ChainDynamics& chain, std::size_t first_scaled);
+
+  void advance_in_pieces(double force, double background, double duration);
+  void advance_piece(double force, double background, double duration);
+  template <std::size_t masses>
+  void advance_piece_of(ChainMotion<masses>& motion, double force, double background, double duration);
+  template <std::size_t masses>
+  void advance_round_corners(ChainMotion<masses>& motion, double force, double duration);
+  void respond_to(double background);
+  std::size_t pace_for(double duration);
+  void move_by_reference(const ChainInput& input, double duration);
 
   DeviceModel device_;
   OperatorModel person_;
   IntendedMotion motion_;
+  ForceDelay delay_;
+  IntegratorConfig integrator_;
   bool has_operator_ = false;
-  bool blocked_ = false;
+  bool exact_ = true;
+  double force_limit_ = 0.0;  // N; infinity: none
+  std::size_t tip_ = 0;       // number of the mass that the person holds
+  double series_stiffness_ = 0.0;
 
-  double x_ = 0.0;
-  double v_ = 0.0;
-  double y_ = 0.0;
-  double w_ = 0.0;
-  bool sticking_ = false;
-  double direction_ = 1.0;
-
+  MovingChain chain_;
   double activation_ = 0.0;
   double push_ = 0.0;  // lagged background force, N
   double gain_ = 1.0;
-  double k1_ = 0.0;
-  double b1_ = 0.0;
-  double k2_ = 0.0;
-  double b2_ = 0.0;
-  double sliding_rate_ = 0.0;  // bounds on ||A||, 1/s: sliding, and of the hand alone while the handle sticks
-  double stuck_rate_ = 0.0;
+  double target_ = 0.0;  // of the intended motion
+  double settled_background_ =
+      -1.0;  // the background force at which activation and push have arrived, if there is one
 
-  double per_mass_ = 0.0;
-  double per_hand_mass_ = 0.0;
-  double stiffness_rate_ = 0.0;  // the parts of those bounds at g = 1
-  double damping_rate_ = 0.0;
-  double stuck_stiffness_rate_ = 0.0;
-  double stuck_damping_rate_ = 0.0;
-  double series_stiffness_ = 0.0;
-
-  double piece_ = 0.0;  // the piece length that the three decay factors below belong to
-  double half_decay_ = 1.0;
-  double decay_ = 1.0;
-  double push_decay_ = 1.0;
+  std::array<Pace, paces> paces_;
+  std::size_t pace_ = 0;
+  std::size_t next_pace_ = 0;
+  Motion chain_motion_;
+  std::shared_ptr<PropagatorTable> table_;
+  GainGrid grid_;
 
   double applied_force_ = 0.0;
   std::uint64_t samples_ = 0;
   std::uint64_t clipped_samples_ = 0;
-  std::uint64_t event_limit_hits_ = 0;
-
-  Series cx_{};
-  Series cv_{};
-  Series cy_{};
-  Series cw_{};
-  State end_{};  // the series summed at the end of the step
 };
 
 }  // namespace kmax::simulation

@@ -1,11 +1,14 @@
 #pragma once
 // The mechanical side of one axis of a haptic device, seen at the handle: a mass with viscous and Coulomb
-// friction, driven by a force that the motor can supply only up to a limit.
+// friction, driven by a force that the motor can supply only up to a limit and, if wanted, late; and behind
+// it, if wanted, a structure that bends.
 
 #include <array>
+#include <optional>
 #include <span>
 
 #include "host_tools/simulation/model_field.hpp"
+#include "host_tools/simulation/structure_model.hpp"
 
 namespace kmax::simulation {
 
@@ -15,10 +18,12 @@ namespace kmax::simulation {
 // fig. 6). Mass, damping and friction cannot be told apart from that one number, so this is calibration, not
 // measurement.
 struct DeviceModel {
-  double mass = 0.045;       // kg
+  double mass = 0.045;       // kg; with a structure that of the motor's side alone
   double damping = 0.05;     // N s/m
   double friction = 0.093;   // N, Coulomb: the same standing and moving
   double force_limit = 3.3;  // N; a commanded force beyond it is clipped; 0 = never clipped
+  double delay = 0.0;  // s, from a command to its force at the handle; before the first arrives it is 0 N
+  std::optional<StructureModel> structure{};  // none: the handle is the motor's side itself
 };
 
 inline constexpr std::array device_fields{
@@ -26,11 +31,13 @@ inline constexpr std::array device_fields{
     ModelField<DeviceModel>{"damping", &DeviceModel::damping, 0.0, 1000.0, "N s/m"},
     ModelField<DeviceModel>{"friction", &DeviceModel::friction, 0.0, 1000.0, "N"},
     ModelField<DeviceModel>{"force_limit", &DeviceModel::force_limit, 0.0, 1e5, "N (0 = no limit)"},
+    ModelField<DeviceModel>{"delay", &DeviceModel::delay, 0.0, 1.0, "s"},
 };
 
 // Throws std::invalid_argument.
 inline void validate(const DeviceModel& device) {
   require_allowed(device, std::span<const ModelField<DeviceModel>>(device_fields), "device");
+  if (device.structure) validate(*device.structure);
 }
 
 }  // namespace kmax::simulation

@@ -35,6 +35,11 @@ inline constexpr std::array encoder_fields{
     ModelField<EncoderConfig>{"edge_noise", &EncoderConfig::edge_noise, 0.0, 100.0, "counts"},
 };
 
+// Whether the lines are worth simulating: without defects a count is all that they say.
+inline bool has_defects(const EncoderConfig& config) {
+  return config.dropout_probability > 0.0 || config.edge_noise > 0.0;
+}
+
 // Throws std::invalid_argument: a field outside its range; an index position that is not a whole number below
 // the counts of a turn; counts of a turn that are not whole.
 inline void validate(const EncoderConfig& config) {

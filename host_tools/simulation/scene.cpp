@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "host_tools/simulation/scene_device.hpp"
 #include "host_tools/simulation/scene_motor.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 
@@ -19,10 +20,6 @@ constexpr std::array measurement_fields{
     ModelField<Measurement>{"window", &Measurement::window, 1e-3, 1e5, "s"},
     ModelField<Measurement>{"threshold", &Measurement::threshold, 1e-9, 1.0, "m"},
 };
-constexpr std::array start_fields{
-    ModelField<HandleStart>{"start_position", &HandleStart::position, -10.0, 10.0, "m"},
-    ModelField<HandleStart>{"start_velocity", &HandleStart::velocity, -100.0, 100.0, "m/s"},
-};
 constexpr std::array scene_fields{ModelField<Scene>{"duration", &Scene::duration, 1e-3, 1e5, "s"}};
 
 class SceneReader : private SceneTables {
@@ -30,10 +27,10 @@ class SceneReader : private SceneTables {
   SceneReader(std::string_view source, const ParameterCheck& check) : SceneTables(source), check_(check) {}
 
   Scene read(const toml::table& root) {
-    require_known(
-        root, "",
-        {"name", "description", "duration", "seed", "identified", "device", "operator", "motion", "encoder",
-         "parameters", "measurement", "motor", "inverter", "current_sensor", "supply", "axis1"});
+    require_known(root, "",
+                  {"name", "description", "duration", "seed", "identified", "device", "operator", "motion",
+                   "encoder", "parameters", "measurement", "structure", "motor", "inverter", "current_sensor",
+                   "supply", "integrator", "axis1"});
     Scene scene;
     scene.name = std::filesystem::path(source()).stem().string();
     read_text(root, "name", scene.name);
@@ -48,11 +45,13 @@ class SceneReader : private SceneTables {
     if (const toml::table* table = part(root, "", "parameters")) read_parameters(*table, "", scene);
     scene.axes.push_back(read_axis(root, "", scene));
     if (const toml::table* second = part(root, "", "axis1")) {
-      require_known(*second, "axis1.",
-                    {"device", "operator", "motion", "encoder", "motor", "inverter", "current_sensor"});
+      require_known(
+          *second, "axis1.",
+          {"device", "structure", "operator", "motion", "encoder", "motor", "inverter", "current_sensor"});
       scene.axes.push_back(read_axis(*second, "axis1.", scene));
     }
     read_supply_table(*this, root, scene);
+    read_integrator_table(*this, root, scene);
     return scene;
   }
 
@@ -69,24 +68,41 @@ class SceneReader : private SceneTables {
 
   SceneAxis read_axis(const toml::table& table, const std::string& prefix, const Scene& scene) const {
     SceneAxis axis;
-    const toml::table* device = part(table, prefix, "device");
-    if (device == nullptr) {
-      fail(table.source(), fmt::format("[{}device] is missing: every axis needs a device", prefix));
-    }
-    require_known(*device, prefix + "device.",
-                  {"mass", "damping", "friction", "force_limit", "start_position", "start_velocity"});
-    read_fields(*device, prefix + "device.", device_fields, axis.device);
-    if (const toml::table* person = part(table, prefix, "operator")) {
-      read_model(*person, prefix + "operator.", operator_fields, axis.person.emplace());
-    }
-    read_encoder_table(*this, table, prefix, axis);
+    read_device_tables(*this, table, prefix, axis);
+    if (const toml::table* person = part(table, prefix, "operator"))
+      read_operator(*person, prefix, scene, axis);
     read_motor_tables(*this, table, prefix, axis);
+    read_encoder_table(*this, table, prefix, axis);
     if (const toml::table* motion = part(table, prefix, "motion")) {
       read_motion(*motion, prefix, scene, axis);
       axis.start.position = axis.motion->start_position;
     }
-    read_fields(*device, prefix + "device.", start_fields, axis.start);
+    read_start(*this, table, prefix, axis);
+    check_device(*this, table, prefix, axis);
+    if (axis.same_person && (axis.motor || scene.axes.front().motor)) {
+      fail(
+          table.get("operator")->as_table()->get("same_person")->source(),
+          fmt::format("{}operator.same_person = true: allowed is that where neither axis has a motor of kind "
+                      "\"dc\" or \"pmsm\"",
+                      prefix));
+    }
     return axis;
+  }
+
+  void read_operator(const toml::table& table, const std::string& prefix, const Scene& scene,
+                     SceneAxis& axis) const {
+    const bool second = !scene.axes.empty();
+    const std::initializer_list<std::string_view> others{"same_person"};
+    read_model(table, prefix + "operator.", operator_fields, axis.person.emplace(),
+               second ? others : std::initializer_list<std::string_view>{});
+    if (!second) return;
+    read_truth(table, prefix + "operator.", "same_person", axis.same_person);
+    if (axis.same_person && !scene.axes.front().person) {
+      fail(table.get("same_person")->source(),
+           fmt::format(
+               "{}operator.same_person = true: nobody holds axis 0; allowed is that with an [operator]",
+               prefix));
+    }
   }
 
   void read_motion(const toml::table& table, const std::string& prefix, const Scene& scene,
@@ -193,15 +209,6 @@ class SceneReader : private SceneTables {
 };
 
 }  // namespace
-
-CoupledHandle SceneAxis::make_handle() const {
-  if (!person) return CoupledHandle(device, start);
-  if (motion) return CoupledHandle(device, *person, *motion, start);
-  IntendedMotionConfig stay;
-  stay.start_position = start.position;
-  stay.wall_position = start.position;
-  return CoupledHandle(device, *person, stay, start);
-}
 
 Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check) {
   toml::table root;

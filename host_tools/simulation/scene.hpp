@@ -10,27 +10,38 @@
 //                                   calibration; false: with the factory's
 //
 //   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
-//   [operator]                      operator_model.hpp
+//   [structure]                     structure_model.hpp: the handle behind a compliant structure
+//   [operator]                      operator_model.hpp; in [axis1.operator] also same_person = true: the hand
+//                                   is that of axis 0's person, so that grip and arm answer to the background
+//                                   forces of both axes, which stand at right angles. Without [motion] the
+//                                   person stays at the start
 //   [motion]                        intended_motion.hpp; needs [operator]
 //   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p", and
-//                                   reversed = true: it counts downwards
-//   [motor]                         kind = "dc" (brushed_dc_motor.hpp) or "pmsm" (synchronous_motor.hpp; also
-//                                   inductance for inductance_d and inductance_q); without it the axis has
-//                                   an ideal actuator and a force limit. Also defects = ["phase_b_open", ...]
-//                                   (defect.hpp), which are there from the beginning
-//   [inverter] [current_sensor]     inverter.hpp, current_sensor.hpp; need [motor]
+//                                   reversed = true: it counts downwards. Without a motor: a count, without
+//                                   index, chip or mounting, but with noise and dropouts if asked for
+//   [motor]                         kind = "ideal" (as without the table: a force source with the device's
+//                                   force limit), "dc" (brushed_dc_motor.hpp) or "pmsm"
+//                                   (synchronous_motor.hpp; also inductance for inductance_d and
+//                                   inductance_q). Also defects = ["phase_b_open", ...] (defect.hpp) of a
+//                                   real motor, which are there from the beginning
+//   [inverter] [current_sensor]     inverter.hpp, current_sensor.hpp; need a motor that is not ideal
+//   [integrator]                    integrator_config.hpp, one for all axes: kind = "exact" (default),
+//                                   "semi_implicit_euler", "rk4" or "adaptive", with substeps or tolerance
+//                                   where the kind has them. Of the mechanical parts: circuits are always
+//                                   solved exactly
 //   [supply]                        supply.hpp, one for all axes
 //   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
 //   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
-//   [axis1.device] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor] [axis1.inverter]
-//   [axis1.current_sensor]          a second axis
+//   [axis1.device] [axis1.structure] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor]
+//   [axis1.inverter] [axis1.current_sensor]   a second axis
 //
 // SI units. Numbers that are not given keep the defaults of the model structs. The wall that a motion aims at
 // is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
 // axis); a motion that names another one is refused.
 //
 // Refused with SceneError, whose text begins with file:line:column and gives the key, its value and what is
-// allowed: syntax errors, unknown keys, wrong types, values out of range, parts that contradict each other.
+// allowed: syntax errors, unknown keys (with what may have been meant), wrong types, values out of range,
+// parts that contradict each other.
 // Names and values of [parameters] are checked by a function that the caller passes, because the object
 // dictionary is not known here.
 
@@ -47,6 +58,7 @@
 #include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/encoder_config.hpp"
+#include "host_tools/simulation/integrator_config.hpp"
 #include "host_tools/simulation/intended_motion.hpp"
 #include "host_tools/simulation/motor_drive.hpp"
 #include "host_tools/simulation/operator_model.hpp"
@@ -76,16 +88,17 @@ struct SceneAxis {
   DeviceModel device;
   HandleStart start;
   std::optional<OperatorModel> person;
+  bool same_person = false;  // as axis 0's; of the second axis
   std::optional<IntendedMotionConfig> motion;
   EncoderConfig encoder;
-  std::optional<MotorConfig> motor;
+  std::optional<MotorConfig> motor;  // none: ideal
   InverterConfig inverter;
   CurrentSensorConfig current_sensor;
   std::vector<Defect> defects;  // of the motor's axis, from the beginning
 
-  CoupledHandle make_handle() const;
+  CoupledHandle make_handle(const IntegratorConfig& integrator = {}) const;
   // The handle behind its motor, without the device's force limit. Throws std::logic_error without a motor.
-  MotorDrive make_drive(std::uint64_t seed) const;
+  MotorDrive make_drive(std::uint64_t seed, const IntegratorConfig& integrator = {}) const;
 };
 
 struct Scene {
@@ -98,9 +111,15 @@ struct Scene {
   std::vector<SceneParameter> parameters;
   Measurement measurement;
   std::optional<SupplyConfig> supply;
+  IntegratorConfig integrator;
 
-  // make_drive() of that axis, with a seed of its own made from the scene's.
-  MotorDrive make_drive(std::size_t axis) const;
+  // A seed of its own for the noise of that axis, made from the scene's.
+  std::uint64_t seed_of(std::size_t axis) const;
+  // The axis' make_handle() and make_drive(), with the scene's integrator and the axis' seed.
+  CoupledHandle make_handle(std::size_t axis) const { return axes.at(axis).make_handle(integrator); }
+  MotorDrive make_drive(std::size_t axis) const {
+    return axes.at(axis).make_drive(seed_of(axis), integrator);
+  }
   Supply make_supply() const { return Supply(supply.value_or(SupplyConfig{})); }
 };
 

@@ -33,6 +33,7 @@ SceneDrives::SceneDrives(const Scene& scene)
     axis.drive.emplace(scene.make_drive(i));
     axis.encoder_kind = named.encoder.kind;
     axis.encoder_reversed = named.encoder.reversed;
+    axis.moves = named.motion.has_value();
     serial_encoders += axis.encoder_kind == EncoderKind::as5047p ? 1 : 0;
     if (!axis.drive->handle().has_operator()) axis.drive->hold(true);
     for (const Defect defect : named.defects) plant(i, defect);
@@ -57,7 +58,7 @@ void SceneDrives::set_bridge(std::size_t index, const InverterCommand& command) 
   axis.command = command;
   if (!axis.drive || !begins) return;
   if (axis.drive->handle().has_operator()) {
-    axis.drive->handle().begin_motion();
+    if (axis.moves) axis.drive->handle().begin_motion();
   } else if (!axis.let_go) {
     axis.let_go = true;
     axis.drive->hold(false);

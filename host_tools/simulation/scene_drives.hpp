@@ -5,9 +5,9 @@
 // Time passes in advance() only, under the legs set last. An axis that the scene does not have, or has
 // without a motor, is an open connector.
 //
-// A person begins the approach whenever the axis begins to be driven, as one would who was told "now". A
-// handle that nobody holds stays at its start until its axis is driven for the first time, and is let go
-// then.
+// A person who has a motion begins the approach whenever the axis begins to be driven, as one would who was
+// told "now". A handle that nobody holds stays at its start until its axis is driven for the first time, and
+// is let go then.
 //
 // Defects may be planted and mended at any time; finer ones (a share of slip, edges lost in the cable) are
 // set on the parts themselves: drive(axis).encoder_coupling(), supply(), temperature(axis).
@@ -67,6 +67,7 @@ class SceneDrives {
     bool encoder_reversed = false;  // as it is mounted
     TemperatureSensor temperature;
     std::array<bool, defect_names.size()> defects{};
+    bool moves = false;  // somebody holds it who has a motion
     bool let_go = false;
   };
 

@@ -5,22 +5,8 @@
 namespace kmax::simulation {
 namespace {
 
-// "kind" of a table, one of two words. `required`: there is no default.
-bool is_second_kind(const SceneTables& tables, const toml::table& table, const std::string& prefix,
-                    std::string_view first, std::string_view second, bool required) {
-  const toml::node* node = table.get("kind");
-  if (node == nullptr) {
-    if (!required) return false;
-    tables.fail(table.source(),
-                fmt::format("{}kind is missing; allowed is \"{}\" or \"{}\"", prefix, first, second));
-  }
-  const std::string_view kind = node->is_string() ? std::string_view(node->as_string()->get()) : "";
-  if (kind != first && kind != second) {
-    tables.fail(node->source(), fmt::format("{}kind = {}: allowed is \"{}\" or \"{}\"", prefix,
-                                            SceneTables::text_of(*node), first, second));
-  }
-  return kind == second;
-}
+constexpr std::array<std::string_view, 3> motor_kinds{"ideal", "dc", "pmsm"};
+constexpr std::array<std::string_view, 2> encoder_kinds{"quadrature", "as5047p"};
 
 // What only the whole model can tell, with the axis in front and the table's place.
 template <typename Model>
@@ -81,6 +67,32 @@ void read_defects(const SceneTables& tables, const toml::table& motor, const std
   }
 }
 
+// An ideal motor is what an axis without the table has; only to say so.
+void read_ideal_motor(const SceneTables& tables, const toml::table& motor, const std::string& prefix) {
+  if (const toml::node* defects = motor.get("defects")) {
+    tables.fail(defects->source(),
+                fmt::format("{0}motor.defects = {1}: an ideal motor has nothing that could break; allowed is "
+                            "{0}motor.kind = \"dc\" or \"pmsm\", or no defects",
+                            prefix, SceneTables::text_of(*defects)));
+  }
+  tables.require_known(motor, prefix + "motor.", {"kind"});
+}
+
+// A number of the encoder that only a motor's has: refused unless it is its default.
+void require_plain_encoder(const SceneTables& tables, const toml::table& encoder, const std::string& prefix,
+                           const EncoderConfig& config) {
+  const auto refuse = [&](std::string_view key, std::string_view what) {
+    const toml::node& node = *encoder.get(key);
+    tables.fail(node.source(),
+                fmt::format("{0}encoder.{1} = {2}: {3} belongs to a motor's encoder; allowed is that with "
+                            "[{0}motor] kind = \"dc\" or \"pmsm\"",
+                            prefix, key, SceneTables::text_of(node), what));
+  };
+  if (config.kind != EncoderKind::quadrature) refuse("kind", "this chip");
+  if (config.reversed) refuse("reversed", "how it is mounted");
+  if (config.index_position != 0.0) refuse("index_position", "an index");
+}
+
 }  // namespace
 
 void read_encoder_table(const SceneTables& tables, const toml::table& table, const std::string& prefix,
@@ -89,14 +101,15 @@ void read_encoder_table(const SceneTables& tables, const toml::table& table, con
   if (encoder == nullptr) return;
   tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder, {"kind", "reversed"});
   tables.read_truth(*encoder, prefix + "encoder.", "reversed", axis.encoder.reversed);
-  if (is_second_kind(tables, *encoder, prefix + "encoder.", "quadrature", "as5047p", false))
-    axis.encoder.kind = EncoderKind::as5047p;
+  const auto kind = tables.read_choice(*encoder, prefix + "encoder.", "kind", encoder_kinds);
+  if (kind) axis.encoder.kind = static_cast<EncoderKind>(*kind);
   if (!(axis.encoder.count_length() >= 1e-12)) {
     tables.fail(encoder->source(), fmt::format("{}encoder: {} m per count; allowed is 1e-12 m or more",
                                                prefix, axis.encoder.count_length()));
   }
+  if (!axis.motor) require_plain_encoder(tables, *encoder, prefix, axis.encoder);
   // An ideal encoder without lines counts in any unit.
-  if (table.contains("motor")) require_valid(tables, *encoder, prefix, axis.encoder);
+  if (axis.motor || has_defects(axis.encoder)) require_valid(tables, *encoder, prefix, axis.encoder);
 }
 
 void read_motor_tables(const SceneTables& tables, const toml::table& table, const std::string& prefix,
@@ -104,20 +117,29 @@ void read_motor_tables(const SceneTables& tables, const toml::table& table, cons
   const toml::table* motor = tables.part(table, prefix, "motor");
   const toml::table* inverter = tables.part(table, prefix, "inverter");
   const toml::table* sensor = tables.part(table, prefix, "current_sensor");
-  if (motor == nullptr) {
+  if (motor != nullptr) {
+    const auto kind = tables.read_choice(*motor, prefix + "motor.", "kind", motor_kinds);
+    if (!kind) {
+      tables.fail(motor->source(), fmt::format("{}motor.kind is missing; allowed is {}", prefix,
+                                               SceneTables::one_of(motor_kinds)));
+    }
+    if (motor_kinds[*kind] == "ideal") {
+      read_ideal_motor(tables, *motor, prefix);
+    } else if (motor_kinds[*kind] == "pmsm") {
+      axis.motor = read_synchronous(tables, *motor, prefix);
+    } else {
+      BrushedDcMotorConfig config;
+      tables.read_model(*motor, prefix + "motor.", brushed_dc_motor_fields, config, {"kind", "defects"});
+      axis.motor = config;
+    }
+  }
+  if (!axis.motor) {
     const toml::table* lonely = inverter != nullptr ? inverter : sensor;
     if (lonely == nullptr) return;
-    tables.fail(
-        lonely->source(),
-        fmt::format("[{0}{1}] without [{0}motor]: there is no current; add the motor, or remove the table",
-                    prefix, inverter != nullptr ? "inverter" : "current_sensor"));
-  }
-  if (is_second_kind(tables, *motor, prefix + "motor.", "dc", "pmsm", true)) {
-    axis.motor = read_synchronous(tables, *motor, prefix);
-  } else {
-    BrushedDcMotorConfig config;
-    tables.read_model(*motor, prefix + "motor.", brushed_dc_motor_fields, config, {"kind", "defects"});
-    axis.motor = config;
+    tables.fail(lonely->source(),
+                fmt::format("[{0}{1}] without a [{0}motor] of kind \"dc\" or \"pmsm\": there is no current; "
+                            "add the motor, or remove the table",
+                            prefix, inverter != nullptr ? "inverter" : "current_sensor"));
   }
   read_defects(tables, *motor, prefix, axis);
   if (inverter != nullptr) tables.read_model(*inverter, prefix + "inverter.", inverter_fields, axis.inverter);
@@ -133,18 +155,18 @@ void read_supply_table(const SceneTables& tables, const toml::table& root, Scene
   tables.read_truth(*supply, "supply.", "absorbs", config.absorbs);
 }
 
-MotorDrive SceneAxis::make_drive(std::uint64_t seed) const {
+MotorDrive SceneAxis::make_drive(std::uint64_t seed, const IntegratorConfig& integrator) const {
   if (!motor) throw std::logic_error("make_drive: this axis of the scene has no [motor]");
   SceneAxis unlimited = *this;
   unlimited.device.force_limit = 0.0;
-  return MotorDrive({*motor, inverter, current_sensor, encoder, seed}, unlimited.make_handle());
+  return MotorDrive({*motor, inverter, current_sensor, encoder, seed}, unlimited.make_handle(integrator));
 }
 
-MotorDrive Scene::make_drive(std::size_t axis) const {
+std::uint64_t Scene::seed_of(std::size_t axis) const {
   NoiseGenerator seeds(seed);
   std::uint64_t own = seeds.bits();
   for (std::size_t n = 0; n < axis; ++n) own = seeds.bits();
-  return axes.at(axis).make_drive(own);
+  return own;
 }
 
 }  // namespace kmax::simulation

@@ -10,6 +10,7 @@
 namespace kmax::simulation {
 
 // `table`: the one that holds the tables of the axis; `prefix`: "" or "axis1.".
+// The motor is read before the encoder, which needs to know whether there is one.
 void read_encoder_table(const SceneTables& tables, const toml::table& table, const std::string& prefix,
                         SceneAxis& axis);
 void read_motor_tables(const SceneTables& tables, const toml::table& table, const std::string& prefix,

@@ -1,7 +1,9 @@
 #include "host_tools/simulation/scene_table.hpp"
 
+#include <algorithm>
 #include <sstream>
 
+#include "host_tools/device/suggestion.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulation {
@@ -9,6 +11,11 @@ namespace kmax::simulation {
 std::string SceneTables::text_of(const toml::node& node) {
   if (node.is_table()) return "{table}";
   if (node.is_array()) return "[array]";
+  if (const auto* number = node.as_floating_point()) {
+    // The shortest that reads back equal, with a sign that it is no whole number.
+    const std::string shortest = fmt::format("{}", number->get());
+    return shortest + (shortest.find_first_not_of("-0123456789") == std::string::npos ? ".0" : "");
+  }
   std::ostringstream text;
   node.visit([&](const auto& value) { text << value; });
   return text.str();
@@ -22,19 +29,14 @@ std::string SceneTables::place(const toml::source_region& where) const {
   return fmt::format("{}:{}:{}", source_, where.begin.line, where.begin.column);
 }
 
-void SceneTables::refuse_key(const toml::key& key, const toml::node& node, std::string_view prefix,
-                             const std::string& allowed) const {
-  fail(key.source(),
-       fmt::format("{}{} = {}: unknown key; allowed here: {}", prefix, key.str(), text_of(node), allowed));
-}
-
 void SceneTables::require_known(const toml::table& table, std::string_view prefix,
-                                std::initializer_list<std::string_view> allowed) const {
+                                std::span<const std::string_view> allowed) const {
   for (const auto& [key, node] : table) {
     if (std::find(allowed.begin(), allowed.end(), key.str()) != allowed.end()) continue;
-    std::string list;
-    for (const std::string_view name : allowed) list += (list.empty() ? "" : ", ") + std::string(name);
-    refuse_key(key, node, prefix, list);
+    const std::vector<std::string> names(allowed.begin(), allowed.end());
+    fail(key.source(),
+         fmt::format("{}{} = {}: unknown key; allowed here: {}{}", prefix, key.str(), text_of(node),
+                     fmt::join(names, ", "), device::did_you_mean(key.str(), names)));
   }
 }
 
@@ -47,6 +49,29 @@ const toml::table* SceneTables::part(const toml::table& table, std::string_view 
          fmt::format("{}{} = {}: allowed is a table, [{}{}]", prefix, name, text_of(*node), prefix, name));
   }
   return node->as_table();
+}
+
+std::string SceneTables::one_of(std::span<const std::string_view> words) {
+  std::string list;
+  for (std::size_t n = 0; n < words.size(); ++n)
+    list += fmt::format("{}\"{}\"", n == 0 ? "" : n + 1 == words.size() ? " or " : ", ", words[n]);
+  return list;
+}
+
+std::optional<std::size_t> SceneTables::read_choice(const toml::table& table, std::string_view prefix,
+                                                    std::string_view name,
+                                                    std::span<const std::string_view> words) const {
+  const toml::node* node = table.get(name);
+  if (node == nullptr) return std::nullopt;
+  const auto word = std::find(words.begin(), words.end(),
+                              node->is_string() ? std::string_view(node->as_string()->get()) : "");
+  if (word == words.end()) {
+    const std::string given = node->is_string() ? node->as_string()->get() : "";
+    const std::vector<std::string> names(words.begin(), words.end());
+    fail(node->source(), fmt::format("{}{} = {}: allowed is {}{}", prefix, name, text_of(*node),
+                                     one_of(words), device::did_you_mean(given, names)));
+  }
+  return static_cast<std::size_t>(word - words.begin());
 }
 
 void SceneTables::read_text(const toml::table& table, std::string_view name, std::string& value) const {

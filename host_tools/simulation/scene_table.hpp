@@ -5,12 +5,13 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <algorithm>
 #include <array>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "host_tools/simulation/model_field.hpp"
 
@@ -31,12 +32,24 @@ class SceneTables {
   // The value as a person would write it.
   static std::string text_of(const toml::node& node);
 
-  // Refuses keys that are not listed. `prefix`: what stands before a key in messages, "axis1.device.".
+  // Refuses keys that are not listed, with what may have been meant. `prefix`: what stands before a key in
+  // messages, "axis1.device.".
   void require_known(const toml::table& table, std::string_view prefix,
-                     std::initializer_list<std::string_view> allowed) const;
+                     std::span<const std::string_view> allowed) const;
+  void require_known(const toml::table& table, std::string_view prefix,
+                     std::initializer_list<std::string_view> allowed) const {
+    require_known(table, prefix, std::span<const std::string_view>(allowed.begin(), allowed.size()));
+  }
 
   // The table of this name, or nullptr if it is not there.
   const toml::table* part(const toml::table& table, std::string_view prefix, std::string_view name) const;
+
+  // "a", "b" or "c".
+  static std::string one_of(std::span<const std::string_view> words);
+  // The place in `words` of the text that the key has, or nothing if the key is not there.
+  std::optional<std::size_t> read_choice(const toml::table& table, std::string_view prefix,
+                                         std::string_view name,
+                                         std::span<const std::string_view> words) const;
 
   // Leaves `value` as it is if the key is not there.
   void read_text(const toml::table& table, std::string_view name, std::string& value) const;
@@ -66,24 +79,13 @@ class SceneTables {
   void read_model(const toml::table& table, const std::string& prefix,
                   const std::array<ModelField<Model>, count>& fields, Model& model,
                   std::initializer_list<std::string_view> others = {}) const {
-    for (const auto& [key, node] : table) {
-      const std::string_view name = key.str();
-      const bool known = std::any_of(fields.begin(), fields.end(),
-                                     [name](const ModelField<Model>& field) { return field.name == name; });
-      if (known || std::find(others.begin(), others.end(), name) != others.end()) continue;
-      std::string list;
-      for (const std::string_view other : others) list += (list.empty() ? "" : ", ") + std::string(other);
-      for (const ModelField<Model>& field : fields)
-        list += (list.empty() ? "" : ", ") + std::string(field.name);
-      refuse_key(key, node, prefix, list);
-    }
+    std::vector<std::string_view> allowed(others);
+    for (const ModelField<Model>& field : fields) allowed.push_back(field.name);
+    require_known(table, prefix, std::span<const std::string_view>(allowed));
     read_fields(table, prefix, fields, model);
   }
 
  private:
-  [[noreturn]] void refuse_key(const toml::key& key, const toml::node& node, std::string_view prefix,
-                               const std::string& allowed) const;
-
   std::string source_;
 };
 

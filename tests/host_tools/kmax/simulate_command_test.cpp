@@ -18,9 +18,11 @@ TEST_F(Simulate, DocumentTableAndPicture) {
   EXPECT_EQ(kmax({"simulate", scene("haptic.rate = 500\n"), "--csv", in("r.csv"), "--picture", in("r.svg"),
                   "--json"}),
             done);
-  EXPECT_EQ(keys(),
-            (std::vector<std::string>{"scene", "state", "fault", "samples", "contact", "limited_share",
-                                      "clipped_share", "simulated_s", "simulated_per_real_s"}));
+  EXPECT_EQ(keys(), (std::vector<std::string>{"scene", "integrator", "parts", "state", "fault", "samples",
+                                              "contact", "limited_share", "clipped_share", "lost_edges",
+                                              "simulated_s", "simulated_per_real_s"}));
+  EXPECT_EQ(document()["integrator"], "exact");
+  EXPECT_EQ(document()["parts"], Json::parse(R"([["device"]])"));
   EXPECT_EQ(document()["scene"], "scene");
   EXPECT_EQ(document()["state"], "operation_enabled");
   EXPECT_EQ(document()["fault"], "none");
@@ -39,13 +41,38 @@ TEST_F(Simulate, ASuppliedSceneWithAPersonIsJudged) {
   EXPECT_GT(document()["contact"]["peak_to_peak_m"].get<double>(), 0.165e-3);
   EXPECT_EQ(kmax({"simulate", "touch"}), done);
   EXPECT_CONTAINS(output, "held contact: unstable");
+  EXPECT_CONTAINS(output, "  integrator: exact\n");
+  EXPECT_CONTAINS(output, "  axis 0 integrates: device, hand and arm, activation\n");
+}
+
+TEST_F(Simulate, TwoAxesAndAStructureHaveTheirColumns) {
+  const std::string two =
+      folder
+          .write("two.toml",
+                 "duration = 0.1\n[device]\nstart_position = 0.01\n[structure]\n"
+                 "[axis1.device]\nstart_position = 0.02\n[parameters]\nhaptic.rate = 500\n"
+                 "axis1.haptic.rate = 1000\n[integrator]\nkind = \"rk4\"\n")
+          .string();
+  EXPECT_EQ(kmax({"simulate", two, "--csv", in("r.csv"), "--picture", in("r.svg")}), done);
+  EXPECT_CONTAINS(output, "  integrator: rk4, 10 substeps per 2 ms\n");
+  EXPECT_CONTAINS(output, "  axis 0 integrates: device, structure\n");
+  EXPECT_CONTAINS(output, "  axis 1 integrates: device\n");
+  const plot::CsvTable table = plot::read_csv(folder / "r.csv");
+  EXPECT_EQ(table.names.size(), 20u);
+  EXPECT_EQ(table.column("tip_position_m").size(), 50u);
+  EXPECT_NEAR(table.column("axis1_true_position_m").front(), 0.02, 1e-9);
+  EXPECT_CONTAINS(folder.read("r.svg"), "axis 1: position");
+}
+
+TEST_F(Simulate, LostEdgesAreTold) {
+  EXPECT_EQ(kmax({"simulate", "noisy_encoder"}), done);
+  EXPECT_CONTAINS(output, "edges of the encoder lost\n");
+  EXPECT_CONTAINS(output, "encoder noise, encoder dropouts\n");
 }
 
 TEST_F(Simulate, BadScenes) {
   expect_error({"simulate"}, wrong_usage, "scene is required");
-  expect_error({"simulate", "tuoch"}, wrong_usage,
-               "supplied are dc_coreless_a, dc_coreless_b, drone, free_handle, gimbal_a, "
-               "gimbal_b, motor_axes, single_motor, touch, two_axes");
+  expect_error({"simulate", "tuoch"}, wrong_usage, "supplied are compliant_structure, dc_coreless_a, ");
   expect_error({"simulate", scene("wall.stifness = 1\n")}, wrong_usage, "scene.toml:5:");
   expect_error({"simulate", scene("wall.stiffness = -1\n")}, wrong_usage, "scene.toml:5:");
   expect_error({"simulate", scene("measured.position = 0.0\n")}, wrong_usage, "can only be read");
@@ -70,7 +97,7 @@ TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
                  "[parameters]\nvelocity.limit = 0.5\n")
           .string();
   EXPECT_EQ(kmax({"simulate", fast, "--json"}), failed);
-  EXPECT_CONTAINS(said, "the run ended in a fault");
+  EXPECT_CONTAINS(said, "the run ended in a fault of the axis");
   EXPECT_EQ(document()["fault"], "over_speed");
   EXPECT_EQ(document()["state"], "fault");
 }

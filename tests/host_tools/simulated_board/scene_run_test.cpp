@@ -27,16 +27,19 @@ void set(simulation::Scene& scene, const std::string& name, simulation::Paramete
 
 std::vector<std::uint64_t> bits_of(const RunResult& result) {
   std::vector<std::uint64_t> bits;
-  for (const RunSample& s : result.samples) {
-    for (const double value : {s.time, s.true_position, s.true_velocity, s.hand_position, s.intended_position,
-                               s.position, s.velocity, s.force, s.applied_force, s.magnetic_coefficient})
+  auto all = result.samples;
+  all.insert(all.end(), result.second_samples.begin(), result.second_samples.end());
+  for (const RunSample& s : all) {
+    for (const double value :
+         {s.time, s.true_position, s.tip_position, s.true_velocity, s.hand_position, s.intended_position,
+          s.position, s.velocity, s.force, s.applied_force, s.magnetic_coefficient})
       bits.push_back(std::bit_cast<std::uint64_t>(value));
   }
   return bits;
 }
 
 TEST(SceneRun, TheSameSceneGivesTheSameBits) {
-  for (const char* name : {"touch", "two_axes", "free_handle"}) {
+  for (const char* name : {"touch", "two_axes", "free_handle", "noisy_encoder", "compliant_structure"}) {
     simulation::Scene scene = open_scene(name);
     scene.duration = 0.8;
     const RunResult first = run_scene(scene), second = run_scene(scene);
@@ -117,6 +120,63 @@ TEST(SceneRun, WhatKeepsItFromBeingArmedIsSaid) {
   EXPECT_EQ(result.refusal, firmware::Refusal::handle_inside_wall);
   EXPECT_NE(result.end_state, DriveState::operation_enabled);
   EXPECT_FALSE(result.contact);
+}
+
+TEST(SceneRun, BothAxesAreArmedAndSampledTogether) {
+  simulation::Scene scene = open_scene("two_axes");
+  scene.duration = 0.5;
+  scene.axes[1].start.velocity = -0.3;
+  const RunResult result = run_scene(scene);
+  ASSERT_EQ(result.samples.size(), 250u);
+  ASSERT_EQ(result.second_samples.size(), 250u);
+  EXPECT_EQ(result.samples[100].time, result.second_samples[100].time);
+  double deepest = 0.0, strongest = 0.0;
+  for (const RunSample& sample : result.second_samples) {
+    deepest = std::min(deepest, sample.true_position);
+    strongest = std::max(strongest, sample.force);
+  }
+  EXPECT_LT(deepest, 0.0) << "axis 1 flies into its own wall";
+  EXPECT_GT(strongest, 0.05);
+  scene.duration = 0.05;
+  set(scene, "axis1.haptic.rate", 20000.0);
+  const RunResult quick = run_scene(scene);
+  EXPECT_EQ(quick.samples.size(), 25u);
+  EXPECT_EQ(quick.second_samples.size(), 1000u);
+}
+
+TEST(SceneRun, TheSecondAxisIsToldOfToo) {
+  simulation::Scene scene = open_scene("two_axes");
+  scene.duration = 0.5;
+  scene.axes[1].start.position = -0.001;
+  const RunResult refused = run_scene(scene);
+  EXPECT_EQ(refused.axis, 1u);
+  EXPECT_EQ(refused.refusal, firmware::Refusal::handle_inside_wall);
+  EXPECT_TRUE(refused.samples.empty());
+  scene.axes[1].start = {0.005, -1.0};
+  set(scene, "axis1.velocity.limit", 0.5);
+  const RunResult fast = run_scene(scene);
+  EXPECT_EQ(fast.axis, 1u);
+  EXPECT_EQ(fast.fault, firmware::Fault::over_speed);
+  EXPECT_EQ(fast.end_state, DriveState::fault);
+}
+
+TEST(SceneRun, AnotherIntegratorIsAnotherTrace) {
+  simulation::Scene scene = touch(1.0);
+  const RunResult exact = run_scene(scene);
+  const auto furthest = [&] {
+    const RunResult other = run_scene(scene);
+    double largest = 0.0;
+    for (std::size_t n = 0; n < exact.samples.size(); ++n)
+      largest = std::max(largest, std::abs(other.samples[n].true_position - exact.samples[n].true_position));
+    return largest;
+  };
+  EXPECT_EQ(furthest(), 0.0);
+  scene.duration = 0.1;  // the approach, still outside
+  scene.integrator.kind = simulation::IntegratorKind::rk4;
+  const RunResult stepped = run_scene(scene);
+  EXPECT_NE(bits_of(stepped), bits_of(exact));
+  EXPECT_NEAR(stepped.samples.back().true_position, exact.samples[stepped.samples.size() - 1].true_position,
+              1e-6);
 }
 
 TEST(SceneRun, AFaultEndsTheForceAndIsReported) {

@@ -12,7 +12,7 @@ using host_tools_test::thrown_message;
 using simulation::SceneError;
 
 TEST(SimulatedBoard, EverySuppliedSceneOpensUnderItsNameAndRuns) {
-  ASSERT_EQ(supplied_scenes().size(), 10u);
+  ASSERT_EQ(supplied_scenes().size(), 22u);
   for (const SuppliedScene& supplied : supplied_scenes()) {
     const simulation::Scene scene = open_scene(std::string(supplied.name));
     EXPECT_EQ(scene.name, supplied.name);
@@ -32,8 +32,10 @@ TEST(SimulatedBoard, FilesComeBeforeSuppliedScenes) {
 TEST(SimulatedBoard, UnknownScenesNameTheSuppliedOnes) {
   for (const char* name : {"tuoch", "", "touch.toml", "/no/such.toml"})
     EXPECT_CONTAINS(thrown_message<SceneError>([&] { open_scene(name); }),
-                    "supplied are dc_coreless_a, dc_coreless_b, drone, free_handle, gimbal_a, "
-                    "gimbal_b, motor_axes, single_motor, touch, two_axes");
+                    "supplied are compliant_structure, dc_coreless_a, dc_coreless_b, drone, free_handle, "
+                    "gimbal_a, gimbal_b, motor_axes, noisy_encoder, paper1_deviation, paper1_fig_10, "
+                    "paper1_fig_11, paper1_fig_12, paper1_fig_9, paper1_jitter, paper1_magnetic_limit, "
+                    "paper1_plain_limit, paper2_fig_1, paper2_fig_2, single_motor, touch, two_axes");
   const TemporaryFolder folder;
   thrown_message<SceneError>([&] { open_scene(folder.path().string()); });
 }

@@ -107,6 +107,59 @@ TEST(SimulatedDevice, AnAxisWithAMotorAndOneWithoutShareABoard) {
   EXPECT_EQ(device.handle(1).position(), scene.axes[1].start.position);
 }
 
+TEST(SimulatedDevice, APersonWithoutAMotionStaysWhenTheAxisIsArmed) {
+  simulation::Scene scene = open_scene("touch");
+  scene.axes[0].motion.reset();
+  scene.axes[0].start.position = 0.01;
+  SimulatedDevice device(scene);
+  device.drive(0, output(0.0f, true));
+  pass(device, 0.5);
+  EXPECT_EQ(device.handle(0).position(), 0.01);
+  EXPECT_EQ(device.handle(0).intended_position(), 0.01);
+}
+
+TEST(SimulatedDevice, AnEncoderWithDefectsIsLookedAtInEverySample) {
+  simulation::Scene scene = open_scene("touch");
+  scene.axes[0].encoder.edge_noise = 3.0;
+  SimulatedDevice device(scene), same(scene);
+  int changes = 0;
+  std::uint32_t last = device.count(0);
+  for (int n = 0; n < 100; ++n) {
+    const std::uint32_t seen = device.sample(0).count;
+    EXPECT_EQ(device.count(0), seen);
+    EXPECT_EQ(same.sample(0).count, seen);
+    changes += seen != last ? 1 : 0;
+    last = seen;
+  }
+  EXPECT_GT(changes, 50) << "the handle stands still, the count does not";
+  scene.axes[0].encoder.edge_noise = 0.0;
+  scene.axes[0].encoder.dropout_probability = 1.0;
+  SimulatedDevice dead(scene);
+  const std::uint32_t start = dead.sample(0).count;
+  dead.drive(0, output(0.0f, true));
+  pass(dead, 0.3);
+  EXPECT_EQ(dead.sample(0).count, start);
+  EXPECT_GT(dead.lost_edges(0), 100);
+  EXPECT_EQ(dead.lost_edges(1), 0);
+}
+
+TEST(SimulatedDevice, OnePersonOnBothAxesAnswersToBothFields) {
+  simulation::Scene scene = open_scene("paper1_deviation");
+  const auto activation = [&](bool same_person) {
+    scene.axes[1].same_person = same_person;
+    SimulatedDevice device(scene);
+    firmware::AxisOutput out = output(0.0f, true);
+    out.background_force = 3.0f;
+    device.drive(0, out);
+    out.background_force = 4.0f;
+    device.drive(1, out);
+    pass(device, 3.0);
+    return device.handle(1).activation();
+  };
+  EXPECT_NEAR(activation(true), 5.0, 0.01) << "they stand at right angles";
+  EXPECT_NEAR(activation(false), 4.0, 0.01);
+}
+
 TEST(SimulatedDevice, WithoutAMotorThereIsNoPowerStage) {
   SimulatedDevice device(open_scene("touch"));
   EXPECT_FALSE(device.has_motor(0));

@@ -19,6 +19,41 @@ IntendedMotionConfig example() {
   return config;
 }
 
+// The short cut says the same as advance() wherever it applies, and applies to nearly all pieces.
+TEST(IntendedMotion, WithoutACornerTheShortCutGivesTheSamePath) {
+  for (const double piece : {50e-6, 0.002, 0.0123}) {
+    IntendedMotion quick(example());
+    IntendedMotion plain(example());
+    int short_cuts = 0;
+    int pieces = 0;
+    for (double time = 0.0; time < 2.0; time += piece, ++pieces) {
+      if (pieces == 10) {
+        quick.begin();
+        plain.begin();
+      }
+      const double target =
+          -0.01 + (time > 0.3 && time < 0.4 ? 0.05 * (time - 0.3) : 0.0) + (time > 0.5 ? -0.003 : 0.0);
+      IntendedMotion::Segment segment;
+      const IntendedMotion::Path path = plain.advance(piece, target);
+      if (quick.advance_without_corner(piece, target, segment)) {
+        ++short_cuts;
+        ASSERT_EQ(path.count, 1);
+        ASSERT_EQ(segment.duration, path.segments[0].duration);
+        ASSERT_EQ(segment.start, path.segments[0].start);
+        ASSERT_EQ(segment.rate, path.segments[0].rate);
+      } else {
+        quick.advance(piece, target);
+      }
+      ASSERT_EQ(quick.position(), plain.position());
+      ASSERT_EQ(quick.elapsed(), plain.elapsed());
+      ASSERT_EQ(quick.phase(), plain.phase());
+      ASSERT_EQ(quick.hold_end(), plain.hold_end());
+    }
+    EXPECT_GT(short_cuts, pieces / 2);
+    EXPECT_EQ(quick.phase(), MotionPhase::done);
+  }
+}
+
 TEST(IntendedMotion, TargetPressesWithThePushOnTheSurface) {
   IntendedMotionConfig config = example();
   config.wall_position = 0.003;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+
 #include <limits>
 #include <string>
 
@@ -36,8 +38,14 @@ void check_every_field(const std::array<ModelField<Model>, count>& fields) {
 }
 
 TEST(ModelField, EveryNumberOfTheDeviceHasARange) {
-  static_assert(sizeof(DeviceModel) == device_fields.size() * sizeof(double));
+  // The structure behind it has a table of its own.
+  static_assert(offsetof(DeviceModel, structure) == device_fields.size() * sizeof(double));
   check_every_field(device_fields);
+}
+
+TEST(ModelField, EveryNumberOfTheStructureHasARange) {
+  static_assert(sizeof(StructureModel) == structure_fields.size() * sizeof(double));
+  check_every_field(structure_fields);
 }
 
 TEST(ModelField, EveryNumberOfTheOperatorHasARange) {

@@ -106,11 +106,11 @@ cogging_periods = 84
 
 TEST(SceneMotor, RefusalsNamePlaceKeyValueAndWhatIsAllowed) {
   EXPECT_EQ(refusal("[device]\n[motor]\nresistance = 1\n"),
-            "bad.toml:2:1: motor.kind is missing; allowed is \"dc\" or \"pmsm\"");
+            "bad.toml:2:1: motor.kind is missing; allowed is \"ideal\", \"dc\" or \"pmsm\"");
   EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"stepper\"\n"),
-            "bad.toml:3:8: motor.kind = 'stepper': allowed is \"dc\" or \"pmsm\"");
+            "bad.toml:3:8: motor.kind = 'stepper': allowed is \"ideal\", \"dc\" or \"pmsm\"");
   EXPECT_EQ(refusal("[device]\n[motor]\nkind = 1\n"),
-            "bad.toml:3:8: motor.kind = 1: allowed is \"dc\" or \"pmsm\"");
+            "bad.toml:3:8: motor.kind = 1: allowed is \"ideal\", \"dc\" or \"pmsm\"");
   EXPECT_EQ(refusal("[device]\n[motor]\nkind = \"dc\"\nresistance = 0\n"),
             "bad.toml:4:14: motor.resistance = 0: allowed is a number from 0.0001 to 1000 ohm");
   EXPECT_EQ(
@@ -127,11 +127,12 @@ TEST(SceneMotor, RefusalsNamePlaceKeyValueAndWhatIsAllowed) {
             "bad.toml:4:14: motor.inductance = 2: allowed is a number from 1e-07 to 1 H");
   EXPECT_EQ(
       refusal("[device]\n[inverter]\n"),
-      "bad.toml:2:1: [inverter] without [motor]: there is no current; add the motor, or remove the table");
+      "bad.toml:2:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no current; add the "
+      "motor, or remove the table");
   EXPECT_EQ(
       refusal("[device]\n[axis1.device]\n[axis1.current_sensor]\n"),
-      "bad.toml:3:1: [axis1.current_sensor] without [axis1.motor]: there is no current; add the motor, or "
-      "remove the table");
+      "bad.toml:3:1: [axis1.current_sensor] without a [axis1.motor] of kind \"dc\" or \"pmsm\": there is no "
+      "current; add the motor, or remove the table");
   EXPECT_EQ(refusal("[device]\n[supply]\nabsorbs = 1\n"),
             "bad.toml:3:11: supply.absorbs = 1: allowed is true or false");
   const std::string names =

@@ -137,8 +137,8 @@ TEST(Scene, RefusalsNamePlaceKeyValueAndWhatIsAllowed) {
             "bad.toml:2:8: device.mass = 'heavy': allowed is a number from 0.0001 to 100 kg");
   EXPECT_EQ(
       refusal("[device]\n\n  mas = 1.0\n"),
-      "bad.toml:3:3: device.mas = 1.0: unknown key; allowed here: mass, damping, friction, force_limit, "
-      "start_position, start_velocity");
+      "bad.toml:3:3: device.mas = 1.0: unknown key; allowed here: start_position, start_velocity, mass, "
+      "damping, friction, force_limit, delay; did you mean mass?");
   EXPECT_EQ(
       refusal("[device]\n[operator]\ngrip = 1\n"),
       "bad.toml:3:1: operator.grip = 1: unknown key; allowed here: grip_stiffness, grip_damping, hand_mass, "

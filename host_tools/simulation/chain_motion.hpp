@@ -1,0 +1,120 @@
+#pragma once
+// Moves a chain of masses (chain_dynamics.hpp) through time: by the matrices of chain_propagator.hpp where
+// they apply, by the Taylor series of chain_series.hpp with a search for events everywhere else.
+//
+// Events. Every event happens at x_0' = 0. Break-away needs a net force of f_c plus 1e-13 of the forces
+// involved, so it always has a direction and coinciding events resolve one after the other. After 64 events
+// in one step of the series mass 0 is held for the rest of that step; that can only remove energy, and is
+// counted.
+//
+// Which intervals get a matrix: with a table those of a duration met before; without one those of a duration
+// and a gain that stay the same, for longer and longer each time that a matrix is given up for another. Each
+// of `durations` slots remembers one duration and belongs to the caller, who tells when it begins to mean
+// another.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+
+#include "host_tools/simulation/chain_coefficients.hpp"
+#include "host_tools/simulation/chain_dynamics.hpp"
+#include "host_tools/simulation/chain_propagator.hpp"
+#include "host_tools/simulation/propagator_table.hpp"
+
+namespace kmax::simulation {
+
+struct MovingChain {
+  ChainState state;
+  bool sticking = false;   // mass 0 rests, held by friction or blocked
+  bool blocked = false;    // mass 0 is held against any force
+  double direction = 1.0;  // of mass 0, the last one while it rests
+  std::uint64_t event_limit_hits = 0;
+};
+
+template <std::size_t masses>
+class ChainMotion {
+ public:
+  static constexpr std::size_t durations = 4;
+
+  // `chain`: at a gain of 1, which multiplies the springs and dampers from number `first_scaled` on.
+  ChainMotion(const ChainDynamics& chain, std::size_t first_scaled);
+
+  // From now on matrices come from there. nullptr: own ones, for a gain that stays the same.
+  void share(PropagatorTable* table);
+
+  // The slot's next piece has another duration than its last one.
+  void forget(std::size_t slot) { slots_[slot] = Slot{}; }
+
+  // A piece of the slot's duration.
+  [[gnu::always_inline]] void move(MovingChain& moving, double force, double intended, double rate,
+                                   double duration, double gain, std::size_t slot) {
+    Slot& known = slots_[slot];
+    const ChainPropagator<masses>* propagator = nullptr;
+    if constexpr (masses > 1) {
+      if (known.sheet != nullptr) propagator = &known.sheet->at(gain);
+    }
+    if (propagator == nullptr) {
+      propagator = known.gain == gain ? known.propagator : find(known, duration, gain);
+      if (propagator == nullptr) [[unlikely]]
+        return move_by_series(moving, {force, intended, rate}, duration, gain);
+    }
+    if (propagator->steps() != 1) [[unlikely]]
+      return move_in_steps(*propagator, moving, {force, intended, rate});
+    if (!one_step(*propagator, moving, force, intended, rate)) [[unlikely]]
+      step(moving, propagator->coefficients(), {force, intended, rate}, duration);
+  }
+
+  // The gain that the slot's next piece will probably have.
+  [[gnu::always_inline]] void expect(double gain, std::size_t slot) const {
+    if constexpr (masses > 1) {
+      if (slots_[slot].sheet != nullptr) slots_[slot].sheet->prefetch(gain);
+    }
+  }
+
+  // A piece of any duration.
+  void move_by_series(MovingChain& moving, const ChainInput& input, double duration, double gain);
+
+ private:
+  using Sheet = PropagatorTable::Sheet<masses>;
+  struct Slot {
+    const ChainPropagator<masses>* propagator = nullptr;
+    double gain = std::numeric_limits<double>::quiet_NaN();       // of the propagator, if there is one
+    double last_gain = std::numeric_limits<double>::quiet_NaN();  // of the piece before, without a table
+    int repetitions = 0;                                          // of it
+    int patience = 1;                                             // repetitions that are worth a matrix
+    Sheet* sheet = nullptr;
+    bool used = false;
+    std::shared_ptr<const ChainPropagator<masses>> own;
+  };
+
+  [[gnu::always_inline]] static bool one_step(const ChainPropagator<masses>& propagator, MovingChain& moving,
+                                              double force, double intended, double rate) {
+    const bool standing =
+        moving.state.velocity[0] == 0.0 && (moving.blocked || propagator.coefficients().friction > 0.0);
+    moving.sticking = standing;
+    return standing ? propagator.rest(moving.state, force, intended, rate, moving.blocked)
+                    : propagator.slide(moving.state, force, intended, rate);
+  }
+  static void move_in_steps(const ChainPropagator<masses>& propagator, MovingChain& moving,
+                            const ChainInput& input);
+  const ChainPropagator<masses>* find(Slot& slot, double duration, double gain);
+  static void step(MovingChain& moving, const ChainCoefficients<masses>& chain, const ChainInput& input,
+                   double h);
+  void set_gain(double gain);
+
+  ChainDynamics chain_;
+  std::size_t first_scaled_;
+  double gain_ = 1.0;  // of the coefficients
+  ChainCoefficients<masses> unscaled_;
+  ChainCoefficients<masses> coefficients_;
+  PropagatorTable* table_ = nullptr;
+  std::array<Slot, durations> slots_;
+};
+
+extern template class ChainMotion<1>;
+extern template class ChainMotion<2>;
+extern template class ChainMotion<3>;
+
+}  // namespace kmax::simulation

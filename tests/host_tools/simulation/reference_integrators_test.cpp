@@ -1,0 +1,381 @@
+#include "host_tools/simulation/reference_integrators.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "host_tools/simulation/coupled_handle.hpp"
+
+namespace kmax::simulation {
+namespace {
+
+using Integrator = std::function<void(const ChainDynamics&, ChainState&, const ChainInput&, double)>;
+Integrator euler(double step) {
+  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
+    integrate_semi_implicit_euler(d, s, i, duration, step);
+  };
+}
+Integrator rk4(double step) {
+  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
+    integrate_rk4(d, s, i, duration, step);
+  };
+}
+Integrator adaptive(double tolerance) {
+  return [tolerance](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
+    integrate_adaptive(d, s, i, duration, tolerance);
+  };
+}
+struct Named {
+  const char* name;
+  Integrator integrate;
+  double error;  // m after a second, in these tests
+};
+const std::vector<Named>& all() {
+  static const std::vector<Named> integrators{{"semi-implicit Euler", euler(1e-6), 2e-6},
+                                              {"rk4", rk4(2e-6), 2e-10},
+                                              {"adaptive", adaptive(1e-12), 1e-12}};
+  return integrators;
+}
+
+ChainDynamics held(const DeviceModel& device, const OperatorModel& person) {
+  ChainDynamics chain;
+  chain.masses = 2;
+  chain.mass = {device.mass, person.hand_mass, 0.0};
+  chain.stiffness = {person.grip_stiffness, person.arm_stiffness, 0.0};
+  chain.damping = {person.grip_damping, person.arm_damping, 0.0};
+  chain.base_damping = device.damping;
+  chain.friction = device.friction;
+  return chain;
+}
+ChainDynamics sliding_block(double mass, double friction) {
+  ChainDynamics chain;
+  chain.mass[0] = mass;
+  chain.friction = friction;
+  return chain;
+}
+
+// The largest difference of position from the exact method over intervals of 2 ms with these forces, the
+// person keeping to 0 and the handle pulled out of place at the start.
+double error_against_exact(const DeviceModel& device, const OperatorModel& person,
+                           const std::vector<double>& forces, const Integrator& integrate) {
+  IntendedMotionConfig motion;
+  motion.start_position = 0.0;
+  CoupledHandle exact(device, person, motion, HandleStart{0.004, 0.05});
+  const ChainDynamics chain = held(device, person);
+  ChainState state;
+  state.position = {0.004, 0.004, 0.0};
+  state.velocity = {0.05, 0.0, 0.0};
+  double worst = 0.0;
+  for (const double force : forces) {
+    exact.advance(force, 0.0, 0.002);
+    integrate(chain, state, {exact.applied_force(), 0.0, 0.0}, 0.002);
+    worst = std::max({worst, std::abs(exact.position() - state.position[0]),
+                      std::abs(exact.hand_position() - state.position[1])});
+  }
+  return worst;
+}
+std::vector<double> swinging_forces(double amplitude) {
+  std::vector<double> forces;
+  for (int n = 0; n < 250; ++n) forces.push_back(amplitude * std::sin(0.21 * n));
+  return forces;
+}
+
+TEST(ReferenceIntegrators, ConvergeWithTheirOrderOnASmoothMotion) {
+  DeviceModel device;
+  device.friction = 0.0;
+  const auto error = [&](const Integrator& integrate) {
+    return error_against_exact(device, OperatorModel{}, swinging_forces(1.0), integrate);
+  };
+  const double euler_ratio = error(euler(2e-5)) / error(euler(1e-5));
+  EXPECT_NEAR(euler_ratio, 2.0, 0.1);
+  const double rk4_ratio = error(rk4(5e-4)) / error(rk4(2.5e-4));
+  EXPECT_NEAR(rk4_ratio, 16.0, 2.0);
+  for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14})
+    EXPECT_LT(error(adaptive(tolerance)), tolerance + 1e-15) << tolerance;
+  EXPECT_GT(error(adaptive(1e-4)), 1e-10) << "the tolerance is not used";
+}
+
+TEST(ReferenceIntegrators, ConvergeThroughStopsSticksAndBreakAways) {
+  const auto error = [&](const Integrator& integrate) {
+    return error_against_exact(DeviceModel{}, OperatorModel{}, swinging_forces(0.4), integrate);
+  };
+  const double coarse = error(euler(1e-4)), fine = error(euler(1e-4 / 16));
+  EXPECT_LT(coarse, 1e-3);
+  EXPECT_LT(fine, coarse / 6.0);
+  const double rk4_coarse = error(rk4(1e-4)), rk4_fine = error(rk4(1e-4 / 16));
+  EXPECT_LT(rk4_coarse, coarse / 20.0);
+  EXPECT_LT(rk4_fine, rk4_coarse / 30.0) << "order 2 at break-aways, 4 elsewhere";
+  EXPECT_LT(error(adaptive(1e-4)), 1e-4);
+  EXPECT_LT(error(adaptive(1e-8)), 1e-9);
+  EXPECT_LT(error(adaptive(1e-13)), 1e-13);
+}
+
+TEST(ReferenceIntegrators, AgreeWithTheExactMethodWhereTheHandleTrembles) {
+  DeviceModel device;
+  device.friction = 0.6;
+  device.mass = 0.02;
+  OperatorModel person;
+  person.grip_damping = 0.1;
+  person.grip_stiffness = 2000.0;
+  const auto forces = swinging_forces(1.5);
+  EXPECT_LT(error_against_exact(device, person, forces, adaptive(1e-13)), 1e-12);
+  EXPECT_LT(error_against_exact(device, person, forces, rk4(1e-5)), 1e-6);
+  EXPECT_LT(error_against_exact(device, person, forces, euler(1e-6)), 2e-5);
+}
+
+TEST(ReferenceIntegrators, ABlockStopsWhereItsEnergyIsSpentAndStays) {
+  for (const auto& [name, integrate, error] : all()) {
+    ChainState state;
+    state.velocity[0] = 0.2;
+    integrate(sliding_block(0.045, 0.093), state, {}, 1.0);
+    EXPECT_EQ(state.velocity[0], 0.0) << name;
+    EXPECT_NEAR(state.position[0], 0.045 * 0.04 / (2 * 0.093), error) << name;
+    const double stopped = state.position[0];
+    for (const double force : {0.093, -0.093, 0.0, 0.0929}) {
+      integrate(sliding_block(0.045, 0.093), state, {force, 0.0, 0.0}, 1.0);
+      EXPECT_EQ(state.position[0], stopped) << name << ' ' << force;
+      EXPECT_EQ(state.velocity[0], 0.0) << name;
+    }
+  }
+}
+
+TEST(ReferenceIntegrators, AForceAboveFrictionTurnsTheBlockRound) {
+  // 1 N against 0.25 N, 0.1 kg at 0.5 m/s: 12.5 m/s^2 until rest after 0.04 s and 0.01 m, then -7.5 m/s^2.
+  for (const auto& [name, integrate, error] : all()) {
+    ChainState state;
+    state.velocity[0] = 0.5;
+    integrate(sliding_block(0.1, 0.25), state, {-1.0, 0.0, 0.0}, 0.1);
+    EXPECT_NEAR(state.velocity[0], -0.45, 100 * error) << name;
+    EXPECT_NEAR(state.position[0], 0.01 - 0.5 * 7.5 * 0.06 * 0.06, error) << name;
+  }
+}
+
+TEST(ReferenceIntegrators, EulerTurnsRoundWithinOneStep) {
+  // As above in a single step: without springs the velocities are exact.
+  ChainState state;
+  state.velocity[0] = 0.5;
+  integrate_semi_implicit_euler(sliding_block(0.1, 0.25), state, {-1.0, 0.0, 0.0}, 0.1, 1.0);
+  EXPECT_NEAR(state.velocity[0], -0.45, 1e-14);
+}
+
+// A spring whose far end moves: what pulls on the block changes steadily.
+struct PulledBlock {
+  ChainDynamics chain = sliding_block(0.05, 0.1);
+  ChainState state;
+  PulledBlock(double stiffness, double friction) {
+    chain.stiffness[0] = stiffness;
+    chain.friction = friction;
+  }
+  double position_after(const Integrator& integrate, const ChainInput& input, double duration) const {
+    ChainState end = state;
+    integrate(chain, end, input, duration);
+    return end.position[0];
+  }
+};
+
+TEST(ReferenceIntegrators, LeavesAndStopsWithinOneStep) {
+  // 0.2 N falling by 100 N/s: away from 0.1 N at once, at rest after about 2 ms, 1.3 um further.
+  const PulledBlock block(100.0, 0.1);
+  const ChainInput input{0.0, 0.002, -1.0};
+  const double truth = block.position_after(adaptive(1e-13), input, 0.0029);
+  EXPECT_NEAR(truth, 1.33e-6, 2e-8);
+  EXPECT_NEAR(block.position_after(rk4(1e-6), input, 0.0029), truth, 1e-11);
+  EXPECT_NEAR(block.position_after(rk4(1.0), input, 0.0029), truth, 3e-9);
+  EXPECT_NEAR(block.position_after(adaptive(1e-2), input, 0.0029), truth, 1e-9);
+  // And before the first point that is looked at, an eighth of the step.
+  const double pulled_back = block.position_after(adaptive(1e-13), input, 0.0175);
+  EXPECT_LT(pulled_back, -5e-4);
+  EXPECT_NEAR(block.position_after(adaptive(1e-2), input, 0.0175), pulled_back, 1e-5);
+}
+
+TEST(ReferenceIntegrators, AShortStopBetweenThePointsOfALongStepIsSeen) {
+  // The velocity would dip to -4 um/s at 2.5 ms, for 0.4 ms; friction holds the block there instead.
+  PulledBlock block(10.0, 0.01);
+  block.state.velocity[0] = 6.21e-4;
+  const ChainInput input{0.0, -1.5e-3, 1.0};
+  const double truth = block.position_after(rk4(1e-7), input, 0.008);
+  for (const double tolerance : {1e-2, 1e-6, 1e-12})
+    EXPECT_NEAR(block.position_after(adaptive(tolerance), input, 0.008), truth, 1e-10) << tolerance;
+  block.chain.friction = 0.0;
+  EXPECT_GT(std::abs(block.position_after(adaptive(1e-12), input, 0.008) - truth), 1e-9)
+      << "a check without use";
+}
+
+TEST(ReferenceIntegrators, AnEventOnTheEdgeOfAnIntervalIsNoEventTwice) {
+  // Rest after exactly 0.25 s, in numbers without rounding; in eight intervals and in one.
+  for (const auto& [name, integrate, error] : all()) {
+    for (const double interval : {0.25, 0.03125}) {
+      ChainState state;
+      state.velocity[0] = 0.5;
+      for (double t = 0.0; t < 0.25; t += interval) integrate(sliding_block(0.5, 1.0), state, {}, interval);
+      EXPECT_NEAR(state.velocity[0], 0.0, 1e-14) << name;
+      integrate(sliding_block(0.5, 1.0), state, {1.0, 0.0, 0.0}, 0.25);
+      EXPECT_EQ(state.velocity[0], 0.0) << name;
+      EXPECT_NEAR(state.position[0], 0.0625, error) << name;
+    }
+  }
+}
+
+TEST(ReferenceIntegrators, BreaksAwayWhenTheSpringPullsHarderThanFriction) {
+  // k r t = f_c at t = 0.1 s; then x = r (t' - sin(w t') / w), w^2 = k / m.
+  ChainDynamics chain = sliding_block(0.05, 0.1);
+  chain.stiffness[0] = 100.0;
+  const double omega = std::sqrt(100.0 / 0.05), since = 0.03;
+  for (const auto& [name, integrate, error] : all()) {
+    for (const double direction : {1.0, -1.0}) {
+      ChainState state;
+      integrate(chain, state, {0.0, 0.0, direction * 0.01}, 0.0999);
+      EXPECT_EQ(state.position[0], 0.0) << name;
+      state = {};
+      integrate(chain, state, {0.0, 0.0, direction * 0.01}, 0.1 + since);
+      EXPECT_NEAR(direction * state.position[0], 0.01 * (since - std::sin(omega * since) / omega), error)
+          << name;
+      EXPECT_NEAR(direction * state.velocity[0], 0.01 * (1.0 - std::cos(omega * since)), 1e3 * error) << name;
+    }
+  }
+}
+
+TEST(ReferenceIntegrators, ALosslessChainKeepsItsEnergy) {
+  ChainDynamics chain;
+  chain.masses = 3;
+  chain.mass = {0.045, 0.02, 0.234};
+  chain.stiffness = {3000.0, 540.0, 147.0};
+  const auto energy = [&](const ChainState& s) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double next = i == 2 ? 0.0 : s.position[i + 1];
+      sum += 0.5 * chain.mass[i] * s.velocity[i] * s.velocity[i] +
+             0.5 * chain.stiffness[i] * (next - s.position[i]) * (next - s.position[i]);
+    }
+    return sum;
+  };
+  const auto drift = [&](const Integrator& integrate) {
+    ChainState state;
+    state.position = {0.001, -0.002, 0.003};
+    const double before = energy(state);
+    for (int n = 0; n < 2000; ++n) integrate(chain, state, {}, 0.002);
+    return energy(state) / before - 1.0;
+  };
+  EXPECT_LT(std::abs(drift(euler(1e-5))), 1e-2) << "bounded: it is symplectic";
+  const double rk4_drift = drift(rk4(1e-4));
+  EXPECT_LT(rk4_drift, 0.0) << "RK4 damps";
+  EXPECT_GT(rk4_drift, -1e-3);
+  EXPECT_LT(std::abs(drift(adaptive(1e-12))), 1e-9);
+}
+
+TEST(ReferenceIntegrators, FrictionNeverGivesEnergy) {
+  const ChainDynamics chain = held(DeviceModel{}, OperatorModel{});
+  const auto energy = [&](const ChainState& s) {
+    const double grip = s.position[1] - s.position[0];
+    return 0.5 *
+           (chain.mass[0] * s.velocity[0] * s.velocity[0] + chain.mass[1] * s.velocity[1] * s.velocity[1] +
+            chain.stiffness[0] * grip * grip + chain.stiffness[1] * s.position[1] * s.position[1]);
+  };
+  for (const auto& [name, integrate, error] : all()) {
+    ChainState state;
+    state.position = {0.01, -0.01, 0.0};
+    double before = energy(state);
+    const double first = before;
+    for (int n = 0; n < 500; ++n) {
+      integrate(chain, state, {}, 0.002);
+      EXPECT_LE(energy(state), before * (1.0 + 1e-6) + 1e-15) << name << ' ' << n;
+      before = energy(state);
+    }
+    EXPECT_LT(before, 0.1 * first) << name;
+    EXPECT_EQ(state.velocity[0], 0.0) << name;
+  }
+}
+
+TEST(ReferenceIntegrators, ThreeMassesAgreeWithEachOther) {
+  ChainDynamics chain;
+  chain.masses = 3;
+  chain.mass = {0.03, 0.015, 0.234};
+  chain.stiffness = {2e4, 540.0, 147.0};
+  chain.damping = {2.0, 1.7, 9.1};
+  chain.base_damping = 0.05;
+  chain.friction = 0.093;
+  std::vector<ChainState> states(3);
+  for (int n = 0; n < 200; ++n) {
+    for (std::size_t i = 0; i < 3; ++i)
+      all()[i].integrate(chain, states[i], {0.8 * std::sin(0.3 * n), 1e-4 * n, 0.05}, 0.002);
+  }
+  EXPECT_GT(std::abs(states[2].position[0]), 1e-3);
+  for (std::size_t mass = 0; mass < 3; ++mass) {
+    EXPECT_NEAR(states[0].position[mass], states[2].position[mass], 5e-6);
+    EXPECT_NEAR(states[1].position[mass], states[2].position[mass], 1e-8);
+  }
+}
+
+TEST(ReferenceIntegrators, MassesThatAreNotThereAreNotRead) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [name, integrate, error] : all()) {
+    ChainDynamics chain = sliding_block(0.1, 0.0);
+    ChainState plain, spoilt;
+    ChainDynamics other = chain;
+    for (std::size_t i = 1; i < 3; ++i)
+      other.mass[i] = other.stiffness[i] = other.damping[i] = spoilt.position[i] = spoilt.velocity[i] = nan;
+    integrate(chain, plain, {1.0, 0.0, 0.0}, 0.01);
+    integrate(other, spoilt, {1.0, 0.0, 0.0}, 0.01);
+    EXPECT_EQ(plain.position[0], spoilt.position[0]) << name;
+    EXPECT_NEAR(plain.position[0], 0.5 * 10.0 * 1e-4, error) << name;
+  }
+}
+
+TEST(ReferenceIntegrators, AGrazingSpringDoesNotHang) {
+  // The spring's pull rises to exactly the friction force and falls again; with the limit met within
+  // rounding.
+  ChainDynamics chain;
+  chain.masses = 2;
+  chain.mass = {0.05, 0.2, 0.0};
+  chain.stiffness = {100.0, 50.0, 0.0};
+  const double amplitude = 0.001;
+  for (const double excess : {-1e-12, -1e-15, 0.0, 1e-15, 1e-12}) {
+    chain.friction = 100.0 * amplitude * (1.0 + excess);
+    for (const auto& [name, integrate, error] : all()) {
+      ChainState state;
+      state.position = {0.0, amplitude, 0.0};
+      for (int n = 0; n < 100; ++n) integrate(chain, state, {}, 0.01);
+      EXPECT_LT(std::abs(state.position[0]), 1e-9) << name << ' ' << excess;
+    }
+  }
+}
+
+TEST(ReferenceIntegrators, OneGramInAGripOfAMegaNewtonPerMetre) {
+  DeviceModel device;
+  device.mass = 1e-3;
+  OperatorModel person;
+  person.grip_stiffness = 1e6;
+  person.grip_damping = 3.0;
+  std::vector<double> forces;
+  for (int n = 0; n < 20; ++n) forces.push_back(n % 3 == 0 ? 3.0 : -2.0);
+  EXPECT_LT(error_against_exact(device, person, forces, adaptive(1e-12)), 1e-12);
+  EXPECT_LT(error_against_exact(device, person, forces, rk4(2e-6)), 1e-8);
+  EXPECT_LT(error_against_exact(device, person, forces, euler(2e-7)), 1e-5);
+}
+
+RC_GTEST_PROP(ReferenceIntegrators, AdaptiveAgreesWithTheExactMethodForAnyParameters, ()) {
+  const auto between = [](double low, double high) {
+    return low * std::pow(high / low, *rc::gen::inRange(0, 1001) / 1000.0);
+  };
+  DeviceModel device;
+  device.mass = between(1e-3, 0.5);
+  device.damping = between(1e-3, 2.0);
+  device.friction = between(1e-3, 1.0);
+  OperatorModel person;
+  person.grip_stiffness = between(50.0, 5e4);
+  person.grip_damping = between(1e-2, 10.0);
+  person.hand_mass = between(0.02, 1.0);
+  person.arm_stiffness = between(20.0, 1000.0);
+  person.arm_damping = between(0.1, 30.0);
+  std::vector<double> forces;
+  for (int n = 0; n < 10; ++n) forces.push_back(*rc::gen::inRange(-400, 401) * 0.01);
+  RC_ASSERT(error_against_exact(device, person, forces, adaptive(1e-12)) < 1e-11);
+}
+
+}  // namespace
+}  // namespace kmax::simulation

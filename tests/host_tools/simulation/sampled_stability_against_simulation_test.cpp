@@ -1,0 +1,194 @@
+// The exact criterion of control/sampled_stability.hpp against a simulation that knows nothing of it: the
+// force of a linear wall is computed from the handle's position at each sample, in double, and CoupledHandle
+// moves under it. No friction, no quantization, no force limit. Just below the criterion's bound the motion
+// must die away, just above it must grow. Delay is made here, by dividing each sample where the delayed force
+// changes; one test uses the simulated device's own delay instead.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "control/diolaiti_criterion.hpp"
+#include "control/sampled_stability.hpp"
+#include "host_tools/simulation/coupled_handle.hpp"
+#include "tests/control/drawn_loop.hpp"
+
+namespace kmax::simulation {
+namespace {
+
+using Loop = control::SampledLoop<double>;
+
+enum class Delay { divided_sample, of_the_device };
+
+CoupledHandle handle_of(const Loop& loop, Delay delay) {
+  DeviceModel device;
+  if (delay == Delay::of_the_device) device.delay = loop.delay;
+  device.mass = loop.mass;
+  device.damping = loop.damping;
+  device.friction = 0.0;
+  device.force_limit = 0.0;
+  const HandleStart start{.position = 0.0, .velocity = 0.1};
+  if (loop.hand.hand_mass == 0.0) return CoupledHandle(device, start);
+  OperatorModel person;
+  person.grip_stiffness = loop.hand.grip_stiffness;
+  person.grip_damping = loop.hand.grip_damping;
+  person.hand_mass = loop.hand.hand_mass;
+  person.arm_stiffness = loop.hand.arm_stiffness;
+  person.arm_damping = loop.hand.arm_damping;
+  person.activation_gain = 0.0;
+  return CoupledHandle(device, person, IntendedMotionConfig{.start_position = 0.0}, start);
+}
+
+// Loops whose motion changes more slowly than this are not simulated, samples per factor e.
+constexpr double longest_e_fold = 60'000.0;
+
+enum class Fate { decays, grows, undecided };
+
+// Runs until the largest excursion of a block of samples is a twentieth, or the twentyfold, of the first
+// block's.
+Fate fate_of(const Loop& loop, double stiffness, double samples_per_e_fold,
+             Delay delay = Delay::divided_sample) {
+  CoupledHandle handle = handle_of(loop, delay);
+  const int whole = static_cast<int>(std::floor(loop.delay / loop.period));
+  const double late = loop.delay - whole * loop.period;
+  std::array<double, 10> under_way{};  // newest first
+  double last = handle.position();
+  const auto sample = [&] {
+    const double x = handle.position();
+    std::copy_backward(under_way.begin(), under_way.end() - 1, under_way.end());
+    under_way[0] = -stiffness * x - loop.wall_damping * (x - last) / loop.period;
+    last = x;
+    if (delay == Delay::of_the_device) {
+      handle.advance(under_way[0], 0.0, loop.period);
+      return std::abs(x);
+    }
+    const auto newest = static_cast<std::size_t>(whole);
+    if (late > 0.0) handle.advance(under_way[newest + 1], 0.0, late);
+    handle.advance(under_way[newest], 0.0, loop.period - late);
+    return std::abs(x);
+  };
+  const int block = std::max(30, static_cast<int>(samples_per_e_fold * 0.2));
+  double first = 0.0;
+  for (int blocks = 0; blocks < 400; ++blocks) {
+    double largest = 0.0;
+    for (int i = 0; i < block; ++i) largest = std::max(largest, sample());
+    if (blocks == 0) first = largest;
+    if (!(largest < 20.0 * first)) return Fate::grows;
+    if (largest < 0.05 * first) return Fate::decays;
+  }
+  return Fate::undecided;
+}
+
+double samples_per_e_fold(const Loop& loop, double stiffness) {
+  return 1.0 / std::abs(std::log(control::spectral_radius(loop, stiffness)));
+}
+
+TEST(SampledStabilityAgainstSimulation, SevenKnownLimitsWithinATenthOfAPercent) {
+  constexpr double known[7][4] = {{2e-3, 0.045, 0.5, 501.9},    {2e-3, 0.045, 1.0, 1007.5},
+                                  {2e-3, 0.045, 3.58, 3677.5},  {2e-3, 0.045, 8.41, 8967.3},
+                                  {1e-3, 0.045, 0.5, 1001.9},   {0.5e-3, 0.045, 1.0, 4007.4},
+                                  {0.1e-3, 0.045, 1.0, 20007.4}};
+  for (const auto& [period, mass, damping, limit] : known) {
+    const Loop loop{mass, damping, 0.0, period, 0.0, {}};
+    EXPECT_NEAR(control::largest_stable_stiffness(loop), limit, 1e-3 * limit);
+    const double below = 0.999 * limit, above = 1.001 * limit;
+    EXPECT_EQ(fate_of(loop, below, samples_per_e_fold(loop, below)), Fate::decays) << limit;
+    EXPECT_EQ(fate_of(loop, above, samples_per_e_fold(loop, above)), Fate::grows) << limit;
+  }
+}
+
+TEST(SampledStabilityAgainstSimulation, ThousandLoopsWithinOnePercent) {
+  control::LoopDraw draw(2009);
+  int cases = 0, held = 0, delayed = 0, damped = 0, too_slow = 0, never_stable = 0;
+  while (cases < 1000) {
+    const Loop loop = draw.loop();
+    const double limit = control::largest_stable_stiffness(loop);
+    if (limit == 0.0) {
+      ++never_stable;
+      continue;
+    }
+    const double below = 0.99 * limit, above = 1.01 * limit;
+    const double slow = std::max(samples_per_e_fold(loop, below), samples_per_e_fold(loop, above));
+    if (slow > longest_e_fold) {
+      ++too_slow;  // 1 % of K changes too little to be worth the samples
+      continue;
+    }
+    EXPECT_EQ(fate_of(loop, below, samples_per_e_fold(loop, below)), Fate::decays) << "case " << cases;
+    EXPECT_EQ(fate_of(loop, above, samples_per_e_fold(loop, above)), Fate::grows) << "case " << cases;
+    ++cases;
+    held += loop.hand.hand_mass > 0.0;
+    delayed += loop.delay > 0.0;
+    damped += loop.wall_damping != 0.0;
+  }
+  std::printf("1000 loops: %d held, %d delayed, %d with wall damping; redrawn: %d slow, %d never stable\n",
+              held, delayed, damped, too_slow, never_stable);
+  EXPECT_GT(held, 300);
+  EXPECT_GT(delayed, 300);
+  EXPECT_GT(damped, 300);
+}
+
+// The same with the delay that the simulated device has of its own.
+TEST(SampledStabilityAgainstSimulation, DelayOfTheDeviceWithinOnePercent) {
+  control::LoopDraw draw(2010);
+  int cases = 0;
+  while (cases < 100) {
+    const Loop loop = draw.loop();
+    const double limit = control::largest_stable_stiffness(loop);
+    if (limit == 0.0 || loop.delay == 0.0) continue;
+    const double below = 0.99 * limit, above = 1.01 * limit;
+    const double slow_below = samples_per_e_fold(loop, below), slow_above = samples_per_e_fold(loop, above);
+    if (std::max(slow_below, slow_above) > longest_e_fold) continue;
+    EXPECT_EQ(fate_of(loop, below, slow_below, Delay::of_the_device), Fate::decays) << "case " << cases;
+    EXPECT_EQ(fate_of(loop, above, slow_above, Delay::of_the_device), Fate::grows) << "case " << cases;
+    ++cases;
+  }
+}
+
+// A loop that no stiffness makes stable, as the criterion says: more wall damping than the delay allows.
+TEST(SampledStabilityAgainstSimulation, LoopsWithoutAnyStableStiffnessGrow) {
+  control::LoopDraw draw(7);
+  int cases = 0;
+  while (cases < 100) {
+    Loop loop = draw.loop();
+    loop.wall_damping = loop.damping * draw.uniform(2.0, 20.0);
+    if (control::largest_stable_stiffness(loop) > 0.0) continue;
+    const double stiffness = 10.0, slow = samples_per_e_fold(loop, stiffness);
+    if (slow > longest_e_fold) continue;
+    EXPECT_EQ(fate_of(loop, stiffness, slow), Fate::grows) << cases;
+    ++cases;
+  }
+}
+
+// Diolaiti's escape speed (control/diolaiti_criterion.hpp): with friction, the same wall beyond its linear
+// limit comes to rest or runs away by how fast it starts. The balance is one of mean power: in an oscillation
+// of peak speed V, friction takes f_c V 2/pi and viscous damping and the hold (b - K T/2) V^2/2, so the peak
+// speed that escapes is 4/pi times v*.
+TEST(SampledStabilityAgainstSimulation, EscapeSpeedWithFriction) {
+  control::LoopDraw draw(8);
+  for (int i = 0; i < 40; ++i) {
+    const double mass = draw.log_uniform(0.02, 0.5), period = draw.log_uniform(1e-4, 1e-3);
+    const double damping = mass * draw.log_uniform(0.5, 5.0), friction = draw.log_uniform(0.01, 0.3);
+    const double stiffness = 2.0 * damping / period * draw.uniform(1.5, 3.0);
+    const double escape = control::escape_speed(stiffness, damping, friction, period, 0.0);
+    for (const double share : {0.9, 1.1}) {
+      DeviceModel device{.mass = mass, .damping = damping, .friction = friction, .force_limit = 0.0};
+      const double peak = share * 4.0 / 3.14159265 * escape;
+      CoupledHandle handle(device, HandleStart{.position = 0.0, .velocity = peak});
+      // Up to 100 times the turns in which the linear part alone would change the speed by e.
+      bool rests = false, runs = false;
+      for (long k = 0; k < 3'000'000 && !rests && !runs; ++k) {
+        handle.advance(-stiffness * handle.position(), 0.0, period);
+        runs = std::abs(handle.velocity()) > 2.0 * peak;
+        rests = handle.sticking() && std::abs(stiffness * handle.position()) < friction;
+      }
+      EXPECT_EQ(rests, share < 1.0) << i;
+      EXPECT_EQ(runs, share > 1.0) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kmax::simulation
