@@ -1,11 +1,13 @@
 #pragma once
 
-#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/trace_reader.hpp"
+#include "host_tools/experiment/restored_afterwards.hpp"
+#include "host_tools/experiment/watched_touch.hpp"
 #include "host_tools/simulation/contact_measure.hpp"
 
 namespace kmax::experiment {
@@ -30,6 +32,8 @@ struct ContactSettings {
   double hold_time = 3.0;          ///< s from the first touch; the last second is judged
   double contact_patience = 10.0;  ///< s from arming to the first touch
   double threshold = 0.165e-3;     ///< m peak to peak, contact_measure.hpp
+  double force_limit = 3.3;        ///< N; force.limit is lowered to it
+  double abort_amplitude = 5e-3;   ///< m, watched_touch.hpp
 };
 
 struct ContactResult {
@@ -41,6 +45,7 @@ struct ContactResult {
   double limited_share = 0;               ///< of the haptic samples
   std::string velocity_estimator;         ///< what the adaptive laws' velocity came from
   std::uint64_t lost_records = 0;
+  std::optional<double> aborted_at;  ///< s from the first touch, watched_touch.hpp
   double outside_distance(const device::TraceSample& sample) const {
     return side * (sample.position - surface);
   }
@@ -54,18 +59,8 @@ struct ContactResult {
 /// What all conditions have in common, as assignments.
 std::vector<std::string> contact_setup(const ContactSettings& settings);
 
-/// Everything the experiment changes on an axis, put back when it is over, however it ends.
-class RestoredAfterwards {
- public:
-  RestoredAfterwards(device::Device& device, const ContactSettings& settings);
-  ~RestoredAfterwards();
-  RestoredAfterwards(const RestoredAfterwards&) = delete;
-  RestoredAfterwards& operator=(const RestoredAfterwards&) = delete;
-
- private:
-  device::Device& device_;
-  std::vector<device::Assignment> before_;
-};
+/// Everything that run_contact() may change, for RestoredAfterwards.
+std::vector<std::string> contact_changes(const ContactSettings& settings);
 
 /// The trial with the largest oscillation, which decides: a wall is stable when no touch makes it unstable
 /// (paper 1's definition of the maximum stiffness, section 4.2). `trials` must not be empty.
@@ -76,10 +71,8 @@ ContactResult worst_of(std::vector<ContactResult> trials);
 /// does so by itself, a real one has to be told. `tell`: progress, called about five times a second with a
 /// short text.
 ///
-/// The axis is disarmed however this ends. Errors: device::DeviceError (no touch, a fault on the way),
-/// device::ValueError, link::LinkError.
+/// The axis is disarmed however this ends. Errors: those of watch_touch(), device::ValueError.
 ContactResult run_contact(device::Device& device, const ContactCondition& condition,
-                          const ContactSettings& settings,
-                          const std::function<void(const std::string&)>& tell);
+                          const ContactSettings& settings, const Tell& tell);
 
 }  // namespace kmax::experiment

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "host_tools/plot/figure.hpp"
+#include "host_tools/report/page_files.hpp"
 
 namespace kmax::experiment {
 
@@ -87,6 +88,58 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
   const std::filesystem::path picture = folder / (base_name(result.condition) + picture_ending);
   plot::write_figure(figure, picture);
   return {picture, csv};
+}
+
+std::vector<std::string> contact_words(const ContactSettings& settings, std::size_t trials,
+                                       const std::string& velocity_estimator) {
+  return {
+      fmt::format("Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.",
+                  settings.stiffness / 1000, settings.haptic_rate, settings.hold_time),
+      fmt::format("Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials "
+                  "counts.",
+                  settings.threshold * 1000, trials),
+      fmt::format("Velocity estimator: {}.", velocity_estimator)};
+}
+
+std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,
+                                                      const ContactSettings& settings, std::size_t trials,
+                                                      const std::vector<std::filesystem::path>& pictures,
+                                                      const std::filesystem::path& folder,
+                                                      report::Origin origin) {
+  const std::string ours(report::words_of(origin)), theirs(report::words_of(report::Origin::paper));
+  report::Table table;
+  table.columns = {"wall",
+                   "peak to peak (mm), " + ours,
+                   "verdict, " + ours,
+                   "unstable touches",
+                   "force limited",
+                   "figure",
+                   "verdict, " + theirs + " 1",
+                   "agrees"};
+  report::Section section{
+      "Result",
+      contact_words(settings, trials, results.empty() ? "" : results.front().velocity_estimator),
+      {},
+      {}};
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const ContactResult& result = results[i];
+    table.rows.push_back({result.condition.name, fmt::format("{:.3f}", result.measure.peak_to_peak * 1e3),
+                          std::string(words_of(result.measure.verdict)),
+                          fmt::format("{} of {}", result.unstable_trials, result.trials),
+                          fmt::format("{:.1f} %", result.limited_share * 100), result.condition.figure,
+                          result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no"});
+    section.pictures.push_back({fmt::format("{}: position, force and coefficient over time, {}",
+                                            result.condition.name, words_of(result.measure.verdict)),
+                                pictures.at(i)});
+  }
+  section.tables.push_back(table);
+  if (origin != report::Origin::measured)
+    section.paragraphs.emplace_back(
+        "The device and the person are simulated. How much the person's hand stiffens was calibrated on "
+        "other "
+        "simulated hands at one of the paper's numbers: the verdicts are no proof of the method.");
+  return report::write_page({"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section}}, folder,
+                            "contact");
 }
 
 }  // namespace kmax::experiment

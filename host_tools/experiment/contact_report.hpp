@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/experiment/contact_experiment.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 
@@ -16,6 +17,19 @@ std::string contact_table(const std::vector<ContactResult>& results);
 std::vector<std::filesystem::path> write_contact(const ContactResult& result,
                                                  const std::filesystem::path& folder,
                                                  const std::string& picture_ending);
+
+/// What was done, in sentences.
+std::vector<std::string> contact_words(const ContactSettings& settings, std::size_t trials,
+                                       const std::string& velocity_estimator);
+
+/// contact.md and contact.html in the folder of the pictures, which must be as write_contact() left them:
+/// one for each result. `origin`: of the results, which a device measures and a simulation predicts. Returns
+/// the names written. Throws std::runtime_error.
+std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,
+                                                      const ContactSettings& settings, std::size_t trials,
+                                                      const std::vector<std::filesystem::path>& pictures,
+                                                      const std::filesystem::path& folder,
+                                                      report::Origin origin);
 
 std::string_view words_of(simulation::ContactVerdict verdict);
 

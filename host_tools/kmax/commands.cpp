@@ -11,11 +11,11 @@ namespace kmax::cli {
 
 std::span<const AddCommand> all_commands() {
   static constexpr std::array commands = {
-      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,   &add_info_command,
-      &add_devices_command,    &add_drive_commands,          &add_watch_command,    &add_record_command,
-      &add_capture_command,    &add_calibrate_command,       &add_selftest_command, &add_wall_command,
-      &add_simulate_command,   &add_experiment_command,      &add_plot_command,     &add_lines_commands,
-      &add_flash_command,      &add_serve_command,           &add_describe_command,
+      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_info_command,
+      &add_devices_command,    &add_drive_commands,          &add_watch_command,      &add_record_command,
+      &add_capture_command,    &add_calibrate_command,       &add_selftest_command,   &add_wall_command,
+      &add_check_command,      &add_simulate_command,        &add_experiment_command, &add_plot_command,
+      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command,
   };
   return commands;
 }

@@ -31,6 +31,7 @@ void add_devices_command(CLI::App& app, Context& context);
 void add_calibrate_command(CLI::App& app, Context& context);
 void add_selftest_command(CLI::App& app, Context& context);
 void add_wall_command(CLI::App& app, Context& context);
+void add_check_command(CLI::App& app, Context& context);
 void add_simulate_command(CLI::App& app, Context& context);
 void add_experiment_command(CLI::App& app, Context& context);
 void add_plot_command(CLI::App& app, Context& context);

@@ -1,146 +1,45 @@
-// kmax experiment.
+// kmax experiment: the list of the experiments, and what they have in common.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include <algorithm>
+#include <cmath>
 
-#include "host_tools/experiment/contact_report.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/progress.hpp"
+#include "host_tools/kmax/experiment_commands.hpp"
 
 namespace kmax::cli {
 
-namespace {
-struct ContactOptions {
-  experiment::ContactSettings settings;
-  int trials = 3;
-  std::string folder, ending = ".svg";
-};
-
-class Interrupted : public std::runtime_error {
- public:
-  Interrupted() : std::runtime_error("interrupted; the axis has been disarmed") {}
-};
-
-Json condition_json(const experiment::ContactResult& result) {
-  return {{"name", result.condition.name},
-          {"figure", result.condition.figure},
-          {"assignments", result.condition.assignments},
-          {"peak_to_peak_m", result.measure.peak_to_peak},
-          {"verdict", std::string(experiment::words_of(result.measure.verdict))},
-          {"trials", result.trials},
-          {"unstable_trials", result.unstable_trials},
-          {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},
-          {"agrees", result.agrees_with_paper()},
-          {"limited_share", result.limited_share},
-          {"deepest_m", result.measure.deepest},
-          {"samples", result.samples.size()},
-          {"lost_records", result.lost_records}};
+CLI::Validator finite_number() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double number = 0.0;
+        const bool good = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+        return good ? std::string() : fmt::format("'{}' is not a number", text);
+      },
+      "NUMBER");
 }
 
-int run_contact_experiment(Context& context, const ContactOptions& options) {
-  const Interruption interruption;
-  experiment::ContactSettings settings = options.settings;
-  settings.axis = context.axis();
-  const auto conditions = experiment::contact_conditions();
-  // Before anybody presses anything.
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
-  device::Device device = context.connect();
-  const experiment::RestoredAfterwards restored(device, settings);
-  std::vector<experiment::ContactResult> results;
-  Json list = Json::array();
-  std::vector<std::filesystem::path> files;
-  {
-    Progress progress(context.messages());
-    const std::size_t all_trials = conditions.size() * static_cast<std::size_t>(options.trials);
-    std::size_t done_trials = 0;
-    for (const experiment::ContactCondition& condition : conditions) {
-      const auto tell = [&](const std::string& text) {
-        if (interruption.requested()) throw Interrupted();
-        progress.show(fmt::format("{} of {}, {}", done_trials + 1, all_trials, text));
-      };
-      std::vector<experiment::ContactResult> trials;
-      for (int trial = 0; trial < options.trials; ++trial, ++done_trials)
-        trials.push_back(experiment::run_contact(device, condition, settings, tell));
-      results.push_back(experiment::worst_of(std::move(trials)));
-      list.push_back(condition_json(results.back()));
-      if (options.folder.empty()) continue;
-      const auto written = experiment::write_contact(results.back(), options.folder, options.ending);
-      files.insert(files.end(), written.begin(), written.end());
-    }
-  }
-  const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {
-    return r.agrees_with_paper();
-  });
-  const int verdict = all_agree ? done : verdict_is_no;
-  if (context.json) {
-    Json names = Json::array();
-    for (const auto& file : files) names.push_back(file.string());
-    context.print({{"stiffness_n_per_m", settings.stiffness},
-                   {"haptic_rate_hz", settings.haptic_rate},
-                   {"hold_time_s", settings.hold_time},
-                   {"threshold_m", settings.threshold},
-                   {"velocity_estimator", results.front().velocity_estimator},
-                   {"conditions", list},
-                   {"files", names}});
-    return verdict;
-  }
-  fmt::print(
-      context.out,
-      "Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.\n"
-      "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.\n"
-      "Velocity estimator: {}.\n\n{}",
-      settings.stiffness / 1000, settings.haptic_rate, settings.hold_time, settings.threshold * 1000,
-      options.trials, results.front().velocity_estimator, experiment::contact_table(results));
-  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
-  for (const auto& result : results) {
-    if (result.lost_records > 0)
-      context.note(fmt::format("{}: {} trace records were lost on the way", result.condition.name,
-                               result.lost_records));
-  }
-  return verdict;
+void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude) {
+  command
+      .add_option("--force-limit", force_limit,
+                  "Largest force on a device, N: lowers force.limit, never raises it")
+      ->check(finite_number() & CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--abort-amplitude", abort_amplitude,
+          "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then")
+      ->check(finite_number() & CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
 }
-}  // namespace
 
 void add_experiment_command(CLI::App& app, Context& context) {
   auto* experiment =
       app.add_subcommand("experiment", "Runs the papers' experiments on a device, simulated or real.");
   experiment->require_subcommand(1);
-  auto* contact = add_command(
-      *experiment, context,
-      {"contact",
-       "Touches a stiff wall under each law and judges whether it holds still (paper 1, Figs. 9 to 12).",
-       "  kmax experiment contact                                       on the simulated device\n"
-       "  kmax experiment contact --device serial:/dev/ttyUSB0 --out results\n\n"
-       "On arming, press the handle against the wall and keep pressing until told otherwise; a simulated "
-       "person does\n"
-       "so by itself. The axis is disarmed after each trial and on Ctrl-C, and its parameters are put back "
-       "at the end.\n"
-       "Exit code 3: some condition did not come out as the paper says."});
-  auto options = std::make_shared<ContactOptions>();
-  experiment::ContactSettings& settings = options->settings;
-  contact->add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")->capture_default_str();
-  contact->add_option("--rate", settings.haptic_rate, "Rate of the haptic loop, Hz")->capture_default_str();
-  contact->add_option("--hold", settings.hold_time, "Time from the first touch to the end of judging, s")
-      ->check(CLI::Range(1.0, 60.0))
-      ->capture_default_str();
-  contact->add_option("--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m")
-      ->check(CLI::Range(1e-9, 1.0))
-      ->capture_default_str();
-  contact->add_option("--trials", options->trials, "Touches per condition; the worst one counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  contact->add_option("--out", options->folder, "Folder for a picture and a CSV file per condition")
-      ->type_name("DIR");
-  contact->add_option("--format", options->ending, "Kind of picture")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
-      ->type_name("svg|png");
-  contact->callback([&context, options] {
-    context.action = [&context, options] { return run_contact_experiment(context, *options); };
-  });
+  for (const auto add : {&add_max_stiffness_experiment, &add_contact_experiment, &add_jitter_experiment,
+                         &add_deviation_experiment, &add_resolution_experiment})
+    add(*experiment, context);
 }
 
 }  // namespace kmax::cli

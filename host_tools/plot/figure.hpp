@@ -13,7 +13,8 @@ namespace kmax::plot {
 struct Series {
   std::string label;  ///< empty: not in the legend
   std::vector<double> x, y;
-  bool steps = false;  ///< held values: drawn as stairs
+  bool steps = false;   ///< held values: drawn as stairs
+  bool points = false;  ///< each value marked, joined by a line
 };
 
 /// A horizontal or vertical mark, with a text beside it.
@@ -29,6 +30,7 @@ struct Panel {
   std::vector<Series> series;
   std::vector<Mark> marks;
   std::optional<std::pair<double, double>> y_limits{};  ///< what to show; without: all of it
+  bool log_y = false;                                   ///< values that are not above 0 leave a gap
 };
 
 /// Panels stacked above one x axis.
@@ -36,6 +38,8 @@ struct Figure {
   std::string title;
   std::string x_label;
   std::vector<Panel> panels;
+  bool log_x = false;          ///< values that are not above 0 leave a gap
+  bool legend_beside = false;  ///< on the right of the panels instead of over the curves
 };
 
 /// gnuplot is missing or failed, or the file cannot be written; the message says which.

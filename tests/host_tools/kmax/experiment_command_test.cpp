@@ -4,58 +4,15 @@ namespace kmax::cli {
 namespace {
 using Experiment = SimulatedCommandLine;
 
-TEST_F(Experiment, ContactIsADocumentWithAConditionForEachWall) {
-  // Which of the two is a matter of the sampling instants of single touches.
-  const int code =
-      kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("results"), "--json"});
-  ASSERT_TRUE(code == done || code == verdict_is_no) << said;
-  EXPECT_EQ(keys(), (std::vector<std::string>{"stiffness_n_per_m", "haptic_rate_hz", "hold_time_s",
-                                              "threshold_m", "velocity_estimator", "conditions", "files"}));
-  const Json conditions = document()["conditions"];
-  ASSERT_EQ(conditions.size(), 6u);
-  for (const Json& condition : conditions) {
-    EXPECT_EQ(condition["trials"], 1);
-    EXPECT_EQ(condition["lost_records"], 0);
-    EXPECT_EQ(condition["unstable_trials"], condition["verdict"] == "unstable" ? 1 : 0);
-    EXPECT_EQ(condition["agrees"], condition["verdict"] == condition["paper_verdict"]);
-  }
-  const bool all_agree = std::all_of(conditions.begin(), conditions.end(),
-                                     [](const Json& c) { return c["agrees"].get<bool>(); });
-  EXPECT_EQ(code, all_agree ? done : verdict_is_no);
-  ASSERT_EQ(document()["files"].size(), 12u);
-  const Json files = document()["files"];
-  for (const Json& file : files) EXPECT_TRUE(std::filesystem::exists(file.get<std::string>()));
-}
-
-TEST_F(Experiment, BadOptionsAreWrongUsage) {
-  for (const std::vector<std::string>& bad : std::vector<std::vector<std::string>>{{"--stiffness", "-1"},
-                                                                                   {"--stiffness", "nan"},
-                                                                                   {"--rate", "333"},
-                                                                                   {"--rate", "0"},
-                                                                                   {"--hold", "0.5"},
-                                                                                   {"--threshold", "0"},
-                                                                                   {"--trials", "0"},
-                                                                                   {"--trials", "1.5"},
-                                                                                   {"--format", "gif"},
-                                                                                   {"--axis", "2"},
-                                                                                   {"--device", "tcp:x"}}) {
-    std::vector<std::string> arguments = {"experiment", "contact"};
-    arguments.insert(arguments.end(), bad.begin(), bad.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
-  }
+TEST_F(Experiment, WithoutANameOrWithAnUnknownOneIsWrongUsage) {
   EXPECT_EQ(kmax({"experiment"}), wrong_usage);
   EXPECT_EQ(kmax({"experiment", "nothing"}), wrong_usage);
 }
 
-TEST_F(Experiment, AFolderThatCannotBeMadeIsAFailure) {
-  folder.write("file", "");
-  EXPECT_EQ(kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("file/x"), "--json"}),
-            failed);
-  EXPECT_CONTAINS(document()["error"].get<std::string>(), "file/x");
-}
-
-TEST_F(Experiment, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {
-  EXPECT_EQ(kmax({"experiment", "contact", "--axis", "1", "--trials", "1", "--json"}), failed) << output;
+TEST_F(Experiment, HelpNamesEveryExperimentOfThePapers) {
+  EXPECT_EQ(kmax({"experiment", "--help"}), done);
+  for (const char* name : {"max-stiffness", "contact", "jitter", "deviation", "resolution"})
+    EXPECT_CONTAINS(output, name);
 }
 
 }  // namespace

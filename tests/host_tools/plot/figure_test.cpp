@@ -45,6 +45,18 @@ TEST(Figure, PanelsStandAboveEachOther) {
   EXPECT_CONTAINS(folder.read("a.svg"), "other");
 }
 
+TEST(Figure, PanelsShowTheSamePartOfTheirXAxis) {
+  const TemporaryFolder folder;
+  Figure figure = figure_of({"long", {1, 1000}, {1, 2}});
+  figure.panels[0].marks.clear();
+  figure.panels.push_back({"short", {{"", {1, 10}, {1, 2}}}, {}});
+  write_figure(figure, folder / "a.svg");
+  EXPECT_CONTAINS(folder.read("a.svg"), "> 900<") << "the numbers stand under the short one";
+  figure.log_x = true;
+  write_figure(figure, folder / "log.svg");
+  EXPECT_CONTAINS(folder.read("log.svg"), ">3<");
+}
+
 TEST(Figure, ValuesThatAreNotFiniteAreGaps) {
   const TemporaryFolder folder;
   write_figure(figure_of({"", {0, 1, 2, 3, nan, 5}, {1, nan, infinity, 2, 3, -infinity}}),
@@ -52,6 +64,54 @@ TEST(Figure, ValuesThatAreNotFiniteAreGaps) {
   write_figure(figure_of({"", {0, 1, 2}, {4, 4, 4}}), folder / "level.svg");
   write_figure(figure_of({"", {1}, {1e300}}), folder / "point.svg");
   EXPECT_EQ(folder.entries(), 3u);
+}
+
+TEST(Figure, LogarithmicAxesShowWhatIsAboveZero) {
+  const TemporaryFolder folder;
+  Figure figure = figure_of({"error", {1, 10, 100, 1000, -1}, {1e-9, 0, -3, 1e-3, 1}, false, true});
+  figure.panels[0].marks.clear();
+  figure.panels[0].log_y = figure.log_x = true;
+  write_figure(figure, folder / "both.svg");
+  const std::string both = folder.read("both.svg");
+  // Powers of ten: the exponent is a text of its own.
+  for (const char* text : {">10<", ">-8<", ">-4<", ">3<"}) EXPECT_CONTAINS(both, text);
+  figure.panels.push_back({"linear", {line}, {}});
+  write_figure(figure, folder / "one.svg");
+  EXPECT_CONTAINS(folder.read("one.svg"), ">-8<");
+  EXPECT_CONTAINS(folder.read("one.svg"), "> 2.5<");
+  figure.panels = {{"within a decade", {{"", {1, 2}, {2e-7, 3e-7}}}, {}, std::nullopt, true}};
+  write_figure(figure, folder / "narrow.svg");
+  for (const char* text : {">-7<", ">-6<"}) EXPECT_CONTAINS(folder.read("narrow.svg"), text);
+  figure.panels = {{"nothing above 0", {{"", {1, 2}, {0, -1}}}, {}, std::nullopt, true}};
+  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(figure, folder / "none.svg"); }),
+                  "could not draw");
+}
+
+TEST(Figure, TheLegendMayStandBesideTheCurves) {
+  const TemporaryFolder folder;
+  Figure figure = figure_of(line);
+  write_figure(figure, folder / "over.svg");
+  figure.legend_beside = true;
+  write_figure(figure, folder / "beside.svg");
+  EXPECT_NE(folder.read("over.svg"), folder.read("beside.svg"));
+  EXPECT_CONTAINS(folder.read("beside.svg"), ">line<");
+}
+
+TEST(Figure, PointsAreMarked) {
+  const TemporaryFolder folder;
+  Series marked = line;
+  marked.points = true;
+  write_figure(figure_of(line), folder / "line.svg");
+  write_figure(figure_of(marked), folder / "points.svg");
+  const auto marks_of = [&](const char* name) {
+    const std::string svg = folder.read(name);
+    std::size_t count = 0;
+    for (std::size_t at = svg.find("#gpPt6"); at != std::string::npos; at = svg.find("#gpPt6", at + 1))
+      ++count;
+    return count;
+  };
+  EXPECT_EQ(marks_of("line.svg"), 0u);
+  EXPECT_EQ(marks_of("points.svg"), 4u) << "three values and the legend";
 }
 
 TEST(Figure, OtherEndingsMissingFoldersAndNothingToDrawAreRefused) {

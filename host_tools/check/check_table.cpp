@@ -1,0 +1,148 @@
+#include "host_tools/check/check_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "host_tools/device/value_text.hpp"
+
+namespace kmax::check {
+
+using control::Criterion;
+
+namespace {
+std::string number(double value) {
+  if (is_infinite(value)) return "unbounded";
+  return std::abs(value) >= 1e4 && std::abs(value) < 1e7 ? fmt::format("{:.0f}", value)
+                                                         : fmt::format("{:.4g}", value);
+}
+
+std::string margin_text(const std::optional<double>& margin) {
+  if (!margin) return "-";
+  const double percent = 100 * *margin;
+  return std::abs(percent) < 1000 ? fmt::format("{:+.0f} %", percent)
+         : percent > 0            ? "> 1000 %"
+                                  : "< -1000 %";
+}
+
+std::string case_text(const control::StabilityCase<double>& c, const std::string& hand) {
+  std::string text = fmt::format("wall    K {:g} N/m, B {:g} N s/m", c.stiffness, c.wall_damping);
+  if (c.magnetic_coefficient > 0)
+    text +=
+        fmt::format(", F_MC up to {:g} N over x_0 {:g} mm", c.magnetic_coefficient, c.magnetic_length * 1e3);
+  text += fmt::format("\nloop    T {:.4g} ms, T_d {:.4g} ms, quantum {:.4g} mm, force limit {:g} N\n",
+                      c.period * 1e3, c.delay * 1e3, c.quantum * 1e3, c.force_limit);
+  text += fmt::format("device  m {:g} kg, b {:g} N s/m, f_c {:g} N\n", c.mass, c.damping, c.friction);
+  text += fmt::format("hand    {}", hand);
+  if (c.hand.hand_mass > 0)
+    text += fmt::format(": grip {:g} N/m {:g} N s/m, mass {:g} kg, arm {:g} N/m {:g} N s/m",
+                        c.hand.grip_stiffness, c.hand.grip_damping, c.hand.hand_mass, c.hand.arm_stiffness,
+                        c.hand.arm_damping);
+  const auto known = [](double value, const char* unit) {
+    return value > 0 ? fmt::format("{:g} {}", value, unit) : std::string("not known");
+  };
+  return text + fmt::format("; F_h {}, v {}\n", known(c.operator_force, "N"), known(c.operator_speed, "m/s"));
+}
+
+std::string row(const Verdict& verdict) {
+  const control::CriterionResult<double>& result = verdict.result;
+  const CriterionText& text = text_of(result.criterion);
+  if (!result.applies) {
+    const std::string why = text.needs.empty() ? "there is no wall" : fmt::format("needs {}", text.needs);
+    return fmt::format("  {:<20} not judged: {}\n", text.name(), why);
+  }
+  return fmt::format("  {:<20} {:>10} {:<2} {:>10}  {:<4} {:>9}  {}\n", text.name(), number(result.value),
+                     text.relation, number(result.bound), text.unit, margin_text(verdict.margin),
+                     result.pass ? "met" : "NOT MET");
+}
+
+std::string changes_text(const std::vector<Change>& changes, bool facts) {
+  std::string text;
+  for (const Change& change : changes) {
+    if (change.fact == facts) text += (text.empty() ? "" : ", or ") + text_of(change);
+  }
+  return text;
+}
+
+std::string remedies(const Judgement& judgement) {
+  std::string text;
+  const auto add = [&text](std::string_view name, const std::vector<Change>& changes) {
+    const std::string settings = changes_text(changes, false), facts = changes_text(changes, true);
+    constexpr std::string_view indent = "                       ";
+    const std::string first = wrapped(settings.empty() ? "no single setting" : settings, indent);
+    text += fmt::format("  {:<20} {}", name, std::string_view(first).substr(indent.size()));
+    if (!facts.empty()) text += wrapped("if the device or the operator is so: " + facts, indent);
+  };
+  for (const Verdict& verdict : judgement.verdicts) {
+    if (!verdict.result.pass) add(text_of(verdict.result.criterion).name(), verdict.changes);
+  }
+  if (text.empty()) return "";
+  if (std::count_if(judgement.verdicts.begin(), judgement.verdicts.end(),
+                    [](const Verdict& verdict) { return !verdict.result.pass; }) > 1)
+    add("all of them", judgement.changes);
+  return "\nWhat would meet them, each change by itself:\n" + text;
+}
+
+std::string conclusion(const Judgement& judgement) {
+  const auto of = [&judgement](Criterion criterion) -> const control::CriterionResult<double>& {
+    return judgement.verdicts[static_cast<std::size_t>(criterion)].result;
+  };
+  const control::CriterionResult<double>&exact = of(Criterion::sampled_eigenvalues),
+        &gil = of(Criterion::gil);
+  const bool guaranteed = judgement.pass_of(Worth::guarantee);
+  const bool held = judgement.stability_case.hand.hand_mass > 0;
+  std::string text = judgement.pass ? "pass: every criterion that applies is met. "
+                                    : "no pass: a pass takes every criterion that applies. ";
+  if (!gil.applies && !exact.applies) return "\n" + text + "There is no wall.\n";
+  if (!exact.pass)
+    text += held ? "The linear loop is unstable with this hand: expect vibration, unless friction stops it. "
+                 : "The linear loop is unstable with nobody at the handle: expect vibration there, unless "
+                   "friction "
+                   "stops it; a hand may hold it still (--hand). ";
+  else if (!exact.applies)
+    text += "The exact loop could not be judged: no mass, or a delay of more than 8 periods. ";
+  else if (!guaranteed)
+    text += "Nothing is guaranteed, and the linear loop is stable: try it, with a low force.limit first. ";
+  else
+    text += "Stable with every passive hand, as far as the assumptions hold ('kmax check --explain'). ";
+  if (exact.pass && held && gil.applies && !gil.pass) text += "Let go inside the wall, it may vibrate. ";
+  if (!(judgement.stability_case.damping > 0) && !guaranteed)
+    text += "guard.damping is 0: without a measured b no wall is guaranteed (docs/stability_check.md). ";
+  if (judgement.follows_velocity) text += "Not judged: how the adaptive law's field follows the velocity. ";
+  text.pop_back();
+  return "\n" + wrapped(text, "");
+}
+
+std::string region_text(const control::StabilityCase<double>& c) {
+  using control::DiolaitiRegion;
+  if (!(c.stiffness > 0)) return "";
+  const double speed = control::escape_speed(c.stiffness, c.damping, c.friction, c.period, c.quantum);
+  const std::string_view name = words_of(region_of(c));
+  return fmt::format(
+      "  region of Diolaiti: {}{}\n", name,
+      speed > 0 && !is_infinite(speed) ? fmt::format(", at rest again from below {:.3g} m/s", speed) : "");
+}
+}  // namespace
+
+std::string text_of(const Change& change) {
+  return fmt::format("{} {} {}", change.parameter.name(), change.at_least ? "at least" : "at most",
+                     device::value_with_unit(change.parameter, std::bit_cast<std::uint32_t>(change.value)));
+}
+
+std::string judgement_text(const Judgement& judgement, const std::string& hand) {
+  std::string text = case_text(judgement.stability_case, hand);
+  text += fmt::format("\n  {:<20} {:>10}    {:>10}  {:<4} {:>9}  {}\n", "criterion", "value", "bound", "unit",
+                      "margin", "verdict");
+  for (const Worth worth : {Worth::guarantee, Worth::necessary, Worth::heuristic}) {
+    text += fmt::format("{} ({})\n", name_of(worth), meaning_of(worth));
+    for (const Verdict& verdict : judgement.verdicts) {
+      if (text_of(verdict.result.criterion).worth == worth) text += row(verdict);
+    }
+  }
+  text += region_text(judgement.stability_case);
+  return text + remedies(judgement) + conclusion(judgement);
+}
+
+}  // namespace kmax::check

@@ -1,0 +1,183 @@
+#include "host_tools/check/criterion_text.hpp"
+
+#include <fmt/format.h>
+
+#include "firmware/object_dictionary/axis_groups.hpp"
+
+namespace kmax::check {
+
+using control::Criterion;
+
+namespace {
+constexpr std::array<CriterionText, control::criterion_count> texts{{
+    {Criterion::colgate, Worth::guarantee, "N/m", "K", "<", "(b - |B|) / (T/2 + T_d)",
+     "A rigid device of mass m and damping b, a spring and damper wall whose damper uses the difference of "
+     "two "
+     "positions, a zero-order hold. The hand may be anything passive; friction, quantization and the hand's "
+     "own "
+     "damping are not counted on, so most walls in use fail it and are still. The delay is added to half a "
+     "period to first order; a b that is only measured at low speed may be smaller at the rate of the loop.",
+     "",
+     "J. E. Colgate and G. G. Schenkel, Passivity of a class of sampled-data systems: application to haptic "
+     "interfaces, J. Robotic Systems 14(1), 1997."},
+    {Criterion::gil, Worth::heuristic, "N/m", "K", "<", "(b + B) / (T/2 + T_d)",
+     "An estimate, in closed form, of where the linear loop with nobody at the handle turns unstable: close "
+     "while "
+     "(b + B)(T + T_d)/m is well below 1, and off to either side beyond. sampled_eigenvalues is exact, and "
+     "has "
+     "the hand. Friction and quantization are left out.",
+     "",
+     "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche and G. Hirzinger, Stability boundary for haptic "
+     "rendering: "
+     "influence of damping and delay, J. Computing and Information Science in Engineering 9(1), 2009."},
+    {Criterion::sampled_eigenvalues, Worth::necessary, "N/m", "K", "<",
+     "the smallest K at which an eigenvalue of the sampled loop leaves the unit circle",
+     "Exact for the linear model: m, b, the hand of --hand, zero-order hold, wall damper by difference, "
+     "delay. "
+     "Without friction, quantization, the wall's one-sidedness and the field. Friction may hold "
+     "still what it calls unstable; a hand that grips otherwise moves the limit, often several times.",
+     "a device.mass and a delay of at most 8 periods",
+     "K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, chapter on sampling of continuous-time "
+     "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012."},
+    {Criterion::abbott_okamura, Worth::guarantee, "N/m", "K", "<=", "min(2 b / T, 2 f_c / quantum)",
+     "A spring wall without damper or delay on a mass with Coulomb and viscous friction whose encoder has "
+     "this "
+     "quantum; any hand. Necessary and sufficient for passivity of that wall; for this device a guarantee "
+     "only "
+     "as far as T_d is short against T and B is 0: read it together with colgate.",
+     "",
+     "J. J. Abbott and A. M. Okamura, Effects of position quantization and sampling rate on virtual-wall "
+     "passivity, IEEE Trans. Robotics 21(5), 2005."},
+    {Criterion::diolaiti, Worth::heuristic, "m/s", "v, the operator's speed", "<", "f_c / (K T/2 - b)",
+     "Where viscous damping is too small for the spring (K T/2 > b), Coulomb friction still stops what moves "
+     "slower than the escape speed; 0 when friction is too small for the quantum (f_c < K quantum / 2). From "
+     "the energies of one period, without delay and with nobody holding it: the regions are the source's, "
+     "the "
+     "escape speed is derived from the same balance.",
+     "guard.operator_speed",
+     "N. Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, Stability of haptic rendering: "
+     "discretization, "
+     "quantization, time delay, and Coulomb effects, IEEE Trans. Robotics 22(2), 2006."},
+    {Criterion::resolution, Worth::heuristic, "N", "K max(quantum, v T)", "<=", "F_h, the operator's force",
+     "Quasi-static: the step of force that one quantum, or the depth reached before the wall is noticed, "
+     "makes "
+     "must not exceed what the operator holds against. The wall counts as noticed one whole period late, the "
+     "worst case. It says nothing of dynamics and is no passivity condition.",
+     "guard.operator_force", "Paper 2, on position resolution and stability, eqs. 2 to 7."},
+    {Criterion::resolution_speed, Worth::heuristic, "m/s", "v, the operator's speed", "<=", "F_h / (K T)",
+     "The same estimate solved for the speed: an upper bound, for an approach noticed one whole period late.",
+     "guard.operator_force and guard.operator_speed", "Paper 2, eq. 8."},
+    {Criterion::field_slope, Worth::guarantee, "N/m", "2 F_MC / x_0", "<", "(b - |B|) / (T/2 + T_d)",
+     "The magnetic field is steepest at the surface; there it is a spring of 2 F_MC / x_0, to which colgate "
+     "applies as to the wall's own. It is often stiffer than the wall. F_MC is the largest that the law can "
+     "command; that the adaptive law changes it with the velocity is not counted.",
+     "a wall.law with a field",
+     "Colgate and Schenkel 1997 with the slope of eq. 5 of paper 1, on impedance tuning."},
+    {Criterion::saturation_depth, Worth::heuristic, "m", "(force limit - F_MC) / K", ">=", "3 quanta",
+     "Deeper than this the force is clipped: a wall that saturates within three encoder steps is a switch "
+     "between no force and all of it, and what is then found to be 'stable' is bounded by the clip.",
+     "force.limit above 0 and a wall with stiffness", "A rule of this project."},
+}};
+
+constexpr bool in_order() {
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (static_cast<std::size_t>(texts[i].criterion) != i) return false;
+    if (firmware::names::guard_criterion[i].value != static_cast<std::int32_t>(i)) return false;
+  }
+  return std::size(firmware::names::guard_criterion) == texts.size();
+}
+static_assert(in_order());
+
+}  // namespace
+
+std::string wrapped(std::string_view text, std::string_view indent) {
+  constexpr std::size_t width = 110;
+  std::string out, line(indent);
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    if (line.size() > indent.size() && line.size() + 1 + end > width) {
+      out += line + '\n';
+      line = indent;
+    }
+    if (line.size() > indent.size()) line += ' ';
+    line += text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return out + line + '\n';
+}
+
+std::string_view CriterionText::name() const {
+  return firmware::names::guard_criterion[static_cast<std::size_t>(criterion)].name;
+}
+
+const std::array<CriterionText, control::criterion_count>& all_criteria() {
+  return texts;
+}
+
+const CriterionText& text_of(Criterion criterion) {
+  return texts.at(static_cast<std::size_t>(criterion));
+}
+
+std::optional<Criterion> criterion_of(std::string_view name) {
+  for (const CriterionText& text : texts) {
+    if (text.name() == name) return text.criterion;
+  }
+  return std::nullopt;
+}
+
+std::string criterion_names() {
+  std::string names;
+  for (const CriterionText& text : texts) names += (names.empty() ? "" : ", ") + std::string(text.name());
+  return names;
+}
+
+std::string_view name_of(Worth worth) {
+  switch (worth) {
+    case Worth::guarantee:
+      return "guarantee";
+    case Worth::necessary:
+      return "necessary";
+    case Worth::heuristic:
+      break;
+  }
+  return "heuristic";
+}
+
+std::string_view meaning_of(Worth worth) {
+  switch (worth) {
+    case Worth::guarantee:
+      return "met: stable with every passive hand; not met: nothing is proven, most walls in use do not meet "
+             "it";
+    case Worth::necessary:
+      return "not met: the loop without friction is unstable; met: friction, steps or another hand still "
+             "decide";
+    case Worth::heuristic:
+      break;
+  }
+  return "estimates and rules of thumb: met or not, they prove neither";
+}
+
+std::string_view symbols_text() {
+  return "  K, B     stiffness and damping of the wall            wall.stiffness, wall.damping\n"
+         "  F_MC     largest magnetic coefficient of the law      wall.magnetic_coefficient, "
+         "wall.adaptive_*\n"
+         "  x_0      length of the field                          wall.magnetic_length\n"
+         "  T        period of the haptic loop                    1 / haptic.rate\n"
+         "  T_d      from a command to its force                  guard.delay + 1 / current.bandwidth\n"
+         "  quantum  step of the position in use                  encoder count, position.resolution\n"
+         "  m        mass at the handle                           device.mass\n"
+         "  b, f_c   viscous damping and Coulomb friction of it   guard.damping, guard.friction\n"
+         "  F_h, v   force and speed of the operator; 0: unknown  guard.operator_force, "
+         "guard.operator_speed\n";
+}
+
+std::string explanation(Criterion criterion) {
+  const CriterionText& text = text_of(criterion);
+  std::string out = fmt::format("{} ({})\n", text.name(), name_of(text.worth));
+  out += wrapped(fmt::format("{} {} {}   [{}]", text.value, text.relation, text.bound, text.unit), "  ");
+  if (!text.needs.empty()) out += wrapped(fmt::format("Judged only with {}.", text.needs), "  ");
+  out += wrapped(text.assumptions, "  ");
+  return out + wrapped(fmt::format("Source: {}", text.source), "  ");
+}
+
+}  // namespace kmax::check

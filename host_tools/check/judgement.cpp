@@ -1,0 +1,89 @@
+#include "host_tools/check/judgement.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "host_tools/check/change_search.hpp"
+
+namespace kmax::check {
+
+using control::CriterionResult;
+using firmware::ParameterValues;
+
+bool is_infinite(double number) {
+  return !(number < std::numeric_limits<double>::max());
+}
+
+std::optional<double> margin_of(const CriterionResult<double>& result) {
+  if (!result.applies || is_infinite(result.value) || is_infinite(result.bound)) return std::nullopt;
+  constexpr double most = 1e6;
+  const double above = result.at_least ? result.value - result.bound : result.bound - result.value;
+  if (above == 0) return 0.0;
+  if (result.bound <= 0) return above > 0 ? most : -most;
+  return std::clamp(above / result.bound, -most, most);
+}
+
+namespace {
+bool met(const CriterionResult<double>& result) {
+  return result.applies && result.pass;
+}
+}  // namespace
+
+bool Judgement::pass_of(Worth worth) const {
+  return std::all_of(verdicts.begin(), verdicts.end(), [worth](const Verdict& verdict) {
+    return verdict.result.pass || text_of(verdict.result.criterion).worth != worth;
+  });
+}
+
+control::DiolaitiRegion region_of(const control::StabilityCase<double>& c) {
+  return control::diolaiti_region(c.stiffness, c.damping, c.friction, c.period, c.quantum);
+}
+
+std::string_view words_of(control::DiolaitiRegion region) {
+  switch (region) {
+    case control::DiolaitiRegion::passive:
+      return "passive";
+    case control::DiolaitiRegion::limit_cycle:
+      return "limit cycle";
+    case control::DiolaitiRegion::locally_stable:
+      return "locally stable";
+    case control::DiolaitiRegion::unstable:
+      break;
+  }
+  return "unstable";
+}
+
+Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
+                           const control::Hand<double>& hand) {
+  Judgement judgement{parameter_case(values, axis, hand), {}, true, {}, false};
+  judgement.follows_velocity =
+      values.choice<control::WallKind, "wall.law">(axis) == control::WallKind::adaptive;
+  std::vector<control::Criterion> failed;
+  for (std::size_t i = 0; i < control::criterion_count; ++i) {
+    const auto criterion = static_cast<control::Criterion>(i);
+    Verdict& verdict = judgement.verdicts[i];
+    verdict.result = control::judge(criterion, judgement.stability_case);
+    verdict.margin = margin_of(verdict.result);
+    if (verdict.result.pass) continue;
+    failed.push_back(criterion);
+    verdict.changes = find_changes(values, axis, [&](const ParameterValues& changed) {
+      // A criterion that is only switched off is not met.
+      return met(control::judge(criterion, parameter_case(changed, axis, hand)));
+    });
+  }
+  judgement.pass = failed.empty();
+  if (failed.size() > 1) {
+    judgement.changes = find_changes(values, axis, [&](const ParameterValues& changed) {
+      const auto c = parameter_case(changed, axis, hand);
+      // What fails now is the likeliest to fail again.
+      for (const control::Criterion criterion : failed) {
+        if (!met(control::judge(criterion, c))) return false;
+      }
+      const auto results = control::judge_all(c);
+      return std::all_of(results.begin(), results.end(), [](const auto& result) { return result.pass; });
+    });
+  }
+  return judgement;
+}
+
+}  // namespace kmax::check

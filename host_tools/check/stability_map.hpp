@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "control/stability_criteria.hpp"
+#include "firmware/parameter_values.hpp"
+#include "host_tools/device/parameter.hpp"
+
+namespace kmax::check {
+
+/// The values of one parameter along one side of a map.
+struct MapAxis {
+  device::Parameter parameter;
+  double from, to;
+  bool logarithmic = false;
+  std::size_t points = 60;
+
+  double at(std::size_t i) const;
+};
+
+/// "wall.stiffness=0.1N/mm..10N/mm:log,80": NAME=FROM..TO, then :log for equal ratios, then ,POINTS
+/// (2 .. 1000, 60 without). FROM and TO with units as `kmax set` takes them, within the parameter's range,
+/// FROM below TO, above 0 for log. Errors: device::ValueError that says what is allowed; also for parameters
+/// that are no real numbers, or only read.
+MapAxis parse_map_axis(std::string_view text, std::size_t default_axis);
+
+using Results = std::array<control::CriterionResult<double>, control::criterion_count>;
+
+/// All criteria at every point of two parameters.
+struct StabilityMap {
+  MapAxis x, y;
+  std::vector<Results> results;  ///< y.points rows of x.points
+
+  const Results& at(std::size_t column, std::size_t row) const { return results[row * x.points + column]; }
+};
+
+/// Rules between parameters (haptic.rate divides 20000 Hz) are not asked for: the map is of the criteria.
+/// Throws device::ValueError if both sides are the same parameter.
+StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t axis,
+                           const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y);
+
+/// One row per point: the two parameters, whether all criteria pass, and each criterion; 1 passes, 0 fails,
+/// empty where it does not apply. Throws std::runtime_error if the file cannot be written.
+void write_map_csv(const StabilityMap& map, const std::filesystem::path& path);
+
+/// Draws where each criterion's bound runs, the regions between, and the present set as a point. False if
+/// that lies outside of the map. Throws plot::FigureError.
+bool write_map_picture(const StabilityMap& map, const firmware::ParameterValues& values,
+                       const std::string& hand, const std::filesystem::path& path);
+
+}  // namespace kmax::check

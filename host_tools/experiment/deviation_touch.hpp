@@ -1,0 +1,34 @@
+#pragma once
+// A touch on two axes of a device while parameters are switched: the wall is on one axis, the trace is of the
+// other one, which lies along the surface. watched_touch.hpp has the touch on one axis and says what keeps a
+// person safe; the same holds here. Both axes are armed for the touch, and disarmed however it ends.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/experiment/watched_touch.hpp"
+
+namespace kmax::experiment {
+
+struct TimedChange {
+  double time;                           ///< s after the touch
+  std::vector<std::string> assignments;  ///< NAME=VALUE, a name without prefix is on the wall's axis
+};
+
+struct TwoAxisTouch {
+  std::vector<device::TraceSample> samples;  ///< of the axis along the surface; time 0 is the touch
+  std::vector<double> change_times;          ///< s after the touch, of those changes that were made
+  double contact_share = 0.0;  ///< of the looks at the wall's axis, five a second, that saw it touched
+  double limited_share = 0.0;  ///< of the haptic samples, on the axis that was limited more
+  std::uint64_t lost_records = 0;
+  std::optional<double> aborted_at;  ///< s after the touch
+};
+
+/// `watch`: the wall's axis; hold_time is the whole touch; an oscillation of the other axis beyond
+/// abort_amplitude ends it. `changes` in order of time; each is made at the first look after its time (20 ms
+/// and a request), and when it was made is returned. Errors: as watch_touch(), device::ValueError.
+TwoAxisTouch watch_two_axes(device::Device& device, const TouchWatch& watch,
+                            const std::vector<TimedChange>& changes, const Tell& tell);
+
+}  // namespace kmax::experiment

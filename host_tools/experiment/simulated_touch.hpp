@@ -1,0 +1,78 @@
+#pragma once
+// One touch of a simulated wall: a person approaches, presses, holds and lets go, and the hold is judged as
+// contact_measure.hpp judges it. The controller is the firmware's own haptic loop in float
+// (control/haptic_loop.hpp), sampled at its rate with its force held in between; the encoder is ideal; the
+// handle and the person are those of coupled_handle.hpp. What the firmware does beside the loop (states,
+// trips, soft start, motor) has no part in a touch that went well and is not run: `kmax simulate` runs all of
+// it and gives the same positions (tests/host_tools/experiment/simulated_touch_test.cpp).
+//
+// The person answers with activation and push to the background force: the field, and the background force of
+// the interference where it acts everywhere (paper 1, eq. 2).
+//
+// Judged are the true positions at the haptic samples, which is what an encoder without quantum would give.
+//
+// Cost: one haptic tick and one CoupledHandle::advance() per sample. A touch ends as soon as its verdict is
+// certain: unless told otherwise, one that is still in a quarter of the judged window is not simulated to the
+// window's end.
+
+#include <memory>
+#include <vector>
+
+#include "control/haptic_loop.hpp"
+#include "host_tools/simulation/contact_measure.hpp"
+#include "host_tools/simulation/coupled_handle.hpp"
+#include "host_tools/simulation/integrator_config.hpp"
+
+namespace kmax::experiment {
+
+// The haptic loop as the papers' experiments have it at `rate` Hz (SI units): surface at 0 with free space
+// above, no soft start, no trip, the force clipped at `force_limit` N (0: not clipped).
+control::HapticLoopConfig<float> touched_wall(double rate, double count_length, double force_limit);
+
+// Bits of the activation that a table of many touches keeps: at most 0.1 % of g, which shifts the largest stable
+// stiffness by less than 0.01 N/mm (propagator_table.hpp gives the slope). A table of 12 bits is larger than the
+// processor's cache, and takes twice as long.
+inline constexpr int study_gain_bits = 9;
+
+struct TouchSetup {
+  simulation::DeviceModel device;  // force_limit: the device's own clip; keep it as the loop's
+  simulation::OperatorModel person;
+  simulation::IntendedMotionConfig motion;
+  simulation::IntegratorConfig integrator;
+  // For many touches of one person with one device, one after the other: propagator_table.hpp. May be null.
+  std::shared_ptr<simulation::PropagatorTable> matrices;
+  control::HapticLoopConfig<float> wall = touched_wall(500.0, 0.055e-3, 3.3);
+  double window = 1.0;          // s, the end of the hold that is judged
+  double threshold = 0.165e-3;  // m peak to peak
+  // N peak to peak. Above 0: judged is the force asked for, by the same rule, instead of the position. A
+  // stiff wall on a coarse encoder swings by newtons while the handle moves by less than a count.
+  double force_threshold = 0.0;
+};
+
+struct TouchSample {
+  double time;                  // s
+  double position;              // m, true
+  double velocity;              // m/s, true
+  double hand_position;         // m
+  double force;                 // N, asked for
+  double background_force;      // N, what the person answers to
+  double magnetic_coefficient;  // N
+};
+
+struct TouchOutcome {
+  simulation::ContactVerdict verdict = simulation::ContactVerdict::no_contact;
+  double peak_to_peak = 0.0;            // m (N with a force threshold), over what was simulated of the window
+  double deepest = 0.0;                 // m, in it
+  double saturated_share = 0.0;         // of the samples since the first contact: force limited or clipped
+  double contact_speed = 0.0;           // m/s, true, towards the wall at the first sample inside
+  double coefficient_at_contact = 0.0;  // N, F_MC there
+  std::uint64_t samples = 0;            // haptic samples simulated
+  std::uint64_t event_limit_hits = 0;   // coupled_handle.hpp; 0 unless a friction event could not be resolved
+  bool unstable() const { return verdict == simulation::ContactVerdict::unstable; }
+};
+
+// `recording`: every sample is appended, and the touch is simulated to the end of its hold. Throws
+// std::invalid_argument for models or settings out of range.
+TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* recording = nullptr);
+
+}  // namespace kmax::experiment

@@ -1,0 +1,73 @@
+#pragma once
+// A touch of a wall on a device, watched by the host while it lasts: what every experiment on a device does
+// between two changes of its parameters.
+//
+// Who holds the handle stands outside the wall; the axis is armed, the touch is awaited, the hold is traced,
+// the axis is disarmed. It is disarmed however this ends. What keeps a person safe meanwhile, from the
+// fastest: the device's own limits and trips (force.limit, velocity.limit); link.timeout, which removes the
+// force when this program or its link dies; the host, which disarms when the handle oscillates more than it
+// should (abort_amplitude). protective_assignments() sees to the first two.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "host_tools/device/device.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/trace_reader.hpp"
+#include "host_tools/simulation/contact_measure.hpp"
+
+namespace kmax::experiment {
+
+/// Nobody came to the wall in time. Worth another try, which no other error of a touch is.
+class NobodyTouched : public device::DeviceError {
+ public:
+  using device::DeviceError::DeviceError;
+};
+
+struct TouchWatch {
+  std::size_t axis = 0;
+  std::string name;                ///< what is touched, for whoever is told
+  double hold_time = 3.0;          ///< s from the first touch
+  double contact_patience = 10.0;  ///< s from arming to the first touch
+  /// m; an oscillation larger than this ends the touch. 0: none does. Watched from the first touch until the
+  /// hold is over; the host sees it 20 to 100 ms after it has happened, by the link.
+  double abort_amplitude = 0.0;
+  double abort_window = 0.25;  ///< s
+};
+
+struct WatchedTouch {
+  std::vector<device::TraceSample> samples;  ///< from arming on; time 0 is the first touch
+  double surface = 0, side = 1;              ///< m; wall.position and wall.side
+  double limited_share = 0;                  ///< of the haptic samples since arming
+  std::uint64_t lost_records = 0;
+  std::optional<double> aborted_at;  ///< s from the first touch
+  double aborted_amplitude = 0;      ///< m, of what it was aborted for
+};
+
+using Tell = std::function<void(const std::string&)>;
+
+/// Sets nothing; wall and law must be what they should be. `tell`: progress, called about five times a second
+/// with a short text; what it throws ends the touch.
+///
+/// Errors: NobodyTouched; device::DeviceError (a fault with its words, a trace that stops, an axis that
+/// cannot be armed or disarmed), link::LinkError.
+WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell);
+
+/// The share of `window` seconds before the last one of these samples that goes both ways: the smaller one of
+/// the largest rise and the largest fall, m. An oscillation's peak to peak; nearly 0 for a handle that is
+/// taken away or sinks in.
+double oscillation(std::span<const device::TraceSample> samples, double window);
+
+/// The touch by contact_measure.hpp's rule over the last second of the hold (all of a shorter one). A touch
+/// that was aborted is unstable, with the amplitude that it was aborted for.
+simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_time, double threshold);
+
+/// What the device should have set before anybody is asked to touch a wall: force.limit, lowered to
+/// `force_limit` N if it is above, and link.timeout, if that is off or longer than 1 s.
+std::vector<std::string> protective_assignments(device::Device& device, std::size_t axis, double force_limit);
+
+}  // namespace kmax::experiment

@@ -1,0 +1,277 @@
+// kmax check.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <bit>
+
+#include "firmware/parameter_rules.hpp"
+#include "host_tools/check/check_table.hpp"
+#include "host_tools/check/hand_choice.hpp"
+#include "host_tools/check/judgement.hpp"
+#include "host_tools/check/stability_map.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/device/suggestion.hpp"
+#include "host_tools/device/value_text.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/output_file.hpp"
+#include "host_tools/plot/map_figure.hpp"
+
+namespace kmax::cli {
+
+using check::CriterionText;
+using check::MapAxis;
+using check::Verdict;
+using device::Parameter;
+
+namespace {
+struct CheckOptions {
+  std::vector<std::string> assignments, sides, explained;
+  std::string hand = "none", picture, csv;
+  bool explain = false;
+};
+
+std::size_t slot_of(const Parameter& parameter) {
+  return firmware::slot_of(parameter.entry(), parameter.axis());
+}
+
+/// The device's parameters, as far as they are judged or asked for, with those of --set in their place.
+firmware::ParameterValues values_of(Context& context, const CheckOptions& options,
+                                    const std::vector<MapAxis>& sides) {
+  const auto assignments = device::parse_assignments(options.assignments, context.axis());
+  std::vector<Parameter> read = check::case_parameters(context.axis());
+  for (const auto& assignment : assignments) {
+    if (std::find(read.begin(), read.end(), assignment.parameter) == read.end())
+      context.note(fmt::format("{} is not judged by any criterion of axis {}", assignment.parameter.name(),
+                               context.axis()));
+  }
+  for (const MapAxis& side : sides) {
+    if (std::find(read.begin(), read.end(), side.parameter) != read.end()) continue;
+    context.note(fmt::format("{} changes no criterion of axis {}: the map is the same all along it",
+                             side.parameter.name(), context.axis()));
+    read.push_back(side.parameter);
+  }
+  firmware::ParameterValues values;
+  device::Device device = context.connect();
+  const auto raw = device.read(read);
+  for (std::size_t i = 0; i < read.size(); ++i) values.set_raw(slot_of(read[i]), raw[i]);
+  for (const auto& assignment : assignments) values.set_raw(slot_of(assignment.parameter), assignment.raw);
+  if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
+    throw device::ValueError(std::string(firmware::words_of(broken.refusal)));
+  return values;
+}
+
+Json finite_or_null(double number) {
+  return check::is_infinite(number) ? Json(nullptr) : Json(number);
+}
+
+Json changes_json(const std::vector<check::Change>& changes) {
+  Json all = Json::array();
+  for (const check::Change& change : changes)
+    all.push_back({{"parameter", change.parameter.name()},
+                   {"value", device::shortest_double(change.value)},
+                   {"unit", std::string(change.parameter.definition().unit)},
+                   {"at_least", change.at_least},
+                   {"only_if_true", change.fact}});
+  return all;
+}
+
+Json verdict_json(const Verdict& verdict) {
+  const auto& result = verdict.result;
+  const CriterionText& text = check::text_of(result.criterion);
+  return {{"name", std::string(text.name())},
+          {"value", result.applies ? finite_or_null(result.value) : Json(nullptr)},
+          {"bound", result.applies ? finite_or_null(result.bound) : Json(nullptr)},
+          {"unit", std::string(text.unit)},
+          {"margin", verdict.margin ? Json(*verdict.margin) : Json(nullptr)},
+          {"pass", result.pass},
+          {"applies", result.applies},
+          {"at_least", result.at_least},
+          {"worth", std::string(check::name_of(text.worth))},
+          {"changes", changes_json(verdict.changes)}};
+}
+
+Json judgement_json(const check::Judgement& judgement, const std::string& hand) {
+  const auto& c = judgement.stability_case;
+  Json criteria = Json::array();
+  for (const Verdict& verdict : judgement.verdicts) criteria.push_back(verdict_json(verdict));
+  Json worths = Json::object();
+  for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
+    worths[std::string(check::name_of(worth))] = judgement.pass_of(worth);
+  return {{"pass", judgement.pass},
+          {"pass_by_worth", worths},
+          {"criteria", criteria},
+          {"changes", changes_json(judgement.changes)},
+          {"diolaiti_region", std::string(check::words_of(check::region_of(c)))},
+          {"case",
+           {{"stiffness_n_per_m", c.stiffness},
+            {"wall_damping_n_s_per_m", c.wall_damping},
+            {"magnetic_coefficient_n", c.magnetic_coefficient},
+            {"magnetic_length_m", c.magnetic_length},
+            {"period_s", c.period},
+            {"delay_s", c.delay},
+            {"quantum_m", c.quantum},
+            {"mass_kg", c.mass},
+            {"damping_n_s_per_m", c.damping},
+            {"friction_n", c.friction},
+            {"operator_force_n", c.operator_force},
+            {"operator_speed_m_per_s", c.operator_speed},
+            {"force_limit_n", c.force_limit},
+            {"hand", hand}}}};
+}
+
+int judge_set(Context& context, const CheckOptions& options) {
+  const check::HandChoice hand = check::choose_hand(options.hand);
+  const firmware::ParameterValues values = values_of(context, options, {});
+  const check::Judgement judgement = check::judge_parameters(values, context.axis(), hand.hand);
+  if (context.json) {
+    context.print(judgement_json(judgement, hand.name));
+  } else {
+    context.out << check::judgement_text(judgement, hand.name);
+  }
+  return judgement.pass ? done : verdict_is_no;
+}
+
+int draw_map(Context& context, const CheckOptions& options) {
+  if (options.sides.size() != 2)
+    throw UsageError(
+        fmt::format("a map has two sides: give --map twice, not {}",
+                    options.sides.size() == 1 ? "once" : fmt::format("{} times", options.sides.size())));
+  if (options.picture.empty() && options.csv.empty())
+    throw UsageError("--map needs --picture FILE.svg, --csv FILE, or both");
+  std::vector<MapAxis> sides;
+  for (const std::string& side : options.sides) sides.push_back(check::parse_map_axis(side, context.axis()));
+  if (sides[0].parameter == sides[1].parameter)
+    throw UsageError(fmt::format("--map: both sides are {}; name two parameters", sides[0].parameter.name()));
+  if (!options.picture.empty()) plot::require_picture_name(options.picture);
+  if (!options.csv.empty()) check_writable(options.csv);
+  const check::HandChoice hand = check::choose_hand(options.hand);
+  const firmware::ParameterValues values = values_of(context, options, sides);
+  const check::StabilityMap map = check::map_stability(values, context.axis(), hand.hand, sides[0], sides[1]);
+  if (!options.csv.empty()) check::write_map_csv(map, options.csv);
+  if (!options.picture.empty() && !check::write_map_picture(map, values, hand.name, options.picture))
+    context.note("the present parameters lie outside the map and are not marked");
+
+  Json passing = Json::object();
+  passing["all"] = std::count_if(map.results.begin(), map.results.end(), [](const check::Results& results) {
+    return std::all_of(results.begin(), results.end(), [](const auto& result) { return result.pass; });
+  });
+  for (const CriterionText& text : check::all_criteria())
+    passing[std::string(text.name())] =
+        std::count_if(map.results.begin(), map.results.end(), [&text](const check::Results& results) {
+          const auto& result = results[static_cast<std::size_t>(text.criterion)];
+          return result.applies && result.pass;
+        });
+  if (context.json) {
+    context.print({{"points", map.results.size()},
+                   {"points_that_pass", passing},
+                   {"picture", options.picture.empty() ? Json(nullptr) : Json(options.picture)},
+                   {"csv", options.csv.empty() ? Json(nullptr) : Json(options.csv)}});
+    return done;
+  }
+  fmt::print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
+             map.results.size());
+  for (const std::string& file : {options.picture, options.csv}) {
+    if (!file.empty()) fmt::print(context.out, "{}\n", file);
+  }
+  return done;
+}
+
+int explain(Context& context, const std::vector<std::string>& names) {
+  std::vector<control::Criterion> chosen;
+  for (const std::string& name : names) {
+    if (name.empty()) continue;  // --explain alone
+    const auto criterion = check::criterion_of(name);
+    if (!criterion)
+      throw UsageError(fmt::format("--explain: there is no criterion '{}'; criteria are {}", name,
+                                   check::criterion_names()));
+    chosen.push_back(*criterion);
+  }
+  const bool everything = chosen.empty();
+  if (everything) {
+    for (const CriterionText& text : check::all_criteria()) chosen.push_back(text.criterion);
+  }
+  if (context.json) {
+    Json all = Json::array();
+    for (const control::Criterion criterion : chosen) {
+      const CriterionText& text = check::text_of(criterion);
+      all.push_back({{"name", std::string(text.name())},
+                     {"worth", std::string(check::name_of(text.worth))},
+                     {"value", std::string(text.value)},
+                     {"relation", std::string(text.relation)},
+                     {"bound", std::string(text.bound)},
+                     {"unit", std::string(text.unit)},
+                     {"needs", std::string(text.needs)},
+                     {"assumptions", std::string(text.assumptions)},
+                     {"source", std::string(text.source)}});
+    }
+    context.print({{"criteria", all}});
+    return done;
+  }
+  for (const control::Criterion criterion : chosen)
+    fmt::print(context.out, "{}\n", check::explanation(criterion));
+  if (!everything) return done;
+  for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
+    fmt::print(context.out, "{}: {}\n", check::name_of(worth), check::meaning_of(worth));
+  fmt::print(context.out, "\n{}", check::symbols_text());
+  return done;
+}
+
+int run_check(Context& context, const CheckOptions& options) {
+  if (options.explain) {
+    if (!options.sides.empty()) throw UsageError("--explain and --map do not go together");
+    return explain(context, options.explained);
+  }
+  if (!options.sides.empty()) return draw_map(context, options);
+  if (!options.picture.empty() || !options.csv.empty())
+    throw UsageError("--picture and --csv are of a map: give --map NAME=FROM..TO twice");
+  return judge_set(context, options);
+}
+}  // namespace
+
+void add_check_command(CLI::App& app, Context& context) {
+  auto* command = add_command(
+      app, context,
+      {"check", "Judges by stability criteria whether the wall of a parameter set will hold still.",
+       "  kmax check                                 the device's parameters\n"
+       "  kmax check --set guard.damping=0.5 --set wall.stiffness=2N/mm --hand subject_1\n"
+       "  kmax check --explain colgate               formula, assumptions, source; without a name, of all\n"
+       "  kmax check --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log --picture "
+       "map.svg\n\n"
+       "Sets nothing. 'pass' takes every criterion that applies; most walls in use are without a guarantee "
+       "and\n"
+       "still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.\n"
+       "See docs/stability_check.md. Exit code of a map: 0."});
+  auto options = std::make_shared<CheckOptions>();
+  command
+      ->add_option("--set", options->assignments,
+                   "Parameter to judge in place of the device's; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->take_all();
+  command
+      ->add_option("--hand", options->hand,
+                   "Who holds the handle: none (default), subject_1, or a TOML file with an [operator] table")
+      ->type_name("HAND");
+  command
+      ->add_option("--map", options->sides,
+                   "Side of a map, twice: a parameter over a range, 60 points; :log for equal ratios")
+      ->type_name("NAME=FROM..TO[:log][,POINTS]")
+      ->take_all();
+  command->add_option("--picture", options->picture, "Map as .svg or .png")->type_name("FILE");
+  command->add_option("--csv", options->csv, "Map as a table: which criteria pass at every point")
+      ->type_name("FILE");
+  auto* explained =
+      command
+          ->add_option("--explain", options->explained,
+                       "Shows formula, assumptions and source of criteria, and does nothing else")
+          ->type_name("[CRITERION]")
+          ->expected(0, -1);
+  command->callback([&context, options, explained] {
+    options->explain = explained->count() > 0;
+    context.action = [&context, options] { return run_check(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,198 @@
+// kmax experiment max-stiffness.
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <memory>
+
+#include "host_tools/experiment/stiffness_studies.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/max_stiffness_options.hpp"
+
+namespace kmax::cli {
+
+std::string key_of(const experiment::StiffnessCondition& condition) {
+  if (!condition.adaptive) return fmt::format("{:g}", condition.magnetic_coefficient);
+  switch (condition.mode) {
+    case control::AdaptiveMode::latched:
+      return "latched";
+    case control::AdaptiveMode::peak_hold:
+      return "peak_hold";
+    default:
+      return "instant";
+  }
+}
+
+std::vector<experiment::StiffnessCondition> conditions_for(const std::vector<std::string>& keys) {
+  const auto all = experiment::stiffness_conditions();
+  std::vector<std::string> names;
+  for (const auto& condition : all) names.push_back(key_of(condition));
+  for (const std::string& key : keys) {
+    if (std::find(names.begin(), names.end(), key) == names.end())
+      throw UsageError(
+          fmt::format("--conditions {}: there is no such wall; allowed are {}", key, fmt::join(names, ", ")));
+  }
+  std::vector<experiment::StiffnessCondition> chosen;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (keys.empty() || std::find(keys.begin(), keys.end(), names[i]) != keys.end()) chosen.push_back(all[i]);
+  }
+  return chosen;
+}
+
+Json condition_json(const experiment::StiffnessCondition& condition, double stiffness,
+                    const std::vector<double>& subjects, const std::string& name) {
+  return {
+      {"name", name.empty() ? condition.name : name},
+      {"magnetic_coefficient_n", condition.adaptive ? Json(nullptr) : Json(condition.magnetic_coefficient)},
+      {"adaptive", condition.adaptive},
+      {"max_stiffness_n_per_m", stiffness},
+      {"subjects", subjects},
+      {"paper_n_per_m", condition.paper ? Json(*condition.paper) : Json(nullptr)}};
+}
+
+namespace {
+using Options = std::vector<CLI::Option*>;
+
+/// What has no meaning here is refused, rather than passed over.
+void require_none(const Options& options, const char* why) {
+  for (const CLI::Option* option : options) {
+    if (option->count() > 0) throw UsageError(fmt::format("{} {}", option->get_name(), why));
+  }
+}
+
+std::string study_names() {
+  std::string names;
+  for (const experiment::StudyName& study : experiment::stiffness_studies)
+    names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", study.name, study.what);
+  return names;
+}
+
+Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
+  auto* group = command.add_option_group("Simulated people", "Without --device");
+  return {
+      group
+          ->add_option("--subjects", options.subjects,
+                       "People and device: a TOML file, 'clipped' or 'unclipped'; else as --clip says")
+          ->type_name("FILE"),
+      group
+          ->add_option(
+              "--clip", options.clip,
+              "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, "
+              "whose gamma was fitted to it; on, unless --subjects says otherwise")
+          ->check(CLI::IsMember({"on", "off", "both"})),
+      group->add_option("--seed", options.seed,
+                        "Draw other people with this seed; not fitted unless --calibrate"),
+      group->add_flag(
+          "--calibrate", options.calibrate,
+          "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out"),
+      group
+          ->add_option(
+              "--study", options.studies,
+              fmt::format("What the numbers come from and how far they hold, as more sections: {} or "
+                          "all (a quarter of an hour)",
+                          study_names()))
+          ->delimiter(',')
+          ->type_name("LIST"),
+      group->add_option("--jobs", options.jobs, "Searches at a time; all processors without it")
+          ->check(CLI::Range(1, 4096)),
+  };
+}
+
+Options add_device_options(CLI::App& command, MaxStiffnessOptions& options) {
+  auto* group = command.add_option_group("Device", "With --device");
+  experiment::DeviceStiffnessSettings& device = options.device;
+  const auto stiffness = finite_number() & CLI::Range(1.0, 1e6);
+  Options added = {
+      group->add_option("--start", device.start, "First stiffness, N/m")
+          ->check(stiffness)
+          ->capture_default_str(),
+      group->add_option("--start-adaptive", device.start_adaptive, "First stiffness of adaptive walls, N/m")
+          ->check(stiffness)
+          ->capture_default_str(),
+      group->add_option("--step", device.step, "Step, N/m")->check(stiffness)->capture_default_str(),
+      group->add_option("--last", device.last, "The search ends there, N/m")
+          ->check(stiffness)
+          ->capture_default_str(),
+      group->add_option("--trials", device.trials, "Touches at each stiffness; one unstable touch decides")
+          ->check(CLI::Range(1, 1000))
+          ->capture_default_str(),
+      group->add_option("--rate", device.touch.haptic_rate, "Rate of the haptic loop, Hz")
+          ->capture_default_str(),
+      group
+          ->add_option("--hold", device.touch.hold_time, "Time from the first touch to the end of judging, s")
+          ->check(finite_number() & CLI::Range(1.0, 60.0))
+          ->capture_default_str(),
+      group
+          ->add_option("--threshold", device.touch.threshold,
+                       "Peak to peak above which a wall is unstable, m")
+          ->check(finite_number() & CLI::Range(1e-9, 1.0))
+          ->capture_default_str(),
+      group->add_option("--patience", device.touch.contact_patience, "Time from arming to the first touch, s")
+          ->check(finite_number() & CLI::Range(1.0, 600.0))
+          ->capture_default_str(),
+      group->add_flag("--no-prompt", options.no_prompt,
+                      "Ask nobody: for a device with a simulated person ('kmax serve')"),
+  };
+  add_safety_options(*group, device.touch.force_limit, device.touch.abort_amplitude);
+  for (const char* name : {"--force-limit", "--abort-amplitude"}) added.push_back(group->get_option(name));
+  return added;
+}
+}  // namespace
+
+void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
+  auto* command = add_command(
+      experiment, context,
+      {"max-stiffness",
+       "Looks for the largest stiffness of a wall that stays stable, under each law (paper 1, Figs. 6 and "
+       "8).",
+       "  kmax experiment max-stiffness                                  twelve simulated people, seconds\n"
+       "  kmax experiment max-stiffness --clip both --out results        a page with tables and pictures\n"
+       "  kmax experiment max-stiffness --clip both --study causes       where the gain at 2 N comes from\n"
+       "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results\n"
+       "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume\n\n"
+       "Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each "
+       "mode.\n"
+       "Simulated people touch each stiffness at several speeds with several pushes. On a device you are "
+       "told what "
+       "to do:\n"
+       "before each touch take the handle out of the wall and press Enter, then press against the wall until "
+       "the "
+       "time is\n"
+       "over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on "
+       "Ctrl-C; "
+       "its\n"
+       "parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from "
+       "there.\n"
+       "Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a "
+       "device,\n"
+       "2 N or an adaptive wall does not allow more than the plain wall."});
+  auto options = std::make_shared<MaxStiffnessOptions>();
+  command->add_option("--conditions", options->conditions, "Walls: 0,0.5,1,1.5,2,instant,latched,peak_hold")
+      ->delimiter(',')
+      ->type_name("LIST");
+  command->add_option("--out", options->folder, "Folder for a page, pictures, CSV and the journal")
+      ->type_name("DIR");
+  command->add_flag("--resume", options->resume, "Go on with the interrupted run in --out");
+  command->add_option("--format", options->ending, "Kind of picture")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
+      ->type_name("svg|png");
+  const Options of_model = add_model_options(*command, *options);
+  const Options of_device = add_device_options(*command, *options);
+  command->callback([&context, options, of_model, of_device] {
+    context.action = [&context, options, of_model, of_device] {
+      if (options->resume && options->folder.empty())
+        throw UsageError("--resume goes on with the run in a folder: name it with --out");
+      const Interruption interruption;
+      if (context.simulated()) {
+        require_none(of_device, "is for a device; name one with --device");
+        return run_model_max_stiffness(context, *options, interruption);
+      }
+      require_none(of_model, "is for simulated people; leave --device out");
+      return run_device_max_stiffness(context, *options, interruption);
+    };
+  });
+}
+
+}  // namespace kmax::cli

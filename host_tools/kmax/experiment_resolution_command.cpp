@@ -1,0 +1,242 @@
+// kmax experiment resolution.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <map>
+
+#include "host_tools/experiment/resolution_report.hpp"
+#include "host_tools/experiment/subject_set.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+#include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/report/terminal_text.hpp"
+
+namespace kmax::cli {
+namespace {
+
+struct ResolutionOptions {
+  experiment::ResolutionSettings simulated;
+  experiment::ResolutionDeviceSettings device;
+  std::vector<double> speeds;
+  int touches = 0;
+  std::string subjects, folder, ending = ".svg", rounding = "nearest";
+  bool no_prompt = false;
+};
+
+class ResolutionInterrupted : public std::runtime_error {
+ public:
+  ResolutionInterrupted() : std::runtime_error("interrupted; nothing is armed") {}
+};
+
+control::Rounding rounding_of(const std::string& name) {
+  if (name == "floor") return control::Rounding::floor;
+  return name == "hysteresis" ? control::Rounding::hysteresis : control::Rounding::nearest;
+}
+
+experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& options,
+                                     const Interruption& interruption) {
+  experiment::ResolutionSettings settings = options.simulated;
+  settings.wall.rounding = rounding_of(options.rounding);
+  if (!options.speeds.empty()) settings.speeds = options.speeds;
+  if (options.touches > 0) settings.touches = options.touches;
+  std::vector<simulation::OperatorModel> people(1);
+  if (!options.subjects.empty()) {
+    people.clear();
+    for (const experiment::Subject& subject : experiment::open_subject_set(options.subjects).subjects)
+      people.push_back(subject.person);
+  }
+  Progress progress(context.messages());
+  try {
+    return experiment::study_resolution(settings, people, [&](std::size_t done, std::size_t all) {
+      if (interruption.requested()) throw ResolutionInterrupted();
+      progress.show(
+          fmt::format("{:.0f} % done", 100.0 * static_cast<double>(done) / static_cast<double>(all)));
+    });
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
+experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,
+                                    const Interruption& interruption) {
+  experiment::ResolutionDeviceSettings settings = options.device;
+  settings.axis = context.axis();
+  settings.wall = options.simulated.wall;
+  settings.wall.rounding = rounding_of(options.rounding);
+  if (!options.speeds.empty()) settings.speeds = options.speeds;
+  if (options.touches > 0) settings.touches = options.touches;
+  device::Device device = context.connect();
+  const auto check_interruption = [&] {
+    if (interruption.requested()) throw ResolutionInterrupted();
+  };
+  TerminalPrompter prompter(context, check_interruption);
+  Progress progress(context.messages());
+  const experiment::ResolutionDeviceResult result = experiment::run_resolution_on_device(
+      device, settings, options.no_prompt ? nullptr : &prompter, [&](const std::string& text) {
+        check_interruption();
+        progress.show(text);
+      });
+  experiment::ResolutionStudy study;
+  study.wall = settings.wall;
+  study.origin = report::Origin::measured;
+  study.runs = {{{}, result.cells}};
+  std::size_t aborted = 0;
+  for (const bool one : result.aborted) aborted += one ? 1 : 0;
+  study.circumstances = fmt::format(
+      "Measured on {}: {} touches, {} of them aborted because the handle swung too far, wall of {:g} N/mm at "
+      "{:g} Hz, "
+      "force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
+      device.description(), result.cells.size(), aborted, settings.wall.stiffness / 1000,
+      settings.wall.haptic_rate, result.force_limit, result.lost_records);
+  return study;
+}
+
+Json verdict_json(const experiment::ResolutionVerdict& verdict) {
+  return {{"coarse_vibrates_at_every_speed", verdict.coarse_vibrates},
+          {"fine_is_still_below_onset", verdict.fine_is_still},
+          {"fine_vibrates_above_onset", verdict.fine_vibrates_fast},
+          {"onset_from_resolution",
+           verdict.onset_from_resolution ? Json(*verdict.onset_from_resolution) : Json(nullptr)},
+          {"claim_met", verdict.claim_met()}};
+}
+
+Json run_json(const experiment::ResolutionRun& run, bool simulated) {
+  Json cells = Json::array();
+  for (const experiment::ResolutionCell& cell : run.cells)
+    cells.push_back({{"resolution_m", cell.resolution},
+                     {"step_m", cell.step},
+                     {"speed_m_per_s", cell.speed},
+                     {"vibrates", cell.judged() ? Json(cell.vibrates()) : Json(nullptr)},
+                     {"touches", cell.touches},
+                     {"unstable_touches", cell.unstable},
+                     {"peak_to_peak_m", cell.peak_to_peak},
+                     {"force_step_n", cell.force_step}});
+  Json document = Json::object();
+  if (simulated) document = {{"grip", run.hand.grip}, {"delay_s", run.hand.delay}};
+  document["cells"] = std::move(cells);
+  document["verdict"] = verdict_json(experiment::judge_resolution(run.cells));
+  return document;
+}
+
+int run_resolution_experiment(Context& context, const ResolutionOptions& options) {
+  const Interruption interruption;
+  // Before anybody presses anything.
+  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  const bool simulated = context.simulated();
+  const experiment::ResolutionStudy study =
+      simulated ? simulate(context, options, interruption) : measure(context, options, interruption);
+  std::vector<std::filesystem::path> files;
+  if (!options.folder.empty()) files = experiment::write_resolution(study, options.folder, options.ending);
+  const experiment::ResolutionVerdict verdict = study.verdict();
+  const int code = verdict.claim_met() ? done : verdict_is_no;
+  if (context.json) {
+    Json runs = Json::array(), variations = Json::array(), names = Json::array();
+    for (const experiment::ResolutionRun& run : study.runs) runs.push_back(run_json(run, simulated));
+    for (const experiment::ResolutionVariation& one : study.variations)
+      variations.push_back({{"changed_to", one.change}, {"verdict", verdict_json(one.verdict)}});
+    for (const auto& file : files) names.push_back(file.string());
+    context.print({{"origin", std::string(report::words_of(study.origin))},
+                   {"circumstances", study.circumstances},
+                   {"stiffness_n_per_m", study.wall.stiffness},
+                   {"runs", runs},
+                   {"verdict", verdict_json(verdict)},
+                   {"variations", variations},
+                   {"files", names}});
+    return code;
+  }
+  for (const std::string& words : experiment::resolution_words(study))
+    fmt::print(context.out, "{}\n\n", words);
+  fmt::print(context.out, "{}\n{}\n", report::terminal_text(experiment::resolution_table(study)),
+             report::terminal_text(experiment::resolution_claims_table(study)));
+  if (!study.variations.empty())
+    fmt::print(context.out, "{}\n", report::terminal_text(experiment::resolution_variations_table(study)));
+  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  return code;
+}
+}  // namespace
+
+void add_resolution_experiment(CLI::App& experiment, Context& context) {
+  auto* command = add_command(
+      experiment, context,
+      {"resolution",
+       "Touches a wall with coarser and coarser positions and sees what vibrates (paper 2, section 3).",
+       "  kmax experiment resolution                                  a simulated hand, takes seconds\n"
+       "  kmax experiment resolution --grip 1 --delay 0               a firm hand and no delay: nothing "
+       "vibrates\n"
+       "  kmax experiment resolution --out results                    with pictures and a page\n"
+       "  kmax experiment resolution --device serial:/dev/ttyUSB0     somebody's own hand\n\n"
+       "The paper finds that a wall of 1.2 N/mm vibrates at steps of 0.4 mm, and at 0.1 mm only when it is "
+       "touched\n"
+       "faster than 0.1 m/s. On a device you are told before each touch what to do; the force limit is "
+       "lowered, each\n"
+       "touch is disarmed at its end and when the handle swings too far, and all parameters are put back, on "
+       "Ctrl-C\n"
+       "too.\n"
+       "Exit code 3: one of the two did not come out."});
+  auto options = std::make_shared<ResolutionOptions>();
+  experiment::ResolutionSettings& simulated = options->simulated;
+  command->add_option("--stiffness", simulated.wall.stiffness, "Stiffness of the wall, N/m")
+      ->check(finite_number() & CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--rate", simulated.wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none")
+      ->check(finite_number() & CLI::Range(100.0, 20000.0))
+      ->capture_default_str();
+  command->add_option("--hold", simulated.wall.hold, "Time from the touch to the end of judging, s")
+      ->check(finite_number() & CLI::Range(1.0, 60.0))
+      ->capture_default_str();
+  command->add_option("--threshold", simulated.wall.threshold, "Peak to peak above which a wall vibrates, m")
+      ->check(finite_number() & CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  command->add_option("--rounding", options->rounding, "How positions are re-sampled")
+      ->check(CLI::IsMember({"nearest", "floor", "hysteresis"}))
+      ->capture_default_str();
+  command->add_option("--speeds", options->speeds, "Speeds of the touch, m/s; else some from 0.02 to 0.5")
+      ->delimiter(',')
+      ->check(finite_number() & CLI::Range(0.001, 5.0));
+  command->add_option("--touches", options->touches, "Touches per speed (and push); else 4, on a device 1")
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--out", options->folder, "Folder for CSV, pictures and a page")->type_name("DIR");
+  command->add_option("--format", options->ending, "Kind of picture")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
+      ->type_name("svg|png");
+
+  auto* people = command->add_option_group("Simulated", "Without --device");
+  people
+      ->add_option("--subjects", options->subjects,
+                   "People: a file, 'clipped' or 'unclipped'; else subject 1")
+      ->type_name("SET");
+  people->add_option("--grip", simulated.weak.grip, "Factor of the grip's stiffness and damping")
+      ->check(finite_number() & CLI::Range(0.01, 10.0))
+      ->capture_default_str();
+  people->add_option("--delay", simulated.weak.delay, "From a command to its force, s")
+      ->check(finite_number() & CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  people->add_option("--friction", simulated.device.friction, "Coulomb friction of the handle, N")
+      ->check(finite_number() & CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  people->add_option("--pushes", simulated.pushes, "Static pushes, N; a wall vibrates when it does with any")
+      ->delimiter(',')
+      ->check(finite_number() & CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  people->add_option("--clip", simulated.device.force_limit, "Largest force of the device, N; 0: no limit")
+      ->check(finite_number() & CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+
+  auto* device = command->add_option_group("Device", "With --device");
+  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
+  device->add_flag("--no-prompt", options->no_prompt, "Ask nobody: a simulated person needs no asking");
+  device->add_option("--patience", options->device.patience, "Time to come to the wall, s")
+      ->check(finite_number() & CLI::Range(1.0, 600.0))
+      ->capture_default_str();
+  command->callback([&context, options] {
+    context.action = [&context, options] { return run_resolution_experiment(context, *options); };
+  });
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,185 @@
+#include "host_tools/check/parameter_case.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "firmware/stability_guard.hpp"
+
+namespace kmax::check {
+namespace {
+using firmware::ParameterValues;
+
+void set_law(ParameterValues& values, control::WallKind law, std::size_t axis = 0) {
+  values.set_whole<"wall.law">(static_cast<std::uint32_t>(law), axis);
+}
+
+TEST(ParameterCase, EveryNumberComesFromItsParameter) {
+  ParameterValues values;
+  set_law(values, control::WallKind::magnetic);
+  values.set_real<"wall.stiffness">(2500);
+  values.set_real<"wall.damping">(0.5f);
+  values.set_real<"wall.magnetic_coefficient">(1.5f);
+  values.set_real<"wall.magnetic_length">(0.002f);
+  values.set_real<"haptic.rate">(500);
+  values.set_real<"current.bandwidth">(2000);
+  values.set_real<"guard.delay">(0.004f);
+  values.set_real<"device.mass">(0.06f);
+  values.set_real<"guard.damping">(0.25f);
+  values.set_real<"guard.friction">(0.125f);
+  values.set_real<"guard.operator_force">(0.75f);
+  values.set_real<"guard.operator_speed">(0.375f);
+  values.set_real<"force.limit">(5);
+  const auto c = parameter_case(values, 0, {0.2, 500, 2, 100, 9});
+  EXPECT_EQ(c.stiffness, 2500);
+  EXPECT_EQ(c.wall_damping, 0.5);
+  EXPECT_EQ(c.magnetic_coefficient, 1.5);
+  EXPECT_FLOAT_EQ(static_cast<float>(c.magnetic_length), 0.002f);
+  EXPECT_EQ(c.period, 0.002);
+  EXPECT_NEAR(c.delay, 0.0045, 1e-9);
+  EXPECT_NEAR(c.mass, 0.06, 1e-8);
+  EXPECT_EQ(c.damping, 0.25);
+  EXPECT_EQ(c.friction, 0.125);
+  EXPECT_EQ(c.operator_force, 0.75);
+  EXPECT_EQ(c.operator_speed, 0.375);
+  EXPECT_EQ(c.detection_share, 1);
+  EXPECT_EQ(c.force_limit, 5);
+  EXPECT_EQ(c.hand.hand_mass, 0.2);
+  EXPECT_EQ(c.hand.arm_damping, 9);
+}
+
+TEST(ParameterCase, TheFieldIsTheLargestThatTheLawCanCommand) {
+  ParameterValues values;
+  values.set_real<"wall.magnetic_coefficient">(7);
+  set_law(values, control::WallKind::plain);
+  EXPECT_EQ(parameter_case(values, 0).magnetic_coefficient, 0);
+  set_law(values, control::WallKind::magnetic);
+  EXPECT_EQ(parameter_case(values, 0).magnetic_coefficient, 7);
+  set_law(values, control::WallKind::adaptive);
+  EXPECT_EQ(parameter_case(values, 0).magnetic_coefficient, 2) << "the interval's end";
+  values.set_real<"wall.adaptive_force_max">(50);
+  EXPECT_NEAR(parameter_case(values, 0).magnetic_coefficient, 3.2, 1e-6) << "eq. 7 at V_max";
+  values.set_real<"wall.adaptive_gain">(0);
+  values.set_real<"wall.adaptive_offset">(0);
+  EXPECT_NEAR(parameter_case(values, 0).magnetic_coefficient, 0.8, 1e-6) << "the interval's beginning";
+  set_law(values, control::WallKind::none);
+  EXPECT_EQ(parameter_case(values, 0).magnetic_coefficient, 0);
+}
+
+TEST(ParameterCase, WithoutALawThereIsNoWall) {
+  ParameterValues values;
+  values.set_real<"wall.damping">(1);
+  set_law(values, control::WallKind::none);
+  const auto c = parameter_case(values, 0);
+  EXPECT_EQ(c.stiffness, 0);
+  EXPECT_EQ(c.wall_damping, 0);
+}
+
+TEST(ParameterCase, TheQuantumIsAWholeNumberOfCounts) {
+  ParameterValues values;
+  values.set_real<"device.transmission">(0.05f);
+  values.set_whole<"encoder.counts_per_turn">(1000);
+  const double count = 2 * std::acos(-1.0) * static_cast<double>(0.05f) / 1000;
+  const auto quantum = [&values](float resolution) {
+    values.set_real<"position.resolution">(resolution);
+    return parameter_case(values, 0).quantum;
+  };
+  EXPECT_DOUBLE_EQ(quantum(0), count);
+  EXPECT_DOUBLE_EQ(quantum(1e-5f), count) << "finer than the encoder";
+  EXPECT_DOUBLE_EQ(quantum(1e-3f), 3 * count) << "3.18 counts";
+}
+
+TEST(ParameterCase, AnAxisIsItsOwn) {
+  ParameterValues values;
+  set_law(values, control::WallKind::plain, 1);
+  values.set_real<"wall.stiffness">(4000, 1);
+  values.set_real<"haptic.rate">(1000, 1);
+  EXPECT_EQ(parameter_case(values, 1).stiffness, 4000);
+  EXPECT_EQ(parameter_case(values, 1).period, 0.001);
+  EXPECT_EQ(parameter_case(values, 0).stiffness, 1000);
+}
+
+// What is listed is what is read: any other parameter of the axis may take any value without a change.
+TEST(ParameterCase, TheListedParametersAreThoseThatCount) {
+  for (const std::size_t axis : {std::size_t{0}, std::size_t{1}}) {
+    const auto& listed = case_parameters(axis);
+    for (const device::Parameter& parameter : device::all_parameters()) {
+      if (!parameter.writable()) continue;
+      bool changes = false;
+      for (const auto law :
+           {control::WallKind::plain, control::WallKind::magnetic, control::WallKind::adaptive}) {
+        ParameterValues values;
+        set_law(values, law, axis);
+        values.set_real<"position.resolution">(0.001f, axis);
+        // Wide enough for gain and offset to show.
+        for (const float widest : {2.0f, 50.0f}) {
+          values.set_real<"wall.adaptive_force_max">(widest, axis);
+          for (const float offset : {0.0f, 0.8f}) {
+            values.set_real<"wall.adaptive_offset">(offset, axis);
+            values.set_real<"wall.adaptive_gain">(offset * 3, axis);
+            ParameterValues changed = values;
+            const std::size_t slot = firmware::slot_of(parameter.entry(), parameter.axis());
+            const auto& entry = parameter.definition();
+            const double middle = entry.values.empty() ? 0.5 * entry.minimum + 0.5 * entry.maximum : 0;
+            changed.set_raw(
+                slot, firmware::raw_from_number(
+                          entry.type, entry.type == firmware::Type::float32 ? middle : std::trunc(middle)));
+            const auto a = parameter_case(values, axis), b = parameter_case(changed, axis);
+            changes = changes || a.stiffness != b.stiffness || a.wall_damping != b.wall_damping ||
+                      a.magnetic_coefficient != b.magnetic_coefficient ||
+                      a.magnetic_length != b.magnetic_length || a.period != b.period || a.delay != b.delay ||
+                      a.quantum != b.quantum || a.mass != b.mass || a.damping != b.damping ||
+                      a.friction != b.friction || a.operator_force != b.operator_force ||
+                      a.operator_speed != b.operator_speed || a.force_limit != b.force_limit;
+          }
+        }
+      }
+      const bool is_listed = std::find(listed.begin(), listed.end(), parameter) != listed.end();
+      EXPECT_EQ(changes, is_listed) << parameter.name() << " for axis " << axis;
+    }
+  }
+}
+
+// The device's own check before arming must not be of another case than the one that is explained here.
+RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
+  ParameterValues values;
+  const std::size_t axis = *rc::gen::inRange<std::size_t>(0, 2);
+  for (const device::Parameter& parameter : case_parameters(axis)) {
+    const firmware::Entry& entry = parameter.definition();
+    const std::size_t slot = firmware::slot_of(parameter.entry(), parameter.axis());
+    if (entry.type == firmware::Type::float32 && *rc::gen::arbitrary<bool>()) {
+      const double share = *rc::gen::inRange(0, 1001) * 1e-3;
+      values.set_raw(slot,
+                     firmware::raw_from_number(
+                         entry.type, entry.minimum + std::pow(share, 8) * (entry.maximum - entry.minimum)));
+    }
+  }
+  set_law(
+      values,
+      *rc::gen::element(control::WallKind::plain, control::WallKind::magnetic, control::WallKind::adaptive),
+      axis);
+  const auto here = parameter_case(values, axis);
+  const auto there = firmware::stability_case(values, axis);
+  const auto same = [](double a, float b) {
+    return std::abs(a - static_cast<double>(b)) <= 1e-6 * std::max(std::abs(a), 1e-9);
+  };
+  RC_ASSERT(same(here.stiffness, there.stiffness));
+  RC_ASSERT(same(here.wall_damping, there.wall_damping));
+  RC_ASSERT(same(here.magnetic_coefficient, there.magnetic_coefficient));
+  RC_ASSERT(same(here.magnetic_length, there.magnetic_length));
+  RC_ASSERT(same(here.period, there.period));
+  RC_ASSERT(same(here.delay, there.delay));
+  RC_ASSERT(same(here.quantum, there.quantum));
+  RC_ASSERT(same(here.mass, there.mass));
+  RC_ASSERT(same(here.damping, there.damping));
+  RC_ASSERT(same(here.friction, there.friction));
+  RC_ASSERT(same(here.operator_force, there.operator_force));
+  RC_ASSERT(same(here.operator_speed, there.operator_speed));
+  RC_ASSERT(same(here.force_limit, there.force_limit));
+  RC_ASSERT(here.detection_share == static_cast<double>(there.detection_share));
+}
+
+}  // namespace
+}  // namespace kmax::check

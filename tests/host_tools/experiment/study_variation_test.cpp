@@ -1,0 +1,55 @@
+#include "host_tools/experiment/study_variation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/host_tools/experiment/quick_study.hpp"
+
+namespace kmax::experiment {
+namespace {
+
+TEST(StudyVariation, VariesOneThingAtATime) {
+  const auto variations = assumption_variations(few_people(2), {});
+  ASSERT_GT(variations.size(), 15U);
+  EXPECT_EQ(variations.front().group, "none");
+  for (const StudyVariation& variation : variations) {
+    const bool threshold = variation.protocol.threshold != TouchProtocol{}.threshold;
+    const bool pushes = variation.protocol.pushes != TouchProtocol{}.pushes;
+    const bool speeds = variation.protocol.approach_speeds != TouchProtocol{}.approach_speeds;
+    const bool device = variation.set.device.mass != 0.045 || variation.set.device.damping != 0.05 ||
+                        variation.set.device.delay != 0.0;
+    const bool integrator = variation.integrator.kind != simulation::IntegratorKind::exact;
+    const int changed = threshold + pushes + speeds + device + integrator;
+    EXPECT_EQ(changed, variation.group == "none" ? 0 : 1) << variation.name;
+  }
+  const auto draws = draw_variations(few_people(2), {}, 25);
+  EXPECT_EQ(draws.size(), 25U);
+  EXPECT_NE(draws[0].set.subjects[0].person.hand_mass, draws[24].set.subjects[0].person.hand_mass);
+}
+
+TEST(StudyVariation, CountsWhatHolds) {
+  VariationResult rises;
+  rises.means = {1, 2, 3, 4, 9000, 8000, 2, 2};
+  VariationResult falls;
+  falls.means = {5000, 4000, 3, 4, 5, 1, 1, 1};
+  const auto findings = findings_of({rises, falls});
+  EXPECT_EQ(findings[0].holds, 1U);
+  EXPECT_EQ(findings[0].of, 2U);
+  EXPECT_EQ(findings[1].holds, 1U);  // above plain
+  EXPECT_EQ(findings[2].holds, 2U);  // below 2 N
+  EXPECT_EQ(findings[3].holds, 1U);  // 8.02
+}
+
+TEST(StudyVariation, RunsWithWhatItSays) {
+  StudyVariation coarse{"coarse", "threshold", false, few_people(2), quick_run().protocol};
+  coarse.protocol.threshold = 5e-3;  // nothing moves that far
+  StudyVariation as_is{"as is", "none", false, few_people(2), quick_run().protocol};
+  StiffnessRun run = quick_run();
+  run.steps.last = 12e3;
+  const auto results = run_variations({as_is, coarse}, paper_targets(), run);
+  ASSERT_EQ(results.size(), 2U);
+  ASSERT_EQ(results[0].means.size(), stiffness_conditions().size());
+  EXPECT_GT(results[1].means[0], results[0].means[0]);
+}
+
+}  // namespace
+}  // namespace kmax::experiment

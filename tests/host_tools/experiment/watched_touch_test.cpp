@@ -1,0 +1,203 @@
+#include "host_tools/experiment/watched_touch.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tests/host_tools/experiment/touched_board.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::experiment {
+namespace {
+using device::TraceSample;
+using host_tools_test::thrown_message;
+using simulation::ContactVerdict;
+
+std::vector<TraceSample> path(const std::vector<double>& positions, double interval = 0.002) {
+  std::vector<TraceSample> samples;
+  for (const double position : positions)
+    samples.push_back({static_cast<double>(samples.size()) * interval, position, 0, 0});
+  return samples;
+}
+
+TEST(Oscillation, OfWhatGoesOneWayIsNone) {
+  EXPECT_EQ(oscillation({}, 1.0), 0.0);
+  EXPECT_EQ(oscillation(path({1.0}), 1.0), 0.0);
+  EXPECT_EQ(oscillation(path({0, 1, 1, 2, 5, 9}), 1.0), 0.0);
+  EXPECT_EQ(oscillation(path({9, 5, 2, 1, 1, 0}), 1.0), 0.0);
+}
+
+TEST(Oscillation, IsTheSmallerWayOfBoth) {
+  EXPECT_EQ(oscillation(path({0, 5, 3}), 1.0), 2.0);
+  EXPECT_EQ(oscillation(path({5, 0, 3}), 1.0), 3.0);
+  EXPECT_EQ(oscillation(path({0, 5, 0, 5}), 1.0), 5.0);
+  // A drift that is larger than the oscillation on it.
+  EXPECT_EQ(oscillation(path({0, 3, 2, 5, 4, 7, 6}), 1.0), 1.0);
+}
+
+TEST(Oscillation, SeesTheWindowOnly) {
+  const auto samples = path({0, 9, 0, 1, 0, 1, 1, 1, 1});
+  EXPECT_EQ(oscillation(samples, 1.0), 9.0);
+  EXPECT_EQ(oscillation(samples, 0.0101), 1.0);
+  EXPECT_EQ(oscillation(samples, 0.0081), 0.0);
+}
+
+TEST(Oscillation, OfASineIsItsPeakToPeak) {
+  std::vector<double> sine;
+  for (int i = 0; i < 500; ++i) sine.push_back(2e-3 * std::sin(2 * std::numbers::pi * 25 * i * 0.002));
+  EXPECT_NEAR(oscillation(path(sine), 0.25), 4e-3, 1e-4);
+}
+
+RC_GTEST_PROP(OscillationProperty, IsThatOfTheMirrorImageAndAtMostPeakToPeak, ()) {
+  auto positions = *rc::gen::nonEmpty(rc::gen::container<std::vector<double>>(
+      rc::gen::map(rc::gen::inRange(-50, 50), [](int n) { return n * 1e-4; })));
+  const double here = oscillation(path(positions), 10.0);
+  const auto [low, high] = std::minmax_element(positions.begin(), positions.end());
+  RC_ASSERT(here >= 0.0 && here <= *high - *low);
+  // By definition, over all pairs.
+  double rise = 0, fall = 0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    for (std::size_t j = i; j < positions.size(); ++j) {
+      rise = std::max(rise, positions[j] - positions[i]);
+      fall = std::max(fall, positions[i] - positions[j]);
+    }
+  }
+  RC_ASSERT(here == std::min(rise, fall));
+  for (double& position : positions) position = -position;
+  RC_ASSERT(oscillation(path(positions), 10.0) == here);
+  std::reverse(positions.begin(), positions.end());
+  RC_ASSERT(oscillation(path(positions), 10.0) == here);
+}
+
+class Watched : public TouchedBoard {
+ protected:
+  Watched() {
+    set({"wall.law=magnetic", "wall.stiffness=5500", "wall.magnetic_coefficient=0", "haptic.rate=500"});
+    watch.name = "wall";
+    watch.hold_time = 1.0;
+  }
+  WatchedTouch touch() { return watch_touch(device, watch, tell); }
+  TouchWatch watch;
+};
+
+TEST_F(Watched, AnOscillationEndsTheTouchAtOnce) {
+  watch.abort_amplitude = 0.8e-3;  // this wall oscillates by 1.6 mm
+  watch.hold_time = 3.0;
+  const WatchedTouch ended = touch();
+  expect_disarmed();
+  ASSERT_TRUE(ended.aborted_at);
+  EXPECT_GE(*ended.aborted_at, 0.0);
+  EXPECT_LT(*ended.aborted_at, 1.0);
+  EXPECT_GT(ended.aborted_amplitude, 0.8e-3);
+  // What had come in when it was seen: this is how long the axis pushed on, at 115200 baud.
+  EXPECT_LT(ended.samples.back().time - *ended.aborted_at, 0.12);
+  const auto measure = measure_touch(ended, 3.0, 0.165e-3);
+  EXPECT_EQ(measure.verdict, ContactVerdict::unstable);
+  EXPECT_EQ(measure.peak_to_peak, ended.aborted_amplitude);
+  EXPECT_GT(measure.deepest, 0.0);
+}
+
+TEST_F(Watched, AnAmplitudeThatIsNotReachedOrZeroEndsNothing) {
+  for (const double amplitude : {0.0, 20e-3}) {
+    watch.abort_amplitude = amplitude;
+    const WatchedTouch whole = touch();
+    EXPECT_FALSE(whole.aborted_at);
+    EXPECT_GT(whole.samples.back().time, 1.0);
+    EXPECT_EQ(measure_touch(whole, 1.0, 0.165e-3).verdict, ContactVerdict::unstable);
+  }
+}
+
+// At 20 kHz a serial line carries a fraction of the samples; the oscillation is seen in those.
+TEST_F(Watched, AFastLoopIsTracedAsDenselyAsTheLinkAllows) {
+  set({"haptic.rate=20000", "wall.stiffness=1000", "wall.magnetic_coefficient=2"});
+  watch.abort_amplitude = 0.2e-3;
+  const WatchedTouch touched = touch();
+  EXPECT_EQ(touched.lost_records, 0u);
+  EXPECT_TRUE(touched.aborted_at);
+  watch.abort_amplitude = 0.0;
+  const WatchedTouch whole = touch();
+  EXPECT_EQ(whole.lost_records, 0u);
+  ASSERT_GT(whole.samples.size(), 100u);
+  for (std::size_t i = 1; i < whole.samples.size(); ++i)
+    ASSERT_NEAR(whole.samples[i].time - whole.samples[i - 1].time, 0.002, 1e-9);
+}
+
+// The person lets go after 3 s and moves the handle away by centimetres, while the hold is still on.
+TEST_F(Watched, AHandleThatIsTakenAwayIsNoOscillation) {
+  set({"wall.magnetic_coefficient=2"});
+  watch.hold_time = 4.5;
+  watch.abort_amplitude = 5e-3;
+  const WatchedTouch left = touch();
+  EXPECT_FALSE(left.aborted_at) << left.aborted_amplitude;
+  EXPECT_GT(left.samples.back().position, 0.01);
+  EXPECT_EQ(measure_touch(left, 4.5, 0.165e-3).verdict, ContactVerdict::no_contact);
+}
+
+TEST_F(Watched, ALostLinkEndsInAnErrorAndTheDeviceRemovesTheForce) {
+  set(protective_assignments(device, 0, 3.3));
+  bool forceful_then = false;
+  tell = [&](const std::string& text) {
+    if (!text.starts_with("wall: holding")) return;
+    forceful_then = forceful();
+    cable().cut = true;
+  };
+  EXPECT_CONTAINS(thrown_message<link::LinkError>([&] { touch(); }), "the cable is gone");
+  EXPECT_TRUE(forceful_then);
+  EXPECT_TRUE(forceful());  // nobody can tell the device
+  cable().sim.wait(std::chrono::milliseconds(1100));
+  EXPECT_FALSE(forceful());
+}
+
+TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
+  tell = [&](const std::string& text) {
+    if (text.starts_with("wall: holding")) throw std::logic_error("enough");
+  };
+  EXPECT_THROW(touch(), std::logic_error);
+  expect_disarmed();
+}
+
+class WatchedByNobody : public TouchedBoard {
+ protected:
+  WatchedByNobody() : TouchedBoard(nobody()) {}
+};
+
+TEST_F(WatchedByNobody, HasATypeOfItsOwn) {
+  set({"haptic.rate=500"});
+  TouchWatch watch;
+  watch.contact_patience = 1.0;
+  EXPECT_THROW(watch_touch(device, watch, tell), NobodyTouched);
+  expect_disarmed();
+}
+
+class Protective : public TouchedBoard {
+ protected:
+  double limit_with(const std::vector<std::string>& assignments, double force_limit) {
+    set(assignments);
+    set(protective_assignments(device, 0, force_limit));
+    return device.read_number("force.limit");
+  }
+};
+
+TEST_F(Protective, TheForceLimitIsLoweredAndNeverRaised) {
+  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=10"}, 3.3)), 3.3F);
+  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=2"}, 3.3)), 2.0F);
+  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=1000"}, 0.5)), 0.5F);
+}
+
+TEST_F(Protective, TheLinkIsWatchedByTheDevice) {
+  const auto timeout_with = [&](const char* assignment) {
+    set({assignment});
+    set(protective_assignments(device, 0, 1000));
+    return device.read_number("link.timeout");
+  };
+  EXPECT_EQ(timeout_with("link.timeout=0"), 1.0);
+  EXPECT_EQ(timeout_with("link.timeout=60"), 1.0);
+  EXPECT_EQ(timeout_with("link.timeout=0.5"), 0.5);
+  EXPECT_TRUE(protective_assignments(device, 0, 1000).empty());
+}
+
+}  // namespace
+}  // namespace kmax::experiment

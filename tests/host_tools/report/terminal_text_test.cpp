@@ -1,0 +1,89 @@
+#include "host_tools/report/terminal_text.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace kmax::report {
+namespace {
+
+TEST(TerminalText, NumbersStandRightAndWordsLeft) {
+  const Table table{"Largest stiffness",
+                    {"wall", "K_max (N/mm)", "paper"},
+                    {{"plain", "3.58", "-"}, {"2 N field", "8.4", "8.41"}}};
+  EXPECT_EQ(terminal_text(table),
+            "Largest stiffness\n"
+            "wall       K_max (N/mm)  paper\n"
+            "---------  ------------  -----\n"
+            "plain              3.58      -\n"
+            "2 N field           8.4   8.41\n");
+}
+
+TEST(TerminalText, LinesHaveNoSpaceAtTheirEnd) {
+  EXPECT_EQ(terminal_text({"", {"a", "long heading"}, {{"x", "y"}, {"z", ""}}}),
+            "a  long heading\n-  ------------\nx  y\nz\n");
+}
+
+TEST(TerminalText, EmptyTables) {
+  EXPECT_EQ(terminal_text({}), "");
+  EXPECT_EQ(terminal_text({"caption", {}, {}}), "caption\n");
+  EXPECT_EQ(terminal_text({"", {"a", "b"}, {}}), "a  b\n-  -\n");
+  EXPECT_EQ(terminal_text({"", {""}, {{""}}}), "\n\n\n");
+}
+
+TEST(TerminalText, ALinesEndOrAnEscapeSequenceInACellCannotBreakTheTable) {
+  const std::string text = terminal_text({"cap\ntion",
+                                          {"a\tb"},
+                                          {{"x\r\ny"},
+                                           {"\x1B[31mred"},
+                                           {"\xC2\x9B"
+                                            "0m"}}});
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
+  for (const char* control : {"\r", "\t", "\x1B", "\xC2\x9B"})
+    EXPECT_EQ(text.find(control), std::string::npos);
+}
+
+TEST(DisplayWidth, OfUtf8) {
+  EXPECT_EQ(display_width(""), 0u);
+  EXPECT_EQ(display_width("N/mm"), 4u);
+  EXPECT_EQ(display_width("µm"), 2u);
+  EXPECT_EQ(display_width("γ = 0.57"), 8u);
+  EXPECT_EQ(display_width("e\xCC\x81"), 1u);  // e and a combining acute accent
+  EXPECT_EQ(display_width("力覚"), 4u);       // two wide characters
+  EXPECT_EQ(display_width("\xF0\x9F\x98\x80"), 2u);
+  EXPECT_EQ(display_width("a\xE2\x80\x8B"
+                          "b"),
+            2u);  // zero width space
+}
+
+TEST(DisplayWidth, BytesThatAreNoUtf8CountOneEach) {
+  EXPECT_EQ(display_width("\xFF\xFE"), 2u);
+  EXPECT_EQ(display_width("\xE2\x82"), 2u);  // the beginning of a character
+  EXPECT_EQ(display_width("\xC3(a"), 3u);
+  EXPECT_EQ(display_width("\x80"), 1u);
+}
+
+RC_GTEST_PROP(TerminalTextProperty, ColumnsBeginWhereTheirHeadingsDo, ()) {
+  const auto cells = *rc::gen::container<std::vector<std::string>>(
+      rc::gen::container<std::string>(rc::gen::inRange('a', 'f')));
+  Table table{"", {"first", "second"}, {}};
+  for (const std::string& cell : cells) table.rows.push_back({"µ" + cell, "|"});
+  std::istringstream lines(terminal_text(table));
+  std::string line;
+  std::getline(lines, line);
+  const std::size_t second = line.find("second");
+  std::getline(lines, line);
+  while (std::getline(lines, line)) RC_ASSERT(display_width(line.substr(0, line.find('|'))) == second);
+}
+
+RC_GTEST_PROP(TerminalTextProperty, AnyBytesGiveALinePerRow, (const std::vector<std::string>& cells)) {
+  Table table{"", {"heading"}, {}};
+  for (const std::string& cell : cells) table.rows.push_back({cell});
+  const std::string text = terminal_text(table);
+  RC_ASSERT(static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) == cells.size() + 2);
+}
+
+}  // namespace
+}  // namespace kmax::report
