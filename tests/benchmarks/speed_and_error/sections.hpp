@@ -1,0 +1,22 @@
+#pragma once
+// The sections of docs/speed_and_error.md. Each measures, draws its picture into `pictures` and says in words
+// what is compared with what.
+
+#include <filesystem>
+
+#include "host_tools/report/page.hpp"
+
+namespace kmax::benchmark {
+
+report::Section integrator_section(const std::filesystem::path& pictures);
+report::Section velocity_section(const std::filesystem::path& pictures);
+report::Section sine_section(const std::filesystem::path& pictures);
+report::Section square_root_section(const std::filesystem::path& pictures);
+report::Section field_section(const std::filesystem::path& pictures);
+report::Section tick_section(const std::filesystem::path& pictures);
+// ns of one HapticLoop<float>::tick() here, with the adaptive wall and FOAW, as the image's budget has them.
+double native_haptic_tick();
+// `budget`: what `kmax-board ELF --budget --json` printed. Throws std::runtime_error if it is something else.
+report::Section image_section(const std::filesystem::path& pictures, const std::filesystem::path& budget);
+
+}  // namespace kmax::benchmark
