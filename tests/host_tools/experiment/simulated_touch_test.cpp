@@ -162,6 +162,39 @@ TEST(SimulatedTouch, TheOtherSideIsTheMirrorImage) {
   EXPECT_EQ(a.verdict, b.verdict);
 }
 
+// A field of 10 um is a spring of 400 N/mm in front of the wall: met at a count of 1 nm, so that no flipped
+// count can part two integrators that share nothing.
+TEST(SimulatedTouch, AFieldOfTenMicrometresAgreesWithTheAdaptiveReference) {
+  TouchSetup setup = plain(8410);
+  setup.wall = touched_wall(20000, 1e-9, 0.0);
+  setup.wall.wall.kind = control::WallKind::magnetic;
+  setup.wall.wall.stiffness = 8410;
+  setup.wall.wall.magnetic_coefficient = 2;
+  setup.wall.wall.magnetic_length = 10e-6F;
+  setup.device.force_limit = 0.0;
+  setup.motion.start_position = 1e-3;
+  setup.motion.hold_time = 0.2;
+  setup.window = 0.1;
+  std::vector<TouchSample> exact, reference;
+  simulate_touch(setup, &exact);
+  setup.integrator.kind = simulation::IntegratorKind::adaptive;
+  setup.integrator.tolerance = 1e-13;
+  simulate_touch(setup, &reference);
+  const auto touched = std::find_if(exact.begin(), exact.end(),
+                                    [](const TouchSample& sample) { return sample.position <= 0.0; });
+  ASSERT_NE(touched, exact.end());
+  // A float force at 1 nm rounds at some 1e-8 N, which the unstable field multiplies: 5 ms from the first
+  // touch on.
+  const auto compared = static_cast<std::size_t>(touched - exact.begin()) + 100;
+  ASSERT_LE(compared, std::min(exact.size(), reference.size()));
+  double swing = 0.0;
+  for (std::size_t n = 0; n < compared; ++n) {
+    EXPECT_NEAR(exact[n].position, reference[n].position, 1e-9) << n;
+    swing = std::max(swing, std::abs(exact[n].force));
+  }
+  EXPECT_GT(swing, 2.0);
+}
+
 TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
   const auto refused = [](const auto& change) {
     TouchSetup setup = plain(1000);
