@@ -20,9 +20,16 @@ enum class DiolaitiRegion : std::uint8_t {
   unstable,        ///< both below 1/2
 };
 
+/// The period that injects as much as one of `period` with a `delay` beyond the hold: a force that is on the
+/// average T/2 + Td old injects K (T/2 + Td) v^2.
+template <typename Scalar>
+constexpr Scalar period_with_delay(Scalar period, Scalar delay) {
+  return saturate(period + saturate(Scalar(2) * delay));
+}
+
 /// b, f_c of the device, N s/m and N; K, N/m; T, s; Delta, m. Nothing is divided: K = 0, T = 0, Delta = 0 are
-/// passive in their part. Assumes: a rigid device, no wall damping, no delay, nobody holding it; a hand adds
-/// damping and enlarges the stable regions.
+/// passive in their part. Assumes: a rigid device, no wall damping, nobody holding it; a hand adds damping
+/// and enlarges the stable regions. A delay Td is counted by giving period_with_delay() for T.
 template <typename Scalar>
 constexpr DiolaitiRegion diolaiti_region(Scalar stiffness, Scalar damping, Scalar friction, Scalar period,
                                          Scalar quantum) {

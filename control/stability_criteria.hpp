@@ -8,6 +8,12 @@
 
 namespace kmax::control {
 
+/// What of a case the sampled eigenvalues judge.
+template <typename Scalar>
+constexpr SampledLoop<Scalar> sampled_loop_of(const StabilityCase<Scalar>& c) {
+  return {c.mass, c.damping, c.wall_damping, c.period, c.delay, c.hand};
+}
+
 /// One criterion for one case: those of closed_form_criteria.hpp, and
 ///
 ///   criterion            value   bound                                                    passes
@@ -16,11 +22,11 @@ namespace kmax::control {
 ///
 /// which applies with a wall, a mass, a period, and a delay of no more than 8 samples. A stiffness beyond the
 /// bound does not pass even if it is stable again. Firmware includes closed_form_criteria.hpp instead, which
-/// leaves the search (4 KB) out of the image.
+/// leaves the search (4 KB of code at -Os) out of the image.
 template <typename Scalar>
 constexpr CriterionResult<Scalar> judge(Criterion criterion, const StabilityCase<Scalar>& c) {
   if (criterion != Criterion::sampled_eigenvalues) return judge_closed_form(criterion, c);
-  const SampledLoop<Scalar> loop{c.mass, c.damping, c.wall_damping, c.period, c.delay, c.hand};
+  const SampledLoop<Scalar> loop = sampled_loop_of(c);
   const bool wall = !(c.stiffness <= Scalar(0)) || c.wall_damping != Scalar(0);
   if (!wall || !can_be_judged(loop)) return {criterion, false, true, false, Scalar(0), Scalar(0)};
   const Scalar bound = largest_stable_stiffness(loop);

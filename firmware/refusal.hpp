@@ -88,8 +88,8 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
      "a node that is watched (heartbeat_consumer.*) is silent; start it, or stop watching it"},
     {Refusal::restarting, "the device is about to restart"},
     {Refusal::guard_refused,
-     "the stability check fails: the device could not render this wall stably (guard.mode is refuse); 'kmax "
-     "check' explains it"},
+     "the stability check fails: this wall is not guaranteed to be stable on this device (guard.mode is "
+     "refuse); 'kmax check' explains it"},
 });
 
 constexpr std::string_view words_of(Refusal refusal) {

@@ -1,6 +1,7 @@
 // Compiled for size: it runs when parameters change, and flash is what it costs.
 #include "firmware/stability_guard.hpp"
 
+#include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
 #include "firmware/axis.hpp"
 #include "firmware/haptic_configuration.hpp"
@@ -25,6 +26,13 @@ bool has_less_margin(const CriterionResult<float>& a, const CriterionResult<floa
   return a.value * b.bound > b.value * a.bound;
 }
 
+/// guard_criteria, as bits.
+constexpr unsigned guard_criteria_bits = [] {
+  unsigned bits = 0;
+  for (const Criterion criterion : guard_criteria) bits |= 1U << static_cast<unsigned>(criterion);
+  return bits;
+}();
+
 /// A failed one before any that passes.
 bool is_worse(const CriterionResult<float>& a, const CriterionResult<float>& b) {
   return a.pass == b.pass ? has_less_margin(a, b) : b.pass;
@@ -48,7 +56,8 @@ control::StabilityCase<float> stability_case(const ParameterValues& values, std:
   judged.magnetic_coefficient = largest_magnetic_coefficient(values, axis);
   judged.magnetic_length = values.real<"wall.magnetic_length">(axis);
   judged.period = 1.0f / values.real<"haptic.rate">(axis);
-  judged.delay = values.real<"guard.delay">(axis) + 1.0f / values.real<"current.bandwidth">(axis);
+  judged.delay = values.real<"guard.delay">(axis) +
+                 control::current_loop_delay(values.real<"current.bandwidth">(axis), float{tick_rate_hz});
   judged.quantum = static_cast<float>(step * length);
   judged.mass = values.real<"device.mass">(axis);
   judged.damping = values.real<"guard.damping">(axis);
@@ -66,7 +75,7 @@ GuardFinding guard_finding(const ParameterValues& values, std::size_t axis) {
   const auto judged = stability_case(values, axis);
   CriterionResult<float> worst;
   for (const Criterion criterion : guard_criteria) {
-    const auto result = control::judge_closed_form(criterion, judged);
+    const auto result = control::judge_closed_form<float, guard_criteria_bits>(criterion, judged);
     if (!result.applies) continue;
     if (!result.pass)
       finding.failed = static_cast<std::uint16_t>(finding.failed | 1U << static_cast<unsigned>(criterion));
@@ -84,9 +93,11 @@ BrokenRule check_guard(const ParameterValues& wanted, const ParameterValues& now
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (!armed.axis[axis] || wanted.choice<GuardMode, "guard.mode">(axis) != GuardMode::refuse) continue;
     if (guard_finding(wanted, axis).verdict != GuardFinding::Verdict::fail) continue;
-    std::size_t slot = slot_of(0, axis);
-    while (slot < slot_of(axis_entries.size() - 1, axis) && wanted.raw(slot) == now.raw(slot)) ++slot;
-    return {Refusal::guard_refused, slot};
+    for (const std::size_t entry : guard_entries) {
+      const std::size_t slot = slot_of(entry, axis);
+      if (wanted.raw(slot) != now.raw(slot)) return {Refusal::guard_refused, slot};
+    }
+    return {Refusal::guard_refused, slot_of(guard_entries[0], axis)};
   }
   return {};
 }

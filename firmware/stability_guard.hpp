@@ -32,13 +32,40 @@ inline constexpr std::array guard_criteria = {
     control::Criterion::colgate, control::Criterion::abbott_okamura, control::Criterion::resolution,
     control::Criterion::resolution_speed, control::Criterion::field_slope};
 
+/// What of an axis the check reads, the wall first: the entries of the dictionary, of which an armed axis may
+/// change some.
+inline constexpr auto guard_entries = std::to_array<std::uint8_t>({
+    entry_of<"wall.stiffness">(),
+    entry_of<"wall.damping">(),
+    entry_of<"wall.magnetic_coefficient">(),
+    entry_of<"wall.magnetic_length">(),
+    entry_of<"wall.adaptive_gain">(),
+    entry_of<"wall.adaptive_offset">(),
+    entry_of<"wall.adaptive_force_min">(),
+    entry_of<"wall.adaptive_force_max">(),
+    entry_of<"guard.damping">(),
+    entry_of<"guard.friction">(),
+    entry_of<"guard.delay">(),
+    entry_of<"guard.operator_force">(),
+    entry_of<"guard.operator_speed">(),
+    entry_of<"guard.mode">(),
+    entry_of<"drive.mode">(),
+    entry_of<"wall.law">(),
+    entry_of<"position.resolution">(),
+    entry_of<"device.transmission">(),
+    entry_of<"encoder.counts_per_turn">(),
+    entry_of<"haptic.rate">(),
+    entry_of<"current.bandwidth">(),
+});
+
 /// The largest coefficient F_MC, N, that the present law can command, at whatever velocity and in whichever
 /// adaptive mode and relation: eq. 7 at V_max within the adaptive interval. 0 for the laws without a field.
 float largest_magnetic_coefficient(const ParameterValues& values, std::size_t axis);
 
 /// An axis' parameters as the criteria take them: b = guard.damping, f_c = guard.friction, T = 1 /
-/// haptic.rate, delay = guard.delay + 1 / current.bandwidth, quantum = measured.resolution, F_h and v of
-/// guard.operator_*. Nobody holds the handle: the damping of a hand is not counted on.
+/// haptic.rate, delay = guard.delay + that of the current loop (control/current_loop_delay.hpp), quantum =
+/// measured.resolution, F_h and v of guard.operator_*. Nobody holds the handle: the damping of a hand is not
+/// counted on.
 control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis);
 
 /// The stability check of one axis. Not judged where guard.mode is off, where drive.mode renders no wall, and
@@ -48,7 +75,7 @@ control::StabilityCase<float> stability_case(const ParameterValues& values, std:
 GuardFinding guard_finding(const ParameterValues& values, std::size_t axis);
 
 /// The rule for armed axes whose guard.mode is refuse: no change from `now` may break a criterion, or the
-/// check before arming could be walked round. Reported on the axis' first parameter that would change.
+/// check before arming could be walked round. Reported on the first of guard_entries that would change.
 BrokenRule check_guard(const ParameterValues& wanted, const ParameterValues& now, const ArmedAxes& armed);
 
 static_assert(

@@ -46,13 +46,29 @@ std::string case_text(const control::StabilityCase<double>& c, const std::string
   return text + fmt::format("; F_h {}, v {}\n", known(c.operator_force, "N"), known(c.operator_speed, "m/s"));
 }
 
-std::string row(const Verdict& verdict) {
+/// Why the exact loop is not judged.
+std::string why_not_exact(const control::StabilityCase<double>& c) {
+  if (has_no_wall(c)) return "wall.stiffness and wall.damping are 0";
+  if (!(c.mass > 0)) return "needs device.mass";
+  const double periods = c.delay / c.period;
+  if (periods > control::longest_delay)
+    return fmt::format("T_d is {:.3g} periods, more than {}", periods, control::longest_delay);
+  return "its numbers are too far apart";
+}
+
+std::string why_not(Criterion criterion, const control::StabilityCase<double>& c) {
+  const std::string_view needs = text_of(criterion).needs;
+  if (criterion == Criterion::field_slope) return fmt::format("needs {}", needs);
+  if (has_no_wall(c)) return c.magnetic_coefficient > 0 ? why_not_exact(c) : "there is no wall";
+  if (criterion == Criterion::sampled_eigenvalues) return why_not_exact(c);
+  return c.stiffness > 0 ? fmt::format("needs {}", needs) : "wall.stiffness is 0";
+}
+
+std::string row(const Verdict& verdict, const control::StabilityCase<double>& c) {
   const control::CriterionResult<double>& result = verdict.result;
   const CriterionText& text = text_of(result.criterion);
-  if (!result.applies) {
-    const std::string why = text.needs.empty() ? "there is no wall" : fmt::format("needs {}", text.needs);
-    return fmt::format("  {:<20} not judged: {}\n", text.name(), why);
-  }
+  if (!result.applies)
+    return fmt::format("  {:<20} not judged: {}\n", text.name(), why_not(result.criterion, c));
   return fmt::format("  {:<20} {:>10} {:<2} {:>10}  {:<4} {:>9}  {}\n", text.name(), number(result.value),
                      text.relation, number(result.bound), text.unit, margin_text(verdict.margin),
                      result.pass ? "met" : "NOT MET");
@@ -91,25 +107,38 @@ std::string conclusion(const Judgement& judgement) {
   };
   const control::CriterionResult<double>&exact = of(Criterion::sampled_eigenvalues),
         &gil = of(Criterion::gil);
+  const control::StabilityCase<double>& c = judgement.stability_case;
   const bool guaranteed = judgement.pass_of(Worth::guarantee);
-  const bool held = judgement.stability_case.hand.hand_mass > 0;
+  const bool held = c.hand.hand_mass > 0;
   std::string text = judgement.pass ? "pass: every criterion that applies is met. "
                                     : "no pass: a pass takes every criterion that applies. ";
-  if (!gil.applies && !exact.applies) return "\n" + text + "There is no wall.\n";
-  if (!exact.pass)
+  if (has_no_wall(c) && !(c.magnetic_coefficient > 0)) return "\n" + text + "There is no wall.\n";
+  if (!exact.applies)
+    text += has_no_wall(c) ? "The exact loop leaves out the field, and there is nothing else. "
+                           : fmt::format("The exact loop could not be judged: {}. ", why_not_exact(c));
+  if (!exact.pass && control::is_stable(control::sampled_loop_of(c), c.stiffness))
+    text += fmt::format(
+        "The stiffness is beyond the first loss of stability {}: softer walls are unstable, this one is not, "
+        "and it takes little to lose that again. ",
+        held ? "with this hand" : "with nobody at the handle");
+  else if (!exact.pass)
     text += held ? "The linear loop is unstable with this hand: expect vibration, unless friction stops it. "
                  : "The linear loop is unstable with nobody at the handle: expect vibration there, unless "
                    "friction "
                    "stops it; a hand may hold it still (--hand). ";
-  else if (!exact.applies)
-    text += "The exact loop could not be judged: no mass, or a delay of more than 8 periods. ";
-  else if (!guaranteed)
+  else if (!guaranteed && exact.applies)
     text += "Nothing is guaranteed, and the linear loop is stable: try it, with a low force.limit first. ";
-  else
+  else if (!guaranteed)
+    text += "Nothing is guaranteed: if you try it, then with a low force.limit first. ";
+  else if (judgement.guaranteed())
     text += "Stable with every passive hand, as far as the assumptions hold ('kmax check --explain'). ";
   if (exact.pass && held && gil.applies && !gil.pass) text += "Let go inside the wall, it may vibrate. ";
-  if (!(judgement.stability_case.damping > 0) && !guaranteed)
+  if (!(c.damping > 0) && !guaranteed)
     text += "guard.damping is 0: without a measured b no wall is guaranteed (docs/stability_check.md). ";
+  if (judgement.uncovered_damper)
+    text +=
+        "No guarantee covers wall.damping with this velocity.estimator: difference and low_pass are "
+        "covered. ";
   if (judgement.follows_velocity) text += "Not judged: how the adaptive law's field follows the velocity. ";
   text.pop_back();
   return "\n" + wrapped(text, "");
@@ -118,7 +147,7 @@ std::string conclusion(const Judgement& judgement) {
 std::string region_text(const control::StabilityCase<double>& c) {
   using control::DiolaitiRegion;
   if (!(c.stiffness > 0)) return "";
-  const double speed = control::escape_speed(c.stiffness, c.damping, c.friction, c.period, c.quantum);
+  const double speed = escape_speed_of(c);
   const std::string_view name = words_of(region_of(c));
   return fmt::format(
       "  region of Diolaiti: {}{}\n", name,
@@ -138,7 +167,7 @@ std::string judgement_text(const Judgement& judgement, const std::string& hand) 
   for (const Worth worth : {Worth::guarantee, Worth::necessary, Worth::heuristic}) {
     text += fmt::format("{} ({})\n", name_of(worth), meaning_of(worth));
     for (const Verdict& verdict : judgement.verdicts) {
-      if (text_of(verdict.result.criterion).worth == worth) text += row(verdict);
+      if (text_of(verdict.result.criterion).worth == worth) text += row(verdict, judgement.stability_case);
     }
   }
   text += region_text(judgement.stability_case);

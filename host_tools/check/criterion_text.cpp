@@ -15,7 +15,9 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "two "
      "positions, a zero-order hold. The hand may be anything passive; friction, quantization and the hand's "
      "own "
-     "damping are not counted on, so most walls in use fail it and are still. The delay is added to half a "
+     "damping are not counted on, so most walls in use fail it and are still. A damper by low_pass is "
+     "covered too, by foaw "
+     "or tracking not. The delay is added to half a "
      "period to first order; a b that is only measured at low speed may be smaller at the rate of the loop.",
      "",
      "J. E. Colgate and G. G. Schenkel, Passivity of a class of sampled-data systems: application to haptic "
@@ -39,21 +41,22 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "a device.mass and a delay of at most 8 periods",
      "K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, chapter on sampling of continuous-time "
      "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012."},
-    {Criterion::abbott_okamura, Worth::guarantee, "N/m", "K", "<=", "min(2 b / T, 2 f_c / quantum)",
-     "A spring wall without damper or delay on a mass with Coulomb and viscous friction whose encoder has "
-     "this "
-     "quantum; any hand. Necessary and sufficient for passivity of that wall; for this device a guarantee "
-     "only "
-     "as far as T_d is short against T and B is 0: read it together with colgate.",
+    {Criterion::abbott_okamura, Worth::guarantee, "N/m", "K",
+     "<=", "min(2 b / T, 2 (f_c / quantum - |B| / T))",
+     "A spring wall without delay on a mass with Coulomb and viscous friction whose encoder has this "
+     "quantum; any hand. Necessary and sufficient for passivity of that wall without B. A damper by "
+     "difference or low_pass adds up to |B| quantum / T to the step of the force, which friction must hold "
+     "too (own derivation). 2 b / T knows neither T_d nor B: read it together with colgate.",
      "",
      "J. J. Abbott and A. M. Okamura, Effects of position quantization and sampling rate on virtual-wall "
      "passivity, IEEE Trans. Robotics 21(5), 2005."},
-    {Criterion::diolaiti, Worth::heuristic, "m/s", "v, the operator's speed", "<", "f_c / (K T/2 - b)",
-     "Where viscous damping is too small for the spring (K T/2 > b), Coulomb friction still stops what moves "
+    {Criterion::diolaiti, Worth::heuristic, "m/s", "v, the operator's speed", "<",
+     "f_c / (K (T/2 + T_d) - b)",
+     "Where viscous damping is too small for the spring (K (T/2 + T_d) > b), Coulomb friction still stops "
+     "what moves "
      "slower than the escape speed; 0 when friction is too small for the quantum (f_c < K quantum / 2). From "
-     "the energies of one period, without delay and with nobody holding it: the regions are the source's, "
-     "the "
-     "escape speed is derived from the same balance.",
+     "the energies of one period, with nobody holding it: the regions are the source's, with T + 2 T_d for "
+     "T; the escape speed is derived from the same balance.",
      "guard.operator_speed",
      "N. Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, Stability of haptic rendering: "
      "discretization, "
@@ -67,12 +70,15 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
     {Criterion::resolution_speed, Worth::heuristic, "m/s", "v, the operator's speed", "<=", "F_h / (K T)",
      "The same estimate solved for the speed: an upper bound, for an approach noticed one whole period late.",
      "guard.operator_force and guard.operator_speed", "Paper 2, eq. 8."},
-    {Criterion::field_slope, Worth::guarantee, "N/m", "2 F_MC / x_0", "<", "(b - |B|) / (T/2 + T_d)",
+    {Criterion::field_slope, Worth::guarantee, "N/m", "2 F_MC / x_0", "<",
+     "min((b - |B|) / (T/2 + T_d), 2 (f_c / quantum - |B| / T))",
      "The magnetic field is steepest at the surface; there it is a spring of 2 F_MC / x_0, to which colgate "
-     "applies as to the wall's own. It is often stiffer than the wall. F_MC is the largest that the law can "
+     "applies as to the wall's own, and what the quantum makes of it friction must hold. It is often stiffer "
+     "than the wall. F_MC is the largest that the law can "
      "command; that the adaptive law changes it with the velocity is not counted.",
-     "a wall.law with a field",
-     "Colgate and Schenkel 1997 with the slope of eq. 5 of paper 1, on impedance tuning."},
+     "a wall.law with a field above 0",
+     "Colgate and Schenkel 1997, Abbott and Okamura 2005, with the slope of eq. 5 of paper 1, on impedance "
+     "tuning."},
     {Criterion::saturation_depth, Worth::heuristic, "m", "(force limit - F_MC) / K", ">=", "3 quanta",
      "Deeper than this the force is clipped: a wall that saturates within three encoder steps is a switch "
      "between no force and all of it, and what is then found to be 'stable' is bounded by the clip.",
@@ -163,7 +169,8 @@ std::string_view symbols_text() {
          "wall.adaptive_*\n"
          "  x_0      length of the field                          wall.magnetic_length\n"
          "  T        period of the haptic loop                    1 / haptic.rate\n"
-         "  T_d      from a command to its force                  guard.delay + 1 / current.bandwidth\n"
+         "  T_d      from a command to its force                  guard.delay, 1 / current.bandwidth, 0.65 "
+         "ticks\n"
          "  quantum  step of the position in use                  encoder count, position.resolution\n"
          "  m        mass at the handle                           device.mass\n"
          "  b, f_c   viscous damping and Coulomb friction of it   guard.damping, guard.friction\n"

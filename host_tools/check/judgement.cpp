@@ -35,8 +35,23 @@ bool Judgement::pass_of(Worth worth) const {
   });
 }
 
+bool Judgement::guaranteed() const {
+  const bool anything = !has_no_wall(stability_case) || stability_case.magnetic_coefficient > 0;
+  return anything && pass_of(Worth::guarantee) && !follows_velocity && !uncovered_damper;
+}
+
+bool has_no_wall(const control::StabilityCase<double>& c) {
+  return !(c.stiffness > 0) && c.wall_damping == 0;
+}
+
 control::DiolaitiRegion region_of(const control::StabilityCase<double>& c) {
-  return control::diolaiti_region(c.stiffness, c.damping, c.friction, c.period, c.quantum);
+  return control::diolaiti_region(c.stiffness, c.damping, c.friction,
+                                  control::period_with_delay(c.period, c.delay), c.quantum);
+}
+
+double escape_speed_of(const control::StabilityCase<double>& c) {
+  return control::escape_speed(c.stiffness, c.damping, c.friction,
+                               control::period_with_delay(c.period, c.delay), c.quantum);
 }
 
 std::string_view words_of(control::DiolaitiRegion region) {
@@ -55,9 +70,14 @@ std::string_view words_of(control::DiolaitiRegion region) {
 
 Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
                            const control::Hand<double>& hand) {
-  Judgement judgement{parameter_case(values, axis, hand), {}, true, {}, false};
+  Judgement judgement{parameter_case(values, axis, hand), {}, true, {}, false, false};
   judgement.follows_velocity =
       values.choice<control::WallKind, "wall.law">(axis) == control::WallKind::adaptive;
+  using control::VelocityEstimatorKind;
+  const auto estimator = values.choice<VelocityEstimatorKind, "velocity.estimator">(axis);
+  judgement.uncovered_damper = judgement.stability_case.wall_damping != 0 &&
+                               estimator != VelocityEstimatorKind::difference &&
+                               estimator != VelocityEstimatorKind::low_pass;
   std::vector<control::Criterion> failed;
   for (std::size_t i = 0; i < control::criterion_count; ++i) {
     const auto criterion = static_cast<control::Criterion>(i);

@@ -35,7 +35,13 @@ struct Judgement {
 
   bool follows_velocity = false;  ///< the law is adaptive, whose dependence on velocity no criterion judges
 
+  bool uncovered_damper = false;  ///< B with a velocity that is neither a difference nor a low-passed one
+
   bool pass_of(Worth worth) const;
+
+  /// Stable with every passive hand, as far as the assumptions hold: the guarantees are met, there is
+  /// something to guarantee, and nothing of the law is left out of them.
+  bool guaranteed() const;
 };
 
 /// How far a value is from its bound, as a part of the bound: (bound - value) / bound, or for at_least
@@ -47,9 +53,14 @@ std::optional<double> margin_of(const control::CriterionResult<double>& result);
 /// The largest number stands for infinity, as control/stability_criteria.hpp says.
 bool is_infinite(double number);
 
+/// Spring and damper are 0; a field may be there all the same.
+bool has_no_wall(const control::StabilityCase<double>& c);
+
 /// Where the wall stands among Diolaiti's regions, and that in words.
 control::DiolaitiRegion region_of(const control::StabilityCase<double>& c);
 std::string_view words_of(control::DiolaitiRegion region);
+/// The speed below which it comes to rest again, m/s; see control/diolaiti_criterion.hpp.
+double escape_speed_of(const control::StabilityCase<double>& c);
 
 /// `values` keep the rules between parameters. Takes about a millisecond, more when much fails: then single
 /// parameters are searched for values that help.

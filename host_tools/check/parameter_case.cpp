@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
 #include "firmware/haptic_configuration.hpp"
 #include "host_tools/device/number_text.hpp"
@@ -41,7 +42,9 @@ control::StabilityCase<double> parameter_case(const firmware::ParameterValues& v
   c.magnetic_coefficient = largest_coefficient(wall);
   c.magnetic_length = real(wall.magnetic_length);
   c.period = 1.0 / real(values.real<"haptic.rate">(axis));
-  c.delay = real(values.real<"guard.delay">(axis)) + 1.0 / real(values.real<"current.bandwidth">(axis));
+  c.delay = real(values.real<"guard.delay">(axis)) +
+            control::current_loop_delay(real(values.real<"current.bandwidth">(axis)),
+                                        static_cast<double>(firmware::tick_rate_hz));
   c.quantum =
       count * control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), count);
   c.mass = real(values.real<"device.mass">(axis));

@@ -15,7 +15,7 @@ namespace kmax::check {
 ///   F_MC, x_0        the largest coefficient the law can command: none for plain; wall.magnetic_coefficient
 ///                    for magnetic; what eq. 7 and its interval give at most for adaptive
 ///   T                1 / haptic.rate
-///   T_d              guard.delay + 1 / current.bandwidth: the current loop as a delay of its time constant
+///   T_d              guard.delay + 1 / current.bandwidth + 0.65 ticks, see control/current_loop_delay.hpp
 ///   quantum          the step in use: measured in whole encoder counts, as the firmware rounds
 ///                    position.resolution
 ///   m, b, f_c        device.mass, guard.damping, guard.friction

@@ -25,7 +25,7 @@ Words words_for(Criterion criterion) {
       return {"wall.stiffness", "Colgate: (b - |B|) / (T/2 + delay)", "lower wall.stiffness"};
     case Criterion::abbott_okamura:
       return {
-          "wall.stiffness", "Abbott and Okamura: the smaller of 2 b / T and 2 f_c / step",
+          "wall.stiffness", "Abbott and Okamura: the smaller of 2 b / T and 2 (f_c / step - |B| / T)",
           "lower wall.stiffness, make the position's step finer, or raise guard.friction or guard.damping if "
           "the device has more"};
     case Criterion::resolution:
@@ -34,9 +34,10 @@ Words words_for(Criterion criterion) {
     case Criterion::resolution_speed:
       return {"guard.operator_speed", "paper 2: F_h / (K T)", "lower wall.stiffness or raise haptic.rate"};
     case Criterion::field_slope:
-      return {"the field's slope 2 F_MC / x_0,", "as Colgate's for a spring",
-              "lower F_MC (wall.magnetic_coefficient, or wall.adaptive_force_max) or lengthen "
-              "wall.magnetic_length"};
+      return {"the field's slope 2 F_MC / x_0,",
+              "the smaller of (b - |B|) / (T/2 + delay) and 2 (f_c / step - |B| / T)",
+              "lower F_MC (wall.magnetic_coefficient, or wall.adaptive_force_max), lengthen "
+              "wall.magnetic_length, make the position's step finer"};
     default:
       return {"a value", "of a criterion that this program does not know",
               "use the kmax of the device's release"};
@@ -49,6 +50,13 @@ bool needs_damping(Criterion criterion) {
 
 std::string remedy_for(const GuardFinding& finding) {
   const Criterion criterion = finding.criterion;
+  if (finding.bound <= 0.0f && criterion == Criterion::field_slope)
+    return "no field passes while guard.damping is not above the magnitude of wall.damping, or "
+           "guard.friction "
+           "not above |B| step / T: measure them ('kmax calibrate'), or lower wall.damping";
+  if (finding.bound < 0.0f && criterion == Criterion::abbott_okamura)
+    return "no stiffness passes while guard.friction is not above |B| step / T: lower wall.damping, or make "
+           "the position's step finer";
   if (finding.bound <= 0.0f && needs_damping(criterion))
     return "no stiffness passes while guard.damping is not above the magnitude of wall.damping: measure it "
            "('kmax "

@@ -6,6 +6,7 @@
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/errors.hpp"
+#include "host_tools/device/guard_words.hpp"
 #include "host_tools/device/register_plan.hpp"
 
 namespace kmax::device {
@@ -43,6 +44,26 @@ bool is_about_values(Refusal reason) {
     default:
       return false;
   }
+}
+
+/// What the guard found in the set that an axis would have had, as "; " and its words. The device keeps no
+/// finding of a set that it has refused. Empty if the device cannot be asked, or another writer was faster.
+std::string guard_numbers(Device& device, std::span<const Assignment> assignments, std::size_t axis) {
+  firmware::ParameterValues wanted;
+  const auto set = [&wanted](const Parameter& parameter, std::uint32_t raw) {
+    wanted.set_raw(firmware::slot_of(parameter.entry(), parameter.axis()), raw);
+  };
+  std::vector<Parameter> read;
+  for (const std::size_t entry : firmware::guard_entries) read.emplace_back(entry, axis);
+  try {
+    const auto raw = device.read(read);
+    for (std::size_t i = 0; i < read.size(); ++i) set(read[i], raw[i]);
+  } catch (const std::exception&) {
+    return {};
+  }
+  for (const Assignment& assignment : assignments) set(assignment.parameter, assignment.raw);
+  const std::string words = guard_words(firmware::guard_finding(wanted, axis));
+  return words.empty() ? words : "; " + words;
 }
 }  // namespace
 
@@ -225,7 +246,7 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
     throw DeviceError(
         "the device dropped the transaction because its values came too slowly; some of them may be set, "
         "'kmax get' tells");
-  std::string about;
+  std::string about, numbers;
   if (const auto owner = owner_of_holding_register(report.address); owner && *owner != control) {
     about = owner->name();
     const auto wanted = std::find_if(assignments.begin(), assignments.end(),
@@ -234,9 +255,10 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
     if (report.reason == Refusal::out_of_range || report.reason == Refusal::not_a_choice)
       about += fmt::format(" (allowed: {})", allowed_text(*owner));
     about += ": ";
+    if (report.reason == Refusal::guard_refused) numbers = guard_numbers(*this, assignments, owner->axis());
   }
   const std::string message =
-      fmt::format("{}the device refused: {}; {}", about, words_of(report.reason), nothing_changed);
+      fmt::format("{}the device refused: {}{}; {}", about, words_of(report.reason), numbers, nothing_changed);
   if (is_about_values(report.reason)) throw ValueError(message);
   throw DeviceError(message);
 }

@@ -17,7 +17,7 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/output_file.hpp"
-#include "host_tools/plot/map_figure.hpp"
+#include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::cli {
 
@@ -42,6 +42,7 @@ firmware::ParameterValues values_of(Context& context, const CheckOptions& option
                                     const std::vector<MapAxis>& sides) {
   const auto assignments = device::parse_assignments(options.assignments, context.axis());
   std::vector<Parameter> read = check::case_parameters(context.axis());
+  read.push_back(Parameter::of<"velocity.estimator">(context.axis()));  // what the guarantees cover
   for (const auto& assignment : assignments) {
     if (std::find(read.begin(), read.end(), assignment.parameter) == read.end())
       context.note(fmt::format("{} is not judged by any criterion of axis {}", assignment.parameter.name(),
@@ -102,6 +103,7 @@ Json judgement_json(const check::Judgement& judgement, const std::string& hand) 
     worths[std::string(check::name_of(worth))] = judgement.pass_of(worth);
   return {{"pass", judgement.pass},
           {"pass_by_worth", worths},
+          {"guaranteed", judgement.guaranteed()},
           {"criteria", criteria},
           {"changes", changes_json(judgement.changes)},
           {"diolaiti_region", std::string(check::words_of(check::region_of(c)))},

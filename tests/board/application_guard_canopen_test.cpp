@@ -18,7 +18,7 @@ class GuardOnCan : public testing::Test, public CanOpenHost {
     bench.set_up_plain_wall();
     bench.device.stand_at(1000);
     bench.preset("current.bandwidth", 4000);
-    bench.preset("guard.damping", 1.1);
+    bench.preset("guard.damping", 1.23);
     bench.preset("guard.friction", 1);
     bench.preset("guard.mode", 2);
     run_ms(5);
@@ -50,7 +50,7 @@ TEST_F(GuardOnCan, RefusesToArmWithTheNumbersInObjectsAndArmsWhenItIsMended) {
   EXPECT_EQ(read(finding, 3), 0U);
   EXPECT_EQ(read_real(finding, 4), 5500.0f);
   EXPECT_NEAR(read_real(finding, 5), 4000.0f, 0.01f);
-  EXPECT_EQ(write_real(guard, 2, 1.6f), 0U);
+  EXPECT_EQ(write_real(guard, 2, 1.8f), 0U);
   EXPECT_EQ(read(finding, 1), 1U);
   EXPECT_TRUE(arm());
   EXPECT_EQ(read(drive_status, 3), 0U);

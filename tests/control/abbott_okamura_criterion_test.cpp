@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -26,6 +27,42 @@ TEST(AbbottOkamuraCriterion, WhatIsNotThereDoesNotLimit) {
   constexpr double tiny = std::numeric_limits<double>::denorm_min();
   EXPECT_EQ(abbott_okamura_stiffness_limit(1.0, 1.0, tiny, tiny), largest);
   EXPECT_EQ(abbott_okamura_stiffness_limit(0.0, 1.0, tiny, tiny), 0.0);
+}
+
+// 2 (f_c/Delta - |B|/T): 2 (0.1/50e-6 - 1/1e-3) = 2000.
+TEST(AbbottOkamuraCriterion, ADamperTakesItsStepOfTheFriction) {
+  for (const double wall_damping : {1.0, -1.0}) {
+    EXPECT_NEAR(position_step_stiffness_limit(0.1, wall_damping, 1e-3, 50e-6), 2000.0, 1e-9);
+    EXPECT_NEAR(abbott_okamura_stiffness_limit(10.0, 0.1, 1e-3, 50e-6, wall_damping), 2000.0, 1e-9);
+  }
+  EXPECT_NEAR(abbott_okamura_stiffness_limit(10.0, 0.1, 1e-3, 50e-6, 3.0), -2000.0, 1e-9);
+  EXPECT_NEAR(abbott_okamura_stiffness_limit(10.0, 0.1, 1e-3, 0.0, 3.0), 20000.0, 1e-9) << "no step";
+  EXPECT_EQ(position_step_stiffness_limit(0.1, 1.0, 0.0, 50e-6), -largest) << "no period";
+}
+
+// Over every pair of positions that lie on the border of two steps: the force that is computed is never
+// farther from that of the true positions than the friction at the limit.
+TEST(AbbottOkamuraCriterion, FrictionAtTheLimitIsTheWorstErrorOfTheForce) {
+  const double friction = 0.2, period = 1e-3, quantum = 50e-6;
+  for (const double wall_damping : {0.0, 0.5, 2.0, -2.0}) {
+    const double stiffness = position_step_stiffness_limit(friction, wall_damping, period, quantum);
+    ASSERT_GT(stiffness, 0.0);
+    double worst = 0.0;
+    for (int now = -60; now <= 60; ++now) {
+      for (int before = -60; before <= 60; ++before) {
+        const auto error = [&](int at) {
+          const double position = (at / 20.0 + 1e-12) * quantum;
+          return std::floor(position / quantum + 0.5) * quantum - position;
+        };
+        worst = std::max(
+            worst, std::abs(stiffness * error(now) + wall_damping * (error(now) - error(before)) / period));
+      }
+    }
+    EXPECT_LE(worst, friction * 1.0000001);
+    if (wall_damping >= 0.0) {
+      EXPECT_GT(worst, 0.9 * friction);
+    }
+  }
 }
 
 RC_GTEST_PROP(AbbottOkamuraCriterion, Monotone, ()) {

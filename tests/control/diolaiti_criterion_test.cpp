@@ -40,6 +40,17 @@ TEST(DiolaitiCriterion, EscapeSpeed) {
   EXPECT_LE(escape_speed(next, 1.0, 1e300, 2e-3, 1e-4), largest);
 }
 
+// A delay of half a period injects as much as the hold itself.
+TEST(DiolaitiCriterion, ADelayCountsTwiceItsLengthOfPeriod) {
+  EXPECT_DOUBLE_EQ(period_with_delay(2e-3, 0.0), 2e-3);
+  EXPECT_DOUBLE_EQ(period_with_delay(1e-3, 0.5e-3), 2e-3);
+  EXPECT_DOUBLE_EQ(escape_speed(1000.0, 0.5, 0.1, period_with_delay(1e-3, 0.5e-3), 1e-4), 0.2);
+  EXPECT_EQ(diolaiti_region(1000.0, 0.9, 1.0, 1e-3, 1e-4), DiolaitiRegion::passive);
+  EXPECT_EQ(diolaiti_region(1000.0, 0.9, 1.0, period_with_delay(1e-3, 0.5e-3), 1e-4),
+            DiolaitiRegion::locally_stable);
+  EXPECT_EQ(period_with_delay(1.0, largest), largest);
+}
+
 RC_GTEST_PROP(DiolaitiCriterion, PassiveIsWhereAbbottAndOkamuraAllowIt, ()) {
   const auto amount = [](double unit) { return unit * *rc::gen::inRange(1, 1000); };
   const double k = amount(10.0), b = amount(0.01), f = amount(0.001), period = amount(1e-5),

@@ -18,6 +18,34 @@ TEST(FieldCriterion, KnownNumbers) {
   EXPECT_EQ(steepest_field_slope(1.0, 0.0), std::numeric_limits<double>::max());
 }
 
+TEST(FieldCriterion, TheLimitIsTheSmallerOfHoldAndStep) {
+  // (20 - 0)/0.5 ms = 40000 and 2 * 0.01/0.055 mm = 364: 2 N over 0.2 mm pass the first and buzz.
+  EXPECT_DOUBLE_EQ(field_slope_limit(20.0, 0.0, 0.01, 1e-3, 0.0, 0.0), 40000.0);
+  EXPECT_NEAR(field_slope_limit(20.0, 0.0, 0.01, 1e-3, 0.0, 55e-6), 363.6, 0.1);
+  EXPECT_DOUBLE_EQ(field_slope_limit(20.0, 0.0, 10.0, 1e-3, 0.0, 55e-6), 40000.0);
+  EXPECT_NEAR(field_slope_limit(20.0, 1.0, 0.1, 1e-3, 0.5e-3, 50e-6), 2000.0, 1e-6);
+  EXPECT_NEAR(field_slope_limit(2.0, 1.0, 1.0, 1e-3, 0.5e-3, 50e-6), 1000.0, 1e-6);
+}
+
+// No field within its limit changes by more than twice the friction over one step, wherever the steps lie.
+RC_GTEST_PROP(FieldCriterion, FrictionHoldsEveryStepWithinTheLimit, ()) {
+  const double friction = *rc::gen::inRange(1, 100) * 0.01, quantum = *rc::gen::inRange(1, 100) * 1e-6;
+  const double length = *rc::gen::inRange(1, 100) * 1e-5;
+  const double limit = field_slope_limit(1e6, 0.0, friction, 1e-3, 0.0, quantum);
+  WallLawConfig<double> config;
+  config.kind = WallKind::magnetic;
+  config.magnetic_coefficient = limit * length / 2;
+  config.magnetic_length = length;
+  WallLaw<double> law;
+  const auto prepared = WallLaw<double>::prepare(config, 1e-3);
+  for (int i = 0; i < 40; ++i) {
+    const double from = i * 0.25 * quantum;
+    const double step =
+        law.update(prepared, from, 0.0).force - law.update(prepared, from + quantum, 0.0).force;
+    RC_ASSERT(step <= 2 * friction * (1 + 1e-12));
+  }
+}
+
 // The slope is that of the law that runs: reached at the surface, and nowhere exceeded.
 RC_GTEST_PROP(FieldCriterion, IsTheLawsSteepestSlope, ()) {
   WallLawConfig<double> config;

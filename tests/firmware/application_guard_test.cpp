@@ -15,7 +15,7 @@ namespace {
 using control::Criterion;
 using Verdict = firmware::GuardFinding::Verdict;
 
-/// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: T/2 + Td = 275 us, and 1.1 N s/m allow 4000 N/m.
+/// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: T/2 + Td = 307.5 us, and 1.23 N s/m allow 4000.
 class GuardedArming : public testing::Test {
  protected:
   GuardedArming() {
@@ -23,7 +23,7 @@ class GuardedArming : public testing::Test {
       bench.set_up_plain_wall(axis);
       bench.device.stand_at(1000, axis);
       bench.preset("current.bandwidth", 4000, axis);
-      bench.preset("guard.damping", 1.1, axis);
+      bench.preset("guard.damping", 1.23, axis);
       bench.preset("guard.friction", 1, axis);
       bench.preset("guard.mode", 2, axis);
     }
@@ -86,14 +86,14 @@ TEST_F(GuardedArming, EveryWayOfMendingItArms) {
   const struct {
     std::string_view name;
     double number;
-  } ways[] = {{"guard.damping", 1.6}, {"current.bandwidth", 8000}, {"wall.law", 0},  {"guard.mode", 0},
+  } ways[] = {{"guard.damping", 1.8}, {"current.bandwidth", 8000}, {"wall.law", 0},  {"guard.mode", 0},
               {"guard.mode", 1},      {"drive.mode", 2},           {"drive.mode", 1}};
   for (const auto& [name, number] : ways) {
     Bench other;
     other.set_up_plain_wall();
     other.device.stand_at(1000);
     other.preset("current.bandwidth", 4000);
-    other.preset("guard.damping", 1.1);
+    other.preset("guard.damping", 1.23);
     other.preset("guard.friction", 1);
     other.preset("wall.stiffness", 5500);
     other.preset("guard.mode", 2);
@@ -165,7 +165,7 @@ TEST_F(GuardedArming, WhileArmedNoSingleWriteMayBreakACriterion) {
   bench.run_ms(2);
   EXPECT_EQ(bench.force(), 1.0f);
   expect_refused("wall.stiffness", 4001);
-  expect_refused("wall.damping", 0.9);
+  expect_refused("wall.damping", 1);
   expect_refused("guard.damping", 0.2);
   expect_refused("guard.friction", 1e-4);
   expect_refused("guard.delay", 0.002);
@@ -174,7 +174,7 @@ TEST_F(GuardedArming, WhileArmedNoSingleWriteMayBreakACriterion) {
   EXPECT_EQ(bench.force(), 1.0f) << "the wall is as it was";
   EXPECT_EQ(bench.state(), DriveState::operation_enabled);
   EXPECT_EQ(bench.set("wall.stiffness", 3999), 0);
-  EXPECT_EQ(bench.set("guard.damping", 2), 0);
+  EXPECT_EQ(bench.set("guard.damping", 2.2), 0);
   EXPECT_EQ(bench.set("wall.stiffness", 7000), 0) << "the device has more damping than was thought";
   // Nor may the guard itself be taken away.
   EXPECT_NE(bench.set("guard.mode", 0), 0);

@@ -14,6 +14,7 @@ inline unsigned bit(control::Criterion criterion) {
 }
 
 /// A plain wall on axis 0 that passes everything: 1000 N/m, 2 kHz, steps of 10 um, a well damped device.
+/// T/2 + Td = 250 us + 250 us + 32.5 us.
 class Guard : public testing::Test {
  protected:
   Guard() {
@@ -24,7 +25,7 @@ class Guard : public testing::Test {
     set("current.bandwidth", 4000);
     set("encoder.counts_per_turn", 1'000'000);
     set("device.transmission", 1.5915494309189535);
-    set("guard.damping", 5);
+    set("guard.damping", 5.325);
     set("guard.friction", 1);
   }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "control/adaptive_coefficient.hpp"
 #include "firmware/haptic_configuration.hpp"
@@ -130,7 +131,8 @@ TEST_F(GuardOfArmedAxes, RefusesWhatWouldBreakAnArmedAxisAndNamesTheParameterTha
   EXPECT_EQ(check(true, false).refusal, Refusal::none) << "the other axis is not armed";
   for (const bool other : {false, true}) {
     EXPECT_EQ(check(other, true).refusal, Refusal::guard_refused);
-    EXPECT_EQ(check(other, true).slot, slot_of(entry_named("force.limit"), 1));
+    EXPECT_EQ(check(other, true).slot, slot_of(entry_named("guard.damping"), 1))
+        << "not force.limit, which is not judged";
   }
 }
 
@@ -148,6 +150,56 @@ TEST_F(GuardOfArmedAxes, ASlotIsNamedEvenWhereNothingWouldChange) {
   set("wall.stiffness", 1e6, 1);
   now = values;
   EXPECT_EQ(owner_of(check(true, true).slot).axis, 1U);
+}
+
+// What is listed is what the guard reads: nothing else of an axis may change its finding, and each of these
+// does somewhere.
+TEST(GuardEntries, AreThoseThatCount) {
+  for (std::size_t entry = 0; entry < axis_settings.size(); ++entry) {
+    const Entry& e = entry_at(entry);
+    bool counts = false;
+    for (const std::uint32_t law : {1U, 2U, 3U}) {
+      for (const float widest : {2.0f, 50.0f}) {
+        for (const float offset : {0.0f, 0.8f}) {
+          ParameterValues values;
+          values.set_whole<"guard.mode">(1);
+          values.set_whole<"wall.law">(law);
+          values.set_real<"guard.damping">(5);
+          values.set_real<"guard.operator_force">(1);
+          values.set_real<"guard.operator_speed">(0.1f);
+          values.set_real<"position.resolution">(0.001f);
+          values.set_real<"wall.adaptive_force_max">(widest);
+          values.set_real<"wall.adaptive_offset">(offset);
+          values.set_real<"wall.adaptive_gain">(3 * offset);
+          const auto judged = [&values] {
+            std::array<float, 2 * guard_criteria.size() + 1> all{};
+            all.back() = guard_finding(values, 0).verdict == Verdict::not_judged ? 0.0f : 1.0f;
+            for (std::size_t i = 0; i < guard_criteria.size(); ++i) {
+              const auto result = control::judge_closed_form(guard_criteria[i], stability_case(values, 0));
+              all[2 * i] = result.value;
+              all[2 * i + 1] = result.bound;
+            }
+            return all;
+          };
+          const auto before = judged();
+          std::vector<double> numbers{e.minimum, e.maximum, 0.5 * e.minimum + 0.5 * e.maximum};
+          if (!e.values.empty()) {
+            numbers.clear();
+            for (const NamedValue& named : e.values) numbers.push_back(named.value);
+          }
+          for (const double number : numbers) {
+            const ParameterValues kept = values;
+            values.set_raw(slot_of(entry, 0),
+                           raw_from_number(e.type, e.type == Type::float32 ? number : std::trunc(number)));
+            counts = counts || judged() != before;
+            values = kept;
+          }
+        }
+      }
+    }
+    const bool listed = std::find(guard_entries.begin(), guard_entries.end(), entry) != guard_entries.end();
+    EXPECT_EQ(counts, listed) << e.name;
+  }
 }
 
 // Stores of firmware that had no guard.delay and knew only "off".

@@ -77,10 +77,10 @@ TEST_F(Guard, TakesEveryNumberFromTheParameterThatMeansIt) {
   EXPECT_EQ(judged.magnetic_coefficient, 1.25f);
   EXPECT_EQ(judged.magnetic_length, 0.002f);
   EXPECT_EQ(judged.period, 0.0005f);
-  EXPECT_FLOAT_EQ(judged.delay, 0.00125f) << "guard.delay and 1 / current.bandwidth";
+  EXPECT_FLOAT_EQ(judged.delay, 0.0012825f) << "guard.delay, 1 / current.bandwidth and 0.65 ticks";
   EXPECT_NEAR(judged.quantum, 60e-6f, 1e-11f) << "the step in use: six counts, not the 55 um asked for";
   EXPECT_EQ(judged.mass, 0.0625f);
-  EXPECT_EQ(judged.damping, 5.0f);
+  EXPECT_EQ(judged.damping, 5.325f);
   EXPECT_EQ(judged.friction, 1.0f);
   EXPECT_EQ(judged.operator_force, 3.0f);
   EXPECT_EQ(judged.operator_speed, 0.75f);
@@ -97,7 +97,7 @@ TEST_F(Guard, AxesAreJudgedEachByItsOwn) {
   EXPECT_EQ(finding(1).value, 1e6f);
 }
 
-// b / (T/2 + Td) = 5 / (250 us + 250 us) = 10,000 N/m, not to be reached.
+// b / (T/2 + Td) = 5.325 / (250 us + 282.5 us) = 10,000 N/m, not to be reached.
 TEST_F(Guard, ColgateOnBothSidesOfItsBound) {
   expect_pass();
   const float bound = finding().bound;
@@ -116,14 +116,14 @@ TEST_F(Guard, ColgateOnBothSidesOfItsBound) {
 }
 
 TEST_F(Guard, ColgateCountsDampingOfTheWallAndEveryDelay) {
-  set("wall.damping", 2);
+  set("wall.damping", 2.13);
   EXPECT_NEAR(finding().bound, 6'000.0f, 0.01f);
   set("guard.delay", 0.0005);
-  EXPECT_NEAR(finding().bound, 3'000.0f, 0.01f);
+  EXPECT_NEAR(finding().bound, 3.195f / 1032.5e-6f, 0.01f);
   set("haptic.rate", 20000);
-  EXPECT_NEAR(finding().bound, 3.0f / 775e-6f, 0.01f);
+  EXPECT_NEAR(finding().bound, 3.195f / 807.5e-6f, 0.01f);
   set("current.bandwidth", 1000);
-  EXPECT_NEAR(finding().bound, 3.0f / 1525e-6f, 0.01f);
+  EXPECT_NEAR(finding().bound, 3.195f / 1557.5e-6f, 0.01f);
 }
 
 // 2 f_c / Delta = 2 * 0.01 / 10 um = 2000 N/m, which may be reached.
@@ -144,6 +144,16 @@ TEST_F(Guard, AbbottOkamuraOnBothSidesOfItsBound) {
   set("position.resolution", 30e-6);
   expect_fail(bit(Criterion::abbott_okamura));
   EXPECT_NEAR(finding().bound, 2'000.0f / 3.0f, 0.01f);
+  // As does a damper: 2 (0.02 N / 30 um - 0.1 N s/m / 0.5 ms) = 933 N/m.
+  set("guard.friction", 0.02);
+  expect_pass();
+  set("wall.damping", 0.1);
+  expect_fail(bit(Criterion::abbott_okamura));
+  EXPECT_NEAR(finding().bound, 2'800.0f / 3.0f, 0.01f);
+  // Alone, it steps by 6 mN of 5.
+  set("guard.friction", 0.005);
+  set("wall.stiffness", 0);
+  expect_fail(bit(Criterion::abbott_okamura));
 }
 
 // K eta = 1000 N/m * 10 um.
@@ -211,6 +221,24 @@ TEST_F(Guard, FieldSlopeOnBothSidesOfItsBound) {
   expect_pass();
 }
 
+// 2 N over 0.2 mm change by 1.1 N from one step of 55 um to the next.
+TEST_F(Guard, FieldSlopeOnBothSidesOfWhatFrictionHolds) {
+  set("wall.law", 2);
+  set("wall.stiffness", 100);
+  set("wall.magnetic_length", 2e-4);
+  set("guard.damping", 20);
+  set("position.resolution", 55e-6);
+  set("guard.friction", 0.61);
+  expect_pass();
+  EXPECT_EQ(finding().criterion, Criterion::field_slope);
+  EXPECT_NEAR(finding().bound, 2 * 0.61 / 60e-6, 0.01) << "six counts of 10 um";
+  set("guard.friction", 0.59);
+  expect_fail(bit(Criterion::field_slope));
+  set("guard.friction", 0.01);
+  expect_fail(bit(Criterion::field_slope));
+  EXPECT_NEAR(finding().bound, 2 * 0.01 / 60e-6, 0.01);
+}
+
 TEST_F(Guard, AFieldAloneIsJudgedToo) {
   set("wall.law", 2);
   set("wall.stiffness", 0);
@@ -235,7 +263,7 @@ TEST_F(Guard, WithoutFrictionNoSpringPasses) {
 }
 
 TEST_F(Guard, MoreWallDampingThanTheDeviceHasGivesANegativeBound) {
-  set("wall.damping", 7);
+  set("wall.damping", 7.455);
   expect_fail(bit(Criterion::colgate));
   EXPECT_NEAR(finding().bound, -4'000.0f, 0.01f);
   set("wall.stiffness", 0);
@@ -253,16 +281,16 @@ TEST_F(Guard, NamesTheFailedCriterionWithTheLeastMargin) {
   // One that passes with no margin at all is not named while another fails.
   set("wall.stiffness", 1000);
   set("guard.friction", 0.0049);
-  set("guard.damping", 0.51);
+  set("guard.damping", 0.54);
   expect_fail(bit(Criterion::abbott_okamura));
   EXPECT_EQ(finding().criterion, Criterion::abbott_okamura);
 }
 
 TEST_F(Guard, NamesTheOneFartherBeyondWhenNoValueCouldPass) {
-  set("wall.damping", 7);
+  set("wall.damping", 7.455);
   set("guard.friction", 0);
   expect_fail(bit(Criterion::colgate) | bit(Criterion::abbott_okamura));
-  EXPECT_EQ(finding().criterion, Criterion::colgate) << "1000 beyond -4000 N/m, and 1000 beyond 0";
+  EXPECT_EQ(finding().criterion, Criterion::colgate) << "1000 N/m where no value passes, the first of two";
   set("wall.law", 2);
   set("guard.friction", 1);
   set("wall.magnetic_coefficient", 0.6);
@@ -272,10 +300,11 @@ TEST_F(Guard, NamesTheOneFartherBeyondWhenNoValueCouldPass) {
   EXPECT_EQ(finding().criterion, Criterion::colgate);
   // One that no value could pass is worse than any that only this one does not.
   set("wall.damping", 0);
-  set("wall.magnetic_coefficient", 20);
+  set("wall.law", 1);
+  set("guard.operator_force", 1e-3);
   set("guard.friction", 0);
-  expect_fail(bit(Criterion::abbott_okamura) | bit(Criterion::field_slope));
-  EXPECT_EQ(finding().criterion, Criterion::abbott_okamura) << "not the slope of 40,000 N/m over 10,000";
+  expect_fail(bit(Criterion::abbott_okamura) | bit(Criterion::resolution));
+  EXPECT_EQ(finding().criterion, Criterion::abbott_okamura) << "not the step of 10 mN over 1";
 }
 
 TEST_F(Guard, LargestCoefficientOfEachLaw) {

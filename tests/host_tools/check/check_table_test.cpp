@@ -45,18 +45,61 @@ TEST(CheckTable, TheLastWordsSayWhatFollows) {
   EXPECT_CONTAINS(text_for(none), "There is no wall");
   ParameterValues late = with_damping(5, 1);
   late.set_real<"guard.delay">(0.01f);
-  EXPECT_CONTAINS(text_for(late), "more than 8 periods");
+  EXPECT_CONTAINS(text_for(late), "could not be judged: T_d is 207 periods");
+  EXPECT_CONTAINS(text_for(late), "sampled_eigenvalues  not judged: T_d is 207 periods, more than 8");
   ParameterValues adaptive = with_damping(5, 1);
   adaptive.set_whole<"wall.law">(static_cast<std::uint32_t>(control::WallKind::adaptive));
   EXPECT_CONTAINS(text_for(adaptive), "adaptive law's field follows the velocity");
+}
+
+TEST(CheckTable, AFieldOrADamperAloneIsAWallToo) {
+  ParameterValues field = with_damping(5, 1);
+  field.set_whole<"wall.law">(static_cast<std::uint32_t>(control::WallKind::magnetic));
+  field.set_real<"wall.stiffness">(0);
+  field.set_real<"wall.magnetic_coefficient">(0.5f);
+  const std::string text = text_for(field);
+  EXPECT_EQ(text.find("There is no wall"), std::string::npos) << text;
+  EXPECT_CONTAINS(text, "leaves out the field");
+  EXPECT_CONTAINS(text, "Stable with every passive hand");
+  EXPECT_CONTAINS(text, "colgate              not judged: wall.stiffness and wall.damping are 0");
+  EXPECT_CONTAINS(text, "sampled_eigenvalues  not judged: wall.stiffness and wall.damping are 0");
+  field.set_real<"guard.damping">(0);
+  EXPECT_CONTAINS(text_for(field), "Nothing is guaranteed: if you try it");
+  ParameterValues damper = with_damping(5, 1);
+  damper.set_real<"wall.stiffness">(0);
+  damper.set_real<"wall.damping">(0.1f);
+  damper.set_whole<"velocity.estimator">(0);
+  EXPECT_CONTAINS(text_for(damper), "Stable with every passive hand");
+  EXPECT_CONTAINS(text_for(damper), "saturation_depth     not judged: wall.stiffness is 0");
+  damper.set_real<"wall.damping">(0);
+  EXPECT_CONTAINS(text_for(damper), "There is no wall");
+}
+
+// Stable again beyond the first loss: see control/sampled_stability.hpp.
+TEST(CheckTable, AStableIslandIsNotCalledUnstable) {
+  ParameterValues values = with_damping(0.08f, 0.1f);
+  values.set_real<"device.mass">(0.05f);
+  values.set_real<"guard.delay">(0.0015f);
+  values.set_real<"haptic.rate">(2500);
+  const control::Hand<double> hand{0.05, 2250, 9.6, 370, 1.1};
+  const auto text_at = [&](float stiffness) {
+    values.set_real<"wall.stiffness">(stiffness);
+    return text_for(values, hand);
+  };
+  for (const float unstable : {700.0f, 4000.0f, 8000.0f})
+    EXPECT_CONTAINS(text_at(unstable), "unstable with this hand: expect");
+  const std::string text = text_at(5500);  // 4740 .. 6649 N/m
+  EXPECT_CONTAINS(text, "The stiffness is beyond the first loss of stability");
+  EXPECT_EQ(text.find("is unstable with"), std::string::npos) << text;
+  EXPECT_CONTAINS(text, "no pass");
 }
 
 TEST(CheckTable, RemediesNameParameterSideAndUnit) {
   ParameterValues values = with_damping(0.5f, 0.1f);
   values.set_real<"wall.stiffness">(2000);
   const std::string text = text_for(values);
-  EXPECT_CONTAINS(text, "wall.stiffness at most 1390 N/m");
-  EXPECT_CONTAINS(text, "guard.damping at least 0.717 N s/m");
+  EXPECT_CONTAINS(text, "wall.stiffness at most 1270 N/m");
+  EXPECT_CONTAINS(text, "guard.damping at least 0.782 N s/m");
   EXPECT_CONTAINS(text, "all of them");
   EXPECT_EQ(text_for(with_damping(5, 1)).find("What would meet"), std::string::npos);
 }

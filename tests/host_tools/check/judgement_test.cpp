@@ -82,8 +82,8 @@ TEST(Judgement, ColgateByHand) {
   values.set_real<"guard.delay">(0.001f);
   values.set_real<"wall.damping">(1);
   const Verdict colgate = verdict_of(judge_parameters(values, 0, {}), Criterion::colgate);
-  EXPECT_NEAR(colgate.result.bound, (5 - 1) / (0.0005 + 0.0015), 1e-4);
-  EXPECT_NEAR(*colgate.margin, 0.5, 1e-6);
+  EXPECT_NEAR(colgate.result.bound, (5 - 1) / (0.0005 + 0.0015325), 1e-4);
+  EXPECT_NEAR(*colgate.margin, 1 - 2.0325 / 4, 1e-6);
 }
 
 TEST(Judgement, AHandMovesTheEigenvalueBoundOnly) {
@@ -110,11 +110,46 @@ TEST(Judgement, RegionsOfDiolaiti) {
   EXPECT_EQ(region(), "locally stable");
 }
 
+TEST(Judgement, TheRegionCountsTheDelay) {
+  ParameterValues values = good();
+  values.set_real<"guard.damping">(1);
+  EXPECT_EQ(region_of(parameter_case(values, 0)), control::DiolaitiRegion::passive);
+  values.set_real<"guard.delay">(0.001f);
+  const auto c = parameter_case(values, 0);
+  EXPECT_EQ(region_of(c), control::DiolaitiRegion::locally_stable);
+  EXPECT_NEAR(escape_speed_of(c), 1 / (1000 * (25e-6 + c.delay) - 1), 1e-6);
+}
+
+// No damper but one by difference or low_pass is what Colgate's condition and the step of the force are of.
+TEST(Judgement, ADamperOfAnotherEstimatorIsNotGuaranteed) {
+  ParameterValues values = good();
+  values.set_real<"wall.damping">(0.5f);
+  for (std::uint32_t estimator = 0; estimator < 5; ++estimator) {
+    values.set_whole<"velocity.estimator">(estimator);
+    const Judgement judgement = judge_parameters(values, 0, {});
+    EXPECT_TRUE(judgement.pass) << estimator;
+    EXPECT_EQ(judgement.guaranteed(), estimator < 2) << estimator;
+    EXPECT_EQ(judgement.uncovered_damper, estimator >= 2) << estimator;
+  }
+  values.set_real<"wall.damping">(0);
+  EXPECT_TRUE(judge_parameters(values, 0, {}).guaranteed());
+}
+
+TEST(Judgement, WithoutAForceThereIsNothingToGuarantee) {
+  ParameterValues values = good();
+  values.set_real<"wall.stiffness">(0);
+  EXPECT_FALSE(judge_parameters(values, 0, {}).guaranteed());
+  values.set_whole<"wall.law">(static_cast<std::uint32_t>(control::WallKind::magnetic));
+  EXPECT_TRUE(judge_parameters(values, 0, {}).guaranteed()) << "a field alone";
+}
+
 TEST(Judgement, TheAdaptiveLawIsSaidNotToBeJudgedWhole) {
   ParameterValues values = good();
   EXPECT_FALSE(judge_parameters(values, 0, {}).follows_velocity);
+  EXPECT_TRUE(judge_parameters(values, 0, {}).guaranteed());
   values.set_whole<"wall.law">(static_cast<std::uint32_t>(control::WallKind::adaptive));
   EXPECT_TRUE(judge_parameters(values, 0, {}).follows_velocity);
+  EXPECT_FALSE(judge_parameters(values, 0, {}).guaranteed());
 }
 
 }  // namespace

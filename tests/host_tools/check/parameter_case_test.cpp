@@ -38,7 +38,7 @@ TEST(ParameterCase, EveryNumberComesFromItsParameter) {
   EXPECT_EQ(c.magnetic_coefficient, 1.5);
   EXPECT_FLOAT_EQ(static_cast<float>(c.magnetic_length), 0.002f);
   EXPECT_EQ(c.period, 0.002);
-  EXPECT_NEAR(c.delay, 0.0045, 1e-9);
+  EXPECT_NEAR(c.delay, 0.0045325, 1e-9) << "with 0.65 ticks";
   EXPECT_NEAR(c.mass, 0.06, 1e-8);
   EXPECT_EQ(c.damping, 0.25);
   EXPECT_EQ(c.friction, 0.125);

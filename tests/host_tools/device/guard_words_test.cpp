@@ -51,7 +51,11 @@ TEST(GuardWords, EveryCriterionOfTheGuardHasItsOwnUnitAndRemedy) {
 
 TEST(GuardWords, WithoutDampingOrFrictionTheyAskForIt) {
   EXPECT_CONTAINS(guard_words(failed(Criterion::colgate, 1000.0f, 0.0f)), "guard.damping is not above");
-  EXPECT_CONTAINS(guard_words(failed(Criterion::field_slope, 1000.0f, -5.0f)), "guard.damping is not above");
+  EXPECT_CONTAINS(
+      guard_words(failed(Criterion::field_slope, 1000.0f, -5.0f)),
+      "no field passes while guard.damping is not above the magnitude of wall.damping, or guard.friction");
+  EXPECT_CONTAINS(guard_words(failed(Criterion::abbott_okamura, 1000.0f, -5.0f)),
+                  "guard.friction is not above |B| step / T: lower wall.damping");
   EXPECT_CONTAINS(guard_words(failed(Criterion::abbott_okamura, 1000.0f, 0.0f)),
                   "guard.damping or guard.friction is 0: measure them ('kmax calibrate')");
 }

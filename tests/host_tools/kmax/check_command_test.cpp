@@ -34,7 +34,7 @@ TEST_F(Check, PassIsExitCodeZeroAndFailThree) {
   EXPECT_EQ(check({}), verdict_is_no);
   EXPECT_CONTAINS(output, "no pass");
   EXPECT_CONTAINS(output, "NOT MET");
-  EXPECT_CONTAINS(output, "guard.damping at least 0.359 N s/m");
+  EXPECT_CONTAINS(output, "guard.damping at least 0.391 N s/m");
 }
 
 TEST_F(Check, TheDocument) {
@@ -44,8 +44,8 @@ TEST_F(Check, TheDocument) {
   const Json colgate = criterion("colgate");
   EXPECT_EQ(colgate["unit"], "N/m");
   EXPECT_EQ(colgate["value"], 1000.0);
-  EXPECT_NEAR(colgate["bound"].get<double>(), 1 / (0.0005 + 1 / 3000.0), 1e-6);
-  EXPECT_NEAR(colgate["margin"].get<double>(), 1.0 / 6, 1e-9);
+  EXPECT_NEAR(colgate["bound"].get<double>(), 1 / (0.0005 + 1 / 3000.0 + 0.65 / 20000), 1e-6);
+  EXPECT_NEAR(colgate["margin"].get<double>(), 1 - (0.0005 + 1 / 3000.0 + 0.65 / 20000) * 1000, 1e-9);
   EXPECT_EQ(colgate["pass"], true);
   EXPECT_EQ(colgate["applies"], true);
   EXPECT_EQ(colgate["worth"], "guarantee");
@@ -55,6 +55,7 @@ TEST_F(Check, TheDocument) {
   EXPECT_TRUE(resolution["bound"].is_null());
   EXPECT_EQ(criterion("saturation_depth")["at_least"], true);
   EXPECT_EQ(document()["diolaiti_region"], "passive");
+  EXPECT_EQ(document()["guaranteed"], true);
   EXPECT_EQ(document()["case"]["period_s"], 0.001);
 
   EXPECT_EQ(check({}, {"--json"}), verdict_is_no);
@@ -88,9 +89,26 @@ TEST_F(Check, TheExactLinearLimitsAreFoundUpToTheCurrentLoopsDelay) {
     return criterion("sampled_eigenvalues")["bound"].get<double>();
   };
   // 501.9 and 4007.4 N/m without any delay; a delay adds to half a period.
-  const double delay = 1 / 15700.0;
+  const double delay = 1 / 15700.0 + 0.65 / 20000;
   EXPECT_NEAR(bound("0.5", "500"), 501.9 * 1e-3 / (1e-3 + delay), 3);
   EXPECT_NEAR(bound("1", "2000"), 4007.4 * 0.25e-3 / (0.25e-3 + delay), 30);
+}
+
+TEST_F(Check, TheEstimatorDecidesWhetherADamperIsGuaranteed) {
+  const std::vector<std::string> set = {"guard.damping=5", "guard.friction=1", "wall.damping=0.5"};
+  EXPECT_EQ(check(set), done);
+  EXPECT_CONTAINS(output, "No guarantee covers wall.damping with this velocity.estimator");
+  EXPECT_EQ(output.find("Stable with every passive hand"), std::string::npos);
+  std::vector<std::string> covered = set;
+  covered.push_back("velocity.estimator=difference");
+  EXPECT_EQ(check(covered), done);
+  EXPECT_CONTAINS(output, "Stable with every passive hand");
+  EXPECT_EQ(said.find("not judged by any criterion"), std::string::npos) << said;
+  // Half of f_c is a step of the damper: 0.16 N s/m by 0.0383 mm in 0.05 ms are 0.123 N.
+  covered = {"guard.damping=5", "guard.friction=0.12", "wall.damping=0.16", "velocity.estimator=difference",
+             "wall.stiffness=100"};
+  EXPECT_EQ(check(covered), verdict_is_no);
+  EXPECT_EQ(output.find("Stable with every passive hand"), std::string::npos);
 }
 
 TEST_F(Check, AHandIsNamedOrReadFromAFile) {

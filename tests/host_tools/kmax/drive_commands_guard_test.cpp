@@ -11,7 +11,7 @@
 namespace kmax::cli {
 namespace {
 
-/// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.1 N s/m allow 4000 N/m.
+/// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.23 N s/m allow 4000 N/m.
 class GuardOnCommandLine : public testing::Test {
  protected:
   GuardOnCommandLine() {
@@ -19,7 +19,7 @@ class GuardOnCommandLine : public testing::Test {
     bench->device.stand_at(1000);
     bench->device.stand_at(1000, 1);
     bench->preset("current.bandwidth", 4000);
-    bench->preset("guard.damping", 1.1);
+    bench->preset("guard.damping", 1.23);
     bench->preset("guard.friction", 1);
     bench->run_ms(5);
   }
@@ -106,6 +106,8 @@ TEST_F(GuardOnCommandLine, ASetThatIsRefusedWhileArmedNamesTheParameterAndChange
   ASSERT_EQ(kmax({"arm"}), done) << said;
   EXPECT_EQ(kmax({"set", "force.limit=2", "wall.stiffness=5500"}), failed);
   EXPECT_CONTAINS(said, "wall.stiffness = 5500 N/m: the device refused: the stability check fails");
+  EXPECT_CONTAINS(said, "; wall.stiffness 5500 N/m exceeds 4000");
+  EXPECT_CONTAINS(said, "(Colgate");
   EXPECT_CONTAINS(said, "nothing was changed");
   EXPECT_EQ(bench->get("wall.stiffness"), 1000);
   EXPECT_TRUE(armed());
