@@ -25,7 +25,7 @@ StiffnessCondition adaptive(AdaptiveMode mode) {
 }
 
 double mean_of(const SubjectSet& set, const StiffnessRun& run, const std::string& name,
-               const StiffnessCondition& condition, double hold_time = 0.0) {
+               const StiffnessCondition& condition, CountedEnds* ends = nullptr, double hold_time = 0.0) {
   std::vector<StiffnessJob> jobs;
   for (const Subject& subject : set.subjects) {
     StiffnessJob job{fmt::format("gap: {}, {}, limit {:g} N", name, subject.name, set.device.force_limit),
@@ -33,7 +33,9 @@ double mean_of(const SubjectSet& set, const StiffnessRun& run, const std::string
     if (hold_time > 0.0) job.setup.wall.wall.adaptive.hold_time = static_cast<float>(hold_time);
     jobs.push_back(std::move(job));
   }
-  return mean_stiffness(run_stiffness_jobs(jobs, run));
+  const std::vector<MaxStiffness> found = run_stiffness_jobs(jobs, run);
+  if (ends != nullptr) *ends = counted_ends(found);
+  return mean_stiffness(found);
 }
 
 /// F_MC at the moment of contact, mean over the people.
@@ -60,11 +62,13 @@ std::vector<ApproachResult> run_approaches(const SubjectSet& set, const std::vec
     ApproachResult result{};
     result.approach_speed = speed;
     const std::string at = fmt::format(" at {:g} m/s", speed);
-    result.constant = mean_of(set, single, "2 N" + at, constant(2.0));
-    for (const AdaptiveMode mode : {AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold})
-      result.by_mode.push_back(
-          mean_of(set, single, fmt::format("mode {}{}", static_cast<int>(mode), at), adaptive(mode)));
-    result.held = mean_of(set, single, "held" + at, adaptive(AdaptiveMode::peak_hold), for_ever);
+    result.constant = mean_of(set, single, "2 N" + at, constant(2.0), &result.constant_ends);
+    for (const AdaptiveMode mode : {AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold}) {
+      result.by_mode.push_back(mean_of(set, single, fmt::format("mode {}{}", static_cast<int>(mode), at),
+                                       adaptive(mode), &result.by_mode_ends.emplace_back()));
+    }
+    result.held =
+        mean_of(set, single, "held" + at, adaptive(AdaptiveMode::peak_hold), &result.held_ends, for_ever);
     result.coefficient_at_contact = coefficient_at_contact(set, speed, result.held);
     results.push_back(std::move(result));
   }

@@ -13,6 +13,10 @@ struct ApproachResult {
   double held;                  // N/m: peak_hold whose hold time is far longer than the touch
   double
       coefficient_at_contact;  // N, mean over the people, of the wall that is held, at its largest stiffness
+  // Of these means, in the same order.
+  CountedEnds constant_ends{};
+  std::vector<CountedEnds> by_mode_ends{};
+  CountedEnds held_ends{};
 };
 
 std::vector<ApproachResult> run_approaches(const SubjectSet& set, const std::vector<double>& speeds,

@@ -6,10 +6,15 @@
 
 namespace kmax::experiment {
 
+// What is looked for here lies far below the 1 N/mm that other searches begin with: a field that no hand
+// answers is unstable there already.
+inline constexpr double cause_first_stiffness = 100.0;  // N/m; the run's own first stiffness is not used
+
 struct CauseResult {
   CauseCondition condition;
   double mean = 0.0;             // N/m
   double saturated_share = 0.0;  // largest, simulated_touch.hpp
+  CountedEnds ends{};
 };
 
 // `set`: calibrated. One result per cause_conditions().
@@ -19,6 +24,7 @@ struct FieldLengthResult {
   double magnetic_length;  // m, x_0
   double slope;            // N/m, 2 F_MC / x_0 just outside the wall
   double mean;             // N/m
+  CountedEnds ends{};
 };
 
 // The field alone, F_MC = 2 N, the hand unchanged, for several lengths.

@@ -10,27 +10,30 @@
 namespace kmax::experiment {
 
 std::vector<ContactCondition> contact_conditions() {
-  const auto magnetic = [](const char* coefficient) {
-    return std::vector<std::string>{"wall.law=magnetic",
-                                    fmt::format("wall.magnetic_coefficient={}", coefficient)};
-  };
-  const auto adaptive = [](const char* mode) {
-    return std::vector<std::string>{"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)};
-  };
-  return {
-      {"F_MC = 0 N", "9", magnetic("0"), "large sustained oscillation", false},
-      {"F_MC = 1 N", "10", magnetic("1"), "smaller oscillation, not stable", false},
-      {"F_MC = 2 N", "11", magnetic("2"), "stable", true},
-      {"adaptive, instant", "12", adaptive("instant"), "stable", true},
-      {"adaptive, latched", "12", adaptive("latched"), "stable", true},
-      {"adaptive, peak_hold", "12", adaptive("peak_hold"), "stable", true},
-  };
+  std::vector<ContactCondition> conditions;
+  for (const paper::ContactVerdict& verdict : paper::contact_verdicts) {
+    const auto add = [&](const std::string& name, std::vector<std::string> assignments) {
+      conditions.push_back({name, std::string(verdict.figure), std::move(assignments),
+                            std::string(verdict.words), verdict.stable});
+    };
+    if (!verdict.adaptive) {
+      const std::string coefficient = fmt::format("{:g}", verdict.magnetic_coefficient);
+      add(fmt::format("F_MC = {} N", coefficient),
+          {"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", coefficient)});
+      continue;
+    }
+    for (const char* mode : {"instant", "latched", "peak_hold"})
+      add(fmt::format("adaptive, {}", mode),
+          {"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)});
+  }
+  return conditions;
 }
 
 std::vector<std::string> contact_setup(const ContactSettings& settings) {
   return {fmt::format("wall.stiffness={}", settings.stiffness),
           fmt::format("haptic.rate={}", settings.haptic_rate),
           "wall.damping=0",
+          "position.resolution=0",
           "wall.magnetic_length=0.001",
           "wall.adaptive_gain=2.4",
           "wall.adaptive_offset=0.8",

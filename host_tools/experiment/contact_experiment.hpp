@@ -6,6 +6,7 @@
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/trace_reader.hpp"
+#include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/restored_afterwards.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 #include "host_tools/simulation/contact_measure.hpp"
@@ -27,13 +28,13 @@ std::vector<ContactCondition> contact_conditions();
 
 struct ContactSettings {
   std::size_t axis = 0;
-  double stiffness = 5500;         ///< N/m
-  double haptic_rate = 500;        ///< Hz
-  double hold_time = 3.0;          ///< s from the first touch; the last second is judged
-  double contact_patience = 10.0;  ///< s from arming to the first touch
-  double threshold = 0.165e-3;     ///< m peak to peak, contact_measure.hpp
-  double force_limit = 3.3;        ///< N; force.limit is lowered to it
-  double abort_amplitude = 5e-3;   ///< m, watched_touch.hpp
+  double stiffness = paper::contact_stiffness;    ///< N/m
+  double haptic_rate = paper::update_rate;        ///< Hz
+  double hold_time = 3.0;                         ///< s from the first touch; the last second is judged
+  double contact_patience = 10.0;                 ///< s from arming to the first touch
+  double threshold = 0.165e-3;                    ///< m peak to peak, contact_measure.hpp
+  double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
+  double abort_amplitude = 5e-3;                  ///< m, watched_touch.hpp
 };
 
 struct ContactResult {
@@ -50,6 +51,8 @@ struct ContactResult {
     return side * (sample.position - surface);
   }
   std::size_t trials = 1, unstable_trials = 0;  ///< of the condition; the rest is the worst trial's
+  /// Held until it was judged; else to be made again.
+  bool counts() const { return measure.verdict != simulation::ContactVerdict::no_contact; }
   bool agrees_with_paper() const {
     return (measure.verdict == simulation::ContactVerdict::stable) == condition.paper_stable &&
            measure.verdict != simulation::ContactVerdict::no_contact;

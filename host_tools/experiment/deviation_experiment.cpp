@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "control/haptic_loop.hpp"
-#include "host_tools/experiment/jitter_rank_correlation.hpp"
+#include "host_tools/experiment/rank_correlation.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/encoder_model.hpp"

@@ -91,6 +91,7 @@ struct DeviationResult {
   double before = 0.0;         ///< m, in the same touches before F_B began
   double contact_share = 0.0, beyond_limit_share = 0.0;
   std::size_t touches = 0, aborted = 0;
+  std::size_t without_contact = 0;  ///< on a device: left the wall too often to be averaged
 };
 DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const DeviationTouch> touches);
 

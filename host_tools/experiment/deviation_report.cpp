@@ -31,6 +31,19 @@ const DeviationFit* fit_named(const DeviationStudy& study, std::string_view name
     if (fit.kind.name == name) return &fit;
   return nullptr;
 }
+
+/// Does the deviation fall, and with a hand that does not stiffen?
+std::string_view words_without_stiffening(bool falls, bool falls_without) {
+  if (falls)
+    return falls_without ? "With a hand that does not stiffen it falls all the same: something else than the "
+                           "stiffening makes the trend."
+                         : "With a hand that does not stiffen it does not fall: in this model the trend is "
+                           "the stiffening and nothing else.";
+  return falls_without
+             ? "With a hand that does not stiffen it falls at every F_I: the stiffening is not "
+               "what would make the trend."
+             : "With a hand that does not stiffen it does not either: there is no trend to explain.";
+}
 }  // namespace
 
 DeviationStudy study_deviation(const DeviationSettings& settings,
@@ -134,11 +147,8 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
       fmt::format("Claim of the paper: the deviation falls when F_B increases. Here it {}.",
                   study.verdict.claim_met() ? "falls at every F_I" : "does not fall at every F_I"));
   if (!study.without_stiffening.empty()) {
-    words.push_back(fmt::format(
-        "With a hand that does not stiffen it {}: in this model the trend is the stiffening and nothing "
-        "else.",
-        study.verdict_without_stiffening.claim_met() ? "falls all the same, so something else makes the trend"
-                                                     : "does not fall"));
+    words.emplace_back(
+        words_without_stiffening(study.verdict.claim_met(), study.verdict_without_stiffening.claim_met()));
     double size = 0.0;
     std::size_t counted = 0;
     for (const DeviationResult& result : study.results) {

@@ -5,12 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <stdexcept>
 
 #include "host_tools/device/drive.hpp"
 
 namespace kmax::experiment {
 namespace {
 using std::chrono::milliseconds;
+
+/// Records per s: what a serial line carries besides the readings of the wall's axis. At 500 per s a round
+/// takes a quarter of a second, in which a wall is unstable unseen.
+constexpr double trace_rate = 100.0;
 
 double number(device::Device& device, std::size_t axis, const char* name) {
   return device.read_number(fmt::format("axis{}.{}", axis, name));
@@ -67,12 +73,18 @@ class BothArmed {
 class TwoAxisWatch {
  public:
   TwoAxisWatch(device::Device& device, const TouchWatch& watch, const std::vector<TimedChange>& changes,
-               const Tell& tell)
-      : device_(device), watch_(watch), changes_(changes), tell_(tell) {}
+               const Tell& tell, double wall_abort_amplitude)
+      : device_(device),
+        watch_(watch),
+        changes_(changes),
+        tell_(tell),
+        wall_abort_amplitude_(wall_abort_amplitude) {}
 
   TwoAxisTouch run() {
     wait_until_outside();
-    device::TraceReader trace(device_, 1 - watch_.axis);
+    const double rate = number(device_, 1 - watch_.axis, "haptic.rate");
+    device::TraceReader trace(device_, 1 - watch_.axis,
+                              static_cast<std::uint16_t>(std::max(1.0, std::round(rate / trace_rate))));
     {
       BothArmed armed(device_, watch_.axis);
       record(trace, armed);
@@ -95,7 +107,9 @@ class TwoAxisWatch {
  private:
   static constexpr auto longest_silence = std::chrono::seconds(2);
 
-  bool inside() { return number(device_, watch_.axis, "measured.distance") <= 0.0; }
+  /// Of the wall's axis from the surface, m: its position but for origin and direction.
+  double distance() { return number(device_, watch_.axis, "measured.distance"); }
+  bool inside() { return distance() <= 0.0; }
 
   void wait_until_outside() {
     const auto begin = device_.link().now();
@@ -112,6 +126,7 @@ class TwoAxisWatch {
       if (now < touched_ + next.time) return;
       device_.apply(device::parse_assignments(next.assignments, watch_.axis));
       touch_.change_times.push_back(now - touched_);
+      if (next.moves_wall_axis) disturbed_ = now;
     }
   }
 
@@ -126,6 +141,23 @@ class TwoAxisWatch {
     return true;
   }
 
+  /// The trace is of the other axis; of this one there is a reading a round.
+  bool wall_oscillates(double now) {
+    ++looks_;
+    wall_.push_back({now, distance(), 0.0, 0.0});
+    touching_ += wall_.back().position <= 0.0 ? 1 : 0;
+    const auto settled = std::find_if(wall_.begin(), wall_.end(), [&](const device::TraceSample& look) {
+      return look.time >= disturbed_ + wall_settling;
+    });
+    const double limit = wall_abort_amplitude_;
+    if (limit <= 0.0 || (oscillation({settled, wall_.end()}, watch_.abort_window) <= limit &&
+                         oscillation(wall_, watch_.abort_window) <= 5.0 * limit))
+      return false;
+    touch_.aborted_at = now - touched_;
+    touch_.wall_oscillated = true;
+    return true;
+  }
+
   void record(device::TraceReader& trace, BothArmed& armed) {
     auto last_news = device_.link().now();
     for (int round = 0;; ++round) {
@@ -137,13 +169,13 @@ class TwoAxisWatch {
       if (device_.link().now() - last_news > longest_silence)
         throw device::DeviceError("the trace has stopped during the touch; does another program use it?");
       const double now = touch_.samples.empty() ? 0.0 : touch_.samples.back().time;
-      if (touched_ < 0.0 && inside()) touched_ = now;
+      if (touched_ < 0.0 && inside()) touched_ = disturbed_ = now;
       if (touched_ < 0.0 && now > watch_.contact_patience)
         throw NobodyTouched(
             fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
                         watch_.contact_patience));
       if (touched_ >= 0.0) {
-        if (oscillates(now) || now >= touched_ + watch_.hold_time) return;
+        if (oscillates(now) || wall_oscillates(now) || now >= touched_ + watch_.hold_time) return;
         change(now);
       }
       if (round % 10 == 0) report(now, armed);
@@ -153,8 +185,6 @@ class TwoAxisWatch {
   void report(double now, BothArmed& armed) {
     armed.require_armed();
     if (touched_ < 0.0) return tell_(fmt::format("{}: waiting for the touch", watch_.name));
-    ++looks_;
-    touching_ += inside() ? 1 : 0;
     tell_(fmt::format("{}: {:.1f} of {:.1f} s", watch_.name, std::min(now - touched_, watch_.hold_time),
                       watch_.hold_time));
   }
@@ -166,12 +196,18 @@ class TwoAxisWatch {
   TwoAxisTouch touch_;
   std::size_t looks_ = 0, touching_ = 0;
   double touched_ = -1.0;
+  double disturbed_ = -1.0;  ///< the touch or the last change that moved the wall's axis
+  double wall_abort_amplitude_;
+  std::vector<device::TraceSample> wall_;  ///< of the wall's axis, since the touch
 };
 }  // namespace
 
 TwoAxisTouch watch_two_axes(device::Device& device, const TouchWatch& watch,
-                            const std::vector<TimedChange>& changes, const Tell& tell) {
-  return TwoAxisWatch(device, watch, changes, tell).run();
+                            const std::vector<TimedChange>& changes, const Tell& tell,
+                            double wall_abort_amplitude) {
+  require_sound(watch);
+  if (!(wall_abort_amplitude >= 0.0)) throw std::invalid_argument("wall_abort_amplitude must be 0 or above");
+  return TwoAxisWatch(device, watch, changes, tell, wall_abort_amplitude).run();
 }
 
 }  // namespace kmax::experiment

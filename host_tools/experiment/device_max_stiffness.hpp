@@ -35,7 +35,13 @@ struct DeviceStiffnessTouch {
   double peak_to_peak = 0;  ///< m
   double limited_share = 0;
   bool aborted = false;
+  std::uint64_t lost_records = 0;  ///< of the trace
+  bool counts() const { return verdict != simulation::ContactVerdict::no_contact; }
 };
+
+/// In a journal; without stiffness and trial, which are in the key. from_json throws what is wrong.
+void to_json(RunJournal::Json& json, const DeviceStiffnessTouch& touch);
+void from_json(const RunJournal::Json& json, DeviceStiffnessTouch& touch);
 
 struct DeviceStiffnessResult {
   StiffnessCondition condition;
@@ -48,8 +54,8 @@ RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessS
 
 /// One condition. Whoever holds the handle is asked before each touch to take it out of the wall and presses
 /// when it is armed; without a prompter nobody is asked, and a simulated person needs no asking. `journal`
-/// may be null. A touch that leaves the wall too early is made again, up to three times; then the search ends
-/// there (never_touched).
+/// may be null. A touch that leaves the wall too early or that cannot be judged is made again
+/// (touch_journal.hpp); then the search ends there (never_touched).
 ///
 /// Parameters stay changed: RestoredAfterwards with contact_changes(settings.touch). Errors: those of
 /// run_contact() and of the journal; NobodyTouched after the third time.
@@ -59,7 +65,8 @@ DeviceStiffnessResult find_max_stiffness(device::Device& device, const Stiffness
                                          const Tell& tell);
 
 /// What paper 1 claims and this can contradict: a field of 2 N and every adaptive wall allow more stiffness
-/// than the plain wall. Conditions that have not been measured say nothing.
+/// than the plain wall. Conditions that have not been measured say nothing, nor do those whose search ended
+/// before an unstable touch (beyond_last, never_touched).
 bool order_is_the_papers(const std::vector<DeviceStiffnessResult>& results);
 
 }  // namespace kmax::experiment

@@ -40,6 +40,7 @@ void draw(const std::vector<DeviceStiffnessResult>& results, double threshold,
   plot::Panel panel{"peak to peak (mm)", {}, {{threshold * 1e3, false, "unstable above"}}};
   double highest = threshold * 1e3;
   for (const DeviceStiffnessResult& result : results) {
+    if (result.touches.empty()) continue;
     plot::Series series{result.condition.name, {}, {}};
     std::vector<DeviceStiffnessTouch> touches = result.touches;
     // A search that went down is drawn upwards too.
@@ -76,14 +77,14 @@ report::Table device_stiffness_table(const std::vector<DeviceStiffnessResult>& r
 
 report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& results) {
   report::Table table;
-  table.columns = {"wall",           "stiffness_n_per_m", "touch",        "verdict",
-                   "peak_to_peak_m", "limited_share",     "ended_by_host"};
+  table.columns = {"wall",           "stiffness_n_per_m", "touch",         "verdict",
+                   "peak_to_peak_m", "limited_share",     "ended_by_host", "lost_records"};
   for (const DeviceStiffnessResult& result : results) {
     for (const DeviceStiffnessTouch& touch : result.touches)
       table.rows.push_back({result.condition.name, fmt::format("{}", touch.stiffness),
                             std::to_string(touch.trial), std::string(words_of(touch.verdict)),
                             fmt::format("{}", touch.peak_to_peak), fmt::format("{}", touch.limited_share),
-                            touch.aborted ? "yes" : "no"});
+                            touch.aborted ? "yes" : "no", std::to_string(touch.lost_records)});
   }
   return table;
 }
@@ -112,20 +113,26 @@ std::vector<std::filesystem::path> write_device_stiffness(const std::vector<Devi
                                                           const std::string& picture_ending) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path picture = folder / ("max_stiffness" + picture_ending);
-  draw(results, settings.touch.threshold, picture);
   const std::filesystem::path csv = folder / "max_stiffness.csv",
                               touches = folder / "max_stiffness_touches.csv";
   report::Table table = device_stiffness_table(results);
   report::write_csv(table, csv);
   report::write_csv(device_touch_table(results), touches);
   report::Page page{"Largest stable stiffness (paper 1, Figs. 6 and 8)", {}};
-  page.sections.push_back(
-      {"Result",
-       device_stiffness_words(settings, device),
-       {table},
-       {{"Peak-to-peak oscillation of each touch over the stiffness of the wall", picture}}});
+  page.sections.push_back({"Result", device_stiffness_words(settings, device), {table}, {}});
+  const bool touched = std::any_of(results.begin(), results.end(), [](const DeviceStiffnessResult& result) {
+    return !result.touches.empty();
+  });
+  if (touched)
+    page.sections.back().pictures.push_back(
+        {"Peak-to-peak oscillation of each touch over the stiffness of the wall", picture});
   std::vector<std::filesystem::path> files = report::write_page(page, folder, "max_stiffness");
-  files.insert(files.end(), {csv, touches, picture});
+  files.insert(files.end(), {csv, touches});
+  if (touched) {
+    // Last: what has been measured must not be lost with a picture.
+    draw(results, settings.touch.threshold, picture);
+    files.push_back(picture);
+  }
   return files;
 }
 

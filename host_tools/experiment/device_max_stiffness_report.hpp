@@ -20,7 +20,7 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
                                                 const std::string& device);
 
 /// max_stiffness.md, .html, both tables as .csv, and a picture of every touch's oscillation over its
-/// stiffness. Returns the names written. Throws plot::FigureError, std::runtime_error.
+/// stiffness, if there are touches. Returns the names written. Throws plot::FigureError, std::runtime_error.
 std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
                                                           const DeviceStiffnessSettings& settings,
                                                           const std::string& device,

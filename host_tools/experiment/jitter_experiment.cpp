@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "host_tools/experiment/jitter_rank_correlation.hpp"
+#include "host_tools/experiment/rank_correlation.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/encoder_model.hpp"

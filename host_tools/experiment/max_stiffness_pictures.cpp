@@ -12,8 +12,7 @@
 
 namespace kmax::experiment {
 
-report::Picture draw_max_stiffness(const std::vector<MaxStiffnessStudy>& studies,
-                                   const std::filesystem::path& file) {
+plot::Figure max_stiffness_figure(const std::vector<MaxStiffnessStudy>& studies) {
   plot::Figure figure;
   figure.title = "Largest stable stiffness, mean of the people";
   figure.x_label = "F_{MC} of the constant field (N)";
@@ -58,15 +57,38 @@ report::Picture draw_max_stiffness(const std::vector<MaxStiffnessStudy>& studies
     modes.points = true;
     panel.series.push_back(modes);
   }
-  panel.y_limits = {0.0, 10.0};
+  double top = 0.0;
+  for (const plot::Mark& mark : panel.marks) top = std::max(top, mark.at);
+  for (const plot::Series& series : panel.series) {
+    for (const double y : series.y) top = std::max(top, std::isnan(y) ? 0.0 : y);
+  }
+  panel.y_limits = {0.0, std::ceil(1.05 * top)};
   figure.panels.push_back(std::move(panel));
-  plot::write_figure(figure, file);
-  return {
-      "Largest stable stiffness over F_MC. The values at 0 and 2 N are calibrated, those between and the "
-      "adaptive ones predicted; the adaptive wall, from its worst mode to its best, stands at the 0.8 N that "
-      "eq. 7 "
-      "commands at rest.",
-      file};
+  return figure;
+}
+
+std::string max_stiffness_caption(const std::vector<MaxStiffnessStudy>& studies) {
+  std::vector<std::string> calibrated;
+  for (const MaxStiffnessStudy& study : studies) {
+    std::string values;
+    for (const ConditionResult& result : study.conditions) {
+      if (result.condition.origin != report::Origin::calibrated) continue;
+      values += fmt::format("{}{:g}", values.empty() ? "" : " and ", result.condition.magnetic_coefficient);
+    }
+    if (!values.empty()) calibrated.push_back(fmt::format("{} N ({})", values, clip_words(study.set.device)));
+  }
+  return fmt::format(
+      "Largest stable stiffness over F_MC. {}; the adaptive wall, from its worst mode to its best, stands at "
+      "the 0.8 N that eq. 7 commands at rest.",
+      calibrated.empty() ? std::string("All values of ours are predicted, nothing was fitted to these people")
+                         : fmt::format("The values at {} are calibrated, all others of ours predicted",
+                                       fmt::join(calibrated, ", ")));
+}
+
+report::Picture draw_max_stiffness(const std::vector<MaxStiffnessStudy>& studies,
+                                   const std::filesystem::path& file) {
+  plot::write_figure(max_stiffness_figure(studies), file);
+  return {max_stiffness_caption(studies), file};
 }
 
 report::Picture draw_rates(const std::vector<RateResult>& results, double count_length, RateMeasure measure,

@@ -21,8 +21,8 @@ report::Table max_stiffness_table(const std::vector<MaxStiffnessStudy>& studies)
 report::Table subject_table(const MaxStiffnessStudy& study);
 report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& studies);
 
-// Does every condition that the paper gives a number for come out as it must: the calibrated ones within
-// their tolerance, the constant coefficients in rising order?
+// Do the calibrated conditions come out within their tolerance, and the constant coefficients, fitted or not,
+// in rising order?
 bool as_calibrated(const MaxStiffnessStudy& study);
 
 report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results);

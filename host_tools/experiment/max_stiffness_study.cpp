@@ -9,6 +9,20 @@
 
 namespace kmax::experiment {
 
+namespace {
+
+// A fit with another force limit is none: part of the gain is the limit's.
+report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condition) {
+  if (!set.fitted || set.fitted->force_limit != set.device.force_limit || condition.adaptive)
+    return report::Origin::predicted;
+  std::optional<double> target;
+  if (condition.magnetic_coefficient == 0.0) target = set.fitted->plain_target;
+  if (condition.magnetic_coefficient == 2.0) target = set.fitted->magnetic_target;
+  return target && condition.paper == target ? report::Origin::calibrated : report::Origin::predicted;
+}
+
+}  // namespace
+
 std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jobs, const StiffnessRun& run) {
   return collect_jobs<MaxStiffness>(
       jobs.size(), run.threads,
@@ -24,6 +38,15 @@ std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jo
         return result;
       },
       run.progress);
+}
+
+CountedEnds counted_ends(std::span<const MaxStiffness> results) {
+  CountedEnds ends;
+  for (const MaxStiffness& result : results) {
+    ends.at_zero += result.stiffness == 0.0 ? 1 : 0;
+    ends.beyond_last += result.beyond_last ? 1 : 0;
+  }
+  return ends;
 }
 
 double mean_stiffness(std::span<const MaxStiffness> results) {
@@ -65,6 +88,7 @@ MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
   for (const StiffnessCondition& condition : conditions) {
     const auto end = next + static_cast<std::ptrdiff_t>(set.subjects.size());
     study.conditions.push_back({condition, {next, end}});
+    study.conditions.back().condition.origin = origin_of(set, condition);
     next = end;
   }
   for (const MaxStiffness& result : results) {

@@ -57,10 +57,19 @@ struct MaxStiffnessStudy {
   std::uint64_t event_limit_hits = 0;
 };
 
+// A condition's number is calibrated if the set says that it was fitted to this very number with the force
+// limit it has now, and predicted otherwise.
 MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const std::vector<StiffnessCondition>& conditions,
                                           const StiffnessRun& run);
 
 double mean_stiffness(std::span<const MaxStiffness> results);  // N/m
+
+// People whose number in a mean is only a bound.
+struct CountedEnds {
+  std::size_t at_zero = 0;      // unstable at the first stiffness already: counted as 0
+  std::size_t beyond_last = 0;  // stable up to the last: counted as that
+};
+CountedEnds counted_ends(std::span<const MaxStiffness> results);
 
 }  // namespace kmax::experiment

@@ -109,6 +109,7 @@ OperatorCalibration calibrate_operator(const SubjectSet& set, const CalibrationS
   result.plain_met = std::abs(plain - settings.plain_target) <= plain_tolerance;
   result.magnetic_met = std::abs(magnetic - settings.magnetic_target) <= magnetic_tolerance;
   result.set = with(set, friction, gain);
+  result.set.fitted = Fitted{settings.plain_target, settings.magnetic_target, set.device.force_limit};
   return result;
 }
 

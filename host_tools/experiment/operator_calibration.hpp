@@ -31,7 +31,7 @@ struct CalibrationStep {
 };
 
 struct OperatorCalibration {
-  SubjectSet set;  // with what was found
+  SubjectSet set;  // with what was found, and what to, whether it was met or not
   double friction = 0.0, activation_gain = 0.0;
   double plain = 0.0, magnetic = 0.0;            // N/m, means at the end
   bool plain_met = false, magnetic_met = false;  // within the tolerance of the study: 100 and 150 N/m

@@ -12,6 +12,7 @@
 
 #include "host_tools/calibration/prompter.hpp"
 #include "host_tools/experiment/resolution_experiment.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
@@ -27,6 +28,20 @@ struct ResolutionDeviceSettings {
   double patience = 20.0;                         ///< s for the person to come to the wall
 };
 
+/// One touch, as a journal keeps it.
+struct ResolutionDeviceTouch {
+  double speed = 0.0;  ///< m/s, measured
+  bool unstable = false, without_contact = false, aborted = false;
+  double peak_to_peak = 0.0;  ///< m
+  std::uint64_t lost_records = 0;
+  bool counts() const { return !without_contact; }
+};
+void to_json(RunJournal::Json& json, const ResolutionDeviceTouch& touch);
+void from_json(const RunJournal::Json& json, ResolutionDeviceTouch& touch);  ///< throws what is wrong
+
+/// Everything the touches depend on, for a journal.
+RunJournal::Json journal_settings(device::Device& device, const ResolutionDeviceSettings& settings);
+
 struct ResolutionDeviceResult {
   std::vector<ResolutionCell> cells;  ///< one for each touch, with the speed that was measured
   std::vector<double> asked_speeds;   ///< m/s, of the same touches
@@ -36,10 +51,12 @@ struct ResolutionDeviceResult {
 };
 
 /// `prompter` null: nobody is asked. Changes only parameters of one axis and link.timeout, and puts them
-/// back. Errors as watch_touch(), device::ValueError.
+/// back; `notice` is told if that fails. `journal` may be null; touches are made again and kept as
+/// touch_journal.hpp says. Errors as watch_touch(), device::ValueError, JournalError.
 ResolutionDeviceResult run_resolution_on_device(device::Device& device,
                                                 const ResolutionDeviceSettings& settings,
-                                                calibration::Prompter* prompter, const Tell& tell);
+                                                calibration::Prompter* prompter, const Tell& tell,
+                                                RunJournal* journal = nullptr, const Tell& notice = {});
 
 /// Towards the wall, m/s, over the last 30 ms before time 0; 0 without samples there.
 double touch_speed(const WatchedTouch& touch);

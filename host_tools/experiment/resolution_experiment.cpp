@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "control/resolution_criterion.hpp"
@@ -158,13 +159,22 @@ ResolutionVerdict judge_resolution(std::span<const ResolutionCell> cells) {
   return verdict;
 }
 
+namespace {
+auto varied_numbers(const ResolutionSettings& settings) {
+  return std::tuple(settings.weak.grip, settings.weak.delay, settings.device.friction,
+                    settings.wall.threshold, settings.pushes, settings.wall.rounding);
+}
+}  // namespace
+
 std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
                                                  const std::vector<simulation::OperatorModel>& people,
                                                  const std::function<void(std::size_t, std::size_t)>& tell) {
   std::vector<std::pair<std::string, ResolutionSettings>> changes;
   const auto change = [&](std::string name, auto make) {
-    changes.emplace_back(std::move(name), settings);
-    make(changes.back().second);
+    ResolutionSettings changed = settings;
+    make(changed);
+    // What is the setting's own number already differs in none.
+    if (varied_numbers(changed) != varied_numbers(settings)) changes.emplace_back(std::move(name), changed);
   };
   for (const double grip : {0.15, 0.2, 0.25, 0.3, 0.4})
     change(fmt::format("grip x {:g}", grip), [&](ResolutionSettings& s) { s.weak.grip = grip; });

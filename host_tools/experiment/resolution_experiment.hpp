@@ -101,7 +101,8 @@ struct ResolutionVariation {
   ResolutionVerdict verdict;
   std::optional<double> coarse_onset, fine_onset;  ///< m/s, onset_speed()
 };
-/// Other grips, delays, friction and roundings: how much the claims hang on the numbers chosen.
+/// Other grips, delays, friction and roundings: how much the claims hang on the numbers chosen. What the
+/// settings have already is left out.
 std::vector<ResolutionVariation> vary_resolution(
     const ResolutionSettings& settings, const std::vector<simulation::OperatorModel>& people,
     const std::function<void(std::size_t done, std::size_t all)>& tell = {});

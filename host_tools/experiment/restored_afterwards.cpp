@@ -1,14 +1,18 @@
 #include "host_tools/experiment/restored_afterwards.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <utility>
 
 #include "host_tools/device/parameter.hpp"
+#include "host_tools/device/value_text.hpp"
 
 namespace kmax::experiment {
 
 RestoredAfterwards::RestoredAfterwards(device::Device& device, std::size_t axis,
-                                       const std::vector<std::string>& changed)
-    : device_(device) {
+                                       const std::vector<std::string>& changed, Notice notice)
+    : device_(device), notice_(std::move(notice)) {
   std::vector<device::Parameter> parameters;
   for (const std::string& text : changed) {
     const device::Parameter parameter = device::resolve(text.substr(0, text.find('=')), axis);
@@ -22,8 +26,21 @@ RestoredAfterwards::RestoredAfterwards(device::Device& device, std::size_t axis,
 RestoredAfterwards::~RestoredAfterwards() {
   try {
     device_.apply(before_);
-  } catch (const std::exception&) {
-    // The link is gone, and with it the way to put anything back.
+  } catch (const std::exception& error) {
+    tell(error.what());
+  }
+}
+
+void RestoredAfterwards::tell(const char* why) const noexcept {
+  if (!notice_) return;
+  try {
+    std::string text = fmt::format("the parameters of the experiment have not been put back ({}); set", why);
+    for (const device::Assignment& assignment : before_)
+      text += fmt::format(" {}={}", assignment.parameter.name(),
+                          device::value_text(assignment.parameter, assignment.raw));
+    notice_(text);
+  } catch (...) {
+    // Nobody is there to be told.
   }
 }
 

@@ -21,7 +21,7 @@ class StiffnessClimb {
   std::optional<double> next() const {
     if (given_up_ || (unstable_seen_ && stable_seen_)) return std::nullopt;
     const double stiffness = at(number_);
-    if (stiffness > last_ * (1.0 + 1e-12) || stiffness < 0.5 * step_) return std::nullopt;
+    if (stiffness > last_ * (1.0 + 1e-12) || stiffness < rounding * step_) return std::nullopt;
     return stiffness;
   }
 
@@ -45,6 +45,8 @@ class StiffnessClimb {
   bool beyond_last() const { return stable_seen_ && !unstable_seen_ && !given_up_ && !next(); }
 
  private:
+  /// Of a step: what is left of it where the way down ends at 0.
+  static constexpr double rounding = 1e-9;
   /// Counted in steps, so that they add no rounding.
   double at(int number) const { return first_ + step_ * number; }
 

@@ -31,8 +31,6 @@ std::vector<StiffnessCondition> stiffness_conditions() {
     condition.name = fmt::format("F_MC = {:g} N", coefficient);
     condition.magnetic_coefficient = coefficient;
     condition.paper = printed(coefficient, false);
-    // The two numbers that friction and activation were fitted to.
-    if (condition.paper) condition.origin = report::Origin::calibrated;
     conditions.push_back(condition);
   }
   using control::AdaptiveMode;
@@ -55,8 +53,8 @@ TouchSetup touch_setup(const simulation::DeviceModel& device, const simulation::
   setup.device = device;
   setup.person = person;
   setup.wall = touched_wall(paper::update_rate, paper::touch_resolution, device.force_limit);
-  // The estimator is the firmware's default where a velocity counts. Constant walls ask for none, and FOAW costs
-  // more than all the rest of the tick.
+  // The estimator is the firmware's default where a velocity counts. Constant walls ask for none, and FOAW
+  // costs more than all the rest of the tick.
   if (!condition.adaptive) setup.wall.velocity.kind = control::VelocityEstimatorKind::difference;
   condition.apply(setup);
   return setup;

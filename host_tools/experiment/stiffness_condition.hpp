@@ -18,7 +18,8 @@ struct StiffnessCondition {
   bool adaptive = false;
   control::AdaptiveMode mode = control::AdaptiveMode::instant;
   std::optional<double> paper;  // N/m
-  // Whether the model was fitted to this very number, or it follows without another fit.
+  // Whether the model was fitted to this very number, or it follows without another fit. That hangs on the
+  // people: run_max_stiffness_study() sets it in its results.
   report::Origin origin = report::Origin::predicted;
 
   void apply(TouchSetup& setup) const;

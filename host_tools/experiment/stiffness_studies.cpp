@@ -90,7 +90,7 @@ std::vector<report::Section> run_stiffness_study(std::string_view name, const st
     return variations("What nobody knows", sets, run,
                       [&](const SubjectSet& set) { return assumption_variations(set, run.protocol); });
   if (name == "draws")
-    return variations("Other people", sets, run, [&](const SubjectSet& set) {
+    return variations("Other people", {sets.front()}, run, [&](const SubjectSet& set) {
       return draw_variations(set, run.protocol, drawn_groups);
     });
   if (name == "adaptive") return adaptive(sets, run);

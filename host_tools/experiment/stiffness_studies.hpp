@@ -26,8 +26,8 @@ inline constexpr std::array<StudyName, 6> stiffness_studies{{
 
 inline constexpr std::size_t drawn_groups = 25;
 
-// `sets`: calibrated, at least one; "rates" uses the device of the first and the person of the supplied
-// scenes. The run's journal keeps what is done. Throws std::invalid_argument for an unknown name, and what
+// `sets`: calibrated, at least one; "draws" uses the first, since every group takes a calibration; "rates"
+// the device of the first and the person of the supplied scenes. The run's journal keeps what is done. Throws std::invalid_argument for an unknown name, and what
 // the run throws.
 std::vector<report::Section> run_stiffness_study(std::string_view name, const std::vector<SubjectSet>& sets,
                                                  const StiffnessRun& run,

@@ -27,16 +27,23 @@ struct VariationResult {
   StudyVariation variation;
   double friction = 0.0, activation_gain = 0.0;
   std::vector<double> means;  // N/m, in the order of stiffness_conditions()
+  // Of a variation that was fitted again: did the fit reach its two targets (operator_calibration.hpp)? One
+  // that did not says nothing about what the targets leave open.
+  bool plain_met = true, magnetic_met = true;
+  bool met() const { return plain_met && magnetic_met; }
+  std::vector<CountedEnds> ends{};  // of the means, in their order
 };
 
 // One job each, in the run's threads and journal; protocol and integrator are the variations' own.
 std::vector<VariationResult> run_variations(const std::vector<StudyVariation>& variations,
                                             const CalibrationSettings& calibration, const StiffnessRun& run);
 
-// What holds in how many of the results, as sentences with their counts.
+// What holds in how many of the results, as sentences with their counts. Results whose fit missed count
+// neither way.
 struct VariationFinding {
   std::string claim;
   std::size_t holds = 0, of = 0;
+  std::size_t missed = 0;  // left out
 };
 std::vector<VariationFinding> findings_of(const std::vector<VariationResult>& results);
 

@@ -3,6 +3,8 @@
 // that a result can be traced to every number that made it and run again.
 //
 //   name = "..."          description = "..."        seed = 1 (of the draw)
+//   [fitted]              optional: plain, magnetic (N/m), force_limit (N), see Fitted. Only a calibration
+//                         writes it; take it out of a file whose numbers you change
 //   [device] [structure]  device_model.hpp, structure_model.hpp
 //   [[subject]]           name, and operator_model.hpp
 //
@@ -13,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,10 +30,19 @@ struct Subject {
   simulation::OperatorModel person;
 };
 
+// What friction and activation gain of a set were fitted to: the means of paper 1's plain wall and of its
+// F_MC = 2 N, with a device of this force limit. All three are given, or none.
+struct Fitted {
+  double plain_target = 0.0;     // N/m
+  double magnetic_target = 0.0;  // N/m
+  double force_limit = 0.0;      // N; 0: none
+};
+
 struct SubjectSet {
   std::string name;
   std::string description;
-  std::uint64_t seed = 0;  // of the draw
+  std::uint64_t seed = 0;        // of the draw
+  std::optional<Fitted> fitted;  // none: nothing was fitted to these people and this device
   simulation::DeviceModel device;
   std::vector<Subject> subjects;
 };
@@ -57,7 +69,8 @@ std::vector<Subject> draw_subjects(std::size_t count, std::uint64_t seed,
                                    const HandRanges& ranges = {});
 
 // Numbers that are not given keep the defaults of the models. Throw simulation::SceneError, whose text begins
-// with file:line:column: syntax, unknown keys, values out of range, nobody in the set, a name given twice.
+// with file:line:column: syntax, unknown keys, values out of range, a [fitted] without one of
+// its numbers, nobody in the set, a name given twice.
 SubjectSet load_subject_set(const std::filesystem::path& path);
 SubjectSet parse_subject_set(std::string_view text, std::string_view source);
 // A file, or one of the sets in the program itself by its name if there is no such file.

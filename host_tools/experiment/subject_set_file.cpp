@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 
@@ -16,12 +16,18 @@ namespace {
 
 using simulation::SceneError;
 
+constexpr std::array fitted_fields{
+    simulation::ModelField<Fitted>{"plain", &Fitted::plain_target, 1.0, 1e7, "N/m"},
+    simulation::ModelField<Fitted>{"magnetic", &Fitted::magnetic_target, 1.0, 1e7, "N/m"},
+    simulation::ModelField<Fitted>{"force_limit", &Fitted::force_limit, 0.0, 1e5, "N (0 = no limit)"},
+};
+
 class SubjectSetReader : private simulation::SceneTables {
  public:
   using SceneTables::SceneTables;
 
   SubjectSet read(const toml::table& root) const {
-    require_known(root, "", {"name", "description", "seed", "device", "structure", "subject"});
+    require_known(root, "", {"name", "description", "seed", "fitted", "device", "structure", "subject"});
     SubjectSet set;
     set.name = std::filesystem::path(source()).stem().string();
     read_text(root, "name", set.name);
@@ -32,6 +38,7 @@ class SubjectSetReader : private simulation::SceneTables {
              fmt::format("seed = {}: allowed is a whole number from 0 to 2^63 - 1", text_of(*seed)));
       set.seed = static_cast<std::uint64_t>(seed->as_integer()->get());
     }
+    if (const toml::table* fitted = part(root, "", "fitted")) read_fitted(*fitted, set.fitted.emplace());
     if (const toml::table* device = part(root, "", "device"))
       read_model(*device, "device.", simulation::device_fields, set.device);
     if (const toml::table* structure = part(root, "", "structure"))
@@ -41,6 +48,16 @@ class SubjectSetReader : private simulation::SceneTables {
   }
 
  private:
+  // There is no default for what a set was fitted to.
+  void read_fitted(const toml::table& table, Fitted& fitted) const {
+    read_model(table, "fitted.", fitted_fields, fitted);
+    for (const auto& field : fitted_fields) {
+      if (table.contains(field.name)) continue;
+      fail(table.source(),
+           fmt::format("fitted.{} is missing: [fitted] has plain, magnetic and force_limit", field.name));
+    }
+  }
+
   void read_subjects(const toml::table& root, SubjectSet& set) const {
     const toml::node* node = root.get("subject");
     if (node == nullptr) fail(root.source(), "[[subject]] is missing: a set has at least one person");
@@ -83,22 +100,11 @@ std::string quoted(const std::string& text) {
 }  // namespace
 
 SubjectSet parse_subject_set(std::string_view text, std::string_view source) {
-  toml::table root;
-  try {
-    root = toml::parse(text, source);
-  } catch (const toml::parse_error& error) {
-    throw SceneError(fmt::format("{}:{}:{}: not valid TOML: {}", source, error.source().begin.line,
-                                 error.source().begin.column, error.description()));
-  }
-  return SubjectSetReader(source).read(root);
+  return SubjectSetReader(source).read(simulation::parsed_toml(text, source));
 }
 
 SubjectSet load_subject_set(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    throw SceneError(fmt::format("{}: cannot be read; give the path of a subject set (TOML)", path.string()));
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  return parse_subject_set(text, path.string());
+  return parse_subject_set(simulation::text_of_file(path, "a subject set"), path.string());
 }
 
 SubjectSet open_subject_set(const std::string& name_or_path) {
@@ -114,9 +120,10 @@ SubjectSet open_subject_set(const std::string& name_or_path) {
 }
 
 std::string subject_set_text(const SubjectSet& set) {
-  std::string text =
-      fmt::format("name = {}\ndescription = {}\nseed = {}\n\n[device]\n{}", quoted(set.name),
-                  quoted(set.description), set.seed, fields_text(simulation::device_fields, set.device));
+  std::string text = fmt::format("name = {}\ndescription = {}\nseed = {}\n", quoted(set.name),
+                                 quoted(set.description), set.seed);
+  if (set.fitted) text += "\n[fitted]\n" + fields_text(fitted_fields, *set.fitted);
+  text += "\n[device]\n" + fields_text(simulation::device_fields, set.device);
   if (set.device.structure)
     text += "\n[structure]\n" + fields_text(simulation::structure_fields, *set.device.structure);
   for (const Subject& subject : set.subjects) {

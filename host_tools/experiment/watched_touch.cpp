@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 
@@ -53,6 +54,19 @@ class ArmedWhile {
 
 double number(device::Device& device, std::size_t axis, const char* name) {
   return device.read_number(fmt::format("axis{}.{}", axis, name));
+}
+
+/// Whether contact_measure.hpp has enough to judge: two samples in every quarter of the window.
+bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
+                   const simulation::ContactCriterion& criterion) {
+  std::array<std::size_t, 4> count{};
+  const double length = criterion.window_end - criterion.window_begin;
+  for (const simulation::ContactSample& sample : positions) {
+    if (sample.time < criterion.window_begin || sample.time >= criterion.window_end) continue;
+    const double part = (sample.time - criterion.window_begin) / length * 4.0;
+    ++count[std::min<std::size_t>(3, static_cast<std::size_t>(part))];
+  }
+  return *std::min_element(count.begin(), count.end()) >= 2;
 }
 
 /// Whoever pressed in the trial before may still be inside the wall, where arming is refused: waits until the
@@ -126,7 +140,22 @@ double oscillation(std::span<const TraceSample> samples, double window) {
   return std::min(rise, fall);
 }
 
+void require_sound(const TouchWatch& watch) {
+  // With a NaN no comparison would ever end the touch.
+  const bool times = std::isfinite(watch.hold_time) && watch.hold_time > 0.0 &&
+                     std::isfinite(watch.contact_patience) && watch.contact_patience > 0.0;
+  const bool abort = std::isfinite(watch.abort_amplitude) && watch.abort_amplitude >= 0.0 &&
+                     std::isfinite(watch.abort_window) && watch.abort_window > 0.0;
+  if (times && abort) return;
+  throw std::invalid_argument(
+      fmt::format("a touch held for {} s, waited for {} s, ended by {} m within {} s: all must be finite, "
+                  "the times above "
+                  "0, the amplitude 0 or above",
+                  watch.hold_time, watch.contact_patience, watch.abort_amplitude, watch.abort_window));
+}
+
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell) {
+  require_sound(watch);
   WatchedTouch touch;
   touch.surface = number(device, watch.axis, "wall.position");
   touch.side = number(device, watch.axis, "wall.side");
@@ -182,6 +211,7 @@ simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_
   criterion.threshold = threshold;
   criterion.wall_position = touch.surface;
   criterion.wall_side = touch.side;
+  if (!can_be_judged(positions, criterion)) return {};
   return simulation::measure_contact(positions, criterion);
 }
 

@@ -53,9 +53,12 @@ using Tell = std::function<void(const std::string&)>;
 /// Sets nothing; wall and law must be what they should be. `tell`: progress, called about five times a second
 /// with a short text; what it throws ends the touch.
 ///
-/// Errors: NobodyTouched; device::DeviceError (a fault with its words, a trace that stops, an axis that
-/// cannot be armed or disarmed), link::LinkError.
+/// Errors: std::invalid_argument (require_sound); NobodyTouched; device::DeviceError (a fault with its words,
+/// a trace that stops, an axis that cannot be armed or disarmed), link::LinkError.
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell);
+
+/// Times and amplitudes that can end a touch. Throws std::invalid_argument naming them if not.
+void require_sound(const TouchWatch& watch);
 
 /// The share of `window` seconds before the last one of these samples that goes both ways: the smaller one of
 /// the largest rise and the largest fall, m. An oscillation's peak to peak; nearly 0 for a handle that is
@@ -63,7 +66,8 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
 double oscillation(std::span<const device::TraceSample> samples, double window);
 
 /// The touch by contact_measure.hpp's rule over the last second of the hold (all of a shorter one). A touch
-/// that was aborted is unstable, with the amplitude that it was aborted for.
+/// that was aborted is unstable, with the amplitude that it was aborted for; one whose records were lost, so
+/// that too few are left to judge, is no_contact without samples: to be made again.
 simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_time, double threshold);
 
 /// What the device should have set before anybody is asked to touch a wall: force.limit, lowered to

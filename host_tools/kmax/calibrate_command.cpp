@@ -3,20 +3,14 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include <poll.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <iostream>
 #include <string>
 
 #include "host_tools/calibration/procedure.hpp"
-#include "host_tools/device/number_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/progress.hpp"
+#include "host_tools/kmax/terminal_prompter.hpp"
 
 namespace kmax::cli {
 
@@ -33,30 +27,6 @@ struct CalibrateOptions {
   double current = 0.0;
   bool no_save = false;
   bool hand = false;
-};
-
-/// Asks on the messages' stream and waits for the Enter key.
-class TerminalPrompter final : public calibration::Prompter {
- public:
-  /// `tell` is called while nobody answers and may throw to give up.
-  TerminalPrompter(Context& context, std::function<void()> tell)
-      : context_(context), tell_(std::move(tell)) {}
-  void ask(const std::string& what_to_do) override {
-    context_.note(fmt::format("{}, then press Enter", what_to_do));
-    std::string line;
-    // A read that waits would keep Ctrl-C from being seen.
-    pollfd input{STDIN_FILENO, POLLIN, 0};
-    while (std::cin.rdbuf()->in_avail() <= 0) {
-      if (const int ready = poll(&input, 1, 100); ready > 0) break;
-      tell_();
-    }
-    if (!std::getline(std::cin, line))
-      throw calibration::CalibrationInterrupted("nobody answered: --hand needs somebody at the terminal");
-  }
-
- private:
-  Context& context_;
-  std::function<void()> tell_;
 };
 
 void choose_sets(CalibrationSettings& settings, const std::vector<std::string>& names) {
@@ -124,7 +94,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   const auto check_interruption = [&] {
     if (interruption.requested()) throw calibration::CalibrationInterrupted("interrupted");
   };
-  TerminalPrompter prompter(context, check_interruption);
+  TerminalPrompter prompter(context, check_interruption, "--hand needs somebody at the terminal");
   CalibrationReport report;
   {
     Progress progress(context.messages());
@@ -149,14 +119,6 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   }
   return report.pass() ? done : verdict_is_no;
 }
-/// Ranges let a NaN pass.
-const CLI::Validator finite(
-    [](const std::string& text) {
-      double number = 0.0;
-      const bool good = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
-      return good ? std::string() : fmt::format("'{}' is not a number", text);
-    },
-    "NUMBER");
 }  // namespace
 
 void add_calibrate_command(CLI::App& app, Context& context) {
@@ -181,12 +143,12 @@ void add_calibrate_command(CLI::App& app, Context& context) {
       ->check(CLI::IsMember({"electrical", "encoder", "mechanical", "compensation", "all"}))
       ->capture_default_str();
   command->add_option("--travel", settings.travel, "How far the handle may move to either side, m")
-      ->check(finite & CLI::Range(0.001, 1.0))
+      ->check(finite_number() & CLI::Range(0.001, 1.0))
       ->capture_default_str();
   command
       ->add_option("--current", options->current,
                    "Motor current to measure with, A; half of current.limit without it")
-      ->check(finite & CLI::Range(0.01, 120.0));
+      ->check(finite_number() & CLI::Range(0.01, 120.0));
   command->add_flag("--keep-pole-pairs", settings.keep_pole_pairs,
                     "Fail if motor.pole_pairs is not what is measured, rather than correct it");
   command->add_flag("--hand", options->hand,

@@ -11,7 +11,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/link/device_address.hpp"
 #include "host_tools/plot/csv_table.hpp"
-#include "host_tools/plot/figure.hpp"
+#include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/wall/wall_table.hpp"
 

@@ -1,36 +1,45 @@
-// kmax experiment: the list of the experiments, and what they have in common.
+// kmax experiment: the list of the experiments, and what those on a device have in common.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <cmath>
+#include <filesystem>
 
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 
 namespace kmax::cli {
 
-CLI::Validator finite_number() {
-  return CLI::Validator(
-      [](const std::string& text) {
-        double number = 0.0;
-        const bool good = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
-        return good ? std::string() : fmt::format("'{}' is not a number", text);
-      },
-      "NUMBER");
+void require_none(const std::vector<CLI::Option*>& options, const char* why) {
+  for (const CLI::Option* option : options) {
+    if (option->count() > 0) throw UsageError(fmt::format("{} {}", option->get_name(), why));
+  }
 }
 
-void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude) {
-  command
-      .add_option("--force-limit", force_limit,
-                  "Largest force on a device, N: lowers force.limit, never raises it")
-      ->check(finite_number() & CLI::Range(0.01, 1000.0))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--abort-amplitude", abort_amplitude,
-          "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then")
-      ->check(finite_number() & CLI::Range(1e-5, 1.0))
-      ->capture_default_str();
+void require_kind(const Context& context, CLI::App& of_people, CLI::App& of_device) {
+  if (context.simulated()) {
+    require_none(of_device.get_options(), "is for a device; name one with --device");
+  } else {
+    require_none(of_people.get_options(), "is for simulated people; leave --device out");
+  }
+}
+
+void add_resume_option(CLI::App& device, bool& resume) {
+  device.add_flag("--resume", resume, "Go on with the interrupted run in --out");
+}
+
+std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
+                                                           const std::string& name,
+                                                           const experiment::RunJournal::Json& settings,
+                                                           bool resume) {
+  using experiment::RunJournal;
+  if (folder.empty()) {
+    if (resume) throw UsageError("--resume goes on with the run in a folder: name it with --out");
+    return nullptr;
+  }
+  auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
+                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
+  if (resume) context.note(fmt::format("{} touches are done already", journal->resumed()));
+  return journal;
 }
 
 void add_experiment_command(CLI::App& app, Context& context) {

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <CLI/App.hpp>
-#include <CLI/Validators.hpp>
 
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/kmax/context.hpp"
 
 namespace kmax::cli {
@@ -15,10 +19,20 @@ void add_jitter_experiment(CLI::App& experiment, Context& context);
 void add_deviation_experiment(CLI::App& experiment, Context& context);
 void add_resolution_experiment(CLI::App& experiment, Context& context);
 
-/// CLI::Range lets a NaN pass: this does not.
-CLI::Validator finite_number();
+/// What has no meaning here is refused, rather than passed over: UsageError naming the first one given.
+void require_none(const std::vector<CLI::Option*>& options, const char* why);
 
-/// --force-limit and --abort-amplitude, which every experiment on a device takes; values in N and m.
-void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude);
+/// Of the two groups of options only the one that the device in use is for may be given. UsageError.
+void require_kind(const Context& context, CLI::App& of_people, CLI::App& of_device);
+
+/// --resume, of the experiments on a device that keep a journal.
+void add_resume_option(CLI::App& device, bool& resume);
+
+/// The journal NAME.journal of the touches, in `folder`; none without a folder. UsageError for `resume`
+/// without a folder; experiment::JournalError.
+std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
+                                                           const std::string& name,
+                                                           const experiment::RunJournal::Json& settings,
+                                                           bool resume);
 
 }  // namespace kmax::cli

@@ -3,17 +3,16 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
-#include <map>
-
 #include "host_tools/experiment/deviation_device.hpp"
 #include "host_tools/experiment/deviation_report.hpp"
-#include "host_tools/experiment/subject_set.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/kmax/value_json.hpp"
 #include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
@@ -23,32 +22,23 @@ struct DeviationOptions {
   experiment::DeviationSettings simulated;
   experiment::DeviationDeviceSettings device;
   double clip = 0.0, activation_gain = -1.0;
-  std::string subjects, folder, ending = ".svg";
-  bool no_prompt = false;
+  std::string subjects;
+  ExperimentFiles files;
+  bool no_prompt = false, resume = false;
 };
 
-class DeviationInterrupted : public std::runtime_error {
- public:
-  DeviationInterrupted() : std::runtime_error("interrupted; nothing is armed") {}
-};
+constexpr auto interrupted = "interrupted; nothing is armed";
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
                                     const Interruption& interruption) {
   experiment::DeviationSettings settings = options.simulated;
-  std::vector<simulation::OperatorModel> people(1);
-  if (!options.subjects.empty()) {
-    const experiment::SubjectSet set = experiment::open_subject_set(options.subjects);
-    settings.device = set.device;
-    people.clear();
-    for (const experiment::Subject& subject : set.subjects) people.push_back(subject.person);
-  }
+  std::vector<simulation::OperatorModel> people = people_of(options.subjects, settings.device);
   settings.device.force_limit = options.clip;
-  if (options.activation_gain >= 0.0)
-    for (simulation::OperatorModel& person : people) person.activation_gain = options.activation_gain;
+  set_activation_gain(people, options.activation_gain);
   Progress progress(context.messages());
   try {
     return experiment::study_deviation(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw DeviationInterrupted();
+      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
       progress.show(fmt::format("{} of {} pairs of forces", done, all));
     });
   } catch (const std::invalid_argument& error) {
@@ -62,16 +52,21 @@ experiment::DeviationStudy measure(Context& context, const DeviationOptions& opt
   settings.axis = context.axis();
   settings.protocol = options.simulated.protocol;
   device::Device device = context.connect();
+  const auto journal = open_touch_journal(context, options.files.folder, "deviation",
+                                          experiment::journal_settings(device, settings), options.resume);
   const auto check_interruption = [&] {
-    if (interruption.requested()) throw DeviationInterrupted();
+    if (interruption.requested())
+      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
   };
-  TerminalPrompter prompter(context, check_interruption);
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   Progress progress(context.messages());
   const experiment::DeviationDeviceResult result = experiment::run_deviation_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter, [&](const std::string& text) {
+      device, settings, options.no_prompt ? nullptr : &prompter,
+      [&](const std::string& text) {
         check_interruption();
         progress.show(text);
-      });
+      },
+      journal.get(), [&](const std::string& text) { context.note(text); });
   experiment::DeviationStudy study;
   study.origin = report::Origin::measured;
   study.results = result.results;
@@ -84,11 +79,13 @@ experiment::DeviationStudy measure(Context& context, const DeviationOptions& opt
       device.description(), settings.protocol.stiffness / 1000, settings.protocol.haptic_rate, settings.axis,
       settings.protocol.pulse_on, 1 - settings.axis, result.force_limit, 100 * result.limited_share,
       result.lost_records);
+  for (const experiment::DeviationResult& one : study.results) {
+    if (one.without_contact > 0)
+      context.note(fmt::format(
+          "F_B = {:g} N, F_I = {:g} N: not counted, the wall was touched less than {:.0f} % of the time",
+          one.paper.background, one.paper.interference, 100 * experiment::least_contact));
+  }
   return study;
-}
-
-Json optional_json(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
 }
 
 Json pairs_json(const std::vector<experiment::DeviationResult>& results) {
@@ -101,6 +98,7 @@ Json pairs_json(const std::vector<experiment::DeviationResult>& results) {
                      {"deviation_before_m", known ? Json(result.before) : Json(nullptr)},
                      {"touches", result.touches},
                      {"aborted", result.aborted},
+                     {"without_contact", result.without_contact},
                      {"contact_share", result.contact_share},
                      {"beyond_paper_force_limit_share", result.beyond_limit_share},
                      {"paper_deviation_m", result.paper.deviation}});
@@ -136,12 +134,12 @@ Json fits_json(const std::vector<experiment::DeviationFit>& fits) {
 
 int run_deviation_experiment(Context& context, const DeviationOptions& options) {
   const Interruption interruption;
-  // Before anybody presses anything.
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  make_folder(options.files);
   const experiment::DeviationStudy study = context.simulated() ? simulate(context, options, interruption)
                                                                : measure(context, options, interruption);
   std::vector<std::filesystem::path> files;
-  if (!options.folder.empty()) files = experiment::write_deviation(study, options.folder, options.ending);
+  if (!options.files.folder.empty())
+    files = experiment::write_deviation(study, options.files.folder, options.files.ending);
   const int code = study.verdict.claim_met() ? done : verdict_is_no;
   if (context.json) {
     Json document = {{"origin", std::string(report::words_of(study.origin))},
@@ -152,9 +150,7 @@ int run_deviation_experiment(Context& context, const DeviationOptions& options) 
       document["without_stiffening"] = {{"pairs", pairs_json(study.without_stiffening)},
                                         {"verdict", verdict_json(study.verdict_without_stiffening)}};
     document["paper_table_fits"] = fits_json(study.fits);
-    Json names = Json::array();
-    for (const auto& file : files) names.push_back(file.string());
-    document["files"] = std::move(names);
+    document["files"] = names_json(files);
     context.print(document);
     return code;
   }
@@ -164,7 +160,7 @@ int run_deviation_experiment(Context& context, const DeviationOptions& options) 
        {experiment::deviation_table(study), experiment::deviation_claims_table(study),
         experiment::deviation_fit_table(study)})
     fmt::print(context.out, "{}\n", report::terminal_text(table));
-  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  print_names(context.out, files);
   return code;
 }
 }  // namespace
@@ -208,21 +204,11 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
   command->add_option("--rest", protocol.rest, "Time for the arm to adjust, after the touch and with F_B, s")
       ->check(finite_number() & CLI::Range(0.1, 60.0))
       ->capture_default_str();
-  command->add_option("--out", options->folder, "Folder for CSV, pictures and a page")->type_name("DIR");
-  command->add_option("--format", options->ending, "Kind of picture")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
-      ->type_name("svg|png");
+  add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  people
-      ->add_option("--subjects", options->subjects,
-                   "People: a file, 'clipped' or 'unclipped'; else subject 1")
-      ->type_name("SET");
-  people
-      ->add_option("--activation-gain", options->activation_gain,
-                   "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
-      ->check(finite_number() & CLI::Range(0.0, 100.0));
+  add_subjects_option(*people, options->subjects);
+  add_activation_gain_option(*people, options->activation_gain);
   people->add_option("--push", simulated.push, "Push against the wall, N; above every F_B")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
@@ -232,12 +218,13 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
 
   auto* device = command->add_option_group("Device", "With --device");
   add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  device->add_flag("--no-prompt", options->no_prompt, "Ask nobody: a simulated person needs no asking");
-  device->add_option("--patience", options->device.patience, "Time to come to the wall, s")
-      ->check(finite_number() & CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_deviation_experiment(context, *options); };
+  add_touch_options(*device, options->no_prompt, options->device.patience);
+  add_resume_option(*device, options->resume);
+  command->callback([&context, options, people, device] {
+    context.action = [&context, options, people, device] {
+      require_kind(context, *people, *device);
+      return run_deviation_experiment(context, *options);
+    };
   });
 }
 

@@ -3,16 +3,15 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
-#include <map>
-
 #include "host_tools/experiment/jitter_report.hpp"
-#include "host_tools/experiment/subject_set.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/kmax/value_json.hpp"
 #include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
@@ -22,32 +21,23 @@ struct JitterOptions {
   experiment::JitterSettings simulated;
   experiment::JitterDeviceSettings device;
   double clip = 0.0, activation_gain = -1.0;
-  std::string subjects, folder, ending = ".svg";
-  bool no_prompt = false;
+  std::string subjects;
+  ExperimentFiles files;
+  bool no_prompt = false, resume = false;
 };
 
-class JitterInterrupted : public std::runtime_error {
- public:
-  JitterInterrupted() : std::runtime_error("interrupted; nothing is armed") {}
-};
+constexpr auto interrupted = "interrupted; nothing is armed";
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
                                  const Interruption& interruption) {
   experiment::JitterSettings settings = options.simulated;
-  std::vector<simulation::OperatorModel> people(1);
-  if (!options.subjects.empty()) {
-    const experiment::SubjectSet set = experiment::open_subject_set(options.subjects);
-    settings.device = set.device;
-    people.clear();
-    for (const experiment::Subject& subject : set.subjects) people.push_back(subject.person);
-  }
+  std::vector<simulation::OperatorModel> people = people_of(options.subjects, settings.device);
   settings.device.force_limit = options.clip;
-  if (options.activation_gain >= 0.0)
-    for (simulation::OperatorModel& person : people) person.activation_gain = options.activation_gain;
+  set_activation_gain(people, options.activation_gain);
   Progress progress(context.messages());
   try {
     return experiment::study_jitter(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw JitterInterrupted();
+      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
       progress.show(fmt::format("{} of {} pairs of forces", done, all));
     });
   } catch (const std::invalid_argument& error) {
@@ -62,16 +52,21 @@ experiment::JitterStudy measure(Context& context, const JitterOptions& options,
   settings.wall = options.simulated.wall;
   settings.touches = options.simulated.touches;
   device::Device device = context.connect();
+  const auto journal = open_touch_journal(context, options.files.folder, "jitter",
+                                          experiment::journal_settings(device, settings), options.resume);
   const auto check_interruption = [&] {
-    if (interruption.requested()) throw JitterInterrupted();
+    if (interruption.requested())
+      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
   };
-  TerminalPrompter prompter(context, check_interruption);
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   Progress progress(context.messages());
   const experiment::JitterDeviceResult result = experiment::run_jitter_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter, [&](const std::string& text) {
+      device, settings, options.no_prompt ? nullptr : &prompter,
+      [&](const std::string& text) {
         check_interruption();
         progress.show(text);
-      });
+      },
+      journal.get(), [&](const std::string& text) { context.note(text); });
   experiment::JitterStudy study;
   study.wall = settings.wall;
   study.origin = report::Origin::measured;
@@ -84,10 +79,6 @@ experiment::JitterStudy measure(Context& context, const JitterOptions& options,
       device.description(), settings.touches, settings.wall.stiffness / 1000, settings.wall.haptic_rate,
       result.force_limit, 100 * result.limited_share, result.lost_records);
   return study;
-}
-
-Json optional_json(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
 }
 
 Json pairs_json(const std::vector<experiment::JitterResult>& results) {
@@ -119,12 +110,12 @@ Json verdict_json(const experiment::JitterVerdict& verdict) {
 
 int run_jitter_experiment(Context& context, const JitterOptions& options) {
   const Interruption interruption;
-  // Before anybody presses anything.
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  make_folder(options.files);
   const experiment::JitterStudy study = context.simulated() ? simulate(context, options, interruption)
                                                             : measure(context, options, interruption);
   std::vector<std::filesystem::path> files;
-  if (!options.folder.empty()) files = experiment::write_jitter(study, options.folder, options.ending);
+  if (!options.files.folder.empty())
+    files = experiment::write_jitter(study, options.files.folder, options.files.ending);
   const int code = study.verdict.claim_met() ? done : verdict_is_no;
   if (context.json) {
     Json document = {{"origin", std::string(report::words_of(study.origin))},
@@ -137,9 +128,7 @@ int run_jitter_experiment(Context& context, const JitterOptions& options) {
                             {"pairs", pairs_json(variation.results)},
                             {"verdict", verdict_json(variation.verdict)}});
     document["variations"] = std::move(variations);
-    Json names = Json::array();
-    for (const auto& file : files) names.push_back(file.string());
-    document["files"] = std::move(names);
+    document["files"] = names_json(files);
     context.print(document);
     return code;
   }
@@ -148,7 +137,7 @@ int run_jitter_experiment(Context& context, const JitterOptions& options) {
              report::terminal_text(experiment::jitter_claims_table(study)));
   if (!study.variations.empty())
     fmt::print(context.out, "{}\n", report::terminal_text(experiment::jitter_variations_table(study)));
-  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  print_names(context.out, files);
   return code;
 }
 }  // namespace
@@ -186,21 +175,11 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
   command->add_option("--touches", simulated.touches, "Touches per person and pair of forces")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--out", options->folder, "Folder for CSV, pictures and a page")->type_name("DIR");
-  command->add_option("--format", options->ending, "Kind of picture")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
-      ->type_name("svg|png");
+  add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  people
-      ->add_option("--subjects", options->subjects,
-                   "People: a file, 'clipped' or 'unclipped'; else subject 1")
-      ->type_name("SET");
-  people
-      ->add_option("--activation-gain", options->activation_gain,
-                   "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
-      ->check(finite_number() & CLI::Range(0.0, 100.0));
+  add_subjects_option(*people, options->subjects);
+  add_activation_gain_option(*people, options->activation_gain);
   people->add_option("--push", simulated.push, "Push without the forces that the person answers to, N")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
@@ -216,12 +195,13 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
 
   auto* device = command->add_option_group("Device", "With --device");
   add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  device->add_flag("--no-prompt", options->no_prompt, "Ask nobody: a simulated person needs no asking");
-  device->add_option("--patience", options->device.patience, "Time to come to the wall, s")
-      ->check(finite_number() & CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_jitter_experiment(context, *options); };
+  add_touch_options(*device, options->no_prompt, options->device.patience);
+  add_resume_option(*device, options->resume);
+  command->callback([&context, options, people, device] {
+    context.action = [&context, options, people, device] {
+      require_kind(context, *people, *device);
+      return run_jitter_experiment(context, *options);
+    };
   });
 }
 

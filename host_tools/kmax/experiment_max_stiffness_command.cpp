@@ -8,6 +8,8 @@
 #include "host_tools/experiment/stiffness_studies.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 
 namespace kmax::cli {
@@ -53,13 +55,6 @@ Json condition_json(const experiment::StiffnessCondition& condition, double stif
 
 namespace {
 using Options = std::vector<CLI::Option*>;
-
-/// What has no meaning here is refused, rather than passed over.
-void require_none(const Options& options, const char* why) {
-  for (const CLI::Option* option : options) {
-    if (option->count() > 0) throw UsageError(fmt::format("{} {}", option->get_name(), why));
-  }
-}
 
 std::string study_names() {
   std::string names;

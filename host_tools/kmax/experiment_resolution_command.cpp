@@ -3,16 +3,15 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
-#include <map>
-
 #include "host_tools/experiment/resolution_report.hpp"
-#include "host_tools/experiment/subject_set.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/kmax/value_json.hpp"
 #include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
@@ -23,14 +22,12 @@ struct ResolutionOptions {
   experiment::ResolutionDeviceSettings device;
   std::vector<double> speeds;
   int touches = 0;
-  std::string subjects, folder, ending = ".svg", rounding = "nearest";
-  bool no_prompt = false;
+  std::string subjects, rounding = "nearest";
+  ExperimentFiles files;
+  bool no_prompt = false, resume = false;
 };
 
-class ResolutionInterrupted : public std::runtime_error {
- public:
-  ResolutionInterrupted() : std::runtime_error("interrupted; nothing is armed") {}
-};
+constexpr auto interrupted = "interrupted; nothing is armed";
 
 control::Rounding rounding_of(const std::string& name) {
   if (name == "floor") return control::Rounding::floor;
@@ -43,16 +40,13 @@ experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& 
   settings.wall.rounding = rounding_of(options.rounding);
   if (!options.speeds.empty()) settings.speeds = options.speeds;
   if (options.touches > 0) settings.touches = options.touches;
-  std::vector<simulation::OperatorModel> people(1);
-  if (!options.subjects.empty()) {
-    people.clear();
-    for (const experiment::Subject& subject : experiment::open_subject_set(options.subjects).subjects)
-      people.push_back(subject.person);
-  }
+  // Of a set the people only: the device is paper 2's.
+  simulation::DeviceModel unused;
+  const std::vector<simulation::OperatorModel> people = people_of(options.subjects, unused);
   Progress progress(context.messages());
   try {
     return experiment::study_resolution(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw ResolutionInterrupted();
+      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
       progress.show(
           fmt::format("{:.0f} % done", 100.0 * static_cast<double>(done) / static_cast<double>(all)));
     });
@@ -70,16 +64,21 @@ experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& o
   if (!options.speeds.empty()) settings.speeds = options.speeds;
   if (options.touches > 0) settings.touches = options.touches;
   device::Device device = context.connect();
+  const auto journal = open_touch_journal(context, options.files.folder, "resolution",
+                                          experiment::journal_settings(device, settings), options.resume);
   const auto check_interruption = [&] {
-    if (interruption.requested()) throw ResolutionInterrupted();
+    if (interruption.requested())
+      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
   };
-  TerminalPrompter prompter(context, check_interruption);
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   Progress progress(context.messages());
   const experiment::ResolutionDeviceResult result = experiment::run_resolution_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter, [&](const std::string& text) {
+      device, settings, options.no_prompt ? nullptr : &prompter,
+      [&](const std::string& text) {
         check_interruption();
         progress.show(text);
-      });
+      },
+      journal.get(), [&](const std::string& text) { context.note(text); });
   experiment::ResolutionStudy study;
   study.wall = settings.wall;
   study.origin = report::Origin::measured;
@@ -99,8 +98,7 @@ Json verdict_json(const experiment::ResolutionVerdict& verdict) {
   return {{"coarse_vibrates_at_every_speed", verdict.coarse_vibrates},
           {"fine_is_still_below_onset", verdict.fine_is_still},
           {"fine_vibrates_above_onset", verdict.fine_vibrates_fast},
-          {"onset_from_resolution",
-           verdict.onset_from_resolution ? Json(*verdict.onset_from_resolution) : Json(nullptr)},
+          {"onset_from_resolution", optional_json(verdict.onset_from_resolution)},
           {"claim_met", verdict.claim_met()}};
 }
 
@@ -124,28 +122,27 @@ Json run_json(const experiment::ResolutionRun& run, bool simulated) {
 
 int run_resolution_experiment(Context& context, const ResolutionOptions& options) {
   const Interruption interruption;
-  // Before anybody presses anything.
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  make_folder(options.files);
   const bool simulated = context.simulated();
   const experiment::ResolutionStudy study =
       simulated ? simulate(context, options, interruption) : measure(context, options, interruption);
   std::vector<std::filesystem::path> files;
-  if (!options.folder.empty()) files = experiment::write_resolution(study, options.folder, options.ending);
+  if (!options.files.folder.empty())
+    files = experiment::write_resolution(study, options.files.folder, options.files.ending);
   const experiment::ResolutionVerdict verdict = study.verdict();
   const int code = verdict.claim_met() ? done : verdict_is_no;
   if (context.json) {
-    Json runs = Json::array(), variations = Json::array(), names = Json::array();
+    Json runs = Json::array(), variations = Json::array();
     for (const experiment::ResolutionRun& run : study.runs) runs.push_back(run_json(run, simulated));
     for (const experiment::ResolutionVariation& one : study.variations)
       variations.push_back({{"changed_to", one.change}, {"verdict", verdict_json(one.verdict)}});
-    for (const auto& file : files) names.push_back(file.string());
     context.print({{"origin", std::string(report::words_of(study.origin))},
                    {"circumstances", study.circumstances},
                    {"stiffness_n_per_m", study.wall.stiffness},
                    {"runs", runs},
                    {"verdict", verdict_json(verdict)},
                    {"variations", variations},
-                   {"files", names}});
+                   {"files", names_json(files)}});
     return code;
   }
   for (const std::string& words : experiment::resolution_words(study))
@@ -154,7 +151,7 @@ int run_resolution_experiment(Context& context, const ResolutionOptions& options
              report::terminal_text(experiment::resolution_claims_table(study)));
   if (!study.variations.empty())
     fmt::print(context.out, "{}\n", report::terminal_text(experiment::resolution_variations_table(study)));
-  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  print_names(context.out, files);
   return code;
 }
 }  // namespace
@@ -200,17 +197,10 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
       ->check(finite_number() & CLI::Range(0.001, 5.0));
   command->add_option("--touches", options->touches, "Touches per speed (and push); else 4, on a device 1")
       ->check(CLI::Range(1, 1000));
-  command->add_option("--out", options->folder, "Folder for CSV, pictures and a page")->type_name("DIR");
-  command->add_option("--format", options->ending, "Kind of picture")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
-      ->type_name("svg|png");
+  add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  people
-      ->add_option("--subjects", options->subjects,
-                   "People: a file, 'clipped' or 'unclipped'; else subject 1")
-      ->type_name("SET");
+  add_subjects_option(*people, options->subjects);
   people->add_option("--grip", simulated.weak.grip, "Factor of the grip's stiffness and damping")
       ->check(finite_number() & CLI::Range(0.01, 10.0))
       ->capture_default_str();
@@ -230,12 +220,13 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
 
   auto* device = command->add_option_group("Device", "With --device");
   add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  device->add_flag("--no-prompt", options->no_prompt, "Ask nobody: a simulated person needs no asking");
-  device->add_option("--patience", options->device.patience, "Time to come to the wall, s")
-      ->check(finite_number() & CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_resolution_experiment(context, *options); };
+  add_touch_options(*device, options->no_prompt, options->device.patience);
+  add_resume_option(*device, options->resume);
+  command->callback([&context, options, people, device] {
+    context.action = [&context, options, people, device] {
+      require_kind(context, *people, *device);
+      return run_resolution_experiment(context, *options);
+    };
   });
 }
 

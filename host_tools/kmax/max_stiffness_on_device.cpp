@@ -7,6 +7,7 @@
 
 #include "host_tools/experiment/device_max_stiffness_report.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
@@ -26,9 +27,12 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
                    const std::vector<std::filesystem::path>& files) {
   if (context.json) {
     Json conditions = Json::array();
-    for (const DeviceStiffnessResult& result : results)
+    for (const DeviceStiffnessResult& result : results) {
       conditions.push_back(
           condition_json(result.condition, result.found.stiffness, {result.found.stiffness}));
+      conditions.back()["beyond_last"] = result.found.beyond_last;
+      conditions.back()["never_touched"] = result.found.never_touched;
+    }
     context.print({{"conditions", conditions}});
     for (const auto& file : files) context.note(file.string());
     return;
@@ -66,9 +70,10 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
       throw ExperimentInterrupted(journal ? "interrupted; the axis has been disarmed; --resume goes on"
                                           : "interrupted; the axis has been disarmed");
   };
-  TerminalPrompter prompter(context, check_interruption);
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   const experiment::RestoredAfterwards restored(device, settings.touch.axis,
-                                                experiment::contact_changes(settings.touch));
+                                                experiment::contact_changes(settings.touch),
+                                                [&](const std::string& text) { context.note(text); });
   std::vector<DeviceStiffnessResult> results;
   {
     Progress progress(context.messages());

@@ -11,6 +11,7 @@
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/experiment/stiffness_studies.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/report/page_files.hpp"
@@ -50,6 +51,7 @@ SubjectSet subject_set(Context& context, const MaxStiffnessOptions& options, boo
   SubjectSet set = experiment::open_subject_set(own ? options.subjects : clip ? "clipped" : "unclipped");
   if (own && !options.clip.empty() && clips(set) != clip) {
     set.device.force_limit = clip ? experiment::paper::touch_force_limit : 0.0;
+    set.fitted.reset();
     if (!options.calibrate)
       context.note(fmt::format("{} with the friction and gamma of the set: nothing is calibrated",
                                experiment::clip_words(set.device)));
@@ -58,6 +60,7 @@ SubjectSet subject_set(Context& context, const MaxStiffnessOptions& options, boo
     const simulation::OperatorModel common = set.subjects.front().person;
     set.subjects = experiment::draw_subjects(set.subjects.size(), *options.seed, common);
     set.seed = *options.seed;
+    set.fitted.reset();
     if (!options.calibrate)
       context.note("other people with the friction and gamma of those they replace: nothing is calibrated");
   }
@@ -78,7 +81,9 @@ experiment::ProgressReport reporter(Progress& progress, const Interruption& inte
   };
 }
 
-RunJournal::Json journal_settings(const SubjectSet& set, const experiment::StiffnessRun& run) {
+RunJournal::Json journal_settings(SubjectSet set, const experiment::StiffnessRun& run) {
+  // What the numbers were fitted to changes nothing about what is found with them.
+  set.fitted.reset();
   return {{"experiment", "max-stiffness of simulated people"},
           {"program_version", KMAX_VERSION},
           {"subjects", experiment::subject_set_text(set)},
@@ -158,7 +163,7 @@ std::vector<report::Section> more_sections(Context& context, const MaxStiffnessO
   if (!options.folder.empty()) {
     RunJournal::Json settings = journal_settings(sets.front(), run);
     settings["experiment"] = "studies of simulated people";
-    if (sets.size() > 1) settings["more_subjects"] = experiment::subject_set_text(sets[1]);
+    if (sets.size() > 1) settings["more_subjects"] = journal_settings(sets[1], run)["subjects"];
     const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::anew;
     journal.emplace(std::filesystem::path(options.folder) / "max_stiffness_studies.journal", settings, begin);
     run.journal = &*journal;

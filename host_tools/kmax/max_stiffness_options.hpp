@@ -23,7 +23,7 @@ struct MaxStiffnessOptions {
   std::optional<std::uint64_t> seed;
   bool calibrate = false;
   std::vector<std::string> studies;  ///< names of experiment::stiffness_studies, or "all"
-  std::size_t jobs = 0;  ///< 0: all processors
+  std::size_t jobs = 0;              ///< 0: all processors
 
   // On a device.
   experiment::DeviceStiffnessSettings device;
@@ -39,11 +39,6 @@ std::vector<experiment::StiffnessCondition> conditions_for(const std::vector<std
 /// One entry of the document's "conditions". `name`: the condition's, if nothing else is said.
 Json condition_json(const experiment::StiffnessCondition& condition, double stiffness,
                     const std::vector<double>& subjects, const std::string& name = {});
-
-class ExperimentInterrupted : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Each does the experiment, prints it, and returns the exit code.
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,

@@ -11,16 +11,23 @@ namespace kmax::cli {
 /// Asks whoever sits at the terminal, on the messages' stream, and waits for the Enter key on standard input.
 class TerminalPrompter final : public calibration::Prompter {
  public:
-  /// `check` is called ten times a second while nobody answers, and may throw to give up.
-  TerminalPrompter(Context& context, std::function<void()> check)
-      : context_(context), check_(std::move(check)) {}
+  /// `check` is called at least ten times a second while nobody answers, and may throw to give up. `advice`:
+  /// what to do when nobody can.
+  TerminalPrompter(Context& context, std::function<void()> check, std::string advice)
+      : context_(context), check_(std::move(check)), advice_(std::move(advice)) {}
 
-  /// Throws std::runtime_error when standard input ends: nobody is there to answer.
+  /// Throws calibration::CalibrationInterrupted when standard input ends or is closed: nobody is there to
+  /// answer.
   void ask(const std::string& what_to_do) override;
 
  private:
   Context& context_;
   std::function<void()> check_;
+  std::string advice_;
 };
+
+/// What an experiment's prompter advises.
+inline constexpr auto experiment_prompt_advice =
+    "somebody must be at the terminal, or --no-prompt be given for a simulated person";
 
 }  // namespace kmax::cli

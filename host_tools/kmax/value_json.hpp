@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/kmax/context.hpp"
@@ -13,6 +14,12 @@ Json value_json(const device::Parameter& parameter, std::uint32_t raw);
 
 /// A number of the dictionary itself (a bound).
 Json number_json(double number);
+
+/// null for what is not known.
+template <typename Value>
+Json optional_json(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 /// {"value": ..., "unit": ...}
 Json value_and_unit_json(const device::Parameter& parameter, std::uint32_t raw);

@@ -1,13 +1,10 @@
 #include "host_tools/plot/figure.hpp"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <csignal>
-#include <cstdio>
 #include <limits>
 
 namespace kmax::plot {
@@ -17,34 +14,6 @@ namespace {
 // Okabe and Ito's palette, blue first.
 constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"};
 constexpr std::array point_types = {7, 5, 9, 13, 11, 6, 4};
-
-// In single quotes: between double ones gnuplot runs what stands in `backquotes` as a command, and the text
-// may come from a file that somebody else made.
-std::string quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) {
-    if (c == '\'') out += '\'';
-    out += c == '\n' || c == '\r' ? ' ' : c;
-  }
-  return out + "'";
-}
-
-/// A gnuplot that ends early, or is not there, closes the pipe: an error to report, no reason to die.
-class WithoutPipeSignal {
- public:
-  WithoutPipeSignal() {
-    struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;
-    sigemptyset(&ignore.sa_mask);
-    sigaction(SIGPIPE, &ignore, &previous_);
-  }
-  ~WithoutPipeSignal() { sigaction(SIGPIPE, &previous_, nullptr); }
-  WithoutPipeSignal(const WithoutPipeSignal&) = delete;
-  WithoutPipeSignal& operator=(const WithoutPipeSignal&) = delete;
-
- private:
-  struct sigaction previous_ {};
-};
 
 bool can_be_shown(double value, bool logarithmic) {
   return std::isfinite(value) && (!logarithmic || value > 0.0);
@@ -161,13 +130,9 @@ bool has_points(const Figure& figure) {
   });
 }
 
-std::string script_for(const Figure& figure, const std::filesystem::path& path, const std::string& terminal) {
+std::string script_for(const Figure& figure) {
   const std::size_t panels = figure.panels.size();
-  const std::size_t height = panels == 1 ? 480 : 120 + 200 * panels;
   std::string script =
-      fmt::format("set terminal {} size 900,{} font 'sans,12' background '#ffffff'\n", terminal, height);
-  script += fmt::format("set output {}\n", quoted(path.string()));
-  script +=
       "set grid lc rgb '#dddddd' lt 1\nset border lc rgb '#444444'\nset key top right opaque noenhanced\n";
   script += figure.legend_beside
                 ? fmt::format("set key outside Left reverse\nset rmargin {}\n", 9 + longest_label(figure))
@@ -187,40 +152,17 @@ std::string script_for(const Figure& figure, const std::filesystem::path& path, 
     script += panel_script(figure.panels[i], i + 1 == panels, figure, block);
     block += figure.panels[i].series.size();
   }
-  return script + "unset multiplot\nset output\n";
+  return script + "unset multiplot\n";
 }
 
 }  // namespace
 
 void write_figure(const Figure& figure, const std::filesystem::path& path) {
-  const std::string ending = path.extension().string();
-  if (ending != ".svg" && ending != ".png")
-    throw PictureNameError(fmt::format("{}: a picture's name must end in .svg or .png", path.string()));
   if (figure.panels.empty() || std::any_of(figure.panels.begin(), figure.panels.end(),
                                            [](const Panel& p) { return p.series.empty(); }))
     throw FigureError(fmt::format("{}: there is nothing to draw", path.string()));
-  if (!path.parent_path().empty() && !std::filesystem::is_directory(path.parent_path()))
-    throw PictureNameError(
-        fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
-
-  std::filesystem::path unfinished = path;
-  unfinished += ".part";
-  const std::string script = script_for(figure, unfinished, ending == ".svg" ? "svg" : "pngcairo");
-  FILE* gnuplot = popen("gnuplot >/dev/null 2>&1", "w");
-  if (gnuplot == nullptr) throw FigureError("gnuplot cannot be started");
-  const WithoutPipeSignal guard;
-  const bool written = std::fwrite(script.data(), 1, script.size(), gnuplot) == script.size();
-  const int status = pclose(gnuplot);
-  std::error_code error;
-  if (written && WIFEXITED(status) && WEXITSTATUS(status) == 0)
-    std::filesystem::rename(unfinished, path, error);
-  if (!written || !WIFEXITED(status) || WEXITSTATUS(status) != 0 || error) {
-    std::error_code ignored;
-    std::filesystem::remove(unfinished, ignored);
-    throw FigureError(WIFEXITED(status) && WEXITSTATUS(status) == 127
-                          ? "gnuplot is not installed; on Debian: apt-get install gnuplot-nox"
-                          : fmt::format("{}: gnuplot could not draw it", path.string()));
-  }
+  const std::size_t panels = figure.panels.size();
+  draw_picture(script_for(figure), {900, panels == 1 ? 480 : 120 + 200 * panels}, path);
 }
 
 }  // namespace kmax::plot

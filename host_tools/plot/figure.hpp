@@ -2,10 +2,11 @@
 
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::plot {
 
@@ -40,18 +41,6 @@ struct Figure {
   std::vector<Panel> panels;
   bool log_x = false;          ///< values that are not above 0 leave a gap
   bool legend_beside = false;  ///< on the right of the panels instead of over the curves
-};
-
-/// gnuplot is missing or failed, or the file cannot be written; the message says which.
-class FigureError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// The name given for a picture cannot be one: its ending, or a folder that does not exist.
-class PictureNameError : public FigureError {
- public:
-  using FigureError::FigureError;
 };
 
 /// Draws with gnuplot into an SVG or a PNG, by the file's ending. Curves keep Okabe and Ito's colours, which

@@ -1,12 +1,9 @@
 #include "host_tools/plot/map_figure.hpp"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <array>
 #include <cmath>
-#include <csignal>
-#include <cstdio>
 
 namespace kmax::plot {
 
@@ -17,17 +14,6 @@ namespace {
 constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
                                 "#56B4E9", "#000000", "#7A4A1E", "#5A5A5A"};
 constexpr std::size_t dash_patterns = 5;
-
-// In single quotes, as figure.cpp says: between double ones gnuplot runs what stands in `backquotes`.
-std::string quoted(const std::string& text) {
-  // A quote that begins the text is not read as one that is doubled: a space goes before it.
-  std::string out = text.starts_with('\'') ? "' " : "'";
-  for (const char c : text) {
-    if (c == '\'') out += '\'';
-    out += c == '\n' || c == '\r' ? ' ' : c;
-  }
-  return out + "'";
-}
 
 std::string data_block(const std::string& name, const std::vector<Outline>& outlines, bool closed) {
   std::string block = fmt::format("${} << EOD\n", name);
@@ -67,12 +53,8 @@ std::string title_of(const std::string& label) {
   return label.empty() ? "notitle" : "title " + quoted(label);
 }
 
-std::string script_for(const MapFigure& figure, const std::filesystem::path& path,
-                       const std::string& terminal) {
+std::string script_for(const MapFigure& figure) {
   std::string script =
-      fmt::format("set terminal {} size 1000,560 font 'sans,12' background '#ffffff'\nset output {}\n",
-                  terminal, quoted(path.string()));
-  script +=
       "set border lc rgb '#444444'\nset tics nomirror front\nset grid front lc rgb '#bbbbbb' lt 1 lw 0.5\n"
       "set key outside right top Left reverse noenhanced spacing 1.25 samplen 3.5\n";
   if (figure.log_x) script += "set logscale x 10\n" + ticks('x', figure.x_limits);
@@ -106,25 +88,8 @@ std::string script_for(const MapFigure& figure, const std::filesystem::path& pat
   }
   // A map without anything in it is still a map.
   if (plots.empty()) plots = "plot 1/0 notitle";
-  return script + plots + "\nset output\n";
+  return script + plots + "\n";
 }
-
-/// A gnuplot that ends early, or is not there, closes the pipe: an error to report, no reason to die.
-class WithoutPipeSignal {
- public:
-  WithoutPipeSignal() {
-    struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;
-    sigemptyset(&ignore.sa_mask);
-    sigaction(SIGPIPE, &ignore, &previous_);
-  }
-  ~WithoutPipeSignal() { sigaction(SIGPIPE, &previous_, nullptr); }
-  WithoutPipeSignal(const WithoutPipeSignal&) = delete;
-  WithoutPipeSignal& operator=(const WithoutPipeSignal&) = delete;
-
- private:
-  struct sigaction previous_ {};
-};
 
 bool is_side(const std::pair<double, double>& limits, bool logarithmic) {
   return std::isfinite(limits.first) && std::isfinite(limits.second) && limits.first < limits.second &&
@@ -133,37 +98,10 @@ bool is_side(const std::pair<double, double>& limits, bool logarithmic) {
 
 }  // namespace
 
-void require_picture_name(const std::filesystem::path& path) {
-  if (path.extension() != ".svg" && path.extension() != ".png")
-    throw PictureNameError(fmt::format("{}: a picture's name must end in .svg or .png", path.string()));
-  if (!path.parent_path().empty() && !std::filesystem::is_directory(path.parent_path()))
-    throw PictureNameError(
-        fmt::format("{}: the folder {} does not exist", path.string(), path.parent_path().string()));
-}
-
 void write_map_figure(const MapFigure& figure, const std::filesystem::path& path) {
-  require_picture_name(path);
   if (!is_side(figure.x_limits, figure.log_x) || !is_side(figure.y_limits, figure.log_y))
     throw FigureError(fmt::format("{}: a side of the map is no range", path.string()));
-
-  std::filesystem::path unfinished = path;
-  unfinished += ".part";
-  const std::string script = script_for(figure, unfinished, path.extension() == ".svg" ? "svg" : "pngcairo");
-  FILE* gnuplot = popen("gnuplot >/dev/null 2>&1", "w");
-  if (gnuplot == nullptr) throw FigureError("gnuplot cannot be started");
-  const WithoutPipeSignal guard;
-  const bool written = std::fwrite(script.data(), 1, script.size(), gnuplot) == script.size();
-  const int status = pclose(gnuplot);
-  std::error_code error;
-  const bool drawn = written && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-  if (drawn) std::filesystem::rename(unfinished, path, error);
-  if (!drawn || error) {
-    std::error_code ignored;
-    std::filesystem::remove(unfinished, ignored);
-    throw FigureError(WIFEXITED(status) && WEXITSTATUS(status) == 127
-                          ? "gnuplot is not installed; on Debian: apt-get install gnuplot-nox"
-                          : fmt::format("{}: gnuplot could not draw it", path.string()));
-  }
+  draw_picture(script_for(figure), {1000, 560}, path);
 }
 
 }  // namespace kmax::plot

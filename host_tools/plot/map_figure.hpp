@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "host_tools/plot/figure.hpp"
+#include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::plot {
 
@@ -44,9 +44,6 @@ struct MapFigure {
   std::vector<MapLine> lines;
   std::optional<MapPoint> point;
 };
-
-/// Throws PictureNameError for what cannot be a picture's name: before anybody waits for the picture.
-void require_picture_name(const std::filesystem::path& path);
 
 /// Draws with gnuplot into an SVG or a PNG, by the file's ending. Lines take Okabe and Ito's colours first
 /// and differ in dash pattern too; the legend stands beside the map. The folder must exist. About 0.1 s.

@@ -2,15 +2,19 @@
 // Was a held contact stable? Judged from the recorded position of the handle alone, so that a simulated and a
 // real device are judged by the same rule. The papers give no measure; this one is ours:
 //
-//   unstable   = peak-to-peak position > threshold in every quarter of the judged window
+//   unstable   = peak-to-peak position > threshold (by more than its millionth) in every quarter of the
+//                judged window
 //   stable     = not unstable, and the handle touched the wall
 //   no_contact = the handle was never inside the wall during the window
 //
 // The threshold of 0.165 mm is three counts of the Geomagic Touch's 0.055 mm: an oscillation that cannot be
-// the flicker of a count. "In every quarter" separates a lasting oscillation from one that dies out, and from
-// a single slip. Contact means that at least one sample of the window lies on the wall's inner side, side *
-// (x - wall) <= margin: a hand that hovers in the magnetic field in front of the surface, however still, has
-// not shown that the wall is stable. A handle that bounces out of the wall and back is in contact.
+// the flicker of a count. Exactly three counts are therefore stable, and the millionth keeps them so: a
+// device holds its transmission as a float, which at 4000 counts per turn makes three counts 0.165000008 mm,
+// and differences of positions round too. That is below 1e-7 of the threshold; the next count is a third of
+// it. "In every quarter" separates a lasting oscillation from one that dies out, and from a single slip.
+// Contact means that at least one sample of the window lies on the wall's inner side, side * (x - wall) <=
+// margin: a hand that hovers in the magnetic field in front of the surface, however still, has not shown that
+// the wall is stable. A handle that bounces out of the wall and back is in contact.
 //
 // The measure sees 3.3 N of clipped force as 0.6 mm at 5.5 N/mm: with a clipped force large amplitudes say
 // little.
@@ -26,6 +30,8 @@
 #include <stdexcept>
 
 namespace kmax::simulation {
+
+inline constexpr double rounding_allowance = 1e-6;  // of the threshold
 
 struct ContactSample {
   double time;      // s
@@ -100,6 +106,7 @@ inline ContactMeasure measure_contact(std::span<const ContactSample> recording,
     if (outside <= criterion.contact_margin) ++touching;
   }
 
+  const double threshold = criterion.threshold * (1.0 + rounding_allowance);
   ContactMeasure measure;
   bool oscillates = true;
   for (std::size_t quarter = 0; quarter < 4; ++quarter) {
@@ -111,7 +118,7 @@ inline ContactMeasure measure_contact(std::span<const ContactSample> recording,
                       quarter + 1, criterion.window_begin, criterion.window_end, count[quarter]));
     }
     measure.quarter_peak_to_peak[quarter] = high[quarter] - low[quarter];
-    oscillates = oscillates && measure.quarter_peak_to_peak[quarter] > criterion.threshold;
+    oscillates = oscillates && measure.quarter_peak_to_peak[quarter] > threshold;
     measure.samples += count[quarter];
   }
   measure.peak_to_peak =

@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "host_tools/simulation/scene_device.hpp"
 #include "host_tools/simulation/scene_motor.hpp"
@@ -137,11 +135,16 @@ class SceneReader : private SceneTables {
     }
   }
 
+  // Axis 0 need not be named: `axis0.wall.position` and `wall.position` are one parameter.
+  static std::string_view without_axis_0(std::string_view name) {
+    constexpr std::string_view axis = "axis0.";
+    return name.starts_with(axis) ? name.substr(axis.size()) : name;
+  }
+
   static const SceneParameter* find_parameter(const Scene& scene, const std::string& prefix,
                                               std::string_view name) {
     for (const SceneParameter& parameter : scene.parameters) {
-      if (parameter.name == prefix + std::string(name)) return &parameter;
-      if (prefix.empty() && parameter.name == "axis0." + std::string(name)) return &parameter;
+      if (without_axis_0(parameter.name) == prefix + std::string(name)) return &parameter;
     }
     return nullptr;
   }
@@ -191,9 +194,10 @@ class SceneReader : private SceneTables {
                                         text_of(node)));
       }
       for (const SceneParameter& earlier : scene.parameters) {
-        if (earlier.name == name) {
-          fail(node.source(), fmt::format("parameters.{} = {}: given twice (also at {}); remove one", name,
-                                          text_of(node), earlier.where));
+        if (without_axis_0(earlier.name) == without_axis_0(name)) {
+          fail(node.source(),
+               fmt::format("parameters.{} = {}: given twice (also at {}{}); remove one", name, text_of(node),
+                           earlier.where, earlier.name == name ? "" : ", as " + earlier.name));
         }
       }
       if (check_) {
@@ -211,23 +215,11 @@ class SceneReader : private SceneTables {
 }  // namespace
 
 Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check) {
-  toml::table root;
-  try {
-    root = toml::parse(text, source);
-  } catch (const toml::parse_error& error) {
-    throw SceneError(fmt::format("{}:{}:{}: not valid TOML: {}", source, error.source().begin.line,
-                                 error.source().begin.column, error.description()));
-  }
-  return SceneReader(source, check).read(root);
+  return SceneReader(source, check).read(parsed_toml(text, source));
 }
 
 Scene load_scene(const std::string& path, const ParameterCheck& check) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw SceneError(fmt::format("{}: cannot be read; give the path of a scene file (TOML)", path));
-  }
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return parse_scene(text, path, check);
+  return parse_scene(text_of_file(path, "a scene file"), path, check);
 }
 
 }  // namespace kmax::simulation

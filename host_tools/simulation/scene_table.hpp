@@ -6,6 +6,7 @@
 #include <toml++/toml.h>
 
 #include <array>
+#include <filesystem>
 #include <initializer_list>
 #include <optional>
 #include <span>
@@ -16,6 +17,12 @@
 #include "host_tools/simulation/model_field.hpp"
 
 namespace kmax::simulation {
+
+// Throws SceneError that begins with file:line:column. `source` stands for the file name.
+toml::table parsed_toml(std::string_view text, std::string_view source);
+
+// Throws SceneError. `what`: what the file should have been, with its article.
+std::string text_of_file(const std::filesystem::path& path, std::string_view what);
 
 class SceneTables {
  public:

@@ -32,5 +32,29 @@ TEST(CauseStudy, TakesTheEffectApart) {
   EXPECT_DOUBLE_EQ(lengths[1].slope, 4000.0);
 }
 
+TEST(CauseStudy, LooksBelowTheFirstStiffnessOfOtherSearches) {
+  SubjectSet set = few_people(3, 1.125);
+  set.device.force_limit = 0.0;
+  StiffnessRun run = quick_run(2);
+  run.steps.last = 4000.0;
+  // A steep field that no hand answers is unstable at 1 N/mm for some of these people.
+  const auto lengths = run_field_lengths(set, {0.02e-3}, run);
+  EXPECT_LT(lengths[0].mean, 1000.0);
+  EXPECT_GE(lengths[0].mean, cause_first_stiffness);
+  EXPECT_EQ(lengths[0].ends.at_zero, 0U);
+  // Everything is stable at so little, and nothing ends.
+  run.steps.last = 200.0;
+  run.protocol.threshold = 0.1;
+  for (const CauseResult& cause : run_cause_study(set, run)) {
+    EXPECT_EQ(cause.ends.beyond_last, 3U) << cause.condition.name;
+    EXPECT_EQ(cause.mean, 200.0) << cause.condition.name;
+  }
+  // Nothing is.
+  run.protocol.threshold = 1e-12;
+  std::size_t at_zero = 0;
+  for (const CauseResult& cause : run_cause_study(set, run)) at_zero += cause.ends.at_zero;
+  EXPECT_GT(at_zero, 0U);
+}
+
 }  // namespace
 }  // namespace kmax::experiment

@@ -40,6 +40,30 @@ class Contact : public testing::Test {
   std::function<void(const std::string&)> tell = [this](const std::string& text) { told.push_back(text); };
 };
 
+TEST(ContactConditions, AreThePapersWallsWithTheAdaptiveOneInEachMode) {
+  const auto conditions = contact_conditions();
+  ASSERT_EQ(conditions.size(), paper::contact_verdicts.size() + 2);
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    const auto& verdict = paper::contact_verdicts[std::min<std::size_t>(i, 3)];
+    EXPECT_EQ(conditions[i].figure, verdict.figure);
+    EXPECT_EQ(conditions[i].paper_words, verdict.words);
+    EXPECT_EQ(conditions[i].paper_stable, verdict.stable);
+  }
+  EXPECT_EQ(conditions[1].name, "F_MC = 1 N");
+  EXPECT_EQ(conditions[1].assignments,
+            (std::vector<std::string>{"wall.law=magnetic", "wall.magnetic_coefficient=1"}));
+  EXPECT_EQ(conditions[4].name, "adaptive, latched");
+  EXPECT_EQ(conditions[4].assignments,
+            (std::vector<std::string>{"wall.law=adaptive", "wall.adaptive_mode=latched"}));
+}
+
+// A coarse position that somebody left set makes any wall vibrate (paper 2).
+TEST_F(Contact, PositionsAreThoseOfTheEncoder) {
+  device.apply(device::parse_assignments({"position.resolution=0.0004"}));
+  run(2);
+  EXPECT_EQ(device.read_number("position.resolution"), 0.0);
+}
+
 TEST_F(Contact, ATrialHasTheTouchAtTimeZeroAndLosesNothing) {
   const ContactResult result = run(1);
   expect_disarmed();

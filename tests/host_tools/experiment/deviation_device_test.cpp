@@ -4,6 +4,7 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
@@ -96,6 +97,50 @@ TEST_F(DeviationDevice, ASwingTooLargeEndsATouch) {
   EXPECT_EQ(result.results[0].touches, 0u);
 }
 
+// At 20 N/mm no hand holds the plain wall still. The axis along the surface shows nothing of it.
+TEST_F(DeviationDevice, AWallThatIsUnstableEndsATouch) {
+  settings.protocol.stiffness = 20e3;
+  const DeviationDeviceResult result = run();
+  expect_disarmed_and_restored();
+  EXPECT_EQ(result.results[0].aborted, 1u);
+  EXPECT_EQ(result.results[0].touches, 0u);
+}
+
+TEST_F(DeviationDevice, WhoLeavesTheWallIsAskedAgainAndNotAveraged) {
+  settings.protocol.rest = 2.0;  // the simulated hand lets go after 3.6 s
+  const DeviationDeviceResult result = run();
+  expect_disarmed_and_restored();
+  EXPECT_EQ(asked.requests.size(), 3u);
+  EXPECT_EQ(result.results[0].touches, 0u);
+  EXPECT_EQ(result.results[0].aborted, 0u);
+  EXPECT_EQ(result.results[0].without_contact, 1u);
+}
+
+TEST_F(DeviationDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
+  const host_tools_test::TemporaryFolder folder;
+  settings.pairs = {*paper::deviation(0, 1), *paper::deviation(0, 3)};
+  const auto with_journal = [&](RunJournal::Begin begin) {
+    RunJournal journal(folder / "j", journal_settings(device, settings), begin);
+    return run_deviation_on_device(device, settings, &asked, tell, &journal);
+  };
+  tell = [this](const std::string&) {
+    if (asked.requests.size() == 2) throw std::runtime_error("Ctrl-C");
+  };
+  EXPECT_THROW(with_journal(RunJournal::Begin::anew), std::runtime_error);
+  tell = [](const std::string&) {};
+  const DeviationDeviceResult resumed = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 3u) << "the first pair was done";
+  const DeviationDeviceResult again = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 3u);
+  ASSERT_EQ(again.results.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(again.results[i].touches, 1u);
+    EXPECT_EQ(again.results[i].deviation, resumed.results[i].deviation);
+    EXPECT_EQ(again.results[i].contact_share, resumed.results[i].contact_share);
+  }
+  expect_disarmed_and_restored();
+}
+
 TEST_F(DeviationDevice, GivingUpOnTheWayLeavesNothingBehind) {
   tell = [this](const std::string&) {
     if (device::Drive(device, 1).status().armed()) throw std::logic_error("enough");
@@ -112,6 +157,15 @@ TEST_F(DeviationDevice, BothForceLimitsAreLowered) {
   ASSERT_FALSE(seen.empty());
   EXPECT_EQ(seen.front(), 2.0);
   expect_disarmed_and_restored();
+}
+
+// F_B pushes the handle out of the hand's rest against the wall, and it swings: that is no instability.
+TEST_F(DeviationDevice, ABackgroundForceOnAStableWallEndsNothing) {
+  settings.pairs = {*paper::deviation(1, 3)};
+  const DeviationDeviceResult result = run();
+  expect_disarmed_and_restored();
+  EXPECT_EQ(result.results[0].aborted, 0u);
+  EXPECT_EQ(result.results[0].touches, 1u) << result.results[0].without_contact;
 }
 
 class DeviationWithoutAPerson : public DeviationDevice {

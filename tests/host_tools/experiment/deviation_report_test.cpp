@@ -51,5 +51,45 @@ TEST(DeviationReport, APageOfADeviceWithoutResults) {
   EXPECT_EQ(write_deviation(study, folder / "new", ".svg").size(), 5u);
 }
 
+TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
+  const auto words_of = [](bool falls, bool falls_without) {
+    const auto results = [](bool fall) {
+      std::vector<DeviationResult> cells;
+      for (const paper::DeviationCell& cell : paper::table_2) {
+        DeviationResult result = mean_deviation(cell, {});
+        result.touches = 1;
+        const double share = fall ? 1.0 / (1.0 + cell.background) : 1.0 + cell.background;
+        result.deviation = 1e-3 * cell.interference * share;
+        cells.push_back(result);
+      }
+      return cells;
+    };
+    DeviationStudy study;
+    study.results = results(falls);
+    study.verdict = judge_deviation(study.results);
+    study.without_stiffening = results(falls_without);
+    study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
+    std::string words;
+    for (const std::string& one : deviation_words(study)) words += one + "\n";
+    return words;
+  };
+  const char* cause = "the stiffening and nothing else";
+  EXPECT_CONTAINS(words_of(true, false), cause);
+  for (const auto& [falls, without] :
+       {std::pair{true, true}, std::pair{false, true}, std::pair{false, false}})
+    EXPECT_EQ(words_of(falls, without).find(cause), std::string::npos) << falls << without;
+  EXPECT_CONTAINS(words_of(true, true), "something else than the stiffening makes the trend");
+  EXPECT_CONTAINS(words_of(false, false), "no trend to explain");
+}
+
+// People who do not stiffen are their own comparison.
+TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
+  std::vector<simulation::OperatorModel> people(1);
+  people[0].activation_gain = 0.0;
+  std::string words;
+  for (const std::string& one : deviation_words(study_deviation(few(), people))) words += one + "\n";
+  EXPECT_EQ(words.find("nothing else"), std::string::npos) << words;
+}
+
 }  // namespace
 }  // namespace kmax::experiment

@@ -18,8 +18,8 @@ DeviceStiffnessResult result_of(const std::string& name, double stiffness) {
   result.found.stiffness = stiffness;
   result.found.touches = 2;
   result.found.saturated_share = 0.0125;
-  result.touches = {{stiffness, 1, ContactVerdict::stable, 0.05e-3, 0.0125, false},
-                    {stiffness + 100, 1, ContactVerdict::unstable, 6e-3, 0.2, true}};
+  result.touches = {{stiffness, 1, ContactVerdict::stable, 0.05e-3, 0.0125, false, 0},
+                    {stiffness + 100, 1, ContactVerdict::unstable, 6e-3, 0.2, true, 3}};
   return result;
 }
 
@@ -44,7 +44,8 @@ TEST(DeviceStiffnessReport, TheTableHasThePapersValueBesideOursAndItsOrigin) {
 TEST(DeviceStiffnessReport, EveryTouchIsARow) {
   const report::Table table = device_touch_table({result_of("a", 3500), result_of("b", 4000)});
   ASSERT_EQ(table.rows.size(), 4u);
-  EXPECT_EQ(table.rows[1], (std::vector<std::string>{"a", "3600", "1", "unstable", "0.006", "0.2", "yes"}));
+  EXPECT_EQ(table.rows[1],
+            (std::vector<std::string>{"a", "3600", "1", "unstable", "0.006", "0.2", "yes", "3"}));
 }
 
 TEST(DeviceStiffnessReport, ThePageAndItsFilesAreWritten) {
@@ -57,8 +58,22 @@ TEST(DeviceStiffnessReport, ThePageAndItsFilesAreWritten) {
   EXPECT_CONTAINS(folder.read("out/max_stiffness.html"), "serial:/dev/x");
   EXPECT_CONTAINS(folder.read("out/max_stiffness.html"), "src=\"max_stiffness.svg\"");
   EXPECT_NE(thrown_message<plot::FigureError>(
-                [&] { write_device_stiffness({result_of("a", 3500)}, {}, "x", folder / "out", ".gif"); }),
+                [&] { write_device_stiffness({result_of("a", 3500)}, {}, "x", folder / "gif", ".gif"); }),
             "");
+  // What was measured is there all the same.
+  for (const char* name : {"max_stiffness.csv", "max_stiffness_touches.csv", "max_stiffness.html"})
+    EXPECT_TRUE(std::filesystem::exists(folder / "gif" / name)) << name;
+}
+
+TEST(DeviceStiffnessReport, WithoutATouchThereIsNoPicture) {
+  const TemporaryFolder folder;
+  DeviceStiffnessResult untouched = result_of("a", 0);
+  untouched.touches.clear();
+  EXPECT_EQ(write_device_stiffness({untouched}, {}, "x", folder / "out", ".svg").size(), 4u);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/max_stiffness.svg"));
+  EXPECT_EQ(folder.read("out/max_stiffness.html").find("<img"), std::string::npos);
+  EXPECT_EQ(write_device_stiffness({untouched, result_of("b", 1)}, {}, "x", folder / "out", ".svg").size(),
+            5u);
 }
 
 }  // namespace

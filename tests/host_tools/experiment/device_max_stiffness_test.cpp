@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "host_tools/device/value_text.hpp"
 #include "host_tools/experiment/stiffness_climb.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
@@ -203,9 +204,11 @@ TEST_F(DeviceStiffnessWithoutAPerson, IsAskedThreeTimesAndNotWithoutAPrompter) {
 // The simulated hand lets go after 3 s and is not in the wall any more when the touch is judged.
 TEST_F(DeviceStiffness, ATouchThatIsNotHeldIsMadeThreeTimesAndEndsTheSearch) {
   settings.touch.hold_time = 5.0;
-  const DeviceStiffnessResult result = find(wall_with(2));
+  const auto journal = open(RunJournal::Begin::anew);
+  const DeviceStiffnessResult result = find(wall_with(2), nullptr, journal.get());
   EXPECT_TRUE(result.found.never_touched);
   EXPECT_EQ(result.touches.size(), 1u);
+  EXPECT_EQ(journal->size(), 0u) << "a run that is resumed tries again";
   EXPECT_EQ(
       std::count_if(told.begin(), told.end(), [](const auto& text) { return text.ends_with("once more"); }),
       3);
@@ -245,6 +248,56 @@ TEST_F(DeviceStiffness, AgreesWithTheModelWithinAStep) {
     EXPECT_GE(found, least - settings.step) << coefficient;
     EXPECT_LE(found, most + settings.step) << coefficient;
   }
+}
+
+TEST_F(DeviceStiffness, AJournalBelongsToTheHandleAndToTheSignalsOfItsTouches) {
+  { open(RunJournal::Begin::anew); }
+  { open(RunJournal::Begin::resume); }
+  for (const char* changed : {"velocity.estimator=difference", "force.slew_limit=1000", "force.ramp_time=0.1",
+                              "device.transmission=0.04", "encoder.counts_per_turn=4096"}) {
+    const std::string name = std::string(changed).substr(0, std::string(changed).find('='));
+    const device::Parameter parameter = device::resolve(name);
+    const std::string before = name + "=" + device::value_text(parameter, device.read(parameter));
+    set({changed});
+    EXPECT_CONTAINS(thrown_message<JournalError>([&] { open(RunJournal::Begin::resume); }), name);
+    set({before});
+  }
+}
+
+TEST(DeviceStiffnessTouchInAJournal, ComesBackWhole) {
+  DeviceStiffnessTouch touch, back;
+  touch.verdict = ContactVerdict::unstable;
+  touch.peak_to_peak = 0.1 + 0.2;
+  touch.limited_share = 0.25;
+  touch.aborted = true;
+  touch.lost_records = 7;
+  RunJournal::Json json;
+  to_json(json, touch);
+  from_json(json, back);
+  EXPECT_EQ(back.verdict, touch.verdict);
+  EXPECT_EQ(back.peak_to_peak, touch.peak_to_peak);
+  EXPECT_EQ(back.limited_share, touch.limited_share);
+  EXPECT_TRUE(back.aborted);
+  EXPECT_EQ(back.lost_records, 7u);
+  json["verdict"] = "perhaps";
+  EXPECT_THROW(from_json(json, back), std::invalid_argument);
+}
+
+TEST(OrderOfThePaper, IsNotJudgedFromSearchesThatEndedBeforeAnUnstableTouch) {
+  const auto found = [](double coefficient, double stiffness, bool beyond_last, bool never_touched) {
+    DeviceStiffnessResult result;
+    result.condition.magnetic_coefficient = coefficient;
+    result.found.stiffness = stiffness;
+    result.found.beyond_last = beyond_last;
+    result.found.never_touched = never_touched;
+    return result;
+  };
+  const auto plain = found(0, 3500, false, false);
+  EXPECT_TRUE(order_is_the_papers({plain, found(2, 3000, false, true)}));
+  EXPECT_TRUE(order_is_the_papers({plain, found(2, 3500, true, false)}));
+  EXPECT_TRUE(order_is_the_papers({found(0, 8000, true, false), found(2, 8000, true, false)}));
+  EXPECT_TRUE(order_is_the_papers({found(0, 8000, false, true), found(2, 7000, false, false)}));
+  EXPECT_FALSE(order_is_the_papers({plain, found(2, 3000, false, false)}));
 }
 
 TEST(OrderOfThePaper, IsContradictedByAFieldThatDoesNotHelp) {

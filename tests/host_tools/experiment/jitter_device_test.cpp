@@ -4,6 +4,7 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
@@ -84,6 +85,47 @@ TEST_F(JitterDevice, GivingUpOnTheWayLeavesNothingBehind) {
   };
   EXPECT_THROW(run(), std::logic_error);
   expect_disarmed_and_restored();
+}
+
+TEST_F(JitterDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
+  const host_tools_test::TemporaryFolder folder;
+  const auto with_journal = [&](RunJournal::Begin begin) {
+    RunJournal journal(folder / "j", journal_settings(device, settings), begin);
+    return run_jitter_on_device(device, settings, &asked, tell, &journal);
+  };
+  tell = [this](const std::string& text) {
+    if (text.starts_with("F_B = 2 N") && device::Drive(device, 0).status().armed())
+      throw std::runtime_error("Ctrl-C");
+  };
+  EXPECT_THROW(with_journal(RunJournal::Begin::anew), std::runtime_error);
+  EXPECT_EQ(asked.requests.size(), 2u);
+  tell = [](const std::string&) {};
+  const JitterDeviceResult resumed = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 3u) << "the first pair was done";
+  ASSERT_EQ(resumed.results.size(), 2u);
+  EXPECT_EQ(resumed.results[0].touches, 1u);
+  const JitterDeviceResult again = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 3u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(again.results[i].amplitude, resumed.results[i].amplitude);
+    EXPECT_EQ(again.results[i].adjustment_time, resumed.results[i].adjustment_time);
+  }
+  EXPECT_EQ(again.limited_share, resumed.limited_share);
+  settings.wall.window = 0.7;
+  EXPECT_CONTAINS(thrown_message<JournalError>([&] { with_journal(RunJournal::Begin::resume); }), "window_s");
+  expect_disarmed_and_restored();
+}
+
+TEST_F(JitterDevice, WhoDoesNotTouchIsAskedThreeTimes) {
+  simulation::Scene scene = simulated_board::factory_scene();
+  scene.axes[0].person.reset();
+  scene.axes[0].motion.reset();
+  scene.axes[0].start.position = 0.02;
+  device = device::Device(std::make_unique<link::SimLink>(scene));
+  settings.patience = 0.5;
+  EXPECT_THROW(run(), NobodyTouched);
+  EXPECT_EQ(asked.requests.size(), 3u);
+  EXPECT_THROW(run_jitter_on_device(device, settings, nullptr, tell), NobodyTouched);
 }
 
 TEST_F(JitterDevice, AStiffnessThatIsNotAllowedIsRefusedBeforeAnybodyIsAsked) {

@@ -62,6 +62,37 @@ TEST(MaxStiffnessStudy, MeanAndDeviationAreThoseOfTheBook) {
   EXPECT_EQ(ConditionResult{}.mean(), 0.0);
 }
 
+TEST(MaxStiffnessStudy, IsCalibratedOnlyWhereTheSetWasFitted) {
+  const auto origins = [](const SubjectSet& set) {
+    StiffnessRun run = quick_run();
+    run.steps.last = 1000.0;
+    std::string letters;
+    for (const ConditionResult& result : run_max_stiffness_study(set, stiffness_conditions(), run).conditions)
+      letters += result.condition.origin == report::Origin::calibrated ? 'c' : 'p';
+    return letters;
+  };
+  SubjectSet set = few_people(1);
+  EXPECT_EQ(origins(set), "pppppppp");
+  set.fitted = Fitted{3580.0, 8410.0, set.device.force_limit};
+  EXPECT_EQ(origins(set), "cpppcppp");
+  set.fitted->magnetic_target = 8000.0;
+  EXPECT_EQ(origins(set), "cppppppp");
+  set.fitted = Fitted{3600.0, 8410.0, set.device.force_limit};
+  EXPECT_EQ(origins(set), "ppppcppp");
+  // Another force limit than that of the fit.
+  set.fitted = Fitted{3580.0, 8410.0, set.device.force_limit + 1.0};
+  EXPECT_EQ(origins(set), "pppppppp");
+}
+
+TEST(MaxStiffnessStudy, CountsThePeopleWhoseNumberIsABound) {
+  std::vector<MaxStiffness> found(4);
+  found[0].stiffness = found[1].stiffness = 40e3;
+  found[1].beyond_last = true;
+  const CountedEnds ends = counted_ends(found);
+  EXPECT_EQ(ends.at_zero, 2U);
+  EXPECT_EQ(ends.beyond_last, 1U);
+}
+
 // The supplied sets are calibrated: this is what the project shows of paper 1. The bounds are those of the
 // study itself.
 TEST(MaxStiffnessStudy, TheSuppliedSetsMeetThePaperWhereTheyWereFitted) {
@@ -76,6 +107,8 @@ TEST(MaxStiffnessStudy, TheSuppliedSetsMeetThePaperWhereTheyWereFitted) {
     for (std::size_t n = 1; n < 5; ++n)
       EXPECT_GT(study.conditions[n].mean(), study.conditions[n - 1].mean()) << name << ' ' << n;
     EXPECT_TRUE(as_calibrated(study)) << name;
+    EXPECT_EQ(study.conditions[0].condition.origin, report::Origin::calibrated);
+    EXPECT_EQ(study.conditions[4].condition.origin, report::Origin::calibrated);
     EXPECT_EQ(study.event_limit_hits, 0U);
   }
 }

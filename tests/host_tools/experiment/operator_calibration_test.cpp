@@ -25,6 +25,10 @@ TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
   EXPECT_NEAR(fit.activation_gain, 0.7, 0.15);
   EXPECT_EQ(fit.set.device.friction, fit.friction);
   EXPECT_EQ(fit.set.subjects[3].person.activation_gain, fit.activation_gain);
+  ASSERT_TRUE(fit.set.fitted);
+  EXPECT_EQ(fit.set.fitted->plain_target, settings.plain_target);
+  EXPECT_EQ(fit.set.fitted->magnetic_target, settings.magnetic_target);
+  EXPECT_EQ(fit.set.fitted->force_limit, fit.set.device.force_limit);
   // What it says of itself is what its set gives.
   const auto again = run_max_stiffness_study(fit.set, {conditions[0], conditions[4]}, quick_run());
   EXPECT_EQ(again.conditions[0].mean(), fit.plain);

@@ -4,6 +4,7 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
@@ -75,6 +76,41 @@ TEST_F(ResolutionDevice, WithoutAPrompterNobodyIsAsked) {
   EXPECT_EQ(result.cells.size(), 1u);
   EXPECT_TRUE(asked.requests.empty());
   expect_disarmed_and_restored();
+}
+
+TEST_F(ResolutionDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
+  const host_tools_test::TemporaryFolder folder;
+  Tell tell = [](const std::string&) {};
+  const auto with_journal = [&](RunJournal::Begin begin) {
+    RunJournal journal(folder / "j", journal_settings(device, settings), begin);
+    return run_resolution_on_device(device, settings, &asked, tell, &journal);
+  };
+  tell = [this](const std::string&) {
+    if (asked.requests.size() == 3) throw std::runtime_error("Ctrl-C");
+  };
+  EXPECT_THROW(with_journal(RunJournal::Begin::anew), std::runtime_error);
+  tell = [](const std::string&) {};
+  const ResolutionDeviceResult resumed = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 4u) << "two of three touches were done";
+  const ResolutionDeviceResult again = with_journal(RunJournal::Begin::resume);
+  EXPECT_EQ(asked.requests.size(), 4u);
+  ASSERT_EQ(again.cells.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(again.cells[i].speed, resumed.cells[i].speed);
+    EXPECT_EQ(again.cells[i].peak_to_peak, resumed.cells[i].peak_to_peak);
+    EXPECT_EQ(again.cells[i].vibrates(), resumed.cells[i].vibrates());
+  }
+  expect_disarmed_and_restored();
+}
+
+// The simulated hand lets go after 3 s: nobody is in the wall when it is judged.
+TEST_F(ResolutionDevice, ATouchThatIsNotHeldIsMadeThreeTimes) {
+  settings.wall.hold = 5.0;
+  settings.resolutions = {0.0};
+  const ResolutionDeviceResult result = run();
+  EXPECT_EQ(asked.requests.size(), 3u);
+  ASSERT_EQ(result.cells.size(), 1u);
+  EXPECT_FALSE(result.cells[0].judged());
 }
 
 TEST(TouchSpeed, IsTowardsTheWallOverTheLastMoment) {

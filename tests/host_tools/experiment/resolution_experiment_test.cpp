@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace kmax::experiment {
@@ -117,6 +118,25 @@ TEST(SimulateResolution, SettingsOutOfRangeAreRefused) {
   settings.pushes.clear();
   EXPECT_THROW(simulate_resolution(settings, {}, subject_1, 0, 0.1), std::invalid_argument);
   EXPECT_THROW(run_resolution({}, {}), std::invalid_argument);
+}
+
+TEST(VaryResolution, EveryVariationDiffersFromTheSettings) {
+  ResolutionSettings settings;
+  settings.resolutions = {0.4e-3};
+  settings.speeds = {0.1};
+  settings.touches = 1;
+  const auto named = [&](const std::string& change) {
+    const auto variations = vary_resolution(settings, subject_1);
+    return std::count_if(variations.begin(), variations.end(),
+                         [&](const ResolutionVariation& one) { return one.change == change; });
+  };
+  EXPECT_EQ(vary_resolution(settings, subject_1).size(), 14u);
+  EXPECT_EQ(named("grip x 0.25"), 0);
+  EXPECT_EQ(named("grip x 0.3"), 1);
+  settings.weak = {0.3, 1e-3};
+  EXPECT_EQ(named("grip x 0.25"), 1);
+  EXPECT_EQ(named("grip x 0.3"), 0);
+  EXPECT_EQ(named("delay 1 ms"), 0);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "host_tools/device/errors.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
+#include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -29,6 +30,27 @@ TEST_F(Restored, AnUnknownNameIsRefusedAndALostLinkIsNot) {
   }
   cable().cut = false;
   EXPECT_NO_THROW(device.read_number("wall.stiffness"));
+}
+
+TEST_F(Restored, WhatCouldNotBePutBackIsTold) {
+  set({"axis1.wall.stiffness=2222", "axis1.wall.law=magnetic", "link.timeout=0.5"});
+  const auto notice = [this](const std::string& text) { told.push_back(text); };
+  { const RestoredAfterwards restored(device, 1, {"wall.stiffness=5"}, notice); }
+  EXPECT_TRUE(told.empty());
+  {
+    const RestoredAfterwards restored(device, 1, {"wall.stiffness=5", "wall.law", "link.timeout"}, notice);
+    cable().cut = true;
+  }
+  ASSERT_EQ(told.size(), 1u);
+  for (const char* part :
+       {"the cable is gone", " axis1.wall.stiffness=2222", " axis1.wall.law=magnetic", " link.timeout=0.5"})
+    EXPECT_CONTAINS(told[0], part);
+}
+
+TEST_F(Restored, ANoticeThatFailsEndsNothing) {
+  const RestoredAfterwards restored(device, 0, {"wall.stiffness"},
+                                    [](const std::string&) { throw std::runtime_error("full"); });
+  cable().cut = true;
 }
 
 }  // namespace

@@ -60,6 +60,28 @@ RC_GTEST_PROP(StiffnessClimbProperty, FindsTheLimitWithinAStepFromAnyStart, ()) 
   RC_ASSERT(limit < climb.result() + 100);
 }
 
+TEST(StiffnessClimb, AStartBelowHalfAStepIsTouched) {
+  StiffnessClimb up(40, 100, 1000);
+  EXPECT_EQ(climb_to(up, 250), (std::vector<double>{40, 140, 240, 340}));
+  EXPECT_EQ(up.result(), 240);
+  StiffnessClimb down(40, 100, 1000);
+  EXPECT_EQ(climb_to(down, 0), (std::vector<double>{40}));
+  StiffnessClimb remainder(230, 100, 1000);
+  EXPECT_EQ(climb_to(remainder, 110), (std::vector<double>{230, 130, 30}));
+  EXPECT_EQ(remainder.result(), 30);
+}
+
+RC_GTEST_PROP(StiffnessClimbProperty, FindsTheLimitWithinAStepFromAStartThatIsNoMultiple, ()) {
+  const double first = *rc::gen::inRange(1, 100000) * 0.1, step = *rc::gen::inRange(1, 20000) * 0.1;
+  const double limit = *rc::gen::inRange(1, 20000) * 1.0;
+  StiffnessClimb climb(first, step, 20e3);
+  const std::vector<double> asked = climb_to(climb, limit);
+  RC_ASSERT(!asked.empty() && asked.front() == first);
+  for (const double stiffness : asked) RC_ASSERT(stiffness > 0.0);
+  RC_ASSERT(climb.result() <= limit);
+  if (!climb.beyond_last()) RC_ASSERT(limit < climb.result() + step * (1.0 + 1e-9));
+}
+
 TEST(StiffnessClimb, RefusesAbsurdSteps) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(StiffnessClimb(0, 100, 1000), std::invalid_argument);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/host_tools/experiment/quick_study.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -49,6 +50,51 @@ TEST(StudyVariation, RunsWithWhatItSays) {
   ASSERT_EQ(results.size(), 2U);
   ASSERT_EQ(results[0].means.size(), stiffness_conditions().size());
   EXPECT_GT(results[1].means[0], results[0].means[0]);
+}
+
+TEST(StudyVariation, AFitThatMissedCountsForNothing) {
+  VariationResult rises, missed;
+  rises.means = missed.means = {1, 2, 3, 4, 9000, 8000, 2, 2};
+  missed.magnetic_met = false;
+  for (const VariationFinding& finding : findings_of({rises, missed})) {
+    EXPECT_EQ(finding.of, 1U);
+    EXPECT_EQ(finding.holds, 1U) << finding.claim;
+    EXPECT_EQ(finding.missed, 1U);
+  }
+  EXPECT_NE(findings_of({rises})[3].claim.find("8.02 N/mm"), std::string::npos);
+}
+
+TEST(StudyVariation, SaysWhetherItsFitMetItsTargetsAlsoFromTheJournal) {
+  const host_tools_test::TemporaryFolder folder;
+  CalibrationSettings out_of_reach = paper_targets();
+  out_of_reach.magnetic_target = 39e3;
+  out_of_reach.gain_most = 0.01;
+  out_of_reach.most_steps = 2;
+  const StudyVariation refit{"fitted", "none", true, few_people(1), quick_run().protocol};
+  StiffnessRun run = quick_run(1);
+  run.steps = {.first = 1000.0, .step = 1000.0, .last = 5000.0};
+  RunJournal journal(folder / "run.journal", {{"what", "test"}}, RunJournal::Begin::anew);
+  run.journal = &journal;
+  const auto fresh = run_variations({refit}, out_of_reach, run);
+  EXPECT_FALSE(fresh[0].magnetic_met);
+  const auto known = run_variations({refit}, out_of_reach, run);
+  EXPECT_EQ(journal.size(), 1U);
+  EXPECT_EQ(known[0].plain_met, fresh[0].plain_met);
+  EXPECT_FALSE(known[0].magnetic_met);
+  EXPECT_EQ(known[0].means, fresh[0].means);
+  ASSERT_EQ(fresh[0].ends.size(), stiffness_conditions().size());
+  ASSERT_EQ(known[0].ends.size(), fresh[0].ends.size());
+  for (std::size_t n = 0; n < fresh[0].ends.size(); ++n) {
+    EXPECT_EQ(known[0].ends[n].at_zero, fresh[0].ends[n].at_zero);
+    EXPECT_EQ(known[0].ends[n].beyond_last, fresh[0].ends[n].beyond_last);
+    EXPECT_EQ(fresh[0].ends[n].at_zero, fresh[0].means[n] == 0.0 ? 1U : 0U);
+  }
+}
+
+TEST(StudyVariation, OtherPeopleAreNotTheFittedOnes) {
+  SubjectSet set = few_people(2);
+  set.fitted = Fitted{3580.0, 8410.0, 3.3};
+  for (const StudyVariation& draw : draw_variations(set, {}, 3)) EXPECT_FALSE(draw.set.fitted);
 }
 
 }  // namespace

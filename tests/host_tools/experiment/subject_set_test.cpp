@@ -135,5 +135,38 @@ TEST(SubjectSet, RefusesWhatIsWrongWithItsPlace) {
   EXPECT_THROW(draw_subjects(10'001, 1), std::invalid_argument);
 }
 
+TEST(SubjectSet, KeepsWhatItWasFittedTo) {
+  SubjectSet set;
+  set.subjects = draw_subjects(1, 1);
+  EXPECT_FALSE(parse_subject_set(subject_set_text(set), "text").fitted);
+  set.fitted = Fitted{3580.25, 0.1 + 8410.0, 0.0};
+  const SubjectSet back = parse_subject_set(subject_set_text(set), "text");
+  ASSERT_TRUE(back.fitted);
+  EXPECT_EQ(back.fitted->plain_target, set.fitted->plain_target);
+  EXPECT_EQ(back.fitted->magnetic_target, set.fitted->magnetic_target);
+  EXPECT_EQ(back.fitted->force_limit, 0.0);
+  for (const char* name : {"clipped", "unclipped"}) {
+    const SubjectSet supplied = open_subject_set(name);
+    ASSERT_TRUE(supplied.fitted) << name;
+    EXPECT_EQ(supplied.fitted->plain_target, 3580.0);
+    EXPECT_EQ(supplied.fitted->magnetic_target, 8410.0);
+    EXPECT_EQ(supplied.fitted->force_limit, supplied.device.force_limit);
+  }
+}
+
+TEST(SubjectSet, RefusesAFitThatIsNotAllThere) {
+  const auto message = [](const std::string& fitted) {
+    return host_tools_test::thrown_message<SceneError>(
+        [&] { parse_subject_set("name = \"x\"\n[fitted]\n" + fitted + "[[subject]]\n", "people.toml"); });
+  };
+  EXPECT_EQ(message("plain = 3580\nmagnetic = 8410\n"),
+            "people.toml:2:1: fitted.force_limit is missing: [fitted] has plain, magnetic and force_limit");
+  EXPECT_TRUE(message("magnetic = 8410\nforce_limit = 0\n").starts_with("people.toml:2:"));
+  EXPECT_TRUE(message("plain = 0\nmagnetic = 8410\nforce_limit = 0\n").starts_with("people.toml:3:"));
+  EXPECT_TRUE(message("plain = 1\nmagnetic = nan\nforce_limit = 0\n").starts_with("people.toml:4:"));
+  EXPECT_TRUE(message("plain = 1\nmagnetic = 2\nforce_limit = -1\n").starts_with("people.toml:5:"));
+  EXPECT_TRUE(message("plain = 1\nplan = 2\n").starts_with("people.toml:4:"));
+}
+
 }  // namespace
 }  // namespace kmax::experiment

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tests/host_tools/experiment/touched_board.hpp"
@@ -157,6 +158,40 @@ TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
   };
   EXPECT_THROW(touch(), std::logic_error);
   expect_disarmed();
+}
+
+// No comparison with a NaN is ever true: the axis would stay armed for ever.
+TEST_F(Watched, WhatWouldNeverEndTheTouchIsRefusedBeforeArming) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  tell = [&](const std::string&) { FAIL() << "begun"; };
+  for (const double bad : {nan, infinity, -1.0}) {
+    for (double TouchWatch::*member : {&TouchWatch::hold_time, &TouchWatch::contact_patience,
+                                       &TouchWatch::abort_amplitude, &TouchWatch::abort_window}) {
+      TouchWatch one = watch;
+      one.*member = bad;
+      EXPECT_NE(thrown_message<std::invalid_argument>([&] { watch_touch(device, one, tell); }), "") << bad;
+    }
+  }
+  expect_disarmed();
+}
+
+/// Held for 2 s at 500 Hz, deep in the wall.
+WatchedTouch held() {
+  WatchedTouch touch;
+  for (int i = 0; i < 1100; ++i) touch.samples.push_back({0.002 * i, -1e-3, 0, 0});
+  return touch;
+}
+
+TEST(MeasureTouch, WithoutEnoughOfTheRecordIsToBeMadeAgainAndNoError) {
+  EXPECT_EQ(measure_touch(held(), 2.0, 0.165e-3).verdict, ContactVerdict::stable);
+  WatchedTouch gap = held();
+  gap.lost_records = 126;
+  std::erase_if(gap.samples, [](const TraceSample& s) { return s.time > 1.499 && s.time < 1.7495; });
+  const auto measure = measure_touch(gap, 2.0, 0.165e-3);
+  EXPECT_EQ(measure.verdict, ContactVerdict::no_contact);
+  EXPECT_EQ(measure.samples, 0u);
+  EXPECT_EQ(measure_touch(WatchedTouch{}, 2.0, 0.165e-3).verdict, ContactVerdict::no_contact);
 }
 
 class WatchedByNobody : public TouchedBoard {

@@ -1,3 +1,6 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include "host_tools/link/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
@@ -70,6 +73,18 @@ TEST_F(Calibrate, TheTableSaysWhatWasBefore) {
   EXPECT_CONTAINS(output, "dry run");
   ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--no-save"}), done) << said;
   EXPECT_CONTAINS(output, "kmax save");
+}
+
+TEST_F(Calibrate, AHandThatNobodyLendsEndsItWithEverythingAsBefore) {
+  const int before = dup(STDIN_FILENO), nobody = open("/dev/null", O_RDONLY);
+  ASSERT_EQ(dup2(nobody, STDIN_FILENO), STDIN_FILENO);
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--hand"}), failed) << output;
+  dup2(before, STDIN_FILENO);
+  close(before);
+  close(nobody);
+  EXPECT_CONTAINS(said, "then press Enter");
+  EXPECT_CONTAINS(said, "nobody answered: --hand needs somebody at the terminal; the axis has been disarmed");
+  EXPECT_CONTAINS(said, "all parameters are as before");
 }
 
 TEST_F(Calibrate, WithoutAMotorThereIsNothingToDo) {

@@ -1,3 +1,6 @@
+#include <filesystem>
+
+#include "host_tools/kmax/experiment_commands.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
 namespace kmax::cli {
@@ -13,6 +16,39 @@ TEST_F(Experiment, HelpNamesEveryExperimentOfThePapers) {
   EXPECT_EQ(kmax({"experiment", "--help"}), done);
   for (const char* name : {"max-stiffness", "contact", "jitter", "deviation", "resolution"})
     EXPECT_CONTAINS(output, name);
+}
+
+// An option of the other kind of device would be believed to be at work.
+TEST_F(Experiment, OptionsOfTheOtherKindOfDeviceAreRefused) {
+  for (const char* name : {"jitter", "deviation", "resolution"}) {
+    for (const std::vector<std::string>& of_device :
+         std::vector<std::vector<std::string>>{{"--no-prompt"},
+                                               {"--patience", "5"},
+                                               {"--force-limit", "2"},
+                                               {"--resume", "--out", in("out")}}) {
+      std::vector<std::string> arguments = {"experiment", name};
+      arguments.insert(arguments.end(), of_device.begin(), of_device.end());
+      expect_error(arguments, wrong_usage, of_device[0] + " is for a device; name one with --device");
+    }
+    expect_error({"experiment", name, "--device", "serial:/dev/none", "--subjects", "clipped"}, wrong_usage,
+                 "--subjects is for simulated people; leave --device out");
+    expect_error({"experiment", name, "--device", "serial:/dev/none", "--clip", "0"}, wrong_usage,
+                 "--clip is for simulated people");
+  }
+}
+
+TEST_F(Experiment, AJournalIsKeptWhereThereIsAFolderAndResumedFromThereOnly) {
+  std::ostringstream out, messages;
+  Context context(out, messages, {});
+  const Json settings = {{"experiment", "x"}};
+  EXPECT_EQ(open_touch_journal(context, "", "x", settings, false), nullptr);
+  EXPECT_THROW(open_touch_journal(context, "", "x", settings, true), UsageError);
+  std::filesystem::create_directory(folder / "out");
+  open_touch_journal(context, in("out"), "x", settings, false)->add("a", 1);
+  EXPECT_EQ(messages.str(), "");
+  EXPECT_EQ(open_touch_journal(context, in("out"), "x", settings, true)->resumed(), 1u);
+  EXPECT_CONTAINS(messages.str(), "1 touches are done already");
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/x.journal"));
 }
 
 }  // namespace

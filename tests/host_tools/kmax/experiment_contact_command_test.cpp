@@ -1,3 +1,7 @@
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "host_tools/link/sim_link.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
 namespace kmax::cli {
@@ -37,6 +41,10 @@ TEST_F(ContactCommand, BadOptionsAreWrongUsage) {
                                                                                    {"--rate", "0"},
                                                                                    {"--hold", "0.5"},
                                                                                    {"--threshold", "0"},
+                                                                                   {"--hold", "nan"},
+                                                                                   {"--hold", "inf"},
+                                                                                   {"--threshold", "nan"},
+                                                                                   {"--patience", "nan"},
                                                                                    {"--trials", "0"},
                                                                                    {"--trials", "1.5"},
                                                                                    {"--format", "gif"},
@@ -56,6 +64,49 @@ TEST_F(ContactCommand, AFolderThatCannotBeMadeIsAFailure) {
   EXPECT_EQ(kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("file/x"), "--json"}),
             failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "file/x");
+}
+
+/// A board that is reached under the address of a real one, by somebody whose standard input has ended.
+class ContactOnADevice : public ContactCommand {
+ protected:
+  ContactOnADevice() : input_(dup(STDIN_FILENO)) {
+    const int nothing = open("/dev/null", O_RDONLY);
+    dup2(nothing, STDIN_FILENO);
+    close(nothing);
+  }
+  ~ContactOnADevice() override {
+    dup2(input_, STDIN_FILENO);
+    close(input_);
+  }
+  int on_device(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"experiment", "contact", "--device", "serial:/dev/none",
+                                          "--trials",   "1",       "--hold",   "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    std::ostringstream out, messages;
+    Context context(out, messages,
+                    [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+
+ private:
+  int input_;
+};
+
+TEST_F(ContactOnADevice, SomebodyIsAskedBeforeThereIsForce) {
+  EXPECT_EQ(on_device({}), failed);
+  EXPECT_CONTAINS(said, "F_MC = 0 N: take the handle out of the wall");
+  EXPECT_CONTAINS(said, "--no-prompt");
+  EXPECT_EQ(said.find("holding"), std::string::npos);
+}
+
+TEST_F(ContactOnADevice, WithoutAPromptNobodyIsAsked) {
+  const int code = on_device({"--no-prompt", "--json"});
+  EXPECT_TRUE(code == done || code == verdict_is_no) << said;
+  EXPECT_EQ(said.find("take the handle out of the wall and be ready"), std::string::npos) << said;
+  EXPECT_EQ(document()["conditions"].size(), 6u);
 }
 
 TEST_F(ContactCommand, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {

@@ -38,9 +38,12 @@ TEST_F(MaxStiffness, OnADeviceIsTheContractsDocumentAndHasFiles) {
   const Json& plain = conditions[0];
   std::vector<std::string> names;
   for (const auto& item : plain.items()) names.push_back(item.key());
-  EXPECT_EQ(names, (std::vector<std::string>{"name", "magnetic_coefficient_n", "adaptive",
-                                             "max_stiffness_n_per_m", "subjects", "paper_n_per_m"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"name", "magnetic_coefficient_n", "adaptive", "max_stiffness_n_per_m",
+                                      "subjects", "paper_n_per_m", "beyond_last", "never_touched"}));
   EXPECT_EQ(plain["magnetic_coefficient_n"], 0);
+  EXPECT_EQ(plain["beyond_last"], false);
+  EXPECT_EQ(plain["never_touched"], false);
   EXPECT_EQ(plain["adaptive"], false);
   EXPECT_EQ(plain["paper_n_per_m"], 3580);
   EXPECT_EQ(plain["subjects"], Json::array({plain["max_stiffness_n_per_m"]}));
@@ -65,12 +68,20 @@ TEST_F(MaxStiffness, ARunIsResumedFromItsJournalAndWithItsSettingsOnly) {
 }
 
 TEST_F(MaxStiffness, AWallThatAllowsNoMoreThanThePlainOneIsAnswerNo) {
-  // Both are stable up to the end of the search.
-  EXPECT_EQ(on_device({"--conditions", "0,2", "--start", "1000", "--start-adaptive", "1000", "--step", "1000",
-                       "--last", "2000", "--hold", "1"}),
+  // Less than the handle bounces by: no touch of either is stable.
+  EXPECT_EQ(on_device({"--conditions", "0,2", "--start", "1000", "--step", "1000", "--last", "2000", "--hold",
+                       "1", "--abort-amplitude", "1e-5"}),
             verdict_is_no)
-      << said;
+      << said << output;
   EXPECT_CONTAINS(output, "F_MC = 2 N");
+  EXPECT_CONTAINS(output, "none stable");
+}
+
+// Nothing says by how much either is larger.
+TEST_F(MaxStiffness, WallsThatAreStableUpToTheEndAreNotCompared) {
+  const std::vector<std::string> arguments = {"--conditions", "0,2",    "--start", "1000",   "--step",
+                                              "1000",         "--last", "2000",    "--hold", "1"};
+  EXPECT_EQ(on_device(arguments), done) << said;
   EXPECT_CONTAINS(output, ">= 2.00");
 }
 

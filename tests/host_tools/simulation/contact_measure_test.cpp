@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 namespace kmax::simulation {
@@ -125,6 +126,25 @@ RC_GTEST_PROP(ContactMeasure, VerdictIsTheSameMirroredAndShifted, ()) {
   RC_ASSERT(std::abs(plain.peak_to_peak - mirror.peak_to_peak) < 1e-14);
   if (std::abs(centre - amplitude) > 1e-9 && std::abs(2.0 * amplitude - 0.165e-3) > 3e-6) {
     RC_ASSERT(plain.verdict == mirror.verdict);
+  }
+}
+
+// A real device's position: counts times a transmission that the device holds as a float.
+TEST(ContactMeasure, ThreeCountsAreStableWhateverTheRounding) {
+  const double turn = 2.0 * std::numbers::pi / 4000.0;  // rad per count
+  const double count_length = static_cast<double>(static_cast<float>(0.055e-3 / turn)) * turn;
+  for (const int lowest : {-7, -1000, 12345, -363637}) {
+    const auto swing = [&](int counts) {
+      return record([&, counts](double t) {
+        const int number = static_cast<int>(std::round(t / 0.002)) % 2 == 0 ? lowest : lowest + counts;
+        return count_length * number;
+      });
+    };
+    ContactCriterion criterion = window();
+    criterion.wall_position = count_length * (lowest + 10);
+    ASSERT_GT(3 * count_length, criterion.threshold);
+    EXPECT_EQ(measure_contact(swing(3), criterion).verdict, ContactVerdict::stable) << lowest;
+    EXPECT_EQ(measure_contact(swing(4), criterion).verdict, ContactVerdict::unstable) << lowest;
   }
 }
 

@@ -233,5 +233,18 @@ TEST(Scene, TouchIsTheDefaultsOfTheModels) {
   EXPECT_EQ(axis.encoder.count_length(), EncoderConfig{}.count_length());
 }
 
+TEST(Scene, AxisZeroByItsNameIsTheSameParameter) {
+  const std::string start = "[device]\n[parameters]\n";
+  const std::string both = refusal(start + "axis0.wall.position = 0.01\nwall.position = 0.02\n");
+  EXPECT_TRUE(both.starts_with("bad.toml:4:")) << both;
+  EXPECT_NE(both.find("given twice (also at bad.toml:3:"), std::string::npos) << both;
+  EXPECT_NE(both.find("as axis0.wall.position"), std::string::npos) << both;
+  EXPECT_NE(refusal(start + "wall.position = 0.02\naxis0.wall.position = 0.02\n").find("given twice"),
+            std::string::npos);
+  // The second axis has a wall of its own.
+  EXPECT_EQ(refusal(start + "axis1.wall.position = 0.01\nwall.position = 0.02\n"), "accepted");
+  EXPECT_EQ(refusal(start + "axis1.wall.position = 0.01\naxis0.wall.position = 0.02\n"), "accepted");
+}
+
 }  // namespace
 }  // namespace kmax::simulation

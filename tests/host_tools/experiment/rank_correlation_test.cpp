@@ -1,4 +1,4 @@
-#include "host_tools/experiment/jitter_rank_correlation.hpp"
+#include "host_tools/experiment/rank_correlation.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

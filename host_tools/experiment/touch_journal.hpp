@@ -1,0 +1,75 @@
+#pragma once
+// What every experiment does with the touches that a person makes on a device: one that did not count is made
+// again, and each that is over is in a journal at once, so that nothing is lost when the run ends early.
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "host_tools/calibration/prompter.hpp"
+#include "host_tools/device/device.hpp"
+#include "host_tools/experiment/run_journal.hpp"
+#include "host_tools/experiment/watched_touch.hpp"
+
+namespace kmax::experiment {
+
+inline constexpr int touch_attempts = 3;
+
+/// What the touches depend on besides an experiment's own settings, for a journal: the device's identity, and
+/// the parameters of this axis that no experiment sets.
+RunJournal::Json device_circumstances(device::Device& device, std::size_t axis);
+
+struct TouchSession {
+  calibration::Prompter* prompter = nullptr;  ///< null: nobody is asked
+  RunJournal* journal = nullptr;              ///< null: none is kept
+  const Tell& tell;
+};
+
+/// The touch that `once` makes. One that does not count (Touch::counts()), or that nobody made although
+/// somebody was asked, is made again, up to three times in all; the last one that does not count is returned.
+/// Errors: those of `once`; NobodyTouched without a prompter or after the third time.
+template <typename Touch>
+Touch repeated_touch(const TouchSession& session, const std::string& name,
+                     const std::function<Touch()>& once) {
+  for (int attempt = 1;; ++attempt) {
+    try {
+      Touch touch = once();
+      if (touch.counts()) return touch;
+      session.tell(fmt::format("{}: the handle was not in the wall when it was judged; once more", name));
+      if (attempt == touch_attempts) return touch;
+    } catch (const NobodyTouched&) {
+      if (session.prompter == nullptr || attempt == touch_attempts) throw;
+    }
+  }
+}
+
+/// The touch that the journal has under `key`; else repeated_touch(), put into the journal if it counts: a
+/// run that is resumed tries again what did not.
+///
+/// Touch has to_json(RunJournal::Json&, const Touch&) and from_json(const RunJournal::Json&, Touch&). Errors:
+/// those of repeated_touch(); JournalError.
+template <typename Touch>
+Touch journaled_touch(const TouchSession& session, const std::string& key, const std::string& name,
+                      const std::function<Touch()>& once) {
+  if (const RunJournal::Json* known = session.journal != nullptr ? session.journal->find(key) : nullptr) {
+    try {
+      Touch touch;
+      from_json(*known, touch);
+      return touch;
+    } catch (const std::exception&) {
+      throw JournalError(fmt::format("{}: '{}' is not what this experiment writes; begin without --resume",
+                                     session.journal->file().string(), key));
+    }
+  }
+  Touch touch = repeated_touch(session, name, once);
+  if (session.journal != nullptr && touch.counts()) {
+    RunJournal::Json json;
+    to_json(json, touch);
+    session.journal->add(key, json);
+  }
+  return touch;
+}
+
+}  // namespace kmax::experiment

@@ -1,0 +1,83 @@
+#include "host_tools/kmax/experiment_options.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <map>
+
+#include "host_tools/experiment/subject_set.hpp"
+#include "host_tools/kmax/finite_number.hpp"
+
+namespace kmax::cli {
+
+void add_file_options(CLI::App& command, ExperimentFiles& files, const std::string& contents) {
+  command.add_option("--out", files.folder, contents)->type_name("DIR");
+  command.add_option("--format", files.ending, "Kind of picture")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
+      ->type_name("svg|png");
+}
+
+void make_folder(const ExperimentFiles& files) {
+  if (!files.folder.empty()) std::filesystem::create_directories(files.folder);
+}
+
+Json names_json(const std::vector<std::filesystem::path>& written) {
+  Json names = Json::array();
+  for (const auto& file : written) names.push_back(file.string());
+  return names;
+}
+
+void print_names(std::ostream& out, const std::vector<std::filesystem::path>& written) {
+  for (const auto& file : written) fmt::print(out, "{}\n", file.string());
+}
+
+void add_subjects_option(CLI::App& command, std::string& people) {
+  command.add_option("--subjects", people, "People: a file, 'clipped' or 'unclipped'; else subject 1")
+      ->type_name("SET");
+}
+
+std::vector<simulation::OperatorModel> people_of(const std::string& set, simulation::DeviceModel& device) {
+  if (set.empty()) return std::vector<simulation::OperatorModel>(1);
+  const experiment::SubjectSet opened = experiment::open_subject_set(set);
+  device = opened.device;
+  std::vector<simulation::OperatorModel> people;
+  for (const experiment::Subject& subject : opened.subjects) people.push_back(subject.person);
+  return people;
+}
+
+void add_activation_gain_option(CLI::App& command, double& activation_gain) {
+  command
+      .add_option("--activation-gain", activation_gain,
+                  "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
+      ->check(finite_number() & CLI::Range(0.0, 100.0));
+}
+
+void set_activation_gain(std::vector<simulation::OperatorModel>& people, double activation_gain) {
+  if (activation_gain < 0.0) return;
+  for (simulation::OperatorModel& person : people) person.activation_gain = activation_gain;
+}
+
+void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude) {
+  command
+      .add_option("--force-limit", force_limit,
+                  "Largest force on a device, N: lowers force.limit, never raises it")
+      ->check(finite_number() & CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--abort-amplitude", abort_amplitude,
+          "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then")
+      ->check(finite_number() & CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
+}
+
+void add_touch_options(CLI::App& command, bool& no_prompt, double& patience) {
+  command.add_flag("--no-prompt", no_prompt, "Ask nobody: a simulated person needs no asking");
+  command.add_option("--patience", patience, "Time to come to the wall, s")
+      ->check(finite_number() & CLI::Range(1.0, 600.0))
+      ->capture_default_str();
+}
+
+}  // namespace kmax::cli
