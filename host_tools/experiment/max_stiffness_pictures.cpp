@@ -42,8 +42,7 @@ plot::Figure max_stiffness_figure(const std::vector<MaxStiffnessStudy>& studies)
       constant.y.push_back(result.mean() / 1e3);
     }
     panel.series.push_back(constant);
-    plot::Series modes{
-        "adaptive, over F_{MC} at rest and at contact, " + clip_words(study.set.device), {}, {}};
+    plot::Series modes{std::string("adaptive, ") + clipped, {}, {}};
     double least = 1e300, most = 0.0;
     for (const ConditionResult& result : study.conditions) {
       if (!result.condition.adaptive) continue;

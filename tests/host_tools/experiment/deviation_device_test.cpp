@@ -106,14 +106,15 @@ TEST_F(DeviationDevice, AWallThatIsUnstableEndsATouch) {
   EXPECT_EQ(result.results[0].touches, 0u);
 }
 
-TEST_F(DeviationDevice, WhoLeavesTheWallIsAskedAgainAndNotAveraged) {
+// Asked again, or, when the handle bounces on the way out, taken for an oscillation and ended: never
+// averaged.
+TEST_F(DeviationDevice, WhoLeavesTheWallIsNotAveraged) {
   settings.protocol.rest = 2.0;  // the simulated hand lets go after 3.6 s
   const DeviationDeviceResult result = run();
   expect_disarmed_and_restored();
-  EXPECT_EQ(asked.requests.size(), 3u);
   EXPECT_EQ(result.results[0].touches, 0u);
-  EXPECT_EQ(result.results[0].aborted, 0u);
-  EXPECT_EQ(result.results[0].without_contact, 1u);
+  EXPECT_EQ(result.results[0].aborted + result.results[0].without_contact, 1u);
+  EXPECT_EQ(asked.requests.size(), result.results[0].aborted == 1u ? 1u : 3u);
 }
 
 TEST_F(DeviationDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {

@@ -56,7 +56,15 @@ TEST_F(DeviationCommand, ADeviceIsMeasured) {
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["pairs"].size(), 16u);
-  for (const Json& pair : all["pairs"]) EXPECT_EQ(pair["deviation_m"], 0);
+  // This simulated person does not answer to the interference's F_B and loses the wall to it: such touches
+  // are not averaged. Where one was held, nothing gave way.
+  std::size_t held = 0;
+  for (const Json& pair : all["pairs"]) {
+    if (pair["deviation_m"].is_null()) continue;
+    EXPECT_EQ(pair["deviation_m"], 0);
+    ++held;
+  }
+  EXPECT_GT(held, 0U);
   EXPECT_EQ(all["verdict"]["claim_met"], false);
   EXPECT_FALSE(all.contains("without_stiffening")) << "only people that are simulated have a twin";
 }
