@@ -46,7 +46,7 @@ class AdaptiveCoefficient {
   struct Coefficients {
     Scalar gain{}, offset{}, inverse_velocity_max{}, force_min{}, force_max{};
     Scalar rest{};       ///< N, the bounded value at zero velocity
-    Scalar most{};       ///< N, the bounded value at V_max and beyond
+    Scalar most{};       ///< N, the bounded value at V_max and beyond; no mode ever gives more
     Scalar retention{};  ///< share of the excess over `rest` that is left after one sample
     AdaptiveRelation relation{};
     AdaptiveVelocity velocity{};
@@ -132,10 +132,11 @@ class AdaptiveCoefficient {
     return present;
   }
 
-  // The excess is never below 0 and the rest never below force_min: one bound is left to be kept.
+  // The excess is never below 0 and the rest never below force_min: one bound is left to be kept. Rounding
+  // can put rest + (most - rest) an ulp above `most`, below force_max (in float: rest 0.756, most 1.823).
   Scalar held(const Coefficients& c) const {
     const Scalar force = c.rest + excess_;
-    return force > c.force_max ? c.force_max : force;
+    return force > c.most ? c.most : force;
   }
 
   static constexpr Scalar bounded(const Coefficients& c, Scalar force) {

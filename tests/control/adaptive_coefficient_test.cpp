@@ -135,6 +135,25 @@ TEST(AdaptiveCoefficient, PeakHoldNeverStallsShortOfItsRestInFloat) {
   EXPECT_EQ(force, 0.8f);
 }
 
+// The stability guard judges a wall by `most`: an ulp above it is above what was judged.
+TEST(AdaptiveCoefficient, NoModeGivesMoreThanAtTheTopSpeedNotByRoundingEither) {
+  AdaptiveCoefficientConfig<float> config{
+      .gain = 1.46f, .offset = 0.363f, .force_min = 0.756f, .force_max = 5.19242f};
+  for (const AdaptiveMode mode : {AdaptiveMode::instant, AdaptiveMode::latched, AdaptiveMode::peak_hold}) {
+    config.mode = mode;
+    int reached = 0;
+    for (int i = 0; i < 1000; ++i) {
+      config.gain = 1.0f + static_cast<float>(i) * 1.3e-3f;
+      AdaptiveCoefficient<float> coefficient;
+      const auto c = AdaptiveCoefficient<float>::prepare(config, 0.001f);
+      const float force = coefficient.update(c, -2.0f * config.velocity_max, true);
+      ASSERT_LE(force, c.most) << config.gain;
+      if (force == c.most) ++reached;
+    }
+    EXPECT_GT(reached, 500);
+  }
+}
+
 TEST(AdaptiveCoefficient, ZeroHoldTimeIsInstant) {
   Config config;
   config.mode = AdaptiveMode::peak_hold;
