@@ -29,9 +29,9 @@ namespace kmax::experiment {
 // above, no soft start, no trip, the force clipped at `force_limit` N (0: not clipped).
 control::HapticLoopConfig<float> touched_wall(double rate, double count_length, double force_limit);
 
-// Bits of the activation that a table of many touches keeps: at most 0.1 % of g, which shifts the largest stable
-// stiffness by less than 0.01 N/mm (propagator_table.hpp gives the slope). A table of 12 bits is larger than the
-// processor's cache, and takes twice as long.
+// Bits of the activation that a table of many touches keeps: at most 0.1 % of g, which shifts the largest
+// stable stiffness by less than 0.01 N/mm (propagator_table.hpp gives the slope). A table of 12 bits is
+// larger than the processor's cache, and takes twice as long.
 inline constexpr int study_gain_bits = 9;
 
 struct TouchSetup {

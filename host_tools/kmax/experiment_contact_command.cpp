@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "host_tools/experiment/contact_report.hpp"
+#include "host_tools/experiment/contact/contact_report.hpp"
 #include "host_tools/experiment/touch_journal.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"

@@ -3,8 +3,8 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include "host_tools/experiment/deviation_device.hpp"
-#include "host_tools/experiment/deviation_report.hpp"
+#include "host_tools/experiment/deviation/deviation_device.hpp"
+#include "host_tools/experiment/deviation/deviation_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"

@@ -3,7 +3,7 @@
 #include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
-#include "host_tools/experiment/jitter_report.hpp"
+#include "host_tools/experiment/jitter/jitter_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "host_tools/experiment/stiffness_studies.hpp"
+#include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"

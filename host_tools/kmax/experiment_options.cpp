@@ -6,7 +6,7 @@
 
 #include <map>
 
-#include "host_tools/experiment/subject_set.hpp"
+#include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/kmax/finite_number.hpp"
 
 namespace kmax::cli {

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <filesystem>
 
-#include "host_tools/experiment/device_max_stiffness_report.hpp"
+#include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"

@@ -6,11 +6,11 @@
 #include <chrono>
 #include <filesystem>
 
-#include "host_tools/experiment/max_stiffness_pictures.hpp"
-#include "host_tools/experiment/max_stiffness_sections.hpp"
+#include "host_tools/experiment/max_stiffness/max_stiffness_pictures.hpp"
+#include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
+#include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
-#include "host_tools/experiment/stiffness_studies.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "host_tools/kmax/progress.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/experiment/device_max_stiffness.hpp"
+#include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/interruption.hpp"
 

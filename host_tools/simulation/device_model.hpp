@@ -16,8 +16,8 @@ namespace kmax::simulation {
 // force (paper 1, section 4). Viscous damping and Coulomb friction are not published; 0.05 N s/m and 0.093 N
 // are those of a first study, which fitted them so that twelve hands have a plain K_max of 3.58 N/mm at 500
 // Hz (paper 1, fig. 6). For the twelve hands that the experiments draw, 0.122 N does that
-// (host_tools/experiment/subjects); for 25 draws 0.08 to 0.15 N. Mass, damping and friction cannot be told
-// apart from that one number, so this is calibration, not measurement.
+// (host_tools/experiment/people/subjects); for 25 draws 0.08 to 0.15 N. Mass, damping and friction cannot be
+// told apart from that one number, so this is calibration, not measurement.
 struct DeviceModel {
   double mass = 0.045;       // kg; with a structure that of the motor's side alone
   double damping = 0.05;     // N s/m

@@ -23,7 +23,7 @@ namespace kmax::simulation {
 // 79-272 N/m, 4.6-18.1 N s/m), rounded to what they deserve: nobody was picked. gamma = 0.574 /N was fitted
 // to one number, K_max = 8.41 N/mm at F_MC = 2 N with the force clipped at 3.3 N, over twelve other simulated
 // hands in a first study, and is kept for the supplied scenes. The calibrated sets of the experiments
-// (host_tools/experiment/subjects) have 0.434 /N clipped and 1.13 /N not clipped.
+// (host_tools/experiment/people/subjects) have 0.434 /N clipped and 1.13 /N not clipped.
 //
 // With the default device and motion (0.2 m/s, push 1.0 N), K = 5.5 N/mm at 500 Hz and 0.055 mm, subject 1
 // reproduces figs. 9 to 11 of paper 1: F_MC = 0 oscillates with 1.6 mm, 1 N with 0.9 mm, 2 N is still; within

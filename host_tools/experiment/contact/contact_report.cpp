@@ -1,0 +1,145 @@
+#include "host_tools/experiment/contact/contact_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+
+#include "host_tools/plot/figure.hpp"
+#include "host_tools/report/page_files.hpp"
+
+namespace kmax::experiment {
+
+std::string_view words_of(simulation::ContactVerdict verdict) {
+  switch (verdict) {
+    case simulation::ContactVerdict::stable:
+      return "stable";
+    case simulation::ContactVerdict::unstable:
+      return "unstable";
+    case simulation::ContactVerdict::no_contact:
+      return "no contact";
+  }
+  return "";
+}
+
+std::string contact_table(const std::vector<ContactResult>& results) {
+  std::string table =
+      fmt::format("{:<22}{:>14}  {:<11}{:<13}{:>8}  {:<9}{:<33}{}\n", "condition", "peak to peak", "verdict",
+                  "unstable in", "limited", "figure", "paper 1 says", "agrees");
+  for (const ContactResult& result : results) {
+    table += fmt::format("{:<22}{:>11.3f} mm  {:<11}{:<13}{:>6.1f} %  {:<9}{:<33}{}\n", result.condition.name,
+                         result.measure.peak_to_peak * 1e3, words_of(result.measure.verdict),
+                         fmt::format("{} of {}", result.unstable_trials, result.trials),
+                         result.limited_share * 100, "Fig. " + result.condition.figure,
+                         result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no");
+  }
+  return table;
+}
+
+namespace {
+std::string base_name(const ContactCondition& condition) {
+  std::string name = "contact_" + condition.name;
+  std::string clean;
+  for (const char c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      clean += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    } else if (!clean.empty() && clean.back() != '_') {
+      clean += '_';
+    }
+  }
+  return clean;
+}
+}  // namespace
+
+std::vector<std::filesystem::path> write_contact(const ContactResult& result,
+                                                 const std::filesystem::path& folder,
+                                                 const std::string& picture_ending) {
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path csv = folder / (base_name(result.condition) + ".csv");
+  std::ofstream file(csv);
+  file << "time_s,position_m,force_n,magnetic_coefficient_n\n";
+  plot::Series distance{"", {}, {}, true}, force{"", {}, {}, true}, coefficient{"", {}, {}, true};
+  for (const device::TraceSample& sample : result.samples) {
+    file << fmt::format("{},{},{},{}\n", sample.time, sample.position, sample.force,
+                        sample.magnetic_coefficient);
+    for (plot::Series* series : {&distance, &force, &coefficient}) series->x.push_back(sample.time);
+    distance.y.push_back(result.outside_distance(sample) * 1e3);
+    force.y.push_back(sample.force);
+    coefficient.y.push_back(sample.magnetic_coefficient);
+  }
+  file.close();
+  if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", csv.string()));
+
+  plot::Figure figure;
+  figure.title = fmt::format("{}: {}, {:.2f} mm peak to peak", result.condition.name,
+                             words_of(result.measure.verdict), result.measure.peak_to_peak * 1e3);
+  figure.x_label = "time since the first touch (s)";
+  const std::vector<plot::Mark> judged = {{result.judged_from, true, "judged"}, {result.judged_to, true, ""}};
+  const std::vector<plot::Mark> unnamed = {{result.judged_from, true, ""}, {result.judged_to, true, ""}};
+  figure.panels = {{"position from the surface (mm)", {distance}, judged},
+                   {"force (N)", {force}, unnamed},
+                   {"F_{MC} (N)", {coefficient}, unnamed}};
+  // The approach from centimetres away would hide what happens at the surface.
+  const double deepest = *std::min_element(distance.y.begin(), distance.y.end());
+  figure.panels[0].y_limits = {deepest - 0.3, std::max(2.0, -2 * deepest)};
+  figure.panels[2].y_limits = {
+      -0.1, std::max(2.2, 1.1 * *std::max_element(coefficient.y.begin(), coefficient.y.end()))};
+  const std::filesystem::path picture = folder / (base_name(result.condition) + picture_ending);
+  plot::write_figure(figure, picture);
+  return {picture, csv};
+}
+
+std::vector<std::string> contact_words(const ContactSettings& settings, std::size_t trials,
+                                       const std::string& velocity_estimator) {
+  return {
+      fmt::format("Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.",
+                  settings.stiffness / 1000, settings.haptic_rate, settings.hold_time),
+      fmt::format("Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials "
+                  "counts.",
+                  settings.threshold * 1000, trials),
+      fmt::format("Velocity estimator: {}.", velocity_estimator)};
+}
+
+std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,
+                                                      const ContactSettings& settings, std::size_t trials,
+                                                      const std::vector<std::filesystem::path>& pictures,
+                                                      const std::filesystem::path& folder,
+                                                      report::Origin origin) {
+  const std::string ours(report::words_of(origin)), theirs(report::words_of(report::Origin::paper));
+  report::Table table;
+  table.columns = {"wall",
+                   "peak to peak (mm), " + ours,
+                   "verdict, " + ours,
+                   "unstable touches",
+                   "force limited",
+                   "figure",
+                   "verdict, " + theirs + " 1",
+                   "agrees"};
+  report::Section section{
+      "Result",
+      contact_words(settings, trials, results.empty() ? "" : results.front().velocity_estimator),
+      {},
+      {}};
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const ContactResult& result = results[i];
+    table.rows.push_back({result.condition.name, fmt::format("{:.3f}", result.measure.peak_to_peak * 1e3),
+                          std::string(words_of(result.measure.verdict)),
+                          fmt::format("{} of {}", result.unstable_trials, result.trials),
+                          fmt::format("{:.1f} %", result.limited_share * 100), result.condition.figure,
+                          result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no"});
+    section.pictures.push_back({fmt::format("{}: position, force and coefficient over time, {}",
+                                            result.condition.name, words_of(result.measure.verdict)),
+                                pictures.at(i)});
+  }
+  section.tables.push_back(table);
+  if (origin != report::Origin::measured)
+    section.paragraphs.emplace_back(
+        "The device and the person are simulated. How much the person's hand stiffens was calibrated on "
+        "other "
+        "simulated hands at one of the paper's numbers: the verdicts are no proof of the method.");
+  return report::write_page({"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section}}, folder,
+                            "contact");
+}
+
+}  // namespace kmax::experiment

@@ -1,0 +1,102 @@
+#include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/experiment/max_stiffness/max_stiffness_json.hpp"
+
+namespace kmax::experiment {
+
+namespace {
+
+// A fit with another force limit is none: part of the gain is the limit's.
+report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condition) {
+  if (!set.fitted || set.fitted->force_limit != set.device.force_limit || condition.adaptive)
+    return report::Origin::predicted;
+  std::optional<double> target;
+  if (condition.magnetic_coefficient == 0.0) target = set.fitted->plain_target;
+  if (condition.magnetic_coefficient == 2.0) target = set.fitted->magnetic_target;
+  return target && condition.paper == target ? report::Origin::calibrated : report::Origin::predicted;
+}
+
+}  // namespace
+
+std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jobs, const StiffnessRun& run) {
+  return collect_jobs<MaxStiffness>(
+      jobs.size(), run.threads,
+      [&](std::size_t index) {
+        const StiffnessJob& job = jobs[index];
+        if (run.journal != nullptr) {
+          if (const RunJournal::Json* known = run.journal->find(job.name)) return max_stiffness_from(*known);
+        }
+        TouchSetup setup = job.setup;
+        setup.integrator = run.integrator;
+        const MaxStiffness result = search_max_stiffness(setup, run.protocol, run.steps);
+        if (run.journal != nullptr) run.journal->add(job.name, json_of(result));
+        return result;
+      },
+      run.progress);
+}
+
+CountedEnds counted_ends(std::span<const MaxStiffness> results) {
+  CountedEnds ends;
+  for (const MaxStiffness& result : results) {
+    ends.at_zero += result.stiffness == 0.0 ? 1 : 0;
+    ends.beyond_last += result.beyond_last ? 1 : 0;
+  }
+  return ends;
+}
+
+double mean_stiffness(std::span<const MaxStiffness> results) {
+  double sum = 0.0;
+  for (const MaxStiffness& result : results) sum += result.stiffness;
+  return results.empty() ? 0.0 : sum / static_cast<double>(results.size());
+}
+
+double ConditionResult::mean() const {
+  return mean_stiffness(subjects);
+}
+
+double ConditionResult::standard_deviation() const {
+  if (subjects.size() < 2) return 0.0;
+  const double centre = mean();
+  double sum = 0.0;
+  for (const MaxStiffness& subject : subjects) sum += std::pow(subject.stiffness - centre, 2);
+  return std::sqrt(sum / static_cast<double>(subjects.size() - 1));
+}
+
+double ConditionResult::largest_saturated_share() const {
+  double largest = 0.0;
+  for (const MaxStiffness& subject : subjects) largest = std::max(largest, subject.saturated_share);
+  return largest;
+}
+
+MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
+                                          const std::vector<StiffnessCondition>& conditions,
+                                          const StiffnessRun& run) {
+  std::vector<StiffnessJob> jobs;
+  for (const StiffnessCondition& condition : conditions) {
+    for (const Subject& subject : set.subjects)
+      jobs.push_back({fmt::format("{}, {}", condition.name, subject.name),
+                      touch_setup(set.device, subject.person, condition)});
+  }
+  const std::vector<MaxStiffness> results = run_stiffness_jobs(jobs, run);
+  MaxStiffnessStudy study{set, run.protocol, run.steps, {}};
+  auto next = results.begin();
+  for (const StiffnessCondition& condition : conditions) {
+    const auto end = next + static_cast<std::ptrdiff_t>(set.subjects.size());
+    study.conditions.push_back({condition, {next, end}});
+    study.conditions.back().condition.origin = origin_of(set, condition);
+    next = end;
+  }
+  for (const MaxStiffness& result : results) {
+    study.simulated_time += result.simulated_time;
+    study.touches += result.touches;
+    study.event_limit_hits += result.event_limit_hits;
+  }
+  return study;
+}
+
+}  // namespace kmax::experiment

@@ -1,0 +1,234 @@
+#include "host_tools/experiment/contact/contact_experiment.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/errors.hpp"
+#include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::experiment {
+namespace {
+using host_tools_test::thrown_message;
+using simulation::ContactVerdict;
+
+class Contact : public testing::Test {
+ protected:
+  explicit Contact(const simulation::Scene& scene = simulated_board::factory_scene())
+      : device(std::make_unique<link::SimLink>(scene)) {
+    settings.hold_time = 1.0;
+  }
+
+  simulated_board::SimulatedBoard& simulation() {
+    return dynamic_cast<link::SimLink&>(device.link()).simulation();
+  }
+  void expect_disarmed() {
+    EXPECT_NE(device::Drive(device, 0).status().state(), firmware::DriveState::operation_enabled);
+    EXPECT_FALSE(simulation().board().output().axis[0].enabled);
+  }
+  ContactResult run(std::size_t condition) {
+    return run_contact(device, contact_conditions()[condition], settings, tell);
+  }
+
+  device::Device device;
+  ContactSettings settings;
+  std::vector<std::string> told;
+  std::function<void(const std::string&)> tell = [this](const std::string& text) { told.push_back(text); };
+};
+
+TEST(ContactConditions, AreThePapersWallsWithTheAdaptiveOneInEachMode) {
+  const auto conditions = contact_conditions();
+  ASSERT_EQ(conditions.size(), paper::contact_verdicts.size() + 2);
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    const auto& verdict = paper::contact_verdicts[std::min<std::size_t>(i, 3)];
+    EXPECT_EQ(conditions[i].figure, verdict.figure);
+    EXPECT_EQ(conditions[i].paper_words, verdict.words);
+    EXPECT_EQ(conditions[i].paper_stable, verdict.stable);
+  }
+  EXPECT_EQ(conditions[1].name, "F_MC = 1 N");
+  EXPECT_EQ(conditions[1].assignments,
+            (std::vector<std::string>{"wall.law=magnetic", "wall.magnetic_coefficient=1"}));
+  EXPECT_EQ(conditions[4].name, "adaptive, latched");
+  EXPECT_EQ(conditions[4].assignments,
+            (std::vector<std::string>{"wall.law=adaptive", "wall.adaptive_mode=latched"}));
+}
+
+// A coarse position that somebody left set makes any wall vibrate (paper 2).
+TEST_F(Contact, PositionsAreThoseOfTheEncoder) {
+  device.apply(device::parse_assignments({"position.resolution=0.0004"}));
+  run(2);
+  EXPECT_EQ(device.read_number("position.resolution"), 0.0);
+}
+
+TEST_F(Contact, ATrialHasTheTouchAtTimeZeroAndLosesNothing) {
+  const ContactResult result = run(1);
+  expect_disarmed();
+  EXPECT_EQ(result.condition.name, "F_MC = 1 N");
+  EXPECT_EQ(result.lost_records, 0u);
+  EXPECT_EQ(result.judged_from, 0.0);
+  EXPECT_EQ(result.judged_to, 1.0);
+  EXPECT_NE(result.measure.verdict, ContactVerdict::no_contact);
+  ASSERT_FALSE(result.samples.empty());
+  EXPECT_LT(result.samples.front().time, 0.0);
+  EXPECT_GT(result.samples.back().time, 1.0);
+  for (const auto& sample : result.samples) {
+    ASSERT_TRUE(sample.time >= 0 || result.outside_distance(sample) > 0.0) << sample.time;
+    ASSERT_TRUE(sample.time != 0 || result.outside_distance(sample) <= 0.0);
+  }
+  EXPECT_EQ(std::count_if(result.samples.begin(), result.samples.end(), [](auto& s) { return s.time == 0; }),
+            1);
+  EXPECT_FALSE(result.velocity_estimator.empty());
+  ASSERT_FALSE(told.empty());
+  EXPECT_CONTAINS(told.front(), "F_MC = 1 N: waiting for the touch");
+  EXPECT_CONTAINS(told.back(), "of 1.0 s");
+  EXPECT_EQ(device.read_number("wall.magnetic_coefficient"), 1);
+  EXPECT_EQ(device.read_number("trace.interval"), 0);
+}
+
+// The person presses for 3 s, and the trial is over after 1.3 s: arming must wait until the hand is back.
+TEST_F(Contact, AnotherTrialOnTheSameDeviceWaitsForTheHandle) {
+  run(0);
+  EXPECT_LT(device.read_number("measured.distance"), 0);
+  const ContactResult second = run(2);
+  EXPECT_EQ(second.lost_records, 0u);
+  EXPECT_NE(second.measure.verdict, ContactVerdict::no_contact);
+  expect_disarmed();
+}
+
+TEST_F(Contact, AnExceptionFromTellDisarms) {
+  for (const std::size_t after : {0u, 1u}) {
+    std::size_t calls = 0;
+    tell = [&](const std::string& text) {
+      if (text.ends_with("out of the wall")) return;
+      EXPECT_TRUE(simulation().board().output().axis[0].enabled);
+      if (calls++ == after) throw std::logic_error("enough");
+    };
+    EXPECT_THROW(run(0), std::logic_error);
+    EXPECT_EQ(calls, after + 1);
+    expect_disarmed();
+  }
+}
+
+TEST_F(Contact, AFaultOnTheWayIsReported) {
+  tell = [&](const std::string&) { simulation().device().connect_encoder(0, false); };
+  const auto what = thrown_message<device::DeviceError>([&] { run(0); });
+  EXPECT_CONTAINS(what, "lost its force during the trial");
+  EXPECT_CONTAINS(what, "encoder");
+  expect_disarmed();
+}
+
+// Between the last look at the statusword and the end of the trial.
+TEST_F(Contact, AFaultJustBeforeTheEndIsReportedToo) {
+  std::size_t trials = 0;
+  tell = [&](const std::string& text) { trials += text.ends_with("out of the wall") ? 0 : 1; };
+  run(0);
+  const std::size_t last = trials;
+  std::size_t calls = 0;
+  tell = [&](const std::string& text) {
+    if (!text.ends_with("out of the wall") && ++calls == last)
+      simulation().device().connect_encoder(0, false);
+  };
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "lost its force");
+}
+
+TEST_F(Contact, ATraceThatStopsEndsTheTrialDisarmed) {
+  tell = [&](const std::string&) { device.write(device::Parameter::of<"trace.interval">(), 0, true); };
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "trace has stopped");
+  expect_disarmed();
+}
+
+TEST_F(Contact, ValuesThatAreNotAllowedAreRefusedBeforeArming) {
+  settings.stiffness = -1;
+  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "wall.stiffness");
+  settings.stiffness = 5500;
+  settings.haptic_rate = 333;
+  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "haptic.rate");
+  EXPECT_TRUE(told.empty());
+  expect_disarmed();
+}
+
+class ContactWithoutAPerson : public Contact {
+ protected:
+  static simulation::Scene nobody() {
+    simulation::Scene scene = simulated_board::factory_scene();
+    scene.axes[0].person.reset();
+    scene.axes[0].motion.reset();
+    scene.axes[0].start.position = 0.02;
+    scene.axes[0].start.velocity = 0.0;
+    return scene;
+  }
+  ContactWithoutAPerson() : Contact(nobody()) {}
+};
+
+TEST_F(ContactWithoutAPerson, NoTouchWithinPatienceIsAnError) {
+  settings.contact_patience = 2.0;
+  const auto begin = device.link().now();
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "nobody touched the wall within 2 s");
+  EXPECT_LT(device.link().now() - begin, std::chrono::seconds(4));
+  expect_disarmed();
+}
+
+TEST(ContactSetup, ConditionsCanBeSetTogetherWithTheSetup) {
+  std::set<std::string> names;
+  for (const ContactCondition& condition : contact_conditions()) {
+    auto all = contact_setup({});
+    all.insert(all.end(), condition.assignments.begin(), condition.assignments.end());
+    EXPECT_NO_THROW(device::parse_assignments(all, 1)) << condition.name;
+    names.insert(condition.name);
+  }
+  EXPECT_EQ(names.size(), contact_conditions().size());
+}
+
+ContactResult trial(ContactVerdict verdict, double peak_to_peak, std::uint64_t lost = 0) {
+  ContactResult result;
+  result.measure.verdict = verdict;
+  result.measure.peak_to_peak = peak_to_peak;
+  result.lost_records = lost;
+  return result;
+}
+
+TEST(WorstOf, AnUnstableTrialOutweighsTheLargestSlipOfAStableOne) {
+  const ContactResult worst =
+      worst_of({trial(ContactVerdict::stable, 5e-3, 1), trial(ContactVerdict::unstable, 2e-4, 2),
+                trial(ContactVerdict::no_contact, 9e-3, 4)});
+  EXPECT_EQ(worst.measure.verdict, ContactVerdict::unstable);
+  EXPECT_EQ(worst.measure.peak_to_peak, 2e-4);
+  EXPECT_EQ(worst.trials, 3u);
+  EXPECT_EQ(worst.unstable_trials, 1u);
+  EXPECT_EQ(worst.lost_records, 7u);
+}
+
+RC_GTEST_PROP(WorstOfProperty, OrderDoesNotMatterAndNothingIsWorse, ()) {
+  const auto numbers = *rc::gen::nonEmpty<std::vector<std::pair<int, bool>>>(
+      rc::gen::container<std::vector<std::pair<int, bool>>>(
+          rc::gen::pair(rc::gen::inRange(0, 10), rc::gen::arbitrary<bool>())));
+  std::vector<ContactResult> trials;
+  for (const auto& [size, unstable] : numbers)
+    trials.push_back(trial(unstable ? ContactVerdict::unstable : ContactVerdict::stable, size * 1e-4));
+  const ContactResult worst = worst_of(trials);
+  std::reverse(trials.begin(), trials.end());
+  const ContactResult reversed = worst_of(trials);
+  RC_ASSERT(worst.measure.verdict == reversed.measure.verdict);
+  RC_ASSERT(worst.measure.peak_to_peak == reversed.measure.peak_to_peak);
+  RC_ASSERT((worst.unstable_trials > 0) == (worst.measure.verdict == ContactVerdict::unstable));
+  for (const ContactResult& one : trials)
+    RC_ASSERT(one.measure.verdict != worst.measure.verdict ||
+              one.measure.peak_to_peak <= worst.measure.peak_to_peak);
+}
+
+TEST(ContactResult, NoContactNeverAgreesWithThePaper) {
+  ContactResult result = trial(ContactVerdict::no_contact, 0);
+  result.condition.paper_stable = false;
+  EXPECT_FALSE(result.agrees_with_paper());
+  result.measure.verdict = ContactVerdict::unstable;
+  EXPECT_TRUE(result.agrees_with_paper());
+  result.condition.paper_stable = true;
+  EXPECT_FALSE(result.agrees_with_paper());
+}
+
+}  // namespace
+}  // namespace kmax::experiment

@@ -1,0 +1,95 @@
+#include "host_tools/experiment/deviation/deviation_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/host_tools/temporary_folder.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::experiment {
+namespace {
+
+DeviationSettings few() {
+  DeviationSettings settings;
+  settings.protocol.pulses = 1;
+  return settings;
+}
+
+TEST(DeviationReport, SaysWhatHoldsAndWhatTheTableDoesNotTell) {
+  const DeviationStudy study = study_deviation(few(), std::vector<simulation::OperatorModel>(1));
+  std::string words;
+  for (const std::string& one : deviation_words(study)) words += one + "\n";
+  EXPECT_CONTAINS(words, "Here it falls at every F_I");
+  EXPECT_CONTAINS(words, "With a hand that does not stiffen it does not fall");
+  EXPECT_CONTAINS(words, "hardly identifies a stiffness gain");
+  EXPECT_CONTAINS(words, "Sizes are not reproduced");
+  for (const auto& table :
+       {deviation_table(study), deviation_claims_table(study), deviation_fit_table(study)})
+    EXPECT_NO_THROW(report::require_rectangular(table));
+  EXPECT_EQ(deviation_table(study).rows.size(), paper::table_2.size());
+  EXPECT_EQ(deviation_claims_table(study).rows.size(), 9u);
+  EXPECT_EQ(deviation_fit_table(study).rows.size(), 4u);
+}
+
+TEST(DeviationReport, WritesAPageWithItsPictures) {
+  const host_tools_test::TemporaryFolder folder;
+  const DeviationStudy study = study_deviation(few(), std::vector<simulation::OperatorModel>(1));
+  const auto files = write_deviation(study, folder / "new", ".svg");
+  EXPECT_EQ(files.size(), 6u);
+  for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
+}
+
+TEST(DeviationReport, APageOfADeviceWithoutResults) {
+  const host_tools_test::TemporaryFolder folder;
+  DeviationStudy study;
+  study.origin = report::Origin::measured;
+  study.results = {mean_deviation(*paper::deviation(0, 5), {}), mean_deviation(*paper::deviation(3, 5), {})};
+  study.verdict = judge_deviation(study.results);
+  study.fits = fit_table_2();
+  EXPECT_NO_THROW(report::require_rectangular(deviation_table(study)));
+  EXPECT_EQ(write_deviation(study, folder / "new", ".svg").size(), 5u);
+}
+
+TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
+  const auto words_of = [](bool falls, bool falls_without) {
+    const auto results = [](bool fall) {
+      std::vector<DeviationResult> cells;
+      for (const paper::DeviationCell& cell : paper::table_2) {
+        DeviationResult result = mean_deviation(cell, {});
+        result.touches = 1;
+        const double share = fall ? 1.0 / (1.0 + cell.background) : 1.0 + cell.background;
+        result.deviation = 1e-3 * cell.interference * share;
+        cells.push_back(result);
+      }
+      return cells;
+    };
+    DeviationStudy study;
+    study.results = results(falls);
+    study.verdict = judge_deviation(study.results);
+    study.without_stiffening = results(falls_without);
+    study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
+    std::string words;
+    for (const std::string& one : deviation_words(study)) words += one + "\n";
+    return words;
+  };
+  const char* cause = "the stiffening and nothing else";
+  EXPECT_CONTAINS(words_of(true, false), cause);
+  for (const auto& [falls, without] :
+       {std::pair{true, true}, std::pair{false, true}, std::pair{false, false}})
+    EXPECT_EQ(words_of(falls, without).find(cause), std::string::npos) << falls << without;
+  EXPECT_CONTAINS(words_of(true, true), "something else than the stiffening makes the trend");
+  EXPECT_CONTAINS(words_of(false, false), "no trend to explain");
+}
+
+// People who do not stiffen are their own comparison.
+TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
+  std::vector<simulation::OperatorModel> people(1);
+  people[0].activation_gain = 0.0;
+  std::string words;
+  for (const std::string& one : deviation_words(study_deviation(few(), people))) words += one + "\n";
+  EXPECT_EQ(words.find("nothing else"), std::string::npos) << words;
+}
+
+}  // namespace
+}  // namespace kmax::experiment

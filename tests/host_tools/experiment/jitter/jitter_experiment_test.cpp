@@ -1,0 +1,205 @@
+#include "host_tools/experiment/jitter/jitter_experiment.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace kmax::experiment {
+namespace {
+
+std::vector<JitterSample> course(const std::vector<double>& outside, double begin = 0.0) {
+  std::vector<JitterSample> samples;
+  for (std::size_t i = 0; i < outside.size(); ++i)
+    samples.push_back({begin + 0.002 * static_cast<double>(i), outside[i], i % 2 == 0 ? 5.0 : 1.0});
+  return samples;
+}
+
+JitterWall short_wall() {
+  JitterWall wall;
+  wall.window = 0.1;
+  wall.settled_time = 0.01;
+  return wall;
+}
+
+TEST(MeasureJitter, AHandleThatStaysInsideHasNone) {
+  const JitterMeasure measure =
+      measure_jitter(course({3e-3, 1e-3, 0, -1e-4, -2e-4, -2e-4, -2e-4, -2e-4}), short_wall());
+  EXPECT_TRUE(measure.touched);
+  EXPECT_TRUE(measure.settled);
+  EXPECT_EQ(measure.amplitude, 0.0);
+  EXPECT_EQ(measure.adjustment_time, 0.0);
+  EXPECT_EQ(measure.beyond_limit_share, 0.5);
+}
+
+TEST(MeasureJitter, CountsFromTheFirstTouchToTheEndOfTheLastSampleOutside) {
+  // Touch at sample 1, out at 2 to 3 and at 5, inside from 6 on.
+  const JitterMeasure measure = measure_jitter(
+      course({9e-3, -1e-4, 2e-3, 1e-3, -1e-4, 5e-4, -1e-4, -1e-4, -1e-4, -1e-4, -1e-4, -1e-4, -1e-4}),
+      short_wall());
+  EXPECT_TRUE(measure.settled);
+  EXPECT_DOUBLE_EQ(measure.amplitude, 2e-3);
+  EXPECT_NEAR(measure.adjustment_time, 5 * 0.002, 1e-12);
+}
+
+TEST(MeasureJitter, AHandleThatIsOutsideNearTheEndHasNotSettled) {
+  EXPECT_FALSE(measure_jitter(course({-1e-4, 2e-3, -1e-4, 2e-3, -1e-4, -1e-4}), short_wall()).settled);
+  EXPECT_FALSE(measure_jitter(course({-1e-4, 2e-3}), short_wall()).settled);
+}
+
+TEST(MeasureJitter, WithoutATouchThereIsNothing) {
+  const JitterMeasure measure = measure_jitter(course({1e-3, 2e-3, 1e-6}), short_wall());
+  EXPECT_FALSE(measure.touched);
+  EXPECT_FALSE(measure.settled);
+  EXPECT_FALSE(measure_jitter({}, short_wall()).touched);
+}
+
+TEST(MeasureJitter, WhatComesAfterTheWindowDoesNotCount) {
+  std::vector<double> outside(80, -1e-4);
+  outside[60] = 5e-3;  // 0.12 s after the touch
+  EXPECT_EQ(measure_jitter(course(outside), short_wall()).amplitude, 0.0);
+}
+
+RC_GTEST_PROP(MeasureJitterProperty, DoesNotDependOnWhenTheRecordingBegan, ()) {
+  const auto steps = *rc::gen::container<std::vector<int>>(40, rc::gen::inRange(-3, 4));
+  std::vector<double> outside(steps.begin(), steps.end());
+  const auto begin = *rc::gen::inRange(-5, 6);
+  const JitterMeasure a = measure_jitter(course(outside), short_wall());
+  const JitterMeasure b = measure_jitter(course(outside, begin), short_wall());
+  RC_ASSERT(a.touched == b.touched);
+  RC_ASSERT(a.settled == b.settled);
+  RC_ASSERT(a.amplitude == b.amplitude);
+  RC_ASSERT(std::abs(a.adjustment_time - b.adjustment_time) < 1e-9);
+}
+
+std::vector<JitterResult> as_printed() {
+  std::vector<JitterResult> results;
+  for (const paper::JitterCell& cell : paper::table_1) {
+    JitterMeasure measure;
+    measure.touched = measure.settled = true;
+    measure.amplitude = cell.amplitude;
+    measure.adjustment_time = cell.adjustment_time;
+    results.push_back(mean_jitter(cell, {&measure, 1}));
+  }
+  return results;
+}
+
+// A rule that the paper's own numbers break would say nothing.
+TEST(JudgeJitter, ThePapersOwnTableMeetsItsClaim) {
+  const JitterVerdict verdict = judge_jitter(as_printed());
+  EXPECT_TRUE(verdict.claim_met());
+  EXPECT_DOUBLE_EQ(verdict.amplitude_rank.value(), 1.0);
+  EXPECT_DOUBLE_EQ(verdict.time_rank.value(), 1.0);
+  ASSERT_EQ(verdict.amplitude.size(), 3u);  // at 1 N there is no jitter to fall
+}
+
+TEST(JudgeJitter, ATouchThatNeverSettlesHasNoTimeThatCouldFall) {
+  std::vector<JitterResult> results = as_printed();
+  results.back().unsettled = 1;
+  EXPECT_TRUE(judge_jitter(results).amplitude_falls());
+  EXPECT_FALSE(judge_jitter(results).time_falls());
+  results.back().unsettled = 0;
+  results.back().aborted = 1;
+  EXPECT_FALSE(judge_jitter(results).claim_met());
+}
+
+TEST(JudgeJitter, OneForceThatDoesNotFallIsEnough) {
+  std::vector<JitterResult> results = as_printed();
+  for (JitterResult& result : results)
+    if (result.paper.interference == 5.0 && result.paper.background == 4.0) result.amplitude = 6e-3;
+  EXPECT_FALSE(judge_jitter(results).amplitude_falls());
+  EXPECT_TRUE(judge_jitter(results).time_falls());
+  EXPECT_FALSE(judge_jitter({}).claim_met());
+}
+
+TEST(JudgeJitter, NoTouchAtAllIsNoClaim) {
+  std::vector<JitterResult> results = as_printed();
+  for (JitterResult& result : results) result.touches = 0;
+  EXPECT_FALSE(judge_jitter(results).claim_met());
+}
+
+TEST(SimulateJitter, TheWeakestForceThrowsNobodyOut) {
+  for (const double background : {0.0, 1.0}) {
+    const JitterMeasure measure = simulate_jitter({}, {}, background, 1.0);
+    EXPECT_TRUE(measure.touched);
+    EXPECT_EQ(measure.amplitude, 0.0) << background;
+    EXPECT_EQ(measure.adjustment_time, 0.0);
+  }
+}
+
+TEST(SimulateJitter, BothFallWithTheBackgroundForce) {
+  const JitterVerdict verdict = judge_jitter(run_jitter({}, {simulation::OperatorModel{}}));
+  EXPECT_TRUE(verdict.amplitude_falls());
+  EXPECT_TRUE(verdict.time_falls());
+}
+
+// The point of the experiment: it is the stiffening that makes the trend.
+TEST(SimulateJitter, AHandThatDoesNotStiffenShowsNoTrend) {
+  simulation::OperatorModel person;
+  person.activation_gain = 0.0;
+  const JitterVerdict verdict = judge_jitter(run_jitter({}, {person}));
+  EXPECT_FALSE(verdict.amplitude_falls());
+  for (const JitterTrend& trend : verdict.amplitude) EXPECT_GT(trend.with, 0.8 * trend.without);
+}
+
+TEST(SimulateJitter, APersonWhoNeverPressesHarderNeverSettles) {
+  JitterSettings settings;
+  settings.reaction = 0.0;
+  const JitterMeasure measure = simulate_jitter(settings, {}, 0.0, 7.0);
+  EXPECT_TRUE(measure.touched);
+  EXPECT_FALSE(measure.settled);
+}
+
+TEST(SimulateJitter, TheForceIsNotClippedUnlessAskedFor) {
+  std::vector<JitterSample> samples;
+  simulate_jitter({}, {}, 4.0, 7.0, 0.0, &samples);
+  const auto force = [](const JitterSample& sample) { return sample.force; };
+  const auto strongest = [&] {
+    double most = 0.0;
+    for (const JitterSample& sample : samples) most = std::max(most, force(sample));
+    return most;
+  };
+  EXPECT_GT(strongest(), 11.0);
+  JitterSettings clipped;
+  clipped.device.force_limit = 3.3;
+  simulate_jitter(clipped, {}, 4.0, 7.0, 0.0, &samples);
+  EXPECT_LE(strongest(), 3.3001);
+}
+
+TEST(SimulateJitter, ABackgroundForceActsBeforeTheTouch) {
+  std::vector<JitterSample> samples;
+  simulate_jitter({}, {}, 3.0, 5.0, 0.0, &samples);
+  ASSERT_LT(samples.front().time, 0.0);
+  EXPECT_NEAR(samples.front().force, 3.0, 1e-6);
+}
+
+TEST(SimulateJitter, SettingsOutOfRangeAreRefused) {
+  JitterSettings settings;
+  settings.reaction = 1.5;
+  EXPECT_THROW(simulate_jitter(settings, {}, 0, 1), std::invalid_argument);
+  settings = {};
+  settings.wall.stiffness = std::nan("");
+  EXPECT_THROW(simulate_jitter(settings, {}, 0, 1), std::invalid_argument);
+  settings = {};
+  settings.touches = 0;
+  EXPECT_THROW(run_jitter(settings, {simulation::OperatorModel{}}), std::invalid_argument);
+  EXPECT_THROW(run_jitter({}, {}), std::invalid_argument);
+}
+
+TEST(PaperTables, HaveTheSamePairsOfForcesAndTimesOfWhole15Milliseconds) {
+  for (std::size_t i = 0; i < paper::table_1.size(); ++i) {
+    const paper::JitterCell& cell = paper::table_1[i];
+    EXPECT_EQ(cell.background, paper::table_2[i].background);
+    EXPECT_EQ(cell.interference, paper::table_2[i].interference);
+    EXPECT_LE(cell.background, cell.interference);
+    const double times = cell.adjustment_time / 0.015;
+    EXPECT_NEAR(times, std::round(times), 1e-9);
+  }
+  EXPECT_FALSE(paper::jitter(4, 3));
+  EXPECT_EQ(paper::jitter(2, 3)->amplitude, 1.6e-3);
+  EXPECT_EQ(paper::deviation(3, 7)->deviation, 9.2e-3);
+}
+
+}  // namespace
+}  // namespace kmax::experiment

@@ -1,0 +1,107 @@
+#include "host_tools/experiment/max_stiffness/max_stiffness_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host_tools/experiment/people/subject_set.hpp"
+
+namespace kmax::experiment {
+namespace {
+
+TouchSetup plain(const simulation::OperatorModel& person) {
+  TouchSetup setup;
+  setup.person = person;
+  setup.wall.wall.kind = control::WallKind::plain;
+  return setup;
+}
+
+TEST(MaxStiffnessSearch, TheResultIsStableAndTheNextStepIsNot) {
+  const TouchProtocol protocol;
+  const StiffnessSteps steps;
+  for (const Subject& subject : draw_subjects(3, 1)) {
+    TouchSetup setup = plain(subject.person);
+    const MaxStiffness found = search_max_stiffness(setup, protocol, steps);
+    ASSERT_GT(found.stiffness, 0.0);
+    const auto any_unstable = [&](double stiffness) {
+      setup.wall.wall.stiffness = static_cast<float>(stiffness);
+      for (const double speed : protocol.approach_speeds) {
+        for (const double push : protocol.pushes) {
+          setup.motion.approach_speed = speed;
+          setup.motion.push_force = push;
+          if (simulate_touch(setup).unstable()) return true;
+        }
+      }
+      return false;
+    };
+    EXPECT_FALSE(any_unstable(found.stiffness));
+    EXPECT_TRUE(any_unstable(found.stiffness + steps.step));
+    EXPECT_EQ(std::fmod(found.stiffness, 100.0), 0.0);
+    setup.wall.wall.stiffness = static_cast<float>(found.stiffness + steps.step);
+    setup.motion.approach_speed = found.ending_speed;
+    setup.motion.push_force = found.ending_push;
+    EXPECT_TRUE(simulate_touch(setup).unstable());
+  }
+}
+
+TEST(MaxStiffnessSearch, SaysWhenItHasNoAnswer) {
+  TouchSetup setup = plain({});
+  const MaxStiffness soft = search_max_stiffness(setup, {}, {.first = 100, .step = 100, .last = 300});
+  EXPECT_TRUE(soft.beyond_last);
+  EXPECT_EQ(soft.stiffness, 300.0);
+  const MaxStiffness hard = search_max_stiffness(setup, {}, {.first = 20e3, .step = 100, .last = 30e3});
+  EXPECT_FALSE(hard.beyond_last);
+  EXPECT_EQ(hard.stiffness, 0.0);
+  EXPECT_GT(hard.ending_peak_to_peak, 0.165e-3);
+  setup.wall.wall.kind = control::WallKind::magnetic;
+  setup.person.push_lag = 100.0;
+  TouchProtocol timid;
+  timid.pushes = {0.0};
+  const MaxStiffness none = search_max_stiffness(setup, timid, {});
+  EXPECT_TRUE(none.never_touched);
+}
+
+TEST(MaxStiffnessSearch, GrowingStepsMeetTheSameLimitWithinTheirSize) {
+  const TouchSetup setup = plain({});
+  const double equal = search_max_stiffness(setup, {}, {}).stiffness;
+  const double growing =
+      search_max_stiffness(setup, {}, {.first = 100, .step = 10, .growth = 0.03}).stiffness;
+  EXPECT_NEAR(growing, equal, 0.03 * equal + 100.0);
+}
+
+// An integrator that shares nothing with the exact scheme, at 1 us, from three steps below the limit on.
+TEST(MaxStiffnessSearch, TheExactSchemeAgreesWithAReferenceOfOneMicrosecond) {
+  TouchProtocol protocol;
+  protocol.approach_speeds = {0.1, 0.5};
+  protocol.pushes = {0.3, 1.0};
+  const auto people = draw_subjects(8, 1);
+  for (std::size_t n = 0; n < people.size(); ++n) {
+    TouchSetup setup = plain(people[n].person);
+    setup.device.friction = n % 2 == 0 ? 0.093 : 0.2;
+    if (n >= 4) {
+      setup.wall.wall.kind = control::WallKind::magnetic;
+      setup.wall.wall.magnetic_coefficient = 1.0F;
+    }
+    const MaxStiffness exact = search_max_stiffness(setup, protocol, {});
+    setup.integrator.kind = simulation::IntegratorKind::rk4;
+    setup.integrator.substeps = 2000.0;
+    const StiffnessSteps near{
+        .first = exact.stiffness - 300.0, .step = 100.0, .last = exact.stiffness + 300.0};
+    const MaxStiffness reference = search_max_stiffness(setup, protocol, near);
+    EXPECT_NEAR(exact.stiffness, reference.stiffness, 100.0 + 1e-6)
+        << people[n].name << " exact " << exact.stiffness << " reference " << reference.stiffness;
+  }
+}
+
+TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
+  const TouchSetup setup = plain({});
+  EXPECT_THROW(search_max_stiffness(setup, {.approach_speeds = {}}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.pushes = {}}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {}, {.step = 0.0}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {}, {.first = -1.0}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {}, {.first = 2.0, .last = 1.0}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {}, {.last = std::nan("")}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace kmax::experiment

@@ -1,0 +1,39 @@
+#include "host_tools/experiment/max_stiffness/stiffness_condition.hpp"
+
+#include <gtest/gtest.h>
+
+namespace kmax::experiment {
+namespace {
+
+TEST(StiffnessCondition, AreThoseOfThePaper) {
+  const auto conditions = stiffness_conditions();
+  ASSERT_EQ(conditions.size(), 8U);
+  EXPECT_EQ(conditions[0].paper, 3580.0);
+  EXPECT_EQ(conditions[4].paper, 8410.0);
+  EXPECT_EQ(conditions[7].paper, 8020.0);
+  EXPECT_FALSE(conditions[2].paper.has_value());
+  for (const auto& condition : conditions) {
+    // Whether it is calibrated is not the condition's to say.
+    EXPECT_EQ(condition.origin, report::Origin::predicted);
+    TouchSetup setup;
+    condition.apply(setup);
+    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::adaptive, condition.adaptive);
+    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::plain,
+              !condition.adaptive && condition.magnetic_coefficient == 0.0);
+  }
+}
+
+TEST(CauseCondition, NothingOfTheFieldIsLeftWhereItIsSwitchedOff) {
+  for (const CauseCondition& condition : cause_conditions(2.0)) {
+    TouchSetup setup;
+    condition.apply(setup);
+    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::magnetic, condition.field) << condition.name;
+    EXPECT_EQ(setup.person.activation_gain > 0.0, condition.stiffens) << condition.name;
+    EXPECT_EQ(setup.wall.interference.background_force > 0.0F, condition.preload) << condition.name;
+    EXPECT_EQ(setup.person.grip_stiffness,
+              simulation::OperatorModel{}.grip_stiffness * condition.grip_factor);
+  }
+}
+
+}  // namespace
+}  // namespace kmax::experiment

@@ -1,0 +1,62 @@
+#include "host_tools/experiment/people/operator_calibration.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
+
+namespace kmax::experiment {
+namespace {
+
+// A target made by known numbers is met by the numbers that are found for it.
+TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
+  SubjectSet truth = few_people(4);
+  truth.device.friction = 0.14;
+  for (Subject& subject : truth.subjects) subject.person.activation_gain = 0.7;
+  const auto conditions = stiffness_conditions();
+  const auto made = run_max_stiffness_study(truth, {conditions[0], conditions[4]}, quick_run());
+  CalibrationSettings settings{};
+  settings.plain_target = made.conditions[0].mean();
+  settings.magnetic_target = made.conditions[1].mean();
+  const OperatorCalibration fit = calibrate_operator(few_people(4), settings, quick_run());
+  EXPECT_NEAR(fit.plain, settings.plain_target, 50.0);
+  EXPECT_NEAR(fit.magnetic, settings.magnetic_target, 75.0);
+  EXPECT_TRUE(fit.plain_met && fit.magnetic_met);
+  EXPECT_NEAR(fit.friction, 0.14, 0.02);
+  EXPECT_NEAR(fit.activation_gain, 0.7, 0.15);
+  EXPECT_EQ(fit.set.device.friction, fit.friction);
+  EXPECT_EQ(fit.set.subjects[3].person.activation_gain, fit.activation_gain);
+  ASSERT_TRUE(fit.set.fitted);
+  EXPECT_EQ(fit.set.fitted->plain_target, settings.plain_target);
+  EXPECT_EQ(fit.set.fitted->magnetic_target, settings.magnetic_target);
+  EXPECT_EQ(fit.set.fitted->force_limit, fit.set.device.force_limit);
+  // What it says of itself is what its set gives.
+  const auto again = run_max_stiffness_study(fit.set, {conditions[0], conditions[4]}, quick_run());
+  EXPECT_EQ(again.conditions[0].mean(), fit.plain);
+  EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
+}
+
+TEST(OperatorCalibration, SaysWhenATargetIsOutOfReach) {
+  CalibrationSettings settings = paper_targets();
+  EXPECT_EQ(settings.plain_target, 3580.0);
+  EXPECT_EQ(settings.magnetic_target, 8410.0);
+  settings.friction_most = 0.01;
+  settings.gain_most = 0.01;
+  settings.most_steps = 4;
+  const OperatorCalibration fit = calibrate_operator(few_people(2), settings, quick_run());
+  EXPECT_FALSE(fit.plain_met);
+  EXPECT_FALSE(fit.magnetic_met);
+  EXPECT_THROW(calibrate_operator(SubjectSet{}, settings, quick_run()), std::invalid_argument);
+}
+
+TEST(OperatorCalibration, LeavesTheFrictionWhereItIsToldTo) {
+  CalibrationSettings settings = paper_targets();
+  settings.fit_friction = false;
+  settings.most_steps = 3;
+  SubjectSet set = few_people(2);
+  set.device.friction = 0.111;
+  const OperatorCalibration fit = calibrate_operator(set, settings, quick_run());
+  EXPECT_EQ(fit.friction, 0.111);
+}
+
+}  // namespace
+}  // namespace kmax::experiment

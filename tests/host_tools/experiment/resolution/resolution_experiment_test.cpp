@@ -1,0 +1,143 @@
+#include "host_tools/experiment/resolution/resolution_experiment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace kmax::experiment {
+namespace {
+
+ResolutionCell cell(double resolution, double speed, bool vibrates) {
+  ResolutionCell made;
+  made.resolution = resolution;
+  made.speed = speed;
+  made.touches = made.people = 1;
+  made.unstable = made.people_unstable = vibrates ? 1 : 0;
+  return made;
+}
+
+std::vector<ResolutionCell> as_claimed() {
+  std::vector<ResolutionCell> cells;
+  for (const double speed : {0.05, 0.09, 0.11, 0.3}) {
+    cells.push_back(cell(0.4e-3, speed, true));
+    cells.push_back(cell(0.1e-3, speed, speed > 0.1));
+  }
+  return cells;
+}
+
+TEST(JudgeResolution, WhatThePaperClaimsMeetsTheClaim) {
+  const ResolutionVerdict verdict = judge_resolution(as_claimed());
+  EXPECT_TRUE(verdict.claim_met());
+  EXPECT_FALSE(verdict.onset_from_resolution);  // the encoder's own step was not run
+  EXPECT_EQ(onset_speed(as_claimed(), 0.1e-3), 0.11);
+  EXPECT_EQ(onset_speed(as_claimed(), 0.4e-3), 0.05);
+}
+
+TEST(JudgeResolution, EachCellThatDiffersBreaksIt) {
+  for (std::size_t i = 0; i < as_claimed().size(); ++i) {
+    auto cells = as_claimed();
+    cells[i].people_unstable = cells[i].unstable = 1 - cells[i].unstable;
+    EXPECT_FALSE(judge_resolution(cells).claim_met()) << i;
+  }
+}
+
+TEST(JudgeResolution, WhatWasNotTriedIsNotMet) {
+  EXPECT_FALSE(judge_resolution({}).claim_met());
+  auto cells = as_claimed();
+  std::erase_if(cells, [](const ResolutionCell& one) { return one.resolution == 0.1e-3 && one.speed < 0.1; });
+  EXPECT_FALSE(judge_resolution(cells).claim_met());
+  cells = as_claimed();
+  for (ResolutionCell& one : cells) one.without_contact = one.touches;
+  EXPECT_FALSE(judge_resolution(cells).claim_met());
+}
+
+TEST(JudgeResolution, TheEncodersOwnStepIsTheControl) {
+  auto cells = as_claimed();
+  cells.push_back(cell(0.0, 0.3, true));
+  EXPECT_EQ(judge_resolution(cells).onset_from_resolution, false);
+  cells.push_back(cell(0.0, 0.11, false));
+  EXPECT_EQ(judge_resolution(cells).onset_from_resolution, true);
+}
+
+TEST(OnsetSpeed, NeedsTheFastestToVibrate) {
+  const std::vector<ResolutionCell> cells{cell(0, 0.1, true), cell(0, 0.2, false), cell(0, 0.3, true),
+                                          cell(0, 0.4, true)};
+  EXPECT_EQ(onset_speed(cells, 0), 0.3);
+  EXPECT_FALSE(onset_speed(std::span(cells).first(2), 0));
+  EXPECT_FALSE(onset_speed({}, 0));
+}
+
+TEST(ResolutionCell, HalfThePeopleDecide) {
+  ResolutionCell one;
+  EXPECT_FALSE(one.vibrates());
+  one.people = 12;
+  one.people_unstable = 5;
+  EXPECT_FALSE(one.vibrates());
+  one.people_unstable = 6;
+  EXPECT_TRUE(one.vibrates());
+}
+
+TEST(StepInUse, IsWholeCounts) {
+  EXPECT_DOUBLE_EQ(step_in_use(0.0, 0.023e-3), 0.023e-3);
+  EXPECT_DOUBLE_EQ(step_in_use(0.1e-3, 0.023e-3), 4 * 0.023e-3);
+  EXPECT_DOUBLE_EQ(step_in_use(0.4e-3, 0.023e-3), 17 * 0.023e-3);
+}
+
+const std::vector<simulation::OperatorModel> subject_1(1);
+
+// The null result: at no step and no speed.
+TEST(SimulateResolution, WithAFullGripAndNoDelayNothingVibrates) {
+  for (const double resolution : {0.0, 0.1e-3, 0.4e-3})
+    for (const double speed : {0.02, 0.1, 0.5})
+      EXPECT_EQ(simulate_resolution({}, {}, subject_1, resolution, speed).unstable, 0u)
+          << resolution << " " << speed;
+}
+
+TEST(SimulateResolution, WithAWeakGripAndADelayBothClaimsAppear) {
+  const auto runs = run_resolution({}, subject_1);
+  ASSERT_EQ(runs.size(), 4u);
+  EXPECT_TRUE(judge_resolution(runs.back().cells).claim_met());
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_FALSE(judge_resolution(runs[i].cells).claim_met()) << i;
+  // And yet the speed's part of them is none of the resolution's.
+  EXPECT_EQ(judge_resolution(runs.back().cells).onset_from_resolution, false);
+}
+
+TEST(SimulateResolution, TheCriterionStandsBesideIt) {
+  const ResolutionSettings settings;
+  const ResolutionCell slow = simulate_resolution(settings, {}, subject_1, 0.4e-3, 0.02);
+  EXPECT_NEAR(slow.force_step, 1200 * 17 * 0.023e-3, 1e-9);
+  const ResolutionCell fast = simulate_resolution(settings, {}, subject_1, 0.1e-3, 0.5);
+  EXPECT_NEAR(fast.force_step, 1200 * 0.5e-3, 1e-9);
+}
+
+TEST(SimulateResolution, SettingsOutOfRangeAreRefused) {
+  ResolutionSettings settings;
+  EXPECT_THROW(simulate_resolution(settings, {0.0, 0.0}, subject_1, 0, 0.1), std::invalid_argument);
+  EXPECT_THROW(simulate_resolution(settings, {1.0, std::nan("")}, subject_1, 0, 0.1), std::invalid_argument);
+  settings.pushes.clear();
+  EXPECT_THROW(simulate_resolution(settings, {}, subject_1, 0, 0.1), std::invalid_argument);
+  EXPECT_THROW(run_resolution({}, {}), std::invalid_argument);
+}
+
+TEST(VaryResolution, EveryVariationDiffersFromTheSettings) {
+  ResolutionSettings settings;
+  settings.resolutions = {0.4e-3};
+  settings.speeds = {0.1};
+  settings.touches = 1;
+  const auto named = [&](const std::string& change) {
+    const auto variations = vary_resolution(settings, subject_1);
+    return std::count_if(variations.begin(), variations.end(),
+                         [&](const ResolutionVariation& one) { return one.change == change; });
+  };
+  EXPECT_EQ(vary_resolution(settings, subject_1).size(), 14u);
+  EXPECT_EQ(named("grip x 0.25"), 0);
+  EXPECT_EQ(named("grip x 0.3"), 1);
+  settings.weak = {0.3, 1e-3};
+  EXPECT_EQ(named("grip x 0.25"), 1);
+  EXPECT_EQ(named("grip x 0.3"), 0);
+  EXPECT_EQ(named("delay 1 ms"), 0);
+}
+
+}  // namespace
+}  // namespace kmax::experiment
