@@ -5,16 +5,14 @@
 #include <type_traits>
 #include <vector>
 
-namespace kmax::experiment {
+#include "host_tools/experiment/progress_report.hpp"
 
-/// How many of the jobs are done. Called in the thread that called run_jobs(), before the first job, after
-/// jobs have ended and at least five times a second while they run. What it throws ends the run: so Ctrl-C
-/// is noticed.
-using ProgressReport = std::function<void(std::size_t done, std::size_t count)>;
+namespace kmax::experiment {
 
 /// Calls job(0) .. job(count - 1), up to `jobs` of them at a time, each in some thread of its own but begun
 /// in that order. A job writes its result where its index says: then results do not depend on the threads.
-/// `jobs` 0: default_jobs().
+/// `jobs` 0: default_jobs(). `report` is called in the calling thread, before the first job, after jobs have
+/// ended and at least five times a second while they run.
 ///
 /// When a job or the report throws, no further job begins, those under way are waited for, and the exception
 /// comes out: the report's, else that of the failed job with the lowest index, which is the same however many

@@ -27,15 +27,18 @@ void add_resume_option(CLI::App& device, bool& resume) {
   device.add_flag("--resume", resume, "Go on with the interrupted run in --out");
 }
 
+void require_folder_to_resume(const std::string& folder, bool resume) {
+  if (resume && folder.empty())
+    throw UsageError("--resume goes on with the run in a folder: name it with --out");
+}
+
 std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
                                                            const std::string& name,
                                                            const experiment::RunJournal::Json& settings,
                                                            bool resume) {
   using experiment::RunJournal;
-  if (folder.empty()) {
-    if (resume) throw UsageError("--resume goes on with the run in a folder: name it with --out");
-    return nullptr;
-  }
+  require_folder_to_resume(folder, resume);
+  if (folder.empty()) return nullptr;
   auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
                                               resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
   if (resume) context.note(fmt::format("{} touches are done already", journal->resumed()));

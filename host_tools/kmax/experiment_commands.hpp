@@ -28,8 +28,11 @@ void require_kind(const Context& context, CLI::App& of_people, CLI::App& of_devi
 /// --resume, of the experiments on a device that keep a journal.
 void add_resume_option(CLI::App& device, bool& resume);
 
-/// The journal NAME.journal of the touches, in `folder`; none without a folder. UsageError for `resume`
-/// without a folder; experiment::JournalError.
+/// UsageError for --resume without --out.
+void require_folder_to_resume(const std::string& folder, bool resume);
+
+/// The journal NAME.journal of the touches, in `folder`; none without a folder. Errors:
+/// require_folder_to_resume(), experiment::JournalError.
 std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
                                                            const std::string& name,
                                                            const experiment::RunJournal::Json& settings,

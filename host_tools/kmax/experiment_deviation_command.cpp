@@ -1,49 +1,28 @@
 // kmax experiment deviation.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include "host_tools/experiment/deviation/deviation_device.hpp"
 #include "host_tools/experiment/deviation/deviation_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/progress.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/kmax/value_json.hpp"
-#include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
 namespace {
 
-struct DeviationOptions {
+struct DeviationOptions : StudyOptions {
   experiment::DeviationSettings simulated;
   experiment::DeviationDeviceSettings device;
-  double clip = 0.0, activation_gain = -1.0;
-  std::string subjects;
-  ExperimentFiles files;
-  bool no_prompt = false, resume = false;
+  PeopleOptions people;
 };
-
-constexpr auto interrupted = "interrupted; nothing is armed";
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
                                     const Interruption& interruption) {
-  experiment::DeviationSettings settings = options.simulated;
-  std::vector<simulation::OperatorModel> people = people_of(options.subjects, settings.device);
-  settings.device.force_limit = options.clip;
-  set_activation_gain(people, options.activation_gain);
-  Progress progress(context.messages());
-  try {
-    return experiment::study_deviation(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
-      progress.show(fmt::format("{} of {} pairs of forces", done, all));
-    });
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  return simulate_force_pairs(context, interruption, options.simulated, options.people,
+                              experiment::study_deviation);
 }
 
 experiment::DeviationStudy measure(Context& context, const DeviationOptions& options,
@@ -52,21 +31,8 @@ experiment::DeviationStudy measure(Context& context, const DeviationOptions& opt
   settings.axis = context.axis();
   settings.protocol = options.simulated.protocol;
   device::Device device = context.connect();
-  const auto journal = open_touch_journal(context, options.files.folder, "deviation",
-                                          experiment::journal_settings(device, settings), options.resume);
-  const auto check_interruption = [&] {
-    if (interruption.requested())
-      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  Progress progress(context.messages());
-  const experiment::DeviationDeviceResult result = experiment::run_deviation_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter,
-      [&](const std::string& text) {
-        check_interruption();
-        progress.show(text);
-      },
-      journal.get(), [&](const std::string& text) { context.note(text); });
+  const experiment::DeviationDeviceResult result = make_touches(
+      context, interruption, device, "deviation", settings, options, experiment::run_deviation_on_device);
   experiment::DeviationStudy study;
   study.origin = report::Origin::measured;
   study.results = result.results;
@@ -108,7 +74,7 @@ Json pairs_json(const std::vector<experiment::DeviationResult>& results) {
 
 Json verdict_json(const experiment::DeviationVerdict& verdict) {
   Json trends = Json::array();
-  for (const experiment::DeviationTrend& trend : verdict.trends)
+  for (const experiment::BackgroundTrend& trend : verdict.trends)
     trends.push_back({{"interference_force_n", trend.interference},
                       {"without_m", trend.without},
                       {"with_m", trend.with},
@@ -132,37 +98,23 @@ Json fits_json(const std::vector<experiment::DeviationFit>& fits) {
   return all;
 }
 
-int run_deviation_experiment(Context& context, const DeviationOptions& options) {
-  const Interruption interruption;
-  make_folder(options.files);
-  const experiment::DeviationStudy study = context.simulated() ? simulate(context, options, interruption)
-                                                               : measure(context, options, interruption);
-  std::vector<std::filesystem::path> files;
-  if (!options.files.folder.empty())
-    files = experiment::write_deviation(study, options.files.folder, options.files.ending);
-  const int code = study.verdict.claim_met() ? done : verdict_is_no;
-  if (context.json) {
-    Json document = {{"origin", std::string(report::words_of(study.origin))},
-                     {"circumstances", study.circumstances},
-                     {"pairs", pairs_json(study.results)},
-                     {"verdict", verdict_json(study.verdict)}};
-    if (!study.without_stiffening.empty())
-      document["without_stiffening"] = {{"pairs", pairs_json(study.without_stiffening)},
-                                        {"verdict", verdict_json(study.verdict_without_stiffening)}};
-    document["paper_table_fits"] = fits_json(study.fits);
-    document["files"] = names_json(files);
-    context.print(document);
-    return code;
-  }
-  for (const std::string& words : experiment::deviation_words(study))
-    fmt::print(context.out, "{}\n\n", words);
-  for (const report::Table& table :
-       {experiment::deviation_table(study), experiment::deviation_claims_table(study),
-        experiment::deviation_fit_table(study)})
-    fmt::print(context.out, "{}\n", report::terminal_text(table));
-  print_names(context.out, files);
-  return code;
+StudyReport report_of(const experiment::DeviationStudy& study) {
+  StudyReport report{study.verdict.claim_met(),
+                     document_of(study),
+                     experiment::deviation_words(study),
+                     {experiment::deviation_table(study), experiment::deviation_claims_table(study),
+                      experiment::deviation_fit_table(study)}};
+  report.document["pairs"] = pairs_json(study.results);
+  report.document["verdict"] = verdict_json(study.verdict);
+  if (!study.without_stiffening.empty())
+    report.document["without_stiffening"] = {{"pairs", pairs_json(study.without_stiffening)},
+                                             {"verdict", verdict_json(study.verdict_without_stiffening)}};
+  report.document["paper_table_fits"] = fits_json(study.fits);
+  return report;
 }
+
+constexpr StudyCommand<experiment::DeviationStudy, DeviationOptions> deviation_study{
+    simulate, measure, experiment::write_deviation, report_of};
 }  // namespace
 
 void add_deviation_experiment(CLI::App& experiment, Context& context) {
@@ -207,25 +159,12 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
   add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  add_subjects_option(*people, options->subjects);
-  add_activation_gain_option(*people, options->activation_gain);
+  add_people_options(*people, options->people);
   people->add_option("--push", simulated.push, "Push against the wall, N; above every F_B")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  people->add_option("--clip", options->clip, "Largest force of the simulated device, N; 0: no limit")
-      ->check(finite_number() & CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-
-  auto* device = command->add_option_group("Device", "With --device");
-  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  add_touch_options(*device, options->no_prompt, options->device.patience);
-  add_resume_option(*device, options->resume);
-  command->callback([&context, options, people, device] {
-    context.action = [&context, options, people, device] {
-      require_kind(context, *people, *device);
-      return run_deviation_experiment(context, *options);
-    };
-  });
+  add_clip_option(*people, options->people.clip);
+  add_study_action(*command, context, *people, options, deviation_study);
 }
 
 }  // namespace kmax::cli

@@ -1,48 +1,28 @@
 // kmax experiment jitter.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
+#include "host_tools/experiment/jitter/jitter_device.hpp"
 #include "host_tools/experiment/jitter/jitter_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/progress.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/kmax/value_json.hpp"
-#include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
 namespace {
 
-struct JitterOptions {
+struct JitterOptions : StudyOptions {
   experiment::JitterSettings simulated;
   experiment::JitterDeviceSettings device;
-  double clip = 0.0, activation_gain = -1.0;
-  std::string subjects;
-  ExperimentFiles files;
-  bool no_prompt = false, resume = false;
+  PeopleOptions people;
 };
-
-constexpr auto interrupted = "interrupted; nothing is armed";
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
                                  const Interruption& interruption) {
-  experiment::JitterSettings settings = options.simulated;
-  std::vector<simulation::OperatorModel> people = people_of(options.subjects, settings.device);
-  settings.device.force_limit = options.clip;
-  set_activation_gain(people, options.activation_gain);
-  Progress progress(context.messages());
-  try {
-    return experiment::study_jitter(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
-      progress.show(fmt::format("{} of {} pairs of forces", done, all));
-    });
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  return simulate_force_pairs(context, interruption, options.simulated, options.people,
+                              experiment::study_jitter);
 }
 
 experiment::JitterStudy measure(Context& context, const JitterOptions& options,
@@ -52,21 +32,8 @@ experiment::JitterStudy measure(Context& context, const JitterOptions& options,
   settings.wall = options.simulated.wall;
   settings.touches = options.simulated.touches;
   device::Device device = context.connect();
-  const auto journal = open_touch_journal(context, options.files.folder, "jitter",
-                                          experiment::journal_settings(device, settings), options.resume);
-  const auto check_interruption = [&] {
-    if (interruption.requested())
-      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  Progress progress(context.messages());
-  const experiment::JitterDeviceResult result = experiment::run_jitter_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter,
-      [&](const std::string& text) {
-        check_interruption();
-        progress.show(text);
-      },
-      journal.get(), [&](const std::string& text) { context.note(text); });
+  const experiment::JitterDeviceResult result = make_touches(
+      context, interruption, device, "jitter", settings, options, experiment::run_jitter_on_device);
   experiment::JitterStudy study;
   study.wall = settings.wall;
   study.origin = report::Origin::measured;
@@ -108,38 +75,25 @@ Json verdict_json(const experiment::JitterVerdict& verdict) {
           {"adjustment_time_rank_correlation", optional_json(verdict.time_rank)}};
 }
 
-int run_jitter_experiment(Context& context, const JitterOptions& options) {
-  const Interruption interruption;
-  make_folder(options.files);
-  const experiment::JitterStudy study = context.simulated() ? simulate(context, options, interruption)
-                                                            : measure(context, options, interruption);
-  std::vector<std::filesystem::path> files;
-  if (!options.files.folder.empty())
-    files = experiment::write_jitter(study, options.files.folder, options.files.ending);
-  const int code = study.verdict.claim_met() ? done : verdict_is_no;
-  if (context.json) {
-    Json document = {{"origin", std::string(report::words_of(study.origin))},
-                     {"circumstances", study.circumstances},
-                     {"pairs", pairs_json(study.results)},
-                     {"verdict", verdict_json(study.verdict)}};
-    Json variations = Json::array();
-    for (const experiment::JitterVariation& variation : study.variations)
-      variations.push_back({{"name", variation.name},
-                            {"pairs", pairs_json(variation.results)},
-                            {"verdict", verdict_json(variation.verdict)}});
-    document["variations"] = std::move(variations);
-    document["files"] = names_json(files);
-    context.print(document);
-    return code;
-  }
-  for (const std::string& words : experiment::jitter_words(study)) fmt::print(context.out, "{}\n\n", words);
-  fmt::print(context.out, "{}\n{}\n", report::terminal_text(experiment::jitter_table(study)),
-             report::terminal_text(experiment::jitter_claims_table(study)));
-  if (!study.variations.empty())
-    fmt::print(context.out, "{}\n", report::terminal_text(experiment::jitter_variations_table(study)));
-  print_names(context.out, files);
-  return code;
+StudyReport report_of(const experiment::JitterStudy& study) {
+  StudyReport report{study.verdict.claim_met(),
+                     document_of(study),
+                     experiment::jitter_words(study),
+                     {experiment::jitter_table(study), experiment::jitter_claims_table(study)}};
+  if (!study.variations.empty()) report.tables.push_back(experiment::jitter_variations_table(study));
+  report.document["pairs"] = pairs_json(study.results);
+  report.document["verdict"] = verdict_json(study.verdict);
+  Json variations = Json::array();
+  for (const experiment::JitterVariation& variation : study.variations)
+    variations.push_back({{"name", variation.name},
+                          {"pairs", pairs_json(variation.results)},
+                          {"verdict", verdict_json(variation.verdict)}});
+  report.document["variations"] = std::move(variations);
+  return report;
 }
+
+constexpr StudyCommand<experiment::JitterStudy, JitterOptions> jitter_study{
+    simulate, measure, experiment::write_jitter, report_of};
 }  // namespace
 
 void add_jitter_experiment(CLI::App& experiment, Context& context) {
@@ -178,8 +132,7 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
   add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  add_subjects_option(*people, options->subjects);
-  add_activation_gain_option(*people, options->activation_gain);
+  add_people_options(*people, options->people);
   people->add_option("--push", simulated.push, "Push without the forces that the person answers to, N")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
@@ -189,20 +142,8 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
   people->add_option("--reaction", simulated.reaction, "Share of F_I that the person answers to, 0 to 1")
       ->check(finite_number() & CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  people->add_option("--clip", options->clip, "Largest force of the simulated device, N; 0: no limit")
-      ->check(finite_number() & CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-
-  auto* device = command->add_option_group("Device", "With --device");
-  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  add_touch_options(*device, options->no_prompt, options->device.patience);
-  add_resume_option(*device, options->resume);
-  command->callback([&context, options, people, device] {
-    context.action = [&context, options, people, device] {
-      require_kind(context, *people, *device);
-      return run_jitter_experiment(context, *options);
-    };
-  });
+  add_clip_option(*people, options->people.clip);
+  add_study_action(*command, context, *people, options, jitter_study);
 }
 
 }  // namespace kmax::cli

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
@@ -51,6 +52,10 @@ Json condition_json(const experiment::StiffnessCondition& condition, double stif
       {"max_stiffness_n_per_m", stiffness},
       {"subjects", subjects},
       {"paper_n_per_m", condition.paper ? Json(*condition.paper) : Json(nullptr)}};
+}
+
+double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 namespace {
@@ -168,17 +173,13 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
       ->type_name("LIST");
   command->add_option("--out", options->folder, "Folder for a page, pictures, CSV and the journal")
       ->type_name("DIR");
-  command->add_flag("--resume", options->resume, "Go on with the interrupted run in --out");
-  command->add_option("--format", options->ending, "Kind of picture")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
-      ->type_name("svg|png");
+  add_resume_option(*command, options->resume);
+  add_format_option(*command, options->ending);
   const Options of_model = add_model_options(*command, *options);
   const Options of_device = add_device_options(*command, *options);
   command->callback([&context, options, of_model, of_device] {
     context.action = [&context, options, of_model, of_device] {
-      if (options->resume && options->folder.empty())
-        throw UsageError("--resume goes on with the run in a folder: name it with --out");
+      require_folder_to_resume(options->folder, options->resume);
       const Interruption interruption;
       if (context.simulated()) {
         require_none(of_device, "is for a device; name one with --device");

@@ -13,7 +13,11 @@ namespace kmax::cli {
 
 void add_file_options(CLI::App& command, ExperimentFiles& files, const std::string& contents) {
   command.add_option("--out", files.folder, contents)->type_name("DIR");
-  command.add_option("--format", files.ending, "Kind of picture")
+  add_format_option(command, files.ending);
+}
+
+void add_format_option(CLI::App& command, std::string& ending) {
+  command.add_option("--format", ending, "Kind of picture")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
       ->type_name("svg|png");
@@ -47,16 +51,27 @@ std::vector<simulation::OperatorModel> people_of(const std::string& set, simulat
   return people;
 }
 
-void add_activation_gain_option(CLI::App& command, double& activation_gain) {
+void add_people_options(CLI::App& command, PeopleOptions& options) {
+  add_subjects_option(command, options.subjects);
   command
-      .add_option("--activation-gain", activation_gain,
+      .add_option("--activation-gain", options.activation_gain,
                   "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
       ->check(finite_number() & CLI::Range(0.0, 100.0));
 }
 
-void set_activation_gain(std::vector<simulation::OperatorModel>& people, double activation_gain) {
-  if (activation_gain < 0.0) return;
-  for (simulation::OperatorModel& person : people) person.activation_gain = activation_gain;
+void add_clip_option(CLI::App& command, double& clip) {
+  command.add_option("--clip", clip, "Largest force of the simulated device, N; 0: no limit")
+      ->check(finite_number() & CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+}
+
+std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
+                                                 simulation::DeviceModel& device) {
+  std::vector<simulation::OperatorModel> people = people_of(options.subjects, device);
+  device.force_limit = options.clip;
+  if (options.activation_gain >= 0.0)
+    for (simulation::OperatorModel& person : people) person.activation_gain = options.activation_gain;
+  return people;
 }
 
 void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude) {

@@ -28,6 +28,8 @@ struct ExperimentFiles {
 /// `contents`: what the help text of --out says.
 void add_file_options(CLI::App& command, ExperimentFiles& files,
                       const std::string& contents = "Folder for CSV, pictures and a page");
+/// --format alone.
+void add_format_option(CLI::App& command, std::string& ending);
 /// Makes the folder, if one is wanted: before anybody presses anything.
 void make_folder(const ExperimentFiles& files);
 Json names_json(const std::vector<std::filesystem::path>& written);
@@ -39,9 +41,18 @@ void add_subjects_option(CLI::App& command, std::string& people);
 /// Subject 1, or those of the set and its device. Throws simulation::SceneError.
 std::vector<simulation::OperatorModel> people_of(const std::string& set, simulation::DeviceModel& device);
 
-/// --activation-gain; negative: as the people are.
-void add_activation_gain_option(CLI::App& command, double& activation_gain);
-void set_activation_gain(std::vector<simulation::OperatorModel>& people, double activation_gain);
+/// --subjects, --activation-gain and --clip: whom the forces of a simulated device push, and how far it goes.
+struct PeopleOptions {
+  std::string subjects;
+  double activation_gain = -1.0;  ///< 1/N, of everybody; negative: as the people are
+  double clip = 0.0;              ///< N; 0: no limit
+};
+/// --subjects and --activation-gain.
+void add_people_options(CLI::App& command, PeopleOptions& options);
+void add_clip_option(CLI::App& command, double& clip);
+/// As people_of() of the set, with the gain, and the device with the limit, that the options give.
+std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
+                                                 simulation::DeviceModel& device);
 
 /// --force-limit and --abort-amplitude, which every experiment on a device takes; values in N and m.
 void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude);

@@ -1,37 +1,33 @@
 // kmax experiment resolution.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
+#include "host_tools/experiment/resolution/resolution_device.hpp"
 #include "host_tools/experiment/resolution/resolution_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/progress.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/kmax/value_json.hpp"
-#include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
 namespace {
 
-struct ResolutionOptions {
+struct ResolutionOptions : StudyOptions {
   experiment::ResolutionSettings simulated;
   experiment::ResolutionDeviceSettings device;
   std::vector<double> speeds;
   int touches = 0;
   std::string subjects, rounding = "nearest";
-  ExperimentFiles files;
-  bool no_prompt = false, resume = false;
 };
-
-constexpr auto interrupted = "interrupted; nothing is armed";
 
 control::Rounding rounding_of(const std::string& name) {
   if (name == "floor") return control::Rounding::floor;
   return name == "hysteresis" ? control::Rounding::hysteresis : control::Rounding::nearest;
+}
+
+std::string percent_words(std::size_t done, std::size_t all) {
+  return fmt::format("{:.0f} % done", 100.0 * static_cast<double>(done) / static_cast<double>(all));
 }
 
 experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& options,
@@ -43,16 +39,9 @@ experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& 
   // Of a set the people only: the device is paper 2's.
   simulation::DeviceModel unused;
   const std::vector<simulation::OperatorModel> people = people_of(options.subjects, unused);
-  Progress progress(context.messages());
-  try {
-    return experiment::study_resolution(settings, people, [&](std::size_t done, std::size_t all) {
-      if (interruption.requested()) throw ExperimentInterrupted(interrupted);
-      progress.show(
-          fmt::format("{:.0f} % done", 100.0 * static_cast<double>(done) / static_cast<double>(all)));
-    });
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  return simulate_study(context, interruption, percent_words, [&](const experiment::ProgressReport& tell) {
+    return experiment::study_resolution(settings, people, tell);
+  });
 }
 
 experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,
@@ -64,21 +53,8 @@ experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& o
   if (!options.speeds.empty()) settings.speeds = options.speeds;
   if (options.touches > 0) settings.touches = options.touches;
   device::Device device = context.connect();
-  const auto journal = open_touch_journal(context, options.files.folder, "resolution",
-                                          experiment::journal_settings(device, settings), options.resume);
-  const auto check_interruption = [&] {
-    if (interruption.requested())
-      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on" : interrupted);
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  Progress progress(context.messages());
-  const experiment::ResolutionDeviceResult result = experiment::run_resolution_on_device(
-      device, settings, options.no_prompt ? nullptr : &prompter,
-      [&](const std::string& text) {
-        check_interruption();
-        progress.show(text);
-      },
-      journal.get(), [&](const std::string& text) { context.note(text); });
+  const experiment::ResolutionDeviceResult result = make_touches(
+      context, interruption, device, "resolution", settings, options, experiment::run_resolution_on_device);
   experiment::ResolutionStudy study;
   study.wall = settings.wall;
   study.origin = report::Origin::measured;
@@ -120,40 +96,27 @@ Json run_json(const experiment::ResolutionRun& run, bool simulated) {
   return document;
 }
 
-int run_resolution_experiment(Context& context, const ResolutionOptions& options) {
-  const Interruption interruption;
-  make_folder(options.files);
-  const bool simulated = context.simulated();
-  const experiment::ResolutionStudy study =
-      simulated ? simulate(context, options, interruption) : measure(context, options, interruption);
-  std::vector<std::filesystem::path> files;
-  if (!options.files.folder.empty())
-    files = experiment::write_resolution(study, options.files.folder, options.files.ending);
+StudyReport report_of(const experiment::ResolutionStudy& study) {
   const experiment::ResolutionVerdict verdict = study.verdict();
-  const int code = verdict.claim_met() ? done : verdict_is_no;
-  if (context.json) {
-    Json runs = Json::array(), variations = Json::array();
-    for (const experiment::ResolutionRun& run : study.runs) runs.push_back(run_json(run, simulated));
-    for (const experiment::ResolutionVariation& one : study.variations)
-      variations.push_back({{"changed_to", one.change}, {"verdict", verdict_json(one.verdict)}});
-    context.print({{"origin", std::string(report::words_of(study.origin))},
-                   {"circumstances", study.circumstances},
-                   {"stiffness_n_per_m", study.wall.stiffness},
-                   {"runs", runs},
-                   {"verdict", verdict_json(verdict)},
-                   {"variations", variations},
-                   {"files", names_json(files)}});
-    return code;
-  }
-  for (const std::string& words : experiment::resolution_words(study))
-    fmt::print(context.out, "{}\n\n", words);
-  fmt::print(context.out, "{}\n{}\n", report::terminal_text(experiment::resolution_table(study)),
-             report::terminal_text(experiment::resolution_claims_table(study)));
-  if (!study.variations.empty())
-    fmt::print(context.out, "{}\n", report::terminal_text(experiment::resolution_variations_table(study)));
-  print_names(context.out, files);
-  return code;
+  StudyReport report{verdict.claim_met(),
+                     document_of(study),
+                     experiment::resolution_words(study),
+                     {experiment::resolution_table(study), experiment::resolution_claims_table(study)}};
+  if (!study.variations.empty()) report.tables.push_back(experiment::resolution_variations_table(study));
+  Json runs = Json::array(), variations = Json::array();
+  for (const experiment::ResolutionRun& run : study.runs)
+    runs.push_back(run_json(run, !study.pushes.empty()));
+  for (const experiment::ResolutionVariation& one : study.variations)
+    variations.push_back({{"changed_to", one.change}, {"verdict", verdict_json(one.verdict)}});
+  report.document["stiffness_n_per_m"] = study.wall.stiffness;
+  report.document["runs"] = std::move(runs);
+  report.document["verdict"] = verdict_json(verdict);
+  report.document["variations"] = std::move(variations);
+  return report;
 }
+
+constexpr StudyCommand<experiment::ResolutionStudy, ResolutionOptions> resolution_study{
+    simulate, measure, experiment::write_resolution, report_of};
 }  // namespace
 
 void add_resolution_experiment(CLI::App& experiment, Context& context) {
@@ -217,17 +180,7 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
   people->add_option("--clip", simulated.device.force_limit, "Largest force of the device, N; 0: no limit")
       ->check(finite_number() & CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-
-  auto* device = command->add_option_group("Device", "With --device");
-  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  add_touch_options(*device, options->no_prompt, options->device.patience);
-  add_resume_option(*device, options->resume);
-  command->callback([&context, options, people, device] {
-    context.action = [&context, options, people, device] {
-      require_kind(context, *people, *device);
-      return run_resolution_experiment(context, *options);
-    };
-  });
+  add_study_action(*command, context, *people, options, resolution_study);
 }
 
 }  // namespace kmax::cli

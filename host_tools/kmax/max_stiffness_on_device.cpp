@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
-#include <chrono>
 #include <filesystem>
 
 #include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
+#include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "host_tools/kmax/progress.hpp"
@@ -17,10 +17,6 @@ namespace kmax::cli {
 
 namespace {
 using experiment::DeviceStiffnessResult;
-
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 void print_results(Context& context, const std::vector<DeviceStiffnessResult>& results,
                    const experiment::DeviceStiffnessSettings& settings, const std::string& device,
@@ -40,7 +36,7 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
   for (const std::string& line : experiment::device_stiffness_words(settings, device))
     fmt::print(context.out, "{}\n", line);
   fmt::print(context.out, "\n{}", report::terminal_text(experiment::device_stiffness_table(results)));
-  for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+  print_names(context.out, files);
 }
 }  // namespace
 
@@ -57,14 +53,8 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
   // Before anybody presses anything.
   if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
   device::Device device = context.connect();
-  std::optional<experiment::RunJournal> journal;
-  if (!options.folder.empty())
-    journal.emplace(
-        std::filesystem::path(options.folder) / "max_stiffness.journal",
-        experiment::journal_settings(device, settings),
-        options.resume ? experiment::RunJournal::Begin::resume : experiment::RunJournal::Begin::anew);
-  if (journal && options.resume) context.note(fmt::format("{} touches are done already", journal->resumed()));
-
+  const auto journal = open_touch_journal(context, options.folder, "max_stiffness",
+                                          experiment::journal_settings(device, settings), options.resume);
   const auto check_interruption = [&] {
     if (interruption.requested())
       throw ExperimentInterrupted(journal ? "interrupted; the axis has been disarmed; --resume goes on"
@@ -86,9 +76,8 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
                                        remaining.seconds(seconds_now(), results.size(), conditions.size()));
         progress.show(fmt::format("walls: {}; {}", far, text));
       };
-      results.push_back(experiment::find_max_stiffness(device, condition, settings,
-                                                       options.no_prompt ? nullptr : &prompter,
-                                                       journal ? &*journal : nullptr, tell));
+      results.push_back(experiment::find_max_stiffness(
+          device, condition, settings, options.no_prompt ? nullptr : &prompter, journal.get(), tell));
     }
   }
   std::vector<std::filesystem::path> files;

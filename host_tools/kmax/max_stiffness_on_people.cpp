@@ -3,7 +3,6 @@
 #include <fmt/ostream.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 
 #include "host_tools/experiment/max_stiffness/max_stiffness_pictures.hpp"
@@ -23,10 +22,6 @@ namespace {
 using experiment::MaxStiffnessStudy;
 using experiment::RunJournal;
 using experiment::SubjectSet;
-
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 bool clips(const SubjectSet& set) {
   return set.device.force_limit > 0.0;
@@ -241,7 +236,7 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
     for (const auto& file : files) context.note(file.string());
   } else {
     for (const report::Section& section : page.sections) print_section(context.out, section);
-    for (const auto& file : files) fmt::print(context.out, "{}\n", file.string());
+    print_names(context.out, files);
   }
   return std::all_of(studies.begin(), studies.end(), experiment::as_calibrated) ? done : verdict_is_no;
 }

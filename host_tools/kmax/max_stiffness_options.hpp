@@ -40,6 +40,9 @@ std::vector<experiment::StiffnessCondition> conditions_for(const std::vector<std
 Json condition_json(const experiment::StiffnessCondition& condition, double stiffness,
                     const std::vector<double>& subjects, const std::string& name = {});
 
+/// Of a clock that does not run backwards, for experiment::RemainingTime.
+double seconds_now();
+
 /// Each does the experiment, prints it, and returns the exit code.
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,
                             const Interruption& interruption);

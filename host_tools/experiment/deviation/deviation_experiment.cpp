@@ -10,6 +10,7 @@
 
 #include "control/haptic_loop.hpp"
 #include "host_tools/experiment/rank_correlation.hpp"
+#include "host_tools/experiment/setting_check.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/encoder_model.hpp"
@@ -41,12 +42,9 @@ DeviationMeasure measure_deviation(std::span<const DeviationSample> samples, std
 }
 
 namespace {
+constexpr SettingCheck check("deviation");
+
 void require(const DeviationSettings& settings, double background) {
-  const auto check = [](const char* name, double value, double least, double most) {
-    if (!(value >= least && value <= most))
-      throw std::invalid_argument(
-          fmt::format("deviation: {} = {}: allowed is {} to {}", name, value, least, most));
-  };
   const DeviationProtocol& protocol = settings.protocol;
   check("stiffness", protocol.stiffness, 1.0, 1e6);
   check("haptic rate", protocol.haptic_rate, 10.0, 1e6);
@@ -168,9 +166,8 @@ DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const
 
 std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
                                            const std::vector<simulation::OperatorModel>& people,
-                                           const std::function<void(std::size_t, std::size_t)>& tell) {
-  if (people.empty())
-    throw std::invalid_argument("deviation: nobody to hold the handle; give at least one person");
+                                           const ProgressReport& tell) {
+  check.require_somebody(people);
   std::vector<DeviationResult> results;
   for (const paper::DeviationCell& cell : paper::table_2) {
     if (tell) tell(results.size(), paper::table_2.size());
@@ -183,8 +180,7 @@ std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
 }
 
 bool DeviationVerdict::claim_met() const {
-  return !trends.empty() &&
-         std::all_of(trends.begin(), trends.end(), [](const DeviationTrend& trend) { return trend.falls(); });
+  return all_fall(trends);
 }
 
 DeviationVerdict judge_deviation(std::span<const DeviationResult> results) {
@@ -199,24 +195,9 @@ DeviationVerdict judge_deviation(std::span<const DeviationResult> results) {
   for (const double interference : paper::interference_forces) {
     const auto undisturbed = paper::deviation(0.0, interference);
     if (!undisturbed || undisturbed->deviation == 0.0) continue;
-    std::vector<double> forces, values, printed;
-    for (const DeviationResult& result : results) {
-      if (result.paper.interference != interference || result.touches == 0) continue;
-      forces.push_back(result.paper.background);
-      values.push_back(result.deviation);
-      printed.push_back(result.paper.deviation);
-    }
-    DeviationTrend trend{interference, 0.0, 0.0, 0.0, 0.0, rank_correlation(forces, values)};
-    if (!forces.empty()) {
-      const auto [least, most] = std::minmax_element(forces.begin(), forces.end());
-      const auto first = static_cast<std::size_t>(least - forces.begin());
-      const auto last = static_cast<std::size_t>(most - forces.begin());
-      trend.without = values[first];
-      trend.with = values[last];
-      trend.paper_without = printed[first];
-      trend.paper_with = printed[last];
-    }
-    verdict.trends.push_back(trend);
+    verdict.trends.push_back(background_trend(interference, results, &DeviationResult::deviation));
+    verdict.paper_trends.push_back(background_trend(
+        interference, results, [](const DeviationResult& result) { return result.paper.deviation; }));
   }
   return verdict;
 }

@@ -18,13 +18,14 @@
 // With activation_gain = 0 nothing in this model makes Dev depend on F_B: that case is computed beside every
 // other, and there the paper's trend must fail.
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/background_trend.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
@@ -96,21 +97,14 @@ struct DeviationResult {
 DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const DeviationTouch> touches);
 
 /// All pairs of Table II; `tell` as run_jitter().
-std::vector<DeviationResult> run_deviation(
-    const DeviationSettings& settings, const std::vector<simulation::OperatorModel>& people,
-    const std::function<void(std::size_t done, std::size_t all)>& tell = {});
-
-struct DeviationTrend {
-  double interference;               ///< N
-  double without, with;              ///< m, at F_B = 0 and at the largest F_B
-  double paper_without, paper_with;  ///< m
-  std::optional<double> rank;        ///< correlation with F_B
-  bool falls() const { return without > 0.0 && with <= 0.9 * without; }
-};
+std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
+                                           const std::vector<simulation::OperatorModel>& people,
+                                           const ProgressReport& tell = {});
 
 struct DeviationVerdict {
-  std::vector<DeviationTrend> trends;  ///< one for each F_I that has a deviation in the paper
-  std::optional<double> rank;          ///< ours against the paper's, over all pairs
+  std::vector<BackgroundTrend> trends;        ///< m, one for each F_I that has a deviation in the paper
+  std::vector<BackgroundTrend> paper_trends;  ///< m, the paper's, over the same pairs of forces
+  std::optional<double> rank;                 ///< ours against the paper's, over all pairs
   /// The paper's claim (section 2.2.2): the deviation decreases while F_B increases.
   bool claim_met() const;
 };

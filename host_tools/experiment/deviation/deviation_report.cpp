@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page_files.hpp"
 
@@ -11,12 +12,6 @@ namespace kmax::experiment {
 namespace {
 std::string mm(double metres) {
   return fmt::format("{:.2f}", metres * 1e3);
-}
-std::string yes_no(bool value) {
-  return value ? "yes" : "no";
-}
-std::string rank_text(const std::optional<double>& rank) {
-  return rank ? fmt::format("{:+.2f}", *rank) : std::string("-");
 }
 
 const DeviationResult* at(const std::vector<DeviationResult>& results, const paper::DeviationCell& cell) {
@@ -48,33 +43,25 @@ std::string_view words_without_stiffening(bool falls, bool falls_without) {
 
 DeviationStudy study_deviation(const DeviationSettings& settings,
                                const std::vector<simulation::OperatorModel>& people,
-                               const std::function<void(std::size_t, std::size_t)>& tell) {
-  const auto part = [&](std::size_t number) {
-    return [&tell, number](std::size_t done, std::size_t all) {
-      if (tell) tell(number * all + done, 2 * all);
-    };
-  };
+                               const ProgressReport& tell) {
   DeviationStudy study;
-  study.results = run_deviation(settings, people, part(0));
+  study.results = run_deviation(settings, people, part_of(tell, 0, 1, 2));
   study.verdict = judge_deviation(study.results);
   std::vector<simulation::OperatorModel> never_stiffer = people;
   for (simulation::OperatorModel& person : never_stiffer) person.activation_gain = 0.0;
-  study.without_stiffening = run_deviation(settings, never_stiffer, part(1));
+  study.without_stiffening = run_deviation(settings, never_stiffer, part_of(tell, 1, 1, 2));
   study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
   study.fits = fit_table_2();
   simulate_deviation(settings, people.front(), 3.0, 5.0, &study.touch);
   double contact = 1.0;
   for (const DeviationResult& result : study.results) contact = std::min(contact, result.contact_share);
   study.circumstances = fmt::format(
-      "Simulated: {} {}, wall of {:g} N/mm at {:g} Hz, push {:g} N, {} pulses of {:g} s without and {} with "
+      "Simulated: {}, wall of {:g} N/mm at {:g} Hz, push {:g} N, {} pulses of {:g} s without and {} with "
       "F_B, {:g} "
       "s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
-      people.size(), people.size() == 1 ? "person" : "people", settings.protocol.stiffness / 1000,
-      settings.protocol.haptic_rate, settings.push, settings.protocol.pulses, settings.protocol.pulse_on,
-      settings.protocol.pulses, settings.protocol.rest,
-      settings.device.force_limit > 0.0 ? fmt::format("clipped at {:g} N", settings.device.force_limit)
-                                        : std::string("not clipped"),
-      100 * contact);
+      people_words(people.size()), settings.protocol.stiffness / 1000, settings.protocol.haptic_rate,
+      settings.push, settings.protocol.pulses, settings.protocol.pulse_on, settings.protocol.pulses,
+      settings.protocol.rest, clipping_words(settings.device), 100 * contact);
   return study;
 }
 
@@ -107,19 +94,19 @@ report::Table deviation_claims_table(const DeviationStudy& study) {
       "Does Dev fall when F_B increases?",
       {"hand", "F_I (N)", "F_B = 0 (mm)", "largest F_B (mm)", "ratio", "rank with F_B", "falls"},
       {}};
+  const auto ratio = [](const BackgroundTrend& trend) {
+    return trend.without > 0 ? fmt::format("{:.2f}", trend.with / trend.without) : "-";
+  };
   const auto rows = [&](const std::string& name, const DeviationVerdict& verdict) {
-    for (const DeviationTrend& trend : verdict.trends)
+    for (const BackgroundTrend& trend : verdict.trends)
       table.rows.push_back({name, fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
-                            trend.without > 0 ? fmt::format("{:.2f}", trend.with / trend.without) : "-",
-                            rank_text(trend.rank), yes_no(trend.falls())});
+                            ratio(trend), rank_text(trend.rank), yes_no(trend.falls())});
   };
   rows(std::string(report::words_of(study.origin)), study.verdict);
   if (!study.without_stiffening.empty()) rows("activation_gain = 0", study.verdict_without_stiffening);
-  for (const DeviationTrend& trend : study.verdict.trends)
-    table.rows.push_back(
-        {"paper", fmt::format("{:g}", trend.interference), mm(trend.paper_without), mm(trend.paper_with),
-         trend.paper_without > 0 ? fmt::format("{:.2f}", trend.paper_with / trend.paper_without) : "-", "-",
-         "yes"});
+  for (const BackgroundTrend& trend : study.verdict.paper_trends)
+    table.rows.push_back({"paper", fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
+                          ratio(trend), "-", "yes"});
   return table;
 }
 

@@ -25,7 +25,7 @@ struct DeviationStudy {
 
 DeviationStudy study_deviation(const DeviationSettings& settings,
                                const std::vector<simulation::OperatorModel>& people,
-                               const std::function<void(std::size_t done, std::size_t all)>& tell = {});
+                               const ProgressReport& tell = {});
 
 report::Table deviation_table(const DeviationStudy& study);
 report::Table deviation_claims_table(const DeviationStudy& study);

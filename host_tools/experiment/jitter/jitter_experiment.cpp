@@ -1,12 +1,10 @@
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "host_tools/experiment/rank_correlation.hpp"
+#include "host_tools/experiment/setting_check.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/encoder_model.hpp"
@@ -40,12 +38,9 @@ JitterMeasure measure_jitter(std::span<const JitterSample> samples, const Jitter
 }
 
 namespace {
+constexpr SettingCheck check("jitter");
+
 void require(const JitterSettings& settings) {
-  const auto check = [](const char* name, double value, double least, double most) {
-    if (!(value >= least && value <= most))
-      throw std::invalid_argument(
-          fmt::format("jitter: {} = {}: allowed is {} to {}", name, value, least, most));
-  };
   check("stiffness", settings.wall.stiffness, 1.0, 1e6);
   check("haptic rate", settings.wall.haptic_rate, 10.0, 1e6);
   check("window", settings.wall.window, 0.01, 1000.0);
@@ -134,9 +129,8 @@ JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMe
 
 std::vector<JitterResult> run_jitter(const JitterSettings& settings,
                                      const std::vector<simulation::OperatorModel>& people,
-                                     const std::function<void(std::size_t, std::size_t)>& tell) {
-  if (people.empty())
-    throw std::invalid_argument("jitter: nobody to hold the handle; give at least one person");
+                                     const ProgressReport& tell) {
+  check.require_somebody(people);
   require(settings);
   std::vector<JitterResult> results;
   for (const paper::JitterCell& cell : paper::table_1) {
@@ -152,29 +146,6 @@ std::vector<JitterResult> run_jitter(const JitterSettings& settings,
   }
   return results;
 }
-
-namespace {
-bool all_fall(const std::vector<JitterTrend>& trends) {
-  return !trends.empty() &&
-         std::all_of(trends.begin(), trends.end(), [](const JitterTrend& trend) { return trend.falls(); });
-}
-
-JitterTrend trend_at(double interference, std::span<const JitterResult> results,
-                     double JitterResult::*number) {
-  std::vector<double> forces, values;
-  for (const JitterResult& result : results) {
-    if (result.paper.interference != interference || result.touches == 0) continue;
-    forces.push_back(result.paper.background);
-    values.push_back(result.*number);
-  }
-  JitterTrend trend{interference, 0.0, 0.0, rank_correlation(forces, values)};
-  if (forces.empty()) return trend;
-  const auto [least, most] = std::minmax_element(forces.begin(), forces.end());
-  trend.without = values[static_cast<std::size_t>(least - forces.begin())];
-  trend.with = values[static_cast<std::size_t>(most - forces.begin())];
-  return trend;
-}
-}  // namespace
 
 bool JitterVerdict::amplitude_falls() const {
   return all_fall(amplitude);
@@ -200,8 +171,8 @@ JitterVerdict judge_jitter(std::span<const JitterResult> results) {
   for (const double interference : paper::interference_forces) {
     const auto undisturbed = paper::jitter(0.0, interference);
     if (!undisturbed || undisturbed->amplitude == 0.0) continue;
-    verdict.amplitude.push_back(trend_at(interference, results, &JitterResult::amplitude));
-    verdict.time.push_back(trend_at(interference, results, &JitterResult::adjustment_time));
+    verdict.amplitude.push_back(background_trend(interference, results, &JitterResult::amplitude));
+    verdict.time.push_back(background_trend(interference, results, &JitterResult::adjustment_time));
   }
   return verdict;
 }

@@ -17,14 +17,15 @@
 // The forces exceed the 3.3 N of the paper's own device: the simulated one is not clipped, and the share of
 // samples beyond 3.3 N is reported.
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "control/haptic_loop.hpp"
+#include "host_tools/experiment/background_trend.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
@@ -83,18 +84,10 @@ JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMe
 /// All pairs of Table I. `tell` is called before each pair with how many are done, and may throw.
 std::vector<JitterResult> run_jitter(const JitterSettings& settings,
                                      const std::vector<simulation::OperatorModel>& people,
-                                     const std::function<void(std::size_t done, std::size_t all)>& tell = {});
-
-/// Does a number fall when F_B rises from its least to its largest value, at one F_I?
-struct JitterTrend {
-  double interference;         ///< N
-  double without, with;        ///< at F_B = 0 and at the largest F_B
-  std::optional<double> rank;  ///< correlation with F_B
-  bool falls() const { return without > 0.0 && with <= 0.9 * without; }
-};
+                                     const ProgressReport& tell = {});
 
 struct JitterVerdict {
-  std::vector<JitterTrend> amplitude, time;         ///< one for each F_I that has jitter in the paper
+  std::vector<BackgroundTrend> amplitude, time;     ///< one for each F_I that has jitter in the paper
   std::optional<double> amplitude_rank, time_rank;  ///< ours against the paper's, over all pairs
   bool all_settled = true;
   bool amplitude_falls() const;

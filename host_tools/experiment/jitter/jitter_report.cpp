@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page_files.hpp"
 
@@ -15,12 +16,6 @@ std::string mm(double metres) {
 std::string ms(double seconds) {
   return fmt::format("{:.0f}", seconds * 1e3);
 }
-std::string yes_no(bool value) {
-  return value ? "yes" : "no";
-}
-std::string rank_text(const std::optional<double>& rank) {
-  return rank ? fmt::format("{:+.2f}", *rank) : std::string("-");
-}
 
 std::string time_text(const JitterResult& result) {
   if (result.touches == 0) return "-";
@@ -30,13 +25,8 @@ std::string time_text(const JitterResult& result) {
 }  // namespace
 
 JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simulation::OperatorModel>& people,
-                         const std::function<void(std::size_t, std::size_t)>& tell) {
-  const std::size_t runs = 3;
-  const auto part = [&](std::size_t number) {
-    return [&tell, number](std::size_t done, std::size_t all) {
-      if (tell) tell(number * all + done, runs * all);
-    };
-  };
+                         const ProgressReport& tell) {
+  const auto part = [&](std::size_t number) { return part_of(tell, number, 1, 3); };
   JitterStudy study;
   study.wall = settings.wall;
   study.results = run_jitter(settings, people, part(0));
@@ -56,12 +46,10 @@ JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simul
   simulate_jitter(settings, people.front(), 0.0, 5.0, 0.0, &study.without);
   simulate_jitter(settings, people.front(), 3.0, 5.0, 0.0, &study.with);
   study.circumstances = fmt::format(
-      "Simulated: {} {}, {} touches each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force "
+      "Simulated: {}, {} touches each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force "
       "is {}.",
-      people.size(), people.size() == 1 ? "person" : "people", settings.touches,
-      settings.wall.stiffness / 1000, settings.wall.haptic_rate, settings.push, settings.approach_speed,
-      settings.device.force_limit > 0.0 ? fmt::format("clipped at {:g} N", settings.device.force_limit)
-                                        : std::string("not clipped"));
+      people_words(people.size()), settings.touches, settings.wall.stiffness / 1000,
+      settings.wall.haptic_rate, settings.push, settings.approach_speed, clipping_words(settings.device));
   return study;
 }
 
@@ -87,11 +75,11 @@ report::Table jitter_claims_table(const JitterStudy& study) {
   report::Table table{"Do they fall when F_B increases?",
                       {"F_I (N)", "number", "F_B = 0", "largest F_B", "rank with F_B", "falls"},
                       {}};
-  for (const JitterTrend& trend : study.verdict.amplitude)
+  for (const BackgroundTrend& trend : study.verdict.amplitude)
     table.rows.push_back({fmt::format("{:g}", trend.interference), "Jit (mm)",
                           fmt::format("{:.2f}", trend.without * 1e3), fmt::format("{:.2f}", trend.with * 1e3),
                           rank_text(trend.rank), yes_no(trend.falls())});
-  for (const JitterTrend& trend : study.verdict.time)
+  for (const BackgroundTrend& trend : study.verdict.time)
     table.rows.push_back({fmt::format("{:g}", trend.interference), "AT (ms)", ms(trend.without),
                           ms(trend.with), rank_text(trend.rank),
                           yes_no(trend.falls() && study.verdict.all_settled)});

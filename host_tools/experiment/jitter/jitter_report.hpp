@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/experiment/jitter/jitter_device.hpp"
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -31,7 +30,7 @@ struct JitterStudy {
 
 /// The simulated study: the table, and the table without stiffening and without an answer to F_I.
 JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simulation::OperatorModel>& people,
-                         const std::function<void(std::size_t done, std::size_t all)>& tell = {});
+                         const ProgressReport& tell = {});
 
 report::Table jitter_table(const JitterStudy& study);         ///< every pair of forces
 report::Table jitter_claims_table(const JitterStudy& study);  ///< the paper's claims, one row each

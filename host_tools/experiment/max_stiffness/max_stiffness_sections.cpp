@@ -7,6 +7,7 @@
 
 #include "host_tools/experiment/max_stiffness/marked_means.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/report_words.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -81,8 +82,7 @@ void append(std::vector<std::string>& to, const std::vector<std::string>& more) 
 }  // namespace
 
 std::string clip_words(const simulation::DeviceModel& device) {
-  return device.force_limit > 0.0 ? fmt::format("force clipped at {:g} N", device.force_limit)
-                                  : "force not clipped";
+  return "force " + clipping_words(device);
 }
 
 report::Table max_stiffness_table(const std::vector<MaxStiffnessStudy>& studies) {

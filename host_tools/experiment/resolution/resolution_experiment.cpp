@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "control/resolution_criterion.hpp"
+#include "host_tools/experiment/setting_check.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 
 namespace kmax::experiment {
@@ -19,12 +20,9 @@ double step_in_use(double resolution, double count_length) {
 }
 
 namespace {
+constexpr SettingCheck check("resolution");
+
 void require(const ResolutionSettings& settings, const ResolutionHand& hand) {
-  const auto check = [](const char* name, double value, double least, double most) {
-    if (!(value >= least && value <= most))
-      throw std::invalid_argument(
-          fmt::format("resolution: {} = {}: allowed is {} to {}", name, value, least, most));
-  };
   check("stiffness", settings.wall.stiffness, 1.0, 1e6);
   check("hold", settings.wall.hold, 1.0, 1000.0);
   check("touches", settings.touches, 1, 1000);
@@ -37,23 +35,30 @@ void require(const ResolutionSettings& settings, const ResolutionHand& hand) {
 }
 }  // namespace
 
-ResolutionCell simulate_resolution(const ResolutionSettings& settings, const ResolutionHand& hand,
-                                   const std::vector<simulation::OperatorModel>& people, double resolution,
-                                   double speed) {
-  require(settings, hand);
+TouchSetup resolution_touch(const ResolutionSettings& settings, const ResolutionHand& hand,
+                            const simulation::OperatorModel& person, double resolution) {
   const ResolutionWall& wall = settings.wall;
   TouchSetup setup;
   setup.device = settings.device;
   setup.device.delay = hand.delay;
+  setup.person = person;
+  setup.person.grip_stiffness *= hand.grip;
+  setup.person.grip_damping *= hand.grip;
   setup.threshold = wall.threshold;
-  setup.motion.approach_speed = speed;
   setup.motion.hold_time = wall.hold;
   setup.wall = touched_wall(wall.haptic_rate, settings.count_length, settings.device.force_limit);
   setup.wall.wall.kind = control::WallKind::plain;
   setup.wall.wall.stiffness = static_cast<float>(wall.stiffness);
   setup.wall.position_resolution = resolution;
   setup.wall.position_rounding = wall.rounding;
+  return setup;
+}
 
+ResolutionCell simulate_resolution(const ResolutionSettings& settings, const ResolutionHand& hand,
+                                   const std::vector<simulation::OperatorModel>& people, double resolution,
+                                   double speed) {
+  require(settings, hand);
+  const ResolutionWall& wall = settings.wall;
   ResolutionCell cell;
   cell.resolution = resolution;
   cell.step = step_in_use(resolution, settings.count_length);
@@ -61,9 +66,8 @@ ResolutionCell simulate_resolution(const ResolutionSettings& settings, const Res
   cell.force_step = control::force_step(wall.stiffness, cell.step, 1.0, speed, 1.0 / wall.haptic_rate);
   cell.people = people.size();
   for (const simulation::OperatorModel& person : people) {
-    setup.person = person;
-    setup.person.grip_stiffness *= hand.grip;
-    setup.person.grip_damping *= hand.grip;
+    TouchSetup setup = resolution_touch(settings, hand, person, resolution);
+    setup.motion.approach_speed = speed;
     bool vibrates = false;
     for (const double push : settings.pushes) {
       setup.motion.push_force = push;
@@ -85,9 +89,8 @@ ResolutionCell simulate_resolution(const ResolutionSettings& settings, const Res
 
 std::vector<ResolutionRun> run_resolution(const ResolutionSettings& settings,
                                           const std::vector<simulation::OperatorModel>& people,
-                                          const std::function<void(std::size_t, std::size_t)>& tell) {
-  if (people.empty())
-    throw std::invalid_argument("resolution: nobody to hold the handle; give at least one person");
+                                          const ProgressReport& tell) {
+  check.require_somebody(people);
   const std::array<ResolutionHand, 4> hands{
       {{1.0, 0.0}, {1.0, settings.weak.delay}, {settings.weak.grip, 0.0}, settings.weak}};
   const std::size_t all = hands.size() * settings.resolutions.size() * settings.speeds.size();
@@ -168,7 +171,7 @@ auto varied_numbers(const ResolutionSettings& settings) {
 
 std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
                                                  const std::vector<simulation::OperatorModel>& people,
-                                                 const std::function<void(std::size_t, std::size_t)>& tell) {
+                                                 const ProgressReport& tell) {
   std::vector<std::pair<std::string, ResolutionSettings>> changes;
   const auto change = [&](std::string name, auto make) {
     ResolutionSettings changed = settings;

@@ -18,7 +18,6 @@
 // Simulated with simulated_touch.hpp. Beside it the paper's criterion, K max(eta, delta v T) <= F_h
 // (control/resolution_criterion.hpp), with delta = 1 and F_h = the push.
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,6 +25,8 @@
 
 #include "control/resampler.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
@@ -72,15 +73,19 @@ struct ResolutionRun {
   std::vector<ResolutionCell> cells;
 };
 
+/// A touch as the experiment makes it; how fast, how hard and from where are the caller's (setup.motion).
+TouchSetup resolution_touch(const ResolutionSettings& settings, const ResolutionHand& hand,
+                            const simulation::OperatorModel& person, double resolution);
+
 /// Throws std::invalid_argument.
 ResolutionCell simulate_resolution(const ResolutionSettings& settings, const ResolutionHand& hand,
                                    const std::vector<simulation::OperatorModel>& people, double resolution,
                                    double speed);
 
 /// Full grip without delay, with delay, weak grip without delay, with delay: in this order.
-std::vector<ResolutionRun> run_resolution(
-    const ResolutionSettings& settings, const std::vector<simulation::OperatorModel>& people,
-    const std::function<void(std::size_t done, std::size_t all)>& tell = {});
+std::vector<ResolutionRun> run_resolution(const ResolutionSettings& settings,
+                                          const std::vector<simulation::OperatorModel>& people,
+                                          const ProgressReport& tell = {});
 
 struct ResolutionVerdict {
   bool coarse_vibrates = false;     ///< 0.4 mm: at every speed
@@ -103,9 +108,9 @@ struct ResolutionVariation {
 };
 /// Other grips, delays, friction and roundings: how much the claims hang on the numbers chosen. What the
 /// settings have already is left out.
-std::vector<ResolutionVariation> vary_resolution(
-    const ResolutionSettings& settings, const std::vector<simulation::OperatorModel>& people,
-    const std::function<void(std::size_t done, std::size_t all)>& tell = {});
+std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
+                                                 const std::vector<simulation::OperatorModel>& people,
+                                                 const ProgressReport& tell = {});
 
 /// The lowest speed from which on every higher one vibrates; nothing if the highest does not.
 std::optional<double> onset_speed(std::span<const ResolutionCell> cells, double resolution);

@@ -5,15 +5,13 @@
 #include <algorithm>
 
 #include "control/resolution_criterion.hpp"
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page_files.hpp"
 
 namespace kmax::experiment {
 namespace {
-std::string yes_no(bool value) {
-  return value ? "yes" : "no";
-}
 std::string mm(double metres) {
   return fmt::format("{:.3g}", metres * 1e3);
 }
@@ -32,20 +30,9 @@ std::string onset_text(const ResolutionRun& run, double resolution) {
 
 void record(const ResolutionSettings& settings, const simulation::OperatorModel& person, double resolution,
             std::vector<double>* times, std::vector<double>& positions) {
-  TouchSetup setup;
-  setup.device = settings.device;
-  setup.device.delay = settings.weak.delay;
-  setup.person = person;
-  setup.person.grip_stiffness *= settings.weak.grip;
-  setup.person.grip_damping *= settings.weak.grip;
-  setup.motion.hold_time = settings.wall.hold;
+  TouchSetup setup = resolution_touch(settings, settings.weak, person, resolution);
   setup.motion.approach_speed = 0.05;
   setup.motion.push_force = settings.pushes.front();
-  setup.wall = touched_wall(settings.wall.haptic_rate, settings.count_length, settings.device.force_limit);
-  setup.wall.wall.kind = control::WallKind::plain;
-  setup.wall.wall.stiffness = static_cast<float>(settings.wall.stiffness);
-  setup.wall.position_resolution = resolution;
-  setup.wall.position_rounding = settings.wall.rounding;
   std::vector<TouchSample> samples;
   simulate_touch(setup, &samples);
   for (const TouchSample& sample : samples) {
@@ -61,17 +48,13 @@ std::string words_of(const ResolutionHand& hand) {
 
 ResolutionStudy study_resolution(const ResolutionSettings& settings,
                                  const std::vector<simulation::OperatorModel>& people,
-                                 const std::function<void(std::size_t, std::size_t)>& tell) {
+                                 const ProgressReport& tell) {
   ResolutionStudy study;
   study.wall = settings.wall;
   study.pushes = settings.pushes;
-  const std::size_t parts = 4;  // the variations take about three times as long as the runs
-  study.runs = run_resolution(settings, people, [&](std::size_t done, std::size_t all) {
-    if (tell) tell(done, parts * all);
-  });
-  study.variations = vary_resolution(settings, people, [&](std::size_t done, std::size_t all) {
-    if (tell) tell(all + (parts - 1) * done, parts * all);
-  });
+  // The variations take about three times as long as the runs.
+  study.runs = run_resolution(settings, people, part_of(tell, 0, 1, 4));
+  study.variations = vary_resolution(settings, people, part_of(tell, 1, 3, 4));
   record(settings, people.front(), 0.4e-3, &study.trace_time, study.trace_coarse);
   record(settings, people.front(), 0.1e-3, nullptr, study.trace_fine);
   const std::size_t samples =
@@ -82,11 +65,11 @@ ResolutionStudy study_resolution(const ResolutionSettings& settings,
   std::string pushes;
   for (const double push : settings.pushes) pushes += fmt::format("{}{:g}", pushes.empty() ? "" : ", ", push);
   study.circumstances = fmt::format(
-      "Simulated: {} {}, {} with each push of {} N, wall of {:g} N/mm at {:g} Hz, encoder of {} mm, friction "
+      "Simulated: {}, {} with each push of {} N, wall of {:g} N/mm at {:g} Hz, encoder of {} mm, friction "
       "{:g} N. A wall "
       "vibrates for a person when any touch does (more than {} mm peak to peak in every quarter of the last "
       "second){}.",
-      people.size(), people.size() == 1 ? "person" : "people",
+      people_words(people.size()),
       settings.touches == 1 ? "one touch" : fmt::format("{} touches", settings.touches), pushes,
       settings.wall.stiffness / 1000, settings.wall.haptic_rate, mm(settings.count_length),
       settings.device.friction, mm(settings.wall.threshold),

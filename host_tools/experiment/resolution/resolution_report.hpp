@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/experiment/resolution/resolution_device.hpp"
 #include "host_tools/experiment/resolution/resolution_experiment.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -18,7 +17,7 @@ struct ResolutionStudy {
   std::vector<ResolutionVariation> variations;  ///< empty for a device
   std::vector<double> pushes;                   ///< N; empty for a device
   std::string circumstances;
-  /// One touch at 0.4 mm and one at 0.1 mm with the last hand, 0.2 m/s; empty for a device.
+  /// One touch at 0.4 mm and one at 0.1 mm with the last hand, 0.05 m/s; empty for a device.
   std::vector<double> trace_time, trace_coarse, trace_fine;  ///< s, m, m
 
   ResolutionVerdict verdict() const { return judge_resolution(runs.back().cells); }
@@ -26,7 +25,7 @@ struct ResolutionStudy {
 
 ResolutionStudy study_resolution(const ResolutionSettings& settings,
                                  const std::vector<simulation::OperatorModel>& people,
-                                 const std::function<void(std::size_t done, std::size_t all)>& tell = {});
+                                 const ProgressReport& tell = {});
 
 std::string words_of(const ResolutionHand& hand);
 

@@ -45,7 +45,6 @@ TEST_F(JitterCommand, PicturesHaveTheKindAskedFor) {
 }
 
 TEST_F(JitterCommand, ADeviceIsMeasured) {
-  board.axes[0].motion->push_force = 6.0;  // more than every F_B
   const int code = on_device({"--touches", "1", "--window", "0.6", "--json"});
   ASSERT_TRUE(code == done || code == verdict_is_no) << said;
   const Json all = document();
@@ -57,7 +56,8 @@ TEST_F(JitterCommand, ADeviceIsMeasured) {
 }
 
 TEST_F(JitterCommand, APersonWhoNeverComesToTheWallIsAFailure) {
-  board.axes[0].motion->push_force = 0.5;
+  board.axes[0].motion.reset();
+  board.axes[0].start.position = 0.02;
   EXPECT_EQ(on_device({"--touches", "1", "--window", "0.6", "--patience", "3", "--json"}), failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "nobody touched the wall within 3 s");
 }

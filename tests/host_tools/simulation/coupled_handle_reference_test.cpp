@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host_tools/simulation/coupled_handle.hpp"
+#include "tests/host_tools/simulation/drawn_models.hpp"
 #include "tests/host_tools/simulation/reference_handle.hpp"
 
 namespace kmax::simulation {
@@ -100,18 +101,10 @@ TEST(CoupledHandleReference, AgreesForAGramAndAMegaNewtonPerMetre) {
 }
 
 RC_GTEST_PROP(CoupledHandleReference, AgreesForAnyParameters, ()) {
-  const auto between = [](double low, double high) {
-    return low * std::pow(high / low, *rc::gen::inRange(0, 1001) / 1000.0);
-  };
-  DeviceModel device{between(1e-3, 0.5), between(1e-3, 2.0), between(1e-3, 1.0), 3.3};
-  OperatorModel person;
-  person.grip_stiffness = between(50.0, 5e4);
-  person.grip_damping = between(1e-2, 10.0);
-  person.hand_mass = between(0.02, 1.0);
-  person.arm_stiffness = between(20.0, 1000.0);
-  person.arm_damping = between(0.1, 30.0);
+  const DeviceModel device = drawn_device();
+  const OperatorModel person = drawn_person();
   IntendedMotionConfig motion;
-  motion.approach_speed = between(0.01, 1.0);
+  motion.approach_speed = drawn_between(0.01, 1.0);
   motion.start_position = *rc::gen::inRange(0, 3) * 1e-3;
   std::vector<std::array<double, 2>> forces;
   for (int n = 0; n < 8; ++n) {

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/host_tools/simulation/energy_balance.hpp"
+
 namespace kmax::simulation {
 namespace {
 
@@ -185,15 +187,7 @@ TEST(CoupledHandle, LosslessSceneKeepsItsEnergy) {
 RC_GTEST_PROP(CoupledHandle, WithoutAPersonEnergyNeverExceedsTheWorkOfTheMotor, ()) {
   CoupledHandle handle(bare(0.045, *rc::gen::inRange(0, 20) * 0.1, *rc::gen::inRange(0, 20) * 0.01),
                        HandleStart{0.0, *rc::gen::inRange(-10, 11) * 0.05});
-  double energy = handle.energy();
-  for (int n = 0; n < 50; ++n) {
-    const double force = *rc::gen::inRange(-330, 331) * 0.01;
-    const double before = handle.position();
-    handle.advance(force, 0.0, period);
-    const double work = force * (handle.position() - before);
-    RC_ASSERT(handle.energy() <= energy + work + 1e-12);
-    energy = handle.energy();
-  }
+  require_no_energy_from_nowhere(handle, 50, period);
 }
 
 // --- Intervals.

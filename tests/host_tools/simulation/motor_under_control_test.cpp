@@ -4,22 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "control/dc_current_controller.hpp"
 #include "control/field_oriented_controller.hpp"
 #include "host_tools/simulation/scene.hpp"
+#include "tests/host_tools/simulation/scene_file.hpp"
 
 namespace kmax::simulation {
 namespace {
 
 constexpr float tick = 50e-6f;
 constexpr double half_tick = 25e-6;
-
-Scene motor_axes() {
-  const std::filesystem::path here = std::filesystem::path(__FILE__).parent_path();
-  return load_scene((here / "../../../host_tools/simulation/scenes/motor_axes.toml").string());
-}
 
 class ControlledAxis {
  public:
@@ -106,7 +101,7 @@ class ControlledAxis {
 };
 
 TEST(MotorUnderControl, TheForceThatIsAskedForArrives) {
-  const Scene scene = motor_axes();
+  const Scene scene = scene_file("motor_axes");
   for (std::size_t axis = 0; axis < 2; ++axis) {
     // At several places of the turn: a wrong electrical angle would be right at some.
     for (const double start : {0.0, 0.0011, 0.0047, 0.03}) {
@@ -130,7 +125,7 @@ TEST(MotorUnderControl, TheForceThatIsAskedForArrives) {
 }
 
 TEST(MotorUnderControl, APersonPressesBothHandlesAgainstTheirWalls) {
-  const Scene scene = motor_axes();
+  const Scene scene = scene_file("motor_axes");
   for (std::size_t axis = 0; axis < 2; ++axis) {
     ControlledAxis controlled(scene, axis);
     controlled.drive().handle().begin_motion();

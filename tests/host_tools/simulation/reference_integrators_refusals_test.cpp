@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host_tools/simulation/reference_integrators.hpp"
+#include "tests/host_tools/simulation/integrator_functions.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::simulation {
@@ -16,22 +17,6 @@ namespace {
 
 using host_tools_test::thrown_message;
 
-using Integrator = std::function<void(const ChainDynamics&, ChainState&, const ChainInput&, double)>;
-Integrator euler(double step) {
-  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_semi_implicit_euler(d, s, i, duration, step);
-  };
-}
-Integrator rk4(double step) {
-  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_rk4(d, s, i, duration, step);
-  };
-}
-Integrator adaptive(double tolerance) {
-  return [tolerance](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_adaptive(d, s, i, duration, tolerance);
-  };
-}
 const std::vector<std::pair<const char*, Integrator>>& all() {
   static const std::vector<std::pair<const char*, Integrator>> integrators{
       {"semi-implicit Euler", euler(1e-4)}, {"rk4", rk4(1e-4)}, {"adaptive", adaptive(1e-9)}};

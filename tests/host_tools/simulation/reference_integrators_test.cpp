@@ -10,26 +10,12 @@
 #include <vector>
 
 #include "host_tools/simulation/coupled_handle.hpp"
+#include "tests/host_tools/simulation/drawn_models.hpp"
+#include "tests/host_tools/simulation/integrator_functions.hpp"
 
 namespace kmax::simulation {
 namespace {
 
-using Integrator = std::function<void(const ChainDynamics&, ChainState&, const ChainInput&, double)>;
-Integrator euler(double step) {
-  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_semi_implicit_euler(d, s, i, duration, step);
-  };
-}
-Integrator rk4(double step) {
-  return [step](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_rk4(d, s, i, duration, step);
-  };
-}
-Integrator adaptive(double tolerance) {
-  return [tolerance](const ChainDynamics& d, ChainState& s, const ChainInput& i, double duration) {
-    integrate_adaptive(d, s, i, duration, tolerance);
-  };
-}
 struct Named {
   const char* name;
   Integrator integrate;
@@ -359,19 +345,8 @@ TEST(ReferenceIntegrators, OneGramInAGripOfAMegaNewtonPerMetre) {
 }
 
 RC_GTEST_PROP(ReferenceIntegrators, AdaptiveAgreesWithTheExactMethodForAnyParameters, ()) {
-  const auto between = [](double low, double high) {
-    return low * std::pow(high / low, *rc::gen::inRange(0, 1001) / 1000.0);
-  };
-  DeviceModel device;
-  device.mass = between(1e-3, 0.5);
-  device.damping = between(1e-3, 2.0);
-  device.friction = between(1e-3, 1.0);
-  OperatorModel person;
-  person.grip_stiffness = between(50.0, 5e4);
-  person.grip_damping = between(1e-2, 10.0);
-  person.hand_mass = between(0.02, 1.0);
-  person.arm_stiffness = between(20.0, 1000.0);
-  person.arm_damping = between(0.1, 30.0);
+  const DeviceModel device = drawn_device();
+  const OperatorModel person = drawn_person();
   std::vector<double> forces;
   for (int n = 0; n < 10; ++n) forces.push_back(*rc::gen::inRange(-400, 401) * 0.01);
   RC_ASSERT(error_against_exact(device, person, forces, adaptive(1e-12)) < 1e-11);

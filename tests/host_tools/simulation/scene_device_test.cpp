@@ -5,6 +5,7 @@
 #include <string>
 
 #include "host_tools/simulation/scene.hpp"
+#include "tests/host_tools/simulation/scene_refusal.hpp"
 
 namespace kmax::simulation {
 namespace {
@@ -82,14 +83,6 @@ TEST(SceneDevice, TheSamePersonHoldsBothAxes) {
   const std::string two = "[device]\n[operator]\n[axis1.device]\n[axis1.operator]\n";
   EXPECT_FALSE(parse_scene(two, "s").axes[1].same_person);
   EXPECT_TRUE(parse_scene(two + "same_person = true\n", "s").axes[1].same_person);
-  const auto refusal = [](const std::string& text) -> std::string {
-    try {
-      parse_scene(text, "bad.toml");
-      return "accepted";
-    } catch (const SceneError& error) {
-      return error.what();
-    }
-  };
   EXPECT_EQ(refusal("[device]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n"),
             "bad.toml:4:15: axis1.operator.same_person = true: nobody holds axis 0; allowed is that with an "
             "[operator]");

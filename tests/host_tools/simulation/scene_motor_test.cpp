@@ -1,31 +1,18 @@
 // scene_motor.hpp, through the scenes that it reads.
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <string>
 
 #include "host_tools/simulation/scene.hpp"
+#include "tests/host_tools/simulation/scene_file.hpp"
+#include "tests/host_tools/simulation/scene_refusal.hpp"
 
 namespace kmax::simulation {
 namespace {
 
-std::string refusal(const std::string& text) {
-  try {
-    parse_scene(text, "bad.toml");
-    return "accepted";
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-}
-
-Scene supplied(const std::string& name) {
-  const std::filesystem::path here = std::filesystem::path(__FILE__).parent_path();
-  return load_scene((here / "../../../host_tools/simulation/scenes" / (name + ".toml")).string());
-}
-
 TEST(SceneMotor, WithoutTheTablesThereIsNoMotor) {
   for (const char* name : {"touch", "free_handle", "two_axes"}) {
-    const Scene scene = supplied(name);
+    const Scene scene = scene_file(name);
     EXPECT_FALSE(scene.supply);
     for (const SceneAxis& axis : scene.axes) {
       EXPECT_FALSE(axis.motor);
@@ -171,7 +158,7 @@ TEST(SceneMotor, RefusesEveryKindOfNonsense) {
 }
 
 TEST(SceneMotor, ADriveHasNoForceLimitAndItsOwnSeed) {
-  const Scene scene = supplied("motor_axes");
+  const Scene scene = scene_file("motor_axes");
   ASSERT_EQ(scene.axes.size(), 2u);
   ASSERT_EQ(scene.axes[0].device.force_limit, 3.3);
   MotorDrive drive = scene.make_drive(0), same = scene.make_drive(0), other = scene.make_drive(1);
@@ -192,7 +179,7 @@ TEST(SceneMotor, ADriveHasNoForceLimitAndItsOwnSeed) {
 // What only a calibration can find is not among the parameters of a device that has none yet.
 TEST(SceneMotor, TheSuppliedDevicesToCalibrateDoNotTellTheirMotors) {
   for (const char* name : {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"}) {
-    const Scene scene = supplied(name);
+    const Scene scene = scene_file(name);
     EXPECT_FALSE(scene.identified) << name;
     ASSERT_EQ(scene.axes.size(), 1u);
     const SceneAxis& axis = scene.axes[0];
@@ -218,7 +205,7 @@ TEST(SceneMotor, TheSuppliedDevicesToCalibrateDoNotTellTheirMotors) {
       EXPECT_LT(pmsm->cogging_torque / axis.encoder.transmission, axis.device.friction) << name;
     }
   }
-  const auto gimbal = supplied("gimbal_b");
+  const auto gimbal = scene_file("gimbal_b");
   const auto salient = std::get<SynchronousMotorConfig>(*gimbal.axes[0].motor);
   EXPECT_GT(salient.inductance_q, 1.2 * salient.inductance_d);
 }
@@ -227,7 +214,7 @@ TEST(SceneMotor, TheSuppliedDevicesToCalibrateDoNotTellTheirMotors) {
 // theirs.
 TEST(SceneMotor, TheSuppliedScenesAgreeWithTheirParameters) {
   for (const char* name : {"motor_axes", "single_motor"}) {
-    const Scene scene = supplied(name);
+    const Scene scene = scene_file(name);
     const auto parameter = [&](std::size_t axis, const std::string& key) {
       for (const SceneParameter& one : scene.parameters) {
         if (one.name != (axis == 1 ? "axis1." : "") + key) continue;

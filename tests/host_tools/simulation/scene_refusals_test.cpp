@@ -7,18 +7,10 @@
 #include <vector>
 
 #include "tests/host_tools/simulation/scene_keys.hpp"
+#include "tests/host_tools/simulation/scene_refusal.hpp"
 
 namespace kmax::simulation {
 namespace {
-
-std::string refusal(const std::string& text) {
-  try {
-    parse_scene(text, "bad.toml");
-    return "accepted";
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-}
 
 void expect_refused(const Key& key, const std::string& value) {
   const Written scene = scene_with(key, key.name, value);

@@ -5,23 +5,11 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/host_tools/simulation/scene_file.hpp"
+#include "tests/host_tools/simulation/scene_refusal.hpp"
+
 namespace kmax::simulation {
 namespace {
-
-std::string supplied_scenes() {
-  const std::filesystem::path here = std::filesystem::path(__FILE__).parent_path();
-  return (here / "../../../host_tools/simulation/scenes").lexically_normal().string();
-}
-
-// The message of the SceneError that the text provokes, or "accepted".
-std::string refusal(const std::string& text, const ParameterCheck& check = {}) {
-  try {
-    parse_scene(text, "bad.toml", check);
-    return "accepted";
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-}
 
 TEST(Scene, DefaultsAreThoseOfTheModels) {
   const Scene scene = parse_scene("[device]\n", "somewhere/plain.toml");
@@ -210,7 +198,7 @@ TEST(Scene, AMissingFileIsNamed) {
 
 TEST(Scene, AllSuppliedScenesLoad) {
   int scenes = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(supplied_scenes())) {
+  for (const auto& entry : std::filesystem::directory_iterator(scene_folder())) {
     if (entry.path().extension() != ".toml") continue;
     const Scene scene = load_scene(entry.path().string());
     EXPECT_EQ(scene.name, entry.path().stem().string());
@@ -220,7 +208,7 @@ TEST(Scene, AllSuppliedScenesLoad) {
 }
 
 TEST(Scene, TouchIsTheDefaultsOfTheModels) {
-  const Scene scene = load_scene(supplied_scenes() + "/touch.toml");
+  const Scene scene = scene_file("touch");
   const SceneAxis& axis = scene.axes.at(0);
   for (const auto& field : device_fields)
     EXPECT_EQ(axis.device.*field.member, DeviceModel{}.*field.member) << field.name;

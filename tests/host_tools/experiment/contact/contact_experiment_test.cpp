@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <set>
 
-#include "host_tools/device/drive.hpp"
 #include "host_tools/device/errors.hpp"
-#include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
@@ -16,28 +15,17 @@ namespace {
 using host_tools_test::thrown_message;
 using simulation::ContactVerdict;
 
-class Contact : public testing::Test {
+class Contact : public TouchedBoard {
  protected:
-  explicit Contact(const simulation::Scene& scene = simulated_board::factory_scene())
-      : device(std::make_unique<link::SimLink>(scene)) {
+  explicit Contact(const simulation::Scene& scene = simulated_board::factory_scene()) : TouchedBoard(scene) {
     settings.hold_time = 1.0;
   }
 
-  simulated_board::SimulatedBoard& simulation() {
-    return dynamic_cast<link::SimLink&>(device.link()).simulation();
-  }
-  void expect_disarmed() {
-    EXPECT_NE(device::Drive(device, 0).status().state(), firmware::DriveState::operation_enabled);
-    EXPECT_FALSE(simulation().board().output().axis[0].enabled);
-  }
   ContactResult run(std::size_t condition) {
     return run_contact(device, contact_conditions()[condition], settings, tell);
   }
 
-  device::Device device;
   ContactSettings settings;
-  std::vector<std::string> told;
-  std::function<void(const std::string&)> tell = [this](const std::string& text) { told.push_back(text); };
 };
 
 TEST(ContactConditions, AreThePapersWallsWithTheAdaptiveOneInEachMode) {
@@ -153,14 +141,6 @@ TEST_F(Contact, ValuesThatAreNotAllowedAreRefusedBeforeArming) {
 
 class ContactWithoutAPerson : public Contact {
  protected:
-  static simulation::Scene nobody() {
-    simulation::Scene scene = simulated_board::factory_scene();
-    scene.axes[0].person.reset();
-    scene.axes[0].motion.reset();
-    scene.axes[0].start.position = 0.02;
-    scene.axes[0].start.velocity = 0.0;
-    return scene;
-  }
   ContactWithoutAPerson() : Contact(nobody()) {}
 };
 

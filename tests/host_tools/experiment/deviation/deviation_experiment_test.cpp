@@ -64,7 +64,7 @@ TEST(JudgeDeviation, ThePapersOwnTableMeetsItsClaim) {
   EXPECT_TRUE(verdict.claim_met());
   EXPECT_DOUBLE_EQ(verdict.rank.value(), 1.0);
   ASSERT_EQ(verdict.trends.size(), 3u);
-  for (const DeviationTrend& trend : verdict.trends) EXPECT_DOUBLE_EQ(trend.rank.value(), -1.0);
+  for (const BackgroundTrend& trend : verdict.trends) EXPECT_DOUBLE_EQ(trend.rank.value(), -1.0);
 }
 
 TEST(JudgeDeviation, ANumberThatStaysDoesNotFall) {
@@ -97,7 +97,7 @@ TEST(SimulateDeviation, AHandThatDoesNotStiffenShowsNoTrend) {
   person.activation_gain = 0.0;
   const DeviationVerdict verdict = judge_deviation(run_deviation(settings, {person}));
   EXPECT_FALSE(verdict.claim_met());
-  for (const DeviationTrend& trend : verdict.trends) EXPECT_NEAR(trend.with / trend.without, 1.0, 0.01);
+  for (const BackgroundTrend& trend : verdict.trends) EXPECT_NEAR(trend.with / trend.without, 1.0, 0.01);
 }
 
 // A hand at rest gives way by F/k; k1 and k2 in series, less the friction.

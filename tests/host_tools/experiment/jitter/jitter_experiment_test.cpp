@@ -140,7 +140,7 @@ TEST(SimulateJitter, AHandThatDoesNotStiffenShowsNoTrend) {
   person.activation_gain = 0.0;
   const JitterVerdict verdict = judge_jitter(run_jitter({}, {person}));
   EXPECT_FALSE(verdict.amplitude_falls());
-  for (const JitterTrend& trend : verdict.amplitude) EXPECT_GT(trend.with, 0.8 * trend.without);
+  for (const BackgroundTrend& trend : verdict.amplitude) EXPECT_GT(trend.with, 0.8 * trend.without);
 }
 
 TEST(SimulateJitter, APersonWhoNeverPressesHarderNeverSettles) {

@@ -7,6 +7,7 @@
 
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/experiment/max_stiffness/stiffness_climb.hpp"
+#include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -23,16 +24,6 @@ StiffnessCondition wall_with(double coefficient) {
   condition.magnetic_coefficient = coefficient;
   return condition;
 }
-
-class Asked final : public calibration::Prompter {
- public:
-  void ask(const std::string& what_to_do) override {
-    asked.push_back(what_to_do);
-    if (answer) answer();
-  }
-  std::vector<std::string> asked;
-  std::function<void()> answer;
-};
 
 class DeviceStiffness : public TouchedBoard {
  protected:
@@ -100,15 +91,15 @@ TEST_F(DeviceStiffness, AbortedTouchesAreUnstableAndTheSearchGoesDownToTheBottom
 }
 
 TEST_F(DeviceStiffness, EverybodyIsAskedBeforeEachTouchAndNeverWhileThereIsForce) {
-  Asked person;
+  AskedPerson person;
   person.answer = [&] { EXPECT_FALSE(forceful()); };
   settings.trials = 2;
   settings.last = 3000;
   const DeviceStiffnessResult result = find(wall_with(2), &person);
-  ASSERT_EQ(person.asked.size(), 2u);
+  ASSERT_EQ(person.requests.size(), 2u);
   EXPECT_EQ(result.touches.size(), 2u);
-  EXPECT_CONTAINS(person.asked[0], "3 N/mm, touch 1 of 2: take the handle out of the wall");
-  EXPECT_CONTAINS(person.asked[1], "touch 2 of 2");
+  EXPECT_CONTAINS(person.requests[0], "3 N/mm, touch 1 of 2: take the handle out of the wall");
+  EXPECT_CONTAINS(person.requests[1], "touch 2 of 2");
 }
 
 TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
@@ -192,10 +183,10 @@ class DeviceStiffnessWithoutAPerson : public DeviceStiffness {
 };
 
 TEST_F(DeviceStiffnessWithoutAPerson, IsAskedThreeTimesAndNotWithoutAPrompter) {
-  Asked person;
+  AskedPerson person;
   const auto journal = open(RunJournal::Begin::anew);
   EXPECT_THROW(find(wall_with(0), &person, journal.get()), NobodyTouched);
-  EXPECT_EQ(person.asked.size(), 3u);
+  EXPECT_EQ(person.requests.size(), 3u);
   EXPECT_THROW(find(wall_with(0)), NobodyTouched);
   EXPECT_EQ(journal->size(), 0u);
   expect_disarmed();

@@ -4,17 +4,12 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
 namespace {
-
-class Asked final : public calibration::Prompter {
- public:
-  void ask(const std::string& what_to_do) override { requests.push_back(what_to_do); }
-  std::vector<std::string> requests;
-};
 
 class ResolutionDevice : public testing::Test {
  protected:
@@ -40,7 +35,7 @@ class ResolutionDevice : public testing::Test {
 
   device::Device device;
   ResolutionDeviceSettings settings;
-  Asked asked;
+  AskedPerson asked;
   std::vector<double> before;
 };
 

@@ -1,0 +1,151 @@
+#pragma once
+// How the commands of those experiments go that end in a study (jitter, deviation, resolution): made with
+// simulated people or touch by touch on a device, written into a folder, printed, answered by an exit code.
+
+#include <CLI/App.hpp>
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/run_journal.hpp"
+#include "host_tools/experiment/watched_touch.hpp"
+#include "host_tools/kmax/context.hpp"
+#include "host_tools/kmax/experiment_commands.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/progress.hpp"
+#include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/report/page.hpp"
+
+namespace kmax::cli {
+
+/// Options of every such command. Each derives its own, with the experiment's settings as `simulated` and
+/// `device`; the latter have force_limit, abort_amplitude and patience.
+struct StudyOptions {
+  ExperimentFiles files;
+  bool no_prompt = false, resume = false;
+};
+
+/// What is printed of a study.
+struct StudyReport {
+  bool claim_met = false;               ///< the paper's
+  Json document;                        ///< without "files"
+  std::vector<std::string> paragraphs;  ///< before the tables
+  std::vector<report::Table> tables;
+};
+
+/// The document's beginning: "origin" and "circumstances".
+template <typename Study>
+Json document_of(const Study& study) {
+  return {{"origin", std::string(report::words_of(study.origin))}, {"circumstances", study.circumstances}};
+}
+
+/// The parts of one command.
+template <typename Study, typename Options>
+struct StudyCommand {
+  using Make = Study (*)(Context& context, const Options& options, const Interruption& interruption);
+  Make simulate, measure;
+  std::vector<std::filesystem::path> (*write)(const Study& study, const std::filesystem::path& folder,
+                                              const std::string& ending);
+  StudyReport (*report)(const Study& study);
+};
+
+/// With --json the document, else the rest; then the files. Returns the exit code.
+int print_study(Context& context, StudyReport study, const std::vector<std::filesystem::path>& files);
+
+/// The whole command: the study, its files if there is a folder for them, what is said of it. Returns the
+/// exit code.
+template <typename Study, typename Options>
+int run_study(Context& context, const Options& options, const StudyCommand<Study, Options>& command) {
+  const Interruption interruption;
+  make_folder(options.files);
+  const Study study =
+      (context.simulated() ? command.simulate : command.measure)(context, options, interruption);
+  std::vector<std::filesystem::path> files;
+  if (!options.files.folder.empty()) files = command.write(study, options.files.folder, options.files.ending);
+  return print_study(context, command.report(study), files);
+}
+
+/// The options for a device, and what the command does. `people`: the group of options for simulated people.
+template <typename Study, typename Options>
+void add_study_action(CLI::App& command, Context& context, CLI::App& people,
+                      const std::shared_ptr<Options>& options, const StudyCommand<Study, Options>& study) {
+  auto* device = command.add_option_group("Device", "With --device");
+  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
+  add_touch_options(*device, options->no_prompt, options->device.patience);
+  add_resume_option(*device, options->resume);
+  command.callback([&context, &people, device, options, study] {
+    context.action = [&context, &people, device, options, study] {
+      require_kind(context, people, *device);
+      return run_study(context, *options, study);
+    };
+  });
+}
+
+/// What a run that keeps no journal says on Ctrl-C.
+inline constexpr auto interrupted_study = "interrupted; nothing is armed";
+
+/// The study that `make` makes with simulated people: called with the report of its progress, which `words`
+/// puts into a line, and which throws ExperimentInterrupted on Ctrl-C. UsageError for settings it refuses.
+template <typename Make>
+auto simulate_study(Context& context, const Interruption& interruption,
+                    std::string (*words)(std::size_t done, std::size_t all), const Make& make) {
+  Progress progress(context.messages());
+  try {
+    return make([&](std::size_t done, std::size_t all) {
+      if (interruption.requested()) throw ExperimentInterrupted(interrupted_study);
+      progress.show(words(done, all));
+    });
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
+/// "3 of 16 pairs of forces".
+std::string force_pairs_words(std::size_t done, std::size_t all);
+
+/// simulate_study() of an experiment over the pairs of F_B and F_I, with these people and their device.
+template <typename Study, typename Settings>
+Study simulate_force_pairs(Context& context, const Interruption& interruption, Settings settings,
+                           const PeopleOptions& options,
+                           Study (*make)(const Settings& settings,
+                                         const std::vector<simulation::OperatorModel>& people,
+                                         const experiment::ProgressReport& tell)) {
+  const std::vector<simulation::OperatorModel> people = people_of(options, settings.device);
+  return simulate_study(context, interruption, force_pairs_words,
+                        [&](const experiment::ProgressReport& tell) { return make(settings, people, tell); });
+}
+
+/// The touches on a device, which `run` makes: kept in the journal `name` in --out, asked for at the terminal
+/// unless --no-prompt is given. Ctrl-C is an ExperimentInterrupted. Errors: those of open_touch_journal() and
+/// of `run`.
+template <typename Result, typename Settings>
+Result make_touches(Context& context, const Interruption& interruption, device::Device& device,
+                    const std::string& name, const Settings& settings, const StudyOptions& options,
+                    Result (*run)(device::Device& device, const Settings& settings,
+                                  calibration::Prompter* prompter, const experiment::Tell& tell,
+                                  experiment::RunJournal* journal, const experiment::Tell& notice)) {
+  const auto journal = open_touch_journal(context, options.files.folder, name,
+                                          journal_settings(device, settings), options.resume);
+  const auto check_interruption = [&] {
+    if (interruption.requested())
+      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on"
+                                          : interrupted_study);
+  };
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
+  Progress progress(context.messages());
+  return run(
+      device, settings, options.no_prompt ? nullptr : &prompter,
+      [&](const std::string& text) {
+        check_interruption();
+        progress.show(text);
+      },
+      journal.get(), [&](const std::string& text) { context.note(text); });
+}
+
+}  // namespace kmax::cli
