@@ -93,6 +93,7 @@ class HapticLoop {
     wall_.reset();
     interference_.reset();
     limiter_.reset();
+    background_force_ = Scalar(0);
     ticks_until_sample_ = 0;
     held_ = Output{};
   }
@@ -127,6 +128,7 @@ class HapticLoop {
     out.magnetic_force = wall.magnetic_force;
     out.magnetic_coefficient = wall.magnetic_coefficient;
     out.tangential_force = disturbance.tangential;
+    background_force_ = wall.magnetic_force + disturbance.background;
 
     Scalar requested = c.side * (wall.force + disturbance.normal) + external_force;
     // The same unless it overflows.
@@ -153,6 +155,11 @@ class HapticLoop {
 
   /// 0 to 1: the share of the force that the soft start lets pass; 0 while not enabled.
   Scalar ramp() const { return limiter_.ramp(); }
+
+  /// N, outwards: what papers call the background force, the field's force and the interference's F_B, as
+  /// evaluated in the last haptic sample, before soft start and limits. Not part of Output, which is copied
+  /// in every tick; only a person who is simulated asks for it.
+  Scalar background_force() const { return background_force_; }
 
   /// What the last tick() gave.
   const Output& output() const { return held_; }
@@ -184,6 +191,7 @@ class HapticLoop {
   WallLaw<Scalar> wall_;
   Interference<Scalar> interference_;
   ForceLimiter<Scalar> limiter_;
+  Scalar background_force_{};
   std::uint32_t ticks_until_sample_ = 0;
   bool settled_ = false;  // the velocity estimator has seen a position
   Output held_;

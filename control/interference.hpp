@@ -37,6 +37,7 @@ class Interference {
   };
   struct Output {
     Scalar normal{};      ///< N, outwards
+    Scalar background{};  ///< N, outwards: F_B's share of it in this sample
     Scalar tangential{};  ///< N, along the surface
   };
 
@@ -68,10 +69,11 @@ class Interference {
       ++samples_inside_;
     }
     if (c.mode == InterferenceMode::perpendicular) {
+      out.background = c.background_force;
       out.normal = inside ? saturate(c.background_force + c.force) : c.background_force;
     } else if (c.mode == InterferenceMode::parallel && inside) {
       out.tangential = c.force;
-      if (elapsed >= c.onset_samples) out.normal = c.background_force;
+      if (elapsed >= c.onset_samples) out.normal = out.background = c.background_force;
     }
     return out;
   }

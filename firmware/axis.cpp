@@ -139,7 +139,7 @@ bool Axis::render(const AxisSetting& setting, const Input& input, std::uint32_t 
   if (std::bit_cast<std::int32_t>(setting.compensation.limit) > 0) force = compensated(setting, position);
   output_.force = force;
   output_.tangential_force = out.tangential_force;
-  output_.background_force = out.magnetic_force;
+  output_.background_force = loop_.background_force();
   motor_.update(setting.motor, input.motor, force, position, out.velocity, true, output_.motor);
   if (output_.motor.fault != Fault::none) [[unlikely]]
     return trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);

@@ -91,8 +91,10 @@ class Axis {
     /// N along +x, with compensation; 0 unless enabled. In mode haptic within force.limit.
     float force;
     float tangential_force;  ///< N, to be made by the other axis
-    float background_force;  ///< N, the field's share of the force while enabled, outwards
-    bool enabled;            ///< false: the bridge must be off
+    /// N, outwards, while enabled: field and F_B, what a simulated person answers to. The board has no use
+    /// for it.
+    float background_force;
+    bool enabled;  ///< false: the bridge must be off
     MotorControl::Output motor{};
   };
 

@@ -58,9 +58,10 @@ void SimulatedDevice::advance(double duration) {
 
 /// What the hand on the axis answers to: the two axes stand at right angles.
 double SimulatedDevice::background_force(const Axis& axis) const {
-  const auto own = static_cast<double>(axis.output.background_force);
-  if (!axis.same_person || !axes_[0]) return own;
-  return std::hypot(own, static_cast<double>(axes_[0]->output.background_force));
+  if (!axes_[0] || !axes_[1] || !axes_[1]->same_person)
+    return static_cast<double>(axis.output.background_force);
+  return std::hypot(static_cast<double>(axes_[0]->output.background_force),
+                    static_cast<double>(axes_[1]->output.background_force));
 }
 
 void SimulatedDevice::connect_encoder(std::size_t axis, bool connected) {

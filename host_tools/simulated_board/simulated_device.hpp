@@ -21,8 +21,9 @@ namespace kmax::simulated_board {
 /// costs nothing.
 ///
 /// A person who has a motion begins the approach when the axis is armed, as one would who was told "now";
-/// arming again begins another trial. A handle that nobody holds stays at its start until its axis is armed
-/// for the first time, and is let go then.
+/// arming again begins another trial. The person answers to the background force that the firmware renders,
+/// the field's and the interference's F_B (AxisOutput::background_force). A handle that nobody holds stays at
+/// its start until its axis is armed for the first time, and is let go then.
 class SimulatedDevice {
  public:
   /// Throws std::invalid_argument for a scene whose parts are not allowed.

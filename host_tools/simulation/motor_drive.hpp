@@ -18,11 +18,12 @@
 // the winding. The handle given here must have force_limit = 0 (SceneAxis::make_drive sees to it); advance()
 // throws std::logic_error once the handle has clipped.
 //
-// Background force: CoupledHandle wants to know the field force that makes the person co-contract, apart
-// from the whole force. A motor shows only the whole. So it is a setting: 0 unless set_background_force() is
-// called, by whoever knows what the firmware commands. background_from_motor() takes the motor's own force
-// instead; that counts the wall's force as field too, and so overstates the activation against the
-// calibration in operator_model.hpp, by the push force when pressing against a plain wall.
+// Background force: CoupledHandle wants to know the background force (the field's and F_B) that makes the
+// person co-contract, apart from the whole force. A motor shows only the whole. So it is a setting: 0 unless
+// set_background_force() is called, by whoever knows what the firmware commands. background_from_motor()
+// takes the motor's own force instead; that counts the wall's force as background too, and so overstates the
+// activation against the calibration in operator_model.hpp, by the push force when pressing against a plain
+// wall.
 //
 // Cost of advance() for 25 us with a person, who costs 0.1 us of it: brushed 0.3 us, synchronous 0.5 us, and
 // with a current in the dead time's band 0.4 and 0.7 us (a busy machine: three tasks on each core). No heap.

@@ -171,6 +171,10 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
             static_cast<std::uint32_t>(world.uniform(0, 3)));
       write(firmware::entry_of<"wall.adaptive_relation">(), axis,
             static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write(firmware::entry_of<"interference.mode">(), axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write(firmware::entry_of<"interference.force">(), axis, real(world.uniform(-1, 5)));
+      write(firmware::entry_of<"interference.background_force">(), axis, real(world.uniform(-1, 4)));
+      write(firmware::entry_of<"interference.onset_time">(), axis, real(world.uniform(0, 0.002)));
       write(firmware::entry_of<"velocity.estimator">(), axis,
             static_cast<std::uint32_t>(world.uniform(0, 5)));
       write(firmware::entry_of<"velocity.window">(), axis, static_cast<std::uint32_t>(world.uniform(1, 17)));

@@ -3,6 +3,10 @@
 // lies along the surface and takes the interference, which the firmware passes from axis to axis. The person
 // presses the handle against the wall and keeps it there while it is pushed sideways, five times without and
 // five times with a background force.
+//
+// A person simulated on a device answers to F_B on the wall's axis, and on the other one where its scene says
+// that it is the same person's hand (operator.same_person). The scene's push must exceed F_B, since what the
+// person adds against F_B lags behind the onset, and its hold last for the whole touch.
 
 #include <string>
 #include <vector>

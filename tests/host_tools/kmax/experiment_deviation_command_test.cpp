@@ -56,8 +56,8 @@ TEST_F(DeviationCommand, ADeviceIsMeasured) {
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["pairs"].size(), 16u);
-  // This simulated person presses with 1 N and loses the wall to an F_B that sets in faster than the push can
-  // follow: such touches are not averaged. Where one was held, nothing gave way.
+  // This simulated person presses with 1 N and may lose the wall to an F_B that sets in faster than the push
+  // can follow: such touches are not averaged. Where one was held, nothing gave way.
   std::size_t held = 0;
   for (const Json& pair : all["pairs"]) {
     if (pair["deviation_m"].is_null()) continue;

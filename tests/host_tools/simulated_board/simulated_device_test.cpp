@@ -143,7 +143,7 @@ TEST(SimulatedDevice, AnEncoderWithDefectsIsLookedAtInEverySample) {
   EXPECT_EQ(dead.lost_edges(1), 0);
 }
 
-TEST(SimulatedDevice, OnePersonOnBothAxesAnswersToBothFields) {
+TEST(SimulatedDevice, OnePersonOnBothAxesAnswersToBothBackgroundForces) {
   simulation::Scene scene = open_scene("paper1_deviation");
   const auto activation = [&](bool same_person) {
     scene.axes[1].same_person = same_person;
@@ -154,10 +154,12 @@ TEST(SimulatedDevice, OnePersonOnBothAxesAnswersToBothFields) {
     out.background_force = 4.0f;
     device.drive(1, out);
     pass(device, 3.0);
-    return device.handle(1).activation();
+    return std::pair(device.handle(0).activation(), device.handle(1).activation());
   };
-  EXPECT_NEAR(activation(true), 5.0, 0.01) << "they stand at right angles";
-  EXPECT_NEAR(activation(false), 4.0, 0.01);
+  EXPECT_NEAR(activation(true).first, 5.0, 0.01) << "they stand at right angles";
+  EXPECT_NEAR(activation(true).second, 5.0, 0.01);
+  EXPECT_NEAR(activation(false).first, 3.0, 0.01);
+  EXPECT_NEAR(activation(false).second, 4.0, 0.01);
 }
 
 TEST(SimulatedDevice, WithoutAMotorThereIsNoPowerStage) {

@@ -126,7 +126,7 @@ TEST(SuppliedScenes, TheComparedWallsOfPaper1DifferInTheWallOnly) {
 
 TEST(SuppliedScenes, ABackgroundForceMakesTheJitterOfTable1Smaller) {
   const RunResult three = run_scene(with("paper1_jitter"));
-  const RunResult none = run_scene(with("paper1_jitter", {{"wall.magnetic_coefficient", 0.0, ""}}));
+  const RunResult none = run_scene(with("paper1_jitter", {{"interference.background_force", 0.0, ""}}));
   EXPECT_EQ(three.contact->verdict, ContactVerdict::unstable) << "it is thrown out again and again";
   EXPECT_NEAR(thrown_out(none), 2.5e-3, 0.4e-3);
   EXPECT_NEAR(thrown_out(three), 1.45e-3, 0.3e-3);
@@ -143,7 +143,7 @@ TEST(SuppliedScenes, ABackgroundForceMakesTheJitterOfTable1Smaller) {
 
 TEST(SuppliedScenes, ABackgroundForceMakesTheDeviationOfTable2Smaller) {
   const auto deviation = [](double background, bool activation) {
-    Scene scene = with("paper1_deviation", {{"wall.magnetic_coefficient", background, ""}});
+    Scene scene = with("paper1_deviation", {{"interference.background_force", background, ""}});
     if (!activation) without_activation(scene);
     return pushed_aside(run_scene(scene));
   };

@@ -169,6 +169,39 @@ TEST_F(DeviationDevice, ABackgroundForceOnAStableWallEndsNothing) {
   EXPECT_EQ(result.results[0].touches, 1u) << result.results[0].without_contact;
 }
 
+/// Deviation of one pulse of 3 N along the surface at F_B = `background`, m, by one person who presses
+/// against the wall harder than any F_B and keeps the handle where it is along the surface.
+double served_deviation(double background, double activation_gain) {
+  simulation::Scene scene = two_held_axes();
+  scene.axes[0].motion->push_force = 3.0;
+  scene.axes[0].motion->hold_time = 8.0;
+  scene.axes[1].motion.reset();
+  scene.axes[1].start.position = 0.0;
+  scene.axes[1].same_person = true;
+  for (simulation::SceneAxis& axis : scene.axes) axis.person->activation_gain = activation_gain;
+  device::Device device(std::make_unique<link::SimLink>(scene));
+  device.apply(device::parse_assignments({"axis1.wall.law=none"}));
+  DeviationDeviceSettings settings;
+  settings.protocol.pulses = 1;
+  settings.protocol.rest = 1.5;
+  settings.pairs = {*paper::deviation(background, 3)};
+  const DeviationResult result =
+      run_deviation_on_device(device, settings, nullptr, [](const std::string&) {}).results.front();
+  EXPECT_EQ(result.touches, 1u) << "F_B = " << background << ", gamma = " << activation_gain;
+  return result.deviation;
+}
+
+// Table II by a served person: whoever stiffens with F_B is moved less, and it is the stiffening that does
+// it.
+TEST(DeviationOfAServedPerson, FallsWithTheBackgroundForceIfThePersonStiffens) {
+  const double none = served_deviation(0, 0.574), one = served_deviation(1, 0.574),
+               two = served_deviation(2, 0.574);
+  EXPECT_NEAR(none, 3.0 / 116.0, 2e-3);
+  EXPECT_LT(one, 0.8 * none);
+  EXPECT_LT(two, 0.8 * one);
+  EXPECT_NEAR(served_deviation(2, 0.0), none, 0.05 * none);
+}
+
 class DeviationWithoutAPerson : public DeviationDevice {
  protected:
   DeviationWithoutAPerson() {

@@ -47,6 +47,9 @@ class JitterDevice : public testing::Test {
 };
 
 TEST_F(JitterDevice, EveryTouchIsAskedForAndMeasured) {
+  // The person presses with 1 N, and against F_B as well: 5 N inside, clipped at 3.3 N with F_B, are too
+  // much.
+  settings.pairs = {*paper::jitter(0, 1), *paper::jitter(1, 5)};
   const JitterDeviceResult result = run();
   expect_disarmed_and_restored();
   ASSERT_EQ(result.results.size(), 2u);
@@ -56,7 +59,7 @@ TEST_F(JitterDevice, EveryTouchIsAskedForAndMeasured) {
   EXPECT_EQ(result.lost_records, 0u);
   ASSERT_EQ(asked.requests.size(), 2u);
   EXPECT_CONTAINS(asked.requests[0], "1 N");
-  EXPECT_CONTAINS(asked.requests[1], "5 N");
+  EXPECT_CONTAINS(asked.requests[1], "1 N act at once, inside 6 N");
 }
 
 TEST_F(JitterDevice, TheForceLimitIsLoweredButNeverRaised) {
@@ -133,6 +136,30 @@ TEST_F(JitterDevice, AStiffnessThatIsNotAllowedIsRefusedBeforeAnybodyIsAsked) {
   EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(); }), "wall.stiffness");
   EXPECT_TRUE(asked.requests.empty());
   expect_disarmed_and_restored();
+}
+
+/// Jitter at F_I = 5 N, m.
+double served_jitter(double background, double activation_gain) {
+  simulation::Scene scene = simulated_board::open_scene("paper1_jitter");
+  scene.axes[0].person->activation_gain = activation_gain;
+  device::Device device(std::make_unique<link::SimLink>(scene));
+  JitterDeviceSettings settings;
+  settings.touches = 1;
+  settings.force_limit = 20.0;
+  settings.wall.window = 1.5;
+  settings.pairs = {*paper::jitter(background, 5)};
+  const JitterResult result =
+      run_jitter_on_device(device, settings, nullptr, [](const std::string&) {}).results.front();
+  EXPECT_EQ(result.touches, 1u) << "F_B = " << background << ", gamma = " << activation_gain;
+  return result.amplitude;
+}
+
+// Table I by a served person: whoever stiffens with F_B is thrown out less far, and it is the stiffening that
+// does it.
+TEST(JitterOfAServedPerson, FallsWithTheBackgroundForceIfThePersonStiffens) {
+  const double none = served_jitter(0, 0.574), three = served_jitter(3, 0.574);
+  EXPECT_LT(three, 0.8 * none);
+  EXPECT_GT(served_jitter(3, 0.0), 0.9 * none);
 }
 
 }  // namespace
