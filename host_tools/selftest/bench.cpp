@@ -216,7 +216,7 @@ void Bench::arm_quietly() {
 ArmingTrial Bench::try_arming() {
   ArmingTrial trial;
   const auto start = device_.link().now();
-  for (;;) {
+  for (int silences = 0;;) {
     tell_("arming with zero volts");
     try {
       arm_quietly();
@@ -233,6 +233,10 @@ ArmingTrial Bench::try_arming() {
       clear_fault();
     } else {
       drive_.disarm();
+    }
+    if (trial.fault == firmware::Fault::link_silent) {
+      note_silence(++silences);
+      continue;
     }
     const bool starting = trial.refusal == firmware::Refusal::power_stage_not_ready ||
                           trial.refusal == firmware::Refusal::store_busy;
@@ -268,7 +272,39 @@ void Bench::take_counts(const std::vector<double>& counts, Recording& recording)
   }
 }
 
+void Bench::note_silence(int silences) {
+  if (silences >= most_silences)
+    throw DeviceError(
+        fmt::format("{} times in a row the device heard nothing for {:g} s and removed the force: this "
+                    "program or the link was held up for so long; try again when this computer has less to "
+                    "do",
+                    silences, longest_silence));
+}
+
 Recording Bench::give(const Pulse& pulse, Observe observe) {
+  for (int silences = 0;;) {
+    if (const auto recording = try_to_give(pulse, observe)) return *recording;
+    note_silence(++silences);
+  }
+}
+
+/// Nothing: the host was silent for too long, before the pulse or after it.
+std::optional<Recording> Bench::try_to_give(const Pulse& pulse, Observe observe) {
+  try {
+    const Recording recording = give_once(pulse, observe);
+    if (recording.fault == firmware::Fault::link_silent) return std::nullopt;
+    return recording;
+  } catch (const HandleMoved&) {
+    throw;
+  } catch (const DeviceError&) {
+    // It could not be armed, or the pulse never came.
+    if (fault_of(drive_.status()) != firmware::Fault::link_silent) throw;
+    clear_fault();
+    return std::nullopt;
+  }
+}
+
+Recording Bench::give_once(const Pulse& pulse, Observe observe) {
   constexpr std::uint32_t before = 32, after = 60;
   tell_(fmt::format("a pulse of {:.2f} V", pulse.voltage));
   if (const double moved = displacement(); std::abs(moved) > farthest_start)

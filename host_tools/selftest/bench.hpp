@@ -29,7 +29,9 @@ class HandleMoved : public device::DeviceError {
 /// current of zero): so it is from the first tick on. A pulse is a run that is started afterwards.
 ///
 /// While it is armed link.timeout is 1 s, whatever it was: a program that is killed, or a cable that is
-/// pulled, leaves no force.
+/// pulled, leaves no force. A program that merely was not run for a second, on a busy computer, finds an axis
+/// that is off: that says nothing about the axis. What was under way, arming or a pulse, is done again, and
+/// after `most_silences` of them in a row a DeviceError says why it cannot be done.
 ///
 /// Before the first change all parameters that are used are remembered; leave() disarms and puts them back,
 /// and so does the destructor if nobody has called it. Errors: DeviceError and link::LinkError, from every
@@ -59,13 +61,15 @@ class Bench {
   void clear_fault();
   LinkTrial try_link(int exchanges);
   /// Arms with zero volts for a moment. A power stage that is still starting is waited for, up to 2 s.
+  /// Throws DeviceError if the axis was off for the host's silence every time.
   ArmingTrial try_arming();
   /// Arms with zero volts and stays so. False: it cannot be armed.
   bool arm_with_zero_volts();
   /// Bridge off.
   Recording record_rest(std::size_t samples);
-  /// One pulse. A trip ends it and is in the recording; its fault is cleared. Throws HandleMoved if something
-  /// else has moved the handle: nothing has been given then.
+  /// One pulse. A trip ends it and is in the recording; its fault is cleared. A pulse around which the host
+  /// was silent is given again. Throws HandleMoved if something else has moved the handle: nothing has been
+  /// given then.
   Recording give(const Pulse& pulse, Observe observe = Observe::position);
   std::vector<double> read_supply(int readings);
 
@@ -87,6 +91,7 @@ class Bench {
   static constexpr double travel = Evidence::travel;
   /// s: link.timeout during the test. While it is armed the device hears of the host every 20 ms.
   static constexpr double longest_silence = 1.0;
+  static constexpr int most_silences = 3;
   /// m: no pulse is given farther than this from the start.
   static constexpr double farthest_start = 0.6e-3;
 
@@ -95,6 +100,9 @@ class Bench {
   bool disarm(Left& left);
   bool put_back(Left& left);
   void arm_quietly();
+  std::optional<Recording> try_to_give(const Pulse& pulse, Observe observe);
+  Recording give_once(const Pulse& pulse, Observe observe);
+  void note_silence(int silences);
   void take_counts(const std::vector<double>& counts, Recording& recording);
   double distance_from_start(double counts) const;
 

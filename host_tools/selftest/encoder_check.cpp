@@ -68,10 +68,14 @@ CheckResult check_encoder(const Evidence& evidence) {
                      "magnet of a magnetic one");
   }
   if (!evidence.motion) {
-    const std::string reason = reason_without_pulses(evidence);
+    std::string reason = reason_without_pulses(evidence);
+    if (reason.empty())
+      reason = evidence.pulse_fault == Fault::none
+                   ? "the motor's circuit must be right first"
+                   : fmt::format("a pulse was ended by a fault ({})",
+                                 firmware::text_of(evidence.pulse_fault).what);
     return say(Verdict::not_judged, "",
-               fmt::format("{}; whether it sees motion is not judged: {}", at_rest,
-                           reason.empty() ? "the motor's circuit must be right first" : reason));
+               fmt::format("{}; whether it sees motion is not judged: {}", at_rest, reason));
   }
   const MotionEvidence& motion = *evidence.motion;
   result.values.insert(result.values.end(), {{"motion_by_encoder", motion.encoder_excursion, "m"},

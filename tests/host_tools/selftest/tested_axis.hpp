@@ -57,6 +57,8 @@ class WatchedLink final : public link::Link {
   void cut() { cut_ = true; }
   /// Called before every tick.
   std::function<void()> before_tick;
+  /// Called before every message: for how long the host is held up before it sends it.
+  std::function<std::chrono::milliseconds()> held_up;
 
  private:
   static void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
@@ -75,6 +77,7 @@ class WatchedLink final : public link::Link {
   }
   std::vector<std::uint8_t> exchange(std::vector<std::uint8_t> frame, std::uint16_t address) {
     const std::uint8_t function = frame[1];
+    if (held_up) wait(held_up());
     if (cut_) {
       wait(std::chrono::milliseconds(100));
       throw link::LinkError("no answer");

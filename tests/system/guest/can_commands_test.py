@@ -141,11 +141,23 @@ class Commands(unittest.TestCase):
                 self.assertEqual(steps - {20 if kind == "record" else 1}, set())
                 self.assertEqual(len(ticks), 200)
 
+    def self_test(self, device):
+        """Its report. Where the computer is too busy to run kmax and the board in time, kmax says that the test could not
+        be carried out, and it is made again: how busy it is must not decide."""
+        for _ in range(10):
+            done = kmax("selftest", "--json", device=device, check=False, timeout=600)
+            if done.returncode in (0, 3):
+                return json.loads(done.stdout)
+            self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.fail(f"10 self-tests could not be carried out; the last one: {done.stdout}{done.stderr}")
+
     def test_selftest(self):
-        (_, can, _), (_, line, _) = self.both("selftest", "--json")
-        self.assertEqual([(check["name"], check["verdict"]) for check in can["checks"]],
-                         [(check["name"], check["verdict"]) for check in line["checks"]])
-        self.assertEqual(can["pass"], line["pass"])
+        can, line = ([(check["name"], check["verdict"]) for check in self.self_test(device)["checks"]]
+                     for device in (self.board.can_device, self.board.device))
+        self.assertEqual([name for name, _ in can], [name for name, _ in line])
+        # Of a link is judged whether its answers come in time.
+        self.assertEqual([check for check in can if check[0] != "link"],
+                         [check for check in line if check[0] != "link"])
 
 
 class SeveralPrograms(unittest.TestCase):
