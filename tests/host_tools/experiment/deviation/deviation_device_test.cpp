@@ -4,6 +4,7 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -21,12 +22,6 @@ simulation::Scene two_held_axes() {
   scene.axes[1].motion->push_force = 0.0;
   return scene;
 }
-
-class Asked final : public calibration::Prompter {
- public:
-  void ask(const std::string& what_to_do) override { requests.push_back(what_to_do); }
-  std::vector<std::string> requests;
-};
 
 class DeviationDevice : public testing::Test {
  protected:
@@ -57,7 +52,7 @@ class DeviationDevice : public testing::Test {
 
   device::Device device;
   DeviationDeviceSettings settings;
-  Asked asked;
+  AskedPerson asked;
   Tell tell = [](const std::string&) {};
   std::vector<double> before;
 };

@@ -4,18 +4,13 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
+#include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
 namespace {
 using host_tools_test::thrown_message;
-
-class Asked final : public calibration::Prompter {
- public:
-  void ask(const std::string& what_to_do) override { requests.push_back(what_to_do); }
-  std::vector<std::string> requests;
-};
 
 class JitterDevice : public testing::Test {
  protected:
@@ -41,7 +36,7 @@ class JitterDevice : public testing::Test {
 
   device::Device device;
   JitterDeviceSettings settings;
-  Asked asked;
+  AskedPerson asked;
   Tell tell = [](const std::string&) {};
   std::vector<double> before;
 };
