@@ -230,7 +230,7 @@ class As5047pAngle {
   }
 
   /// Before there is a movement to compare with, the frames are compared with each other.
-  constexpr As5047pSample start_with(std::uint16_t angle) {
+  [[gnu::cold]] constexpr As5047pSample start_with(std::uint16_t angle) {
     const bool first = agreeing_ == 0;
     const bool agrees = first || (agreeing_ == 1 ? within(step_to(last_, angle), config_.maximum_step)
                                                  : reachable(last_, angle, 1, 1));

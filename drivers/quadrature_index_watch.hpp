@@ -42,8 +42,10 @@ class QuadratureIndexWatch {
   /// believed.
   constexpr bool ISR_plausible(std::uint32_t count, bool index_line) {
     if (!index_line) {
-      if (high_) [[unlikely]]
-        fall(count);
+      if (high_) [[unlikely]] {
+        high_ = false;
+        if (!learned_ && !failed_) learn(count);
+      }
       low_at_ = count;
       low_seen_ = true;
       return !failed_;
@@ -71,9 +73,12 @@ class QuadratureIndexWatch {
   static constexpr std::int32_t lesser(std::int32_t a, std::int32_t b) { return a < b ? a : b; }
   static constexpr std::int32_t greater(std::int32_t a, std::int32_t b) { return a < b ? b : a; }
 
-  /// The counts at which the line is high, before the index is known. Counts here are from where it rose: the
+  // Both before the index is known only, and kept out of the tick's one function, of which there is a copy
+  // for each axis: inlined they are 1 KiB of the image.
+
+  /// The counts at which the line is high. Counts here are from where it rose: the
   /// last low look, or the first look of all.
-  constexpr void extend(std::uint32_t count) {
+  [[gnu::noinline, gnu::cold]] constexpr void extend(std::uint32_t count) {
     if (!high_) {
       from_low_ = low_seen_;
       rose_at_ = low_seen_ ? low_at_ : count;
@@ -85,9 +90,8 @@ class QuadratureIndexWatch {
     if (highest_ - lowest_ >= config_.widest) failed_ = true;
   }
 
-  constexpr void fall(std::uint32_t count) {
-    high_ = false;
-    if (learned_ || failed_) return;
+  /// The line has fallen.
+  [[gnu::noinline, gnu::cold]] constexpr void learn(std::uint32_t count) {
     const auto out = static_cast<std::int32_t>(count - rose_at_);
     if (from_low_ && is_crossing(out)) {
       const std::int32_t below = lesser(0, out), above = greater(0, out);

@@ -4,6 +4,7 @@
 
 #include "firmware/application.hpp"
 #include "firmware/canopen/communication_rules.hpp"
+#include "firmware/canopen/copy_bytes.hpp"
 
 namespace kmax::firmware {
 
@@ -19,11 +20,11 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
     case Refusal::out_of_range: {
       bool above = false;
       if (entry.type == Type::float32) {
-        above = std::bit_cast<float>(raw) > std::bit_cast<float>(entry.maximum);
+        above = std::bit_cast<float>(raw) > std::bit_cast<float>(entry.maximum());
       } else if (is_signed(entry.type)) {
-        above = static_cast<std::int32_t>(raw) > static_cast<std::int32_t>(entry.maximum);
+        above = static_cast<std::int32_t>(raw) > static_cast<std::int32_t>(entry.maximum());
       } else {
-        above = raw > entry.maximum;
+        above = raw > entry.maximum();
       }
       return above ? Abort::value_too_high : Abort::value_too_low;
     }
@@ -189,7 +190,7 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
       put_words(offset, out, [&](std::uint32_t word) { return app_.capture_.value_at(word); });
       return Abort::none;
     case SpecialObject::scratch:
-      std::copy_n(scratch_.begin() + offset, out.size(), out.begin());
+      canopen::copy_bytes(std::span(scratch_).subspan(offset, out.size()), out);
       return Abort::none;
     default:
       put_bytes(number_of(place, subindex), offset, out);
@@ -251,7 +252,7 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
       if (little_endian(in) != signature_load) return Abort::not_transferred;
       return abort_for(app_.save_defaults().refusal, {}, 0);
     case SpecialObject::scratch:
-      std::copy(in.begin(), in.end(), scratch_.begin());
+      canopen::copy_bytes(in, scratch_);
       scratch_size_ = static_cast<std::uint32_t>(in.size());
       return Abort::none;
     default:
@@ -276,8 +277,7 @@ Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
     const std::uint8_t node_id = app_.node_.node_id();
     const Abort abort = canopen::check_communication(app_.registers_.values(), slot, raw, node_id);
     if (abort != Abort::none) return abort;
-    if (canopen::node_relative(entry)) raw = canopen::stored_cob_id(raw, descriptor.default_value, node_id);
-    app_.registers_.write_communication(slot, raw);
+    app_.registers_.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
     return Abort::none;
   }
   const std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16),
@@ -293,10 +293,9 @@ void ApplicationObjects::refresh() {
 }
 
 std::uint32_t ApplicationObjects::value(std::size_t slot) const {
-  const std::size_t entry = owner_of(slot).entry;
   const std::uint32_t raw = app_.registers_.values().raw(slot);
-  if (!canopen::node_relative(entry)) return raw;
-  return canopen::resolved_cob_id(raw, descriptors[entry].default_value, app_.node_.node_id());
+  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, app_.node_.node_id())
+                                         : raw;
 }
 
 bool ApplicationObjects::take(std::size_t slot, std::uint32_t raw) {

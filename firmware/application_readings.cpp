@@ -1,6 +1,7 @@
 // What a host can read.
 #include "firmware/application.hpp"
 #include "firmware/haptic_configuration.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 #include "firmware/profile_readings.hpp"
 #include "firmware/statusword.hpp"
 

@@ -48,8 +48,8 @@ DeviceRegisters::WriteResult DeviceRegisters::check_and_set(Staged& target, std:
                                                             bool armed) const {
   for (std::size_t i = 0; i < in.size();) {
     const auto a = static_cast<std::uint16_t>(address + i);
-    const RegisterPlace* place = find(true, a);
-    if (place == nullptr) return {Refusal::unknown_register, a};
+    const std::optional<RegisterPlace> place = find(true, a);
+    if (!place) return {Refusal::unknown_register, a};
     if (place->address != a || i + place->words > in.size()) return {Refusal::value_cut_in_two, a};
     const SlotDescriptor& entry = descriptors[owner_of(place->slot).entry];
     const std::uint32_t raw =
@@ -66,8 +66,8 @@ DeviceRegisters::WriteResult DeviceRegisters::check_and_set(Staged& target, std:
 
 bool DeviceRegisters::only_setpoints(std::uint16_t address, std::size_t count) const {
   for (std::size_t i = 0; i < count; ++i) {
-    const RegisterPlace* place = find(true, static_cast<std::uint16_t>(address + i));
-    if (place == nullptr || !is_setpoint(owner_of(place->slot).entry)) return false;
+    const std::optional<RegisterPlace> place = find(true, static_cast<std::uint16_t>(address + i));
+    if (!place || !is_setpoint(owner_of(place->slot).entry)) return false;
   }
   return count != 0;
 }
@@ -174,7 +174,7 @@ DeviceRegisters::WriteResult DeviceRegisters::write(std::uint16_t address, std::
     return control_transaction(address, in[0], armed, now_us);
   // A command and no value; the application takes it before it comes here, if it has a store.
   if (in.size() == 1 && address == register_address(store_entry, 0))
-    return refuse(in[0] > descriptors[store_entry].maximum ? Refusal::out_of_range : Refusal::store_missing,
+    return refuse(in[0] > descriptors[store_entry].maximum() ? Refusal::out_of_range : Refusal::store_missing,
                   address);
 
   for (std::size_t axis = 0; axis < axis_count; ++axis) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "firmware/armed_axes.hpp"
@@ -12,35 +13,27 @@
 
 namespace kmax::firmware {
 
-/// The Modbus view of the dictionary: sorted places of all values, made when compiled.
+/// Where a value is in its table.
 struct RegisterPlace {
   std::uint16_t address;
-  std::uint16_t slot : 12;
-  std::uint16_t words : 4;
+  std::uint16_t words;
+  std::size_t slot;
 };
-static_assert(slot_count <= 4096);
 
+/// The Modbus view of the dictionary, made when compiled: the entries of one table in the order of their
+/// registers, of axis 0 or of the device.
 template <bool writable>
-inline constexpr std::size_t register_place_count = [] {
-  std::size_t count = 0;
-  for (std::size_t slot = 0; slot < slot_count; ++slot)
-    count += descriptors[owner_of(slot).entry].writable == writable ? 1 : 0;
-  return count;
-}();
-
-template <bool writable>
-inline constexpr auto register_places = [] {
-  std::array<RegisterPlace, register_place_count<writable>> places{};
+inline constexpr auto entries_by_register = [] {
+  constexpr auto count = std::count_if(descriptors.begin(), descriptors.end(),
+                                       [](const SlotDescriptor& d) { return d.writable == writable; });
+  std::array<std::uint16_t, count> entries{};
   std::size_t next = 0;
-  for (std::size_t slot = 0; slot < slot_count; ++slot) {
-    const auto [entry, axis] = owner_of(slot);
-    if (descriptors[entry].writable != writable) continue;
-    places[next++] = {modbus_address(entry, axis), static_cast<std::uint16_t>(slot & 0xFFFu),
-                      static_cast<std::uint16_t>(words_of(descriptors[entry].type) & 0xFu)};
+  for (std::size_t entry = 0; entry < entry_count; ++entry) {
+    if (descriptors[entry].writable == writable) entries[next++] = static_cast<std::uint16_t>(entry);
   }
-  std::sort(places.begin(), places.end(),
-            [](const RegisterPlace& a, const RegisterPlace& b) { return a.address < b.address; });
-  return places;
+  std::sort(entries.begin(), entries.end(),
+            [](std::size_t a, std::size_t b) { return descriptors[a].address < descriptors[b].address; });
+  return entries;
 }();
 
 /// Parameters as registers: reading, checked writing, and transactions.
@@ -85,8 +78,8 @@ class DeviceRegisters {
 
   bool readable(bool holding, std::uint32_t address, std::size_t count) const {
     for (std::uint32_t a = address; a < address + count;) {
-      const RegisterPlace* place = find(holding, a);
-      if (place == nullptr) return false;
+      const std::optional<RegisterPlace> place = find(holding, a);
+      if (!place) return false;
       a = place->address + std::uint32_t{place->words};
     }
     return true;
@@ -96,7 +89,7 @@ class DeviceRegisters {
   void read(bool holding, std::uint16_t address, std::span<std::uint16_t> out) const {
     for (std::size_t i = 0; i < out.size(); ++i) {
       const auto a = static_cast<std::uint16_t>(address + i);
-      const RegisterPlace* place = find(holding, a);
+      const std::optional<RegisterPlace> place = find(holding, a);
       const std::uint32_t raw = values_.raw(place->slot);
       out[i] = static_cast<std::uint16_t>(place->words == 2 && a == place->address ? raw >> 16 : raw);
     }
@@ -142,17 +135,23 @@ class DeviceRegisters {
   }
 
  private:
-  static const RegisterPlace* find(bool holding, std::uint32_t address) {
-    return holding ? find_in(register_places<true>, address) : find_in(register_places<false>, address);
-  }
-  template <std::size_t size>
-  static const RegisterPlace* find_in(const std::array<RegisterPlace, size>& places, std::uint32_t address) {
-    const auto after =
-        std::upper_bound(places.begin(), places.end(), address,
-                         [](std::uint32_t a, const RegisterPlace& p) { return a < p.address; });
-    if (after == places.begin()) return nullptr;
-    const RegisterPlace& place = *(after - 1);
-    return address < std::uint32_t{place.address} + place.words ? &place : nullptr;
+  static std::optional<RegisterPlace> find(bool holding, std::uint32_t address) {
+    const std::span<const std::uint16_t> entries =
+        holding ? std::span<const std::uint16_t>(entries_by_register<true>) : entries_by_register<false>;
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      const std::size_t offset = axis * axis_modbus_offset;
+      if (address < offset) break;
+      const auto after =
+          std::upper_bound(entries.begin(), entries.end(), address - offset,
+                           [](std::uint32_t a, std::size_t entry) { return a < descriptors[entry].address; });
+      if (after == entries.begin()) continue;
+      const std::size_t entry = *(after - 1);
+      const SlotDescriptor& d = descriptors[entry];
+      const std::uint16_t words = words_of(d.type);
+      if (address - offset < std::uint32_t{d.address} + words && (axis == 0 || d.per_axis))
+        return {{static_cast<std::uint16_t>(d.address + offset), words, slot_of(entry, axis)}};
+    }
+    return std::nullopt;
   }
 
   struct Staged {

@@ -2,6 +2,13 @@
 
 namespace kmax::firmware {
 
+// The defaults. As the member's initialiser they would be worked out when compiled and stored in the image, 1
+// KiB of it.
+ParameterKeeper::ParameterKeeper() {
+  for (std::size_t i = 0; i < persistent_count; ++i)
+    kept_[i] = descriptors[owner_of(persistent_slots[i]).entry].default_value();
+}
+
 const LoadReport& ParameterKeeper::attach(AnyFlashSectors flash, ParameterValues& values) {
   flash_ = flash;
   state_ = flash_.present() ? StoreState::idle : StoreState::no_memory;
@@ -43,7 +50,7 @@ void ParameterKeeper::publish(ParameterValues& v) const {
   v.set_whole<"store.saved_parameters">(survey_.header.count);
   std::uint32_t unsaved = 0;
   for (std::size_t i = 0; i < persistent_count; ++i)
-    unsaved += v.raw(persistent_parameters[i].slot) != kept_[i] ? 1U : 0U;
+    unsaved += v.raw(persistent_slots[i]) != kept_[i] ? 1U : 0U;
   v.set_whole<"store.unsaved_parameters">(unsaved);
   v.set_whole<"store.free_saves">(
       flash_.present() ? static_cast<std::uint32_t>(decltype(store_)::free_saves(survey_)) : 0U);

@@ -24,7 +24,7 @@ enum class StoreCommand : std::uint16_t { save = 1, defaults = 2 };
 /// with what a host reads about it.
 class ParameterKeeper {
  public:
-  ParameterKeeper() = default;
+  ParameterKeeper();
   ParameterKeeper(const ParameterKeeper&) = delete;
   ParameterKeeper& operator=(const ParameterKeeper&) = delete;
 
@@ -55,7 +55,7 @@ class ParameterKeeper {
   ParameterStore<AnyFlashSectors> store_{flash_};
   StoreSurvey survey_;
   LoadReport loaded_;
-  PersistentValues kept_ = persistent_part(ParameterValues{});  ///< what a restart brings
+  PersistentValues kept_{};  ///< what a restart brings
   StoreState state_ = StoreState::no_memory;
 };
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -31,26 +30,25 @@ class ParameterMigration {
   explicit ParameterMigration(const ParameterValues& before) : before_(before), result_(before) {}
 
   void take(std::uint32_t identity, std::uint32_t raw) {
-    const auto is_wanted = [identity](const auto& p) { return p.identity == identity; };
     // A set is stored in the order of the dictionary: the next one is nearly always the one wanted.
-    auto known = std::find_if(persistent_parameters.begin() + next_, persistent_parameters.end(), is_wanted);
-    if (known == persistent_parameters.end())
-      known = std::find_if(persistent_parameters.begin(), persistent_parameters.end(), is_wanted);
-    if (known == persistent_parameters.end()) {
+    std::size_t known = find(identity, next_);
+    if (known == persistent_count) known = find(identity, 0);
+    if (known == persistent_count) {
       note(identity, report_.dropped, report_.first_dropped);
       return;
     }
-    next_ = known - persistent_parameters.begin() + 1;
-    if (check_value(descriptors[owner_of(known->slot).entry], raw) != Refusal::none) return;
-    result_.set_raw(known->slot, raw);
-    taken_[static_cast<std::size_t>(known - persistent_parameters.begin())] = true;
+    next_ = known + 1;
+    const std::size_t slot = persistent_slots[known];
+    if (check_value(descriptors[owner_of(slot).entry], raw) != Refusal::none) return;
+    result_.set_raw(slot, raw);
+    taken_[known] = true;
   }
 
   /// After the last take().
   const ParameterValues& finish() {
     keep_rules();
     for (std::size_t i = 0; i < persistent_count; ++i) {
-      if (!taken_[i]) note(persistent_parameters[i].identity, report_.defaulted, report_.first_defaulted);
+      if (!taken_[i]) note(persistent_identity(i), report_.defaulted, report_.first_defaulted);
     }
     return result_;
   }
@@ -62,7 +60,7 @@ class ParameterMigration {
   bool put_back(Matches matches) {
     bool changed = false;
     for (std::size_t i = 0; i < persistent_count; ++i) {
-      const std::size_t slot = persistent_parameters[i].slot;
+      const std::size_t slot = persistent_slots[i];
       if (result_.raw(slot) == before_.raw(slot) || !matches(slot)) continue;
       taken_[i] = false;
       changed = true;
@@ -78,9 +76,9 @@ class ParameterMigration {
       if (broken.refusal == Refusal::none) return;
       if (put_back([&](std::size_t slot) { return slot == broken.slot; })) continue;
       const auto [entry, axis] = owner_of(broken.slot);
-      const std::uint16_t group = register_group(entry);
+      const std::uint8_t group = descriptors[entry].group;
       if (put_back([&](std::size_t slot) {
-            return owner_of(slot).axis == axis && register_group(owner_of(slot).entry) == group;
+            return owner_of(slot).axis == axis && descriptors[owner_of(slot).entry].group == group;
           }))
         continue;
       put_back([](std::size_t) { return true; });
@@ -88,14 +86,11 @@ class ParameterMigration {
     }
   }
 
-  static std::uint16_t register_group(std::size_t entry) { return groups[entry]; }
-
-  // The dictionary itself, with its texts, stays out of the image.
-  static constexpr auto groups = [] {
-    std::array<std::uint16_t, entry_count> all{};
-    for (std::size_t i = 0; i < entry_count; ++i) all[i] = entry_at(i).group.index;
-    return all;
-  }();
+  /// Of the persistent parameters from `from` on; persistent_count if it is none of them.
+  static std::size_t find(std::uint32_t identity, std::size_t from) {
+    while (from < persistent_count && persistent_identity(from) != identity) ++from;
+    return from;
+  }
 
   static void note(std::uint32_t identity, std::uint16_t& count,
                    std::array<std::uint32_t, MigrationReport::named>& first) {
@@ -107,7 +102,7 @@ class ParameterMigration {
   ParameterValues result_;
   std::array<bool, persistent_count> taken_{};
   MigrationReport report_;
-  std::ptrdiff_t next_ = 0;  ///< behind the parameter that was taken last
+  std::size_t next_ = 0;  ///< behind the parameter that was taken last
 };
 
 }  // namespace kmax::firmware

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "firmware/flash_sectors.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 #include "firmware/parameter_migration.hpp"
 #include "firmware/parameter_record.hpp"
 #include "firmware/persistent_parameters.hpp"
@@ -201,7 +202,7 @@ class ParameterStore {
     if (i == length - 2) return crc_.value();
     if (i == length - 1) return record::commit;
     const std::size_t pair = (i - record::header_words) / 2;
-    return (i - record::header_words) % 2 == 0 ? persistent_parameters[pair].identity : pending_[pair];
+    return (i - record::header_words) % 2 == 0 ? persistent_identity(pair) : pending_[pair];
   }
 
   void write() {

@@ -25,47 +25,45 @@ struct ParameterIdentity {
 };
 
 constexpr ParameterIdentity identity_of(std::size_t entry, std::size_t axis) {
-  const Entry& e = entry_at(entry);
-  return {static_cast<std::uint16_t>(e.index() + (e.scope() == Scope::axis ? axis * axis_index_offset : 0)),
-          e.object_subindex(), e.type};
+  const SlotDescriptor& d = descriptors[entry];
+  return {static_cast<std::uint16_t>(d.index + (d.per_axis ? axis * axis_index_offset : 0)), d.subindex,
+          d.type};
 }
-
-/// One parameter that save keeps.
-struct PersistentParameter {
-  std::uint32_t identity;
-  std::uint16_t slot;
-};
 
 inline constexpr std::size_t persistent_count = [] {
   std::size_t count = 0;
-  for (std::size_t slot = 0; slot < slot_count; ++slot) count += entry_at(owner_of(slot).entry).persistent;
+  for (std::size_t slot = 0; slot < slot_count; ++slot) count += descriptors[owner_of(slot).entry].persistent;
   return count;
 }();
 
-/// All of them, in the order of the slots.
-inline constexpr auto persistent_parameters = [] {
-  std::array<PersistentParameter, persistent_count> all{};
+/// The parameters that save keeps, in the order of the slots.
+inline constexpr auto persistent_slots = [] {
+  std::array<std::uint16_t, persistent_count> all{};
   std::size_t next = 0;
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
-    const auto [entry, axis] = owner_of(slot);
-    if (entry_at(entry).persistent)
-      all[next++] = {identity_of(entry, axis).word(), static_cast<std::uint16_t>(slot)};
+    if (descriptors[owner_of(slot).entry].persistent) all[next++] = static_cast<std::uint16_t>(slot);
   }
   return all;
 }();
 
-/// The values of all persistent parameters, in the order of `persistent_parameters`.
+/// ParameterIdentity::word() of the i-th of them.
+constexpr std::uint32_t persistent_identity(std::size_t i) {
+  const auto [entry, axis] = owner_of(persistent_slots[i]);
+  return identity_of(entry, axis).word();
+}
+
+/// The values of all persistent parameters, in the order of `persistent_slots`.
 using PersistentValues = std::array<std::uint32_t, persistent_count>;
 
 constexpr PersistentValues persistent_part(const ParameterValues& values) {
   PersistentValues part{};
-  for (std::size_t i = 0; i < persistent_count; ++i) part[i] = values.raw(persistent_parameters[i].slot);
+  for (std::size_t i = 0; i < persistent_count; ++i) part[i] = values.raw(persistent_slots[i]);
   return part;
 }
 
 constexpr void set_defaults(ParameterValues& values) {
-  for (const PersistentParameter& parameter : persistent_parameters)
-    values.set_raw(parameter.slot, descriptors[owner_of(parameter.slot).entry].default_value);
+  for (const std::size_t slot : persistent_slots)
+    values.set_raw(slot, descriptors[owner_of(slot).entry].default_value());
 }
 
 }  // namespace kmax::firmware

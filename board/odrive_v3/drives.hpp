@@ -130,8 +130,9 @@ class Drives {
   Count ISR_read_quadrature(bool driving);
   void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
   // Rare, and kept out of the tick's one function, whose registers they would take.
-  [[gnu::noinline]] void ISR_calibrate(AxisHardware& hardware, const drivers::stm32f4::CurrentSample& sample);
-  [[gnu::noinline]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
+  [[gnu::noinline, gnu::cold]] void ISR_calibrate(AxisHardware& hardware,
+                                                  const drivers::stm32f4::CurrentSample& sample);
+  [[gnu::noinline, gnu::cold]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
   [[gnu::noinline]] Count ISR_take_serial();
   [[gnu::noinline]] void ISR_begin_serial() { serial_encoder_.ISR_begin(); }
 

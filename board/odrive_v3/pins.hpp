@@ -66,7 +66,7 @@ inline constexpr GpioConfig output_high{.mode = GpioMode::output, .initial_level
 inline constexpr GpioConfig gate_off{.mode = GpioMode::input, .pull = GpioPull::down};
 
 /// Applied before anything else at start-up, in this order: the switch that turns everything off comes first.
-inline constexpr std::array power_stage_off = {
+inline constexpr auto power_stage_off = std::to_array<PinState>({
     PinState{pins::gate_enable, output_low},
     PinState{pins::brake_low_side, output_low},
     PinState{pins::brake_high_side, output_low},
@@ -87,22 +87,22 @@ inline constexpr std::array power_stage_off = {
     PinState{pins::gate_driver0_select, output_high},
     PinState{pins::gate_driver1_select, output_high},
     PinState{pins::gate_driver_fault, {.mode = GpioMode::input, .pull = GpioPull::up}},
-};
+});
 
 /// USART2, alternate function 7. The pull-up keeps an open receive line idle.
-inline constexpr std::array serial_pins = {
+inline constexpr auto serial_pins = std::to_array<PinState>({
     PinState{pins::serial_transmit,
              {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 7}},
     PinState{pins::serial_receive,
              {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 7}},
-};
+});
 
 /// CAN1, alternate function 9. The pull-up keeps a receive line without a transceiver recessive.
-inline constexpr std::array can_pins = {
+inline constexpr auto can_pins = std::to_array<PinState>({
     PinState{pins::can_receive, {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 9}},
     PinState{pins::can_transmit,
              {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 9}},
-};
+});
 
 /// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides. The pull-downs hold a leg off that
 /// the timer does not drive.
@@ -112,35 +112,48 @@ constexpr GpioConfig gate(std::uint8_t alternate_function) {
           .speed = GpioSpeed::high,
           .alternate_function = alternate_function};
 }
-inline constexpr std::array gate_pins = {
-    PinState{{GpioPort::a, 8}, gate(1)},  PinState{{GpioPort::a, 9}, gate(1)},
-    PinState{{GpioPort::a, 10}, gate(1)}, PinState{{GpioPort::b, 13}, gate(1)},
-    PinState{{GpioPort::b, 14}, gate(1)}, PinState{{GpioPort::b, 15}, gate(1)},
-    PinState{{GpioPort::c, 6}, gate(3)},  PinState{{GpioPort::c, 7}, gate(3)},
-    PinState{{GpioPort::c, 8}, gate(3)},  PinState{{GpioPort::a, 7}, gate(3)},
-    PinState{{GpioPort::b, 0}, gate(3)},  PinState{{GpioPort::b, 1}, gate(3)},
-};
+inline constexpr auto gate_pins = std::to_array<PinState>({
+    PinState{{GpioPort::a, 8}, gate(1)},
+    PinState{{GpioPort::a, 9}, gate(1)},
+    PinState{{GpioPort::a, 10}, gate(1)},
+    PinState{{GpioPort::b, 13}, gate(1)},
+    PinState{{GpioPort::b, 14}, gate(1)},
+    PinState{{GpioPort::b, 15}, gate(1)},
+    PinState{{GpioPort::c, 6}, gate(3)},
+    PinState{{GpioPort::c, 7}, gate(3)},
+    PinState{{GpioPort::c, 8}, gate(3)},
+    PinState{{GpioPort::a, 7}, gate(3)},
+    PinState{{GpioPort::b, 0}, gate(3)},
+    PinState{{GpioPort::b, 1}, gate(3)},
+});
 
 /// TIM3 and TIM4, alternate function 2; the board's own pull-ups are stronger than the chip's.
 inline constexpr GpioConfig encoder_line{.mode = GpioMode::alternate, .alternate_function = 2};
 inline constexpr GpioConfig plain_input{.mode = GpioMode::input};
-inline constexpr std::array encoder_pins = {
-    PinState{pins::encoder0_a, encoder_line},    PinState{pins::encoder0_b, encoder_line},
-    PinState{pins::encoder0_index, plain_input}, PinState{pins::encoder1_a, encoder_line},
-    PinState{pins::encoder1_b, encoder_line},    PinState{pins::encoder1_index, plain_input},
-};
+inline constexpr auto encoder_pins = std::to_array<PinState>({
+    PinState{pins::encoder0_a, encoder_line},
+    PinState{pins::encoder0_b, encoder_line},
+    PinState{pins::encoder0_index, plain_input},
+    PinState{pins::encoder1_a, encoder_line},
+    PinState{pins::encoder1_b, encoder_line},
+    PinState{pins::encoder1_index, plain_input},
+});
 
 /// Phase currents, supply, thermistors.
 inline constexpr GpioConfig analog_input{.mode = GpioMode::analog};
-inline constexpr std::array analog_pins = {
-    PinState{{GpioPort::c, 0}, analog_input}, PinState{{GpioPort::c, 1}, analog_input},
-    PinState{{GpioPort::c, 2}, analog_input}, PinState{{GpioPort::c, 3}, analog_input},
-    PinState{{GpioPort::a, 6}, analog_input}, PinState{{GpioPort::c, 5}, analog_input},
-    PinState{{GpioPort::a, 4}, analog_input}, PinState{{GpioPort::a, 5}, analog_input},
-};
+inline constexpr auto analog_pins = std::to_array<PinState>({
+    PinState{{GpioPort::c, 0}, analog_input},
+    PinState{{GpioPort::c, 1}, analog_input},
+    PinState{{GpioPort::c, 2}, analog_input},
+    PinState{{GpioPort::c, 3}, analog_input},
+    PinState{{GpioPort::a, 6}, analog_input},
+    PinState{{GpioPort::c, 5}, analog_input},
+    PinState{{GpioPort::a, 4}, analog_input},
+    PinState{{GpioPort::a, 5}, analog_input},
+});
 
 /// SPI3, alternate function 6. Pulled so that a chip that does not answer reads as all ones.
-inline constexpr std::array bus_pins = {
+inline constexpr auto bus_pins = std::to_array<PinState>({
     PinState{pins::bus_clock,
              {.mode = GpioMode::alternate,
               .pull = GpioPull::down,
@@ -154,12 +167,12 @@ inline constexpr std::array bus_pins = {
               .speed = GpioSpeed::medium,
               .alternate_function = 6}},
     PinState{pins::encoder_select, output_high},
-};
+});
 
-inline constexpr std::array line_pins = {
+inline constexpr auto line_pins = std::to_array<PinState>({
     PinState{pins::emergency_stop, {.mode = GpioMode::input, .pull = GpioPull::up}},
     PinState{pins::healthy, output_low},
-};
+});
 
 namespace detail {
 template <std::size_t count>

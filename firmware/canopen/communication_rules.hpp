@@ -45,9 +45,9 @@ enum class CommunicationRule : std::uint8_t {
 
 struct CommunicationRow {
   CommunicationRule rule = CommunicationRule::bounds;
-  PdoKind kind = PdoKind::receive;
-  std::uint8_t number = 0;       ///< PDO or heartbeat consumer, from 0
-  std::uint32_t predefined = 0;  ///< COB-ID without the node ID
+  PdoKind kind : 1 = PdoKind::receive;
+  std::uint8_t number : 7 = 0;   ///< PDO or heartbeat consumer, from 0
+  std::uint16_t predefined = 0;  ///< COB-ID without the node ID
 };
 
 /// CANopen's entries are the last of the dictionary.
@@ -67,16 +67,17 @@ inline constexpr auto communication_rows = [] {
     }
     if (index == 0x1016) {
       row.rule = CommunicationRule::heartbeat_consumer;
-      row.number = static_cast<std::uint8_t>(subindex - 1);
+      row.number = (subindex - 1U) & 0x7FU;
     }
     if (index < 0x1400 || index >= 0x1C00) continue;
     row.kind = index >= 0x1800 ? PdoKind::transmit : PdoKind::receive;
-    row.number = static_cast<std::uint8_t>(index & 0xFF);
+    row.number = index & 0x7FU;
     if ((index & 0x200) != 0) {
       row.rule = subindex == 0 ? CommunicationRule::mapped_count : CommunicationRule::mapped_object;
     } else if (subindex == 1) {
       row.rule = CommunicationRule::pdo_cob_id;
-      row.predefined = (row.kind == PdoKind::transmit ? cob_id::tpdo : cob_id::rpdo)[row.number];
+      row.predefined = static_cast<std::uint16_t>(
+          (row.kind == PdoKind::transmit ? cob_id::tpdo : cob_id::rpdo)[row.number]);
     } else if (subindex == 2) {
       row.rule = CommunicationRule::transmission_type;
     } else if (subindex == 3) {
@@ -109,7 +110,7 @@ constexpr Abort check_communication(const ParameterValues& now, std::size_t slot
   const CommunicationRow& row = communication_rows[slot - first_communication_slot];
   const PdoSlots& pdo = slots_of(row.kind, row.number % pdo_count);
   const bool exists = (now.raw(pdo.cob_id) & cob_id::invalid) == 0;
-  const bool in_bounds = written <= descriptors[owner_of(slot).entry].maximum;
+  const bool in_bounds = written <= descriptors[owner_of(slot).entry].maximum();
 
   switch (row.rule) {
     case CommunicationRule::bounds:

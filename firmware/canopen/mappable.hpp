@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
@@ -21,16 +22,22 @@ constexpr bool rpdo_mappable(const Entry& entry) {
   return entry.change == Change::any_time || entry.name == "profile.operation_mode";
 }
 
-/// The same by entry without the entries' texts, which stay on the host.
-struct Mappable {
-  bool tpdo, rpdo;
-};
+// The same by the entry's number, without the entries' texts, which stay on the host: a bit for each.
 
-inline constexpr auto mappable_entries = [] {
-  std::array<Mappable, entry_count> all{};
-  for (std::size_t i = 0; i < entry_count; ++i)
-    all[i] = {tpdo_mappable(entry_at(i)), rpdo_mappable(entry_at(i))};
-  return all;
+template <bool (*may)(const Entry&)>
+inline constexpr auto mappable_bits = [] {
+  std::array<std::uint32_t, (entry_count + 31) / 32> bits{};
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    if (may(entry_at(i))) bits[i / 32] |= 1U << (i % 32);
+  }
+  return bits;
 }();
+
+constexpr bool tpdo_mappable(std::size_t entry) {
+  return ((mappable_bits<tpdo_mappable>[entry / 32] >> (entry % 32)) & 1U) != 0;
+}
+constexpr bool rpdo_mappable(std::size_t entry) {
+  return ((mappable_bits<rpdo_mappable>[entry / 32] >> (entry % 32)) & 1U) != 0;
+}
 
 }  // namespace kmax::firmware::canopen

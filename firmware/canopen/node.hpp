@@ -90,7 +90,7 @@ class Node {
     sync_.configure(setting(entry_of<"canopen.sync_cob_id">()));
     const std::uint32_t emergency = setting(entry_of<"canopen.emergency_cob_id">());
     emergency_.configure(
-        resolved_cob_id(emergency, descriptors[entry_of<"canopen.emergency_cob_id">()].default_value, id),
+        resolved_cob_id(emergency, descriptors[entry_of<"canopen.emergency_cob_id">()].default_value(), id),
         static_cast<std::uint16_t>(setting(entry_of<"canopen.emergency_inhibit_time">())));
     const auto heartbeat_ms = static_cast<std::uint16_t>(setting(entry_of<"canopen.heartbeat_time">()));
     if (heartbeat_ms != heartbeat_ms_) nmt_.set_heartbeat(heartbeat_ms, now_us);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 
 #include "firmware/canopen/cob_id.hpp"
@@ -12,37 +13,46 @@
 
 namespace kmax::firmware::canopen {
 
-/// Where a value of the dictionary is as an object; in the order of index and sub-index.
-struct ObjectPlace {
-  std::uint16_t index;
-  std::uint8_t subindex;
-  std::uint16_t slot;
+/// The entries in the order of index and sub-index of axis 0 or of the device.
+inline constexpr auto entries_by_object = [] {
+  std::array<std::uint16_t, entry_count> entries{};
+  std::iota(entries.begin(), entries.end(), std::uint16_t{0});
+  std::sort(entries.begin(), entries.end(), [](std::size_t a, std::size_t b) {
+    const SlotDescriptor &of_a = descriptors[a], &of_b = descriptors[b];
+    return of_a.index != of_b.index ? of_a.index < of_b.index : of_a.subindex < of_b.subindex;
+  });
+  return entries;
+}();
+
+/// An entry and the axis whose it is.
+struct ObjectOwner {
+  std::size_t entry, axis;
 };
 
-inline constexpr auto object_places = [] {
-  std::array<ObjectPlace, slot_count> places{};
-  for (std::size_t slot = 0; slot < slot_count; ++slot) {
-    const auto [entry, axis] = owner_of(slot);
-    const Entry& e = entry_at(entry);
-    places[slot] = {
-        static_cast<std::uint16_t>(e.index() + (e.scope() == Scope::axis ? axis * axis_index_offset : 0)),
-        e.object_subindex(), static_cast<std::uint16_t>(slot)};
+/// The last value of the dictionary that is at this index, and at this sub-index or a lower one.
+constexpr std::optional<ObjectOwner> last_at_or_before(ObjectAddress address) {
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const std::size_t offset = axis * axis_index_offset;
+    if (address.index < offset) break;
+    const std::size_t index = address.index - offset;
+    const auto after = std::upper_bound(entries_by_object.begin(), entries_by_object.end(), address.subindex,
+                                        [&](std::size_t s, std::size_t e) {
+                                          return index != descriptors[e].index ? index < descriptors[e].index
+                                                                               : s < descriptors[e].subindex;
+                                        });
+    if (after == entries_by_object.begin()) continue;
+    const std::size_t entry = *(after - 1);
+    if (descriptors[entry].index == index && (axis == 0 || descriptors[entry].per_axis))
+      return {{entry, axis}};
   }
-  std::sort(places.begin(), places.end(), [](const ObjectPlace& a, const ObjectPlace& b) {
-    return a.index != b.index ? a.index < b.index : a.subindex < b.subindex;
-  });
-  return places;
-}();
+  return std::nullopt;
+}
 
 /// The slot of an object, if it is a value of the dictionary.
 constexpr std::optional<std::size_t> slot_at(ObjectAddress address) {
-  const auto found = std::lower_bound(
-      object_places.begin(), object_places.end(), address, [](const ObjectPlace& p, const ObjectAddress& a) {
-        return p.index != a.index ? p.index < a.index : p.subindex < a.subindex;
-      });
-  if (found == object_places.end() || found->index != address.index || found->subindex != address.subindex)
-    return std::nullopt;
-  return found->slot;
+  const auto owner = last_at_or_before(address);
+  if (!owner || descriptors[owner->entry].subindex != address.subindex) return std::nullopt;
+  return slot_of(owner->entry, owner->axis);
 }
 
 /// A special object without its texts, which stay on the host.
@@ -75,24 +85,11 @@ constexpr const SpecialPlace* special_at(ObjectAddress address) {
 /// Highest sub-index there is at an index; nothing if there is no such index.
 constexpr std::optional<std::uint8_t> highest_subindex(std::uint16_t index) {
   std::optional<std::uint8_t> highest;
-  const auto after = std::upper_bound(object_places.begin(), object_places.end(), index,
-                                      [](std::uint16_t i, const ObjectPlace& p) { return i < p.index; });
-  if (after != object_places.begin() && (after - 1)->index == index) highest = (after - 1)->subindex;
+  if (const auto last = last_at_or_before({index, 0xFF})) highest = descriptors[last->entry].subindex;
   for (const SpecialPlace& row : special_places) {
     if (row.index == index && (!highest || *highest < row.last_subindex)) highest = row.last_subindex;
   }
   return highest;
-}
-
-inline constexpr auto node_relative_entries = [] {
-  std::array<bool, entry_count> all{};
-  for (std::size_t i = 0; i < entry_count; ++i) all[i] = entry_at(i).node_relative;
-  return all;
-}();
-
-/// A COB-ID whose default has the node ID added.
-constexpr bool node_relative(std::size_t entry) {
-  return node_relative_entries[entry];
 }
 
 /// The COB-ID that a value means: the predefined ones have the node ID added.

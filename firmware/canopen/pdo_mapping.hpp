@@ -63,9 +63,9 @@ constexpr Abort find_mapped(PdoKind kind, std::uint32_t raw, MappedObject& objec
     return address.subindex == 0 || special_at(address) != nullptr ? Abort::not_mappable : Abort::no_subindex;
   }
   const std::size_t entry = owner_of(*slot).entry;
-  const Mappable& may = mappable_entries[entry];
   const Type type = descriptors[entry].type;
-  if (!(kind == PdoKind::transmit ? may.tpdo : may.rpdo) || bits != 8 * bytes_of(type))
+  if (!(kind == PdoKind::transmit ? tpdo_mappable(entry) : rpdo_mappable(entry)) ||
+      bits != 8 * bytes_of(type))
     return Abort::not_mappable;
   object = {static_cast<std::uint16_t>(*slot), bits, is_signed(type)};
   return Abort::none;

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
 
+#include "firmware/canopen/copy_bytes.hpp"
 #include "firmware/canopen/object_access.hpp"
 
 namespace kmax::firmware::canopen {
@@ -33,7 +33,7 @@ class SdoSink {
   [[nodiscard]] Abort append(std::span<const std::uint8_t> bytes) {
     const Abort refused = check_room(size_ + bytes.size());
     if (refused != Abort::none) return refused;
-    std::copy(bytes.begin(), bytes.end(), buffer_.begin() + static_cast<std::ptrdiff_t>(size_));
+    copy_bytes(bytes, buffer_.subspan(size_));
     size_ += bytes.size();
     return Abort::none;
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "firmware/canopen/copy_bytes.hpp"
 #include "firmware/canopen/object_access.hpp"
 
 namespace kmax::firmware::canopen {
@@ -41,8 +42,7 @@ class SdoSource {
       const Abort failed = fill(offset);
       if (failed != Abort::none) return failed;
     }
-    const std::uint8_t* from = window_.data() + (offset - begins_);
-    std::copy(from, from + out.size(), out.begin());
+    copy_bytes(window_.subspan(offset - begins_, out.size()), out);
     return Abort::none;
   }
 

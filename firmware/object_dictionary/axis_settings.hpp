@@ -110,14 +110,16 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
          "Viscous damping b at the handle that the stability check may count on."),
     real("guard.friction", group::guard, 3, "N", 0, 100, 0,
-         "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does not "
+         "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does "
+         "not "
          "subtract what compensation.limit allows to be taken away; compensation.limit must be below it."),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
          "Force F_h of the operator in paper 2's resolution criteria; 0: not known, they are not judged."),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
          "Speed v of the operator in paper 2's resolution criteria; 0: not known."),
     real("guard.delay", group::guard, 6, "s", 0, 1, 0,
-         "Delay from a command to its force at the handle, beyond the current loop's own (1 / current.bandwidth "
+         "Delay from a command to its force at the handle, beyond the current loop's own (1 / "
+         "current.bandwidth "
          "and 0.65 ticks)."),
 
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,

@@ -67,13 +67,14 @@ consteval std::size_t entry_of() {
 inline constexpr auto modbus_addresses = [] {
   std::array<std::uint16_t, entry_count> addresses{};
   for (std::size_t i = 0; i < entry_count; ++i) {
-    const Entry& entry = entry_at(i);
-    std::uint16_t address = entry.group.modbus_base;
-    for (std::size_t j = 0; j < i; ++j) {
-      if (entry_at(j).group.index == entry.group.index)
-        address = static_cast<std::uint16_t>(address + words_of(entry_at(j).type));
-    }
-    addresses[i] = address;
+    const std::uint16_t group = entry_at(i).group.index;
+    // Back to the one before it in the group, nearly always the next: every file that includes this pays for
+    // it.
+    std::size_t after = i;
+    while (after > 0 && entry_at(after - 1).group.index != group) --after;
+    addresses[i] =
+        after == 0 ? entry_at(i).group.modbus_base
+                   : static_cast<std::uint16_t>(addresses[after - 1] + words_of(entry_at(after - 1).type));
   }
   return addresses;
 }();
@@ -101,29 +102,5 @@ constexpr SlotOwner owner_of(std::size_t slot) {
     return {slot % axis_entries.size(), slot / axis_entries.size()};
   return {slot - (axis_count - 1) * axis_entries.size(), 0};
 }
-
-/// FNV-1a over what host and device must agree on: name, place, type, bounds, choices. Texts may differ.
-inline constexpr std::uint32_t dictionary_checksum = [] {
-  std::uint32_t hash = 2166136261u;
-  const auto mix = [&hash](std::uint32_t value) {
-    for (int byte = 0; byte < 4; ++byte) hash = (hash ^ ((value >> (8 * byte)) & 0xFFu)) * 16777619u;
-  };
-  for (std::size_t i = 0; i < entry_count; ++i) {
-    const Entry& entry = entry_at(i);
-    for (const char c : entry.name) mix(static_cast<std::uint32_t>(c));
-    mix(modbus_addresses[i]);
-    mix(entry.index());
-    mix(entry.object_subindex());
-    mix(static_cast<std::uint32_t>(entry.type));
-    mix(static_cast<std::uint32_t>(entry.access));
-    mix(raw_from_number(entry.type, entry.minimum));
-    mix(raw_from_number(entry.type, entry.maximum));
-    for (const NamedValue& choice : entry.values) {
-      for (const char c : choice.name) mix(static_cast<std::uint32_t>(c));
-      mix(static_cast<std::uint32_t>(choice.value));
-    }
-  }
-  return hash;
-}();
 
 }  // namespace kmax::firmware

@@ -1,4 +1,5 @@
 #include "host_tools/description/eds.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>

@@ -1,4 +1,5 @@
 #include "host_tools/device/device.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <fmt/format.h>
 

@@ -14,8 +14,8 @@
 
 namespace kmax::simulated_board {
 
-/// The axes of a scene that have motors, behind a board's power stage: what board/odrive_v3/drives.cpp does
-/// in the interrupt, in virtual time and with the same drivers.
+/// The axes of a scene that have motors, behind a board's power stage: what board/odrive_v3/drives_tick.cpp
+/// does in the interrupt, in virtual time and with the same drivers.
 ///
 /// Order of a tick: sample() of each axis sees the moment of the conversion; drive() takes the tick's result;
 /// advance() lets the old duties act for half the time, and the new ones for the

@@ -1,4 +1,5 @@
 #include "firmware/application.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -110,8 +110,8 @@ static_assert(FlashSectors<FakeFlash>);
 inline ParameterValues some_values(std::uint32_t seed) {
   std::mt19937 random(seed);
   ParameterValues values;
-  for (const PersistentParameter& parameter : persistent_parameters) {
-    const Entry& entry = entry_at(owner_of(parameter.slot).entry);
+  for (const std::size_t slot : persistent_slots) {
+    const Entry& entry = entry_at(owner_of(slot).entry);
     const double share = static_cast<double>(random()) / 4294967295.0;
     std::uint32_t raw = 0;
     if (!entry.values.empty()) {
@@ -119,10 +119,10 @@ inline ParameterValues some_values(std::uint32_t seed) {
     } else {
       raw = raw_from_number(entry.type, entry.minimum + share * (entry.maximum - entry.minimum));
     }
-    const std::uint32_t before = values.raw(parameter.slot);
-    if (check_value(descriptors[owner_of(parameter.slot).entry], raw) != Refusal::none) continue;
-    values.set_raw(parameter.slot, raw);
-    if (check_rules(values).refusal != Refusal::none) values.set_raw(parameter.slot, before);
+    const std::uint32_t before = values.raw(slot);
+    if (check_value(descriptors[owner_of(slot).entry], raw) != Refusal::none) continue;
+    values.set_raw(slot, raw);
+    if (check_rules(values).refusal != Refusal::none) values.set_raw(slot, before);
   }
   return values;
 }

@@ -28,8 +28,8 @@ std::uint32_t bits(float value) {
 /// All persistent parameters with `values`, as a list that a test can spoil.
 std::vector<Pair> pairs_of(const ParameterValues& values) {
   std::vector<Pair> pairs;
-  for (const PersistentParameter& p : persistent_parameters)
-    pairs.push_back({p.identity, values.raw(p.slot)});
+  for (std::size_t i = 0; i < persistent_count; ++i)
+    pairs.push_back({persistent_identity(i), values.raw(persistent_slots[i])});
   return pairs;
 }
 
@@ -117,7 +117,7 @@ TEST(ParameterMigration, AnEmptySetIsASet) {
   const Taken taken = take({});
   EXPECT_EQ(persistent_part(taken.values), persistent_part(ParameterValues{}));
   EXPECT_EQ(taken.report.migration.defaulted, persistent_count);
-  EXPECT_EQ(taken.report.migration.first_defaulted[0], persistent_parameters[0].identity);
+  EXPECT_EQ(taken.report.migration.first_defaulted[0], persistent_identity(0));
 }
 
 TEST(ParameterMigration, ValuesThatAHostCouldNotWriteAreNotTaken) {
@@ -210,8 +210,7 @@ TEST(ParameterMigration, TheNextSaveIsThisFirmwaresOwn) {
 
 TEST(PersistentParameters, IdentitiesAreUniqueAndThoseOfTheBus) {
   for (std::size_t i = 0; i < persistent_count; ++i) {
-    for (std::size_t j = 0; j < i; ++j)
-      ASSERT_NE(persistent_parameters[i].identity, persistent_parameters[j].identity);
+    for (std::size_t j = 0; j < i; ++j) ASSERT_NE(persistent_identity(i), persistent_identity(j));
   }
   EXPECT_EQ(identity<"wall.stiffness">(0), 0x2000'0405U);
   EXPECT_EQ(identity<"wall.stiffness">(1), 0x2800'0405U);

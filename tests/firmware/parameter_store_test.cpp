@@ -1,4 +1,5 @@
 #include "firmware/parameter_store.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <gtest/gtest.h>
 
@@ -117,7 +118,7 @@ void put_record(FakeFlash& flash, std::size_t sector, std::size_t word, record::
   };
   header.count = persistent_count;
   for (std::size_t i = 0; i < record::header_words; ++i) put(header.word(i));
-  for (std::size_t i = 0; i < persistent_count; ++i) put(persistent_parameters[i].identity), put(values[i]);
+  for (std::size_t i = 0; i < persistent_count; ++i) put(persistent_identity(i)), put(values[i]);
   flash.words[sector][word] = crc.value();
   flash.words[sector][word + 1] = record::commit;
 }

@@ -206,12 +206,12 @@ TEST(GuardEntries, AreThoseThatCount) {
 TEST(GuardSettings, AStoreWithoutTheDelayKeepsAllElse) {
   const ParameterValues before;
   ParameterMigration migration(before);
-  for (const PersistentParameter& parameter : persistent_parameters) {
-    if (owner_of(parameter.slot).entry == entry_named("guard.delay")) continue;
-    std::uint32_t raw = before.raw(parameter.slot);
-    if (owner_of(parameter.slot).entry == entry_named("guard.damping"))
-      raw = raw_from_number(Type::float32, 0.5);
-    migration.take(parameter.identity, raw);
+  for (std::size_t i = 0; i < persistent_count; ++i) {
+    const std::size_t slot = persistent_slots[i];
+    if (owner_of(slot).entry == entry_named("guard.delay")) continue;
+    std::uint32_t raw = before.raw(slot);
+    if (owner_of(slot).entry == entry_named("guard.damping")) raw = raw_from_number(Type::float32, 0.5);
+    migration.take(persistent_identity(i), raw);
   }
   const ParameterValues& taken = migration.finish();
   for (const std::size_t axis : {0U, 1U}) {

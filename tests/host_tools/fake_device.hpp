@@ -9,6 +9,7 @@
 #include "firmware/axis_state_machine.hpp"
 #include "firmware/device_registers.hpp"
 #include "firmware/modbus/register_bank.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 #include "host_tools/link/link.hpp"
 
 namespace kmax::host_tools_test {

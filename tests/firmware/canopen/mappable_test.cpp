@@ -48,8 +48,8 @@ TEST(Mappable, WhatIsReceivedIsWritableAndOfAnAxis) {
 
 TEST(Mappable, TheCompactTableSaysTheSame) {
   for (std::size_t i = 0; i < entry_count; ++i) {
-    EXPECT_EQ(mappable_entries[i].tpdo, tpdo_mappable(entry_at(i)));
-    EXPECT_EQ(mappable_entries[i].rpdo, rpdo_mappable(entry_at(i)));
+    EXPECT_EQ(tpdo_mappable(i), tpdo_mappable(entry_at(i)));
+    EXPECT_EQ(rpdo_mappable(i), rpdo_mappable(entry_at(i)));
   }
 }
 

@@ -22,8 +22,12 @@ TEST(DescribedObjects, EveryPlaceOfTheFirmwareIsThereOnceAndInOrder) {
   const auto all = described_objects();
   for (std::size_t i = 1; i < all.size(); ++i)
     EXPECT_LT(std::pair(all[i - 1].index, all[i - 1].subindex), std::pair(all[i].index, all[i].subindex));
-  for (const auto& place : firmware::canopen::object_places)
-    EXPECT_NE(find(all, place.index, place.subindex), nullptr) << place.index << ":" << int{place.subindex};
+  for (std::size_t slot = 0; slot < firmware::slot_count; ++slot) {
+    const auto [entry, axis] = firmware::owner_of(slot);
+    const firmware::Entry& e = firmware::entry_at(entry);
+    const auto index = static_cast<std::uint16_t>(e.index() + axis * firmware::axis_index_offset);
+    EXPECT_NE(find(all, index, e.object_subindex()), nullptr) << index << ":" << int{e.object_subindex()};
+  }
   std::set<std::uint16_t> indices;
   for (const DescribedObject& object : all) indices.insert(object.index);
   for (const std::uint16_t index : indices) {

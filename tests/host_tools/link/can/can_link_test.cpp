@@ -1,4 +1,5 @@
 #include "host_tools/link/can/can_link.hpp"
+#include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <gtest/gtest.h>
 
