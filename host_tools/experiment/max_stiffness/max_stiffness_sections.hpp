@@ -3,12 +3,9 @@
 // beside ours, and in words what holds and what does not. Every number in the words is taken from the
 // results.
 
-#include "host_tools/experiment/max_stiffness/adaptive_gap.hpp"
 #include "host_tools/experiment/max_stiffness/cause_study.hpp"
-#include "host_tools/experiment/max_stiffness/held_wall_study.hpp"
+#include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
 #include "host_tools/experiment/max_stiffness/study_variation.hpp"
-#include "host_tools/experiment/max_stiffness/update_rate_study.hpp"
-#include "host_tools/experiment/people/operator_calibration.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
@@ -25,8 +22,6 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
 // in rising order?
 bool as_calibrated(const MaxStiffnessStudy& study);
 
-report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results);
-
 report::Section calibration_section(const std::vector<OperatorCalibration>& calibrations);
 
 struct ClippedCauses {
@@ -37,10 +32,5 @@ struct ClippedCauses {
 report::Section cause_section(const std::vector<ClippedCauses>& results);
 
 report::Section variation_section(const std::string& heading, const std::vector<VariationResult>& results);
-
-report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<ApproachResult>& approaches,
-                                     const NeededCoefficient& needed);
-
-report::Section rate_section(const std::vector<RateResult>& results);
 
 }  // namespace kmax::experiment

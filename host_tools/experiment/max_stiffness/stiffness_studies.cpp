@@ -5,8 +5,11 @@
 #include <functional>
 #include <stdexcept>
 
+#include "host_tools/experiment/max_stiffness/adaptive_gap_section.hpp"
+#include "host_tools/experiment/max_stiffness/held_wall_section.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_pictures.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
+#include "host_tools/experiment/max_stiffness/rate_section.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 
 namespace kmax::experiment {

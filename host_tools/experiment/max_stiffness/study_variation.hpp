@@ -4,7 +4,7 @@
 // is run with the calibrated numbers left as they are, and if wanted with both fitted again to the same two
 // targets: what the two fits then predict differently is what the targets do not identify.
 
-#include "host_tools/experiment/people/operator_calibration.hpp"
+#include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
 
 namespace kmax::experiment {
 

@@ -32,4 +32,10 @@ inline std::string paragraphs_of(const report::Section& section) {
   return text;
 }
 
+inline SubjectSet two_people() {
+  SubjectSet set;
+  set.subjects = draw_subjects(2, 1);
+  return set;
+}
+
 }  // namespace kmax::experiment

@@ -1,9 +1,9 @@
-// The sections on Figs. 9 to 12, the adaptive wall's gap and the rate of the loop.
+#include "host_tools/experiment/max_stiffness/adaptive_gap_section.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "host_tools/experiment/max_stiffness/marked_means.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
@@ -16,30 +16,6 @@ std::string n_per_mm(double stiffness) {
   return fmt::format("{:.2f}", stiffness / 1e3);
 }
 }  // namespace
-
-report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results) {
-  report::Section section{
-      fmt::format("A wall of 5.5 N/mm held (paper 1, Figs. 9 to 12; {})", clip_words(set.device)),
-      {},
-      {},
-      {}};
-  report::Table table{
-      fmt::format("Stable when none of {} touches is unstable; nothing was fitted to this",
-                  results.front().named.touches),
-      {"condition", "figure", "paper 1", fmt::format("{}, mm p-p", named_person), std::string(named_person),
-       "agrees", fmt::format("stable of {}", set.subjects.size()), "median worst, mm p-p", "ours is"},
-      {}};
-  for (const HeldWallResult& result : results) {
-    table.rows.push_back(
-        {result.condition.name, result.figure, result.paper_stable ? "stable" : "unstable",
-         fmt::format("{:.2f}", result.named.worst * 1e3), result.named.stable() ? "stable" : "unstable",
-         result.named.stable() == result.paper_stable ? "yes" : "no",
-         fmt::format("{}", result.stable_people()), fmt::format("{:.2f}", result.median_worst() * 1e3),
-         std::string(report::words_of(result.condition.origin))});
-  }
-  section.tables.push_back(std::move(table));
-  return section;
-}
 
 report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<ApproachResult>& approaches,
                                      const NeededCoefficient& needed) {
@@ -100,53 +76,6 @@ report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<Ap
                 "no more than at a faster approach.",
                 slowest.approach_speed, n_per_mm(best)));
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
-  return section;
-}
-
-report::Section rate_section(const std::vector<RateResult>& results) {
-  report::Section section{"Rate of the loop, encoder and velocity estimator", {}, {}, {}};
-  section.paragraphs.push_back(
-      "One person, force not clipped, steps of 3 %. Unstable is what moves by more than three counts of the "
-      "encoder peak to peak in the first table of each encoder, and what swings by more than 1 N in the "
-      "second: "
-      "one count is that much at 1 N / count length, so nothing above can be found there, at any rate.");
-  using Kind = std::pair<double, RateMeasure>;
-  const auto coarse_first = [](const Kind& a, const Kind& b) {
-    return a.first != b.first ? a.first > b.first : a.second < b.second;
-  };
-  std::map<Kind, std::vector<const RateResult*>, decltype(coarse_first)> by_kind(coarse_first);
-  for (const RateResult& result : results)
-    by_kind[{result.setting.count_length, result.setting.measure}].push_back(&result);
-  for (const auto& [kind, of_encoder] : by_kind) {
-    report::Table table{
-        fmt::format("Largest stable stiffness, N/mm, encoder of {:g} um, unstable: {}", kind.first * 1e6,
-                    kind.second == RateMeasure::moves ? "moves by 3 counts" : "swings by 1 N"),
-        {"loop"},
-        {}};
-    const std::vector<double> rates = study_rates();
-    for (const double rate : rates) table.columns.push_back(fmt::format("{:g} Hz", rate));
-    std::vector<std::string> names;
-    for (const RateResult* result : of_encoder) {
-      const std::string name = name_of(result->setting);
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-    }
-    for (const std::string& name : names) {
-      std::vector<std::string> row{name};
-      for (const double rate : rates) {
-        const auto found = std::find_if(of_encoder.begin(), of_encoder.end(), [&](const RateResult* result) {
-          return result->setting.rate == rate && name_of(result->setting) == name;
-        });
-        if (found == of_encoder.end()) {
-          row.emplace_back("-");
-          continue;
-        }
-        const MaxStiffness& stiffness = (*found)->found;
-        row.push_back(fmt::format("{}{:.3g}", stiffness.beyond_last ? ">" : "", stiffness.stiffness / 1e3));
-      }
-      table.rows.push_back(std::move(row));
-    }
-    section.tables.push_back(std::move(table));
-  }
   return section;
 }
 

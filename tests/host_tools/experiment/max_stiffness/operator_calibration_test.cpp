@@ -1,4 +1,4 @@
-#include "host_tools/experiment/people/operator_calibration.hpp"
+#include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
 
 #include <gtest/gtest.h>
 
