@@ -75,10 +75,10 @@ class ParameterMigration {
       const BrokenRule broken = check_rules(result_);
       if (broken.refusal == Refusal::none) return;
       if (put_back([&](std::size_t slot) { return slot == broken.slot; })) continue;
-      const auto [entry, axis] = owner_of(broken.slot);
-      const std::uint8_t group = descriptors[entry].group;
+      const auto owner = owner_of(broken.slot);
+      const std::uint8_t group = descriptors[owner.entry].group;
       if (put_back([&](std::size_t slot) {
-            return owner_of(slot).axis == axis && descriptors[owner_of(slot).entry].group == group;
+            return owner_of(slot).axis == owner.axis && descriptors[owner_of(slot).entry].group == group;
           }))
         continue;
       put_back([](std::size_t) { return true; });

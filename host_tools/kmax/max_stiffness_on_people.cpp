@@ -65,7 +65,7 @@ SubjectSet subject_set(Context& context, const MaxStiffnessOptions& options, boo
 /// How far a run is, in one line; what it throws on Ctrl-C stops the run between searches.
 experiment::ProgressReport reporter(Progress& progress, const Interruption& interruption, std::string what,
                                     std::size_t known) {
-  return [&progress, &interruption, what = std::move(what), known,
+  return [&progress, &interruption, what = std::move(what),
           remaining = experiment::RemainingTime(seconds_now(), known)](std::size_t done_jobs,
                                                                        std::size_t count) {
     if (interruption.requested())

@@ -41,8 +41,8 @@ void Bus::attach(std::uint32_t base, std::uint32_t size, std::string name, Perip
         complain("overlaps " + other->name);
       }
     }
-    blocks_.push_back(
-        std::make_unique<Block>(AddressRange{base, size}, std::move(name), &block, std::move(clocked)));
+    blocks_.push_back(std::make_unique<Block>(
+        Block{AddressRange{base, size}, std::move(name), &block, std::move(clocked)}));
     const std::uint32_t first = (base - range.base) >> page_shift;
     const std::uint32_t last = (base - range.base + size - 1) >> page_shift;
     for (std::uint32_t page = first; page <= last; ++page) pages_[area][page].push_back(blocks_.back().get());

@@ -59,7 +59,7 @@ std::vector<StudyVariation> assumption_variations(const SubjectSet& set, const T
   for (const auto& [kind, substeps, name] :
        {std::tuple{IntegratorKind::semi_implicit_euler, 10.0, "semi-implicit Euler, 10 steps in 2 ms"},
         std::tuple{IntegratorKind::rk4, 4.0, "RK4, 4 steps in 2 ms"}}) {
-    add("integrator", name, false, [&](StudyVariation& v) {
+    add("integrator", name, false, [kind = kind, substeps = substeps](StudyVariation& v) {
       v.integrator.kind = kind;
       v.integrator.substeps = substeps;
     });
