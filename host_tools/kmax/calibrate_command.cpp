@@ -1,6 +1,5 @@
 // kmax calibrate.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <string>
@@ -9,6 +8,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 
@@ -57,29 +57,29 @@ Json step_json(const StepReport& step) {
 }
 
 void print_step(std::ostream& out, const StepReport& step) {
-  fmt::print(out, "{}: {}\n", step.name,
-             step.pass      ? "done"
-             : step.skipped ? "left out, a step before it has failed"
-                            : "FAILED");
+  print(out, "{}: {}\n", step.name,
+        step.pass      ? "done"
+        : step.skipped ? "left out, a step before it has failed"
+                       : "FAILED");
   for (const IdentifiedValue& value : step.values)
-    fmt::print(out, "  {:<32} {:>12.5g} +- {:<10.2g} {:<6} {}\n", value.name, value.value, value.spread,
-               value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : "");
+    print(out, "  {:<32} {:>12.5g} +- {:<10.2g} {:<6} {}\n", value.name, value.value, value.spread,
+          value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : "");
   for (const Diagnosis& remark : step.remarks)
-    fmt::print(out, "  {}: {}; {}\n", remark.cause, remark.words, remark.advice);
+    print(out, "  {}: {}; {}\n", remark.cause, remark.words, remark.advice);
   if (step.failure)
-    fmt::print(out, "  {}: {}\n  {}\n", step.failure->cause, step.failure->words, step.failure->advice);
+    print(out, "  {}: {}\n  {}\n", step.failure->cause, step.failure->words, step.failure->advice);
 }
 
 void print_report(Context& context, const CalibrateOptions& options, const CalibrationReport& report) {
   for (const StepReport& step : report.steps) print_step(context.out, step);
   if (report.stored) {
-    fmt::print(context.out, "saved\n");
+    print(context.out, "saved\n");
   } else if (report.kept) {
-    fmt::print(context.out, "kept until the next restart; 'kmax save' keeps it for good\n");
+    print(context.out, "kept until the next restart; 'kmax save' keeps it for good\n");
   } else if (options.settings.dry_run && report.pass()) {
-    fmt::print(context.out, "dry run: all parameters are as before\n");
+    print(context.out, "dry run: all parameters are as before\n");
   } else {
-    fmt::print(context.out, "nothing was kept: all parameters are as before\n");
+    print(context.out, "nothing was kept: all parameters are as before\n");
   }
 }
 

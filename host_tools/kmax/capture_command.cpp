@@ -1,6 +1,5 @@
 // kmax capture.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -17,6 +16,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/output_file.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 
 namespace kmax::cli {
@@ -221,7 +221,7 @@ int run_capture(Context& context, const CaptureOptions& given) {
     write_csv(context.out, captured);
     context.note(summary);
   } else {
-    fmt::print(context.out, "{}: {}\n", options.file, summary);
+    print(context.out, "{}: {}\n", options.file, summary);
   }
   return done;
 }

@@ -1,6 +1,5 @@
 // kmax check.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -17,6 +16,7 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/output_file.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::cli {
@@ -173,10 +173,10 @@ int draw_map(Context& context, const CheckOptions& options) {
                    {"csv", options.csv.empty() ? Json(nullptr) : Json(options.csv)}});
     return done;
   }
-  fmt::print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
-             map.results.size());
+  print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
+        map.results.size());
   for (const std::string& file : {options.picture, options.csv}) {
-    if (!file.empty()) fmt::print(context.out, "{}\n", file);
+    if (!file.empty()) print(context.out, "{}\n", file);
   }
   return done;
 }
@@ -212,12 +212,11 @@ int explain(Context& context, const std::vector<std::string>& names) {
     context.print({{"criteria", all}});
     return done;
   }
-  for (const control::Criterion criterion : chosen)
-    fmt::print(context.out, "{}\n", check::explanation(criterion));
+  for (const control::Criterion criterion : chosen) print(context.out, "{}\n", check::explanation(criterion));
   if (!everything) return done;
   for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
-    fmt::print(context.out, "{}: {}\n", check::name_of(worth), check::meaning_of(worth));
-  fmt::print(context.out, "\n{}", check::symbols_text());
+    print(context.out, "{}: {}\n", check::name_of(worth), check::meaning_of(worth));
+  print(context.out, "\n{}", check::symbols_text());
   return done;
 }
 

@@ -1,6 +1,5 @@
 // kmax describe: the object dictionary of this program, without a device.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <cstdlib>
@@ -12,6 +11,7 @@
 #include "host_tools/device/suggestion.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -42,14 +42,13 @@ void describe_modbus(Context& context) {
   std::map<std::pair<Table, std::uint16_t>, Parameter> by_address;
   for (const Parameter& parameter : device::all_parameters())
     by_address.emplace(std::pair(parameter.table(), parameter.address()), parameter);
-  fmt::print(context.out, "table,address,words,type,access,name,unit,allowed,default\n");
+  print(context.out, "table,address,words,type,access,name,unit,allowed,default\n");
   for (const auto& [place, parameter] : by_address) {
     const Json description = description_json(parameter);
-    fmt::print(context.out, "{},0x{:04X},{},{},{},{},{},\"{}\",{}\n", table_name(parameter),
-               parameter.address(), parameter.words(), description["type"].get<std::string>(),
-               description["access"].get<std::string>(), parameter.name(), parameter.definition().unit,
-               parameter.writable() ? allowed_text(parameter) : "",
-               parameter.writable() ? value_text(parameter, parameter.default_raw()) : "");
+    print(context.out, "{},0x{:04X},{},{},{},{},{},\"{}\",{}\n", table_name(parameter), parameter.address(),
+          parameter.words(), description["type"].get<std::string>(), description["access"].get<std::string>(),
+          parameter.name(), parameter.definition().unit, parameter.writable() ? allowed_text(parameter) : "",
+          parameter.writable() ? value_text(parameter, parameter.default_raw()) : "");
   }
 }
 
@@ -92,7 +91,7 @@ std::string default_text(const Parameter& parameter) {
 }
 
 void describe_markdown(Context& context) {
-  fmt::print(
+  print(
       context.out,
       "# Parameters\n\n"
       "Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis\n"
@@ -106,21 +105,20 @@ void describe_markdown(Context& context) {
     const auto& entry = parameter.definition();
     if (entry.group.index != group) {
       group = entry.group.index;
-      fmt::print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
-                 parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
-      fmt::print(context.out,
-                 "| name | unit | allowed | default | type | object | register | help "
-                 "|\n|---|---|---|---|---|---|---|---|\n");
+      print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
+            parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
+      print(context.out,
+            "| name | unit | allowed | default | type | object | register | help "
+            "|\n|---|---|---|---|---|---|---|---|\n");
     }
     std::string help = escaped(entry.help);
     if (entry.change == firmware::Change::disarmed_only) help += " Changes only while disarmed.";
     if (parameter.writable() && !entry.persistent) help += " Not saved.";
     const bool settable = entry.access != firmware::Access::read_only;
     const Json type = description_json(parameter)["type"];
-    fmt::print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name,
-               entry.unit, settable ? escaped(allowed_text(parameter)) : "read only", default_text(parameter),
-               type.get<std::string>(), parameter.index(), entry.object_subindex(), parameter.address(),
-               help);
+    print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name, entry.unit,
+          settable ? escaped(allowed_text(parameter)) : "read only", default_text(parameter),
+          type.get<std::string>(), parameter.index(), entry.object_subindex(), parameter.address(), help);
   }
 }
 

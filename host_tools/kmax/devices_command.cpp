@@ -1,12 +1,12 @@
 // kmax devices.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <memory>
 
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/reachable_devices.hpp"
 
 namespace kmax::cli {
@@ -51,8 +51,8 @@ int run_devices(Context& context, const std::vector<std::string>& buses) {
   std::size_t width = 0;
   for (const ReachableDevice& device : devices) width = std::max(width, device.address.size());
   for (const ReachableDevice& device : devices)
-    fmt::print(context.out, "{:<{}}  {}\n", device.address.empty() ? "-" : device.address, width,
-               device.description);
+    print(context.out, "{:<{}}  {}\n", device.address.empty() ? "-" : device.address, width,
+          device.description);
   return code;
 }
 }  // namespace

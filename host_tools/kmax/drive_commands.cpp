@@ -1,6 +1,5 @@
 // kmax state, arm, disarm, stop, clear.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "host_tools/device/number_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 
@@ -96,7 +96,7 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
     if (context.json) {
       list.push_back(status_json(axis, status, drive.guard()));
     } else {
-      fmt::print(context.out, "{}\n", status_line(axis, status, drive.guard()));
+      print(context.out, "{}\n", status_line(axis, status, drive.guard()));
     }
   }
   if (context.json) context.print({{"axes", list}});
@@ -186,7 +186,7 @@ int run_arm(Context& context, bool holding) {
   const double timeout = device.read_number("link.timeout");
   drive.arm();
   try {
-    if (!context.json) fmt::print(context.out, "{}\n", status_line(drive.axis(), drive.status(), {}));
+    if (!context.json) print(context.out, "{}\n", status_line(drive.axis(), drive.status(), {}));
     context.out.flush();
     note_a_warning(context, drive);
     if (!holding) note_what_ends_the_force(context, timeout);

@@ -1,6 +1,5 @@
 // kmax experiment contact.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 
@@ -119,8 +119,8 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   }
   for (const std::string& line :
        experiment::contact_words(settings, trials, results.front().velocity_estimator))
-    fmt::print(context.out, "{}\n", line);
-  fmt::print(context.out, "\n{}", experiment::contact_table(results));
+    print(context.out, "{}\n", line);
+  print(context.out, "\n{}", experiment::contact_table(results));
   print_names(context.out, files);
   for (const auto& result : results) {
     if (result.lost_records > 0)

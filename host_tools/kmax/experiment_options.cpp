@@ -1,13 +1,13 @@
 #include "host_tools/kmax/experiment_options.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <map>
 
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/kmax/finite_number.hpp"
+#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 
@@ -34,7 +34,7 @@ Json names_json(const std::vector<std::filesystem::path>& written) {
 }
 
 void print_names(std::ostream& out, const std::vector<std::filesystem::path>& written) {
-  for (const auto& file : written) fmt::print(out, "{}\n", file.string());
+  for (const auto& file : written) print(out, "{}\n", file.string());
 }
 
 void add_subjects_option(CLI::App& command, std::string& people) {

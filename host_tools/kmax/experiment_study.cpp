@@ -1,10 +1,10 @@
 #include "host_tools/kmax/experiment_study.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <utility>
 
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {
@@ -18,9 +18,8 @@ int print_study(Context& context, StudyReport study, const std::vector<std::file
     study.document["files"] = names_json(files);
     context.print(study.document);
   } else {
-    for (const std::string& words : study.paragraphs) fmt::print(context.out, "{}\n\n", words);
-    for (const report::Table& table : study.tables)
-      fmt::print(context.out, "{}\n", report::terminal_text(table));
+    for (const std::string& words : study.paragraphs) print(context.out, "{}\n\n", words);
+    for (const report::Table& table : study.tables) print(context.out, "{}\n", report::terminal_text(table));
     print_names(context.out, files);
   }
   return study.claim_met ? done : verdict_is_no;

@@ -1,6 +1,5 @@
 // kmax flash.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "host_tools/kmax/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 
@@ -159,12 +159,12 @@ int show_plan(Context& context, const BoardProfile& board, Method method, const 
                    {"commands", commands}});
     return done;
   }
-  fmt::print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
-             flash::facts_of(method).name);
-  if (by_lines) fmt::print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
+        flash::facts_of(method).name);
+  if (by_lines) print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
   for (const flash::Step& step : steps)
-    fmt::print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
-  if (by_lines) fmt::print(context.out, "# start the application: [lines.reset]\n");
+    print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
+  if (by_lines) print(context.out, "# start the application: [lines.reset]\n");
   return done;
 }
 
@@ -200,10 +200,10 @@ int carry_out(Context& context, const BoardServices& services, const lines::Line
                    {"parameters_crc32", hexadecimal(report.parameters_crc)},
                    {"started", started}});
   } else {
-    fmt::print(context.out,
-               "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
-               "{})\n",
-               image.size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
+    print(context.out,
+          "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
+          "{})\n",
+          image.size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
   }
   if (!started) context.note(fmt::format("to start it: {}", board.to_application));
   return done;

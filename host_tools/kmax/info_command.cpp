@@ -1,6 +1,5 @@
 // kmax info.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <map>
@@ -8,6 +7,7 @@
 #include "host_tools/device/crash_words.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
@@ -92,7 +92,7 @@ int run_info(Context& context) {
 
   const auto line = [&context](std::string name, const std::string& text) {
     for (char& letter : name) letter = letter == '_' ? ' ' : letter;
-    fmt::print(context.out, "{:<20} {}\n", name, text);
+    print(context.out, "{:<20} {}\n", name, text);
   };
   line("device", device.description());
   line("program version", KMAX_VERSION);

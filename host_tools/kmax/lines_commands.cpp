@@ -1,6 +1,5 @@
 // kmax lines, reset, bootloader.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/held_lines.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 
@@ -85,18 +85,17 @@ int list_lines(Context& context, const BoardServices& services, const LinesConfi
                           {"state", facts.active ? Json(state) : Json(nullptr)}};
         continue;
       }
-      fmt::print(context.out, "{:15} {} line {}{}, {}: {}\n", name, facts.chip, facts.offset,
-                 facts.name.empty() ? "" : fmt::format(" \"{}\"", facts.name),
-                 facts.output ? "output" : "input",
-                 facts.high ? fmt::format("{}, {}", *facts.high ? "high" : "low", state)
-                            : fmt::format("held by {}", facts.consumer));
+      print(context.out, "{:15} {} line {}{}, {}: {}\n", name, facts.chip, facts.offset,
+            facts.name.empty() ? "" : fmt::format(" \"{}\"", facts.name), facts.output ? "output" : "input",
+            facts.high ? fmt::format("{}, {}", *facts.high ? "high" : "low", state)
+                       : fmt::format("held by {}", facts.consumer));
     } catch (const lines::LineError& error) {
       // The others are still worth seeing.
       if (!first_error) first_error = std::current_exception();
       if (context.json) {
         document[name] = {{"error", error.what()}};
       } else {
-        fmt::print(context.out, "{:15} {}\n", name, error.what());
+        print(context.out, "{:15} {}\n", name, error.what());
       }
     }
   }
@@ -143,8 +142,7 @@ int watch_lines(Context& context, const BoardServices& services, const LinesOpti
   for (std::size_t i = 0; i < roles.size(); ++i) {
     const std::string word(lines::state_word(roles[i], states[i]));
     start[std::string(lines::facts_of(roles[i]).name)] = word;
-    if (!context.json)
-      fmt::print(context.out, "{:>20}  {:15} {}\n", "now", lines::facts_of(roles[i]).name, word);
+    if (!context.json) print(context.out, "{:>20}  {:15} {}\n", "now", lines::facts_of(roles[i]).name, word);
   }
   context.out.flush();
   // The wait ends at an edge; its limit is only for the end of the whole.
@@ -156,7 +154,7 @@ int watch_lines(Context& context, const BoardServices& services, const LinesOpti
         edges.push_back(
             {{"line", name}, {"state", word}, {"active", edge.active}, {"time_ns", edge.time.count()}});
       } else {
-        fmt::print(context.out, "{:>20}  {:15} {}\n", seconds_text(edge.time), name, word);
+        print(context.out, "{:>20}  {:15} {}\n", seconds_text(edge.time), name, word);
       }
     }
     context.out.flush();
@@ -208,7 +206,7 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
     held.drive(config.required(role), role, active);
     const std::string name(lines::facts_of(role).name), word(lines::state_word(role, active));
     document[name] = word;
-    if (!context.json) fmt::print(context.out, "{} = {}\n", name, word);
+    if (!context.json) print(context.out, "{} = {}\n", name, word);
   }
   context.out.flush();
   if (std::ranges::any_of(assignments, [](const auto& one) { return one.role == LineRole::emergency_stop; }))
@@ -235,7 +233,7 @@ int run_reset(Context& context, const BoardServices& services, const LinesConfig
   if (context.json) {
     context.print({{"reset", true}});
   } else {
-    fmt::print(context.out, "the board was reset\n");
+    print(context.out, "the board was reset\n");
   }
   return done;
 }
@@ -255,7 +253,7 @@ int run_bootloader(Context& context, const BoardServices& services, const std::s
   if (context.json) {
     context.print({{"bootloader", true}});
   } else {
-    fmt::print(context.out, "the ROM bootloader runs until the next reset ('kmax reset')\n");
+    print(context.out, "the ROM bootloader runs until the next reset ('kmax reset')\n");
   }
   return done;
 }

@@ -1,6 +1,5 @@
 // kmax experiment max-stiffness on a device.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <filesystem>
 
@@ -9,6 +8,7 @@
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/report/terminal_text.hpp"
@@ -34,8 +34,8 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
     return;
   }
   for (const std::string& line : experiment::device_stiffness_words(settings, device))
-    fmt::print(context.out, "{}\n", line);
-  fmt::print(context.out, "\n{}", report::terminal_text(experiment::device_stiffness_table(results)));
+    print(context.out, "{}\n", line);
+  print(context.out, "\n{}", report::terminal_text(experiment::device_stiffness_table(results)));
   print_names(context.out, files);
 }
 }  // namespace

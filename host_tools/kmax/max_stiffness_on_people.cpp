@@ -1,6 +1,5 @@
 // kmax experiment max-stiffness on simulated people.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/report/page_files.hpp"
 #include "host_tools/report/terminal_text.hpp"
@@ -189,8 +189,8 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
 }
 
 void print_section(std::ostream& out, const report::Section& section) {
-  for (const std::string& paragraph : section.paragraphs) fmt::print(out, "{}\n", paragraph);
-  for (const report::Table& table : section.tables) fmt::print(out, "\n{}", report::terminal_text(table));
+  for (const std::string& paragraph : section.paragraphs) print(out, "{}\n", paragraph);
+  for (const report::Table& table : section.tables) print(out, "\n{}", report::terminal_text(table));
 }
 }  // namespace
 

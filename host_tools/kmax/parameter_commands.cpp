@@ -1,6 +1,5 @@
 // kmax list, get, set.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameter_table.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -94,8 +94,8 @@ int run_get(Context& context, const std::vector<std::string>& names) {
     if (context.json) {
       document[shown_name(names[i], parameters[i])] = value_and_unit_json(parameters[i], raw[i]);
     } else {
-      fmt::print(context.out, "{} = {}\n", shown_name(names[i], parameters[i]),
-                 value_with_unit(parameters[i], raw[i]));
+      print(context.out, "{} = {}\n", shown_name(names[i], parameters[i]),
+            value_with_unit(parameters[i], raw[i]));
     }
   }
   if (context.json) context.print(document);
@@ -144,8 +144,8 @@ int run_set(Context& context, const std::vector<std::string>& texts) {
     if (context.json) {
       document[parameter.name()] = value_and_unit_json(parameter, raw);
     } else {
-      fmt::print(context.out, "{} = {} (was {})\n", parameter.name(), value_with_unit(parameter, raw),
-                 value_text(parameter, before[i]));
+      print(context.out, "{} = {} (was {})\n", parameter.name(), value_with_unit(parameter, raw),
+            value_text(parameter, before[i]));
     }
   }
   if (context.json) context.print(document);

@@ -1,6 +1,5 @@
 // kmax dump, load, diff.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include "host_tools/device/parameter_file.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/output_file.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
@@ -99,7 +99,7 @@ int run_dump(Context& context, const std::string& file) {
                    {"firmware", origin.firmware},
                    {"parameters", all}});
   } else if (to_file) {
-    fmt::print(context.out, "{}: {} written\n", file, parameters_text(values.size()));
+    print(context.out, "{}: {} written\n", file, parameters_text(values.size()));
   } else {
     context.out << text;
   }
@@ -212,16 +212,16 @@ int run_load(Context& context, const LoadOptions& options) {
   }
   for (const auto& [setting, before] : changes) {
     const auto& [parameter, raw] = setting.assignment;
-    fmt::print(context.out, "{} = {} ({} {})\n", parameter.name(), value_with_unit(parameter, raw),
-               options.dry_run ? "is" : "was", value_text(parameter, before));
+    print(context.out, "{} = {} ({} {})\n", parameter.name(), value_with_unit(parameter, raw),
+          options.dry_run ? "is" : "was", value_text(parameter, before));
   }
   if (options.dry_run) {
-    fmt::print(context.out, "{}: {}, {} would change; nothing was set\n", options.file,
-               parameters_text(settings.size()), changes.size());
+    print(context.out, "{}: {}, {} would change; nothing was set\n", options.file,
+          parameters_text(settings.size()), changes.size());
     return done;
   }
-  fmt::print(context.out, "{}: {} set and read back equal; {} changed\n", options.file,
-             parameters_text(settings.size()), changes.size());
+  print(context.out, "{}: {} set and read back equal; {} changed\n", options.file,
+        parameters_text(settings.size()), changes.size());
   if (!changes.empty()) context.note("until the next restart: only 'kmax save' keeps them");
   return done;
 }
@@ -263,11 +263,11 @@ int run_diff(Context& context, const std::string& file) {
     file_width = std::max(file_width, row.in_file.size());
   }
   if (differences.empty()) {
-    fmt::print(context.out, "{}: {}, equal on the device\n", file, parameters_text(settings.size()));
+    print(context.out, "{}: {}, equal on the device\n", file, parameters_text(settings.size()));
   } else {
     for (const Row& row : rows)
-      fmt::print(context.out, "{:<{}}  {:<{}}  {}\n", row.name, name_width, row.in_file, file_width,
-                 row.on_device);
+      print(context.out, "{:<{}}  {:<{}}  {}\n", row.name, name_width, row.in_file, file_width,
+            row.on_device);
   }
   if (not_in_file != 0)
     context.note(fmt::format("{} not in the file and not compared",

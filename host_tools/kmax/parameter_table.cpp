@@ -1,7 +1,6 @@
 #include "host_tools/kmax/parameter_table.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <algorithm>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "host_tools/device/number_text.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 
@@ -58,7 +58,7 @@ void print_wrapped(std::ostream& out, std::string_view text) {
       end = text.rfind(' ', width - indent);
       if (end == std::string_view::npos) end = width - indent;
     }
-    fmt::print(out, "{:{}}{}\n", "", indent, text.substr(0, end));
+    print(out, "{:{}}{}\n", "", indent, text.substr(0, end));
     text.remove_prefix(std::min(text.size(), end + 1));
   }
 }
@@ -84,7 +84,7 @@ void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows
                                    cells.value, value, cells.unit, unit, cut(cells.range, range), range,
                                    cells.default_value, default_value, cut(cells.help, help));
     line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print(out, "{}\n", line);
+    print(out, "{}\n", line);
     if (!whole_texts || &cells == &table.front()) continue;
     if (cells.range.size() > range) print_wrapped(out, cells.range);
     print_wrapped(out, cells.help);

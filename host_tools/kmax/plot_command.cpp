@@ -1,11 +1,11 @@
 // kmax plot.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <filesystem>
 
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/figure.hpp"
 
@@ -48,7 +48,7 @@ int run_plot(Context& context, const PlotOptions& options) {
   if (context.json) {
     context.print({{"picture", picture}});
   } else {
-    fmt::print(context.out, "{}\n", picture);
+    print(context.out, "{}\n", picture);
   }
   return done;
 }

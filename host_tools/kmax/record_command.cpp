@@ -1,6 +1,5 @@
 // kmax record.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/output_file.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/link/device_address.hpp"
 #include "host_tools/record/can_source.hpp"
@@ -184,7 +184,7 @@ int run_record(Context& context, const RecordOptions& options) {
   if (options.to_standard_output()) {
     context.note(text);
   } else {
-    fmt::print(context.out, "{}: {}\n", options.file, text);
+    print(context.out, "{}: {}\n", options.file, text);
   }
   return done;
 }

@@ -1,6 +1,5 @@
 // kmax selftest.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <cmath>
@@ -9,6 +8,7 @@
 
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/progress.hpp"
 #include "host_tools/selftest/selftest.hpp"
 
@@ -81,15 +81,15 @@ void print_table(Context& context, const selftest::Report& report) {
   constexpr std::size_t name_width = 23, verdict_width = 11, width = 108;
   constexpr std::size_t indent = name_width + verdict_width;
   if (report.fault_at_start)
-    fmt::print(context.out, "{:<{}}{}\n", "fault before the test", indent,
-               wrapped(fmt::format("{} ({})", report.fault_at_start->words,
-                                   report.fault_at_start->cleared ? "cleared" : "its cause remains"),
-                       width - indent, indent));
+    print(context.out, "{:<{}}{}\n", "fault before the test", indent,
+          wrapped(fmt::format("{} ({})", report.fault_at_start->words,
+                              report.fault_at_start->cleared ? "cleared" : "its cause remains"),
+                  width - indent, indent));
   for (const selftest::CheckResult& check : report.checks)
-    fmt::print(context.out, "{:<{}}{:<{}}{}\n", check.name, name_width, selftest::name_of(check.verdict),
-               verdict_width, wrapped(check.message, width - indent, indent));
-  fmt::print(context.out, "The handle was moved by {:.2f} mm at most, by its encoder.\n{}\n",
-             report.largest_displacement * 1e3, selftest::conclusion(report));
+    print(context.out, "{:<{}}{:<{}}{}\n", check.name, name_width, selftest::name_of(check.verdict),
+          verdict_width, wrapped(check.message, width - indent, indent));
+  print(context.out, "The handle was moved by {:.2f} mm at most, by its encoder.\n{}\n",
+        report.largest_displacement * 1e3, selftest::conclusion(report));
 }
 
 int run_selftest_command(Context& context, const SelfTestOptions& options) {

@@ -1,10 +1,10 @@
 // kmax serve.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/interruption.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/serve/real_time.hpp"
 #include "host_tools/simulated_board/file_flash.hpp"
 
@@ -44,9 +44,9 @@ int run_serve(Context& context, const ServeOptions& options) {
   if (context.json) {
     context.print({{"device", addresses.front()}, {"devices", addresses}, {"scene", scene.name}});
   } else {
-    fmt::print(context.out,
-               "serving scene '{}' as {}\nset KMAX_DEVICE to that, or give it with --device; Ctrl-C ends\n",
-               scene.name, fmt::join(addresses, " and "));
+    print(context.out,
+          "serving scene '{}' as {}\nset KMAX_DEVICE to that, or give it with --device; Ctrl-C ends\n",
+          scene.name, fmt::join(addresses, " and "));
   }
   context.out.flush();
   const auto report = serve::run_in_real_time(simulation, {line ? &*line : nullptr, can ? &*can : nullptr},

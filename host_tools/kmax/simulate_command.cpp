@@ -1,6 +1,5 @@
 // kmax simulate.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_report.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulated_board/scene_run.hpp"
 #include "host_tools/simulation/scene_parts.hpp"
@@ -164,25 +164,24 @@ int run_simulate(Context& context, const SimulateOptions& options) {
   if (context.json) {
     context.print(result_json(scene, result));
   } else {
-    fmt::print(context.out, "{}: {}\n", scene.name, scene.description);
-    fmt::print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
-               result.simulated_s / result.real_s);
-    fmt::print(context.out, "  integrator: {}\n", simulation::words_of(scene.integrator));
+    print(context.out, "{}: {}\n", scene.name, scene.description);
+    print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
+          result.simulated_s / result.real_s);
+    print(context.out, "  integrator: {}\n", simulation::words_of(scene.integrator));
     for (std::size_t n = 0; n < scene.axes.size(); ++n)
-      fmt::print(context.out, "  axis {} integrates: {}\n", n,
-                 fmt::join(simulation::integrated_parts(scene.axes[n]), ", "));
+      print(context.out, "  axis {} integrates: {}\n", n,
+            fmt::join(simulation::integrated_parts(scene.axes[n]), ", "));
     if (result.contact)
-      fmt::print(
-          context.out,
-          "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm\n",
-          experiment::words_of(result.contact->verdict), result.contact->peak_to_peak * 1e3,
-          result.judged_from, result.judged_to, result.contact->deepest * 1e3);
-    fmt::print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
-               result.limited_share * 100, result.clipped_share * 100);
-    if (result.lost_edges > 0) fmt::print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
-    fmt::print(context.out, "  at the end: {}\n", device::words_of(result.end_state));
+      print(context.out,
+            "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm\n",
+            experiment::words_of(result.contact->verdict), result.contact->peak_to_peak * 1e3,
+            result.judged_from, result.judged_to, result.contact->deepest * 1e3);
+    print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
+          result.limited_share * 100, result.clipped_share * 100);
+    if (result.lost_edges > 0) print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
+    print(context.out, "  at the end: {}\n", device::words_of(result.end_state));
     for (const std::string& file : {options.csv, options.picture}) {
-      if (!file.empty()) fmt::print(context.out, "  {}\n", file);
+      if (!file.empty()) print(context.out, "  {}\n", file);
     }
   }
   if (result.fault == firmware::Fault::none) return done;

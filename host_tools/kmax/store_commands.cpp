@@ -1,11 +1,11 @@
 // kmax save, defaults.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 #include <CLI/CLI.hpp>
 
 #include "host_tools/device/store.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
@@ -40,10 +40,10 @@ int run_save(Context& context) {
                    {"write_errors", status.write_errors}});
     return done;
   }
-  fmt::print(context.out, "saved {} as record {}, read back equal; {} before the next erase\n",
-             counted(status.saved_parameters, "parameter"), status.sequence,
-             status.free_saves == 1 ? std::string("1 more save fits")
-                                    : fmt::format("{} more saves fit", status.free_saves));
+  print(context.out, "saved {} as record {}, read back equal; {} before the next erase\n",
+        counted(status.saved_parameters, "parameter"), status.sequence,
+        status.free_saves == 1 ? std::string("1 more save fits")
+                               : fmt::format("{} more saves fit", status.free_saves));
   return done;
 }
 
@@ -64,9 +64,9 @@ int run_defaults(Context& context) {
     return done;
   }
   for (const auto& [parameter, before] : changes)
-    fmt::print(context.out, "{} = {} (was {})\n", parameter.name(),
-               value_with_unit(parameter, parameter.default_raw()), value_text(parameter, before));
-  fmt::print(context.out, "all {} parameters have their defaults; {} changed\n", all, changes.size());
+    print(context.out, "{} = {} (was {})\n", parameter.name(),
+          value_with_unit(parameter, parameter.default_raw()), value_text(parameter, before));
+  print(context.out, "all {} parameters have their defaults; {} changed\n", all, changes.size());
   context.note(status.unsaved_parameters == 0 ? "that is what a restart brings, too"
                                               : "until the next restart: only 'kmax save' keeps them");
   return done;

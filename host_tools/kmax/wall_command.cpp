@@ -1,6 +1,5 @@
 // kmax wall.
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include "host_tools/device/number_text.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/print.hpp"
 #include "host_tools/wall/force_curve.hpp"
 #include "host_tools/wall/wall_table.hpp"
 
@@ -38,8 +38,8 @@ int evaluate_point(Context& context, const WallOptions& options, const wall::Wal
   if (context.json) {
     context.print({{"force_n", at.force}, {"magnetic_force_n", at.magnetic_force}, {"inside", at.inside}});
   } else {
-    fmt::print(context.out, "force {:.9g} N, of which magnetic {:.9g} N, {} the wall\n", at.force,
-               at.magnetic_force, at.inside ? "inside" : "outside");
+    print(context.out, "force {:.9g} N, of which magnetic {:.9g} N, {} the wall\n", at.force,
+          at.magnetic_force, at.inside ? "inside" : "outside");
   }
   return done;
 }
@@ -60,7 +60,7 @@ int run_wall(Context& context, const WallOptions& options) {
     if (context.json) {
       context.print({{"picture", options.picture}});
     } else {
-      fmt::print(context.out, "{}\n", options.picture);
+      print(context.out, "{}\n", options.picture);
     }
     return done;
   }
@@ -81,7 +81,7 @@ int run_wall(Context& context, const WallOptions& options) {
   if (context.json) {
     context.print({{"rows", rows}, {"out", options.output}});
   } else {
-    fmt::print(context.out, "{} rows written to {}\n", rows, options.output);
+    print(context.out, "{} rows written to {}\n", rows, options.output);
   }
   return done;
 }

@@ -1,4 +1,4 @@
-// The power goes away at every erase and every word that a save writes, with that word torn: what the image
+// The power goes away while a save erases and writes, with the word torn that is being written: what the image
 // finds at its next start is the old set or the new one, whole.
 #include <gtest/gtest.h>
 
@@ -109,7 +109,14 @@ std::vector<std::uint8_t> prepared(bool sector_full) {
   return {};
 }
 
-void cut_everywhere(const std::vector<std::uint8_t>& before) {
+// Each cut boots a board twice, so not every word: the first and the last ones, where a record and its sector
+// begin and end, and every seventh between, which meets each word of the parameters' pairs. The store itself
+// is cut at every word in tests/firmware/parameter_store_power_cut_test.cpp.
+bool is_tried(std::uint64_t cut, std::uint64_t operations) {
+  return cut <= 24 || cut + 24 > operations || cut % 7 == 0;
+}
+
+void cut_all_along(const std::vector<std::uint8_t>& before) {
   std::uint64_t operations = 0;
   {
     PowerCutBench bench(before);
@@ -122,6 +129,7 @@ void cut_everywhere(const std::vector<std::uint8_t>& before) {
   ASSERT_GT(operations, 100u);
   std::uint64_t old_sets = 0, new_sets = 0;
   for (std::uint64_t cut = 1; cut <= operations; ++cut) {
+    if (!is_tried(cut, operations)) continue;
     PowerCutBench bench(before);
     bench.set(new_set);
     bench.board().flash().cut_power_after(cut, cut * 7919);
@@ -136,24 +144,24 @@ void cut_everywhere(const std::vector<std::uint8_t>& before) {
       ++old_sets;
     }
     // And it is no dead end.
-    if (cut % 16 == 0) {
+    if (cut % 14 == 0) {
       bench.set(new_set);
       ASSERT_TRUE(bench.save());
       ASSERT_EQ(bench.state(), 2) << "saved";
     }
   }
   EXPECT_GT(old_sets, 0u);
-  std::printf("%llu cuts: %llu times the old set, %llu times the new one\n",
+  std::printf("cuts along %llu words: %llu times the old set, %llu times the new one\n",
               static_cast<unsigned long long>(operations), static_cast<unsigned long long>(old_sets),
               static_cast<unsigned long long>(new_sets));
 }
 
-TEST(PowerCut, AtEveryWordOfASaveLeavesTheOldSetOrTheNew) {
-  cut_everywhere(prepared(false));
+TEST(PowerCut, AlongASaveLeavesTheOldSetOrTheNew) {
+  cut_all_along(prepared(false));
 }
 
-TEST(PowerCut, AtEveryEraseAndWordOfASaveThatChangesTheSector) {
-  cut_everywhere(prepared(true));
+TEST(PowerCut, AlongASaveThatChangesTheSectorToo) {
+  cut_all_along(prepared(true));
 }
 
 }  // namespace

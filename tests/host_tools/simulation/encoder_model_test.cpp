@@ -36,7 +36,7 @@ TEST(EncoderModel, CountLengthOfAMotorEncoder) {
 TEST(EncoderModel, RefusesWhatCannotBeCounted) {
   EXPECT_THROW(EncoderModel(0.0), std::invalid_argument);
   EXPECT_THROW(EncoderModel(-1e-6), std::invalid_argument);
-  EXPECT_THROW(EncoderModel(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
+  EXPECT_THROW(EncoderModel{std::numeric_limits<double>::quiet_NaN()}, std::invalid_argument);
   const EncoderModel encoder(1e-12);
   EXPECT_THROW(encoder.counts(std::numeric_limits<double>::quiet_NaN()), std::domain_error);
   EXPECT_THROW(encoder.counts(1e6), std::domain_error);

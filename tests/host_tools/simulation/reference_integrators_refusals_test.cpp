@@ -78,9 +78,9 @@ TEST(ReferenceIntegratorsRefuse, WhatCannotBeAndLeaveTheStateAlone) {
       double duration = 0.002;
       bad.spoil(chain, state, input, duration);
       const auto before = std::bit_cast<std::array<std::uint64_t, 6>>(state);
-      EXPECT_CONTAINS(
-          thrown_message<std::invalid_argument>([&] { integrate(chain, state, input, duration); }),
-          bad.message);
+      EXPECT_CONTAINS(thrown_message<std::invalid_argument>(
+                          [&, &run = integrate] { run(chain, state, input, duration); }),
+                      bad.message);
       EXPECT_EQ((std::bit_cast<std::array<std::uint64_t, 6>>(state)), before) << name;
     }
   }
