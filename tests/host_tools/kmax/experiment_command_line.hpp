@@ -18,15 +18,9 @@ class ExperimentCommandLine : public SimulatedCommandLine {
   int simulated(const Arguments& more) { return kmax(all_of({"experiment", experiment_}, more)); }
 
   int on_device(const Arguments& more) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
-      return std::make_unique<link::SimLink>(board);
-    });
-    const int code = run(
-        all_of({"experiment", experiment_, "--device", "serial:/dev/none", "--no-prompt"}, more), context);
-    output = out.str();
-    said = messages.str();
-    return code;
+    return kmax(
+        all_of({"experiment", experiment_, "--device", "serial:/dev/none", "--no-prompt"}, more),
+        [this](const std::string&, const link::Notice&) { return std::make_unique<link::SimLink>(board); });
   }
 
   /// The message must name the option and tell what is wrong with its value.

@@ -82,13 +82,8 @@ class ContactOnADevice : public ContactCommand {
     std::vector<std::string> arguments = {"experiment", "contact", "--device", "serial:/dev/none",
                                           "--trials",   "1",       "--hold",   "1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    std::ostringstream out, messages;
-    Context context(out, messages,
-                    [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
+    return kmax(std::move(arguments),
+                [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
   }
 
  private:

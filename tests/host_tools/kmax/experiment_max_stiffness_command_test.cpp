@@ -14,13 +14,8 @@ class MaxStiffness : public SimulatedCommandLine {
     std::vector<std::string> arguments = {"experiment", "max-stiffness", "--device", "serial:/dev/none",
                                           "--no-prompt"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    std::ostringstream out, messages;
-    Context context(out, messages,
-                    [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
+    return kmax(std::move(arguments),
+                [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
   }
   static std::vector<std::string> coarse(std::vector<std::string> more) {
     std::vector<std::string> all = {"--start", "3000", "--step", "1000", "--last", "7000", "--hold", "1"};

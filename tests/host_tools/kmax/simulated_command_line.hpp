@@ -18,10 +18,15 @@ namespace kmax::cli {
 class SimulatedCommandLine : public testing::Test {
  protected:
   int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [](const std::string& address, const link::Notice& notice) {
+    return kmax(std::move(arguments), [](const std::string& address, const link::Notice& notice) {
       return link::open_link(link::parse_device_address(address), notice);
     });
+  }
+  /// With what `open` gives, whatever the address.
+  template <typename Open>
+  int kmax(std::vector<std::string> arguments, const Open& open) {
+    std::ostringstream out, messages;
+    Context context(out, messages, open);
     const int code = run(std::move(arguments), context);
     output = out.str();
     said = messages.str();
