@@ -188,6 +188,8 @@ class Application {
   Refusal obstacle_to_arming(std::size_t axis) const;
   void trip(std::size_t axis, Fault fault, float value, float bound);
   void refresh_readings();
+  /// The same from the reports that are there.
+  void publish_readings();
   /// Of the axis, or of the device, that this slot belongs to.
   void refresh_reading(std::size_t slot);
   void refresh_axis_readings(std::size_t axis);

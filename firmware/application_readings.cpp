@@ -9,6 +9,10 @@ namespace kmax::firmware {
 
 void Application::refresh_readings() {
   take_reports();
+  publish_readings();
+}
+
+void Application::publish_readings() {
   for (std::size_t axis = 0; axis < axis_count; ++axis) refresh_axis_readings(axis);
   refresh_device_readings();
   refresh_store_readings();

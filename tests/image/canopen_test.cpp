@@ -61,5 +61,28 @@ TEST(CanOpen, ResetNodeRestartsTheBoard) {
   EXPECT_EQ(bench.board->resets(), resets + 1) << "the communication alone";
 }
 
+// What is in a PDO is as old as that of any other, wherever in the main loop's own rhythm the node is
+// started: every 10 ms the loop has more to do.
+TEST(CanOpen, ValuesOfPdosAreAPeriodApartAtAnyPhaseOfTheMainLoop) {
+  CanBench bench;
+  bench.start();
+  virtual_board::CanHostNode listener(bench.board->can_bus(), 1'000'000);
+  std::vector<unsigned> ticks;
+  listener.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime) {
+    if (frame.identifier == 0x481) ticks.push_back(frame.data[6] | unsigned{frame.data[7]} << 8);
+  });
+  for (int phase = 0; phase < 20; ++phase) {
+    ticks.clear();
+    bench.nmt(0x01);
+    bench.board->run_for(0.025);
+    bench.nmt(0x80);
+    bench.board->run_for(0.0051);
+    ASSERT_GE(ticks.size(), 24U);
+    // The first goes at once, before the next of the loop's rounds.
+    for (std::size_t i = 2; i < ticks.size(); ++i)
+      EXPECT_EQ((ticks[i] - ticks[i - 1]) & 0xFFFF, 20U) << "PDO " << i << " at phase " << phase;
+  }
+}
+
 }  // namespace
 }  // namespace kmax::tests
