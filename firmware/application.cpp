@@ -39,10 +39,12 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
       settings_(make_settings()),
       handover_(settings_),
       objects_(*this),
-      node_(objects_, {.vendor = vendor_id,
-                       .product = product_code,
-                       .revision = firmware_version,
-                       .serial = board.serial_number}),
+      node_(objects_,
+            {.vendor = vendor_id,
+             .product = product_code,
+             .revision = firmware_version,
+             .serial = board.serial_number},
+            round_ticks * 1'000'000 / tick_rate_hz),
       capture_(capture_memory) {
   for (AxisStateMachine& machine : machines_) machine.initialised();
   configure_thermal();
@@ -160,10 +162,18 @@ bool Application::commutation_known(std::size_t axis) const {
 }
 
 void Application::take_reports() {
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    report_[axis] = snapshots_[axis].read();
-    report_wanted_[axis].store(true, std::memory_order_relaxed);
-  }
+  // The last axis' first: that it is of a round says that those of the others are of the same.
+  for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = snapshots_[axis].read();
+}
+
+/// The main loop's news of a link come at any time; what goes regularly goes with the rounds of the tick.
+bool Application::round_has_begun() {
+  constexpr std::uint32_t without_ticks_us = 1'000;  // where none come, or none any more
+  const std::uint32_t round = report_[axis_count - 1].tick / round_ticks;
+  if (round == round_ && now_us_ - round_us_ < without_ticks_us) return false;
+  round_ = round;
+  round_us_ = now_us_;
+  return true;
 }
 
 Refusal Application::obstacle_to_arming(std::size_t axis) const {

@@ -85,6 +85,10 @@ struct BoardReadings {
 /// or a counter, all of which a host can read. Memory: about 36 KiB on the target, no heap.
 class Application {
  public:
+  /// The main loop's rhythm: every so many ticks each axis reports, besides at once when something has
+  /// changed.
+  static constexpr std::uint32_t round_ticks = 4;
+
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
   /// application.
   explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {});
@@ -97,6 +101,9 @@ class Application {
   TickOutput ISR_tick(const TickInput& input) {
     return {{{ISR_tick(0, input.axis[0]), ISR_tick(1, input.axis[1])}}};
   }
+  /// Between two ticks: the last one began a round, in which both axes report. Behind axis 1's tick the main
+  /// loop should be woken: what it reads then is of this tick.
+  bool ISR_round_begins() const { return ISR_tick_ % round_ticks == 1; }
   void ISR_serial_byte(std::uint8_t byte, bool line_error, std::uint32_t time_us);
 
   void poll(std::uint32_t now_us);
@@ -187,9 +194,8 @@ class Application {
   void supervise(std::size_t axis);
   Refusal obstacle_to_arming(std::size_t axis) const;
   void trip(std::size_t axis, Fault fault, float value, float bound);
+  /// From the reports that the present poll began with: all that it tells is of one moment.
   void refresh_readings();
-  /// The same from the reports that are there.
-  void publish_readings();
   /// Of the axis, or of the device, that this slot belongs to.
   void refresh_reading(std::size_t slot);
   void refresh_axis_readings(std::size_t axis);
@@ -206,6 +212,7 @@ class Application {
   DeviceRegisters::WriteResult command_capture(std::uint16_t command);
   void refresh_capture_readings();
   void take_reports();
+  bool round_has_begun();
   bool commutation_known(std::size_t axis) const;
   DriveMode mode(std::size_t axis) const { return registers_.values().choice<DriveMode, "drive.mode">(axis); }
   Circumstances circumstances_of(std::size_t axis) const;
@@ -270,6 +277,7 @@ class Application {
   std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
   Settings settings_;
   std::uint32_t now_us_ = 0, uptime_second_us_ = 0, uptime_s_ = 0;
+  std::uint32_t round_ = 0, round_us_ = 0;
   bool started_ = false;
 
   Handover<Settings> handover_;
@@ -285,8 +293,6 @@ class Application {
   std::array<std::atomic<float>, axis_count> commanded_force_{};
   std::array<std::atomic<bool>, axis_count> takes_command_{};
   std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
-  /// Asked for by the main loop, taken back by the tick that publishes.
-  std::array<std::atomic<bool>, axis_count> report_wanted_{};
   std::atomic<std::uint8_t> trace_axis_{0};
   std::atomic<std::uint32_t> trace_interval_{0};
 

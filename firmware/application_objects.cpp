@@ -288,10 +288,8 @@ Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
   return abort_for(result.refusal, descriptor, raw);
 }
 
-// By the reports that the poll began with, and not by newer ones: how long it has taken until here varies,
-// and a value of a tick now earlier, now later would be an error in whatever a host makes of a regular PDO.
 void ApplicationObjects::refresh() {
-  app_.publish_readings();
+  app_.refresh_readings();
 }
 
 std::uint32_t ApplicationObjects::value(std::size_t slot) const {

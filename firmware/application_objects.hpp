@@ -27,7 +27,6 @@ class ApplicationObjects {
   canopen::Abort write_begin(canopen::ObjectAddress address, canopen::WriteBounds& bounds);
   canopen::Abort write(canopen::ObjectAddress address, std::span<const std::uint8_t> in);
 
-  /// For PDOs: as the tick last reported when the main loop's present poll began.
   void refresh();
   std::uint32_t value(std::size_t slot) const;
   /// A value of a received PDO; false: refused.

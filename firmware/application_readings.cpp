@@ -8,18 +8,12 @@
 namespace kmax::firmware {
 
 void Application::refresh_readings() {
-  take_reports();
-  publish_readings();
-}
-
-void Application::publish_readings() {
   for (std::size_t axis = 0; axis < axis_count; ++axis) refresh_axis_readings(axis);
   refresh_device_readings();
   refresh_store_readings();
 }
 
 void Application::refresh_reading(std::size_t slot) {
-  take_reports();
   const auto [entry, axis] = owner_of(slot);
   if (descriptors[entry].per_axis) return refresh_axis_readings(axis);
   // Apart, since it compares every parameter with what is kept.

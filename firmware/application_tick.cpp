@@ -19,10 +19,8 @@ const AxisOutput& Application::ISR_tick(std::size_t axis, const AxisInput& input
                              : tangential_[1 - axis];
   const AxisOutput& output = ticked.ISR_tick(settings[axis], input, enable, external, ISR_tick_);
   tangential_[axis] = output.tangential_force;
-  if (ticked.ISR_changed() || report_wanted_[axis].load(std::memory_order_relaxed)) {
-    report_wanted_[axis].store(false, std::memory_order_relaxed);
+  if (ticked.ISR_changed() || ISR_round_begins())
     snapshots_[axis].ISR_publish([&ticked](AxisReport& report) { ticked.ISR_fill(report); });
-  }
   if (axis == trace_axis_.load(std::memory_order_relaxed)) ISR_trace(ticked.ISR_haptic());
   if (capture_.ISR_wants(axis)) [[unlikely]]
     ISR_capture(axis, input, output);

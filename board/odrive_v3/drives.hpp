@@ -81,7 +81,7 @@ class Drives {
   /// Both axes have ticked since the last call that said so.
   firmware::WatchdogGate& watchdog_gate() { return watchdog_gate_; }
 
-  /// Every fourth tick of axis 0: the main loop need not look more often.
+  /// Once a round of the application, when both axes have reported: the main loop need not look more often.
   bool main_loop_due() { return main_loop_due_.exchange(false, std::memory_order_relaxed); }
 
  private:

@@ -160,8 +160,8 @@ void Drives::ISR_tick_of(firmware::Application& application, const Stage& stage)
   axis_ticks_[axis].store(axis_ticks_[axis].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if constexpr (axis == 0) {
     if (settings.has_brake || ISR_brake_on_) ISR_brake(settings.brake, input.motor.supply_voltage);
-    if ((axis_ticks_[0].load(std::memory_order_relaxed) & 3U) == 0)
-      main_loop_due_.store(true, std::memory_order_relaxed);
+  } else {
+    if (application.ISR_round_begins()) main_loop_due_.store(true, std::memory_order_relaxed);
   }
 }
 

@@ -49,7 +49,9 @@ struct NodeEvents {
 template <typename Objects>
 class Node {
  public:
-  Node(Objects& objects, const LssIdentity& identity) : objects_(objects), lss_(identity), sdo_(objects) {}
+  /// `pdo_interval_us`: of poll_pdos().
+  Node(Objects& objects, const LssIdentity& identity, std::uint32_t pdo_interval_us)
+      : objects_(objects), lss_(identity), sdo_(objects), tpdos_(pdo_interval_us) {}
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
@@ -137,8 +139,12 @@ class Node {
     if (events.heartbeat_lost) communication_error(events);
     act_on(lss_.poll(now_us), events);
     sdo_.poll(now_us);
-    if (nmt_.state() == NmtState::operational) tpdos_.poll(now_us);
     return events;
+  }
+
+  /// For PDOs that go by time.
+  void poll_pdos(std::uint32_t now_us) {
+    if (nmt_.state() == NmtState::operational) tpdos_.poll(now_us);
   }
 
   /// The next frame to send, if there is one; it counts as sent.

@@ -11,8 +11,8 @@
 
 namespace kmax::firmware::canopen {
 
-/// Where the values come from. refresh() brings all readings up to date together; value() is the pattern of a
-/// slot as of then.
+/// Where the values come from. refresh() brings all readings to one moment, the latest that there is; value()
+/// is the pattern of a slot as of then.
 template <typename T>
 concept PdoSource = requires(T source, std::size_t slot) {
   source.refresh();
@@ -40,6 +40,10 @@ struct TpdoCounters {
 /// with the same event time have one grid, those with multiples of it meet there; a change of one PDO's
 /// settings leaves the others' grid.
 ///
+/// A caller that comes at a regular interval says so. The grid then lies halfway between two calls, from the
+/// first call after the start on: that a call comes some microseconds early or late never makes it the call
+/// before or after, and event times that are multiples of the interval have frames at exactly their distance.
+///
 /// All PDOs that are due at one moment are read together when the first of them is fetched, and go in the
 /// order 1 to 4. If one is due again before it was fetched, it goes once, with newer values; and on a bus
 /// that never has room for all of them each gets its turn.
@@ -56,6 +60,9 @@ struct TpdoCounters {
 /// value() for each object of the PDOs that are due. Memory: 368 bytes.
 class Tpdos {
  public:
+  /// `call_interval_us`: of poll(); 0: irregular.
+  explicit Tpdos(std::uint32_t call_interval_us = 0) : call_interval_us_(call_interval_us) {}
+
   /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were go
   /// on undisturbed.
   void configure(const ParameterValues& values, std::uint8_t node_id, std::uint32_t bit_rate,
@@ -78,7 +85,7 @@ class Tpdos {
     }
     for (std::size_t i = 0; i < pdo_count; ++i) {
       if (!starts[i]) continue;
-      pdos_[i].due_us = first_due(pdos_[i].period_us, starts, now_us);
+      set_first_due(pdos_[i], starts, now_us);
       starts[i] = false;
     }
   }
@@ -104,6 +111,8 @@ class Tpdos {
   void poll(std::uint32_t now_us) {
     for (Pdo& pdo : pdos_) {
       if (!pdo.timed()) continue;
+      if (pdo.waits_for_call) pdo.due_us = now_us - call_interval_us_ / 2;
+      pdo.waits_for_call = false;
       release(pdo, now_us);
       const std::uint32_t late_us = now_us - pdo.due_us;
       if (late_us >> 31 != 0) continue;
@@ -156,6 +165,7 @@ class Tpdos {
     bool read = false;  // data are of the moment it became due
     bool sent = false;
     bool inhibited = false;
+    bool waits_for_call = false;  // its grid begins with the next one
     std::uint8_t syncs = 0;
 
     bool timed() const { return settings.exists && !settings.synchronous(); }
@@ -173,16 +183,17 @@ class Tpdos {
   }
 
   // On the grid of a PDO of the same period that goes already, else on that of any other, else now.
-  std::uint32_t first_due(std::uint32_t period_us, const std::array<bool, pdo_count>& starts,
-                          std::uint32_t now_us) const {
+  void set_first_due(Pdo& pdo, const std::array<bool, pdo_count>& starts, std::uint32_t now_us) {
     const Pdo* other = nullptr;
     for (std::size_t i = 0; i < pdo_count; ++i) {
       if (starts[i] || !pdos_[i].timed()) continue;
-      if (other == nullptr || pdos_[i].period_us == period_us) other = &pdos_[i];
+      if (other == nullptr || pdos_[i].period_us == pdo.period_us) other = &pdos_[i];
     }
-    if (other == nullptr) return now_us;
+    pdo.due_us = now_us;
+    pdo.waits_for_call = call_interval_us_ != 0 && (other == nullptr || other->waits_for_call);
+    if (other == nullptr) return;
     const std::uint32_t wait_us = other->due_us - now_us;
-    return wait_us >> 31 != 0 ? other->due_us : now_us + wait_us % period_us;
+    pdo.due_us = wait_us >> 31 != 0 ? other->due_us : now_us + wait_us % pdo.period_us;
   }
 
   template <typename Source>
@@ -213,6 +224,7 @@ class Tpdos {
     ++counters_.sent;
   }
 
+  std::uint32_t call_interval_us_;
   std::array<Pdo, pdo_count> pdos_{};
   std::size_t next_ = 0;  // looked at first: goes on where a batch was left
   TpdoCounters counters_;
