@@ -26,6 +26,15 @@ struct ChainDynamics {
   double friction = 0.0;                        // N, Coulomb, of mass 0 against the ground; standing and moving
 };
 
+// `chain` with its springs and dampers from number `first` on times `gain`.
+inline ChainDynamics stiffened(ChainDynamics chain, std::size_t first, double gain) {
+  for (std::size_t i = first; i < chain.masses; ++i) {
+    chain.stiffness[i] *= gain;
+    chain.damping[i] *= gain;
+  }
+  return chain;
+}
+
 struct ChainState {
   std::array<double, most_masses> position{};  // m
   std::array<double, most_masses> velocity{};  // m/s; velocity[0] is exactly 0 while mass 0 sticks

@@ -48,6 +48,7 @@ ChainMotion<masses>::ChainMotion(const ChainDynamics& chain, std::size_t first_s
 template <std::size_t masses>
 void ChainMotion<masses>::share(PropagatorTable* table) {
   table_ = table;
+  rounds_ = table != nullptr && table->rounds();
   slots_.fill(Slot{});
 }
 
@@ -60,13 +61,16 @@ void ChainMotion<masses>::set_gain(double gain) {
 
 template <std::size_t masses>
 const ChainPropagator<masses>* ChainMotion<masses>::find(Slot& slot, double duration, double gain) {
+  if constexpr (masses > 1) {
+    if (slot.sheet != nullptr) return slot.take(slot.sheet->at(gain));
+  }
   slot.propagator = nullptr;
-  slot.gain = std::numeric_limits<double>::quiet_NaN();
+  slot.lowest_gain = slot.highest_gain = std::numeric_limits<double>::quiet_NaN();
   if (table_ != nullptr) {
     if constexpr (masses > 1) {
       // A duration that occurs once is not worth a table.
       if (std::exchange(slot.used, true)) slot.sheet = table_->sheet<masses>(duration);
-      if (slot.sheet != nullptr) return &slot.sheet->at(gain);
+      if (slot.sheet != nullptr) return slot.take(slot.sheet->at(gain));
     }
     return nullptr;
   }
@@ -75,29 +79,31 @@ const ChainPropagator<masses>* ChainMotion<masses>::find(Slot& slot, double dura
   slot.last_gain = gain;
   if (slot.repetitions < slot.patience) return nullptr;
   slot.patience = std::min(2 * slot.patience, 1024);
-  ChainDynamics chain = chain_;
-  for (std::size_t i = first_scaled_; i < masses; ++i) {
-    chain.stiffness[i] *= gain;
-    chain.damping[i] *= gain;
-  }
-  auto own = std::make_shared<ChainPropagator<masses>>(chain, duration);
-  if (chain.friction > 0.0) own->prepare_reversals();  // copies of the handle may go to other threads
+  auto own =
+      std::make_shared<ChainPropagator<masses>>(chain_, first_scaled_, GainSpan{gain, gain, gain}, duration);
+  if (chain_.friction > 0.0) own->prepare_reversals();  // copies of the handle may go to other threads
   slot.own = std::move(own);
-  slot.propagator = slot.own.get();
-  slot.gain = gain;
-  return slot.propagator;
+  return slot.take(*slot.own);
 }
 
 template <std::size_t masses>
 void ChainMotion<masses>::move_in_steps(const ChainPropagator<masses>& propagator, MovingChain& moving,
-                                        const ChainInput& input) {
+                                        const ChainInput& input, double gain) {
+  const double offset = gain - propagator.gains().centre;
   const double h = propagator.step();
   ChainInput part = input;
   for (int n = 0; n < propagator.steps(); ++n) {
     part.intended = input.intended + input.intended_rate * (h * n);
-    if (!one_step(propagator, moving, part.force, part.intended, part.intended_rate))
-      step(moving, propagator.coefficients(), part, h);
+    if (!one_step(propagator, moving, part.force, part.intended, part.intended_rate, offset))
+      search_events(propagator, moving, part, h, gain);
   }
+}
+
+template <std::size_t masses>
+void ChainMotion<masses>::search_events(const ChainPropagator<masses>& propagator, MovingChain& moving,
+                                        const ChainInput& input, double h, double gain) {
+  if (gain == propagator.gains().centre) return step(moving, propagator.coefficients(), input, h);
+  move_by_series(moving, input, h, gain);
 }
 
 template <std::size_t masses>

@@ -50,23 +50,31 @@ class ChainMotion {
   // A piece of the slot's duration.
   [[gnu::always_inline]] void move(MovingChain& moving, double force, double intended, double rate,
                                    double duration, double gain, std::size_t slot) {
+    // With a table that interpolates, the matrices of the piece before nearly always serve again: the
+    // processor then reads them before the gain is known.
     Slot& known = slots_[slot];
-    const ChainPropagator<masses>* propagator = nullptr;
+    const ChainPropagator<masses>* propagator = known.propagator;
+    bool found = false;
+    double offset = 0.0;
     if constexpr (masses > 1) {
-      if (known.sheet != nullptr) propagator = &known.sheet->at(gain);
+      found = rounds_ && known.sheet != nullptr;
+      if (found) propagator = &known.sheet->at(gain);
     }
-    if (propagator == nullptr) {
-      propagator = known.gain == gain ? known.propagator : find(known, duration, gain);
+    if (!found && !(gain >= known.lowest_gain && gain <= known.highest_gain)) {
+      propagator = find(known, duration, gain);
       if (propagator == nullptr) [[unlikely]]
         return move_by_series(moving, {force, intended, rate}, duration, gain);
     }
+    if constexpr (masses > 1) {
+      if (!found) offset = gain - known.centre_gain;
+    }
     if (propagator->steps() != 1) [[unlikely]]
-      return move_in_steps(*propagator, moving, {force, intended, rate});
-    if (!one_step(*propagator, moving, force, intended, rate)) [[unlikely]]
-      step(moving, propagator->coefficients(), {force, intended, rate}, duration);
+      return move_in_steps(*propagator, moving, {force, intended, rate}, gain);
+    if (!one_step(*propagator, moving, force, intended, rate, offset)) [[unlikely]]
+      search_events(*propagator, moving, {force, intended, rate}, duration, gain);
   }
 
-  // The gain that the slot's next piece will probably have.
+  // The gain that the slot's next piece will probably have, with a table that rounds.
   [[gnu::always_inline]] void expect(double gain, std::size_t slot) const {
     if constexpr (masses > 1) {
       if (slots_[slot].sheet != nullptr) slots_[slot].sheet->prefetch(gain);
@@ -80,25 +88,43 @@ class ChainMotion {
   using Sheet = PropagatorTable::Sheet<masses>;
   struct Slot {
     const ChainPropagator<masses>* propagator = nullptr;
-    double gain = std::numeric_limits<double>::quiet_NaN();       // of the propagator, if there is one
+    // Of the propagator, if there is one.
+    double lowest_gain = std::numeric_limits<double>::quiet_NaN();
+    double highest_gain = std::numeric_limits<double>::quiet_NaN();
+    double centre_gain = 1.0;
     double last_gain = std::numeric_limits<double>::quiet_NaN();  // of the piece before, without a table
     int repetitions = 0;                                          // of it
     int patience = 1;                                             // repetitions that are worth a matrix
     Sheet* sheet = nullptr;
     bool used = false;
     std::shared_ptr<const ChainPropagator<masses>> own;
+
+    const ChainPropagator<masses>* take(const ChainPropagator<masses>& one) {
+      lowest_gain = one.gains().lowest;
+      highest_gain = one.gains().highest;
+      centre_gain = one.gains().centre;
+      return propagator = &one;
+    }
   };
 
   [[gnu::always_inline]] static bool one_step(const ChainPropagator<masses>& propagator, MovingChain& moving,
-                                              double force, double intended, double rate) {
+                                              double force, double intended, double rate, double offset) {
     const bool standing =
         moving.state.velocity[0] == 0.0 && (moving.blocked || propagator.coefficients().friction > 0.0);
     moving.sticking = standing;
-    return standing ? propagator.rest(moving.state, force, intended, rate, moving.blocked)
-                    : propagator.slide(moving.state, force, intended, rate);
+    if (masses == 1 || offset == 0.0) {
+      return standing ? propagator.rest(moving.state, force, intended, rate, moving.blocked)
+                      : propagator.slide(moving.state, force, intended, rate);
+    }
+    return standing
+               ? propagator.template rest<true>(moving.state, force, intended, rate, moving.blocked, offset)
+               : propagator.template slide<true>(moving.state, force, intended, rate, offset);
   }
-  static void move_in_steps(const ChainPropagator<masses>& propagator, MovingChain& moving,
-                            const ChainInput& input);
+  void move_in_steps(const ChainPropagator<masses>& propagator, MovingChain& moving, const ChainInput& input,
+                     double gain);
+  // A step that the propagator leaves alone.
+  void search_events(const ChainPropagator<masses>& propagator, MovingChain& moving, const ChainInput& input,
+                     double h, double gain);
   const ChainPropagator<masses>* find(Slot& slot, double duration, double gain);
   static void step(MovingChain& moving, const ChainCoefficients<masses>& chain, const ChainInput& input,
                    double h);
@@ -110,6 +136,7 @@ class ChainMotion {
   ChainCoefficients<masses> unscaled_;
   ChainCoefficients<masses> coefficients_;
   PropagatorTable* table_ = nullptr;
+  bool rounds_ = false;  // the table has a matrix for every gain that occurs
   std::array<Slot, durations> slots_;
 };
 

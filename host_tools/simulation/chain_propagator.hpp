@@ -29,6 +29,11 @@
 // tau is found on the Taylor series of v about the centre of one of four parts of the interval, of degree 9:
 // rests are below 1e-15 of the state as ||A|| h <= 1.25. These tables are built at the first reversal.
 //
+// For gains about one gain. The springs and dampers from one on are multiplied by a gain g; a propagator may
+// serve a span of gains instead of one: every matrix M is then M(g_0) + (g - g_0) M'(g_0), of which the rest
+// is (g - g_0)^2 / 2 M''; inputs and accelerations are those of g itself, bounds those of the span's highest
+// gain, and at g_0 everything is as without a span.
+//
 // Cost, one core of an AMD EPYC: see coupled_handle.hpp. Building: about 4 us, and 4 us for the tables of
 // reversals.
 
@@ -45,25 +50,41 @@ namespace kmax::simulation {
 // Two doubles in one register of the x86-64 baseline (SSE2).
 typedef double DoublePair __attribute__((vector_size(16)));
 
+// The gains that one propagator serves.
+struct GainSpan {
+  double centre = 1.0;  // g_0
+  double lowest = 1.0;
+  double highest = 1.0;
+};
+
 template <std::size_t masses>
 class ChainPropagator {
  public:
   // Over `duration`, divided into steps() equal steps so that ||A|| h <= 1.25.
-  ChainPropagator(const ChainDynamics& chain, double duration);
+  ChainPropagator(const ChainDynamics& chain, double duration)
+      : ChainPropagator(chain, masses, GainSpan{}, duration) {}
+  // `chain`: at a gain of 1, which multiplies the springs and dampers from number `first_scaled` on.
+  ChainPropagator(const ChainDynamics& chain, std::size_t first_scaled, const GainSpan& gains,
+                  double duration);
 
+  const GainSpan& gains() const { return gains_; }
   int steps() const { return steps_; }
   double step() const { return h_; }
-  const ChainCoefficients<masses>& coefficients() const { return chain_; }
+  const ChainCoefficients<masses>& coefficients() const { return chain_; }  // at the centre
 
   // One step of a chain whose mass 0 moves, if it is proven that it goes on in its direction or reverses
-  // once. False: nothing is done. `force`: on mass 0, without Coulomb's.
-  bool slide(ChainState& state, double force, double intended, double rate) const;
+  // once. False: nothing is done. `force`: on mass 0, without Coulomb's. `offset`: g - g_0, which is 0 unless
+  // `off_centre`.
+  template <bool off_centre = false>
+  bool slide(ChainState& state, double force, double intended, double rate, double offset = 0.0) const;
 
   // One step of a chain whose mass 0 stands still, if it is proven that friction holds it. `held`: it is held
   // in any case.
-  bool rest(ChainState& state, double force, double intended, double rate, bool held) const;
+  template <bool off_centre = false>
+  bool rest(ChainState& state, double force, double intended, double rate, bool held,
+            double offset = 0.0) const;
 
-  // Asks for the memory that slide() and rest() read: it is a table's, and far away.
+  // Asks for the memory that slide() and rest() read at the centre: it is a table's, and far away.
   void prefetch() const {
     const char* begin = static_cast<const char*>(static_cast<const void*>(this));
 #pragma GCC unroll 16
@@ -82,6 +103,8 @@ class ChainPropagator {
   static constexpr std::size_t rest_rows = masses == 1 ? 1 : masses - 1;
   static constexpr std::size_t cells = 4;
   static constexpr std::size_t terms = 10;
+  // Of slopes; the rest, times g - g_0, is below that of the interpolation.
+  static constexpr std::size_t slope_terms = 6;
   using Rows = std::array<DoublePair, masses>;  // (change of x_i, v_i)
   using Inputs = std::array<double, columns>;
 
@@ -91,13 +114,38 @@ class ChainPropagator {
     std::array<std::array<std::array<DoublePair, terms / 2>, columns>, cells> velocity;
     std::array<std::array<Rows, terms>, cells> response;
   };
+  using Slide = std::array<Rows, columns>;
+  using Rest = std::array<std::array<DoublePair, rest_rows>, rest_columns>;
+  struct Springs {
+    std::array<double, masses> stiffness{}, damping{};
+  };
+  // Everything per gain.
+  struct ReversalSlopes {
+    std::array<std::array<std::array<DoublePair, slope_terms / 2>, columns>, cells> velocity;
+    std::array<std::array<Rows, slope_terms>, cells> response;
+  };
+  struct Slopes {
+    Slide slide;
+    Rest rest;
+    Springs springs;
+    ChainDynamics chain;  // at a gain of 1
+    std::size_t first_scaled;
+    std::unique_ptr<ReversalSlopes> reversals;
 
+    ChainCoefficients<masses> at(double gain) const {
+      return ChainCoefficients<masses>(stiffened(chain, first_scaled, gain));
+    }
+  };
+
+  static void build_matrices(const ChainCoefficients<masses>& chain, double h, Slide& slide, Rest& rest);
   void build_reversals() const;
+  template <bool off_centre>
+  [[gnu::always_inline]] Springs springs(double offset) const;
   [[gnu::noinline]] bool reverse(const Inputs& z, Rows& result, double direction, double acceleration,
-                                 double energy) const;
+                                 double energy, double offset) const;
 
-  std::array<Rows, columns> slide_;
-  std::array<std::array<DoublePair, rest_rows>, rest_columns> rest_;
+  Slide slide_;
+  Rest rest_;
   ChainCoefficients<masses> chain_;
   double pull_stiffness_ = 0.0;  // of the last spring and damper, per last mass
   double pull_damping_ = 0.0;
@@ -109,29 +157,36 @@ class ChainPropagator {
   double no_break_away_ = 0.0;  // per 2 E': (fastest change of net force times h)^2
   int steps_ = 1;
   mutable std::unique_ptr<Reversals> reversals_;
+  GainSpan gains_;
+  std::unique_ptr<Slopes> slopes_;  // none without a span
 };
 
-namespace chain_propagator {
-
-// c[0] + c[1] t + ... + c[9] t^9, arranged for a short chain of dependent operations.
-template <typename Value>
-inline Value polynomial(const std::array<Value, 10>& c, double t) {
-  const double t2 = t * t;
-  const double t4 = t2 * t2;
-  return ((c[0] + c[1] * t) + (c[2] + c[3] * t) * t2) +
-         (((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) + (c[8] + c[9] * t) * t4) * t4;
+template <std::size_t masses>
+template <bool off_centre>
+[[gnu::always_inline]] inline ChainPropagator<masses>::Springs ChainPropagator<masses>::springs(
+    double offset) const {
+  Springs springs{chain_.stiffness, chain_.damping};
+  if constexpr (off_centre) {
+#pragma GCC unroll 3
+    for (std::size_t i = 0; i < masses; ++i) {
+      springs.stiffness[i] += offset * slopes_->springs.stiffness[i];
+      springs.damping[i] += offset * slopes_->springs.damping[i];
+    }
+  }
+  return springs;
 }
 
-}  // namespace chain_propagator
-
 template <std::size_t masses>
+template <bool off_centre>
 [[gnu::always_inline]] inline bool ChainPropagator<masses>::slide(ChainState& state, double force,
-                                                                  double intended, double rate) const {
+                                                                  double intended, double rate,
+                                                                  double offset) const {
   constexpr std::size_t last = masses - 1;
   const double origin = state.position[0];
   const double direction = std::copysign(1.0, state.velocity[0]);
   const double push = (force - direction * chain_.friction) * chain_.per_mass[0];
 
+  const Springs springs = this->springs<off_centre>(offset);
   Inputs z;
   z[0] = state.velocity[0];
 #pragma GCC unroll 3
@@ -141,8 +196,11 @@ template <std::size_t masses>
   }
   z[push_column] = push;
   if constexpr (masses > 1) {
-    z[columns - 2] = pull_stiffness_ * (intended - origin) + pull_damping_ * rate;
-    z[columns - 1] = pull_stiffness_ * rate;
+    const double pull_stiffness =
+        off_centre ? springs.stiffness[last] * chain_.per_mass[last] : pull_stiffness_;
+    const double pull_damping = off_centre ? springs.damping[last] * chain_.per_mass[last] : pull_damping_;
+    z[columns - 2] = pull_stiffness * (intended - origin) + pull_damping * rate;
+    z[columns - 1] = pull_stiffness * rate;
   }
 
   // The force comes last: it is what the caller has computed just now.
@@ -157,6 +215,18 @@ template <std::size_t masses>
   }
 #pragma GCC unroll 3
   for (std::size_t i = 0; i < masses; ++i) result[i] += slide_[push_column][i] * push;
+  if constexpr (off_centre) {
+    Rows slope;
+#pragma GCC unroll 3
+    for (std::size_t i = 0; i < masses; ++i) slope[i] = slopes_->slide[0][i] * z[0];
+#pragma GCC unroll 8
+    for (std::size_t c = 1; c < columns; ++c) {
+#pragma GCC unroll 3
+      for (std::size_t i = 0; i < masses; ++i) slope[i] += slopes_->slide[c][i] * z[c];
+    }
+#pragma GCC unroll 3
+    for (std::size_t i = 0; i < masses; ++i) result[i] += slope[i] * offset;
+  }
 
   if (chain_.friction > 0.0) {
     // The accelerations, and the energy of the derivative.
@@ -170,8 +240,8 @@ template <std::size_t masses>
         const std::size_t next = i < last ? i + 1 : i;
         const double stretch = (i < last ? state.position[next] : intended) - state.position[i];
         const double closing = (i < last ? state.velocity[next] : rate) - state.velocity[i];
-        above = chain_.stiffness[i] * stretch + chain_.damping[i] * closing;
-        energy += chain_.stiffness[i] * (closing * closing);
+        above = springs.stiffness[i] * stretch + springs.damping[i] * closing;
+        energy += springs.stiffness[i] * (closing * closing);
       }
       double a = (above - below) * chain_.per_mass[i];
       if (i == 0) acceleration = a = a + push;
@@ -189,7 +259,7 @@ template <std::size_t masses>
         // Copies: what reverse() does not see stays in registers.
         const Inputs inputs = z;
         Rows reversed = result;
-        if (!reverse(inputs, reversed, direction, acceleration, energy)) return false;
+        if (!reverse(inputs, reversed, direction, acceleration, energy, offset)) return false;
         result = reversed;
       }
     }
@@ -203,100 +273,16 @@ template <std::size_t masses>
 }
 
 template <std::size_t masses>
-bool ChainPropagator<masses>::reverse(const Inputs& z, Rows& result, double direction, double acceleration,
-                                      double energy) const {
-  const double deceleration = -direction * acceleration;
-  const double speed = direction * z[0];
-  if (!(speed > 0.0 && deceleration > 0.0 && deceleration * deceleration > 4.0 * jerk_ * energy))
-    return false;
-  if (!reversals_) [[unlikely]]
-    build_reversals();
-
-  // A parabola through both ends and the first slope says in which quarter the zero is; a neighbour will do.
-  const double fall = deceleration * h_;
-  const double curve = direction * result[0][1] - speed + fall;
-  std::size_t cell = 0;
-#pragma GCC unroll 3
-  for (std::size_t n = 1; n < cells; ++n) {
-    const double part = static_cast<double>(n) / static_cast<double>(cells);
-    cell += speed - part * (fall - part * curve) > 0.0 ? 1 : 0;
-  }
-  const auto& table = reversals_->velocity[cell];
-  std::array<DoublePair, terms / 2> sums;
-#pragma GCC unroll 5
-  for (std::size_t n = 0; n < terms / 2; ++n) sums[n] = table[0][n] * z[0];
-#pragma GCC unroll 8
-  for (std::size_t c = 1; c < columns; ++c) {
-#pragma GCC unroll 5
-    for (std::size_t n = 0; n < terms / 2; ++n) sums[n] += table[c][n] * z[c];
-  }
-  std::array<double, terms> c;
-#pragma GCC unroll 5
-  for (std::size_t n = 0; n < terms / 2; ++n) {
-    c[2 * n] = sums[n][0];
-    c[2 * n + 1] = sums[n][1];
-  }
-
-  // The inverse series to order 6, then Newton steps, of which one is nearly always enough. |a2| <= 1/16, as
-  // the slope never halves.
-  const double per_slope = 1.0 / c[1];
-  const double u = -c[0] * per_slope;
-  const double a2 = c[2] * per_slope;
-  const double a3 = c[3] * per_slope;
-  const double a4 = c[4] * per_slope;
-  const double a5 = c[5] * per_slope;
-  const double b2 = a2 * a2;
-  const double u2 = u * u;
-  const double r3 = 2.0 * b2 - a3;
-  const double r4 = 5.0 * a2 * (a3 - b2) - a4;
-  const double r5 = 14.0 * b2 * b2 - 21.0 * b2 * a3 + 3.0 * a3 * a3 + 6.0 * a2 * a4 - a5;
-  double t = (u - a2 * u2) + (u * u2) * ((r3 + r4 * u) + r5 * u2);
-  double newton_step = 1.0;
-  for (int round = 0; round < 4 && std::abs(newton_step) > 1e-7; ++round) {
-    // 1 over the slope to its sixth order in what the slope differs from c[1]: at most 1/8.
-    const double steeper = t * (2.0 * a2 + t * (3.0 * a3 + t * (4.0 * a4 + t * (5.0 * a5))));
-    const double steeper2 = steeper * steeper;
-    const double per_slope_there =
-        per_slope * ((1.0 - steeper) * ((1.0 + steeper2) * (1.0 + steeper2 * steeper2)));
-    newton_step = chain_propagator::polynomial(c, t) * per_slope_there;
-    t -= newton_step;
-  }
-  if (!(std::abs(t) <= 1.5 && std::abs(newton_step) <= 1e-7)) return false;
-
-  const auto& after = reversals_->response[cells - 1 - cell];
-  Rows response;
-#pragma GCC unroll 3
-  for (std::size_t i = 0; i < masses; ++i) {
-    std::array<DoublePair, terms> row;
-#pragma GCC unroll 10
-    for (std::size_t n = 0; n < terms; ++n) row[n] = after[n][i];
-    response[i] = chain_propagator::polynomial(row, -t);
-  }
-  constexpr double per_cells = 1.0 / static_cast<double>(cells);
-  const double part = per_cells * (static_cast<double>(cell) + 0.5 + 0.5 * t);  // tau / h
-  if (!(part > 0.0 && part < 1.0)) return false;
-  const double t2 = t * t;
-  const double slope_there =
-      (c[1] + 2.0 * c[2] * t) + t2 * ((3.0 * c[3] + 4.0 * c[4] * t) + t2 * (5.0 * c[5] + 6.0 * c[6] * t));
-  const double slope = -direction * slope_there * slope_scale_;
-  const double jump = 2.0 * friction_rate_;
-  const double onwards = slope - jump;
-  const double rest = 1.0 - part;
-  if (!(onwards > 1e-6 * slope && onwards * onwards > 0.25 * jerk_ * energy * (rest * rest))) return false;
-#pragma GCC unroll 3
-  for (std::size_t i = 0; i < masses; ++i) result[i] += response[i] * (direction * jump);
-  return true;
-}
-
-template <std::size_t masses>
+template <bool off_centre>
 [[gnu::always_inline]] inline bool ChainPropagator<masses>::rest(ChainState& state, double force,
-                                                                 double intended, double rate,
-                                                                 bool held) const {
+                                                                 double intended, double rate, bool held,
+                                                                 double offset) const {
   if constexpr (masses == 1) {
     return held || std::abs(force) <= chain_.friction;
   } else {
     constexpr std::size_t last = masses - 1;
     const double origin = state.position[0];
+    const Springs springs = this->springs<off_centre>(offset);
     std::array<double, rest_columns> z;
     double energy = 0.0;
     double below = 0.0;
@@ -311,9 +297,9 @@ template <std::size_t masses>
       const std::size_t next = i < last ? i + 1 : i;
       const double closing = i < last ? state.velocity[next] - velocity : rate - velocity;
       const double above =
-          chain_.stiffness[i] * ((i < last ? state.position[next] : intended) - state.position[i]) +
-          chain_.damping[i] * closing;
-      energy += chain_.stiffness[i] * (closing * closing);
+          springs.stiffness[i] * ((i < last ? state.position[next] : intended) - state.position[i]) +
+          springs.damping[i] * closing;
+      energy += springs.stiffness[i] * (closing * closing);
       if (i == 0) {
         net = force + above;
       } else {
@@ -326,8 +312,11 @@ template <std::size_t masses>
       const double slack = chain_.friction - std::abs(net);
       if (!(slack > 0.0 && slack * slack > no_break_away_ * energy)) return false;
     }
-    z[rest_columns - 2] = pull_stiffness_ * (intended - origin) + pull_damping_ * rate;
-    z[rest_columns - 1] = pull_stiffness_ * rate;
+    const double pull_stiffness =
+        off_centre ? springs.stiffness[last] * chain_.per_mass[last] : pull_stiffness_;
+    const double pull_damping = off_centre ? springs.damping[last] * chain_.per_mass[last] : pull_damping_;
+    z[rest_columns - 2] = pull_stiffness * (intended - origin) + pull_damping * rate;
+    z[rest_columns - 1] = pull_stiffness * rate;
     std::array<DoublePair, rest_rows> result;
 #pragma GCC unroll 2
     for (std::size_t i = 0; i < rest_rows; ++i) result[i] = rest_[0][i] * z[0];
@@ -335,6 +324,14 @@ template <std::size_t masses>
     for (std::size_t c = 1; c < rest_columns; ++c) {
 #pragma GCC unroll 2
       for (std::size_t i = 0; i < rest_rows; ++i) result[i] += rest_[c][i] * z[c];
+    }
+    if constexpr (off_centre) {
+#pragma GCC unroll 6
+      for (std::size_t c = 0; c < rest_columns; ++c) {
+        const double shift = offset * z[c];
+#pragma GCC unroll 2
+        for (std::size_t i = 0; i < rest_rows; ++i) result[i] += slopes_->rest[c][i] * shift;
+      }
     }
 #pragma GCC unroll 2
     for (std::size_t i = 0; i < rest_rows; ++i) {

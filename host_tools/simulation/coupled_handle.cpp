@@ -85,6 +85,7 @@ void CoupledHandle::share(std::shared_ptr<PropagatorTable> table) {
     throw std::logic_error("share: without an operator there is no activation to have a table of");
   if (table == nullptr || !table->fits(device_, person_))
     throw std::invalid_argument("share: the table was made for another operator or device");
+  rounds_ = table->rounds();
   grid_ = table->grid();
   table_ = std::move(table);
   settled_background_ = -1.0;
@@ -198,7 +199,7 @@ template <std::size_t masses>
   if (has_operator_) {
     if (background != settled_background_) {
       respond_to(background);
-      if (table_ != nullptr) {
+      if (rounds_) {
         const double excess = (activation_ - background) * paces_[pace_].half_decay;
         motion.expect(grid_.nearest(1.0 + person_.activation_gain * (background + excess)), pace_);
       }
@@ -235,7 +236,7 @@ template <std::size_t masses>
   const Pace& pace = paces_[pace_];
   const double excess = activation_ - background;
   const double gain = 1.0 + person_.activation_gain * (background + excess * pace.half_decay);
-  gain_ = table_ != nullptr ? grid_.nearest(gain) : gain;
+  gain_ = rounds_ ? grid_.nearest(gain) : gain;
   activation_ = background + excess * pace.decay;
   push_ = background + (push_ - background) * pace.push_decay;
   const double stiffness = series_stiffness_ * (1.0 + person_.activation_gain * activation_);

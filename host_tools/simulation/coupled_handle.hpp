@@ -65,9 +65,10 @@ class CoupledHandle {
                 const HandleStart& start);
 
   // Takes matrices from a table that other handles of the same person with the same device use too, one after
-  // the other, in one thread. The activation is rounded to the table's grid from now on; propagator_table.hpp
-  // gives the error. For who runs many trials with a background force. Throws std::invalid_argument for a
-  // table of another person or device, std::logic_error without a person.
+  // the other, in one thread. From now on matrices are interpolated over the activation, or the activation is
+  // rounded, as the table was made; propagator_table.hpp gives the errors. For who runs many trials with a
+  // background force. Throws std::invalid_argument for a table of another person or device, std::logic_error
+  // without a person.
   void share(std::shared_ptr<PropagatorTable> table);
 
   // Another method than the exact one, from now on. Throws std::invalid_argument.
@@ -168,6 +169,7 @@ class CoupledHandle {
   Motion chain_motion_;
   std::shared_ptr<PropagatorTable> table_;
   GainGrid grid_;
+  bool rounds_ = false;  // the gain, to the grid
 
   double applied_force_ = 0.0;
   std::uint64_t samples_ = 0;

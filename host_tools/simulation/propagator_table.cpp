@@ -7,8 +7,17 @@
 
 namespace kmax::simulation {
 
+constexpr int interpolated_bits = 6;
+
+PropagatorTable::PropagatorTable(const DeviceModel& device, const OperatorModel& person)
+    : PropagatorTable(device, person, interpolated_bits, false) {}
+
 PropagatorTable::PropagatorTable(const DeviceModel& device, const OperatorModel& person, int gain_bits)
-    : device_(device), person_(person), grid_(std::clamp(gain_bits, 4, 16)) {
+    : PropagatorTable(device, person, gain_bits, true) {}
+
+PropagatorTable::PropagatorTable(const DeviceModel& device, const OperatorModel& person, int gain_bits,
+                                 bool rounds)
+    : device_(device), person_(person), grid_(std::clamp(gain_bits, 4, 16)), rounds_(rounds) {
   if (gain_bits < 4 || gain_bits > 16)
     throw std::invalid_argument(fmt::format("table of {} bits of gain: allowed are 4 to 16", gain_bits));
   validate(device);
@@ -37,8 +46,10 @@ PropagatorTable::Sheet<masses>* PropagatorTable::sheet(double duration) {
 template <std::size_t masses>
 void PropagatorTable::Sheet<masses>::build(std::size_t index, double gain) {
   if (index >= entries_.size()) entries_.resize(index + index / 4 + 16);
-  entries_[index] =
-      std::make_unique<ChainPropagator<masses>>(held_chain(table_.device_, &table_.person_, gain), duration_);
+  const GainSpan gains = table_.rounds_ ? GainSpan{gain, gain, gain} : table_.grid_.nearest_to(gain);
+  const std::size_t grip = masses - 2;
+  entries_[index] = std::make_unique<ChainPropagator<masses>>(
+      held_chain(table_.device_, &table_.person_, 1.0), grip, gains, duration_);
 }
 
 template PropagatorTable::Sheet<2>* PropagatorTable::sheet<2>(double);

@@ -1,19 +1,27 @@
 #pragma once
 // The matrices of chain_propagator.hpp for one person with one device, over the activation g and for every
-// duration in use, built as they are needed. A handle that is given a table (CoupledHandle::share) rounds g
-// to the nearest number with `gain_bits` bits after the leading one, so that the same matrices serve again;
-// the next handle of the same person finds them ready. g = 1 is on the grid: without a background force
-// nothing is rounded.
+// duration in use, built as they are needed, at gains of a grid: numbers with so many bits after the leading
+// one. The next handle of the same person that is given the table (CoupledHandle::share) finds them ready.
+// g = 1 is on the grid: without a background force nothing is approximated.
 //
-// Error of the rounding: at most 2^-(gain_bits + 1) of g, of either sign as g passes through the grid. The
-// largest stable stiffness of the default person rises by about 4 N/mm per unit of g (3.6 N/mm at g = 1, 8.4
-// at 2.15), so even a g that stayed at the edge of its cell would shift it by at most 0.001 N/mm with 12 bits
-// (a relative spacing of 2.4e-4), and by 0.004 N/mm with 10. Fewer bits are faster: more of the table stays
-// in the processor's caches.
+// Between the grid's gains a table either interpolates or rounds.
 //
-// Memory: about 0.5 kB per value of g that occurred (2^gain_bits per octave), and 3.2 kB more for those at
-// which the handle reversed: up to 16 MB for a person pushed from 0 to 2 N with 12 bits. At most 16 durations
-// are kept; others are integrated without a table. Not for several threads at once: a table belongs to one.
+// Interpolating, the usual way: 6 bits, and matrices that are linear in g about the nearest gain of the grid
+// (chain_propagator.hpp). The few matrices of a trial stay in the processor's nearest caches, and the next
+// piece mostly needs those of the one before. Error in a contact at 500 Hz with a field of 1 N: 0.005 um RMS,
+// where 12 bits, rounded, give 0.09 um.
+//
+// Rounding g to a grid of `gain_bits` bits: g is wrong by at most 2^-(gain_bits + 1) of g, of either sign as
+// g passes through the grid. The largest stable stiffness of the default person rises by about 4 N/mm per
+// unit of g (3.6 N/mm at g = 1, 8.4 at 2.15), so even a g that stayed at the edge of its cell would shift it
+// by at most 0.001 N/mm with 12 bits (a relative spacing of 2.4e-4), and by 0.004 N/mm with 10. Fewer bits
+// are faster: more of the table stays in the processor's caches. The published numbers of the experiments are
+// those of a table that rounds (host_tools/experiment/simulated_touch.hpp).
+//
+// Memory: about 0.5 kB per gain of the grid that occurred (2^bits per octave), and 3.2 kB more for those at
+// which the handle reversed: up to 16 MB for a person pushed from 0 to 2 N, rounded to 12 bits. Interpolated
+// 0.9 and 5 kB, in all 0.5 MB. At most 16 durations are kept; others are integrated without a table. Not for
+// several threads at once: a table belongs to one.
 
 #include <bit>
 #include <cstddef>
@@ -38,6 +46,11 @@ class GainGrid {
   double nearest(double gain) const {
     return std::bit_cast<double>((std::bit_cast<std::uint64_t>(gain) + half_) >> dropped_ << dropped_);
   }
+  // All gains that are nearest to a gain of the grid.
+  GainSpan nearest_to(double gain_of_grid) const {
+    const auto centre = std::bit_cast<std::uint64_t>(gain_of_grid);
+    return {gain_of_grid, std::bit_cast<double>(centre - half_), std::bit_cast<double>(centre + half_ - 1)};
+  }
   // The place of a gain of the grid, counted from 1.
   std::size_t index(double gain_of_grid) const {
     constexpr auto one = std::bit_cast<std::uint64_t>(1.0);
@@ -53,10 +66,13 @@ class PropagatorTable {
  public:
   static constexpr std::size_t most_durations = 16;
 
-  // `gain_bits`: 4 to 16. Throws std::invalid_argument.
-  PropagatorTable(const DeviceModel& device, const OperatorModel& person, int gain_bits = 12);
+  // Interpolates. Throws std::invalid_argument.
+  PropagatorTable(const DeviceModel& device, const OperatorModel& person);
+  // Rounds. `gain_bits`: 4 to 16. Throws std::invalid_argument.
+  PropagatorTable(const DeviceModel& device, const OperatorModel& person, int gain_bits);
 
   const GainGrid& grid() const { return grid_; }
+  bool rounds() const { return rounds_; }
 
   // Whether the table serves this device and this person: same masses, springs, dampers and friction. Force
   // limit, delay, activation and push lag do not matter.
@@ -68,7 +84,9 @@ class PropagatorTable {
    public:
     Sheet(const PropagatorTable& table, double duration) : table_(table), duration_(duration) {}
     double duration() const { return duration_; }
-    const ChainPropagator<masses>& at(double gain_of_grid) {
+    // The one that serves `gain`: of the grid if the table rounds, else any.
+    const ChainPropagator<masses>& at(double gain) {
+      const double gain_of_grid = table_.grid_.nearest(gain);
       const std::size_t index = table_.grid_.index(gain_of_grid);
       if (index >= entries_.size() || !entries_[index]) [[unlikely]]
         build(index, gain_of_grid);
@@ -95,9 +113,12 @@ class PropagatorTable {
   Sheet<masses>* sheet(double duration);
 
  private:
+  PropagatorTable(const DeviceModel& device, const OperatorModel& person, int gain_bits, bool rounds);
+
   DeviceModel device_;
   OperatorModel person_;
   GainGrid grid_;
+  bool rounds_;
   std::variant<std::deque<Sheet<2>>, std::deque<Sheet<3>>> sheets_;
 };
 

@@ -195,7 +195,8 @@ void print_contacts() {
     }
   }
   fmt::print(
-      "ns/sample: with a table of 12 bits of gain; controller: its share, on the positions of the same "
+      "ns/sample: with a table that interpolates; 10 bits: one that rounds; controller: its share, on the "
+      "positions of the same "
       "touches\n");
 }
 

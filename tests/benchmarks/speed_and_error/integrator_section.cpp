@@ -189,9 +189,9 @@ report::Section integrator_section(const std::filesystem::path& pictures) {
       "from the reference then says that two oscillations are out of step, and the peak-to-peak position of "
       "the "
       "last 0.5 s is what can be compared.",
-      "'Shared matrices': the exact method with CoupledHandle::share(), for many trials of one person; it "
-      "rounds "
-      "the activation to a grid. Fixed substeps are equal parts of 2 ms, and at least one per interval: 40 "
+      "'Shared matrices': the exact method with CoupledHandle::share(), for many trials of one person; "
+      "their matrices are interpolated over the activation. Fixed substeps are equal parts of 2 ms, and at "
+      "least one per interval: 40 "
       "at 20 kHz."};
   report::Table all{
       "All settings:",

@@ -31,6 +31,20 @@ TEST(GainGrid, RoundsToTheNearestOfItsNumbers) {
   }
 }
 
+TEST(GainGrid, EveryGainLiesInTheSpanOfTheNearestOfItsNumbers) {
+  const GainGrid grid(6);
+  for (double gain = 1.0; gain < 9.0; gain *= 1.0003) {
+    const double nearest = grid.nearest(gain);
+    const GainSpan span = grid.nearest_to(nearest);
+    ASSERT_EQ(span.centre, nearest);
+    ASSERT_LE(span.lowest, gain);
+    ASSERT_GE(span.highest, gain);
+    ASSERT_EQ(grid.nearest(span.lowest), nearest);
+    ASSERT_EQ(grid.nearest(span.highest), nearest);
+    ASSERT_GT(grid.nearest(std::nextafter(span.highest, 10.0)), nearest);
+  }
+}
+
 TEST(PropagatorTable, BuildsOnceAndKeeps) {
   PropagatorTable table(DeviceModel{}, OperatorModel{});
   auto* sheet = table.sheet<2>(0.002);
@@ -42,6 +56,16 @@ TEST(PropagatorTable, BuildsOnceAndKeeps) {
   EXPECT_EQ(&sheet->at(table.grid().nearest(1.5)), entry);
   EXPECT_NEAR(entry->coefficients().stiffness[0], 1.5 * OperatorModel{}.grip_stiffness, 0.2);
   EXPECT_EQ(table.sheet<3>(0.002), nullptr);
+  EXPECT_EQ(&sheet->at(1.503), entry);
+  EXPECT_LT(entry->gains().lowest, 1.5);
+}
+
+TEST(PropagatorTable, OneThatRoundsHasAMatrixForEachGain) {
+  PropagatorTable table(DeviceModel{}, OperatorModel{}, 9);
+  const GainSpan gains = table.sheet<2>(0.002)->at(1.5).gains();
+  EXPECT_EQ(gains.centre, 1.5);
+  EXPECT_EQ(gains.lowest, 1.5);
+  EXPECT_EQ(gains.highest, 1.5);
 }
 
 TEST(PropagatorTable, KeepsSixteenDurations) {
@@ -87,8 +111,8 @@ struct Trace {
 };
 
 Trace contact(const std::shared_ptr<PropagatorTable>& table, double coefficient, double stiffness,
-              double interval) {
-  CoupledHandle handle(DeviceModel{}, OperatorModel{}, IntendedMotionConfig{});
+              double interval, const DeviceModel& device = {}) {
+  CoupledHandle handle(device, OperatorModel{}, IntendedMotionConfig{});
   if (table) handle.share(table);
   handle.begin_motion();
   Trace trace;
@@ -118,8 +142,33 @@ TEST(PropagatorTable, OthersWhoUsedItBeforeMakeNoDifference) {
   EXPECT_EQ(contact(fresh, 2.0, 5500.0, 0.002).positions, contact(used, 2.0, 5500.0, 0.002).positions);
 }
 
+double largest_difference(const Trace& one, const Trace& other) {
+  double largest = 0.0;
+  for (std::size_t n = 0; n < one.positions.size(); ++n)
+    largest = std::max(largest, std::abs(one.positions[n] - other.positions[n]));
+  return largest;
+}
+
+TEST(PropagatorTable, InterpolatesOverTheGainOfAField) {
+  DeviceModel bending;
+  bending.structure = StructureModel{};
+  for (const DeviceModel& device : {DeviceModel{}, bending}) {
+    for (const double interval : {0.002, 50e-6}) {
+      const Trace exact = contact(nullptr, 2.0, 5500.0, interval, device);
+      const auto table = std::make_shared<PropagatorTable>(device, OperatorModel{});
+      const Trace interpolated = contact(table, 2.0, 5500.0, interval, device);
+      const auto fine = std::make_shared<PropagatorTable>(device, OperatorModel{}, 12);
+      const Trace rounded = contact(fine, 2.0, 5500.0, interval, device);
+      const double error = largest_difference(interpolated, exact);
+      EXPECT_GT(error, 0.0);  // the table was in use
+      EXPECT_LT(error, 0.1 * largest_difference(rounded, exact)) << interval;
+      EXPECT_NEAR(interpolated.last_gain / exact.last_gain, 1.0, 1e-6);
+    }
+  }
+}
+
 TEST(PropagatorTable, RoundsTheGainOfAFieldAndNothingElse) {
-  const auto table = std::make_shared<PropagatorTable>(DeviceModel{}, OperatorModel{});
+  const auto table = std::make_shared<PropagatorTable>(DeviceModel{}, OperatorModel{}, 12);
   const Trace with = contact(table, 2.0, 5500.0, 0.002);
   const Trace without = contact(nullptr, 2.0, 5500.0, 0.002);
   EXPECT_GT(without.last_gain, 1.9);
