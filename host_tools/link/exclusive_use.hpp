@@ -42,10 +42,12 @@ class ExclusiveUse {
     bool noticed = false;
     while (!try_take()) {
       const auto waited = Clock::now() - start;
-      if (waited > patience) throw LinkError(name() + ": " + words_for_in_use());
+      // Said before it is given up, even if this program itself was held up meanwhile.
       if (!noticed && notice && waited > std::chrono::milliseconds(300)) {
         notice("waiting for another program to release " + name());
         noticed = true;
+      } else if (waited > patience) {
+        throw LinkError(name() + ": " + words_for_in_use());
       }
       // A loan may be as short as a few ms.
       std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -50,8 +50,8 @@ void SerialLink::Deleter::operator()(_modbus* context) const {
   modbus_free(context);
 }
 
-SerialLink::SerialLink(const DeviceAddress& address, const Notice& notice)
-    : address_(address), lock_(address.path, notice) {
+SerialLink::SerialLink(const DeviceAddress& address, const Notice& notice, milliseconds patience)
+    : address_(address), patience_(patience), lock_(address.path, notice) {
   connect();
 }
 
@@ -63,12 +63,16 @@ void SerialLink::connect() {
   const auto fail = [this](const char* what) {
     throw LinkError(fmt::format("{}: {}: {}", address_.path, what, modbus_strerror(errno)));
   };
-  // A pseudo-terminal has no parity, and the C library calls asking for it an error when nothing else changes.
+  // A pseudo-terminal has no parity, and the C library calls asking for it an error when nothing else
+  // changes.
   const char parity = lock_.pseudo_terminal() ? 'N' : 'E';
   context_.reset(modbus_new_rtu(address_.path.c_str(), static_cast<int>(address_.baud_rate), parity, 8, 1));
   if (!context_) fail("cannot use this port");
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-  modbus_set_response_timeout(context_.get(), 0, std::chrono::microseconds(response_timeout).count());
+  const auto whole_seconds = std::chrono::duration_cast<std::chrono::seconds>(patience_);
+  modbus_set_response_timeout(
+      context_.get(), static_cast<std::uint32_t>(whole_seconds.count()),
+      static_cast<std::uint32_t>(std::chrono::microseconds(patience_ - whole_seconds).count()));
   if (modbus_set_slave(context_.get(), address_.unit) != 0) fail("cannot use this unit");
   if (modbus_connect(context_.get()) != 0) fail("cannot set the port up");
   lock_.exclude_others();
@@ -135,7 +139,7 @@ void SerialLink::exchange(const Request& request, int attempts_allowed,
 
 void SerialLink::listen_until_silent() {
   // A line that never falls silent (a device that chatters) must not hold the program for ever.
-  const auto deadline = Clock::now() + response_timeout;
+  const auto deadline = Clock::now() + patience_;
   std::array<std::uint8_t, 256> discarded;
   pollfd port{modbus_get_socket(context_.get()), POLLIN, 0};
   while (Clock::now() < deadline && poll(&port, 1, static_cast<int>(silence.count())) > 0) {
@@ -171,7 +175,7 @@ std::map<std::string, std::string> SerialLink::identify() {
 
 std::vector<std::uint8_t> SerialLink::receive_identification() {
   std::vector<std::uint8_t> frame;
-  auto deadline = Clock::now() + response_timeout;
+  auto deadline = Clock::now() + patience_;
   pollfd port{modbus_get_socket(context_.get()), POLLIN, 0};
   for (;;) {
     const std::size_t length = identification::frame_length(frame);
@@ -199,7 +203,7 @@ void SerialLink::fail_unanswered(const Request& request, int attempts_made, int 
     throw LinkError(fmt::format(
         "{}: no answer from unit {} at {} baud within {} ms ({}, {}); check that the device is powered, the "
         "wiring, and that unit and baud rate are the device's",
-        address_.path, address_.unit, address_.baud_rate, response_timeout.count(), asked, tried));
+        address_.path, address_.unit, address_.baud_rate, patience_.count(), asked, tried));
   throw LinkError(fmt::format(
       "{}: what came back from unit {} at {} baud is not an answer: {} ({}, {}); check the baud rate, the "
       "wiring and its shielding, and that no other device has the same unit",

@@ -15,7 +15,7 @@ namespace kmax::link {
 /// Modbus RTU on a serial port or pseudo-terminal, through libmodbus: 8 data bits, even parity, 1 stop bit.
 ///
 /// The port is this program's alone (SerialPortLock), except while it waits: then another kmax may use it,
-/// to stop the drive for instance. A request that gets no answer within 500 ms, or an
+/// to stop the drive for instance. A request that gets no answer within 500 ms (`patience`), or an
 /// answer that is not one (bad CRC, other unit, other length), is sent again up to two times if it is a
 /// read or an idempotent write; other writes are sent once, since a lost answer does not tell whether the
 /// device acted. Before anything is sent after such a failure the line is listened to until it is silent: an
@@ -28,8 +28,9 @@ class SerialLink final : public Link {
   static constexpr std::chrono::milliseconds response_timeout{500};
   static constexpr int attempts = 3;
 
-  /// `address` is of kind serial. Errors: LinkError.
-  explicit SerialLink(const DeviceAddress& address, const Notice& notice = {});
+  /// `address` is of kind serial; `patience` is how long an answer is waited for. Errors: LinkError.
+  explicit SerialLink(const DeviceAddress& address, const Notice& notice = {},
+                      std::chrono::milliseconds patience = response_timeout);
   ~SerialLink() override;
 
   std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override;
@@ -62,6 +63,7 @@ class SerialLink final : public Link {
   [[noreturn]] void fail_unanswered(const Request& request, int attempts_made, int error) const;
 
   DeviceAddress address_;
+  std::chrono::milliseconds patience_;
   SerialPortLock lock_;
   std::unique_ptr<_modbus, Deleter> context_;
   bool line_suspect_ = false;  ///< an answer may still be on its way

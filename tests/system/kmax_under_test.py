@@ -9,12 +9,16 @@ import tempfile
 import time
 from pathlib import Path
 
+PATIENCE = 60  # s, for what comes in a moment unless the machine is slow or busy; success does not wait for it
+
+POWER_STAGE_READY = 6000  # ticks, of which 20,000 are a second
+
 KMAX = os.environ.get("KMAX", "build/native/kmax")
 BOARD = os.environ.get("KMAX_BOARD", "build/native/kmax-board")
 ELF = os.environ.get("KMAX_ELF", "build/stm32f405/kmax-odrive_v3.elf")
 
 
-def kmax(*arguments, device=None, check=True, timeout=60):
+def kmax(*arguments, device=None, check=True, timeout=2 * PATIENCE):
     """Runs kmax to its end; returns the finished process."""
     environment = dict(os.environ)
     environment.pop("KMAX_DEVICE", None)
@@ -33,12 +37,12 @@ def kmax_json(*arguments, **options):
 class _Process:
     """A process that offers a serial line under a name of its own."""
 
-    def __init__(self, command, seconds):
+    def __init__(self, command):
         self.folder = tempfile.TemporaryDirectory()
         self.link = Path(self.folder.name) / "line"
         self.process = subprocess.Popen([part.replace("LINK", str(self.link)) for part in command],
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        end = time.monotonic() + seconds
+        end = time.monotonic() + PATIENCE
         while not self.link.exists():
             if self.process.poll() is not None or time.monotonic() > end:
                 self.process.kill()
@@ -56,7 +60,7 @@ class _Process:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         try:
-            self.process.communicate(timeout=10)
+            self.process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.communicate()
@@ -67,21 +71,60 @@ class Serve(_Process):
     """kmax serve: the native firmware with a simulated device."""
 
     def __init__(self, *options):
-        super().__init__([KMAX, "serve", "--serial", "LINK", *options], 20)
+        super().__init__([KMAX, "serve", "--serial", "LINK", *options])
 
 
 class QemuBoard(_Process):
     """The ARM image in QEMU."""
 
     def __init__(self):
-        super().__init__([os.environ["KMAX_QEMU_BOARD"], ELF, "LINK"], 20)
+        super().__init__([os.environ["KMAX_QEMU_BOARD"], ELF, "LINK"])
 
 
 class VirtualBoard(_Process):
     """The ARM image on the virtual board, at real speed."""
 
     def __init__(self, *options):
-        super().__init__([BOARD, ELF, "--serial", "LINK", *options], 20)
+        super().__init__([BOARD, ELF, "--serial", "LINK", *options])
+        self.wait_until_it_answers()
+
+    def wait_until_it_answers(self, device=None):
+        """Until its image has started, power stage and all, which takes its own time."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            done = kmax("get", "info.tick", "--json", device=device or self.device, check=False)
+            if done.returncode == 0 and json.loads(done.stdout)["info.tick"]["value"] > POWER_STAGE_READY:
+                return
+            if time.monotonic() > end or (done.returncode != 0 and "no answer" not in done.stderr):
+                self.process.kill()
+                raise AssertionError(f"the board does not answer: {done.stderr}{self.process.communicate()[0]}")
+
+
+class Holding:
+    """`kmax arm --hold`, from when the axis is armed to the end of the block, where it is killed if it still runs."""
+
+    def __init__(self, device, axis=0):
+        self.process = subprocess.Popen([KMAX, "--device", device, "arm", "--hold", "--axis", str(axis)],
+                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def __enter__(self):
+        first = self.process.stdout.readline()
+        if "Operation enabled" not in first:
+            raise AssertionError(f"it was not armed: {first}{self.process.communicate(timeout=PATIENCE)[0]}")
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.communicate(timeout=PATIENCE)
+
+    def ended(self):
+        """What it said after arming, and its exit code, once it has ended by itself."""
+        said = self.process.communicate(timeout=PATIENCE)[0]
+        return said, self.process.returncode
+
+    def interrupt(self):
+        self.process.send_signal(signal.SIGINT)
+        return self.ended()
 
 
 def registers():

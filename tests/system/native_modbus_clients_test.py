@@ -57,7 +57,7 @@ class Pymodbus(unittest.TestCase):
         self.places = registers()
         # A pseudo-terminal has no parity: the kernel refuses to set it.
         self.client = ModbusSerialClient(str(self.board.link), framer=ModbusRtuFramer, baudrate=115200, bytesize=8,
-                                         parity="N", stopbits=1, timeout=2)
+                                         parity="N", stopbits=1, timeout=20)
         self.assertTrue(self.client.connect())
 
     def tearDown(self):

@@ -11,7 +11,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from kmax_under_test import VirtualBoard
+from kmax_under_test import PATIENCE, VirtualBoard
 
 FOLDER = Path(__file__).resolve().parent / "node_canopen"
 
@@ -49,19 +49,19 @@ class BusBridge(unittest.TestCase):
         self.addCleanup(self.bus.close)
         self.bus.bind(self.path)
         self.bus.listen()
-        self.bus.settimeout(10)
+        self.bus.settimeout(PATIENCE)
 
     def accepted(self):
         """The next client of the bus that stays: the bridge tries first whether there is a bus."""
         connection, _ = self.bus.accept()
-        connection.settimeout(10)
+        connection.settimeout(PATIENCE)
         self.addCleanup(connection.close)
         return connection
 
     def connected(self, bridge):
         stream = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.addCleanup(stream.close)
-        stream.settimeout(10)
+        stream.settimeout(PATIENCE)
         stream.connect(bridge.stream)
         return stream
 
@@ -113,13 +113,13 @@ class BusBridge(unittest.TestCase):
             self.accepted()
             stream = self.connected(bridge)
             self.accepted().close()
-            self.assertEqual(bridge.process.wait(10), 1)
+            self.assertEqual(bridge.process.wait(PATIENCE), 1)
             self.assertIn("gone", bridge.process.stderr.read())
             self.assertEqual(stream.recv(1), b"")
 
     def test_no_bus(self):
         done = subprocess.run([str(FOLDER / "bus_bridge.py"), "/nowhere/bus", "/nowhere/stream"], capture_output=True,
-                              text=True, timeout=10, check=False)
+                              text=True, timeout=PATIENCE, check=False)
         self.assertEqual(done.returncode, 1)
         self.assertIn("/nowhere/bus", done.stderr)
 
@@ -130,7 +130,7 @@ class Master(unittest.TestCase):
         node = shutil.which("node")
         self.assertTrue(node, "node is missing: Debian package nodejs")
         done = subprocess.run([node, str(FOLDER / "master.mjs"), str(argument)], capture_output=True,
-                              text=True, timeout=300, check=False)
+                              text=True, timeout=10 * PATIENCE, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn(" 0 FAILED", done.stdout)
         return done.stdout

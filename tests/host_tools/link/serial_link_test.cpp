@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/link/pty_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -19,12 +22,23 @@ DeviceAddress address_of(const PtyDevice& device) {
   return parse_device_address("serial:" + device.path());
 }
 
+/// For what is answered: a machine that is busy must not look like a silent device. For what the device
+/// answers in the end with silence before it, `quick`, since then the link's patience is waited for.
+constexpr std::chrono::seconds patient{20}, quick{2};
+
+/// The device counts them in a thread of its own.
+int requests_of(PtyDevice& device, int expected) {
+  for (int i = 0; i < 6000 && device.requests() < expected; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return device.requests();
+}
+
 constexpr auto stiffness = Parameter::of<"wall.stiffness">().address();
 const std::vector<std::uint16_t> one_thousand = {0x447A, 0x0000};  // 1000.0f
 
 TEST(SerialLink, ReadsWritesAndIdentifies) {
   PtyDevice device;
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);
   const std::vector<std::uint16_t> two = {0x4000, 0x0000};
   link.write_holding(stiffness, two);
@@ -40,7 +54,7 @@ TEST(SerialLink, ReadsWritesAndIdentifies) {
 
 TEST(SerialLink, AnExceptionIsARefusalAndNotRepeated) {
   PtyDevice device;
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   try {
     link.read_holding(0x7000, 1);
     FAIL();
@@ -56,7 +70,7 @@ TEST(SerialLink, AnExceptionIsARefusalAndNotRepeated) {
 TEST(SerialLink, APortThatVanishesInMidCommandEndsItAtOnce) {
   for (const bool writing : {false, true}) {
     PtyDevice device([](int, Bytes) { return Answer{{}, true}; });
-    SerialLink link(address_of(device));
+    SerialLink link(address_of(device), {}, patient);
     const auto message = thrown_message<LinkError>([&] {
       writing ? link.write_holding_idempotent(stiffness, one_thousand)
               : void(link.read_holding(stiffness, 2));
@@ -72,14 +86,14 @@ TEST(SerialLink, APortThatVanishesInMidCommandEndsItAtOnce) {
 
 TEST(SerialLink, AWriteThatIsSentOnceTellsAVanishedPortFromASilentDevice) {
   PtyDevice device([](int, Bytes) { return Answer{{}, true}; });
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.write_holding(stiffness, one_thousand); }),
                   "vanished");
 }
 
 TEST(SerialLink, APortThatVanishesDuringIdentification) {
   PtyDevice device([](int, Bytes) { return Answer{{}, true}; });
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.identify(); }), "vanished");
 }
 
@@ -111,7 +125,7 @@ TEST(SerialLink, AReadSurvivesTwoBadAnswers) {
   for (std::size_t i = 0; i < spoilings.size(); ++i) {
     PtyDevice device(
         [&, i](int request, Bytes answer) { return Answer{request <= 2 ? spoilings[i](answer) : answer}; });
-    SerialLink link(address_of(device));
+    SerialLink link(address_of(device), {}, quick);
     EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand) << "spoiling " << i;
     EXPECT_EQ(device.requests(), 3) << "spoiling " << i;
   }
@@ -121,15 +135,15 @@ TEST(SerialLink, OnlyIdempotentWritesAreRepeated) {
   const auto deaf_once = [](int request, Bytes answer) { return Answer{request == 1 ? Bytes{} : answer}; };
   {
     PtyDevice device(deaf_once);
-    SerialLink link(address_of(device));
+    SerialLink link(address_of(device), {}, quick);
     link.write_holding_idempotent(stiffness, one_thousand);
-    EXPECT_EQ(device.requests(), 2);
+    EXPECT_EQ(requests_of(device, 2), 2);
   }
   PtyDevice device(deaf_once);
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, quick);
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.write_holding(stiffness, one_thousand); }),
                   "sent once");
-  EXPECT_EQ(device.requests(), 1);
+  EXPECT_EQ(requests_of(device, 1), 1);
 }
 
 TEST(SerialLink, ASilentDeviceIsNamedWithWhatToCheck) {
@@ -140,7 +154,7 @@ TEST(SerialLink, ASilentDeviceIsNamedWithWhatToCheck) {
   EXPECT_CONTAINS(message, "no answer from unit 1 at 115200 baud");
   EXPECT_CONTAINS(message, "0x0020");
   EXPECT_CONTAINS(message, "check");
-  EXPECT_EQ(device.requests(), SerialLink::attempts);
+  EXPECT_EQ(requests_of(device, SerialLink::attempts), SerialLink::attempts);
 }
 
 TEST(SerialLink, ADeviceThatOnlyChattersIsNamed) {
@@ -148,7 +162,7 @@ TEST(SerialLink, ADeviceThatOnlyChattersIsNamed) {
     answer.back() ^= 1;
     return Answer{answer};
   });
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.read_input(0x20, 2); }), "is not an answer");
 }
 
@@ -164,7 +178,7 @@ TEST(SerialLink, ALateAnswerIsNotTakenForTheNext) {
     if (request == 2) answer.insert(answer.end(), late.begin(), late.end());
     return Answer{answer};
   });
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, quick);
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);
   const std::vector<std::uint16_t> damping = {0, 0};
   EXPECT_EQ(link.read_holding(Parameter::of<"wall.damping">().address(), 2), damping);
@@ -172,7 +186,7 @@ TEST(SerialLink, ALateAnswerIsNotTakenForTheNext) {
 
 TEST(SerialLink, FollowsTheDeviceToAnotherRate) {
   PtyDevice device;
-  SerialLink link(address_of(device));
+  SerialLink link(address_of(device), {}, patient);
   link.follow_line_settings(std::nullopt, 9600);
   EXPECT_EQ(link.description(), "serial:" + device.path() + "?baud=9600");
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);

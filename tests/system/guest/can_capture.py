@@ -8,6 +8,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from kmax_under_test import PATIENCE
+
 INTERFACE = os.environ.get("KMAX_TEST_CAN", "vcan0")
 
 
@@ -32,7 +34,7 @@ def parse(line):
 
 def send(text):
     """One frame in cansend's notation, e.g. `000#0101`."""
-    subprocess.run(["cansend", INTERFACE, text], check=True, capture_output=True, text=True, timeout=10)
+    subprocess.run(["cansend", INTERFACE, text], check=True, capture_output=True, text=True, timeout=PATIENCE)
 
 
 class CanCapture:
@@ -55,7 +57,7 @@ class CanCapture:
         self._process = subprocess.Popen(["candump", "-L", "-ta", "-r", "8000000", self._target],
                                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
-        end = time.monotonic() + 10
+        end = time.monotonic() + PATIENCE
         while _listeners() <= before:
             if self._process.poll() is not None or time.monotonic() > end:
                 self._process.kill()
@@ -66,8 +68,8 @@ class CanCapture:
 
     def __exit__(self, *_):
         self._process.terminate()
-        self._reader.join(timeout=10)
-        self._process.wait(timeout=10)
+        self._reader.join(timeout=PATIENCE)
+        self._process.wait(timeout=PATIENCE)
         self._process.stdout.close()
 
     def _read(self):
@@ -81,7 +83,7 @@ class CanCapture:
         with self._heard:
             return [frame for frame in self._frames if identifier in (None, frame.id)]
 
-    def wait_for(self, wanted, seconds=5, count=1):
+    def wait_for(self, wanted, seconds=PATIENCE, count=1):
         """The first frame, or the list of the first `count`, for which `wanted(frame)` holds, heard before or yet to
         come."""
         with self._heard:

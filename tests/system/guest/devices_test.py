@@ -12,6 +12,7 @@ import unittest
 
 from can_capture import INTERFACE, CanCapture, Frame, parse, send
 from gpio_sim import CHIP, SimulatedLine, held, line_numbers
+from kmax_under_test import PATIENCE
 
 
 class CanBus(unittest.TestCase):
@@ -36,7 +37,7 @@ class CanBus(unittest.TestCase):
     def test_none_is_lost_and_the_order_stays(self):
         with CanCapture() as capture:
             subprocess.run(["cangen", INTERFACE, "-g", "0", "-p", "10", "-n", "500", "-I", "42", "-L", "4", "-D", "i"],
-                           check=True, timeout=30)
+                           check=True, timeout=PATIENCE)
             frames = capture.wait_for(lambda frame: frame.id == 0x42, count=500)
         self.assertEqual([int.from_bytes(frame.data, "little") for frame in frames], list(range(500)))
         self.assertEqual(sorted(frame.time for frame in frames), [frame.time for frame in frames])
@@ -51,7 +52,7 @@ class CanBus(unittest.TestCase):
     def test_a_program_of_its_own_on_a_raw_socket(self):
         with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus, CanCapture() as capture:
             bus.bind((INTERFACE,))
-            bus.settimeout(5)
+            bus.settimeout(PATIENCE)
             bus.send(struct.pack("=IB3x8s", 0x185, 2, b"\x12\x34"))
             self.assertEqual(capture.wait_for(lambda frame: frame.id == 0x185).data, b"\x12\x34")
             send("205#99")
@@ -66,7 +67,7 @@ class CanBus(unittest.TestCase):
             # It says nothing when it is ready: whoever has sent too early sends again.
             for _ in range(50):
                 subprocess.run(["isotpsend", "-s", "123", "-d", "321", INTERFACE], input=message, text=True,
-                               capture_output=True, timeout=10)
+                               capture_output=True, timeout=PATIENCE)
                 if select.select([receiver.stdout], [], [], 0.1)[0]:
                     break
             self.assertEqual(receiver.stdout.readline().split(), message.split())
@@ -89,7 +90,7 @@ class Gpio(unittest.TestCase):
 
     def get(self, name):
         return int(subprocess.run(["gpioget", CHIP, str(self.lines[name].number)], check=True, capture_output=True,
-                                  text=True, timeout=10).stdout)
+                                  text=True, timeout=PATIENCE).stdout)
 
     def test_the_lines_have_the_names_of_the_board(self):
         self.assertEqual(set(self.lines), {"NRST", "BOOT0", "ESTOP", "FAULT", "HEALTHY", "SWDIO", "SWCLK"})
@@ -113,28 +114,33 @@ class Gpio(unittest.TestCase):
         line = self.lines["ESTOP"]
         with held(ESTOP=1):
             line.wait_for(1)
-            second = subprocess.run(["gpioset", CHIP, f"{line.number}=0"], capture_output=True, text=True, timeout=10,
-                                    check=False)
+            second = subprocess.run(["gpioset", CHIP, f"{line.number}=0"], capture_output=True, text=True,
+                                    timeout=PATIENCE, check=False)
             self.assertNotEqual(second.returncode, 0)
             self.assertIn("busy", second.stderr)
             self.assertEqual(line.level(), 1)
 
     def test_edges_come_as_events_with_their_time(self):
         line = self.lines["FAULT"]
-        with subprocess.Popen(["gpiomon", "-F", "%e %s.%n", "-n", "4", CHIP, str(line.number)],
+        with subprocess.Popen(["gpiomon", "-b", "-F", "%e %s.%n", "-n", "4", CHIP, str(line.number)],
                               stdout=subprocess.PIPE, text=True) as monitor:
             self.addCleanup(monitor.kill)
-            end = time.monotonic() + 10
+            end = time.monotonic() + PATIENCE
             while line.users() is None and time.monotonic() < end:
                 time.sleep(0.01)
+            events = []
             for level in (1, 0, 1, 1, 0):  # the repeated one is no edge
+                edge = not events or level != int(events[-1][0])
                 line.drive(level)
+                # Two edges of which nobody was told in between may come as one.
+                if edge:
+                    events.append(monitor.stdout.readline().split())
                 time.sleep(0.01)
-            events = [text.split() for text in monitor.communicate(timeout=10)[0].splitlines()]
+            self.assertEqual(monitor.wait(PATIENCE), 0)
         self.assertEqual([kind for kind, _ in events], ["1", "0", "1", "0"])
         times = [float(re.sub(r"\.(\d+)$", lambda part: f".{int(part[1]):09}", stamp)) for _, stamp in events]
         self.assertEqual(times, sorted(times))
-        self.assertGreaterEqual(times[1] - times[0], 0.009)
+        self.assertGreater(times[1] - times[0], 0)
 
 
 if __name__ == "__main__":

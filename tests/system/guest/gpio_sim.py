@@ -9,13 +9,15 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from kmax_under_test import PATIENCE
+
 CHIP = os.environ.get("KMAX_TEST_GPIO", "")
 FOLDER = Path(os.environ.get("KMAX_TEST_GPIO_SIM", "/nowhere"))
 
 
 def line_numbers():
     """{name: number} of the chip's lines."""
-    shown = subprocess.run(["gpioinfo", CHIP], check=True, capture_output=True, text=True, timeout=10).stdout
+    shown = subprocess.run(["gpioinfo", CHIP], check=True, capture_output=True, text=True, timeout=PATIENCE).stdout
     return {name: int(number) for number, name in re.findall(r'^\s*line\s+(\d+):\s+"([^"]+)"', shown, re.M)}
 
 
@@ -34,7 +36,7 @@ class SimulatedLine:
     def drive(self, level):
         (self._folder / "pull").write_text("pull-up" if level else "pull-down")
 
-    def wait_for(self, level, seconds=5):
+    def wait_for(self, level, seconds=PATIENCE):
         """A program sets its output when it comes to it."""
         end = time.monotonic() + seconds
         while self.level() != level:
@@ -44,7 +46,7 @@ class SimulatedLine:
 
     def users(self):
         """The program that holds the line, as gpioinfo names it, or None."""
-        shown = subprocess.run(["gpioinfo", CHIP], check=True, capture_output=True, text=True, timeout=10).stdout
+        shown = subprocess.run(["gpioinfo", CHIP], check=True, capture_output=True, text=True, timeout=PATIENCE).stdout
         user = re.search(rf'^\s*line\s+{self.number}:\s+\S+\s+(?:"([^"]*)"|unused)', shown, re.M)
         return user[1]
 
@@ -59,7 +61,7 @@ def held(**levels):
     try:
         for name in levels:
             line = SimulatedLine(name)
-            end = time.monotonic() + 10
+            end = time.monotonic() + PATIENCE
             while line.users() is None:
                 if process.poll() is not None or time.monotonic() > end:
                     process.kill()
@@ -69,7 +71,7 @@ def held(**levels):
     finally:
         process.send_signal(signal.SIGTERM)
         try:
-            process.wait(10)
+            process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
