@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "host_tools/calibration/trip_diagnosis.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/number_text.hpp"
+#include "host_tools/device/stood_still.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::calibration {
@@ -46,6 +48,7 @@ Bench::Bench(device::Device& device, const CalibrationSettings& settings, Parame
     timeout = longest_timeout;
     journal_.set_temporary({fmt::format("link.timeout={}", timeout)});
   }
+  timeout_ = timeout;
   longest_silence_ = std::min(longest_silence_, timeout / 4.0);
   run_ = static_cast<unsigned>(number("excitation.run"));
   home_ = number("measured.position");
@@ -117,8 +120,7 @@ std::optional<Trip> Bench::trip() {
 }
 
 Trip Bench::cleared(const device::DriveStatus& status) {
-  const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
-  Trip found{text != nullptr ? text->fault : firmware::Fault::none, status.fault_words()};
+  Trip found{device::fault_of(status), status.fault_words()};
   try {
     drive_.clear();
   } catch (const device::DeviceError&) {
@@ -167,7 +169,11 @@ void Bench::arm(double reach) {
     const device::DriveStatus status = drive_.status();
     armed_ = status.armed();
     if (armed_) throw;
-    if (status.faulty()) throw StepFailed(diagnosis_of(cleared(status)));
+    if (status.faulty()) {
+      const Trip found = cleared(status);
+      require_heard(found);
+      throw StepFailed(diagnosis_of(found));
+    }
     if (status.refusal == firmware::Refusal::none) throw;
     unusable_ = true;
     throw StepFailed(diagnosis_of(status.refusal, number("supply.voltage"), number("supply.voltage_min"),
@@ -183,7 +189,9 @@ void Bench::disarm() {
   const device::DriveStatus status = drive_.status();
   if (!status.faulty()) return;
   const Trip found = cleared(status);
-  if (found.fault != firmware::Fault::excitation_travel || found.remains) unseen_trip_ = found;
+  const bool harmless =
+      found.fault == firmware::Fault::excitation_travel || found.fault == firmware::Fault::link_silent;
+  if (!harmless || found.remains) unseen_trip_ = found;
 }
 
 void Bench::begin_still_watch(double longest_still) {
@@ -215,7 +223,10 @@ void Bench::wait_until_finished(double longest_still) {
   const auto end = device_.link().now() + of_seconds(longest_excitation);
   while (armed_ && number("measured.excitation_finished") == 0.0) {
     tell_("");
-    if (const auto tripped = trip()) throw StepFailed(diagnosis_of(*tripped));
+    if (const auto tripped = trip()) {
+      if (tripped->fault == firmware::Fault::link_silent) return;
+      throw StepFailed(diagnosis_of(*tripped));
+    }
     if (stands()) return disarm();
     if (device_.link().now() >= end)
       throw device::DeviceError(
@@ -224,7 +235,55 @@ void Bench::wait_until_finished(double longest_still) {
   }
 }
 
+void Bench::require_heard(const Trip& trip) const {
+  if (trip.fault == firmware::Fault::link_silent) throw HeldUp{timeout_};
+}
+
+// What could not be done for `error`: was it because the host was held up?
+void Bench::require_heard_after(const device::DeviceError& error) {
+  const device::DriveStatus status = drive_.status();
+  const bool silent = device::fault_of(status) == firmware::Fault::link_silent;
+  const bool stood_still = dynamic_cast<const device::StoodStill*>(&error) != nullptr && !status.faulty();
+  if (!silent && !stood_still) return;
+  drive_.disarm();
+  armed_ = false;
+  if (silent) cleared(status);
+  throw HeldUp{timeout_};
+}
+
+void Bench::note_silence(int silences, const HeldUp& held_up) {
+  const std::string seconds = device::number_text(held_up.silence);
+  if (silences >= most_silences)
+    throw device::DeviceError(
+        fmt::format("{} times in a row the device heard nothing for {} s and removed the force: this program "
+                    "or the link was held up for so long; try again when this computer has less to do",
+                    silences, seconds));
+  tell_(fmt::format("measuring again: the device heard nothing for {} s", seconds));
+}
+
 Recording Bench::record(const ExcitationPlan& excitation, const RecordPlan& plan, double reach) {
+  return record_heard(excitation, plan, reach, Afterwards::armed);
+}
+
+Recording Bench::record_alone(const ExcitationPlan& excitation, const RecordPlan& plan) {
+  return record_heard(excitation, plan, 0.0, Afterwards::any);
+}
+
+Recording Bench::record_heard(const ExcitationPlan& excitation, const RecordPlan& plan, double reach,
+                              Afterwards afterwards) {
+  try {
+    Recording seen = record_once(excitation, plan, reach, afterwards);
+    if (seen.trip) require_heard(*seen.trip);
+    return seen;
+  } catch (const device::DeviceError& error) {
+    // It could not be armed, or the excitation never came.
+    require_heard_after(error);
+    throw;
+  }
+}
+
+Recording Bench::record_once(const ExcitationPlan& excitation, const RecordPlan& plan, double reach,
+                             Afterwards afterwards) {
   arm(reach);
   begin_still_watch(plan.longest_still);
   device::CaptureReader reader(device_);
@@ -238,14 +297,14 @@ Recording Bench::record(const ExcitationPlan& excitation, const RecordPlan& plan
     wait(plan.delay);
     begin_capture(reader, plan, firmware::CaptureTrigger::now);
   }
-  return finish_capture(reader);
+  return finish_capture(reader, afterwards);
 }
 
 Recording Bench::watch(const RecordPlan& plan) {
   begin_still_watch(0.0);
   device::CaptureReader reader(device_);
   begin_capture(reader, plan, firmware::CaptureTrigger::now);
-  return finish_capture(reader);
+  return finish_capture(reader, Afterwards::any);
 }
 
 void Bench::begin_capture(device::CaptureReader& reader, const RecordPlan& plan,
@@ -258,7 +317,7 @@ void Bench::begin_capture(device::CaptureReader& reader, const RecordPlan& plan,
               .trigger = trigger});
 }
 
-Recording Bench::finish_capture(device::CaptureReader& reader) {
+Recording Bench::finish_capture(device::CaptureReader& reader, Afterwards afterwards) {
   struct Ended {};
   Recording recording;
   try {
@@ -272,6 +331,7 @@ Recording Bench::finish_capture(device::CaptureReader& reader) {
     reader.stop();
     if (recording.stood) disarm();
   }
+  if (afterwards == Afterwards::any && !recording.trip && armed_) recording.trip = trip();
   try {
     const device::Captured captured = reader.read([&](const device::CaptureProgress&) { tell_(""); });
     recording.interval = captured.interval / captured.tick_rate;
@@ -281,7 +341,11 @@ Recording Bench::finish_capture(device::CaptureReader& reader) {
     // Stopped before it began.
     if (!recording.trip && !recording.stood) throw;
   }
-  if (!recording.trip && armed_) recording.trip = trip();
+  if (recording.trip || !armed_) return recording;
+  recording.trip = trip();
+  if (afterwards == Afterwards::any && recording.trip &&
+      recording.trip->fault == firmware::Fault::link_silent)
+    recording.trip.reset();
   return recording;
 }
 

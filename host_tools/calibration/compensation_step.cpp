@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "host_tools/calibration/centring.hpp"
 #include "host_tools/calibration/cogging_fit.hpp"
@@ -38,11 +39,23 @@ ExcitationPlan moved_by(double stroke, const MotorKnowledge& known) {
   return spring;
 }
 
-Sweep sweep(Bench& bench, const MotorKnowledge& known, double stroke) {
+// By way of the middle, from where all of the travel can be used.
+void go_back(Bench& bench, const MotorKnowledge& known, double displacement) {
+  centre_handle(bench, known);
+  bench.disarm();
+  const ExcitationPlan there = moved_by(displacement - bench.displacement(), known);
+  require_no_trip(bench.record(there, {{"count"}, 10, 10, there.duration - 1.0}));
+}
+
+// `from`: m, where the handle stands.
+Sweep sweep(Bench& bench, const MotorKnowledge& known, double from, double stroke) {
   const double time = std::abs(stroke) / sweep_speed;
   const int interval = std::max(1, static_cast<int>(time / known.tick / static_cast<double>(samples)));
-  const Recording seen =
-      bench.record(moved_by(stroke, known), {{"current", "count"}, samples, interval, 0.0});
+  bool cut_off = false;
+  const Recording seen = bench.repeat([&] {
+    if (std::exchange(cut_off, true)) go_back(bench, known, from);
+    return bench.record(moved_by(stroke, known), {{"current", "count"}, samples, interval, 0.0});
+  });
   require_no_trip(seen);
   Sweep result;
   result.interval = seen.interval;
@@ -54,20 +67,22 @@ Sweep sweep(Bench& bench, const MotorKnowledge& known, double stroke) {
 }  // namespace
 
 void CompensationStep::run(Bench& bench, MotorKnowledge& known, StepReport& report) {
-  centre_handle(bench, known);
+  bench.repeat([&] { centre_handle(bench, known); });
   bench.disarm();
   const double reach = sweep_share * bench.travel();
   bench.tell("compensation: moving to one side");
-  sweep(bench, known, -reach - bench.displacement());
+  const double middle = bench.displacement();
+  sweep(bench, known, middle, -reach - middle);
   std::vector<Sweep> sweeps;
   for (int i = 0; i < bench.settings().repetitions; ++i) {
-    for (const double stroke : {2.0 * reach, -2.0 * reach}) {
+    for (const double from : {-reach, reach}) {
       bench.tell(
           fmt::format("compensation: sweep {} of {}", sweeps.size() + 1, 2 * bench.settings().repetitions));
-      sweeps.push_back(sweep(bench, known, stroke));
+      sweeps.push_back(sweep(bench, known, from, -2.0 * from));
     }
   }
-  sweep(bench, known, -bench.displacement());
+  const double end = bench.displacement();
+  sweep(bench, known, end, -end);
   std::vector<CoggingSweep> views;
   for (const Sweep& one : sweeps) views.push_back({one.force, one.angle});
   CoggingFitConfig config;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "host_tools/calibration/step_report.hpp"
 #include "host_tools/calibration/trip_diagnosis.hpp"
@@ -16,9 +17,40 @@ constexpr double whole_turn = 2.0 * std::numbers::pi;
 constexpr double settle_angle = 1.0;    // rad at the beginning of a sweep that the fit leaves out
 constexpr double usable_travel = 0.93;  // the rest is for cogging, overshoot and lag
 constexpr double alignment_time = 0.6;  // s
+// A handle that has left the travel must come back by more than is left of it.
+constexpr double margin = 0.002;  // m
 }  // namespace
 
 Recording FieldSweep::turn(double by, const std::vector<std::string>& channels, std::size_t samples) {
+  // Before that nobody knows which way back is; the whole step is short then.
+  if (metres_per_radian_ == 0.0) return turn_once(by, channels, samples);
+  const double from = angle_;
+  bool cut_off = false;
+  return bench_.repeat([&] {
+    if (std::exchange(cut_off, true)) go_back(from);
+    return turn_once(by, channels, samples);
+  });
+}
+
+double FieldSweep::angle_by_count() {
+  return known_angle_ + (bench_.displacement() - known_displacement_) / metres_per_radian_;
+}
+
+// The rotor has lost the vector. It falls in again where the count says that it is, and is led to `angle` by
+// way of the middle, from where all of the travel can be used again.
+void FieldSweep::go_back(double angle) {
+  const double away = bench_.displacement();
+  angle_ = angle_by_count();
+  align(std::abs(away) + margin);
+  turn_once(-away / metres_per_radian_, {"count"}, 100);
+  bench_.disarm();
+  align();
+  // Far from the middle the count may have meant another turn of the field.
+  angle_ += whole_turn * std::round((angle_by_count() - angle_) / whole_turn);
+  turn_once(angle - angle_, {"count"}, 100);
+}
+
+Recording FieldSweep::turn_once(double by, const std::vector<std::string>& channels, std::size_t samples) {
   const double length = std::abs(by) / rate;
   ExcitationPlan plan;
   plan.kind = "current";
@@ -52,14 +84,14 @@ void FieldSweep::diagnose_still(double counts, const Recording& to, const Record
                     "free the handle, move it away from its stops, or raise --current"});
 }
 
-void FieldSweep::align() {
+void FieldSweep::align(double reach) {
   ExcitationPlan vector;
   vector.kind = "current";
   vector.bias = known_.current;
   vector.angle = angle_;
   vector.ramp = 0.5 * alignment_time;
   vector.duration = 20.0;
-  require_no_trip(bench_.record(vector, {{"count"}, 10, 10, alignment_time}));
+  require_no_trip(bench_.record(vector, {{"count"}, 10, 10, alignment_time}, reach));
 }
 
 void FieldSweep::prepare() {
@@ -77,6 +109,9 @@ void FieldSweep::prepare() {
     diagnose_still(counts, to, fro);
   }
   const double per_radian = (after - before) / half_turn;  // m
+  metres_per_radian_ = per_radian;
+  known_angle_ = angle_;
+  known_displacement_ = after;
   // The travel counts from where the axis is armed: with the handle in the middle all of it can be used.
   turn(-after / per_radian, {"count"}, 100);
   bench_.disarm();

@@ -36,14 +36,20 @@ class FieldSweep {
   double turns() const { return span_ / 6.283185307179586; }  // electrical, of a sweep
 
  private:
-  void align();
+  void align(double reach = 0.0);
+  // Again from where it began, if the host was held up meanwhile.
   Recording turn(double by, const std::vector<std::string>& channels, std::size_t samples);
+  Recording turn_once(double by, const std::vector<std::string>& channels, std::size_t samples);
+  void go_back(double angle);
+  double angle_by_count();
   void diagnose_still(double counts, const Recording& to, const Recording& fro);
 
   Bench& bench_;
   const MotorKnowledge& known_;
   double angle_ = 0.0;  // rad, where the vector is
   double span_ = 0.0;   // rad, of a sweep
+  // Of the handle, once it has been seen to move.
+  double metres_per_radian_ = 0.0, known_angle_ = 0.0, known_displacement_ = 0.0;
 };
 
 }  // namespace kmax::calibration

@@ -72,9 +72,15 @@ bool blocked(const Step& step, const std::vector<StepReport>& before) {
 
 StepReport run_step(Step& step, Bench& bench, MotorKnowledge& known) {
   StepReport report;
-  report.name = step.name();
+  const MotorKnowledge before = known;
   try {
-    step.run(bench, known, report);
+    // Steps that can repeat a part of themselves do; this is for the rest.
+    bench.repeat([&] {
+      known = before;
+      report = {};
+      report.name = step.name();
+      step.run(bench, known, report);
+    });
   } catch (const StepFailed& failure) {
     report.failure = failure.diagnosis();
   } catch (const device::ValueError& beyond) {

@@ -25,7 +25,8 @@ Push push(Bench& bench, const MotorKnowledge& known, double voltage, double dura
   // The shaft coasts to rest in the time after it.
   const int interval = static_cast<int>(std::max<std::size_t>(1, ticks / 300));
   const std::size_t samples = 2 * ticks / static_cast<std::size_t>(interval);
-  const Recording seen = bench.record(plan, {{"count", "current", "voltage"}, samples, interval, 0.0});
+  const RecordPlan record{{"count", "current", "voltage"}, samples, interval, 0.0};
+  const Recording seen = bench.repeat([&] { return bench.record(plan, record); });
   require_no_trip(seen);
   const double sign = voltage > 0.0 ? 1.0 : -1.0;
   const auto count = seen.of("count"), current = seen.of("current");

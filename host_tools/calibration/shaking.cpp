@@ -56,15 +56,21 @@ void Shaking::require_living_encoder(const Recording& seen, int interval) const 
                   current_, 1000.0 * half_period_ * known_.tick, induced.volts, induced.error));
 }
 
+Recording Shaking::record_centred(const ExcitationPlan& excitation, const RecordPlan& plan) {
+  return bench_.repeat([&] {
+    centre_handle(bench_, known_);
+    return bench_.record_alone(excitation, plan);
+  });
+}
+
 void Shaking::prepare() {
   int blind = 0;
   for (int attempt = 0; attempt < 40; ++attempt) {
-    // The wave drifts where friction, cogging or gravity want it.
-    centre_handle(bench_, known_);
     bench_.tell(fmt::format("shaking: {:.1f} ms half period", 1000.0 * half_period_ * known_.tick));
     const auto ticks = static_cast<std::size_t>((ramp_waves + 6) * half_period_);
     const int interval = static_cast<int>(std::max<std::size_t>(1, ticks / 280));
-    const Recording seen = bench_.record(
+    // The wave drifts where friction, cogging or gravity want it.
+    const Recording seen = record_centred(
         wave(5 * static_cast<std::size_t>(half_period_)),
         {{"count", "voltage", "current"}, ticks / static_cast<std::size_t>(interval), interval, 0.0});
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel &&
@@ -109,13 +115,12 @@ Recording Shaking::record(const std::vector<std::string>& channels, std::size_t 
   const std::size_t ticks = samples * static_cast<std::size_t>(interval);
   constexpr int attempts = 5;
   for (int attempt = 1;; ++attempt) {
-    centre_handle(bench_, known_);
     // The link takes up to a tenth of a second until the capture begins.
     const ExcitationPlan plan = wave(ticks + 6000);
     // A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by
     // the record.
     const double still = known_.brushed() ? 0.0 : std::max(0.1, 4.0 * half_period_ * known_.tick);
-    Recording seen = bench_.record(plan, {channels, samples, interval, plan.ramp, still});
+    Recording seen = record_centred(plan, {channels, samples, interval, plan.ramp, still});
     // A long record may drift out of the travel: a shorter wave drifts less.
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel && attempt < attempts) {
       half_period_ = std::max(20, half_period_ * 4 / 5);

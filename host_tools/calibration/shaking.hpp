@@ -35,6 +35,8 @@ class Shaking {
  private:
   ExcitationPlan wave(std::size_t ticks) const;
   int longest() const;  // half period, ticks
+  // From the middle of the travel, where it cannot be seen that a record before it was cut off.
+  Recording record_centred(const ExcitationPlan& excitation, const RecordPlan& plan);
   void require_living_encoder(const Recording& seen, int interval) const;
 
   Bench& bench_;

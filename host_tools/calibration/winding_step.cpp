@@ -39,6 +39,11 @@ std::vector<double> applied_along(std::span<const double> along, double across, 
   return applied;
 }
 
+// What went before does not matter to these: a rotor falls in anew with the vector.
+Recording record(Bench& bench, const ExcitationPlan& excitation, const RecordPlan& plan) {
+  return bench.repeat([&] { return bench.record_alone(excitation, plan); });
+}
+
 WindingFit resolved(WindingFit fit) {
   if (!fit.finding.is_none())
     throw StepFailed(
@@ -72,7 +77,7 @@ WindingStep::Response WindingStep::respond(Bench& bench, double voltage, double 
   wave.duration = 0.1;
   Response response;
   response.recordings.push_back(
-      bench.record(wave, {{"current_b", "current_c", "voltage", "supply"}, 3 * settling_ticks, 1, 0.0}));
+      record(bench, wave, {{"current_b", "current_c", "voltage", "supply"}, 3 * settling_ticks, 1, 0.0}));
   const Recording& seen = response.recordings.front();
   if (!seen.empty())
     response.phases = phase_response(seen.of("voltage"), seen.of("current_b"), seen.of("current_c"),
@@ -132,7 +137,7 @@ WindingFit WindingStep::rough_fit(Bench& bench, const MotorKnowledge& known) {
   wave.half_period = first_half_period;
   wave.ramp = 0.004;
   wave.duration = 0.2;
-  const Recording seen = bench.record(wave, {{"voltage", "current", "supply"}, 1000, 1, 0.0});
+  const Recording seen = record(bench, wave, {{"voltage", "current", "supply"}, 1000, 1, 0.0});
   require_no_trip(seen);
   const std::vector<double> applied = known.brushed()
                                           ? applied_brushed(seen)
@@ -163,8 +168,8 @@ void WindingStep::measure_brushed(Bench& bench, MotorKnowledge& known, const Win
   std::vector<Estimate> resistance, inductance, dead_time;
   for (int i = 0; i < bench.settings().repetitions; ++i) {
     bench.tell(fmt::format("winding: measurement {} of {}", i + 1, bench.settings().repetitions));
-    const Recording seen = bench.record(
-        wave,
+    const Recording seen = record(
+        bench, wave,
         {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
     require_no_trip(seen);
     const std::vector<double> applied = applied_brushed(seen);
@@ -192,8 +197,9 @@ WindingFit WindingStep::fit_along(Bench& bench, const MotorKnowledge& known, con
   const WindingExcitation planned =
       vector_excitation(rough.resistance.value, rough.inductance.value, known.current, known.tick);
   const ExcitationPlan wave = biased_wave(planned, rough, known, angle, false);
-  const Recording seen = bench.record(
-      wave, {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
+  const Recording seen = record(
+      bench, wave,
+      {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
   require_no_trip(seen);
   const std::vector<double> applied =
       applied_along(seen.of("voltage"), 0.0, angle, mean_of(seen.of("supply")), false);
@@ -216,10 +222,11 @@ WindingFit WindingStep::fit_across(Bench& bench, const MotorKnowledge& known, co
   for (const int half_period : {planned.half_period, winding_slow_half_period(planned.half_period)}) {
     ExcitationPlan wave = biased_wave(planned, rough, known, angle, true);
     wave.half_period = half_period;
-    seen.push_back(bench.record(wave, {{"voltage_d", "current_d", "supply"},
-                                       std::min(planned.samples, most_samples),
-                                       1,
-                                       planned.settling}));
+    seen.push_back(record(bench, wave,
+                          {{"voltage_d", "current_d", "supply"},
+                           std::min(planned.samples, most_samples),
+                           1,
+                           planned.settling}));
     require_no_trip(seen.back());
     applied.push_back(applied_along(seen.back().of("voltage_d"), wave.bias, angle,
                                     mean_of(seen.back().of("supply")), true));

@@ -49,7 +49,7 @@ class Device {
   /// together (= 2). Whatever goes wrong before that leaves the old values: a refusal, a lost link (the
   /// device drops a transaction that falls silent), the end of this program. If the answer to the last step
   /// is lost, reading back decides which of the two happened. A message that is lost before is not repeated
-  /// by itself; the transaction is dropped and begun again, up to three times.
+  /// by itself: the transaction is begun again, up to three times. So it is if this program stood still.
   ///
   /// A transaction somebody else left open is waited for. Values that are applied but read back different
   /// have another writer: DeviceError naming both.

@@ -124,8 +124,11 @@ template <typename Predicate>
 DriveStatus Drive::wait_until(Predicate done) {
   const auto start = device_.link().now();
   for (;;) {
+    // The last look is asked for after the time is over: if this program stands still meanwhile, the device
+    // has had all of it.
+    const auto asked = device_.link().now();
     const DriveStatus seen = status();
-    if (done(seen) || device_.link().now() - start > patience) return seen;
+    if (done(seen) || asked - start > patience) return seen;
     device_.link().wait(poll_interval);
   }
 }
@@ -143,8 +146,10 @@ void Drive::enable() {
   const auto start = device_.link().now();
   // Not repeated when its answer is lost: an axis is never armed by a second try the user did not make.
   command(word::enable_now, false);
+  auto asked = start;  // or later: the look before
   const auto seen = wait_until([&](const DriveStatus& s) {
-    const bool judged = device_.link().now() - start > judgement;
+    const bool judged = asked - start > judgement;
+    asked = device_.link().now();
     return s.armed() || s.faulty() || (judged && s.refusal != Refusal::none);
   });
   if (seen.armed()) return;

@@ -8,6 +8,7 @@
 #include "host_tools/device/errors.hpp"
 #include "host_tools/device/guard_words.hpp"
 #include "host_tools/device/register_plan.hpp"
+#include "host_tools/device/stood_still.hpp"
 
 namespace kmax::device {
 
@@ -26,7 +27,7 @@ constexpr milliseconds patience{2500};
 constexpr milliseconds retry_interval{100};
 // A write that reached the device after it has dropped the transaction would act at once and alone. So no
 // write is repeated inside a transaction, and if this program was stopped for this long (suspended, swapped
-// out), it gives the transaction up.
+// out), it gives the transaction up and begins anew.
 constexpr milliseconds silence_max{1000};
 
 constexpr std::string_view nothing_changed = "nothing was changed";
@@ -123,7 +124,7 @@ class Device::Transaction {
  private:
   void check_silence() const {
     if (device_.link_->now() - last_write_ > silence_max)
-      throw DeviceError(
+      throw StoodStill(
           fmt::format("this program was stopped for too long while it was setting values; {}; try again",
                       nothing_changed));
   }
@@ -182,6 +183,8 @@ void Device::apply(std::span<const Assignment> assignments) {
       return settle_lost_commit(assignments, error.what());
     } catch (const LinkError& error) {
       if (attempt == attempts) throw LinkError(fmt::format("{}; {}", error.what(), nothing_changed));
+    } catch (const StoodStill&) {
+      if (attempt == attempts) throw;
     }
   }
   follow_line_settings(assignments);

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <optional>
 
 #include "host_tools/device/errors.hpp"
 #include "host_tools/device/register_plan.hpp"
+#include "host_tools/device/stood_still.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -245,24 +247,37 @@ TEST(Device, ItsOwnUnansweredTransactionIsNotWaitedFor) {
 
 // A program that is suspended between two messages comes back when the device has dropped the transaction;
 // what it would send then would act at once and alone.
-TEST(Device, ASuspendedProgramGivesUp) {
+TEST(Device, AProgramThatIsSuspendedOnceBeginsAnew) {
   for (int request = 1; request <= 5; ++request) {
     Connection connection;
     Device device = connection.open();
     const auto before = connection.fake->settings();
+    std::optional<decltype(connection.fake->settings())> on_waking;
     connection.link->requests = 0;
     connection.link->after_request = [&](int number) {
       if (number == request) connection.fake->pass(5'000'000);
+      if (number == request + 1) on_waking = connection.fake->settings();
     };
-    const auto set = assignments({"wall.stiffness=3580", "force.limit=2", "axis1.wall.law=magnetic"});
-    if (request < 5) {
-      EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(set); }), "too long");
-      EXPECT_EQ(connection.fake->settings(), before) << "after request " << request;
-    } else {
-      device.apply(set);  // it was applied before
-      EXPECT_EQ(connection.fake->registers.values().real<"force.limit">(), 2.0f);
-    }
+    device.apply(assignments({"wall.stiffness=3580", "force.limit=2", "axis1.wall.law=magnetic"}));
+    const auto& values = connection.fake->registers.values();
+    EXPECT_EQ(values.real<"wall.stiffness">(), 3580.0f) << "after request " << request;
+    EXPECT_EQ(values.real<"force.limit">(), 2.0f) << "after request " << request;
+    EXPECT_FALSE(connection.fake->registers.transaction_open());
+    ASSERT_TRUE(on_waking);
+    EXPECT_EQ(*on_waking == before, request < 5) << "after request " << request;
   }
+}
+
+TEST(Device, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
+  Connection connection;
+  Device device = connection.open();
+  const auto before = connection.fake->settings();
+  connection.link->requests = 0;
+  connection.link->after_request = [&](int) { connection.fake->pass(5'000'000); };
+  const auto set = assignments({"wall.stiffness=3580", "force.limit=2"});
+  EXPECT_CONTAINS(thrown_message<StoodStill>([&] { device.apply(set); }), "too long");
+  EXPECT_EQ(connection.link->requests, 6);  // begun and dropped three times
+  EXPECT_EQ(connection.fake->settings(), before);
 }
 
 }  // namespace

@@ -75,6 +75,38 @@ TEST_F(DriveTest, ADeviceThatDoesNotFollowIsReported) {
   EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "stays in 'Switch on disabled'");
 }
 
+// A program that is stopped just after it has asked for the state has an answer of then, whatever the time.
+TEST_F(DriveTest, AProgramThatStoodStillLooksOnceMoreBeforeItComplains) {
+  for (int stopped = 1; stopped < 25; ++stopped) {
+    fake->judgement_us = 30'000;
+    link->requests = 0;
+    link->after_request = [&](int request) {
+      if (request == stopped) fake->pass(3'000'000);
+    };
+    EXPECT_NO_THROW(drive.arm()) << "after request " << stopped;
+    EXPECT_EQ(state(), DriveState::operation_enabled);
+    EXPECT_NO_THROW(drive.disarm()) << "after request " << stopped;
+    EXPECT_EQ(state(), DriveState::switch_on_disabled);
+  }
+}
+
+TEST_F(DriveTest, AfterAStandstillAnOldRefusalIsNotTakenForTheAnswer) {
+  for (int stopped = 1; stopped < 25; ++stopped) {
+    link->after_request = nullptr;
+    fake->judgement_us = 0;
+    fake->obstacle[1] = Refusal::handle_inside_wall;
+    EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+    fake->obstacle[1] = Refusal::none;
+    fake->judgement_us = 30'000;
+    link->requests = 0;
+    link->after_request = [&](int request) {
+      if (request == stopped) fake->pass(3'000'000);
+    };
+    EXPECT_NO_THROW(drive.arm()) << "after request " << stopped;
+    EXPECT_NO_THROW(drive.disarm()) << "after request " << stopped;
+  }
+}
+
 TEST_F(DriveTest, AnArmedAxisThatDoesNotStopIsAnError) {
   drive.arm();
   fake->deaf_to_commands = true;

@@ -1,0 +1,160 @@
+// A host that is not run for more than link.timeout finds its axis off. That is no finding about the axis,
+// and no reason to throw away what has been measured.
+#include "host_tools/calibration/held_up.hpp"
+
+#include "host_tools/calibration/bench.hpp"
+#include "host_tools/device/errors.hpp"
+#include "tests/host_tools/calibration/procedure_accuracy.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::calibration_test {
+namespace {
+
+using calibration::Bench;
+using calibration::CalibrationReport;
+using calibration::CalibrationSettings;
+using std::chrono::milliseconds;
+
+constexpr milliseconds too_long{1100};  // link.timeout is 1 s
+
+/// The simulated board behind a link whose host can be held up before any message.
+class HeldUpLink final : public link::Link {
+ public:
+  explicit HeldUpLink(const simulation::Scene& scene) : link_(scene) {}
+
+  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
+    hold_up();
+    return link_.read_holding(address, count);
+  }
+  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
+    hold_up();
+    return link_.read_input(address, count);
+  }
+  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
+    hold_up();
+    link_.write_holding(address, values);
+  }
+  void follow_line_settings(std::optional<std::uint8_t> unit,
+                            std::optional<std::uint32_t> baud_rate) override {
+    link_.follow_line_settings(unit, baud_rate);
+  }
+  std::string description() const override { return "sim"; }
+  std::chrono::microseconds now() const override { return link_.now(); }
+  void wait(std::chrono::microseconds duration) override { link_.wait(duration); }
+
+  /// Called before every message that is sent while the bridge is on: whether the host is held up.
+  std::function<bool()> held_up;
+  int times = 0;
+
+ private:
+  void hold_up() {
+    const auto& legs = link_.simulation().device().power().drives().bridge(0).legs;
+    if (!held_up || !(legs[1].enabled || legs[2].enabled) || !held_up()) return;
+    ++times;
+    link_.wait(too_long);
+  }
+  link::SimLink link_;
+};
+
+struct HeldUpDevice {
+  explicit HeldUpDevice(const std::string& name)
+      : scene(simulated_board::open_scene(name)),
+        link(new HeldUpLink(scene)),
+        device(std::unique_ptr<link::Link>(link)) {
+    device.apply(device::parse_assignments({"modbus.baud_rate=921600"}));
+    link->wait(milliseconds(300));  // the power stage starts
+  }
+
+  std::vector<std::uint32_t> parameters() {
+    std::vector<device::Parameter> all;
+    for (const device::Parameter& parameter : device::all_parameters()) {
+      const std::string name(parameter.definition().name);
+      const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
+                           name == "transaction.control" || name == "store.command";
+      if (parameter.writable() && !passing) all.push_back(parameter);
+    }
+    return device.read(all);
+  }
+
+  simulation::Scene scene;
+  HeldUpLink* link;
+  device::Device device;
+  std::string step;  ///< that has begun last
+  int messages = 0;  ///< while its bridge was on
+
+  CalibrationReport calibrate(const CalibrationSettings& settings) {
+    return calibration::calibrate(
+        device, settings, nullptr, [](const std::string&) {},
+        [this](std::string_view begun) {
+          step = begun;
+          messages = 0;
+        });
+  }
+};
+
+CalibrationSettings all_steps() {
+  CalibrationSettings settings;
+  settings.sets.fill(true);
+  settings.repetitions = 2;
+  return settings;
+}
+
+class HeldUpCalibration : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, HeldUpCalibration, testing::Values("dc_coreless_a", "gimbal_b"));
+
+// In each step once, at a place that differs from run to run; the values are as true as ever.
+TEST_P(HeldUpCalibration, OnceInEveryStepFindsWhatIsTrue) {
+  HeldUpDevice whole(GetParam());
+  std::map<std::string, int> length;
+  whole.link->held_up = [&] {
+    ++length[whole.step];
+    return false;
+  };
+  ASSERT_TRUE(whole.calibrate(all_steps()).pass());
+  constexpr int runs = 3;
+  for (int run = 0; run < runs; ++run) {
+    HeldUpDevice tested(GetParam());
+    tested.link->held_up = [&] {
+      return tested.messages++ == length[tested.step] * (2 * run + 1) / (2 * runs);
+    };
+    const CalibrationReport report = tested.calibrate(all_steps());
+    ASSERT_TRUE(report.pass()) << cause_of(report) << " in run " << run;
+    EXPECT_EQ(tested.link->times, static_cast<int>(length.size())) << "run " << run;
+    EXPECT_TRUE(report.stored);
+    EXPECT_FALSE(device::Drive(tested.device, 0).status().faulty());
+    for (const Judged& value : judge(tested.scene.axes[0], report))
+      EXPECT_TRUE(value.good()) << value.name << " is " << value.found << " instead of " << value.truth
+                                << " in run " << run;
+  }
+}
+
+// Wherever that happens to fall, in a part that is measured again as well.
+TEST_P(HeldUpCalibration, EveryNowAndThenFindsWhatIsTrue) {
+  HeldUpDevice tested(GetParam());
+  int message = 0;
+  tested.link->held_up = [&] { return ++message % 997 == 0; };
+  const CalibrationReport report = tested.calibrate(all_steps());
+  ASSERT_TRUE(report.pass()) << cause_of(report);
+  EXPECT_GT(tested.link->times, 5);
+  for (const Judged& value : judge(tested.scene.axes[0], report))
+    EXPECT_TRUE(value.good()) << value.name << " is " << value.found << " instead of " << value.truth;
+}
+
+TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
+  for (const std::string step : {"winding", "torque_constant", "compensation_map"}) {
+    HeldUpDevice tested(GetParam());
+    const auto before = tested.parameters();
+    tested.link->held_up = [&] { return tested.step == step; };
+    EXPECT_CONTAINS(
+        host_tools_test::thrown_message<device::DeviceError>([&] { tested.calibrate(all_steps()); }),
+        "3 times in a row the device heard nothing for 1 s and removed the force");
+    EXPECT_EQ(tested.link->times, Bench::most_silences) << step;
+    tested.link->held_up = {};
+    EXPECT_EQ(tested.parameters(), before) << step;
+    const device::DriveStatus status = device::Drive(tested.device, 0).status();
+    EXPECT_FALSE(status.armed() || status.faulty()) << step;
+  }
+}
+
+}  // namespace
+}  // namespace kmax::calibration_test
