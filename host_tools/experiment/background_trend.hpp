@@ -1,47 +1,54 @@
 #pragma once
 // What paper 1 claims of its tables I and II: a number falls when the background force F_B increases.
 
-#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "host_tools/experiment/rank_correlation.hpp"
+#include "host_tools/experiment/tested_claim.hpp"
 
 namespace kmax::experiment {
 
-/// A number of one interference force F_I at the least and at the largest F_B.
+/// A number of one interference force F_I without F_B and with the largest; nothing where nobody touched.
 struct BackgroundTrend {
-  double interference;         ///< N
-  double without, with;        ///< at the least F_B, which is 0 in both tables, and at the largest
-  std::optional<double> rank;  ///< correlation with F_B
-  /// By a tenth at least.
-  bool falls() const { return without > 0.0 && with <= 0.9 * without; }
+  double interference;            ///< N
+  std::optional<double> without;  ///< at F_B = 0 itself, never at a small one
+  std::optional<double> with;     ///< at the largest F_B above 0 that has a touch
+  std::optional<double> rank;     ///< correlation with F_B
+  /// By a tenth at least. What is 0 without F_B does not fall. Not tested while either number is missing.
+  TestedClaim falls() const {
+    if (!without || !with) return std::nullopt;
+    return *without > 0.0 && *with <= 0.9 * *without;
+  }
 };
 
-/// False without any trend: nothing has been shown then.
-inline bool all_fall(const std::vector<BackgroundTrend>& trends) {
-  return !trends.empty() && std::all_of(trends.begin(), trends.end(),
-                                        [](const BackgroundTrend& trend) { return trend.falls(); });
+/// At every F_I; not tested without any trend.
+inline TestedClaim all_fall(const std::vector<BackgroundTrend>& trends) {
+  std::vector<TestedClaim> each;
+  for (const BackgroundTrend& trend : trends) each.push_back(trend.falls());
+  return all_hold(each);
 }
 
-/// Of the results at this F_I that have a touch; zeros without a rank where there is none. A Result is of one
-/// cell of a table, `paper` (forces in N), and counts its `touches`; `number` is a member or a function of
-/// it.
+/// Of the results at this F_I that have a touch. A Result is of one cell of a table, `paper` (forces in N),
+/// and counts its `touches`; `number` is a member or a function of it.
 template <typename Result, typename Number>
 BackgroundTrend background_trend(double interference, std::span<const Result> results, Number number) {
+  BackgroundTrend trend{interference, {}, {}, {}};
   std::vector<double> forces, values;
+  double largest = 0.0;
   for (const Result& result : results) {
     if (result.paper.interference != interference || result.touches == 0) continue;
-    forces.push_back(result.paper.background);
-    values.push_back(std::invoke(number, result));
+    const double force = result.paper.background, value = std::invoke(number, result);
+    forces.push_back(force);
+    values.push_back(value);
+    if (force == 0.0) trend.without = value;
+    if (force <= largest) continue;
+    largest = force;
+    trend.with = value;
   }
-  BackgroundTrend trend{interference, 0.0, 0.0, rank_correlation(forces, values)};
-  if (forces.empty()) return trend;
-  const auto [least, most] = std::minmax_element(forces.begin(), forces.end());
-  trend.without = values[static_cast<std::size_t>(least - forces.begin())];
-  trend.with = values[static_cast<std::size_t>(most - forces.begin())];
+  trend.rank = rank_correlation(forces, values);
   return trend;
 }
 

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 
+#include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/simulation/device_model.hpp"
 
 namespace kmax::experiment {
@@ -12,11 +14,25 @@ namespace kmax::experiment {
 /// A table's "yes" or "no".
 std::string yes_no(bool value);
 
+/// Likewise, or `untested`.
+std::string yes_no(const TestedClaim& claim, std::string_view untested);
+
 /// A rank correlation, "+0.87"; "-" where there is none.
 std::string rank_text(const std::optional<double>& rank);
 
 /// "1 person", "12 people".
 std::string people_words(std::size_t count);
+
+/// "1 touch", "4 touches".
+std::string touch_words(std::size_t count);
+
+/// "falls", "does not fall" or `untested`.
+std::string fall_words(const TestedClaim& falls, std::string_view untested);
+
+/// A sentence on what a simulated hand that does not stiffen tells of a number's fall with F_B: the
+/// stiffening is its cause only where it falls with it and not without. `number` is the sentence's subject,
+/// "Jit" or "it".
+std::string cause_words(std::string_view number, const TestedClaim& falls, const TestedClaim& falls_without);
 
 /// What the simulated device makes of a force: "clipped at 3.3 N", "not clipped".
 std::string clipping_words(const simulation::DeviceModel& device);

@@ -1,6 +1,7 @@
 #pragma once
-// What every experiment does with the touches that a person makes on a device: one that did not count is made
-// again, and each that is over is in a journal at once, so that nothing is lost when the run ends early.
+// What every experiment does with the touches that a person makes on a device: one that did not count, or
+// that was cut off because this computer stood still, is made again; each that is over is in a journal at
+// once, so that nothing is lost when the run ends early.
 
 #include <functional>
 #include <optional>
@@ -11,11 +12,13 @@
 #include "host_tools/calibration/prompter.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/experiment/run_journal.hpp"
+#include "host_tools/experiment/standstill.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
 
 inline constexpr int touch_attempts = 3;
+inline constexpr int most_standstills = 3;  ///< that one touch survives
 
 /// What the touches depend on besides an experiment's own settings, for a journal: the device's identity, and
 /// the parameters of this axis that no experiment sets.
@@ -25,22 +28,47 @@ struct TouchSession {
   calibration::Prompter* prompter = nullptr;  ///< null: nobody is asked
   RunJournal* journal = nullptr;              ///< null: none is kept
   const Tell& tell;
+  Standstill* standstill = nullptr;  ///< null: a touch that was cut off is an error
 };
+
+/// Why it is made again.
+template <typename Touch>
+std::string reason_not_to_count(const Touch& touch) {
+  if constexpr (requires { touch.lost_records; }) {
+    if (touch.lost_records > 0) return fmt::format("{} records of its trace were lost", touch.lost_records);
+  }
+  return "the handle was not in the wall when it was judged";
+}
 
 /// The touch that `once` makes. One that does not count (Touch::counts()), or that nobody made although
 /// somebody was asked, is made again, up to three times in all; the last one that does not count is returned.
+/// One that a standstill cut off (standstill.hpp) is made again up to three times more.
 /// Errors: those of `once`; NobodyTouched without a prompter or after the third time.
 template <typename Touch>
 Touch repeated_touch(const TouchSession& session, const std::string& name,
                      const std::function<Touch()>& once) {
-  for (int attempt = 1;; ++attempt) {
+  int standstills = 0;
+  const auto was_cut_off = [&](const std::exception& error) {
+    if (session.standstill == nullptr || standstills == most_standstills) return false;
+    if (!session.standstill->cut_off(error, name)) return false;
+    ++standstills;
+    session.tell(fmt::format("{}: once more", name));
+    return true;
+  };
+  for (int attempt = 1;;) {
     try {
+      if (session.standstill != nullptr) session.standstill->touch_begins();
       Touch touch = once();
       if (touch.counts()) return touch;
-      session.tell(fmt::format("{}: the handle was not in the wall when it was judged; once more", name));
-      if (attempt == touch_attempts) return touch;
-    } catch (const NobodyTouched&) {
-      if (session.prompter == nullptr || attempt == touch_attempts) throw;
+      session.tell(fmt::format("{}: {}; once more", name, reason_not_to_count(touch)));
+      if (attempt++ == touch_attempts) return touch;
+    } catch (const device::DeviceError& error) {
+      // Nobody touches a wall whose force was removed unseen.
+      if (was_cut_off(error)) continue;
+      const bool nobody = dynamic_cast<const NobodyTouched*>(&error) != nullptr;
+      if (!nobody || session.prompter == nullptr || attempt++ == touch_attempts) throw;
+    } catch (const link::LinkError& error) {
+      if (!was_cut_off(error)) throw;
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "host_tools/device/drive.hpp"
+#include "host_tools/experiment/late_abort.hpp"
 
 namespace kmax::experiment {
 
@@ -36,18 +37,26 @@ class ArmedWhile {
 
   void require_armed() {
     const device::DriveStatus status = drive_.status();
-    if (status.armed()) return;
-    throw device::DeviceError(
-        fmt::format("the axis lost its force during the trial: {}",
-                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+    if (!status.armed()) fail_without_force(status);
   }
   /// An axis that stays armed is an error to be told.
   void disarm() {
     drive_.disarm();
     armed_ = false;
   }
+  /// After disarming: what the touch was aborted for at `time` of the trace happened under force.
+  void require_force_until(double time, const LateAbort& late) {
+    const device::DriveStatus status = drive_.status();
+    if (late.is_late(time, status)) fail_without_force(status);
+  }
 
  private:
+  [[noreturn]] static void fail_without_force(const device::DriveStatus& status) {
+    throw device::DeviceError(
+        fmt::format("the axis lost its force during the trial: {}",
+                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+  }
+
   device::Drive drive_;
   bool armed_ = true;
 };
@@ -163,6 +172,7 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
   const double thinning = std::max(1.0, std::round(number(device, watch.axis, "haptic.rate") / trace_rate));
   device::TraceReader trace(device, watch.axis, static_cast<std::uint16_t>(thinning));
   Progress progress(watch, touch);
+  LateAbort late;
   {
     ArmedWhile armed(device, watch.axis);
     auto last_news = device.link().now();
@@ -170,6 +180,7 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
       device.link().wait(milliseconds(20));
       trace.read(touch.samples);
       if (progress.look()) last_news = device.link().now();
+      late.looked(progress.now());
       if (touch.aborted_at) break;
       // Without this the axis would stay armed for ever.
       if (device.link().now() - last_news > longest_silence)
@@ -184,6 +195,7 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
     }
     if (!touch.aborted_at) armed.require_armed();
     armed.disarm();
+    if (touch.aborted_at) armed.require_force_until(progress.touched_at() + *touch.aborted_at, late);
   }
   trace.stop();
   const double all = number(device, watch.axis, "measured.armed_samples");

@@ -43,6 +43,17 @@ std::string word_for_command(const std::vector<std::string>& arguments) {
   return {};
 }
 
+/// "experiment jitter": the command that the arguments name, as deep as they were understood; `word` if none
+/// was.
+std::string command_meant(const CLI::App& app, const std::string& word) {
+  std::vector<std::string> path;
+  for (const CLI::App* command = &app; !command->get_subcommands().empty();) {
+    command = command->get_subcommands().front();
+    path.push_back(command->get_name());
+  }
+  return path.empty() ? word : fmt::format("{}", fmt::join(path, " "));
+}
+
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
                           const std::vector<std::string>& arguments) {
   const auto names = command_names(app);
@@ -55,7 +66,8 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
     return fmt::format("there is no command '{}'{}", word,
                        meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
   }
-  return fmt::format("{}: {}; 'kmax {} --help' explains it", word, error.what(), word);
+  const std::string command = command_meant(app, word);
+  return fmt::format("{}: {}; 'kmax {} --help' explains it", command, error.what(), command);
 }
 
 int run_action(Context& context) {

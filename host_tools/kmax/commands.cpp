@@ -20,6 +20,12 @@ std::span<const AddCommand> all_commands() {
   return commands;
 }
 
+CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* help) {
+  return command.add_option("--axis", context.axis_option, help)
+      ->type_name("N")
+      ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
+}
+
 CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes) {
   CLI::App* command = app.add_subcommand(text.name, text.summary);
   command->add_flag("--json", context.json, "One JSON document on standard output, in SI units");
@@ -30,9 +36,7 @@ CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, 
             "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
         ->type_name("ADDRESS");
   if (takes == Takes::device_and_axis)
-    command->add_option("--axis", context.axis_option, "Axis that names without a prefix are on")
-        ->type_name("N")
-        ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
+    add_axis_option(*command, context, "Axis that names without a prefix are on");
   const std::string examples = *text.examples == '\0' ? "" : fmt::format("Examples:\n{}\n\n", text.examples);
   command->footer(examples + exit_code_text);
   return command;

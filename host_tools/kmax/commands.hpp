@@ -51,6 +51,9 @@ struct CommandText {
   const char* examples;  ///< lines, may be empty
 };
 
+/// --axis alone, for a command whose group of options it belongs to.
+CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* help);
+
 /// What a command takes besides its own arguments.
 enum class Takes { nothing, device, device_and_axis };
 

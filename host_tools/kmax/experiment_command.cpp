@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 
@@ -41,7 +42,7 @@ std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, con
   if (folder.empty()) return nullptr;
   auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
                                               resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
-  if (resume) context.note(fmt::format("{} touches are done already", journal->resumed()));
+  if (resume) context.note(fmt::format("done already: {}", experiment::touch_words(journal->resumed())));
   return journal;
 }
 

@@ -42,19 +42,18 @@ Json condition_json(const experiment::ContactResult& result) {
           {"lost_records", result.lost_records}};
 }
 
-/// A trial that was not held is made again, as every experiment does (touch_journal.hpp).
+/// A trial that was not held or was cut off is made again, as every experiment does (touch_journal.hpp).
 experiment::ContactResult make_trial(device::Device& device, const experiment::ContactCondition& condition,
                                      const experiment::ContactSettings& settings,
-                                     calibration::Prompter* prompter, const experiment::Tell& tell) {
-  return experiment::repeated_touch<experiment::ContactResult>(
-      {prompter, nullptr, tell}, condition.name, [&] {
-        if (prompter != nullptr)
-          prompter->ask(
-              fmt::format("{}: take the handle out of the wall and be ready to press it against the wall for "
-                          "{:g} s",
-                          condition.name, settings.hold_time));
-        return experiment::run_contact(device, condition, settings, tell);
-      });
+                                     const experiment::TouchSession& session) {
+  return experiment::repeated_touch<experiment::ContactResult>(session, condition.name, [&] {
+    if (session.prompter != nullptr)
+      session.prompter->ask(
+          fmt::format("{}: take the handle out of the wall and be ready to press it against the wall for "
+                      "{:g} s",
+                      condition.name, settings.hold_time));
+    return experiment::run_contact(device, condition, settings, session.tell);
+  });
 }
 
 int run_contact_experiment(Context& context, const ContactOptions& options) {
@@ -77,6 +76,10 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   std::vector<std::filesystem::path> files, pictures;
   {
     Progress progress(context.messages());
+    experiment::Standstill standstill(device, {settings.axis}, [&](const std::string& text) {
+      progress.make_room();
+      context.note(text);
+    });
     const std::size_t all_trials = conditions.size() * static_cast<std::size_t>(options.trials);
     std::size_t done_trials = 0;
     for (const experiment::ContactCondition& condition : conditions) {
@@ -86,7 +89,8 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
       };
       std::vector<experiment::ContactResult> trials;
       for (int trial = 0; trial < options.trials; ++trial, ++done_trials)
-        trials.push_back(make_trial(device, condition, settings, asks ? &prompter : nullptr, tell));
+        trials.push_back(make_trial(device, condition, settings,
+                                    {asks ? &prompter : nullptr, nullptr, tell, &standstill}));
       results.push_back(experiment::worst_of(std::move(trials)));
       list.push_back(condition_json(results.back()));
       if (options.files.folder.empty()) continue;

@@ -50,6 +50,11 @@ experiment::DeviationStudy measure(Context& context, const DeviationOptions& opt
       context.note(fmt::format(
           "F_B = {:g} N, F_I = {:g} N: not counted, the wall was touched less than {:.0f} % of the time",
           one.paper.background, one.paper.interference, 100 * experiment::least_contact));
+    if (one.aborted > 0)
+      context.note(fmt::format(
+          "F_B = {:g} N, F_I = {:g} N: not counted, the handle swung too far or left the wall before the "
+          "{:g} s of the touch were over",
+          one.paper.background, one.paper.interference, settings.protocol.duration()));
   }
   return study;
 }
@@ -76,11 +81,11 @@ Json verdict_json(const experiment::DeviationVerdict& verdict) {
   Json trends = Json::array();
   for (const experiment::BackgroundTrend& trend : verdict.trends)
     trends.push_back({{"interference_force_n", trend.interference},
-                      {"without_m", trend.without},
-                      {"with_m", trend.with},
+                      {"without_m", optional_json(trend.without)},
+                      {"with_m", optional_json(trend.with)},
                       {"rank_with_background_force", optional_json(trend.rank)},
-                      {"falls", trend.falls()}});
-  return {{"claim_met", verdict.claim_met()},
+                      {"falls", optional_json(trend.falls())}});
+  return {{"claim_met", optional_json(verdict.claim_met())},
           {"rank_correlation", optional_json(verdict.rank)},
           {"trends", trends}};
 }
@@ -99,7 +104,7 @@ Json fits_json(const std::vector<experiment::DeviationFit>& fits) {
 }
 
 StudyReport report_of(const experiment::DeviationStudy& study) {
-  StudyReport report{study.verdict.claim_met(),
+  StudyReport report{study.verdict.claim_met() == true,
                      document_of(study),
                      experiment::deviation_words(study),
                      {experiment::deviation_table(study), experiment::deviation_claims_table(study),
@@ -121,10 +126,15 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
   auto* command = add_command(
       experiment, context,
       {"deviation", "Pushes a hand along the wall and sees how far it gives way (paper 1, Table II).",
-       "  kmax experiment deviation                                    simulated people, takes seconds\n"
-       "  kmax experiment deviation --subjects unclipped --out results with pictures and a page\n"
-       "  kmax experiment deviation --activation-gain 0                a hand that cannot stiffen\n"
-       "  kmax experiment deviation --device serial:/dev/ttyUSB0       somebody's own hand\n\n"
+       "  kmax experiment deviation                                          simulated people, takes "
+       "seconds\n"
+       "  kmax experiment deviation --subjects unclipped --out results       with pictures and a page\n"
+       "  kmax experiment deviation --activation-gain 0                      a hand that cannot stiffen\n"
+       "  kmax experiment deviation --device serial:/dev/ttyUSB0             somebody's own hand\n"
+       "  kmax experiment deviation --device serial:/tmp/kmax --no-prompt    whom 'kmax serve --scene "
+       "paper1_deviation'\n"
+       "                                                                     simulates, in real time: 5 "
+       "minutes\n\n"
        "Pulses of F_I act along the surface, five without and five with a background force F_B away from it. "
        "The\n"
        "paper finds that the deviation falls when F_B increases. A device needs two axes: the wall is on "
@@ -134,7 +144,8 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
        "lowered, each touch is disarmed at its end and when the handle swings too far, and all parameters "
        "are put\n"
        "back, on Ctrl-C too.\n"
-       "Exit code 3: the deviation did not fall."});
+       "Exit code 3: the deviation did not fall, or too little was touched to tell."},
+      Takes::device);
   auto options = std::make_shared<DeviationOptions>();
   experiment::DeviationSettings& simulated = options->simulated;
   experiment::DeviationProtocol& protocol = simulated.protocol;

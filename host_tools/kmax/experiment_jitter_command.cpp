@@ -4,6 +4,7 @@
 
 #include "host_tools/experiment/jitter/jitter_device.hpp"
 #include "host_tools/experiment/jitter/jitter_report.hpp"
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
@@ -40,11 +41,12 @@ experiment::JitterStudy measure(Context& context, const JitterOptions& options,
   study.results = result.results;
   study.verdict = experiment::judge_jitter(study.results);
   study.circumstances = fmt::format(
-      "Measured on {}: {} touches per pair, wall of {:g} N/mm at {:g} Hz, force limit {:g} N, which took "
+      "Measured on {}: {} per pair, wall of {:g} N/mm at {:g} Hz, force limit {:g} N, which took "
       "something "
       "away in up to {:.0f} % of a touch's samples; {} trace records lost.",
-      device.description(), settings.touches, settings.wall.stiffness / 1000, settings.wall.haptic_rate,
-      result.force_limit, 100 * result.limited_share, result.lost_records);
+      device.description(), experiment::touch_words(static_cast<std::size_t>(settings.touches)),
+      settings.wall.stiffness / 1000, settings.wall.haptic_rate, result.force_limit,
+      100 * result.limited_share, result.lost_records);
   return study;
 }
 
@@ -68,15 +70,15 @@ Json pairs_json(const std::vector<experiment::JitterResult>& results) {
 }
 
 Json verdict_json(const experiment::JitterVerdict& verdict) {
-  return {{"jitter_falls", verdict.amplitude_falls()},
-          {"adjustment_time_falls", verdict.time_falls()},
-          {"claim_met", verdict.claim_met()},
+  return {{"jitter_falls", optional_json(verdict.amplitude_falls())},
+          {"adjustment_time_falls", optional_json(verdict.time_falls())},
+          {"claim_met", optional_json(verdict.claim_met())},
           {"jitter_rank_correlation", optional_json(verdict.amplitude_rank)},
           {"adjustment_time_rank_correlation", optional_json(verdict.time_rank)}};
 }
 
 StudyReport report_of(const experiment::JitterStudy& study) {
-  StudyReport report{study.verdict.claim_met(),
+  StudyReport report{study.verdict.claim_met() == true,
                      document_of(study),
                      experiment::jitter_words(study),
                      {experiment::jitter_table(study), experiment::jitter_claims_table(study)}};
@@ -101,10 +103,10 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
       experiment, context,
       {"jitter",
        "Throws a hand out of the wall and sees how far, and how long until it is back (paper 1, Table I).",
-       "  kmax experiment jitter                                    simulated people, takes seconds\n"
-       "  kmax experiment jitter --subjects unclipped --out results with pictures and a page\n"
-       "  kmax experiment jitter --activation-gain 0                a hand that cannot stiffen\n"
-       "  kmax experiment jitter --device serial:/dev/ttyUSB0       somebody's own hand\n\n"
+       "  kmax experiment jitter                                        simulated people, takes seconds\n"
+       "  kmax experiment jitter --subjects unclipped --out results     with pictures and a page\n"
+       "  kmax experiment jitter --activation-gain 0                    a hand that cannot stiffen\n"
+       "  kmax experiment jitter --device serial:/dev/ttyUSB0           somebody's own hand\n\n"
        "Inside the wall an interference force F_I is added, everywhere a background force F_B (1 to 7 N and "
        "0 to\n"
        "4 N). The paper finds that jitter and adjustment time fall when F_B increases. On a device you are "
@@ -112,7 +114,8 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
        "before each touch what to do; the force limit is lowered, each touch is disarmed at its end and when "
        "the\n"
        "handle swings too far, and all parameters are put back, on Ctrl-C too.\n"
-       "Exit code 3: jitter or adjustment time did not fall."});
+       "Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell."},
+      Takes::device);
   auto options = std::make_shared<JitterOptions>();
   experiment::JitterSettings& simulated = options->simulated;
   command

@@ -99,11 +99,12 @@ Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
   };
 }
 
-Options add_device_options(CLI::App& command, MaxStiffnessOptions& options) {
+Options add_device_options(CLI::App& command, Context& context, MaxStiffnessOptions& options) {
   auto* group = command.add_option_group("Device", "With --device");
   experiment::DeviceStiffnessSettings& device = options.device;
   const auto stiffness = finite_number() & CLI::Range(1.0, 1e6);
   Options added = {
+      add_axis_option(*group, context, "Axis that the wall is on"),
       group->add_option("--start", device.start, "First stiffness, N/m")
           ->check(stiffness)
           ->capture_default_str(),
@@ -166,7 +167,8 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
        "there.\n"
        "Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a "
        "device,\n"
-       "2 N or an adaptive wall does not allow more than the plain wall."});
+       "2 N or an adaptive wall does not allow more than the plain wall."},
+      Takes::device);
   auto options = std::make_shared<MaxStiffnessOptions>();
   command->add_option("--conditions", options->conditions, "Walls: 0,0.5,1,1.5,2,instant,latched,peak_hold")
       ->delimiter(',')
@@ -176,7 +178,7 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
   add_resume_option(*command, options->resume);
   add_format_option(*command, options->ending);
   const Options of_model = add_model_options(*command, *options);
-  const Options of_device = add_device_options(*command, *options);
+  const Options of_device = add_device_options(*command, context, *options);
   command->callback([&context, options, of_model, of_device] {
     context.action = [&context, options, of_model, of_device] {
       require_folder_to_resume(options->folder, options->resume);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/experiment/resolution/resolution_device.hpp"
 #include "host_tools/experiment/resolution/resolution_report.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -62,20 +63,20 @@ experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& o
   std::size_t aborted = 0;
   for (const bool one : result.aborted) aborted += one ? 1 : 0;
   study.circumstances = fmt::format(
-      "Measured on {}: {} touches, {} of them aborted because the handle swung too far, wall of {:g} N/mm at "
+      "Measured on {}: {}, {} of them aborted because the handle swung too far, wall of {:g} N/mm at "
       "{:g} Hz, "
       "force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
-      device.description(), result.cells.size(), aborted, settings.wall.stiffness / 1000,
-      settings.wall.haptic_rate, result.force_limit, result.lost_records);
+      device.description(), experiment::touch_words(result.cells.size()), aborted,
+      settings.wall.stiffness / 1000, settings.wall.haptic_rate, result.force_limit, result.lost_records);
   return study;
 }
 
 Json verdict_json(const experiment::ResolutionVerdict& verdict) {
-  return {{"coarse_vibrates_at_every_speed", verdict.coarse_vibrates},
-          {"fine_is_still_below_onset", verdict.fine_is_still},
-          {"fine_vibrates_above_onset", verdict.fine_vibrates_fast},
+  return {{"coarse_vibrates_at_every_speed", optional_json(verdict.coarse_vibrates)},
+          {"fine_is_still_below_onset", optional_json(verdict.fine_is_still)},
+          {"fine_vibrates_above_onset", optional_json(verdict.fine_vibrates_fast)},
           {"onset_from_resolution", optional_json(verdict.onset_from_resolution)},
-          {"claim_met", verdict.claim_met()}};
+          {"claim_met", optional_json(verdict.claim_met())}};
 }
 
 Json run_json(const experiment::ResolutionRun& run, bool simulated) {
@@ -98,7 +99,7 @@ Json run_json(const experiment::ResolutionRun& run, bool simulated) {
 
 StudyReport report_of(const experiment::ResolutionStudy& study) {
   const experiment::ResolutionVerdict verdict = study.verdict();
-  StudyReport report{verdict.claim_met(),
+  StudyReport report{verdict.claim_met() == true,
                      document_of(study),
                      experiment::resolution_words(study),
                      {experiment::resolution_table(study), experiment::resolution_claims_table(study)}};
@@ -136,7 +137,8 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
        "touch is disarmed at its end and when the handle swings too far, and all parameters are put back, on "
        "Ctrl-C\n"
        "too.\n"
-       "Exit code 3: one of the two did not come out."});
+       "Exit code 3: one of the two did not come out, or was not tested."},
+      Takes::device);
   auto options = std::make_shared<ResolutionOptions>();
   experiment::ResolutionSettings& simulated = options->simulated;
   command->add_option("--stiffness", simulated.wall.stiffness, "Stiffness of the wall, N/m")

@@ -14,6 +14,7 @@
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
+#include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
@@ -76,6 +77,7 @@ template <typename Study, typename Options>
 void add_study_action(CLI::App& command, Context& context, CLI::App& people,
                       const std::shared_ptr<Options>& options, const StudyCommand<Study, Options>& study) {
   auto* device = command.add_option_group("Device", "With --device");
+  add_axis_option(*device, context, "Axis that the wall is on");
   add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
   add_touch_options(*device, options->no_prompt, options->device.patience);
   add_resume_option(*device, options->resume);
@@ -145,7 +147,11 @@ Result make_touches(Context& context, const Interruption& interruption, device::
         check_interruption();
         progress.show(text);
       },
-      journal.get(), [&](const std::string& text) { context.note(text); });
+      journal.get(),
+      [&](const std::string& text) {
+        progress.make_room();
+        context.note(text);
+      });
 }
 
 }  // namespace kmax::cli

@@ -76,8 +76,12 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
                                        remaining.seconds(seconds_now(), results.size(), conditions.size()));
         progress.show(fmt::format("walls: {}; {}", far, text));
       };
-      results.push_back(experiment::find_max_stiffness(
-          device, condition, settings, options.no_prompt ? nullptr : &prompter, journal.get(), tell));
+      results.push_back(experiment::find_max_stiffness(device, condition, settings,
+                                                       options.no_prompt ? nullptr : &prompter, journal.get(),
+                                                       tell, [&](const std::string& text) {
+                                                         progress.make_room();
+                                                         context.note(text);
+                                                       }));
     }
   }
   std::vector<std::filesystem::path> files;

@@ -10,7 +10,12 @@ Progress::Progress(std::ostream& messages)
     : messages_(messages), terminal_(&messages == &std::cerr && isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
+  make_room();
+}
+
+void Progress::make_room() {
   if (width_ > 0) messages_ << '\r' << std::string(width_, ' ') << '\r' << std::flush;
+  width_ = 0;
 }
 
 void Progress::show(const std::string& text) {

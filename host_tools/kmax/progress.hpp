@@ -18,6 +18,9 @@ class Progress {
 
   void show(const std::string& text);
 
+  /// Before another message on the same stream: blanks the line.
+  void make_room();
+
  private:
   std::ostream& messages_;
   bool terminal_;

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-#include "host_tools/experiment/restored_afterwards.hpp"
-#include "host_tools/experiment/touch_journal.hpp"
+#include "host_tools/experiment/journal_fields.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -27,6 +26,16 @@ std::vector<std::string> assignments_for(const DeviationProtocol& protocol, std:
           other("interference.mode=none"),
           other(fmt::format("haptic.rate={}", protocol.haptic_rate).c_str())};
 }
+
+constexpr auto journal_fields = [](auto& touch, const auto& field) {
+  field("deviation_before_m", touch.measure.without);
+  field("deviation_m", touch.measure.with);
+  field("pulses", touch.measure.pulses);
+  field("contact_share", touch.contact_share);
+  field("limited_share", touch.limited_share);
+  field("aborted", touch.aborted);
+  field("lost_records", touch.lost_records);
+};
 }  // namespace
 
 std::vector<TimedChange> deviation_changes(const DeviationProtocol& protocol, double background,
@@ -44,39 +53,24 @@ std::vector<TimedChange> deviation_changes(const DeviationProtocol& protocol, do
 }
 
 void to_json(RunJournal::Json& json, const DeviationDeviceTouch& touch) {
-  json = {{"deviation_before_m", touch.measure.without},
-          {"deviation_m", touch.measure.with},
-          {"pulses", touch.measure.pulses},
-          {"contact_share", touch.contact_share},
-          {"limited_share", touch.limited_share},
-          {"aborted", touch.aborted},
-          {"lost_records", touch.lost_records}};
+  write_fields(json, touch, journal_fields);
 }
 
 void from_json(const RunJournal::Json& json, DeviationDeviceTouch& touch) {
-  json.at("deviation_before_m").get_to(touch.measure.without);
-  json.at("deviation_m").get_to(touch.measure.with);
-  json.at("pulses").get_to(touch.measure.pulses);
-  json.at("contact_share").get_to(touch.contact_share);
-  json.at("limited_share").get_to(touch.limited_share);
-  json.at("aborted").get_to(touch.aborted);
-  json.at("lost_records").get_to(touch.lost_records);
+  read_fields(json, touch, journal_fields);
 }
 
 RunJournal::Json journal_settings(device::Device& device, const DeviationDeviceSettings& settings) {
   const DeviationProtocol& protocol = settings.protocol;
-  RunJournal::Json all = {{"experiment", "deviation"}};
-  all.update(device_circumstances(device, settings.axis));
-  all.update(RunJournal::Json{{"other_axis", device_circumstances(device, 1 - settings.axis)},
-                              {"stiffness_n_per_m", protocol.stiffness},
-                              {"haptic_rate_hz", protocol.haptic_rate},
-                              {"rest_s", protocol.rest},
-                              {"pulse_on_s", protocol.pulse_on},
-                              {"pulse_off_s", protocol.pulse_off},
-                              {"pulses", protocol.pulses},
-                              {"force_limit_n", settings.force_limit},
-                              {"abort_amplitude_m", settings.abort_amplitude},
-                              {"wall_abort_amplitude_m", settings.wall_abort_amplitude}});
+  RunJournal::Json all = touch_settings("deviation", device, settings,
+                                        {{"other_axis", device_circumstances(device, 1 - settings.axis)},
+                                         {"stiffness_n_per_m", protocol.stiffness},
+                                         {"haptic_rate_hz", protocol.haptic_rate},
+                                         {"rest_s", protocol.rest},
+                                         {"pulse_on_s", protocol.pulse_on},
+                                         {"pulse_off_s", protocol.pulse_off},
+                                         {"pulses", protocol.pulses}});
+  all["wall_abort_amplitude_m"] = settings.wall_abort_amplitude;
   return all;
 }
 
@@ -92,30 +86,24 @@ std::vector<double> pulse_begins(const std::vector<TimedChange>& changes, const 
   return begins;
 }
 
-DeviationDeviceTouch touch_once(device::Device& device, const DeviationDeviceSettings& settings,
-                                const paper::DeviationCell& pair, const std::string& name,
-                                const TouchSession& session) {
+DeviationDeviceTouch touch_once(device::Device& device, LimitedTouches& touches,
+                                const DeviationDeviceSettings& settings, const paper::DeviationCell& pair,
+                                const std::string& name) {
   const DeviationProtocol& protocol = settings.protocol;
   // The touch before has left its last forces behind.
-  device.apply(device::parse_assignments(assignments_for(protocol, settings.axis), settings.axis));
-  TouchWatch watch;
-  watch.axis = settings.axis;
-  watch.name = name;
-  watch.hold_time = protocol.duration() + 0.1;
-  watch.contact_patience = settings.patience;
-  watch.abort_amplitude = settings.abort_amplitude;
+  touches.set(assignments_for(protocol, settings.axis));
+  const TouchWatch watch = watch_within(settings, name, protocol.duration() + 0.1);
   const std::string later = pair.background > 0.0 ? fmt::format(", and after {:g} s {:g} N away from it",
                                                                 protocol.onset(), pair.background)
                                                   : "";
-  if (session.prompter != nullptr)
-    session.prompter->ask(
-        fmt::format("{}: hold the handle outside the wall; after Enter press it firmly against the wall "
-                    "and keep it on the spot "
-                    "for {:g} s (pulses of {:g} N act along the wall{})",
-                    name, watch.hold_time, pair.interference, later));
+  touches.ask(
+      fmt::format("{}: hold the handle outside the wall; after Enter press it firmly against the wall "
+                  "and keep it on the spot "
+                  "for {:g} s (pulses of {:g} N act along the wall{})",
+                  name, watch.hold_time, pair.interference, later));
   const auto changes = deviation_changes(protocol, pair.background, pair.interference);
   const TwoAxisTouch touch =
-      watch_two_axes(device, watch, changes, session.tell, settings.wall_abort_amplitude);
+      watch_two_axes(device, watch, changes, touches.tell(), settings.wall_abort_amplitude);
   std::vector<DeviationSample> samples;
   for (const device::TraceSample& sample : touch.samples)
     samples.push_back({sample.time, sample.position, sample.force});
@@ -132,21 +120,14 @@ DeviationDeviceTouch touch_once(device::Device& device, const DeviationDeviceSet
 DeviationDeviceResult run_deviation_on_device(device::Device& device, const DeviationDeviceSettings& settings,
                                               calibration::Prompter* prompter, const Tell& tell,
                                               RunJournal* journal, const Tell& notice) {
-  std::vector<std::string> protective = protective_assignments(device, settings.axis, settings.force_limit);
-  for (const std::string& other : protective_assignments(device, 1 - settings.axis, settings.force_limit))
-    if (!other.starts_with("link.")) protective.push_back(other);
-  std::vector<std::string> changed = assignments_for(settings.protocol, settings.axis);
-  changed.insert(changed.end(), protective.begin(), protective.end());
-  const RestoredAfterwards restored(device, settings.axis, changed, notice);
-  device.apply(device::parse_assignments(protective, settings.axis));
-
-  const TouchSession session{prompter, journal, tell};
+  LimitedTouches touches(device, settings, assignments_for(settings.protocol, settings.axis),
+                         {prompter, journal, tell, notice}, {1 - settings.axis});
   DeviationDeviceResult all;
-  all.force_limit = device.read_number(fmt::format("axis{}.force.limit", settings.axis));
+  all.force_limit = touches.force_limit();
   for (const paper::DeviationCell& pair : settings.pairs) {
     const std::string name = fmt::format("F_B = {:g} N, F_I = {:g} N", pair.background, pair.interference);
-    const auto touch = journaled_touch<DeviationDeviceTouch>(
-        session, name, name, [&] { return touch_once(device, settings, pair, name, session); });
+    const auto touch = touches.touch<DeviationDeviceTouch>(
+        name, name, [&] { return touch_once(device, touches, settings, pair, name); });
     all.lost_records += touch.lost_records;
     all.limited_share = std::max(all.limited_share, touch.limited_share);
     DeviationTouch measured;

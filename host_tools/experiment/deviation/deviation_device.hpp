@@ -6,7 +6,8 @@
 //
 // A person simulated on a device answers to F_B on the wall's axis, and on the other one where its scene says
 // that it is the same person's hand (operator.same_person). The scene's push must exceed F_B, since what the
-// person adds against F_B lags behind the onset, and its hold last for the whole touch.
+// person adds against F_B lags behind the onset, and its hold last for the whole touch; whoever lets go
+// sooner swings out of the wall, which ends the touch. The supplied scene paper1_deviation holds for 15 s.
 
 #include <string>
 #include <vector>
@@ -14,17 +15,18 @@
 #include "host_tools/calibration/prompter.hpp"
 #include "host_tools/experiment/deviation/deviation_experiment.hpp"
 #include "host_tools/experiment/deviation/deviation_touch.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 
 namespace kmax::experiment {
 
-struct DeviationDeviceSettings {
-  std::size_t axis = 0;  ///< of the wall; the other one lies along the surface
+/// The limits' axis is the wall's; the other one lies along the surface. force_limit is of both,
+/// abort_amplitude along the surface.
+struct DeviationDeviceSettings : TouchLimits {
+  DeviationDeviceSettings() { abort_amplitude = 0.05; }  // the paper's deviation reaches 17 mm
+
   DeviationProtocol protocol;
-  double force_limit = paper::touch_force_limit;  ///< N, of both axes; force.limit is lowered to it
-  double abort_amplitude = 0.05;       ///< m, along the surface; the paper's deviation reaches 17 mm
   double wall_abort_amplitude = 1e-3;  ///< m, against the wall: a plain wall that is unstable shows more
-  double patience = 20.0;              ///< s for the person to come to the wall
   std::vector<paper::DeviationCell> pairs{paper::table_2.begin(), paper::table_2.end()};
 };
 
@@ -53,11 +55,10 @@ struct DeviationDeviceResult {
   std::uint64_t lost_records = 0;
 };
 
-/// `prompter` null: nobody is asked. One touch for each pair of forces; an aborted one is counted, not
-/// averaged. Pulses are switched by the host, at the link's pace; when each was really switched is what its
-/// deviation is measured from. Changes only parameters of the two axes and link.timeout, and puts them back;
-/// `notice` is told if that fails. `journal` may be null; touches are made again and kept as
-/// touch_journal.hpp says. Errors as watch_touch(), device::ValueError, JournalError.
+/// LimitedTouches on both axes, for `prompter`, `tell`, `journal` and `notice`. One touch for each pair of
+/// forces; an aborted one is counted, not averaged. Pulses are switched by the host, at the link's pace; when
+/// each was really switched is what its deviation is measured from. Errors as watch_touch(),
+/// device::ValueError, JournalError.
 DeviationDeviceResult run_deviation_on_device(device::Device& device, const DeviationDeviceSettings& settings,
                                               calibration::Prompter* prompter, const Tell& tell,
                                               RunJournal* journal = nullptr, const Tell& notice = {});

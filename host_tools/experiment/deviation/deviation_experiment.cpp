@@ -179,9 +179,21 @@ std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
   return results;
 }
 
-bool DeviationVerdict::claim_met() const {
+TestedClaim DeviationVerdict::claim_met() const {
   return all_fall(trends);
 }
+
+namespace {
+std::vector<BackgroundTrend> trends_of(std::span<const DeviationResult> results) {
+  std::vector<BackgroundTrend> trends;
+  for (const double interference : paper::interference_forces) {
+    const auto undisturbed = paper::deviation(0.0, interference);
+    if (!undisturbed || undisturbed->deviation == 0.0) continue;
+    trends.push_back(background_trend(interference, results, &DeviationResult::deviation));
+  }
+  return trends;
+}
+}  // namespace
 
 DeviationVerdict judge_deviation(std::span<const DeviationResult> results) {
   DeviationVerdict verdict;
@@ -192,14 +204,20 @@ DeviationVerdict judge_deviation(std::span<const DeviationResult> results) {
     theirs.push_back(result.paper.deviation);
   }
   verdict.rank = rank_correlation(ours, theirs);
-  for (const double interference : paper::interference_forces) {
-    const auto undisturbed = paper::deviation(0.0, interference);
-    if (!undisturbed || undisturbed->deviation == 0.0) continue;
-    verdict.trends.push_back(background_trend(interference, results, &DeviationResult::deviation));
-    verdict.paper_trends.push_back(background_trend(
-        interference, results, [](const DeviationResult& result) { return result.paper.deviation; }));
-  }
+  verdict.trends = trends_of(results);
   return verdict;
+}
+
+std::vector<BackgroundTrend> printed_deviation_trends() {
+  std::vector<DeviationResult> printed;
+  for (const paper::DeviationCell& cell : paper::table_2) {
+    DeviationResult result;
+    result.paper = cell;
+    result.deviation = cell.deviation;
+    result.touches = 1;
+    printed.push_back(result);
+  }
+  return trends_of(printed);
 }
 
 }  // namespace kmax::experiment

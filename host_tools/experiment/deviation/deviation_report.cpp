@@ -13,6 +13,9 @@ namespace {
 std::string mm(double metres) {
   return fmt::format("{:.2f}", metres * 1e3);
 }
+std::string mm(const std::optional<double>& metres) {
+  return metres ? mm(*metres) : std::string("-");
+}
 
 const DeviationResult* at(const std::vector<DeviationResult>& results, const paper::DeviationCell& cell) {
   for (const DeviationResult& result : results)
@@ -25,19 +28,6 @@ const DeviationFit* fit_named(const DeviationStudy& study, std::string_view name
   for (const DeviationFit& fit : study.fits)
     if (fit.kind.name == name) return &fit;
   return nullptr;
-}
-
-/// Does the deviation fall, and with a hand that does not stiffen?
-std::string_view words_without_stiffening(bool falls, bool falls_without) {
-  if (falls)
-    return falls_without ? "With a hand that does not stiffen it falls all the same: something else than the "
-                           "stiffening makes the trend."
-                         : "With a hand that does not stiffen it does not fall: in this model the trend is "
-                           "the stiffening and nothing else.";
-  return falls_without
-             ? "With a hand that does not stiffen it falls at every F_I: the stiffening is not "
-               "what would make the trend."
-             : "With a hand that does not stiffen it does not either: there is no trend to explain.";
 }
 }  // namespace
 
@@ -95,18 +85,18 @@ report::Table deviation_claims_table(const DeviationStudy& study) {
       {"hand", "F_I (N)", "F_B = 0 (mm)", "largest F_B (mm)", "ratio", "rank with F_B", "falls"},
       {}};
   const auto ratio = [](const BackgroundTrend& trend) {
-    return trend.without > 0 ? fmt::format("{:.2f}", trend.with / trend.without) : "-";
+    return trend.without > 0.0 && trend.with ? fmt::format("{:.2f}", *trend.with / *trend.without) : "-";
   };
-  const auto rows = [&](const std::string& name, const DeviationVerdict& verdict) {
-    for (const BackgroundTrend& trend : verdict.trends)
+  const auto rows = [&](const std::string& name, const std::vector<BackgroundTrend>& trends) {
+    for (const BackgroundTrend& trend : trends)
       table.rows.push_back({name, fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
-                            ratio(trend), rank_text(trend.rank), yes_no(trend.falls())});
+                            ratio(trend), rank_text(trend.rank), yes_no(trend.falls(), "not shown")});
   };
-  rows(std::string(report::words_of(study.origin)), study.verdict);
-  if (!study.without_stiffening.empty()) rows("activation_gain = 0", study.verdict_without_stiffening);
-  for (const BackgroundTrend& trend : study.verdict.paper_trends)
+  rows(std::string(report::words_of(study.origin)), study.verdict.trends);
+  if (!study.without_stiffening.empty()) rows("activation_gain = 0", study.verdict_without_stiffening.trends);
+  for (const BackgroundTrend& trend : printed_deviation_trends())
     table.rows.push_back({"paper", fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
-                          ratio(trend), "-", "yes"});
+                          ratio(trend), "-", yes_no(trend.falls(), "not shown")});
   return table;
 }
 
@@ -130,12 +120,13 @@ report::Table deviation_fit_table(const DeviationStudy& study) {
 
 std::vector<std::string> deviation_words(const DeviationStudy& study) {
   std::vector<std::string> words = {study.circumstances};
+  const TestedClaim falls = study.verdict.claim_met();
   words.push_back(
-      fmt::format("Claim of the paper: the deviation falls when F_B increases. Here it {}.",
-                  study.verdict.claim_met() ? "falls at every F_I" : "does not fall at every F_I"));
+      fmt::format("Claim of the paper: the deviation falls when F_B increases. Here {}.",
+                  falls ? fmt::format("it {} at every F_I", fall_words(falls, ""))
+                        : "this is not shown: not every F_I was touched both without F_B and with it"));
   if (!study.without_stiffening.empty()) {
-    words.emplace_back(
-        words_without_stiffening(study.verdict.claim_met(), study.verdict_without_stiffening.claim_met()));
+    words.push_back(cause_words("it", falls, study.verdict_without_stiffening.claim_met()));
     double size = 0.0;
     std::size_t counted = 0;
     for (const DeviationResult& result : study.results) {
@@ -150,13 +141,14 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
                       "it lasts; the paper's people push back, and 1 N does not move them at all.",
                       size / static_cast<double>(counted)));
   }
-  words.push_back(fmt::format(
-      "Rank correlation with the paper over all pairs: {}. {}", rank_text(study.verdict.rank),
-      study.without_stiffening.empty()
-          ? "Most of it is the work of F_I."
-          : fmt::format(
-                "A hand that does not stiffen has {}: it is the work of F_I and no evidence for the trend.",
-                rank_text(study.verdict_without_stiffening.rank))));
+  if (study.verdict.rank)
+    words.push_back(fmt::format(
+        "Rank correlation with the paper over all pairs: {}. {}", rank_text(study.verdict.rank),
+        study.without_stiffening.empty()
+            ? "Most of it is the work of F_I."
+            : fmt::format(
+                  "A hand that does not stiffen has {}: it is the work of F_I and no evidence for the trend.",
+                  rank_text(study.verdict_without_stiffening.rank))));
   const DeviationFit* stiffening = fit_named(study, fit_stiffening.name);
   const DeviationFit* threshold = fit_named(study, fit_threshold.name);
   const DeviationFit* both = fit_named(study, fit_both.name);
@@ -202,7 +194,8 @@ std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
       if (result.touches == 0) continue;
       ours.x.push_back(result.paper.background);
       ours.y.push_back(result.deviation * 1e3);
-      if (const DeviationResult* other = at(study.without_stiffening, result.paper)) {
+      const DeviationResult* other = at(study.without_stiffening, result.paper);
+      if (other != nullptr && other->touches > 0) {
         flat.x.push_back(result.paper.background);
         flat.y.push_back(other->deviation * 1e3);
       }

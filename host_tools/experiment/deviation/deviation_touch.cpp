@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "host_tools/device/drive.hpp"
+#include "host_tools/experiment/late_abort.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -44,10 +45,14 @@ class BothArmed {
   void require_armed() {
     for (device::Drive& drive : drives_) {
       const device::DriveStatus status = drive.status();
-      if (status.armed()) continue;
-      throw device::DeviceError(fmt::format(
-          "axis {} lost its force during the touch: {}", drive.axis(),
-          status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+      if (!status.armed()) fail_without_force(drive.axis(), status);
+    }
+  }
+  /// After disarming: what the touch was aborted for at `time` of the trace happened under force.
+  void require_force_until(double time, const LateAbort& late) {
+    for (device::Drive& drive : drives_) {
+      const device::DriveStatus status = drive.status();
+      if (late.is_late(time, status)) fail_without_force(drive.axis(), status);
     }
   }
   /// An axis that stays armed is an error to be told.
@@ -57,6 +62,11 @@ class BothArmed {
   }
 
  private:
+  [[noreturn]] static void fail_without_force(std::size_t axis, const device::DriveStatus& status) {
+    throw device::DeviceError(
+        fmt::format("axis {} lost its force during the touch: {}", axis,
+                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+  }
   void disarm_quietly() {
     for (device::Drive& drive : drives_) {
       try {
@@ -90,6 +100,7 @@ class TwoAxisWatch {
       record(trace, armed);
       if (!touch_.aborted_at) armed.require_armed();
       armed.disarm();
+      if (touch_.aborted_at) armed.require_force_until(touched_ + *touch_.aborted_at, late_);
     }
     trace.stop();
     for (const std::size_t axis : {std::size_t{0}, std::size_t{1}}) {
@@ -169,6 +180,7 @@ class TwoAxisWatch {
       if (device_.link().now() - last_news > longest_silence)
         throw device::DeviceError("the trace has stopped during the touch; does another program use it?");
       const double now = touch_.samples.empty() ? 0.0 : touch_.samples.back().time;
+      late_.looked(now);
       if (touched_ < 0.0 && inside()) touched_ = disturbed_ = now;
       if (touched_ < 0.0 && now > watch_.contact_patience)
         throw NobodyTouched(
@@ -194,6 +206,7 @@ class TwoAxisWatch {
   const std::vector<TimedChange>& changes_;
   const Tell& tell_;
   TwoAxisTouch touch_;
+  LateAbort late_;
   std::size_t looks_ = 0, touching_ = 0;
   double touched_ = -1.0;
   double disturbed_ = -1.0;  ///< the touch or the last change that moved the wall's axis

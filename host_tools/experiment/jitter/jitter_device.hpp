@@ -7,18 +7,17 @@
 
 #include "host_tools/calibration/prompter.hpp"
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
 
-struct JitterDeviceSettings {
-  std::size_t axis = 0;
+struct JitterDeviceSettings : TouchLimits {
+  JitterDeviceSettings() { abort_amplitude = 0.03; }  // the paper's jitter reaches 10 mm
+
   JitterWall wall;
-  int touches = 3;                                ///< per pair of forces
-  double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
-  double abort_amplitude = 0.03;                  ///< m; the paper's jitter reaches 10 mm
-  double patience = 20.0;                         ///< s for the person to come to the wall
+  int touches = 3;  ///< per pair of forces
   std::vector<paper::JitterCell> pairs{paper::table_1.begin(), paper::table_1.end()};
 };
 
@@ -28,7 +27,8 @@ struct JitterDeviceTouch {
   bool aborted = false;
   double limited_share = 0.0;
   std::uint64_t lost_records = 0;
-  bool counts() const { return aborted || measure.touched; }
+  /// A jitter that fell into a gap of the trace was never seen.
+  bool counts() const { return aborted || (measure.touched && lost_records == 0); }
 };
 void to_json(RunJournal::Json& json, const JitterDeviceTouch& touch);
 void from_json(const RunJournal::Json& json, JitterDeviceTouch& touch);  ///< throws what is wrong
@@ -38,15 +38,14 @@ RunJournal::Json journal_settings(device::Device& device, const JitterDeviceSett
 
 struct JitterDeviceResult {
   std::vector<JitterResult> results;
-  double force_limit = 0.0;    ///< N, that was at work: a pair beyond it is not what the paper had
-  double limited_share = 0.0;  ///< greatest share of limited samples in a touch
-  std::uint64_t lost_records = 0;
+  double force_limit = 0.0;        ///< N, that was at work: a pair beyond it is not what the paper had
+  double limited_share = 0.0;      ///< greatest share of limited samples in a touch
+  std::uint64_t lost_records = 0;  ///< of touches that were aborted, or not counted for it
 };
 
-/// `prompter` null: nobody is asked, as a simulated person needs no asking. An aborted touch is counted, not
-/// averaged. Changes only parameters of one axis and link.timeout, and puts them back; `notice` is told if
-/// that fails. `journal` may be null; touches are made again and kept as touch_journal.hpp says. Errors as
-/// watch_touch(), device::ValueError, JournalError.
+/// LimitedTouches on one axis, for `prompter`, `tell`, `journal` and `notice`. An aborted touch is counted,
+/// not averaged. One that lost records of its trace every time it was made is neither; `notice` is told.
+/// Errors as watch_touch(), device::ValueError, JournalError.
 JitterDeviceResult run_jitter_on_device(device::Device& device, const JitterDeviceSettings& settings,
                                         calibration::Prompter* prompter, const Tell& tell,
                                         RunJournal* journal = nullptr, const Tell& notice = {});

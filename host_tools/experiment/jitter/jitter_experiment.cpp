@@ -147,11 +147,11 @@ std::vector<JitterResult> run_jitter(const JitterSettings& settings,
   return results;
 }
 
-bool JitterVerdict::amplitude_falls() const {
+TestedClaim JitterVerdict::amplitude_falls() const {
   return all_fall(amplitude);
 }
-bool JitterVerdict::time_falls() const {
-  return all_settled && all_fall(time);
+TestedClaim JitterVerdict::time_falls() const {
+  return all_settled ? all_fall(time) : std::nullopt;
 }
 
 JitterVerdict judge_jitter(std::span<const JitterResult> results) {

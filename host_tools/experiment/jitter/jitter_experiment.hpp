@@ -90,10 +90,10 @@ struct JitterVerdict {
   std::vector<BackgroundTrend> amplitude, time;     ///< one for each F_I that has jitter in the paper
   std::optional<double> amplitude_rank, time_rank;  ///< ours against the paper's, over all pairs
   bool all_settled = true;
-  bool amplitude_falls() const;
-  bool time_falls() const;  ///< false while a touch has not settled: it has no adjustment time
+  TestedClaim amplitude_falls() const;
+  TestedClaim time_falls() const;  ///< not tested while a touch has not settled: it has no adjustment time
   /// The paper's claim (section 2.2.1): both decrease when F_B increases.
-  bool claim_met() const { return amplitude_falls() && time_falls(); }
+  TestedClaim claim_met() const { return all_hold({amplitude_falls(), time_falls()}); }
 };
 JitterVerdict judge_jitter(std::span<const JitterResult> results);
 

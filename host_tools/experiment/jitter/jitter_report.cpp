@@ -13,9 +13,21 @@ namespace {
 std::string mm(double metres) {
   return fmt::format("{:.1f}", metres * 1e3);
 }
+std::string mm_fine(const std::optional<double>& metres) {
+  return metres ? fmt::format("{:.2f}", *metres * 1e3) : std::string("-");
+}
 std::string ms(double seconds) {
   return fmt::format("{:.0f}", seconds * 1e3);
 }
+std::string ms(const std::optional<double>& seconds) {
+  return seconds ? ms(*seconds) : std::string("-");
+}
+
+std::string amplitude_text(const JitterResult& result) {
+  return result.touches > 0 ? mm_fine(result.amplitude) : std::string("-");
+}
+
+constexpr auto untested = "not shown";
 
 std::string time_text(const JitterResult& result) {
   if (result.touches == 0) return "-";
@@ -46,10 +58,11 @@ JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simul
   simulate_jitter(settings, people.front(), 0.0, 5.0, 0.0, &study.without);
   simulate_jitter(settings, people.front(), 3.0, 5.0, 0.0, &study.with);
   study.circumstances = fmt::format(
-      "Simulated: {}, {} touches each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force "
+      "Simulated: {}, {} each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force "
       "is {}.",
-      people_words(people.size()), settings.touches, settings.wall.stiffness / 1000,
-      settings.wall.haptic_rate, settings.push, settings.approach_speed, clipping_words(settings.device));
+      people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)),
+      settings.wall.stiffness / 1000, settings.wall.haptic_rate, settings.push, settings.approach_speed,
+      clipping_words(settings.device));
   return study;
 }
 
@@ -63,10 +76,9 @@ report::Table jitter_table(const JitterStudy& study) {
   for (const JitterResult& result : study.results) {
     table.rows.push_back(
         {fmt::format("{:g}", result.paper.background), fmt::format("{:g}", result.paper.interference),
-         mm(result.paper.amplitude), result.touches > 0 ? fmt::format("{:.2f}", result.amplitude * 1e3) : "-",
-         ms(result.paper.adjustment_time), time_text(result),
-         fmt::format("{} of {}", result.unsettled, result.touches), fmt::format("{}", result.aborted),
-         fmt::format("{:.0f}", 100 * result.beyond_limit_share)});
+         mm(result.paper.amplitude), amplitude_text(result), ms(result.paper.adjustment_time),
+         time_text(result), fmt::format("{} of {}", result.unsettled, result.touches),
+         fmt::format("{}", result.aborted), fmt::format("{:.0f}", 100 * result.beyond_limit_share)});
   }
   return table;
 }
@@ -76,13 +88,12 @@ report::Table jitter_claims_table(const JitterStudy& study) {
                       {"F_I (N)", "number", "F_B = 0", "largest F_B", "rank with F_B", "falls"},
                       {}};
   for (const BackgroundTrend& trend : study.verdict.amplitude)
-    table.rows.push_back({fmt::format("{:g}", trend.interference), "Jit (mm)",
-                          fmt::format("{:.2f}", trend.without * 1e3), fmt::format("{:.2f}", trend.with * 1e3),
-                          rank_text(trend.rank), yes_no(trend.falls())});
+    table.rows.push_back({fmt::format("{:g}", trend.interference), "Jit (mm)", mm_fine(trend.without),
+                          mm_fine(trend.with), rank_text(trend.rank), yes_no(trend.falls(), untested)});
   for (const BackgroundTrend& trend : study.verdict.time)
     table.rows.push_back({fmt::format("{:g}", trend.interference), "AT (ms)", ms(trend.without),
                           ms(trend.with), rank_text(trend.rank),
-                          yes_no(trend.falls() && study.verdict.all_settled)});
+                          yes_no(study.verdict.all_settled ? trend.falls() : std::nullopt, untested)});
   return table;
 }
 
@@ -103,9 +114,9 @@ report::Table jitter_variations_table(const JitterStudy& study) {
       if (result.paper.background == 4.0) last = &result;
     }
     if (first == nullptr || last == nullptr) return;
-    table.rows.push_back({name, yes_no(verdict.amplitude_falls()), yes_no(verdict.time_falls()),
-                          fmt::format("{} of {}", unsettled, touches),
-                          fmt::format("{:.2f} -> {:.2f}", first->amplitude * 1e3, last->amplitude * 1e3),
+    table.rows.push_back({name, yes_no(verdict.amplitude_falls(), untested),
+                          yes_no(verdict.time_falls(), untested), fmt::format("{} of {}", unsettled, touches),
+                          amplitude_text(*first) + " -> " + amplitude_text(*last),
                           time_text(*first) + " -> " + time_text(*last)});
   };
   row("all of it", study.results, study.verdict);
@@ -120,12 +131,11 @@ report::Table jitter_variations_table(const JitterStudy& study) {
 std::vector<std::string> jitter_words(const JitterStudy& study) {
   std::vector<std::string> words = {study.circumstances};
   const JitterVerdict& verdict = study.verdict;
-  words.push_back(fmt::format("Claim of the paper: both fall when F_B increases. Jit: {}. AT: {}.",
-                              verdict.amplitude_falls() ? "falls" : "does not fall",
-                              verdict.time_falls() ? "falls"
-                              : verdict.all_settled
-                                  ? "does not fall"
-                                  : "not shown, since touches did not settle or were aborted"));
+  words.push_back(fmt::format(
+      "Claim of the paper: both fall when F_B increases. Jit: {}. AT: {}.",
+      fall_words(verdict.amplitude_falls(),
+                 "not shown, since not every F_I was touched both without F_B and with it"),
+      fall_words(verdict.time_falls(), "not shown, since touches did not settle or were aborted")));
   double size = 0.0, time = 0.0;
   std::size_t counted = 0;
   for (const JitterResult& result : study.results) {
@@ -144,25 +154,23 @@ std::vector<std::string> jitter_words(const JitterStudy& study) {
         study.origin == report::Origin::measured
             ? ""
             : "Its values come from people who answer at will; the model's time is that of its push lag. "));
-  words.push_back(
-      fmt::format("Rank correlation with the paper over all pairs: Jit {}, AT {}. Most of it is the work of "
-                  "F_I, which anything "
-                  "that yields to a force would show; the trend with F_B is in the table of claims.",
-                  rank_text(verdict.amplitude_rank), rank_text(verdict.time_rank)));
+  if (verdict.amplitude_rank || verdict.time_rank)
+    words.push_back(fmt::format(
+        "Rank correlation with the paper over all pairs: Jit {}, AT {}. Most of it is the work of "
+        "F_I, which anything "
+        "that yields to a force would show; the trend with F_B is in the table of claims.",
+        rank_text(verdict.amplitude_rank), rank_text(verdict.time_rank)));
   if (study.variations.size() == 2) {
     std::size_t unsettled = 0, touches = 0;
     for (const JitterResult& result : study.variations[1].results) {
       unsettled += result.unsettled;
       touches += result.touches;
     }
-    words.push_back(
-        fmt::format("With a hand that does not stiffen Jit {}. With a person who does not answer to F_I {} "
-                    "of {} touches never settle and "
-                    "have no adjustment time.",
-                    study.variations[0].verdict.amplitude_falls()
-                        ? "falls all the same, so that something else makes its trend"
-                        : "does not fall: its trend is the stiffening",
-                    unsettled, touches));
+    words.push_back(fmt::format(
+        "{} With a person who does not answer to F_I {} of {} touches never settle and have no adjustment "
+        "time.",
+        cause_words("Jit", verdict.amplitude_falls(), study.variations[0].verdict.amplitude_falls()),
+        unsettled, touches));
   }
   return words;
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <string_view>
 
+#include "host_tools/experiment/journal_fields.hpp"
 #include "host_tools/experiment/max_stiffness/stiffness_climb.hpp"
 #include "host_tools/experiment/touch_journal.hpp"
 
@@ -18,6 +19,13 @@ constexpr std::array<std::pair<ContactVerdict, std::string_view>, 3> verdict_nam
     {{ContactVerdict::stable, "stable"},
      {ContactVerdict::unstable, "unstable"},
      {ContactVerdict::no_contact, "no_contact"}}};
+
+constexpr auto journal_fields = [](auto& touch, const auto& field) {
+  field("peak_to_peak_m", touch.peak_to_peak);
+  field("limited_share", touch.limited_share);
+  field("aborted", touch.aborted);
+  field("lost_records", touch.lost_records);
+};
 
 std::vector<std::string> assignments_of(const StiffnessCondition& condition) {
   if (!condition.adaptive)
@@ -79,11 +87,8 @@ class Toucher {
 void to_json(RunJournal::Json& json, const DeviceStiffnessTouch& touch) {
   const auto name = std::find_if(verdict_names.begin(), verdict_names.end(),
                                  [&](const auto& entry) { return entry.first == touch.verdict; });
-  json = {{"verdict", name->second},
-          {"peak_to_peak_m", touch.peak_to_peak},
-          {"limited_share", touch.limited_share},
-          {"aborted", touch.aborted},
-          {"lost_records", touch.lost_records}};
+  json = {{"verdict", name->second}};
+  write_fields(json, touch, journal_fields);
 }
 
 void from_json(const RunJournal::Json& json, DeviceStiffnessTouch& touch) {
@@ -92,10 +97,7 @@ void from_json(const RunJournal::Json& json, DeviceStiffnessTouch& touch) {
                                   [&](const auto& one) { return one.second == verdict; });
   if (entry == verdict_names.end()) throw std::invalid_argument("no verdict: " + verdict);
   touch.verdict = entry->first;
-  touch.peak_to_peak = json.at("peak_to_peak_m").get<double>();
-  touch.limited_share = json.at("limited_share").get<double>();
-  touch.aborted = json.at("aborted").get<bool>();
-  touch.lost_records = json.at("lost_records").get<std::uint64_t>();
+  read_fields(json, touch, journal_fields);
 }
 
 RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessSettings& settings) {
@@ -119,9 +121,10 @@ RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessS
 DeviceStiffnessResult find_max_stiffness(device::Device& device, const StiffnessCondition& condition,
                                          const DeviceStiffnessSettings& settings,
                                          calibration::Prompter* prompter, RunJournal* journal,
-                                         const Tell& tell) {
+                                         const Tell& tell, const Tell& notice) {
   DeviceStiffnessResult result{condition, {}, {}};
-  Toucher toucher(device, condition, settings, {prompter, journal, tell});
+  Standstill standstill(device, {settings.touch.axis}, notice);
+  Toucher toucher(device, condition, settings, {prompter, journal, tell, &standstill});
   StiffnessClimb climb(condition.adaptive ? settings.start_adaptive : settings.start, settings.step,
                        settings.last);
   while (const auto stiffness = climb.next()) {

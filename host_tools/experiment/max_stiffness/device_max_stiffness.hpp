@@ -55,14 +55,15 @@ RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessS
 /// One condition. Whoever holds the handle is asked before each touch to take it out of the wall and presses
 /// when it is armed; without a prompter nobody is asked, and a simulated person needs no asking. `journal`
 /// may be null. A touch that leaves the wall too early or that cannot be judged is made again
-/// (touch_journal.hpp); then the search ends there (never_touched).
+/// (touch_journal.hpp); then the search ends there (never_touched). One that a standstill of this computer
+/// cut off is made again too, and `notice` is told.
 ///
 /// Parameters stay changed: RestoredAfterwards with contact_changes(settings.touch). Errors: those of
 /// run_contact() and of the journal; NobodyTouched after the third time.
 DeviceStiffnessResult find_max_stiffness(device::Device& device, const StiffnessCondition& condition,
                                          const DeviceStiffnessSettings& settings,
                                          calibration::Prompter* prompter, RunJournal* journal,
-                                         const Tell& tell);
+                                         const Tell& tell, const Tell& notice = {});
 
 /// What paper 1 claims and this can contradict: a field of 2 N and every adaptive wall allow more stiffness
 /// than the plain wall. Conditions that have not been measured say nothing, nor do those whose search ended

@@ -5,8 +5,7 @@
 #include <algorithm>
 
 #include "control/resolution_criterion.hpp"
-#include "host_tools/experiment/restored_afterwards.hpp"
-#include "host_tools/experiment/touch_journal.hpp"
+#include "host_tools/experiment/journal_fields.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -21,6 +20,14 @@ std::vector<std::string> assignments_for(const ResolutionWall& wall, double reso
           fmt::format("position.rounding={}", roundings[static_cast<std::size_t>(wall.rounding)])};
 }
 
+constexpr auto journal_fields = [](auto& touch, const auto& field) {
+  field("speed_m_per_s", touch.speed);
+  field("unstable", touch.unstable);
+  field("without_contact", touch.without_contact);
+  field("aborted", touch.aborted);
+  field("peak_to_peak_m", touch.peak_to_peak);
+  field("lost_records", touch.lost_records);
+};
 }  // namespace
 
 double touch_speed(const WatchedTouch& touch) {
@@ -37,56 +44,34 @@ double touch_speed(const WatchedTouch& touch) {
 }
 
 void to_json(RunJournal::Json& json, const ResolutionDeviceTouch& touch) {
-  json = {{"speed_m_per_s", touch.speed},
-          {"unstable", touch.unstable},
-          {"without_contact", touch.without_contact},
-          {"aborted", touch.aborted},
-          {"peak_to_peak_m", touch.peak_to_peak},
-          {"lost_records", touch.lost_records}};
+  write_fields(json, touch, journal_fields);
 }
 
 void from_json(const RunJournal::Json& json, ResolutionDeviceTouch& touch) {
-  json.at("speed_m_per_s").get_to(touch.speed);
-  json.at("unstable").get_to(touch.unstable);
-  json.at("without_contact").get_to(touch.without_contact);
-  json.at("aborted").get_to(touch.aborted);
-  json.at("peak_to_peak_m").get_to(touch.peak_to_peak);
-  json.at("lost_records").get_to(touch.lost_records);
+  read_fields(json, touch, journal_fields);
 }
 
 RunJournal::Json journal_settings(device::Device& device, const ResolutionDeviceSettings& settings) {
-  RunJournal::Json all = {{"experiment", "resolution"}};
-  all.update(device_circumstances(device, settings.axis));
-  all.update(RunJournal::Json{{"stiffness_n_per_m", settings.wall.stiffness},
-                              {"haptic_rate_hz", settings.wall.haptic_rate},
-                              {"hold_time_s", settings.wall.hold},
-                              {"threshold_m", settings.wall.threshold},
-                              {"rounding", static_cast<int>(settings.wall.rounding)},
-                              {"resolutions_m", settings.resolutions},
-                              {"speeds_m_per_s", settings.speeds},
-                              {"touches", settings.touches},
-                              {"force_limit_n", settings.force_limit},
-                              {"abort_amplitude_m", settings.abort_amplitude}});
-  return all;
+  return touch_settings("resolution", device, settings,
+                        {{"stiffness_n_per_m", settings.wall.stiffness},
+                         {"haptic_rate_hz", settings.wall.haptic_rate},
+                         {"hold_time_s", settings.wall.hold},
+                         {"threshold_m", settings.wall.threshold},
+                         {"rounding", static_cast<int>(settings.wall.rounding)},
+                         {"resolutions_m", settings.resolutions},
+                         {"speeds_m_per_s", settings.speeds},
+                         {"touches", settings.touches}});
 }
 
 namespace {
-ResolutionDeviceTouch touch_once(device::Device& device, const ResolutionDeviceSettings& settings,
-                                 double speed, const std::string& name, const TouchSession& session) {
-  const ResolutionWall& wall = settings.wall;
-  TouchWatch watch;
-  watch.axis = settings.axis;
-  watch.name = name;
-  watch.hold_time = wall.hold;
-  watch.contact_patience = settings.patience;
-  watch.abort_amplitude = settings.abort_amplitude;
-  if (session.prompter != nullptr)
-    session.prompter->ask(
-        fmt::format("{}: hold the handle outside the wall, lightly; after Enter touch the wall at "
-                    "about {:g} mm in a second "
-                    "and press on for {:g} s",
-                    name, speed * 1e3, wall.hold));
-  const WatchedTouch touch = watch_touch(device, watch, session.tell);
+ResolutionDeviceTouch touch_once(const LimitedTouches& touches, const ResolutionWall& wall, double speed,
+                                 const std::string& name) {
+  touches.ask(
+      fmt::format("{}: hold the handle outside the wall, lightly; after Enter touch the wall at "
+                  "about {:g} mm in a second "
+                  "and press on for {:g} s",
+                  name, speed * 1e3, wall.hold));
+  const WatchedTouch touch = touches.watch(name, wall.hold);
   const simulation::ContactMeasure measure = measure_touch(touch, wall.hold, wall.threshold);
   ResolutionDeviceTouch made;
   made.speed = std::max(0.0, touch_speed(touch));
@@ -118,17 +103,11 @@ ResolutionDeviceResult run_resolution_on_device(device::Device& device,
                                                 calibration::Prompter* prompter, const Tell& tell,
                                                 RunJournal* journal, const Tell& notice) {
   const ResolutionWall& wall = settings.wall;
-  std::vector<std::string> changed = assignments_for(wall, 0.0);
-  const auto protective = protective_assignments(device, settings.axis, settings.force_limit);
-  changed.insert(changed.end(), protective.begin(), protective.end());
-  const RestoredAfterwards restored(device, settings.axis, changed, notice);
-  device.apply(device::parse_assignments(protective, settings.axis));
-
-  const TouchSession session{prompter, journal, tell};
+  LimitedTouches touches(device, settings, assignments_for(wall, 0.0), {prompter, journal, tell, notice});
   ResolutionDeviceResult all;
-  all.force_limit = device.read_number(fmt::format("axis{}.force.limit", settings.axis));
+  all.force_limit = touches.force_limit();
   for (const double resolution : settings.resolutions) {
-    device.apply(device::parse_assignments(assignments_for(wall, resolution), settings.axis));
+    touches.set(assignments_for(wall, resolution));
     const double step = device.read_number(fmt::format("axis{}.measured.resolution", settings.axis));
     for (const double speed : settings.speeds) {
       for (int number = 0; number < settings.touches; ++number) {
@@ -136,8 +115,8 @@ ResolutionDeviceResult run_resolution_on_device(device::Device& device,
                                              speed * 1e3, number + 1, settings.touches);
         // The same step and speed may be asked for twice; the place in the run is asked for once.
         const std::string key = fmt::format("{}: {}", all.cells.size() + 1, name);
-        const auto touch = journaled_touch<ResolutionDeviceTouch>(
-            session, key, name, [&] { return touch_once(device, settings, speed, name, session); });
+        const auto touch = touches.touch<ResolutionDeviceTouch>(
+            key, name, [&] { return touch_once(touches, wall, speed, name); });
         all.cells.push_back(cell_of(touch, wall, resolution, step));
         all.asked_speeds.push_back(speed);
         all.aborted.push_back(touch.aborted);

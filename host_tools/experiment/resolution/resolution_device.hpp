@@ -11,21 +11,18 @@
 #include <vector>
 
 #include "host_tools/calibration/prompter.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/resolution/resolution_experiment.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
 
-struct ResolutionDeviceSettings {
+struct ResolutionDeviceSettings : TouchLimits {
   ResolutionWall wall;
   std::vector<double> resolutions{0.0, 0.1e-3, 0.4e-3};  ///< m
   std::vector<double> speeds{0.05, 0.08, 0.15, 0.3};     ///< m/s, asked of the person
   int touches = 1;                                       ///< for each
-  std::size_t axis = 0;
-  double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
-  double abort_amplitude = 0.01;                  ///< m
-  double patience = 20.0;                         ///< s for the person to come to the wall
 };
 
 /// One touch, as a journal keeps it.
@@ -50,9 +47,8 @@ struct ResolutionDeviceResult {
   std::uint64_t lost_records = 0;
 };
 
-/// `prompter` null: nobody is asked. Changes only parameters of one axis and link.timeout, and puts them
-/// back; `notice` is told if that fails. `journal` may be null; touches are made again and kept as
-/// touch_journal.hpp says. Errors as watch_touch(), device::ValueError, JournalError.
+/// LimitedTouches on one axis, for `prompter`, `tell`, `journal` and `notice`. Errors as watch_touch(),
+/// device::ValueError, JournalError.
 ResolutionDeviceResult run_resolution_on_device(device::Device& device,
                                                 const ResolutionDeviceSettings& settings,
                                                 calibration::Prompter* prompter, const Tell& tell,

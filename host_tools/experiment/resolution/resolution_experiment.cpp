@@ -118,16 +118,13 @@ std::vector<ResolutionCell> at_resolution(std::span<const ResolutionCell> cells,
   return found;
 }
 
-/// Of the cells that `chosen` picks there is one, and `wanted` holds for all.
+/// Does `wanted` hold for all the cells that `chosen` picks? Not tested if it picks none.
 template <typename Chosen, typename Wanted>
-bool holds_for_all(const std::vector<ResolutionCell>& cells, Chosen chosen, Wanted wanted) {
-  bool any = false;
-  for (const ResolutionCell& cell : cells) {
-    if (!chosen(cell)) continue;
-    any = true;
-    if (!wanted(cell)) return false;
-  }
-  return any;
+TestedClaim holds_for_all(const std::vector<ResolutionCell>& cells, Chosen chosen, Wanted wanted) {
+  std::vector<TestedClaim> each;
+  for (const ResolutionCell& cell : cells)
+    if (chosen(cell)) each.emplace_back(wanted(cell));
+  return all_hold(each);
 }
 }  // namespace
 

@@ -27,6 +27,7 @@
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
+#include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
@@ -88,16 +89,21 @@ std::vector<ResolutionRun> run_resolution(const ResolutionSettings& settings,
                                           const ProgressReport& tell = {});
 
 struct ResolutionVerdict {
-  bool coarse_vibrates = false;     ///< 0.4 mm: at every speed
-  bool fine_is_still = false;       ///< 0.1 mm: at every speed below the onset
-  bool fine_vibrates_fast = false;  ///< 0.1 mm: at every speed above it
-  bool any_vibrates = false;        ///< in any touch of anybody
+  TestedClaim coarse_vibrates;     ///< 0.4 mm: at every speed
+  TestedClaim fine_is_still;       ///< 0.1 mm: at every speed below the onset
+  TestedClaim fine_vibrates_fast;  ///< 0.1 mm: at every speed above it
+  bool any_vibrates = false;       ///< in any touch of anybody
   /// The encoder's own step, where it was run, is still at some speed where 0.1 mm vibrates: only then is the
   /// onset the work of the resolution.
   std::optional<bool> onset_from_resolution;
-  bool claim_met() const { return coarse_vibrates && fine_is_still && fine_vibrates_fast; }
+  /// Both claims.
+  TestedClaim claim_met() const { return all_hold({coarse_vibrates, fine_is_still, fine_vibrates_fast}); }
+  bool all_tested() const {
+    return coarse_vibrates.has_value() && fine_is_still.has_value() && fine_vibrates_fast.has_value();
+  }
 };
-/// Needs cells of both resolutions on both sides of the onset speed: what has no cell is not met.
+/// Needs cells of both resolutions on both sides of the onset speed: what has no cell with a contact is not
+/// tested.
 ResolutionVerdict judge_resolution(std::span<const ResolutionCell> cells);
 
 /// The claims with one number of the weak hand's setting changed.

@@ -23,6 +23,22 @@ std::string cell_text(const ResolutionCell& cell) {
   return fmt::format("vibrates ({} of {}, {:.1f} mm)", cell.unstable, cell.touches, cell.peak_to_peak * 1e3);
 }
 
+std::string claim_text(const TestedClaim& claim) {
+  return yes_no(claim, "not tested");
+}
+
+/// Where a touch is missing for a claim to be tested; empty if none is.
+std::string untested_places(const ResolutionVerdict& verdict) {
+  std::string places;
+  const auto add = [&](const TestedClaim& claim, const char* place) {
+    if (!claim) places += fmt::format("{}{}", places.empty() ? "" : ", ", place);
+  };
+  add(verdict.coarse_vibrates, "0.4 mm at any speed");
+  add(verdict.fine_is_still, "0.1 mm below 0.1 m/s");
+  add(verdict.fine_vibrates_fast, "0.1 mm above 0.1 m/s");
+  return places;
+}
+
 std::string onset_text(const ResolutionRun& run, double resolution) {
   const auto onset = onset_speed(run.cells, resolution);
   return onset ? fmt::format("{:g}", *onset) : std::string("none");
@@ -69,8 +85,7 @@ ResolutionStudy study_resolution(const ResolutionSettings& settings,
       "{:g} N. A wall "
       "vibrates for a person when any touch does (more than {} mm peak to peak in every quarter of the last "
       "second){}.",
-      people_words(people.size()),
-      settings.touches == 1 ? "one touch" : fmt::format("{} touches", settings.touches), pushes,
+      people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)), pushes,
       settings.wall.stiffness / 1000, settings.wall.haptic_rate, mm(settings.count_length),
       settings.device.friction, mm(settings.wall.threshold),
       people.size() == 1 ? "" : ", and is said to vibrate when it does for half of the people");
@@ -106,8 +121,8 @@ report::Table resolution_claims_table(const ResolutionStudy& study) {
   for (const ResolutionRun& run : study.runs) {
     const ResolutionVerdict verdict = judge_resolution(run.cells);
     table.rows.push_back({study.pushes.empty() ? "measured" : words_of(run.hand),
-                          yes_no(verdict.coarse_vibrates), yes_no(verdict.fine_is_still),
-                          yes_no(verdict.fine_vibrates_fast), onset_text(run, 0.4e-3),
+                          claim_text(verdict.coarse_vibrates), claim_text(verdict.fine_is_still),
+                          claim_text(verdict.fine_vibrates_fast), onset_text(run, 0.4e-3),
                           onset_text(run, 0.1e-3), onset_text(run, 0.0)});
   }
   table.rows.push_back({"paper", "yes (Figure 2)", "yes (Figure 1)", "yes (section 3)", "-", "0.1", "-"});
@@ -124,42 +139,57 @@ report::Table resolution_variations_table(const ResolutionStudy& study) {
     return speed ? fmt::format("{:g}", *speed) : std::string("none");
   };
   for (const ResolutionVariation& one : study.variations)
-    table.rows.push_back({one.change, yes_no(one.verdict.coarse_vibrates), yes_no(one.verdict.fine_is_still),
-                          yes_no(one.verdict.fine_vibrates_fast), yes_no(one.verdict.claim_met()),
-                          onset(one.coarse_onset), onset(one.fine_onset)});
+    table.rows.push_back({one.change, claim_text(one.verdict.coarse_vibrates),
+                          claim_text(one.verdict.fine_is_still), claim_text(one.verdict.fine_vibrates_fast),
+                          claim_text(one.verdict.claim_met()), onset(one.coarse_onset),
+                          onset(one.fine_onset)});
   return table;
 }
+
+namespace {
+/// By how much 0.4 mm vibrates, and how many other settings show both claims.
+std::string narrowness_words(const ResolutionStudy& study) {
+  double least = 1.0;
+  for (const ResolutionCell& cell : study.runs.back().cells)
+    if (cell.resolution == paper::resolution_verdicts[1].resolution)
+      least = std::min(least, cell.peak_to_peak);
+  const auto met =
+      std::count_if(study.variations.begin(), study.variations.end(),
+                    [](const ResolutionVariation& one) { return one.verdict.claim_met() == true; });
+  return fmt::format(
+      "How narrow that is: the weakest vibration of 0.4 mm has {:.2f} mm, with a threshold of {:.3g} mm, and "
+      "of "
+      "{} settings that differ in one number both claims appear in {}.",
+      least * 1e3, study.wall.threshold * 1e3, study.variations.size(), met);
+}
+}  // namespace
 
 std::vector<std::string> resolution_words(const ResolutionStudy& study) {
   std::vector<std::string> words = {study.circumstances};
   const ResolutionVerdict verdict = study.verdict();
+  const TestedClaim claim_met = verdict.claim_met();
   if (!study.pushes.empty()) {
     const ResolutionVerdict full = judge_resolution(study.runs.front().cells);
     words.push_back(fmt::format("With a full grip and no delay {}.",
-                                full.any_vibrates
-                                    ? "some touches vibrate"
-                                    : "nothing vibrates, at any step and speed: the claims do not appear"));
-    words.push_back(verdict.claim_met() ? fmt::format("With {} both claims appear. These two numbers were "
-                                                      "chosen so that they do: calibrated, not "
-                                                      "predicted.",
-                                                      words_of(study.runs.back().hand))
-                                        : fmt::format("With {} the two claims do not both appear.",
-                                                      words_of(study.runs.back().hand)));
-    double least = 1.0;
-    for (const ResolutionCell& cell : study.runs.back().cells)
-      if (cell.resolution == paper::resolution_verdicts[1].resolution)
-        least = std::min(least, cell.peak_to_peak);
-    const auto met = std::count_if(study.variations.begin(), study.variations.end(),
-                                   [](const ResolutionVariation& one) { return one.verdict.claim_met(); });
-    words.push_back(
-        fmt::format("How narrow that is: the weakest vibration of 0.4 mm has {:.2f} mm, with a threshold of "
-                    "{:.3g} mm, and of {} "
-                    "settings that differ in one number both claims appear in {}.",
-                    least * 1e3, study.wall.threshold * 1e3, study.variations.size(), met));
+                                full.any_vibrates ? "some touches vibrate"
+                                : full.claim_met() == false
+                                    ? "nothing vibrates, at any step and speed: the claims do not appear"
+                                    : "nothing vibrates of what was touched"));
+    const std::string hand = words_of(study.runs.back().hand);
+    words.push_back(claim_met == true    ? fmt::format("With {} both claims appear. These two numbers were "
+                                                          "chosen so that they do: calibrated, not predicted.",
+                                                       hand)
+                    : claim_met == false ? fmt::format("With {} the two claims do not both appear.", hand)
+                                         : fmt::format("With {} the two claims were not both tested.", hand));
+    if (verdict.all_tested()) words.push_back(narrowness_words(study));
   } else {
-    words.push_back(
-        fmt::format("On this device the paper's claims are {}.", verdict.claim_met() ? "met" : "not met"));
+    words.push_back(fmt::format("On this device the paper's claims are {}.", claim_met == true ? "met"
+                                                                             : claim_met == false
+                                                                                 ? "not met"
+                                                                                 : "not all tested"));
   }
+  if (const std::string places = untested_places(verdict); !places.empty())
+    words.push_back(fmt::format("Not tested, for want of a touch there: {}.", places));
   if (verdict.onset_from_resolution)
     words.push_back(*verdict.onset_from_resolution
                         ? "At some speed 0.1 mm vibrates and the encoder's own step does not: there the step "

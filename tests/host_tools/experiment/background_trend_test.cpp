@@ -24,23 +24,38 @@ TEST(BackgroundTrend, IsFromTheLeastToTheLargestForceInWhateverOrder) {
   EXPECT_EQ(trend.without, 8.0);
   EXPECT_EQ(trend.with, 3.0);
   EXPECT_DOUBLE_EQ(trend.rank.value(), -0.8);
-  EXPECT_TRUE(trend.falls());
+  EXPECT_EQ(trend.falls(), true);
 }
 
 TEST(BackgroundTrend, OtherForcesAndPairsThatNobodyTouchedDoNotCount) {
-  const BackgroundTrend trend = trend_of(
-      {{{0, 5, 0}, 9.0, 0}, {{1, 5, 0}, 4.0}, {{2, 5, 0}, 5.0}, {{4, 7, 0}, 1.0}, {{4, 5, 0}, 2.0, 0}});
-  EXPECT_EQ(trend.without, 4.0);
+  const BackgroundTrend trend =
+      trend_of({{{0, 5, 0}, 9.0}, {{1, 5, 0}, 4.0}, {{2, 5, 0}, 5.0}, {{4, 7, 0}, 1.0}, {{4, 5, 0}, 2.0, 0}});
+  EXPECT_EQ(trend.without, 9.0);
   EXPECT_EQ(trend.with, 5.0);
-  EXPECT_FALSE(trend.falls());
+  EXPECT_EQ(trend.falls(), true);
+}
+
+TEST(BackgroundTrend, WithoutABackgroundForceIsAtNoneAndNotAtASmallOne) {
+  const BackgroundTrend trend = trend_of({{{0, 5, 0}, 9.0, 0}, {{1, 5, 0}, 4.0}, {{2, 5, 0}, 1.0}});
+  EXPECT_EQ(trend.without, std::nullopt);
+  EXPECT_EQ(trend.with, 1.0);
+  EXPECT_EQ(trend.rank, -1.0);
+  EXPECT_EQ(trend.falls(), std::nullopt);
+}
+
+TEST(BackgroundTrend, ThePairWithoutABackgroundForceIsNotTheOneWithIt) {
+  const BackgroundTrend trend = trend_of({{{0, 5, 0}, 9.0}, {{4, 5, 0}, 1.0, 0}});
+  EXPECT_EQ(trend.without, 9.0);
+  EXPECT_EQ(trend.with, std::nullopt);
+  EXPECT_EQ(trend.falls(), std::nullopt);
 }
 
 TEST(BackgroundTrend, OfNothingIsNoTrend) {
   const BackgroundTrend trend = trend_of({{{0, 3, 0}, 9.0}});
-  EXPECT_EQ(trend.without, 0.0);
-  EXPECT_EQ(trend.with, 0.0);
-  EXPECT_FALSE(trend.rank);
-  EXPECT_FALSE(trend.falls());
+  EXPECT_EQ(trend.without, std::nullopt);
+  EXPECT_EQ(trend.with, std::nullopt);
+  EXPECT_EQ(trend.rank, std::nullopt);
+  EXPECT_EQ(trend.falls(), std::nullopt);
 }
 
 TEST(BackgroundTrend, TheNumberMayBeAFunctionOfTheResult) {
@@ -50,16 +65,18 @@ TEST(BackgroundTrend, TheNumberMayBeAFunctionOfTheResult) {
 }
 
 TEST(BackgroundTrend, FallsByATenthAtLeast) {
-  EXPECT_TRUE((BackgroundTrend{5.0, 1.0, 0.9, {}}.falls()));
-  EXPECT_FALSE((BackgroundTrend{5.0, 1.0, 0.91, {}}.falls()));
-  EXPECT_FALSE((BackgroundTrend{5.0, 0.0, -1.0, {}}.falls())) << "what is not there cannot fall";
+  EXPECT_EQ((BackgroundTrend{5.0, 1.0, 0.9, {}}.falls()), true);
+  EXPECT_EQ((BackgroundTrend{5.0, 1.0, 0.91, {}}.falls()), false);
+  EXPECT_EQ((BackgroundTrend{5.0, 0.0, -1.0, {}}.falls()), false) << "what is not there cannot fall";
 }
 
 TEST(AllFall, NeedsATrendAndNoneThatStays) {
-  const BackgroundTrend falling{5.0, 1.0, 0.5, {}}, staying{7.0, 1.0, 1.0, {}};
-  EXPECT_TRUE(all_fall({falling, falling}));
-  EXPECT_FALSE(all_fall({falling, staying}));
-  EXPECT_FALSE(all_fall({}));
+  const BackgroundTrend falling{5.0, 1.0, 0.5, {}}, staying{7.0, 1.0, 1.0, {}}, untouched{3.0, 1.0, {}, {}};
+  EXPECT_EQ(all_fall({falling, falling}), true);
+  EXPECT_EQ(all_fall({falling, staying}), false);
+  EXPECT_EQ(all_fall({falling, untouched}), std::nullopt);
+  EXPECT_EQ(all_fall({untouched, staying}), false);
+  EXPECT_EQ(all_fall({}), std::nullopt);
 }
 
 }  // namespace

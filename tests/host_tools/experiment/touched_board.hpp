@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,7 +14,7 @@
 namespace kmax::experiment {
 
 /// A simulated board in virtual time with the simulated person of the supplied scene "touch", behind a link
-/// that can be cut.
+/// that can be cut and that tells of its requests.
 class TouchedBoard : public testing::Test {
  protected:
   class CutLink final : public link::Link {
@@ -38,9 +39,11 @@ class TouchedBoard : public testing::Test {
 
     link::SimLink sim;
     bool cut = false;
+    std::function<void()> before_request;  ///< may be empty; what it throws, the request throws
 
    private:
     void require() const {
+      if (before_request) before_request();
       if (cut) throw link::LinkError("the cable is gone");
     }
   };

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "tests/host_tools/experiment/touched_board.hpp"
+#include "tests/host_tools/experiment/stalled_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
@@ -192,6 +192,57 @@ TEST(MeasureTouch, WithoutEnoughOfTheRecordIsToBeMadeAgainAndNoError) {
   EXPECT_EQ(measure.verdict, ContactVerdict::no_contact);
   EXPECT_EQ(measure.samples, 0u);
   EXPECT_EQ(measure_touch(WatchedTouch{}, 2.0, 0.165e-3).verdict, ContactVerdict::no_contact);
+}
+
+/// A strong hand that hardly damps: without the wall's force it shoots forward and swings back.
+simulation::Scene springy_hand() {
+  simulation::Scene scene = simulated_board::factory_scene();
+  scene.axes[0].person->arm_damping = 0.5;
+  scene.axes[0].person->activation_gain = 0.0;
+  scene.axes[0].motion->hold_time = 6.0;
+  scene.axes[0].motion->push_force = 3.0;
+  return scene;
+}
+
+class WatchedSpringyHand : public StalledBoard {
+ protected:
+  WatchedSpringyHand() : StalledBoard(springy_hand()) {
+    set({"wall.law=magnetic", "wall.stiffness=5500", "wall.magnetic_coefficient=2", "haptic.rate=500",
+         "force.limit=3.3"});
+    watch.abort_amplitude = 11e-3;
+  }
+  TouchWatch watch;
+};
+
+TEST_F(WatchedSpringyHand, StaysWithinItsBoundUnderForce) {
+  EXPECT_EQ(watch_touch(device, watch, tell).aborted_at, std::nullopt);
+}
+
+// The trace of the time in which this program stood still has a swing of 11 mm in it, after the device had
+// removed the force.
+TEST_F(WatchedSpringyHand, WhatItDoesAfterItsForceWasRemovedUnseenIsNoOscillation) {
+  stall = {Stall::Of::program, 30, [](int) { return true; }};
+  const auto what = thrown_message<device::DeviceError>([&] { watch_touch(device, watch, tell); });
+  EXPECT_CONTAINS(what, "lost its force during the trial: the host was silent");
+  expect_disarmed();
+}
+
+// It swings by 8 mm 0.3 s after the touch; this program stands still from a little earlier on.
+TEST_F(WatchedSpringyHand, WhatItDidUnderForceIsOneWhateverCameAfterwards) {
+  watch.abort_amplitude = 7e-3;
+  int tripped = 0;
+  for (const int at_request : {18, 20, 22, 24}) {
+    stall = {Stall::Of::program, at_request, [](int) { return true; }};
+    try {
+      if (!watch_touch(device, watch, tell).aborted_at) continue;
+      tripped += device.read_number("drive.error_code") == 0x8130 ? 1 : 0;
+    } catch (const device::DeviceError&) {
+      // The records of the swing were overwritten.
+    }
+    expect_disarmed();
+    device::Drive(device, 0).clear();
+  }
+  EXPECT_GT(tripped, 0);
 }
 
 class WatchedByNobody : public TouchedBoard {

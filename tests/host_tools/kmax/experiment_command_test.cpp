@@ -12,6 +12,19 @@ TEST_F(Experiment, WithoutANameOrWithAnUnknownOneIsWrongUsage) {
   EXPECT_EQ(kmax({"experiment", "nothing"}), wrong_usage);
 }
 
+// The help that a message points to is the one that has the option.
+TEST_F(Experiment, AWrongValuePointsToTheHelpOfTheExperimentThatItWasGivenTo) {
+  expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
+               "experiment jitter: --stiffness: Value 0 not in range");
+  expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
+               "'kmax experiment jitter --help' explains it");
+  expect_error({"--device", "sim", "experiment", "resolution", "--nothing"}, wrong_usage,
+               "'kmax experiment resolution --help' explains it");
+  expect_error({"experiment", "--nothing", "jitter"}, wrong_usage, "'kmax experiment");
+  expect_error({"experiment"}, wrong_usage, "'kmax experiment --help' explains it");
+  expect_error({"wall", "--position", "here"}, wrong_usage, "'kmax wall --help' explains it");
+}
+
 TEST_F(Experiment, HelpNamesEveryExperimentOfThePapers) {
   EXPECT_EQ(kmax({"experiment", "--help"}), done);
   for (const char* name : {"max-stiffness", "contact", "jitter", "deviation", "resolution"})
@@ -25,6 +38,8 @@ TEST_F(Experiment, OptionsOfTheOtherKindOfDeviceAreRefused) {
          std::vector<std::vector<std::string>>{{"--no-prompt"},
                                                {"--patience", "5"},
                                                {"--force-limit", "2"},
+                                               {"--axis", "1"},
+                                               {"--axis", "0"},
                                                {"--resume", "--out", in("out")}}) {
       std::vector<std::string> arguments = {"experiment", name};
       arguments.insert(arguments.end(), of_device.begin(), of_device.end());
@@ -47,7 +62,7 @@ TEST_F(Experiment, AJournalIsKeptWhereThereIsAFolderAndResumedFromThereOnly) {
   open_touch_journal(context, in("out"), "x", settings, false)->add("a", 1);
   EXPECT_EQ(messages.str(), "");
   EXPECT_EQ(open_touch_journal(context, in("out"), "x", settings, true)->resumed(), 1u);
-  EXPECT_CONTAINS(messages.str(), "1 touches are done already");
+  EXPECT_CONTAINS(messages.str(), "done already: 1 touch");
   EXPECT_TRUE(std::filesystem::exists(folder / "out/x.journal"));
 }
 

@@ -66,7 +66,16 @@ TEST_F(DeviationCommand, ADeviceIsMeasured) {
   }
   EXPECT_GT(held, 0U);
   EXPECT_EQ(all["verdict"]["claim_met"], false);
+  for (const Json& trend : all["verdict"]["trends"])
+    EXPECT_EQ(trend["falls"].is_null(), trend["without_m"].is_null() || trend["with_m"].is_null()) << trend;
   EXPECT_FALSE(all.contains("without_stiffening")) << "only people that are simulated have a twin";
+}
+
+// At 20 N/mm no hand holds the plain wall still.
+TEST_F(DeviationCommand, ATouchThatWasEndedIsExplained) {
+  EXPECT_EQ(on_device({"--pulses", "1", "--rest", "0.2", "--stiffness", "20000"}), verdict_is_no) << said;
+  EXPECT_CONTAINS(said, "F_B = 0 N, F_I = 1 N: not counted, the handle swung too far");
+  EXPECT_CONTAINS(said, "left the wall before the 2.4 s of the touch were over");
 }
 
 TEST_F(DeviationCommand, APushThatLosesTheWallIsRefused) {

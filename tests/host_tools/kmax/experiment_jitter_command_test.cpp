@@ -48,11 +48,22 @@ TEST_F(JitterCommand, ADeviceIsMeasured) {
   const int code = on_device({"--touches", "1", "--window", "0.6", "--json"});
   ASSERT_TRUE(code == done || code == verdict_is_no) << said;
   const Json all = document();
-  EXPECT_EQ(all["verdict"]["claim_met"], code == done);
+  EXPECT_EQ(all["verdict"]["claim_met"] == true, code == done);
   EXPECT_EQ(all["origin"], "measured");
   EXPECT_EQ(all["pairs"].size(), 16u);
   EXPECT_CONTAINS(all["circumstances"].get<std::string>(), "force limit 3.3 N");
+  EXPECT_CONTAINS(all["circumstances"].get<std::string>(), "1 touch per pair");
   EXPECT_TRUE(all["variations"].empty()) << "only people that are simulated can be varied";
+}
+
+// In half a second nobody settles, and a time that nobody has neither falls nor does not.
+TEST_F(JitterCommand, WhatWasNotShownIsNullAndNotNo) {
+  EXPECT_EQ(simulated({"--touches", "1", "--window", "0.5", "--json"}), verdict_is_no) << said;
+  const Json verdict = document()["verdict"];
+  EXPECT_EQ(verdict["jitter_falls"], true);
+  EXPECT_TRUE(verdict["adjustment_time_falls"].is_null()) << verdict;
+  EXPECT_TRUE(verdict["claim_met"].is_null()) << verdict;
+  EXPECT_CONTAINS(document()["circumstances"].get<std::string>(), "1 touch each");
 }
 
 TEST_F(JitterCommand, APersonWhoNeverComesToTheWallIsAFailure) {

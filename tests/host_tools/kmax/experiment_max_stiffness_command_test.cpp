@@ -102,6 +102,7 @@ TEST_F(MaxStiffness, WhatHasNoMeaningOrIsAbsurdIsWrongUsage) {
                                                      {"--axis", "2"}})
     EXPECT_EQ(on_device(bad), wrong_usage) << bad[0] << ": " << said;
   for (const Arguments& bad : std::vector<Arguments>{{"--no-prompt"},
+                                                     {"--axis", "1"},
                                                      {"--trials", "2"},
                                                      {"--force-limit", "2"},
                                                      {"--resume"},

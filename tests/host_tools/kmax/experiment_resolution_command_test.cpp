@@ -37,6 +37,17 @@ TEST_F(ResolutionCommand, AFirmHandWithoutDelayIsAnswerNo) {
   EXPECT_EQ(document()["files"], Json::array());
 }
 
+TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
+  EXPECT_EQ(simulated({"--touches", "1", "--speeds", "0.05", "--json"}), verdict_is_no) << said;
+  const Json verdict = document()["verdict"];
+  EXPECT_EQ(verdict["coarse_vibrates_at_every_speed"], true);
+  EXPECT_EQ(verdict["fine_is_still_below_onset"], true);
+  EXPECT_TRUE(verdict["fine_vibrates_above_onset"].is_null()) << verdict;
+  EXPECT_TRUE(verdict["claim_met"].is_null()) << verdict;
+  for (const Json& variation : document()["variations"])
+    EXPECT_TRUE(variation["verdict"]["fine_vibrates_above_onset"].is_null()) << variation;
+}
+
 TEST_F(ResolutionCommand, PicturesHaveTheKindAskedFor) {
   EXPECT_EQ(simulated({"--touches", "1", "--speeds", "0.05,0.3", "--out", in("results"), "--format", "png"}),
             done)

@@ -197,6 +197,25 @@ TEST(DeviationOfAServedPerson, FallsWithTheBackgroundForceIfThePersonStiffens) {
   EXPECT_NEAR(served_deviation(2, 0.0), none, 0.05 * none);
 }
 
+// With the experiment's own protocol and limits: neither the least nor the largest forces of Table II may
+// throw the scene's person out of the wall, and each touch is held to its end.
+TEST(DeviationOfAServedPerson, TheSuppliedSceneHoldsForWholeTouches) {
+  const simulation::Scene scene = simulated_board::open_scene("paper1_deviation");
+  DeviationDeviceSettings settings;
+  EXPECT_GE(scene.axes[0].motion->hold_time, settings.protocol.duration() + 1.0);
+  settings.pairs = {*paper::deviation(0, 1), *paper::deviation(0, 7), *paper::deviation(4, 7)};
+  device::Device device(std::make_unique<link::SimLink>(scene));
+  const auto results = run_deviation_on_device(device, settings, nullptr, [](const std::string&) {}).results;
+  ASSERT_EQ(results.size(), 3u);
+  for (const DeviationResult& result : results) {
+    EXPECT_EQ(result.touches, 1u) << result.paper.background << " " << result.paper.interference;
+    EXPECT_GE(result.contact_share, least_contact);
+  }
+  EXPECT_LT(results[0].deviation, 0.5 * results[1].deviation);
+  EXPECT_LT(results[2].deviation, 0.5 * results[1].deviation);
+  EXPECT_LT(results[2].deviation, 0.5 * results[2].before);
+}
+
 class DeviationWithoutAPerson : public DeviationDevice {
  protected:
   DeviationWithoutAPerson() {

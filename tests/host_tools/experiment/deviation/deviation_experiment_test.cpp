@@ -61,7 +61,7 @@ std::vector<DeviationResult> as_printed() {
 
 TEST(JudgeDeviation, ThePapersOwnTableMeetsItsClaim) {
   const DeviationVerdict verdict = judge_deviation(as_printed());
-  EXPECT_TRUE(verdict.claim_met());
+  EXPECT_EQ(verdict.claim_met(), true);
   EXPECT_DOUBLE_EQ(verdict.rank.value(), 1.0);
   ASSERT_EQ(verdict.trends.size(), 3u);
   for (const BackgroundTrend& trend : verdict.trends) EXPECT_DOUBLE_EQ(trend.rank.value(), -1.0);
@@ -70,17 +70,35 @@ TEST(JudgeDeviation, ThePapersOwnTableMeetsItsClaim) {
 TEST(JudgeDeviation, ANumberThatStaysDoesNotFall) {
   std::vector<DeviationResult> results = as_printed();
   for (DeviationResult& result : results) result.deviation = 5e-3;
-  EXPECT_FALSE(judge_deviation(results).claim_met());
-  EXPECT_FALSE(judge_deviation({}).claim_met());
+  EXPECT_EQ(judge_deviation(results).claim_met(), false);
+}
+
+TEST(JudgeDeviation, WhatNobodyTouchedIsNotShownAndLeavesThePapersNumbersAlone) {
+  std::vector<DeviationResult> results = as_printed();
   for (DeviationResult& result : results) result.touches = 0;
-  EXPECT_FALSE(judge_deviation(results).claim_met());
+  for (const DeviationVerdict& verdict : {judge_deviation(results), judge_deviation({})}) {
+    EXPECT_EQ(verdict.claim_met(), std::nullopt);
+    ASSERT_EQ(verdict.trends.size(), 3u);
+    for (const BackgroundTrend& trend : verdict.trends) {
+      EXPECT_EQ(trend.without, std::nullopt);
+      EXPECT_EQ(trend.with, std::nullopt);
+    }
+  }
+  const std::vector<BackgroundTrend> printed = printed_deviation_trends();
+  ASSERT_EQ(printed.size(), 3u);
+  EXPECT_EQ(printed[0].interference, 3.0);
+  EXPECT_EQ(printed[0].without, 1.40e-3);
+  EXPECT_EQ(printed[0].with, 0.68e-3);
+  EXPECT_EQ(printed[2].without, 16.6e-3);
+  EXPECT_EQ(printed[2].with, 7.8e-3);
+  EXPECT_EQ(all_fall(printed), true);
 }
 
 TEST(SimulateDeviation, FallsWithTheBackgroundForceAndContactIsKept) {
   DeviationSettings settings;
   settings.protocol = quick();
   const std::vector<DeviationResult> results = run_deviation(settings, {simulation::OperatorModel{}});
-  EXPECT_TRUE(judge_deviation(results).claim_met());
+  EXPECT_EQ(judge_deviation(results).claim_met(), true);
   for (const DeviationResult& result : results) {
     EXPECT_GT(result.contact_share, 0.99);
     if (result.paper.background > 0.0) {
@@ -96,8 +114,9 @@ TEST(SimulateDeviation, AHandThatDoesNotStiffenShowsNoTrend) {
   simulation::OperatorModel person;
   person.activation_gain = 0.0;
   const DeviationVerdict verdict = judge_deviation(run_deviation(settings, {person}));
-  EXPECT_FALSE(verdict.claim_met());
-  for (const BackgroundTrend& trend : verdict.trends) EXPECT_NEAR(trend.with / trend.without, 1.0, 0.01);
+  EXPECT_EQ(verdict.claim_met(), false);
+  for (const BackgroundTrend& trend : verdict.trends)
+    EXPECT_NEAR(trend.with.value() / trend.without.value(), 1.0, 0.01);
 }
 
 // A hand at rest gives way by F/k; k1 and k2 in series, less the friction.

@@ -16,10 +16,15 @@ DeviationSettings few() {
   return settings;
 }
 
+std::string all_words(const DeviationStudy& study) {
+  std::string all;
+  for (const std::string& words : deviation_words(study)) all += words + "\n";
+  return all;
+}
+
 TEST(DeviationReport, SaysWhatHoldsAndWhatTheTableDoesNotTell) {
   const DeviationStudy study = study_deviation(few(), std::vector<simulation::OperatorModel>(1));
-  std::string words;
-  for (const std::string& one : deviation_words(study)) words += one + "\n";
+  const std::string words = all_words(study);
   EXPECT_CONTAINS(words, "Here it falls at every F_I");
   EXPECT_CONTAINS(words, "With a hand that does not stiffen it does not fall");
   EXPECT_CONTAINS(words, "hardly identifies a stiffness gain");
@@ -49,6 +54,33 @@ TEST(DeviationReport, APageOfADeviceWithoutResults) {
   study.fits = fit_table_2();
   EXPECT_NO_THROW(report::require_rectangular(deviation_table(study)));
   EXPECT_EQ(write_deviation(study, folder / "new", ".svg").size(), 5u);
+  const std::string words = all_words(study);
+  EXPECT_CONTAINS(words, "this is not shown");
+  EXPECT_EQ(words.find("does not fall"), std::string::npos) << words;
+  EXPECT_EQ(words.find("the work of F_I"), std::string::npos) << "of numbers that nobody has";
+  const report::Table claims = deviation_claims_table(study);
+  ASSERT_EQ(claims.rows.size(), 6u);
+  using Row = std::vector<std::string>;
+  EXPECT_EQ(claims.rows[0], (Row{"measured", "3", "-", "-", "-", "-", "not shown"}));
+  EXPECT_EQ(claims.rows[3], (Row{"paper", "3", "1.40", "0.68", "0.49", "-", "yes"}));
+  EXPECT_EQ(claims.rows[5], (Row{"paper", "7", "16.60", "7.80", "0.47", "-", "yes"}));
+}
+
+// The numbers of another pair of forces in its place would be taken for those without F_B.
+TEST(DeviationReport, WithoutTheTouchWithoutABackgroundForceNothingIsShown) {
+  DeviationStudy study;
+  study.origin = report::Origin::measured;
+  for (const paper::DeviationCell& cell : paper::table_2) {
+    DeviationResult result = mean_deviation(cell, {});
+    result.deviation = cell.deviation;
+    result.touches = cell.background > 0.0 ? 1 : 0;
+    study.results.push_back(result);
+  }
+  study.verdict = judge_deviation(study.results);
+  using Row = std::vector<std::string>;
+  EXPECT_EQ(deviation_claims_table(study).rows[1],
+            (Row{"measured", "5", "-", "2.40", "-", "-1.00", "not shown"}));
+  EXPECT_CONTAINS(all_words(study), "this is not shown");
 }
 
 TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
@@ -69,9 +101,7 @@ TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
     study.verdict = judge_deviation(study.results);
     study.without_stiffening = results(falls_without);
     study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
-    std::string words;
-    for (const std::string& one : deviation_words(study)) words += one + "\n";
-    return words;
+    return all_words(study);
   };
   const char* cause = "the stiffening and nothing else";
   EXPECT_CONTAINS(words_of(true, false), cause);
@@ -86,8 +116,7 @@ TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
 TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
   std::vector<simulation::OperatorModel> people(1);
   people[0].activation_gain = 0.0;
-  std::string words;
-  for (const std::string& one : deviation_words(study_deviation(few(), people))) words += one + "\n";
+  const std::string words = all_words(study_deviation(few(), people));
   EXPECT_EQ(words.find("nothing else"), std::string::npos) << words;
 }
 

@@ -88,7 +88,7 @@ std::vector<JitterResult> as_printed() {
 // A rule that the paper's own numbers break would say nothing.
 TEST(JudgeJitter, ThePapersOwnTableMeetsItsClaim) {
   const JitterVerdict verdict = judge_jitter(as_printed());
-  EXPECT_TRUE(verdict.claim_met());
+  EXPECT_EQ(verdict.claim_met(), true);
   EXPECT_DOUBLE_EQ(verdict.amplitude_rank.value(), 1.0);
   EXPECT_DOUBLE_EQ(verdict.time_rank.value(), 1.0);
   ASSERT_EQ(verdict.amplitude.size(), 3u);  // at 1 N there is no jitter to fall
@@ -97,26 +97,28 @@ TEST(JudgeJitter, ThePapersOwnTableMeetsItsClaim) {
 TEST(JudgeJitter, ATouchThatNeverSettlesHasNoTimeThatCouldFall) {
   std::vector<JitterResult> results = as_printed();
   results.back().unsettled = 1;
-  EXPECT_TRUE(judge_jitter(results).amplitude_falls());
-  EXPECT_FALSE(judge_jitter(results).time_falls());
+  EXPECT_EQ(judge_jitter(results).amplitude_falls(), true);
+  EXPECT_EQ(judge_jitter(results).time_falls(), std::nullopt);
   results.back().unsettled = 0;
   results.back().aborted = 1;
-  EXPECT_FALSE(judge_jitter(results).claim_met());
+  EXPECT_EQ(judge_jitter(results).claim_met(), std::nullopt);
 }
 
 TEST(JudgeJitter, OneForceThatDoesNotFallIsEnough) {
   std::vector<JitterResult> results = as_printed();
   for (JitterResult& result : results)
     if (result.paper.interference == 5.0 && result.paper.background == 4.0) result.amplitude = 6e-3;
-  EXPECT_FALSE(judge_jitter(results).amplitude_falls());
-  EXPECT_TRUE(judge_jitter(results).time_falls());
-  EXPECT_FALSE(judge_jitter({}).claim_met());
+  EXPECT_EQ(judge_jitter(results).amplitude_falls(), false);
+  EXPECT_EQ(judge_jitter(results).time_falls(), true);
+  EXPECT_EQ(judge_jitter(results).claim_met(), false);
+  EXPECT_EQ(judge_jitter({}).claim_met(), std::nullopt);
 }
 
 TEST(JudgeJitter, NoTouchAtAllIsNoClaim) {
   std::vector<JitterResult> results = as_printed();
   for (JitterResult& result : results) result.touches = 0;
-  EXPECT_FALSE(judge_jitter(results).claim_met());
+  EXPECT_EQ(judge_jitter(results).amplitude_falls(), std::nullopt);
+  EXPECT_EQ(judge_jitter(results).claim_met(), std::nullopt);
 }
 
 TEST(SimulateJitter, TheWeakestForceThrowsNobodyOut) {
@@ -130,8 +132,8 @@ TEST(SimulateJitter, TheWeakestForceThrowsNobodyOut) {
 
 TEST(SimulateJitter, BothFallWithTheBackgroundForce) {
   const JitterVerdict verdict = judge_jitter(run_jitter({}, {simulation::OperatorModel{}}));
-  EXPECT_TRUE(verdict.amplitude_falls());
-  EXPECT_TRUE(verdict.time_falls());
+  EXPECT_EQ(verdict.amplitude_falls(), true);
+  EXPECT_EQ(verdict.time_falls(), true);
 }
 
 // The point of the experiment: it is the stiffening that makes the trend.
@@ -139,8 +141,9 @@ TEST(SimulateJitter, AHandThatDoesNotStiffenShowsNoTrend) {
   simulation::OperatorModel person;
   person.activation_gain = 0.0;
   const JitterVerdict verdict = judge_jitter(run_jitter({}, {person}));
-  EXPECT_FALSE(verdict.amplitude_falls());
-  for (const BackgroundTrend& trend : verdict.amplitude) EXPECT_GT(trend.with, 0.8 * trend.without);
+  EXPECT_EQ(verdict.amplitude_falls(), false);
+  for (const BackgroundTrend& trend : verdict.amplitude)
+    EXPECT_GT(trend.with.value(), 0.8 * trend.without.value());
 }
 
 TEST(SimulateJitter, APersonWhoNeverPressesHarderNeverSettles) {

@@ -28,7 +28,7 @@ std::vector<ResolutionCell> as_claimed() {
 
 TEST(JudgeResolution, WhatThePaperClaimsMeetsTheClaim) {
   const ResolutionVerdict verdict = judge_resolution(as_claimed());
-  EXPECT_TRUE(verdict.claim_met());
+  EXPECT_EQ(verdict.claim_met(), true);
   EXPECT_FALSE(verdict.onset_from_resolution);  // the encoder's own step was not run
   EXPECT_EQ(onset_speed(as_claimed(), 0.1e-3), 0.11);
   EXPECT_EQ(onset_speed(as_claimed(), 0.4e-3), 0.05);
@@ -38,18 +38,36 @@ TEST(JudgeResolution, EachCellThatDiffersBreaksIt) {
   for (std::size_t i = 0; i < as_claimed().size(); ++i) {
     auto cells = as_claimed();
     cells[i].people_unstable = cells[i].unstable = 1 - cells[i].unstable;
-    EXPECT_FALSE(judge_resolution(cells).claim_met()) << i;
+    EXPECT_EQ(judge_resolution(cells).claim_met(), false) << i;
   }
 }
 
-TEST(JudgeResolution, WhatWasNotTriedIsNotMet) {
-  EXPECT_FALSE(judge_resolution({}).claim_met());
-  auto cells = as_claimed();
-  std::erase_if(cells, [](const ResolutionCell& one) { return one.resolution == 0.1e-3 && one.speed < 0.1; });
-  EXPECT_FALSE(judge_resolution(cells).claim_met());
-  cells = as_claimed();
-  for (ResolutionCell& one : cells) one.without_contact = one.touches;
-  EXPECT_FALSE(judge_resolution(cells).claim_met());
+TEST(JudgeResolution, WhatWasNotTriedIsNotTested) {
+  auto untouched = as_claimed();
+  for (ResolutionCell& one : untouched) one.without_contact = one.touches;
+  for (const ResolutionVerdict& verdict : {judge_resolution({}), judge_resolution(untouched)}) {
+    EXPECT_EQ(verdict.coarse_vibrates, std::nullopt);
+    EXPECT_EQ(verdict.fine_is_still, std::nullopt);
+    EXPECT_EQ(verdict.fine_vibrates_fast, std::nullopt);
+    EXPECT_EQ(verdict.claim_met(), std::nullopt);
+    EXPECT_FALSE(verdict.all_tested());
+  }
+}
+
+TEST(JudgeResolution, SpeedsOnOneSideOfTheOnsetTestOneHalf) {
+  auto slow = as_claimed(), fast = as_claimed();
+  std::erase_if(slow, [](const ResolutionCell& one) { return one.speed > 0.1; });
+  std::erase_if(fast, [](const ResolutionCell& one) { return one.speed < 0.1; });
+  EXPECT_EQ(judge_resolution(slow).fine_is_still, true);
+  EXPECT_EQ(judge_resolution(slow).fine_vibrates_fast, std::nullopt);
+  EXPECT_EQ(judge_resolution(slow).claim_met(), std::nullopt);
+  EXPECT_EQ(judge_resolution(fast).fine_is_still, std::nullopt);
+  EXPECT_EQ(judge_resolution(fast).fine_vibrates_fast, true);
+  EXPECT_EQ(judge_resolution(fast).claim_met(), std::nullopt);
+  // What was tested and does not hold is enough for a no.
+  for (ResolutionCell& one : slow) one.unstable = one.people_unstable = 0;
+  EXPECT_EQ(judge_resolution(slow).claim_met(), false);
+  EXPECT_FALSE(judge_resolution(slow).all_tested());
 }
 
 TEST(JudgeResolution, TheEncodersOwnStepIsTheControl) {
@@ -97,8 +115,8 @@ TEST(SimulateResolution, WithAFullGripAndNoDelayNothingVibrates) {
 TEST(SimulateResolution, WithAWeakGripAndADelayBothClaimsAppear) {
   const auto runs = run_resolution({}, subject_1);
   ASSERT_EQ(runs.size(), 4u);
-  EXPECT_TRUE(judge_resolution(runs.back().cells).claim_met());
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_FALSE(judge_resolution(runs[i].cells).claim_met()) << i;
+  EXPECT_EQ(judge_resolution(runs.back().cells).claim_met(), true);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(judge_resolution(runs[i].cells).claim_met(), false) << i;
   // And yet the speed's part of them is none of the resolution's.
   EXPECT_EQ(judge_resolution(runs.back().cells).onset_from_resolution, false);
 }

@@ -17,10 +17,17 @@ ResolutionSettings few() {
   return settings;
 }
 
-TEST(ResolutionReport, SaysWhatHoldsAndWhatDoesNot) {
-  const ResolutionStudy study = study_resolution(few(), std::vector<simulation::OperatorModel>(1));
+std::string all_words(const ResolutionStudy& study) {
   std::string all;
   for (const std::string& words : resolution_words(study)) all += words + "\n";
+  return all;
+}
+
+TEST(ResolutionReport, SaysWhatHoldsAndWhatDoesNot) {
+  const ResolutionStudy study = study_resolution(few(), std::vector<simulation::OperatorModel>(1));
+  const std::string all = all_words(study);
+  EXPECT_CONTAINS(all, "1 person, 1 touch with each push");
+  EXPECT_EQ(all.find("Not tested"), std::string::npos) << all;
   EXPECT_CONTAINS(all, "With a full grip and no delay nothing vibrates");
   EXPECT_CONTAINS(all, "both claims appear");
   EXPECT_CONTAINS(all, "calibrated, not predicted");
@@ -51,7 +58,35 @@ TEST(ResolutionReport, ADevicesTouchesNeedNoSimulation) {
   study.runs = {{{}, {cell}}};
   EXPECT_EQ(resolution_table(study).rows.size(), 1u);
   EXPECT_EQ(write_resolution(study, folder / "new", ".svg").size(), 5u);
+  EXPECT_CONTAINS(resolution_words(study)[1], "the paper's claims are not all tested");
+  EXPECT_CONTAINS(all_words(study), "for want of a touch there: 0.1 mm below 0.1 m/s, 0.1 mm above 0.1 m/s.");
+  study.runs[0].cells[0].unstable = study.runs[0].cells[0].people_unstable = 0;
   EXPECT_CONTAINS(resolution_words(study)[1], "not met");
+}
+
+// With one speed only half of the second claim can be seen, and no other setting shows more of it.
+TEST(ResolutionReport, WhatNoTouchTestedIsNeitherYesNorNo) {
+  for (const double speed : {0.05, 0.2}) {
+    ResolutionSettings settings = few();
+    settings.speeds = {speed};
+    const bool slow = speed < paper::vibration_onset_speed;
+    const ResolutionStudy study = study_resolution(settings, std::vector<simulation::OperatorModel>(1));
+    const report::Table claims = resolution_claims_table(study), changed = resolution_variations_table(study);
+    const std::size_t untested = slow ? 3 : 2, tested = slow ? 2 : 3;
+    for (std::size_t run = 0; run < study.runs.size(); ++run) {
+      EXPECT_EQ(claims.rows[run][untested], "not tested") << speed << " " << run;
+      EXPECT_NE(claims.rows[run][tested], "not tested") << speed << " " << run;
+    }
+    for (const std::vector<std::string>& row : changed.rows) {
+      EXPECT_EQ(row[untested], "not tested") << row[0];
+      EXPECT_NE(row[4], "yes") << row[0];
+    }
+    const std::string all = all_words(study);
+    EXPECT_CONTAINS(all, "the two claims were not both tested");
+    EXPECT_CONTAINS(all, slow ? "for want of a touch there: 0.1 mm above 0.1 m/s."
+                              : "for want of a touch there: 0.1 mm below 0.1 m/s.");
+    EXPECT_EQ(all.find("both claims appear in"), std::string::npos) << all;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,288 @@
+#include "host_tools/experiment/standstill.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/stood_still.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
+#include "host_tools/experiment/touch_journal.hpp"
+#include "tests/host_tools/experiment/asked_person.hpp"
+#include "tests/host_tools/experiment/stalled_board.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::experiment {
+namespace {
+using firmware::Fault;
+using host_tools_test::thrown_message;
+
+class StandstillTest : public TouchedBoard {
+ protected:
+  StandstillTest() { simulation_wait(2000); }
+  void simulation_wait(int milliseconds) { cable().sim.wait(std::chrono::milliseconds(milliseconds)); }
+  bool cut_off(const std::exception& error) {
+    return Standstill(device, {0, 1}, tell).cut_off(error, "a wall");
+  }
+  Fault fault(std::size_t axis) { return device::fault_of(device::Drive(device, axis).status()); }
+
+  const device::DeviceError any_error{"the axis lost its force"};
+  const link::LinkError no_answer{"no answer"};
+  const device::StoodStill stopped{"this program was stopped"};
+};
+
+TEST_F(StandstillTest, ASilenceThatTrippedIsClearedAndTold) {
+  device::Drive(device, 0).arm();
+  simulation_wait(1500);
+  ASSERT_EQ(fault(0), Fault::link_silent);
+  EXPECT_TRUE(cut_off(any_error));
+  EXPECT_EQ(fault(0), Fault::none);
+  EXPECT_EQ(device::Drive(device, 0).status().state(), firmware::DriveState::switch_on_disabled);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_CONTAINS(told[0], "a wall: this touch is thrown away and made again");
+  EXPECT_CONTAINS(told[0], "heard nothing for 1");
+  EXPECT_EQ(told[0].find('\n'), std::string::npos);
+}
+
+TEST_F(StandstillTest, WithoutAFaultItIsTheErrorThatTells) {
+  EXPECT_FALSE(cut_off(any_error));
+  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(cut_off(no_answer));
+  EXPECT_TRUE(cut_off(stopped));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_CONTAINS(told[0], "no answer");
+  EXPECT_CONTAINS(told[1], "this program was stopped");
+}
+
+TEST_F(StandstillTest, AnAxisThatIsStillArmedIsDisarmed) {
+  device::Drive(device, 0).arm();
+  EXPECT_TRUE(cut_off(no_answer));
+  expect_disarmed();
+}
+
+TEST_F(StandstillTest, AnyOtherFaultOfOneOfTheAxesIsLeftAlone) {
+  device::Drive(device, 0).arm();
+  simulation_wait(1500);
+  ASSERT_EQ(fault(0), Fault::link_silent);
+  set({"axis1.wall.law=none"});
+  device::Drive(device, 1).arm();
+  simulation().device().connect_encoder(1, false);
+  simulation_wait(100);
+  ASSERT_EQ(fault(1), Fault::encoder);
+  for (const std::exception* error :
+       {static_cast<const std::exception*>(&any_error), static_cast<const std::exception*>(&no_answer),
+        static_cast<const std::exception*>(&stopped)})
+    EXPECT_FALSE(cut_off(*error));
+  EXPECT_EQ(fault(0), Fault::link_silent);
+  EXPECT_EQ(fault(1), Fault::encoder);
+  EXPECT_TRUE(told.empty());
+}
+
+TEST_F(StandstillTest, WhoStoppedAnAxisMeantIt) {
+  device::Drive(device, 0).arm();
+  device::Drive(device, 0).stop();
+  EXPECT_FALSE(cut_off(no_answer));
+  EXPECT_EQ(device::Drive(device, 0).status().state(), firmware::DriveState::quick_stop_active);
+}
+
+TEST_F(StandstillTest, ADeviceThatCannotBeReachedOrWasStartedAnewIsNotReady) {
+  Standstill standstill(device, {0}, tell);
+  standstill.touch_begins();
+  cable().cut = true;
+  EXPECT_FALSE(standstill.cut_off(no_answer, "a wall"));
+  cable().cut = false;
+  EXPECT_TRUE(standstill.cut_off(no_answer, "a wall"));
+  // It has forgotten the lowered limits.
+  device = device::Device(std::make_unique<CutLink>(simulated_board::factory_scene()));
+  EXPECT_FALSE(standstill.cut_off(no_answer, "a wall"));
+  EXPECT_EQ(told.size(), 1u);
+}
+
+TEST_F(StandstillTest, NobodyNeedsToBeTold) {
+  EXPECT_TRUE(Standstill(device, {0}, {}).cut_off(no_answer, "a wall"));
+}
+
+/// Whole experiments, disturbed: contact and max-stiffness. Those of the other experiments are theirs.
+class DisturbedTouches : public StalledBoard {
+ protected:
+  DisturbedTouches() {
+    contact.hold_time = 2.0;
+    cable().sim.wait(std::chrono::milliseconds(2000));
+    set({"force.limit=10", "link.timeout=5"});
+  }
+
+  /// Three touches of a wall that holds still.
+  std::vector<ContactResult> run_contacts() {
+    const RestoredAfterwards restored(device, 0, contact_changes(contact));
+    Standstill standstill(device, {0}, notice);
+    std::vector<ContactResult> results;
+    for (int trial = 0; trial < 3; ++trial) {
+      results.push_back(repeated_touch<ContactResult>({prompter, nullptr, tell, &standstill}, "wall", [&]() {
+        if (prompter != nullptr) prompter->ask("press");
+        limits.push_back(device.read_number("force.limit"));
+        ContactResult result = run_contact(device, contact_conditions()[2], contact, tell);
+        limits.push_back(device.read_number("force.limit"));
+        return result;
+      }));
+    }
+    return results;
+  }
+  void expect_left_in_order() {
+    expect_disarmed();
+    EXPECT_EQ(device.read_number("force.limit"), 10.0);
+    EXPECT_EQ(device.read_number("link.timeout"), 5.0);
+    EXPECT_EQ(device.read_number("trace.interval"), 0.0);
+  }
+
+  ContactSettings contact;
+  calibration::Prompter* prompter = nullptr;
+  AskedPerson person;
+  std::vector<std::string> notices;
+  std::vector<double> limits;
+  const Tell notice = [this](const std::string& text) { notices.push_back(text); };
+};
+
+constexpr Stall::Of every_stall[] = {Stall::Of::program, Stall::Of::link, Stall::Of::device};
+
+TEST_F(DisturbedTouches, OneOfThemIsMadeAgainAndMeasuresTheSame) {
+  const auto undisturbed = run_contacts();
+  EXPECT_TRUE(notices.empty());
+  for (const Stall::Of of : every_stall) {
+    for (const int at_request : {1, 5, 40, 80}) {
+      SCOPED_TRACE(testing::Message() << static_cast<int>(of) << " at request " << at_request);
+      stall = {of, at_request, [](int touch) { return touch == 2; }};
+      touches = 0;
+      notices.clear();
+      limits.clear();
+      const auto disturbed = run_contacts();
+      EXPECT_EQ(touches, 4);
+      ASSERT_EQ(notices.size(), 1u);
+      EXPECT_CONTAINS(notices[0], "thrown away");
+      ASSERT_EQ(limits.size(), 7u);
+      EXPECT_NEAR(limits[2], 3.3, 1e-6) << "lowered before the touch that is disturbed";
+      EXPECT_NEAR(limits[3], 3.3, 1e-6) << "and before its repetition";
+      ASSERT_EQ(disturbed.size(), 3u);
+      for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(disturbed[i].measure.verdict, undisturbed[i].measure.verdict);
+        EXPECT_NEAR(disturbed[i].measure.peak_to_peak, undisturbed[i].measure.peak_to_peak, 0.15e-3);
+        EXPECT_EQ(disturbed[i].lost_records, 0u);
+        EXPECT_EQ(disturbed[i].aborted_at, std::nullopt);
+      }
+      expect_left_in_order();
+    }
+  }
+}
+
+TEST_F(DisturbedTouches, APersonIsAskedAgain) {
+  prompter = &person;
+  stall = {Stall::Of::program, 40, [](int touch) { return touch == 2; }};
+  EXPECT_EQ(run_contacts().size(), 3u);
+  EXPECT_EQ(person.requests.size(), 4u);
+  EXPECT_EQ(notices.size(), 1u);
+}
+
+TEST_F(DisturbedTouches, WhatNeverEndsIsToldAfterTheThirdRepetition) {
+  stall = {Stall::Of::program, 40, [](int) { return true; }};
+  EXPECT_CONTAINS(
+      thrown_message<device::DeviceError>([&] { run_contacts(); }),
+      "the axis lost its force during the trial: the host was silent for longer than link.timeout");
+  EXPECT_EQ(touches, 1 + most_standstills);
+  EXPECT_EQ(notices.size(), static_cast<std::size_t>(most_standstills));
+  expect_left_in_order();
+  touches = 0;
+  ASSERT_TRUE(device::Drive(device, 0).clear());
+  stall.of = Stall::Of::link;
+  EXPECT_CONTAINS(thrown_message<link::LinkError>([&] { run_contacts(); }), "no answer");
+  EXPECT_EQ(touches, 1 + most_standstills);
+  expect_left_in_order();
+}
+
+TEST_F(DisturbedTouches, ThreeStandstillsAreAllowedToEachTouch) {
+  stall = {Stall::Of::program, 40, [](int touch) { return touch % 4 != 0; }};
+  EXPECT_EQ(run_contacts().size(), 3u);
+  EXPECT_EQ(touches, 12);
+  EXPECT_EQ(notices.size(), 9u);
+  expect_left_in_order();
+}
+
+TEST_F(DisturbedTouches, NoOtherErrorIsRepeated) {
+  tell = [&](const std::string& text) {
+    if (touches == 2 && text.find("holding") != std::string::npos)
+      simulation().device().connect_encoder(0, false);
+  };
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }), "encoder");
+  EXPECT_EQ(touches, 2);
+  EXPECT_TRUE(notices.empty());
+  expect_left_in_order();
+}
+
+TEST_F(DisturbedTouches, NeitherIsWhatTheUserOrAnotherProgramStops) {
+  struct Interrupted {};
+  tell = [&](const std::string& text) {
+    if (touches == 2 && text.find("holding") != std::string::npos) throw Interrupted();
+  };
+  EXPECT_THROW(run_contacts(), Interrupted);
+  EXPECT_EQ(touches, 2);
+  tell = [&](const std::string& text) {
+    if (touches == 4 && text.find("holding") != std::string::npos) device::Drive(device, 0).stop();
+  };
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }), "Quick stop");
+  EXPECT_EQ(touches, 4);
+  EXPECT_TRUE(notices.empty());
+}
+
+// Ctrl-C during a standstill is seen before there is force again.
+TEST_F(DisturbedTouches, NothingIsArmedAgainAfterAnInterruption) {
+  struct Interrupted {};
+  bool interrupted = false;
+  stall = {Stall::Of::program, 40, [&](int) { return interrupted = true; }};
+  tell = [&](const std::string&) {
+    if (interrupted) throw Interrupted();
+  };
+  EXPECT_THROW(run_contacts(), Interrupted);
+  EXPECT_EQ(touches, 1);
+  expect_disarmed();
+}
+
+TEST_F(DisturbedTouches, AnOscillationIsAVerdictAndNotRepeated) {
+  contact.abort_amplitude = 0.5e-3;  // any touch bounces by more
+  stall = {Stall::Of::program, 1000, [](int) { return true; }};
+  const auto results = run_contacts();
+  EXPECT_EQ(touches, 3);
+  for (const ContactResult& result : results) EXPECT_TRUE(result.aborted_at);
+  EXPECT_TRUE(notices.empty());
+}
+
+TEST_F(DisturbedTouches, WithoutAStandstillToLookForTheyAreErrorsAsAnyOther) {
+  stall = {Stall::Of::program, 40, [](int) { return true; }};
+  const auto once = [&] { return run_contact(device, contact_conditions()[2], contact, tell); };
+  EXPECT_THROW(repeated_touch<ContactResult>({nullptr, nullptr, tell}, "wall", once), device::DeviceError);
+  EXPECT_EQ(touches, 1);
+}
+
+TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
+  DeviceStiffnessSettings settings;
+  settings.touch = contact;
+  settings.start = 3000;
+  settings.step = 500;
+  StiffnessCondition plain;
+  plain.name = "plain";
+  const auto search = [&] {
+    return find_max_stiffness(device, plain, settings, prompter, nullptr, tell, notice);
+  };
+  const DeviceStiffnessResult undisturbed = search();
+  for (const Stall::Of of : every_stall) {
+    stall = {of, 40, [](int touch) { return touch == 2; }};
+    touches = 0;
+    notices.clear();
+    const DeviceStiffnessResult disturbed = search();
+    EXPECT_EQ(notices.size(), 1u);
+    EXPECT_EQ(disturbed.found.stiffness, undisturbed.found.stiffness);
+    EXPECT_EQ(disturbed.touches.size(), undisturbed.touches.size());
+    EXPECT_EQ(static_cast<std::size_t>(touches), undisturbed.touches.size() + 1);
+  }
+}
+
+}  // namespace
+}  // namespace kmax::experiment
