@@ -44,7 +44,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
              .product = product_code,
              .revision = firmware_version,
              .serial = board.serial_number},
-            round_ticks * 1'000'000 / tick_rate_hz),
+            round_interval_us),
       capture_(capture_memory) {
   for (AxisStateMachine& machine : machines_) machine.initialised();
   configure_thermal();
@@ -166,11 +166,16 @@ void Application::take_reports() {
   for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = snapshots_[axis].read();
 }
 
-/// The main loop's news of a link come at any time; what goes regularly goes with the rounds of the tick.
+/// The main loop's news of a link come at any time; what goes regularly goes with the rounds of the tick, on
+/// a clock that counts them.
 bool Application::round_has_begun() {
   constexpr std::uint32_t without_ticks_us = 1'000;  // where none come, or none any more
   const std::uint32_t round = report_[axis_count - 1].tick / round_ticks;
-  if (round == round_ && now_us_ - round_us_ < without_ticks_us) return false;
+  const std::uint32_t waited_us = now_us_ - round_us_;
+  // So late that the first axis has reported of the next round: a moment more, and the last will have too.
+  const bool complete = round != round_ && report_[0].tick / round_ticks == round;
+  if (!complete && waited_us < without_ticks_us) return false;
+  round_clock_us_ += round == round_ ? waited_us : (round - round_) * round_interval_us;
   round_ = round;
   round_us_ = now_us_;
   return true;

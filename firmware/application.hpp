@@ -88,6 +88,7 @@ class Application {
   /// The main loop's rhythm: every so many ticks each axis reports, besides at once when something has
   /// changed.
   static constexpr std::uint32_t round_ticks = 4;
+  static constexpr std::uint32_t round_interval_us = round_ticks * 1'000'000 / tick_rate_hz;
 
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
   /// application.
@@ -277,7 +278,7 @@ class Application {
   std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
   Settings settings_;
   std::uint32_t now_us_ = 0, uptime_second_us_ = 0, uptime_s_ = 0;
-  std::uint32_t round_ = 0, round_us_ = 0;
+  std::uint32_t round_ = 0, round_us_ = 0, round_clock_us_ = 0;
   bool started_ = false;
 
   Handover<Settings> handover_;

@@ -67,7 +67,7 @@ void Application::poll_can() {
     node_.configure(registers_.values(), now_us_);
   }
   act_on(node_.poll(now_us_));
-  if (round_has_begun()) node_.poll_pdos(now_us_);
+  if (round_has_begun()) node_.poll_pdos(round_clock_us_);
   if (can_.state != told_can_state_) {
     if (can_.state == CanState::bus_off) act_on(node_.bus_off());
     canopen::Emergency& emergency = node_.emergency();

@@ -51,7 +51,7 @@ class Node {
  public:
   /// `pdo_interval_us`: of poll_pdos().
   Node(Objects& objects, const LssIdentity& identity, std::uint32_t pdo_interval_us)
-      : objects_(objects), lss_(identity), sdo_(objects), tpdos_(pdo_interval_us) {}
+      : objects_(objects), lss_(identity), sdo_(objects), pdo_interval_us_(pdo_interval_us) {}
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
@@ -107,7 +107,7 @@ class Node {
     }
     error_behaviour_ = static_cast<std::uint8_t>(setting(entry_of<"canopen.error_behaviour">()));
     rpdos_.configure(values, id);
-    if (nmt_.state() == NmtState::operational) tpdos_.configure(values, id, lss_.active_bit_rate(), now_us);
+    if (nmt_.state() == NmtState::operational) configure_tpdos(values);
     list_identifiers(id);
   }
 
@@ -117,7 +117,7 @@ class Node {
     if (frame.extended || frame.remote) return events;
     const std::uint32_t id = frame.identifier;
     if (id == cob_id::nmt) {
-      follow(nmt_.receive(frame), values, now_us, events);
+      follow(nmt_.receive(frame), values, events);
     } else if (id == cob_id::lss_request) {
       act_on(lss_.receive(frame, now_us), events);
     } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
@@ -142,16 +142,21 @@ class Node {
     return events;
   }
 
-  /// For PDOs that go by time.
-  void poll_pdos(std::uint32_t now_us) {
-    if (nmt_.state() == NmtState::operational) tpdos_.poll(now_us);
+  /// For PDOs that go by time, which have a clock of their own: `pdo_us` goes on by the interval from call to
+  /// call, also if a call is late. So a PDO goes with the same one of so many calls, and with values at the
+  /// same distance, however long the calls before took and whatever comes between them.
+  void poll_pdos(std::uint32_t pdo_us) {
+    pdo_us_ = pdo_us;
+    if (nmt_.state() != NmtState::operational) return;
+    tpdos_.poll(pdo_us_);
+    tpdos_.read_due(objects_);
   }
 
   /// The next frame to send, if there is one; it counts as sent.
   [[nodiscard]] bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
     if (lss_.quiet()) return false;
     return nmt_.next_frame(out, now_us) || emergency_.next_frame(out, nmt_.state(), now_us) ||
-           (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, now_us)) ||
+           (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
            (speaks() && sdo_.next_frame(out, now_us)) || lss_.next_frame(out);
   }
 
@@ -225,14 +230,14 @@ class Node {
     }
   }
 
-  void follow(NmtEvent event, const ParameterValues& values, std::uint32_t now_us, NodeEvents& events) {
+  void follow(NmtEvent event, const ParameterValues& values, NodeEvents& events) {
     switch (event) {
       case NmtEvent::none:
         break;
       case NmtEvent::entered_operational:
         sdo_start_if_silent();
         rpdos_.configure(values, node_id());
-        tpdos_.configure(values, node_id(), lss_.active_bit_rate(), now_us);
+        configure_tpdos(values);
         break;
       case NmtEvent::entered_pre_operational:
         sdo_start_if_silent();
@@ -257,6 +262,13 @@ class Node {
   void stop_pdos() {
     tpdos_.stop();
     rpdos_.drop_kept();
+  }
+
+  // Those that start do so at the next call of poll_pdos() but one: to start them takes so long that the next
+  // may be late.
+  void configure_tpdos(const ParameterValues& values) {
+    const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
+    tpdos_.configure(values, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
   }
 
   void sdo_start_if_silent() {
@@ -318,6 +330,7 @@ class Node {
   HeartbeatConsumer heartbeats_;
   Sync sync_;
   SdoServer<Objects> sdo_;
+  std::uint32_t pdo_interval_us_, pdo_us_ = 0;
   Tpdos tpdos_;
   Rpdos rpdos_;
   CanSettings settings_;

@@ -40,13 +40,9 @@ struct TpdoCounters {
 /// with the same event time have one grid, those with multiples of it meet there; a change of one PDO's
 /// settings leaves the others' grid.
 ///
-/// A caller that comes at a regular interval says so. The grid then lies halfway between two calls, from the
-/// first call after the start on: that a call comes some microseconds early or late never makes it the call
-/// before or after, and event times that are multiples of the interval have frames at exactly their distance.
-///
-/// All PDOs that are due at one moment are read together when the first of them is fetched, and go in the
-/// order 1 to 4. If one is due again before it was fetched, it goes once, with newer values; and on a bus
-/// that never has room for all of them each gets its turn.
+/// All PDOs that are due at one moment are read together, by read_due() or else when the first of them is
+/// fetched, and go in the order 1 to 4. If one is due again before it was fetched, it goes once, with newer
+/// values; and on a bus that never has room for all of them each gets its turn.
 ///
 /// The inhibit time (types 254 and 255) is the least time between two frames of a PDO as they are fetched.
 /// One that is due earlier waits, and is then sent with the values of that moment. An inhibit time as long as
@@ -60,9 +56,6 @@ struct TpdoCounters {
 /// value() for each object of the PDOs that are due. Memory: 368 bytes.
 class Tpdos {
  public:
-  /// `call_interval_us`: of poll(); 0: irregular.
-  explicit Tpdos(std::uint32_t call_interval_us = 0) : call_interval_us_(call_interval_us) {}
-
   /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were go
   /// on undisturbed.
   void configure(const ParameterValues& values, std::uint8_t node_id, std::uint32_t bit_rate,
@@ -85,7 +78,7 @@ class Tpdos {
     }
     for (std::size_t i = 0; i < pdo_count; ++i) {
       if (!starts[i]) continue;
-      set_first_due(pdos_[i], starts, now_us);
+      pdos_[i].due_us = first_due(pdos_[i].period_us, starts, now_us);
       starts[i] = false;
     }
   }
@@ -111,8 +104,6 @@ class Tpdos {
   void poll(std::uint32_t now_us) {
     for (Pdo& pdo : pdos_) {
       if (!pdo.timed()) continue;
-      if (pdo.waits_for_call) pdo.due_us = now_us - call_interval_us_ / 2;
-      pdo.waits_for_call = false;
       release(pdo, now_us);
       const std::uint32_t late_us = now_us - pdo.due_us;
       if (late_us >> 31 != 0) continue;
@@ -124,18 +115,24 @@ class Tpdos {
     }
   }
 
+  /// The values of what is due are those of now, also if the bus has no room for them yet.
+  template <PdoSource Source>
+  void read_due(Source& source) {
+    const auto waits = [](const Pdo& pdo) { return pdo.state != State::idle && !pdo.inhibited && !pdo.read; };
+    if (std::any_of(pdos_.begin(), pdos_.end(), waits)) read_all(source);
+  }
+
   /// True and the next frame, if there is one to send; it counts as sent. Call it when there is room for one.
   template <PdoSource Source>
   bool next_frame(drivers::CanFrame& out, Source& source, std::uint32_t now_us) {
-    bool anything = false, to_read = false;
+    bool anything = false;
     for (Pdo& pdo : pdos_) {
       if (pdo.state == State::idle) continue;
       if (pdo.timed()) release(pdo, now_us);
       anything = anything || !pdo.inhibited;
-      to_read = to_read || (!pdo.inhibited && !pdo.read);
     }
     if (!anything) return false;
-    if (to_read) read_all(source);
+    read_due(source);
     for (std::size_t i = 0; i < pdo_count; ++i) {
       const std::size_t n = (next_ + i) % pdo_count;
       if (!pdos_[n].ready()) continue;
@@ -165,7 +162,6 @@ class Tpdos {
     bool read = false;  // data are of the moment it became due
     bool sent = false;
     bool inhibited = false;
-    bool waits_for_call = false;  // its grid begins with the next one
     std::uint8_t syncs = 0;
 
     bool timed() const { return settings.exists && !settings.synchronous(); }
@@ -183,17 +179,16 @@ class Tpdos {
   }
 
   // On the grid of a PDO of the same period that goes already, else on that of any other, else now.
-  void set_first_due(Pdo& pdo, const std::array<bool, pdo_count>& starts, std::uint32_t now_us) {
+  std::uint32_t first_due(std::uint32_t period_us, const std::array<bool, pdo_count>& starts,
+                          std::uint32_t now_us) const {
     const Pdo* other = nullptr;
     for (std::size_t i = 0; i < pdo_count; ++i) {
       if (starts[i] || !pdos_[i].timed()) continue;
-      if (other == nullptr || pdos_[i].period_us == pdo.period_us) other = &pdos_[i];
+      if (other == nullptr || pdos_[i].period_us == period_us) other = &pdos_[i];
     }
-    pdo.due_us = now_us;
-    pdo.waits_for_call = call_interval_us_ != 0 && (other == nullptr || other->waits_for_call);
-    if (other == nullptr) return;
+    if (other == nullptr) return now_us;
     const std::uint32_t wait_us = other->due_us - now_us;
-    pdo.due_us = wait_us >> 31 != 0 ? other->due_us : now_us + wait_us % pdo.period_us;
+    return wait_us >> 31 != 0 ? other->due_us : now_us + wait_us % period_us;
   }
 
   template <typename Source>
@@ -224,7 +219,6 @@ class Tpdos {
     ++counters_.sent;
   }
 
-  std::uint32_t call_interval_us_;
   std::array<Pdo, pdo_count> pdos_{};
   std::size_t next_ = 0;  // looked at first: goes on where a batch was left
   TpdoCounters counters_;

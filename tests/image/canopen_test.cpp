@@ -113,7 +113,8 @@ TEST(CanOpen, PdosTellOfOneTickAndOfRegularOnes) {
     ASSERT_GE(static_cast<double>(ticks.size()), 1000.0 * seconds - 1.0);
     for (std::size_t i = 0; i < ticks.size(); ++i) {
       ASSERT_EQ(ticks[i][0], ticks[i][1]) << "PDO " << i << ", " << what;
-      if (i != 0) ASSERT_EQ(ticks[i][0] - ticks[i - 1][0], 20U) << "PDO " << i << ", " << what;
+      const std::uint32_t before = i == 0 ? ticks[0][0] - 20 : ticks[i - 1][0];
+      ASSERT_EQ(ticks[i][0] - before, 20U) << "PDO " << i << ", " << what;
     }
   };
   for (int phase = 0; phase < 40; ++phase) {

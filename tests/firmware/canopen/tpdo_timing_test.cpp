@@ -32,30 +32,6 @@ void expect_grid(const std::vector<SentPdo>& sent, std::uint32_t identifier, std
   EXPECT_LE(due, end_us + period_us);
 }
 
-// Called by a main loop every 200 us, give or take 50: every fifth call sends, at whatever moment the PDOs
-// start.
-RC_GTEST_PROP(TpdoTiming, RegularCallsHaveTheirFramesAtOneDistance, ()) {
-  constexpr std::uint64_t interval_us = 200, jitter_us = 50;
-  TpdoBench bench(*rc::gen::inRange<std::uint64_t>(0, 2 * wrap));
-  bench.tpdos = Tpdos(interval_us);
-  RC_ASSERT(bench.remap(0x1800, {position}, 0x185, 255, 1) == Abort::none);
-  RC_ASSERT(bench.remap(0x1801, {position}, 0x285, 255, 2) == Abort::none);
-  const std::uint64_t first_call = bench.now_us + *rc::gen::inRange<std::uint64_t>(0, interval_us);
-  std::minstd_rand random(*rc::gen::inRange(1U, 1'000'000U));
-  bench.configure();
-  std::vector<std::uint64_t> calls_with[2];
-  for (std::uint64_t call = 0; call < 500; ++call) {
-    bench.sent.clear();
-    bench.step(first_call + call * interval_us + random() % (2 * jitter_us) - bench.now_us);
-    for (const SentPdo& pdo : bench.sent) calls_with[pdo.identifier == 0x285].push_back(call);
-  }
-  RC_ASSERT(calls_with[0].size() == 100U && calls_with[1].size() == 50U);
-  for (std::size_t pdo = 0; pdo < 2; ++pdo) {
-    for (std::size_t i = 0; i < calls_with[pdo].size(); ++i)
-      RC_ASSERT(calls_with[pdo][i] == calls_with[0][0] + (pdo + 1) * 5 * i);
-  }
-}
-
 TEST(TpdoTiming, DaysOfJitteredPollsDoNotMoveTheGrid) {
   const std::uint64_t start = wrap - 12'345;
   TpdoBench bench(start);
