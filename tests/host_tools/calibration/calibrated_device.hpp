@@ -19,6 +19,18 @@ namespace kmax::calibration_test {
 inline constexpr const char* scene_names[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b",
                                               "drone"};
 
+/// All that is set, volatile or not, but commands.
+inline std::vector<std::uint32_t> all_settings(device::Device& device) {
+  std::vector<device::Parameter> all;
+  for (const device::Parameter& parameter : device::all_parameters()) {
+    const std::string name(parameter.definition().name);
+    const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
+                         name == "transaction.control" || name == "store.command";
+    if (parameter.writable() && !passing) all.push_back(parameter);
+  }
+  return device.read(all);
+}
+
 /// A simulated board with one of the motor scenes, on a fast line, that can be calibrated.
 class CalibratedDevice {
  public:
@@ -42,17 +54,7 @@ class CalibratedDevice {
     });
   }
 
-  /// All that is set, volatile or not, but commands.
-  std::vector<std::uint32_t> parameters() {
-    std::vector<device::Parameter> all;
-    for (const device::Parameter& parameter : device::all_parameters()) {
-      const std::string name(parameter.definition().name);
-      const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
-                           name == "transaction.control" || name == "store.command";
-      if (parameter.writable() && !passing) all.push_back(parameter);
-    }
-    return device_.read(all);
-  }
+  std::vector<std::uint32_t> parameters() { return all_settings(device_); }
   bool armed() { return device::Drive(device_, 0).status().armed(); }
   std::uint32_t records() { return device::Store(device_).status().sequence; }
 

@@ -65,16 +65,7 @@ struct HeldUpDevice {
     link->wait(milliseconds(300));  // the power stage starts
   }
 
-  std::vector<std::uint32_t> parameters() {
-    std::vector<device::Parameter> all;
-    for (const device::Parameter& parameter : device::all_parameters()) {
-      const std::string name(parameter.definition().name);
-      const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
-                           name == "transaction.control" || name == "store.command";
-      if (parameter.writable() && !passing) all.push_back(parameter);
-    }
-    return device.read(all);
-  }
+  std::vector<std::uint32_t> parameters() { return all_settings(device); }
 
   simulation::Scene scene;
   HeldUpLink* link;

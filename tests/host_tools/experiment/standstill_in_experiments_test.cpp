@@ -6,22 +6,12 @@
 #include "host_tools/experiment/resolution/resolution_device.hpp"
 #include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/experiment/stalled_board.hpp"
+#include "tests/host_tools/experiment/two_held_axes.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
 namespace {
 using host_tools_test::thrown_message;
-
-/// Axis 0 pressed against its wall, axis 1 held where it is.
-simulation::Scene two_held_axes() {
-  simulation::Scene scene = simulated_board::factory_scene();
-  scene.axes[0].motion->push_force = 2.5;
-  scene.axes[0].motion->hold_time = 3.6;
-  scene.axes.push_back(scene.axes[0]);
-  scene.axes[1].motion->start_position = scene.axes[1].motion->wall_position = 0.0;
-  scene.axes[1].motion->push_force = 0.0;
-  return scene;
-}
 
 class DisturbedExperiment : public StalledBoard {
  protected:

@@ -5,23 +5,13 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/link/sim_link.hpp"
 #include "tests/host_tools/experiment/asked_person.hpp"
+#include "tests/host_tools/experiment/two_held_axes.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment {
 namespace {
 using host_tools_test::thrown_message;
-
-/// Axis 0 pressed against its wall, axis 1 held where it is.
-simulation::Scene two_held_axes() {
-  simulation::Scene scene = simulated_board::factory_scene();
-  scene.axes[0].motion->push_force = 2.5;
-  scene.axes[0].motion->hold_time = 3.6;
-  scene.axes.push_back(scene.axes[0]);
-  scene.axes[1].motion->start_position = scene.axes[1].motion->wall_position = 0.0;
-  scene.axes[1].motion->push_force = 0.0;
-  return scene;
-}
 
 class DeviationDevice : public testing::Test {
  protected:
