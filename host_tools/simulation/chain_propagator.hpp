@@ -163,7 +163,7 @@ class ChainPropagator {
 
 template <std::size_t masses>
 template <bool off_centre>
-[[gnu::always_inline]] inline ChainPropagator<masses>::Springs ChainPropagator<masses>::springs(
+[[gnu::always_inline]] inline typename ChainPropagator<masses>::Springs ChainPropagator<masses>::springs(
     double offset) const {
   Springs springs{chain_.stiffness, chain_.damping};
   if constexpr (off_centre) {
