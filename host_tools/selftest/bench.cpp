@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/drive_fault.hpp"
 #include "host_tools/device/errors.hpp"
 
 namespace kmax::selftest {
@@ -18,12 +19,6 @@ using std::chrono::milliseconds;
 namespace {
 bool starts_with(const std::string_view text, const std::string_view begin) {
   return text.substr(0, begin.size()) == begin;
-}
-
-firmware::Fault fault_of(const device::DriveStatus& status) {
-  if (!status.faulty()) return firmware::Fault::none;
-  const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
-  return text != nullptr ? text->fault : firmware::Fault::none;
 }
 }  // namespace
 
