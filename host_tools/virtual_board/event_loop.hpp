@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "host_tools/virtual_board/cortex_m/processor.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/processor.hpp"
 
 // Interleaves the processor with the peripherals' events, in order of time.
 //

@@ -8,7 +8,7 @@
 
 #include "firmware/modbus/crc.hpp"
 #include "host_tools/link/link.hpp"
-#include "host_tools/virtual_board/virtual_board.hpp"
+#include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 
 namespace kmax::tests {
 

@@ -5,7 +5,7 @@
 
 #include "host_tools/link/can/can_port.hpp"
 #include "host_tools/link/can/sdo_client.hpp"
-#include "host_tools/virtual_board/can_host_node.hpp"
+#include "host_tools/virtual_board/run/can_host_node.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests {

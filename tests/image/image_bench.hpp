@@ -9,10 +9,10 @@
 #include "firmware/fault.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
-#include "host_tools/virtual_board/modbus_master.hpp"
-#include "host_tools/virtual_board/parameter_sectors.hpp"
-#include "host_tools/virtual_board/scene_world.hpp"
-#include "host_tools/virtual_board/virtual_board.hpp"
+#include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
+#include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
+#include "host_tools/virtual_board/run/modbus_master.hpp"
+#include "host_tools/virtual_board/run/parameter_sectors.hpp"
 
 namespace kmax::tests {
 

@@ -100,7 +100,8 @@ report::Section image_section(const std::filesystem::path& pictures, const std::
       "for "
       "this computer and in the flashed image on the virtual board, which counts the image's instructions "
       "and "
-      "models the cycles of each (host_tools/virtual_board/instruction.hpp; wait states of the flash are "
+      "models the cycles of each (host_tools/virtual_board/cortex_m/instruction.hpp; wait states of the "
+      "flash are "
       "left "
       "out). The input differs, the code does not.",
       "The values are equal bit for bit: tests/image/parity_test.cpp repeats every call of the axis' tick in "

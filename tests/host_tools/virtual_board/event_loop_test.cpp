@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "drivers/stm32f4/registers/system_tick.hpp"
-#include "tests/host_tools/virtual_board/program_on_core.hpp"
+#include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board {
 namespace {

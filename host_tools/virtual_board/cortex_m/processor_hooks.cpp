@@ -1,0 +1,269 @@
+// The part of Processor that runs inside Unicorn: what happens before a block, at an access and at an
+// exception. No exception may leave these functions, they are called from translated code; and the engine may
+// be stopped from the block and interrupt hooks only (stopped during an access, it repeats the block with
+// changed registers).
+
+#include <unicorn/unicorn.h>
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "host_tools/virtual_board/cortex_m/processor.hpp"
+
+namespace kmax::virtual_board {
+namespace {
+
+// Numbers of the emulator's exceptions for a Cortex-M.
+constexpr std::uint32_t supervisor_call_trap = 2;
+constexpr std::uint32_t prefetch_abort_trap = 3;
+constexpr std::uint32_t breakpoint_trap = 7;
+constexpr std::uint32_t exception_return_trap = 8;
+
+constexpr std::uint64_t lazy_frame_cycles = 17;
+
+}  // namespace
+
+struct ProcessorHooks {
+  static void block(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
+    static_cast<Processor*>(self)->begin_block(static_cast<std::uint32_t>(address), size);
+  }
+  static void interrupt(uc_engine* /*engine*/, std::uint32_t number, void* self) {
+    static_cast<Processor*>(self)->interrupted(number);
+  }
+  static bool invalid(uc_engine* /*engine*/, uc_mem_type type, std::uint64_t address, int bytes,
+                      std::int64_t value, void* self) {
+    return static_cast<Processor*>(self)->invalid_memory(type, static_cast<std::uint32_t>(address),
+                                                         static_cast<unsigned>(bytes),
+                                                         static_cast<std::uint32_t>(value));
+  }
+  template <std::uint32_t base>
+  static std::uint64_t read(uc_engine* /*engine*/, std::uint64_t offset, unsigned bytes, void* self) {
+    return static_cast<Processor*>(self)->read_register(base + static_cast<std::uint32_t>(offset), bytes);
+  }
+  template <std::uint32_t base>
+  static void write(uc_engine* /*engine*/, std::uint64_t offset, unsigned bytes, std::uint64_t value,
+                    void* self) {
+    static_cast<Processor*>(self)->write_register(base + static_cast<std::uint32_t>(offset), bytes,
+                                                  static_cast<std::uint32_t>(value));
+  }
+  template <AddressRange range>
+  static void map_registers(uc_engine* engine, Processor* self) {
+    CoreEngine::check(
+        uc_mmio_map(engine, range.base, range.size, read<range.base>, self, write<range.base>, self),
+        "mapping registers");
+  }
+};
+
+void Processor::map_memory() {
+  uc_engine* engine = engine_.handle();
+  const auto map = [&](std::span<std::uint8_t> bytes, std::uint32_t base, std::uint32_t rights) {
+    CoreEngine::check(uc_mem_map_ptr(engine, base, bytes.size(), rights, bytes.data()), "mapping memory");
+  };
+  using namespace memory_map;
+  const std::uint32_t before = parameters.base - flash.base;
+  map(bus_.flash().first(before), flash.base, UC_PROT_READ | UC_PROT_EXEC);
+  map(bus_.flash().subspan(before + parameters.size), parameters.base + parameters.size,
+      UC_PROT_READ | UC_PROT_EXEC);
+  map(bus_.sram(), sram.base, UC_PROT_ALL);
+  map(bus_.ccm(), ccm.base, UC_PROT_READ | UC_PROT_WRITE);
+  ProcessorHooks::map_registers<parameters>(engine, this);
+  ProcessorHooks::map_registers<register_areas[0]>(engine, this);
+  ProcessorHooks::map_registers<register_areas[1]>(engine, this);
+  ProcessorHooks::map_registers<register_areas[2]>(engine, this);
+  ProcessorHooks::map_registers<register_areas[3]>(engine, this);
+  static_assert(register_areas.size() == 4);
+}
+
+void Processor::add_hooks() {
+  const auto add = [this](int type, auto function, const char* what) {
+    uc_hook hook{};
+    CoreEngine::check(
+        uc_hook_add(engine_.handle(), &hook, type, reinterpret_cast<void*>(function), this, 1, 0), what);
+  };
+  add(UC_HOOK_BLOCK, &ProcessorHooks::block, "hooking blocks");
+  add(UC_HOOK_INTR, &ProcessorHooks::interrupt, "hooking exceptions");
+  add(UC_HOOK_MEM_INVALID, &ProcessorHooks::invalid, "hooking invalid accesses");
+}
+
+void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
+  // Unicorn forgets the IT state when it is stopped between the two halves of an IT block that the end of a
+  // page cuts, and both ways would then be the same: interrupts wait for the block after.
+  const bool inside_if_then =
+      block_ != nullptr && block_->ends_inside_if_then && address == block_->address + block_->size;
+  if (block_ != nullptr) {
+    // Only here is it known which way the last block's branch went.
+    if (block_->cycles_if_taken != 0 && address != block_->address + block_->size)
+      charge(block_->cycles_if_taken);
+    block_ = nullptr;
+  }
+  const bool interesting = attention_ || now_ >= limit_ || core_.exceptions.preempting() ||
+                           stop_requested_.load(std::memory_order_relaxed);
+  if (interesting && !inside_if_then && must_stop()) {
+    event_ = Event::block_end;
+    uc_emu_stop(engine_.handle());
+    return;
+  }
+  const Block* block = blocks_.find(address, size);
+  if (block == nullptr) block = &blocks_.add(address, bus_.memory(address, size));
+  if (block->floating_point) {
+    if (!core_.system_control.fpu_enabled()) {
+      fail(fmt::format("floating-point instruction at {} while CPACR keeps the FPU off",
+                       place(block->first_floating_point)));
+      event_ = Event::block_end;
+      uc_emu_stop(engine_.handle());
+      return;
+    }
+    if (core_.floating_point.lazy_active()) {
+      core_.floating_point.end_lazy_frame();
+      charge(lazy_frame_cycles);
+    }
+  }
+  if (on_block_) on_block_(address, size);
+  block_ = block;
+  locator_.begin_block(*block);
+  instructions_ += block->instructions;
+  if (config_.units_per_instruction != 0) {
+    block_period_ = config_.units_per_instruction;
+    cycles_ += block->instructions;
+    now_ += block->instructions * block_period_;
+  } else {
+    block_period_ = clocks_.core;
+    cycles_ += block->cycles;
+    now_ += block->cycles * block_period_;
+  }
+}
+
+/// Something is up: find out what. Also takes the limit anew when registers were accessed.
+bool Processor::must_stop() {
+  if (attention_) {
+    attention_ = false;
+    if (schedule_.next_event) limit_ = std::min(run_limit_, schedule_.next_event());
+    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested()) return true;
+  }
+  if (stop_requested_.load(std::memory_order_relaxed) || now_ >= limit_) return true;
+  return core_.exceptions.preempting() && core_.exceptions.deliverable(masks());
+}
+
+/// Sets time and counters to the end of the accessing instruction, instead of its block.
+void Processor::begin_access(std::uint32_t address, unsigned bytes, bool store) {
+  attention_ = true;
+  if (block_ == nullptr) return;
+  const MemoryInstruction* instruction =
+      locator_.locate(address, store, [this](unsigned number) { return core_register(number); });
+  if (instruction == nullptr) {
+    access_pc_ = block_->address;
+  } else {
+    access_pc_ = block_->address + instruction->position;
+    instructions_ahead_ = block_->instructions - instruction->instructions;
+    cycles_ahead_ =
+        config_.units_per_instruction != 0 ? instructions_ahead_ : block_->cycles - instruction->cycles;
+    ahead_ = cycles_ahead_ * block_period_;
+    if (locator_.is_piece(bytes)) throw RefusedAccess("the access is not aligned to its width");
+  }
+  if (now() >= limit_ && schedule_.catch_up) schedule_.catch_up(now());
+}
+
+void Processor::end_access() {
+  ahead_ = 0;
+  instructions_ahead_ = 0;
+  cycles_ahead_ = 0;
+}
+
+void Processor::refuse_access(std::uint32_t address, unsigned bytes, std::uint32_t value, bool store,
+                              std::string why) {
+  if (bad_access_pending_) return;  // the first one counts
+  bad_access_ = {.address = address,
+                 .bytes = bytes,
+                 .value = value,
+                 .store = store,
+                 .pc = access_pc_,
+                 .why = std::move(why)};
+  bad_access_pending_ = true;
+}
+
+/// After a refused access the rest of the block still runs, but reaches no register any more.
+bool Processor::ignores_accesses() const {
+  return bad_access_pending_ && !config_.faults_to_firmware;
+}
+
+std::uint32_t Processor::read_register(std::uint32_t address, unsigned bytes) {
+  if (ignores_accesses()) return 0;
+  std::uint32_t value = 0;
+  try {
+    begin_access(address, bytes, false);
+    value = bus_.read(address, bytes, now());
+  } catch (const std::exception& error) {
+    refuse_access(address, bytes, 0, false, error.what());
+  }
+  end_access();
+  return value;
+}
+
+void Processor::write_register(std::uint32_t address, unsigned bytes, std::uint32_t value) {
+  if (ignores_accesses()) return;
+  try {
+    begin_access(address, bytes, true);
+    bus_.write(address, bytes, value, now());
+  } catch (const std::exception& error) {
+    refuse_access(address, bytes, value, true, error.what());
+  }
+  end_access();
+}
+
+void Processor::interrupted(std::uint32_t number) {
+  switch (number) {
+    case supervisor_call_trap:
+      event_ = Event::supervisor_call;
+      break;
+    case breakpoint_trap: {
+      const std::uint32_t pc = engine_.get(UC_ARM_REG_PC);
+      const auto code = bus_.memory(pc, 2);
+      breakpoint_ = code.empty() ? 0 : code[0];
+      event_ = Event::breakpoint;
+      break;
+    }
+    case exception_return_trap:
+      event_ = Event::exception_return;
+      break;
+    case prefetch_abort_trap:
+      event_ = Event::bad_fetch;
+      break;
+    default:
+      fail(fmt::format("exception {} of the emulator at {}", number, place(engine_.get(UC_ARM_REG_PC))));
+      break;
+  }
+  uc_emu_stop(engine_.handle());
+}
+
+bool Processor::invalid_memory(int type, std::uint32_t address, unsigned bytes, std::uint32_t value) {
+  const bool store = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
+  const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
+  std::uint32_t pc = address;
+  if (!fetch && block_ != nullptr) {
+    const MemoryInstruction* instruction =
+        locator_.locate(address, store, [this](unsigned number) { return core_register(number); });
+    pc = block_->address + (instruction != nullptr ? instruction->position : 0U);
+    // The rest of the block does not run.
+    if (instruction != nullptr) {
+      instructions_ -= block_->instructions - instruction->instructions;
+      const std::uint64_t cycles = config_.units_per_instruction != 0
+                                       ? block_->instructions - instruction->instructions
+                                       : block_->cycles - instruction->cycles;
+      cycles_ -= cycles;
+      now_ -= cycles * block_period_;
+    }
+  }
+  std::string why = "there is nothing at this address";
+  if (fetch && memory_map::ccm.contains(address)) why = "code cannot be fetched from CCM";
+  if (store && memory_map::flash.contains(address)) {
+    why = "flash is programmed through its controller, and only in the parameter sectors";
+  }
+  bad_access_ = {address, bytes, value, store, fetch, true, pc, std::move(why)};
+  event_ = Event::bad_access;
+  return false;
+}
+
+}  // namespace kmax::virtual_board

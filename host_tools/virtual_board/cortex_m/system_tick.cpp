@@ -1,0 +1,114 @@
+#include "host_tools/virtual_board/cortex_m/system_tick.hpp"
+
+#include <cstddef>
+
+namespace kmax::virtual_board {
+namespace {
+
+using namespace drivers::stm32f4;
+
+constexpr const char* name = "SysTick";
+constexpr std::uint32_t ctrl_settings = system_tick_ctrl::Enable::mask |
+                                        system_tick_ctrl::TickInterrupt::mask |
+                                        system_tick_ctrl::ProcessorClock::mask;
+
+}  // namespace
+
+BoardTime SystemTick::tick_period() const {
+  return system_tick_ctrl::ProcessorClock::of(ctrl_) != 0 ? clocks_.core : 8 * clocks_.core;
+}
+
+void SystemTick::reset(BoardTime /*now*/) {
+  ctrl_ = 0;
+  load_ = 0;
+  stopped_value_ = 0;
+  count_flag_ = false;
+  zero_at_ = never;
+}
+
+/// The counter holds `value` from `now` on. At 0 it takes LOAD one clock later.
+void SystemTick::start_from(std::uint32_t value, BoardTime now) {
+  clock_period_ = tick_period();
+  reload_ = load_;
+  stopped_value_ = value;
+  zero_at_ = never;
+  if (value != 0) {
+    zero_at_ = now + value * clock_period_;
+  } else if (load_ != 0) {
+    zero_at_ = now + (BoardTime{load_} + 1) * clock_period_;
+  }
+}
+
+std::uint32_t SystemTick::value_at(BoardTime now) const {
+  if (zero_at_ == never) return stopped_value_;
+  const BoardTime clocks_left = (zero_at_ - now + clock_period_ - 1) / clock_period_;
+  return clocks_left > reload_ && stopped_value_ == 0 ? 0 : static_cast<std::uint32_t>(clocks_left);
+}
+
+void SystemTick::advance(BoardTime now) {
+  while (zero_at_ <= now) {
+    count_flag_ = true;
+    if (system_tick_ctrl::TickInterrupt::of(ctrl_) != 0) exceptions_.pend(exception_number::system_tick);
+    start_from(0, zero_at_);
+  }
+}
+
+std::uint32_t SystemTick::read(const Access& access) {
+  require_word(access, name);
+  advance(access.now);
+  switch (access.offset) {
+    case offsetof(SystemTickRegisters, ctrl): {
+      const std::uint32_t value = ctrl_ | (count_flag_ ? system_tick_ctrl::CountFlag::mask : 0);
+      count_flag_ = false;
+      return value;
+    }
+    case offsetof(SystemTickRegisters, load):
+      return load_;
+    case offsetof(SystemTickRegisters, val):
+      return value_at(access.now);
+    case offsetof(SystemTickRegisters, calib):
+      return calibration;
+    default:
+      refuse(access, name, "no register here");
+  }
+}
+
+void SystemTick::write(const Access& access, std::uint32_t value) {
+  require_word(access, name);
+  advance(access.now);
+  const bool enabled = system_tick_ctrl::Enable::of(ctrl_) != 0;
+  switch (access.offset) {
+    case offsetof(SystemTickRegisters, ctrl): {
+      // COUNTFLAG is read-only; code that sets single bits writes it back.
+      if ((value & ~(ctrl_settings | system_tick_ctrl::CountFlag::mask)) != 0)
+        refuse(access, name, "CTRL: unknown bit");
+      const std::uint32_t counter = value_at(access.now);
+      const std::uint32_t changed = ctrl_ ^ value;
+      ctrl_ = value & ctrl_settings;
+      if (system_tick_ctrl::Enable::of(ctrl_) == 0) {
+        stopped_value_ = counter;
+        zero_at_ = never;
+      } else if (!enabled || system_tick_ctrl::ProcessorClock::of(changed) != 0) {
+        start_from(counter, access.now);
+      }
+      return;
+    }
+    case offsetof(SystemTickRegisters, load):
+      if (value > system_tick_load::Reload::maximum) refuse(access, name, "LOAD has 24 bits");
+      load_ = value;
+      if (enabled && zero_at_ == never) start_from(0, access.now);
+      return;
+    case offsetof(SystemTickRegisters, val):
+      count_flag_ = false;
+      if (enabled) {
+        start_from(0, access.now);
+      } else {
+        stopped_value_ = 0;
+      }
+      return;
+    default:
+      refuse(access, name, "CALIB is read-only");
+  }
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,345 @@
+#include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <stdexcept>
+
+#include "board/odrive_v3/pins.hpp"
+#include "drivers/stm32f4/registers/adc.hpp"
+#include "drivers/stm32f4/registers/can.hpp"
+#include "drivers/stm32f4/registers/rcc.hpp"
+#include "drivers/stm32f4/registers/spi.hpp"
+#include "drivers/stm32f4/registers/syscfg.hpp"
+#include "drivers/stm32f4/registers/timer.hpp"
+
+namespace kmax::virtual_board {
+
+namespace chip = drivers::stm32f4;
+namespace pins = board::odrive_v3::pins;
+using chip::GpioPort;
+using chip::ResetCause;
+
+VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config)
+    : image_(image),
+      world_(world),
+      core_(bus_, clocks_),
+      processor_(bus_, core_, clocks_, config.processor),
+      events_(processor_) {
+  for (const ElfSegment& segment : image_.segments()) {
+    const auto memory = bus_.memory(segment.address, segment.bytes.size());
+    if (memory.empty() || !memory_map::flash.contains(segment.address)) {
+      throw std::runtime_error(
+          fmt::format("the image has {} bytes at 0x{:08X}, where this board has no flash memory",
+                      segment.bytes.size(), segment.address));
+    }
+    std::copy(segment.bytes.begin(), segment.bytes.end(), memory.begin());
+  }
+  processor_.name_functions_by([this](std::uint32_t address) { return image_.function_at(address); });
+  attach_peripherals(config);
+  wire();
+  reset(ResetCause::power_on);
+  set_board_resistors();
+}
+
+void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
+  flash_ = std::make_unique<FlashInterface>(clocks_, bus_.flash());
+  pwr_ = std::make_unique<PwrModel>(clocks_);
+  rcc_ = std::make_unique<RccModel>(clocks_, *flash_, *pwr_);
+  identity_ = std::make_unique<DeviceIdentity>(config.identity);
+  dbgmcu_ = std::make_unique<DbgmcuModel>();
+  dwt_ = std::make_unique<DwtModel>([this] { return processor_.cycles(); },
+                                    [this] { return core_.core_debug.trace_enabled(); });
+  iwdg_ = std::make_unique<IwdgModel>();
+  iwdg_->set_oscillator_hz(config.watchdog_oscillator_hz);
+  exti_ = std::make_unique<ExtiModel>(syscfg_, core_.nvic);
+  pwm_[0] = std::make_unique<AdvancedTimerModel>(AdvancedTimer::tim1, clocks_, core_.nvic);
+  pwm_[1] = std::make_unique<AdvancedTimerModel>(AdvancedTimer::tim8, clocks_, core_.nvic);
+  encoders_[0] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim3, clocks_, core_.nvic);
+  encoders_[1] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim4, clocks_, core_.nvic);
+  adc_ = std::make_unique<AdcModel>(clocks_, core_.nvic, [this](unsigned channel, BoardTime at) {
+    return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
+  });
+  usart2_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::usart2);
+  uart4_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::uart4);
+  free_timers_[0] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim2, clocks_, core_.nvic);
+  free_timers_[1] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim5, clocks_, core_.nvic);
+  can1_ = std::make_unique<CanController>(clocks_, core_.nvic, can_bus_);
+  spi3_ = std::make_unique<SpiModel>(clocks_);
+
+  const auto attach = [this](std::uint32_t base, std::uint32_t size, std::string name, Peripheral& block,
+                             std::size_t enable_register = 0, std::uint32_t enable_mask = 0) {
+    std::function<bool()> clocked;
+    if (enable_mask != 0) {
+      clocked = [this, enable_register, enable_mask] {
+        return rcc_->clock_enabled(static_cast<std::uint32_t>(enable_register), enable_mask);
+      };
+    }
+    bus_.attach(base, size, std::move(name), block, std::move(clocked));
+    peripherals_.push_back(&block);
+  };
+  constexpr std::size_t ahb1 = offsetof(chip::RccRegisters, ahb1enr),
+                        apb1 = offsetof(chip::RccRegisters, apb1enr),
+                        apb2 = offsetof(chip::RccRegisters, apb2enr);
+  constexpr std::uint32_t timer_size = sizeof(chip::TimerRegisters);
+  attach(chip::tim1_base, timer_size, "TIM1", *pwm_[0], apb2, chip::rcc_apb2enr::Timer1::mask);
+  attach(chip::tim8_base, timer_size, "TIM8", *pwm_[1], apb2, chip::rcc_apb2enr::Timer8::mask);
+  attach(chip::tim3_base, timer_size, "TIM3", *encoders_[0], apb1, chip::rcc_apb1enr::Timer3::mask);
+  attach(chip::tim4_base, timer_size, "TIM4", *encoders_[1], apb1, chip::rcc_apb1enr::Timer4::mask);
+  attach(chip::adc_base, 0x400, "ADC", *adc_, apb2,
+         chip::rcc_apb2enr::Adc1::mask | chip::rcc_apb2enr::Adc2::mask | chip::rcc_apb2enr::Adc3::mask);
+  attach(chip::usart2_base, UsartModel::size, "USART2", *usart2_, apb1, chip::rcc_apb1enr::Usart2::mask);
+  attach(chip::uart4_base, UsartModel::size, "UART4", *uart4_, apb1, chip::rcc_apb1enr::Uart4::mask);
+  attach(chip::tim2_base, timer_size, "TIM2", *free_timers_[0], apb1, chip::rcc_apb1enr::Timer2::mask);
+  attach(chip::tim5_base, timer_size, "TIM5", *free_timers_[1], apb1, chip::rcc_apb1enr::Timer5::mask);
+  attach(chip::can1_base, 0x400, "CAN1", *can1_, apb1, chip::rcc_apb1enr::Can1::mask);
+  attach(chip::spi3_base, sizeof(chip::SpiRegisters), "SPI3", *spi3_, apb1, chip::rcc_apb1enr::Spi3::mask);
+  constexpr std::uint32_t port_clocks[] = {chip::rcc_ahb1enr::GpioA::mask, chip::rcc_ahb1enr::GpioB::mask,
+                                           chip::rcc_ahb1enr::GpioC::mask, chip::rcc_ahb1enr::GpioD::mask};
+  for (std::size_t i = 0; i < ports_.size(); ++i) {
+    const auto port = static_cast<GpioPort>(i);
+    ports_[i] = std::make_unique<GpioPortModel>(port);
+    attach(chip::gpio_base(port), 0x400, fmt::format("GPIO{}", "ABCD"[i]), *ports_[i], ahb1, port_clocks[i]);
+  }
+  attach(chip::syscfg_base, 0x400, "SYSCFG", syscfg_, apb2, chip::rcc_apb2enr::SystemConfiguration::mask);
+  attach(chip::exti_base, 0x400, "EXTI", *exti_);
+  attach(chip::rcc_base, RccModel::size, "RCC", *rcc_);
+  attach(chip::pwr_base, PwrModel::size, "PWR", *pwr_, apb1, chip::rcc_apb1enr::Power::mask);
+  attach(chip::flash_interface_base, FlashInterface::size, "FLASH", *flash_);
+  attach(chip::iwdg_base, IwdgModel::size, "IWDG", *iwdg_);
+  attach(chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU", *dbgmcu_);
+  attach(chip::dwt_base, DwtModel::size, "DWT", *dwt_);
+  attach(DeviceIdentity::base, DeviceIdentity::size, "system memory", *identity_);
+  // Only those that do something by themselves: the loop asks each of them at every event. At one instant in
+  // this order: an update event comes before the conversions that it starts.
+  const std::array<Peripheral*, 13> with_events{
+      pwm_[0].get(),        pwm_[1].get(),      adc_.get(),         usart2_.get(),
+      uart4_.get(),         spi3_.get(),        rcc_.get(),         iwdg_.get(),
+      can1_.get(),          encoders_[0].get(), encoders_[1].get(), free_timers_[0].get(),
+      free_timers_[1].get()};
+  for (Peripheral* peripheral : with_events) events_.add(*peripheral);
+  events_.add(core_.system_tick);
+  events_.add(chip_events_);
+  events_.add(flash_stall_);
+}
+
+void VirtualBoard::wire() {
+  bus_.on_parameter_store([this](std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime now) {
+    flash_->store(address, bytes, value, now);
+  });
+  pwm_[0]->on_trigger_output([this](BoardTime now) {
+    pwm_[1]->trigger_input(now);
+    look_at_world(now);
+    adc_->trigger_injected(now);
+  });
+  for (std::size_t axis = 0; axis < pwm_.size(); ++axis) {
+    pwm_[axis]->on_output_change([this, axis](BoardTime now) { show_bridge(axis, now); });
+  }
+  rcc_->on_clock_failure([this](BoardTime now) {
+    for (auto& timer : pwm_) timer->clock_failure_break(now);
+  });
+  rcc_->on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
+    if (level) core_.exceptions.pend(exception_number::non_maskable);
+  });
+  iwdg_->on_started([this](BoardTime /*now*/) { rcc_->note_low_speed_oscillator_running(); });
+  iwdg_->on_reset([this](BoardTime /*now*/) {
+    watchdog_fired_ = true;
+    processor_.stop();
+  });
+  usart2_->on_transmitted([this](std::uint8_t byte, BoardTime /*end*/) { transmitted_.push_back(byte); });
+  wire_chips();
+  wire_pins();
+}
+
+void VirtualBoard::wire_chips() {
+  spi3_->on_frame([this](std::uint16_t word, BoardTime now) { return exchange(word, now); });
+  for (Drv8301Chip& driver : gate_drivers_) {
+    driver.on_fault_output([this](bool /*level*/, BoardTime now) {
+      show_fault_line(now);
+      for (std::size_t axis = 0; axis < pwm_.size(); ++axis) show_bridge(axis, now);
+    });
+  }
+}
+
+// All chips share the wire; those that drive it are anded, and nobody at all is the pull-up.
+std::uint16_t VirtualBoard::exchange(std::uint16_t word, BoardTime now) {
+  std::uint16_t wire = 0xFFFF;
+  for (Drv8301Chip& driver : gate_drivers_) wire &= driver.exchange(word, now).value_or(0xFFFF);
+  if (world_ != nullptr) serial_encoder_.set_fitted(world_->serial_encoder(now).fitted);
+  wire &= serial_encoder_.exchange(word, now).value_or(0xFFFF);
+  for (std::size_t axis = 0; axis < gate_drivers_.size() && world_ != nullptr; ++axis) {
+    world_->set_amplifiers(axis, drivers::gain_factor(gate_drivers_[axis].gain()),
+                           gate_drivers_[axis].calibrating(), now);
+  }
+  return wire;
+}
+
+// Gate signals reach the FETs through a driver that is awake and without a latched fault.
+void VirtualBoard::show_bridge(std::size_t axis, BoardTime now) {
+  if (world_ == nullptr) return;
+  std::array<PwmLegOutput, 3> legs = pwm_[axis]->outputs();
+  if (!gate_drivers_[axis].drives_gates(now)) {
+    for (PwmLegOutput& leg : legs) leg.enabled = false;
+  }
+  world_->set_bridge(axis, legs, now);
+}
+
+void VirtualBoard::show_fault_line(BoardTime now) {
+  const bool low = fault_line_held_ || !gate_drivers_[0].fault_output() || !gate_drivers_[1].fault_output();
+  port(pins::gate_driver_fault.port)
+      .drive(pins::gate_driver_fault.number, low ? PinDrive::low : PinDrive::floating, now);
+}
+
+void VirtualBoard::wire_pins() {
+  for (std::size_t i = 0; i < ports_.size(); ++i) {
+    const auto port_id = static_cast<GpioPort>(i);
+    ports_[i]->on_input_change([this, port_id](unsigned pin, bool level, BoardTime now) {
+      exti_->set_pin(port_id, pin, level, now);
+    });
+  }
+  for (std::size_t i = 0; i < ports_.size(); ++i) {
+    const auto port_id = static_cast<GpioPort>(i);
+    ports_[i]->on_output_change([this, port_id](unsigned number, PinOutput output, BoardTime now) {
+      const board::odrive_v3::PinLocation pin{port_id, static_cast<std::uint8_t>(number)};
+      const bool high = output == PinOutput::high;
+      if (pin == pins::gate_enable) {
+        for (Drv8301Chip& driver : gate_drivers_) driver.enable_gate(high, now);
+        for (std::size_t axis = 0; axis < pwm_.size(); ++axis) show_bridge(axis, now);
+      }
+      // The brake's driver has its supply from the gate drivers.
+      if (pin == pins::brake_high_side && world_ != nullptr)
+        world_->set_brake(high && gate_drivers_[0].answers(now), now);
+      if (pin == pins::gate_driver0_select) gate_drivers_[0].select(output != PinOutput::low, now);
+      if (pin == pins::gate_driver1_select) gate_drivers_[1].select(output != PinOutput::low, now);
+      if (pin == pins::encoder_select) serial_encoder_.select(output != PinOutput::low);
+    });
+  }
+}
+
+void VirtualBoard::set_board_resistors() {
+  const auto drive = [this](board::odrive_v3::PinLocation pin, PinDrive how) {
+    port(pin.port).drive(pin.number, how, now());
+  };
+  for (const auto pin : {pins::brake_low_side, pins::brake_high_side}) drive(pin, PinDrive::pulled_down);
+  for (const auto pin : {pins::encoder0_a, pins::encoder0_b, pins::encoder1_a, pins::encoder1_b})
+    drive(pin, PinDrive::pulled_up);
+  for (const auto pin : {pins::encoder0_index, pins::encoder1_index}) drive(pin, PinDrive::low);
+  drive(pins::healthy, PinDrive::pulled_down);
+  drive(pins::emergency_stop, PinDrive::low);
+}
+
+// At each trigger, which is when the firmware is about to look.
+void VirtualBoard::look_at_world(BoardTime now) {
+  if (world_ == nullptr) return;
+  for (std::size_t axis = 0; axis < encoders_.size(); ++axis) {
+    const EncoderSignals signals = world_->encoder(axis, now);
+    encoders_[axis]->set_encoder_count(signals.edges);
+    const auto index = axis == 0 ? pins::encoder0_index : pins::encoder1_index;
+    if (port(index.port).level(index.number) != signals.index)
+      port(index.port).drive(index.number, signals.index ? PinDrive::high : PinDrive::low, now);
+  }
+  // DRV8301 data sheet, protection: PVDD under-voltage at 5.9 V.
+  constexpr double lowest_supply = 5.9;
+  const bool too_low = world_->supply_voltage() < lowest_supply;
+  if (too_low == supply_was_low_) return;
+  supply_was_low_ = too_low;
+  for (Drv8301Chip& driver : gate_drivers_)
+    driver.set_condition(drivers::Drv8301Fault::supply_under_voltage, too_low, now);
+}
+
+void VirtualBoard::reset(ResetCause cause) {
+  const BoardTime at = now();
+  for (Peripheral* peripheral : peripherals_) peripheral->reset(at);
+  rcc_->note_reset(cause);
+  processor_.reset(at);
+  watchdog_fired_ = false;
+  ++resets_;
+}
+
+void VirtualBoard::run_until(BoardTime time) {
+  while (now() < time && !flash_->power_is_cut()) {
+    const RunEnd end = events_.run_until(time);
+    if (flash_stall_.take()) {
+      stall_until(flash_->busy_until());
+      continue;
+    }
+    if (watchdog_fired_) {
+      reset(ResetCause::independent_watchdog);
+    } else if (end == RunEnd::reset_requested) {
+      reset(ResetCause::software);
+    } else if (end == RunEnd::fault) {
+      // Cut in the middle of an erase or a store: nothing runs any more.
+      if (flash_->power_is_cut()) return;
+      fail();
+    } else if (end == RunEnd::stopped) {
+      return;
+    }
+  }
+}
+
+// The one bank is busy: the core gets no instruction, everything else goes on.
+void VirtualBoard::stall_until(BoardTime time) {
+  while (now() < time && !watchdog_fired_) {
+    const BoardTime next = std::min(time, std::max(events_.next_event(), now()));
+    processor_.stall_until(next);
+    events_.catch_up(next);
+  }
+  if (watchdog_fired_) reset(ResetCause::independent_watchdog);
+}
+
+std::string VirtualBoard::where() const {
+  const std::uint32_t address = processor_.program_counter();
+  return fmt::format("{} in {} (0x{:08X})", processor_.sleeping() ? "sleeping" : "running",
+                     image_.function_at(address), address);
+}
+
+void VirtualBoard::fail() const {
+  throw std::runtime_error(fmt::format("at {:.6f} s: {}", seconds(processor_.now()), processor_.fault()));
+}
+
+void VirtualBoard::run_for(double duration_s) {
+  run_until(now() + static_cast<BoardTime>(duration_s * static_cast<double>(units_per_second)));
+}
+
+void VirtualBoard::receive(std::span<const std::uint8_t> bytes) {
+  for (const std::uint8_t byte : bytes) usart2_->receive(byte, true, true, now());
+}
+
+std::vector<std::uint8_t> VirtualBoard::transmitted() {
+  std::vector<std::uint8_t> bytes;
+  bytes.swap(transmitted_);
+  return bytes;
+}
+
+void VirtualBoard::open_emergency_stop(bool open) {
+  port(pins::emergency_stop.port)
+      .drive(pins::emergency_stop.number, open ? PinDrive::floating : PinDrive::low, now());
+}
+
+bool VirtualBoard::healthy() const {
+  return ports_[static_cast<std::size_t>(pins::healthy.port)]->level(pins::healthy.number);
+}
+
+bool VirtualBoard::fault_line() const {
+  return ports_[static_cast<std::size_t>(pins::gate_driver_fault.port)]->level(
+      pins::gate_driver_fault.number);
+}
+
+void VirtualBoard::hold_fault_line(bool low) {
+  fault_line_held_ = low;
+  show_fault_line(now());
+}
+
+void VirtualBoard::pull_reset() {
+  reset(ResetCause::pin);
+}
+
+void VirtualBoard::cycle_power() {
+  flash_->power_up(now());
+  for (const auto memory : {bus_.sram(), bus_.ccm()}) {
+    for (std::size_t i = 0; i < memory.size(); ++i) memory[i] = static_cast<std::uint8_t>(0xA5U ^ (i * 7U));
+  }
+  reset(ResetCause::power_on);
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,209 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
+#include "host_tools/virtual_board/cortex_m/dwt.hpp"
+#include "host_tools/virtual_board/cortex_m/processor.hpp"
+#include "host_tools/virtual_board/elf_image.hpp"
+#include "host_tools/virtual_board/event_loop.hpp"
+#include "host_tools/virtual_board/odrive_v3/as5047p_chip.hpp"
+#include "host_tools/virtual_board/odrive_v3/board_world.hpp"
+#include "host_tools/virtual_board/odrive_v3/drv8301_chip.hpp"
+#include "host_tools/virtual_board/stm32f4/adc.hpp"
+#include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
+#include "host_tools/virtual_board/stm32f4/can_bus.hpp"
+#include "host_tools/virtual_board/stm32f4/can_controller.hpp"
+#include "host_tools/virtual_board/stm32f4/dbgmcu.hpp"
+#include "host_tools/virtual_board/stm32f4/device_identity.hpp"
+#include "host_tools/virtual_board/stm32f4/exti_and_syscfg.hpp"
+#include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
+#include "host_tools/virtual_board/stm32f4/general_timer.hpp"
+#include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
+#include "host_tools/virtual_board/stm32f4/iwdg.hpp"
+#include "host_tools/virtual_board/stm32f4/pwr.hpp"
+#include "host_tools/virtual_board/stm32f4/rcc.hpp"
+#include "host_tools/virtual_board/stm32f4/spi.hpp"
+#include "host_tools/virtual_board/stm32f4/usart.hpp"
+
+namespace kmax::virtual_board {
+
+struct VirtualBoardConfig {
+  Identity identity{};
+  /// Processor's own settings, for tests that count instructions.
+  ProcessorConfig processor{};
+  std::uint32_t watchdog_oscillator_hz = 32'000;
+};
+
+/// The gate drivers' own events (they wake some time after EN_GATE) in the board's order of time. Not on the
+/// bus.
+class ChipEvents final : public Peripheral {
+ public:
+  explicit ChipEvents(std::array<Drv8301Chip, 2>& chips) : chips_(chips) {}
+  std::uint32_t read(const Access& access) override { refuse(access, "chips", "they have no registers"); }
+  void write(const Access& access, std::uint32_t /*value*/) override {
+    refuse(access, "chips", "they have no registers");
+  }
+  void advance(BoardTime now) override {
+    for (Drv8301Chip& chip : chips_) chip.advance(now);
+  }
+  BoardTime next_event() const override { return std::min(chips_[0].next_event(), chips_[1].next_event()); }
+  void reset(BoardTime /*now*/) override {}
+
+ private:
+  std::array<Drv8301Chip, 2>& chips_;
+};
+
+/// Stops the processor as soon as the flash has become busy, at the end of the block that did it. Not on the
+/// bus.
+class FlashStall final : public Peripheral {
+ public:
+  FlashStall(const std::unique_ptr<FlashInterface>& flash, Processor& processor)
+      : flash_(flash), processor_(processor) {}
+  std::uint32_t read(const Access& access) override { refuse(access, "flash stall", "it has no registers"); }
+  void write(const Access& access, std::uint32_t /*value*/) override {
+    refuse(access, "flash stall", "it has no registers");
+  }
+  void advance(BoardTime /*now*/) override {
+    served_ = flash_->busy_until();
+    pending_ = true;
+    processor_.stop();
+  }
+  BoardTime next_event() const override { return flash_->busy_until() > served_ ? processor_.now() : never; }
+  void reset(BoardTime /*now*/) override { served_ = flash_->busy_until(); }
+
+  /// The flash has become busy since the last call.
+  bool take() { return std::exchange(pending_, false); }
+
+ private:
+  const std::unique_ptr<FlashInterface>& flash_;
+  Processor& processor_;
+  BoardTime served_ = 0;
+  bool pending_ = false;
+};
+
+/// An ODrive v3.6 with an STM32F405 that runs a firmware image: the processor, its peripherals, the chips
+/// around it and the lines of connector J3, wired as pins.hpp of the board says. What the connectors lead to
+/// is a BoardWorld.
+///
+/// Everything happens in board time; the same image, world and calls give the same bits. Whoever wants real
+/// time calls run_until() at the pace of a clock.
+class VirtualBoard {
+ public:
+  /// The image is flashed into an erased part and the power is switched on. The world must outlive the board;
+  /// without one the connectors are open. Throws std::runtime_error when the image cannot run.
+  VirtualBoard(const ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config = {});
+  VirtualBoard(const VirtualBoard&) = delete;
+  VirtualBoard& operator=(const VirtualBoard&) = delete;
+
+  /// Runs to `time`; resets that the firmware or the watchdog ask for happen on the way. Throws
+  /// std::runtime_error, with the place and the function, when the firmware does what is refused.
+  void run_until(BoardTime time);
+  void run_for(double duration_s);
+  BoardTime now() const { return processor_.now(); }
+
+  // USART2, on GPIO3 and GPIO4 of J3.
+  void receive(std::span<const std::uint8_t> bytes);
+  /// What has left the pin since the last call.
+  std::vector<std::uint8_t> transmitted();
+
+  // Lines.
+  /// The contact at GPIO5; open is "stop". It is closed when the board is made.
+  void open_emergency_stop(bool open);
+  /// GPIO8 as a listener with a pull-down sees it.
+  bool healthy() const;
+  /// The reset line, pulled low for a moment.
+  void pull_reset();
+  /// Off and on again: RAM is lost, flash stays. Also after the flash has cut the power
+  /// (FlashInterface::cut_power_after), until when run_until() returns at once.
+  void cycle_power();
+  /// The gate drivers' wired fault line, pulled low from outside.
+  void hold_fault_line(bool low);
+  /// Its level; low is a fault.
+  bool fault_line() const;
+
+  bool bridge_armed(std::size_t axis) const { return pwm_[axis]->moe(); }
+  std::uint64_t resets() const { return resets_; }
+  /// What the processor is about to execute, in words.
+  std::string where() const;
+
+  // For tools and tests.
+  Processor& processor() { return processor_; }
+  Bus& bus() { return bus_; }
+  CorePeripherals& core() { return core_; }
+  FlashInterface& flash() { return *flash_; }
+  RccModel& rcc() { return *rcc_; }
+  UsartModel& usart() { return *usart2_; }
+  /// GPIO1 and GPIO2 of J3; the image of today does not use it.
+  UsartModel& uart4() { return *uart4_; }
+  CanBus& can_bus() { return can_bus_; }
+  const CanBusNode& can_node() const { return *can1_->node(); }
+  AdvancedTimerModel& pwm(std::size_t axis) { return *pwm_[axis]; }
+  GeneralTimerModel& encoder_timer(std::size_t axis) { return *encoders_[axis]; }
+  AdcModel& adc() { return *adc_; }
+  Drv8301Chip& gate_driver(std::size_t axis) { return gate_drivers_[axis]; }
+  GpioPortModel& port(drivers::stm32f4::GpioPort port) { return *ports_[static_cast<std::size_t>(port)]; }
+
+ private:
+  void attach_peripherals(const VirtualBoardConfig& config);
+  void wire();
+  void wire_pins();
+  void set_board_resistors();
+  void reset(drivers::stm32f4::ResetCause cause);
+  void stall_until(BoardTime time);
+  void wire_chips();
+  void show_bridge(std::size_t axis, BoardTime now);
+  void show_fault_line(BoardTime now);
+  std::uint16_t exchange(std::uint16_t word, BoardTime now);
+  void look_at_world(BoardTime now);
+  [[noreturn]] void fail() const;
+
+  ElfImage image_;
+  BoardWorld* world_;
+  BoardClocks clocks_;
+  Bus bus_;
+  CorePeripherals core_;
+  Processor processor_;
+  EventLoop events_;
+
+  std::unique_ptr<FlashInterface> flash_;
+  std::unique_ptr<PwrModel> pwr_;
+  std::unique_ptr<RccModel> rcc_;
+  std::unique_ptr<DeviceIdentity> identity_;
+  std::unique_ptr<DbgmcuModel> dbgmcu_;
+  std::unique_ptr<DwtModel> dwt_;
+  std::unique_ptr<IwdgModel> iwdg_;
+  std::array<std::unique_ptr<GpioPortModel>, 4> ports_;
+  SyscfgModel syscfg_;
+  std::unique_ptr<ExtiModel> exti_;
+  std::array<std::unique_ptr<AdvancedTimerModel>, 2> pwm_;
+  std::array<std::unique_ptr<GeneralTimerModel>, 2> encoders_;
+  std::unique_ptr<AdcModel> adc_;
+  std::unique_ptr<UsartModel> usart2_;
+  std::unique_ptr<UsartModel> uart4_;
+  std::array<std::unique_ptr<GeneralTimerModel>, 2> free_timers_;  ///< TIM2 and TIM5
+  CanBus can_bus_;
+  std::unique_ptr<CanController> can1_;
+  std::unique_ptr<SpiModel> spi3_;
+  std::array<Drv8301Chip, 2> gate_drivers_;
+  As5047pChip serial_encoder_{
+      [this](BoardTime now) { return world_ != nullptr ? world_->serial_encoder(now).angle : 0; }};
+  ChipEvents chip_events_{gate_drivers_};
+  FlashStall flash_stall_{flash_, processor_};
+  std::vector<Peripheral*> peripherals_;  ///< all but the core's
+
+  std::vector<std::uint8_t> transmitted_;
+  bool watchdog_fired_ = false;
+  bool fault_line_held_ = false;
+  bool supply_was_low_ = false;
+  std::uint64_t resets_ = 0;
+};
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,250 @@
+#include "host_tools/virtual_board/run/budget.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "host_tools/simulated_board/scene_parameters.hpp"
+#include "host_tools/virtual_board/cortex_m/instruction.hpp"
+#include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
+#include "host_tools/virtual_board/run/inline_frames.hpp"
+#include "host_tools/virtual_board/run/modbus_master.hpp"
+#include "host_tools/virtual_board/run/parameter_sectors.hpp"
+
+namespace kmax::virtual_board {
+
+namespace {
+
+/// Innermost first: the first function of an instruction's frames that one of these names are part of
+/// decides.
+struct StepPattern {
+  const char* step;
+  const char* function;
+};
+constexpr StepPattern patterns[] = {
+    {"position", "CountExtender<"},
+    {"position", "Axis::position_of"},
+    {"re-sampling", "Resampler::"},
+    {"velocity (FOAW)", "FoawVelocity"},
+    {"velocity (FOAW)", "ChordWindow"},
+    {"velocity (FOAW)", "VelocityEstimator<"},
+    {"adaptive wall", "WallLaw<"},
+    {"adaptive wall", "AdaptiveCoefficient<"},
+    {"interference", "Interference<"},
+    {"force limiter", "ForceLimiter<"},
+    {"haptic loop, the rest", "HapticLoop<"},
+    {"force to current", "MotorTransmission<"},
+    {"DC current", "DcCurrentController<"},
+    {"PMSM current", "FieldOrientedController<"},
+    {"PMSM current", "sine_cosine"},
+    {"phase watch", "PhaseWatch<"},
+    {"excitation", "Excitation::"},
+    {"force compensation", "ForceCompensation<"},
+    {"spin-out watch", "MotionPlausibility<"},
+    {"capture", "Application::ISR_capture"},
+    {"capture", "Capture::"},
+    {"motor control, the rest", "MotorControl::"},
+    {"report to the main loop", "ISR_fill"},
+    {"axis, trips", "firmware::Axis::"},
+    {"application", "firmware::Application::"},
+    {"current sampling", "CurrentSampling<"},
+    {"PWM", "ThreePhasePwm<"},
+    {"encoder, index", "ISR_read_quadrature"},
+    {"encoder, index", "QuadratureIndexWatch"},
+    {"encoder, index", "ReferencedQuadratureCounter"},
+    {"encoder, index", "SerialEncoder"},
+};
+constexpr const char* other_step = "board: conversion, housekeeping";
+
+std::string step_of(const std::vector<std::string>& frames) {
+  for (const std::string& function : frames) {
+    for (const StepPattern& pattern : patterns) {
+      // Not in the types of its arguments.
+      if (function.substr(0, function.find('(')).find(pattern.function) != std::string::npos)
+        return pattern.step;
+    }
+  }
+  return other_step;
+}
+
+std::uint16_t half_word(Bus& bus, std::uint32_t address) {
+  const auto bytes = bus.memory(address, 2);
+  return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
+}
+
+struct Tick {
+  std::size_t axis = 0;
+  std::vector<std::uint32_t> addresses;
+};
+
+/// The sequence of instructions of every run of the conversions' interrupt, without what interrupts it.
+class Recorder {
+ public:
+  Recorder(const ElfImage& image, VirtualBoard& board)
+      : board_(board),
+        handler_(image.required_symbol("ISR_adc").address),
+        application_(
+            image.required_symbol("_ZN4kmax8firmware11Application8ISR_tickEjRKNS0_4Axis5InputE").address) {
+    board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
+  }
+
+  void start() { recording_ = true; }
+  std::vector<Tick> take() { return std::move(ticks_); }
+
+ private:
+  void note(std::uint32_t address, std::uint32_t size) {
+    if (!recording_) return;
+    const auto& exceptions = board_.core().exceptions;
+    constexpr unsigned conversions = 16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::adc);
+    if (address == handler_) {
+      ticks_.emplace_back();
+    }
+    if (ticks_.empty() || !exceptions.active(conversions)) return;
+    if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
+        exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
+      return;
+    Tick& tick = ticks_.back();
+    if (address == application_) tick.axis = board_.processor().core_register(1);
+    for (std::uint32_t at = address; at < address + size;) {
+      tick.addresses.push_back(at);
+      at += is_wide(half_word(board_.bus(), at)) ? 4 : 2;
+    }
+  }
+
+  VirtualBoard& board_;
+  std::uint32_t handler_, application_;
+  bool recording_ = false;
+  std::vector<Tick> ticks_;
+};
+
+/// Entry, exit and the FP frame, PM0214; not part of what instructions cost.
+constexpr std::uint32_t exception_cycles = 12 + 12 + 2 * 17;
+
+void add_parameter(simulation::Scene& scene, const std::string& name, simulation::ParameterValue value) {
+  scene.parameters.push_back({name, std::move(value), "budget"});
+}
+
+struct StepSum {
+  std::uint64_t ticks = 0, instructions = 0, cycles = 0;
+  std::uint32_t worst = 0, worst_cycles = 0;
+};
+
+}  // namespace
+
+bool BudgetReport::kept() const {
+  return std::all_of(lines.begin(), lines.end(), [](const BudgetLine& line) { return line.kept(); });
+}
+
+BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene,
+                            const VirtualBoardConfig& config) {
+  for (const char* prefix : {"", "axis1."}) {
+    add_parameter(scene, std::string(prefix) + "wall.law", std::string("adaptive"));
+    add_parameter(scene, std::string(prefix) + "velocity.estimator", std::string("foaw"));
+    add_parameter(scene, std::string(prefix) + "velocity.window", std::int64_t{16});
+    add_parameter(scene, std::string(prefix) + "haptic.rate", 20000.0);
+  }
+  const ElfImage image = ElfImage::load(elf_path);
+  SceneWorld world(scene);
+  VirtualBoard board(image, &world, config);
+  store_parameters(board, simulated_board::assignments_of(scene));
+  Recorder recorder(image, board);
+  board.run_for(0.3);
+  ModbusMaster master(board);
+  for (std::size_t axis = 0; axis < 2; ++axis) master.arm(axis);
+  recorder.start();
+  // The approach, the contact and some of the hold.
+  board.run_for(0.3);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (!board.bridge_armed(axis))
+      throw std::runtime_error(fmt::format("axis {} has tripped during the measurement", axis));
+  }
+  std::vector<Tick> ticks = recorder.take();
+  if (!ticks.empty()) ticks.pop_back();  // not over
+
+  std::set<std::uint32_t> unique;
+  for (const Tick& tick : ticks) unique.insert(tick.addresses.begin(), tick.addresses.end());
+  const auto frames = inline_frames(elf_path, {unique.begin(), unique.end()});
+  struct Place {
+    std::string step;
+    Instruction instruction;
+  };
+  std::map<std::uint32_t, Place> places;
+  for (const std::uint32_t address : unique) {
+    places[address] = {step_of(frames.at(address)),
+                       decode(half_word(board.bus(), address), half_word(board.bus(), address + 2), address)};
+  }
+
+  std::map<std::string, StepSum> sums;
+  std::array<StepSum, 2> totals{};
+  std::array<std::uint32_t, 2> estimate_worst{};
+  for (const Tick& tick : ticks) {
+    std::map<std::string, std::pair<std::uint32_t, std::uint32_t>> in_tick;
+    for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
+      const Place& place = places.at(tick.addresses[i]);
+      const bool taken = i + 1 < tick.addresses.size() &&
+                         tick.addresses[i + 1] != tick.addresses[i] + place.instruction.bytes;
+      auto& [instructions, cycles] = in_tick[place.step];
+      ++instructions;
+      cycles += place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
+    }
+    std::uint32_t cycles_of_tick = exception_cycles;
+    for (const auto& [step, cost] : in_tick) {
+      cycles_of_tick += cost.second;
+      StepSum& sum = sums[step];
+      ++sum.ticks;
+      sum.instructions += cost.first;
+      sum.cycles += cost.second;
+      sum.worst = std::max(sum.worst, cost.first);
+      sum.worst_cycles = std::max(sum.worst_cycles, cost.second);
+    }
+    std::uint32_t estimate = 0;
+    for (const char* step : {"position", "re-sampling", "velocity (FOAW)"}) {
+      if (const auto found = in_tick.find(step); found != in_tick.end()) estimate += found->second.first;
+    }
+    const std::size_t axis = tick.axis & 1U;
+    estimate_worst[axis] = std::max(estimate_worst[axis], estimate);
+    StepSum& total = totals[axis];
+    ++total.ticks;
+    total.instructions += tick.addresses.size();
+    total.cycles += cycles_of_tick;
+    total.worst = std::max(total.worst, static_cast<std::uint32_t>(tick.addresses.size()));
+    total.worst_cycles = std::max(total.worst_cycles, cycles_of_tick);
+  }
+
+  BudgetReport report;
+  report.ticks = ticks.size();
+  const auto add = [&report](const std::string& name, const StepSum& sum) {
+    const auto count = static_cast<double>(std::max<std::uint64_t>(1, sum.ticks));
+    report.steps.push_back({name, sum.ticks, sum.worst, static_cast<double>(sum.instructions) / count,
+                            static_cast<double>(sum.cycles) / count, sum.worst_cycles});
+  };
+  std::set<std::string> shown;
+  for (const StepPattern& pattern : patterns) {
+    if (sums.contains(pattern.step) && shown.insert(pattern.step).second)
+      add(pattern.step, sums[pattern.step]);
+  }
+  if (sums.contains(other_step)) add(other_step, sums[other_step]);
+  add("whole tick, axis 0 (DC motor)", totals[0]);
+  add("whole tick, axis 1 (PMSM)", totals[1]);
+
+  const auto worst = [&sums](const char* step) { return static_cast<double>(sums[step].worst); };
+  const double tick_cycles = 168e6 / 20e3;
+  report.lines = {
+      {"adaptive wall", worst("adaptive wall"), 90, "instructions", ""},
+      {"position, FOAW (window 16) and re-sampling",
+       static_cast<double>(std::max(estimate_worst[0], estimate_worst[1])), 220, "instructions", ""},
+      {"DC current step", worst("DC current"), 45, "instructions", "lean reference 35"},
+      {"PMSM current step", worst("PMSM current"), 150, "instructions",
+       "lean reference 138, moteus core 202 and whole 420, ODrive 3.x 453, VESC 531, SimpleFOC 807"},
+      {"both axes, adaptive wall every tick",
+       100.0 * static_cast<double>(totals[0].worst_cycles + totals[1].worst_cycles) / tick_cycles, 25,
+       "% of 168 MHz", "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
+  };
+  return report;
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/simulation/scene.hpp"
+#include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
+
+namespace kmax::virtual_board {
+
+/// What one step of the tick costs, over all ticks of the measurement in which it ran.
+struct StepCost {
+  std::string name;
+  std::uint64_t ticks = 0;
+  std::uint32_t worst = 0;         ///< instructions in one tick
+  double mean = 0.0;               ///< instructions
+  double mean_cycles = 0.0;        ///< modelled; see instruction.hpp
+  std::uint32_t worst_cycles = 0;  ///< likewise
+};
+
+/// A bound, and what is held against it.
+struct BudgetLine {
+  std::string name;
+  double value = 0.0;
+  double bound = 0.0;
+  std::string unit;
+  std::string peers;  ///< what others need for the same work, in words
+  bool kept() const { return value <= bound; }
+};
+
+struct BudgetReport {
+  std::vector<StepCost> steps;
+  std::vector<BudgetLine> lines;
+  std::uint64_t ticks = 0;
+  bool kept() const;
+};
+
+/// Runs the image with the scene's two axes, both armed and pressed into an adaptive wall at 20 kHz with the
+/// widest FOAW window, and accounts for every instruction of every tick.
+///
+/// An instruction belongs to the innermost function that names a step, by the debug information of the image:
+/// what the compiler has inlined is told apart too, and what it has moved between two functions goes where it
+/// says it came from. Needs arm-none-eabi-addr2line. Throws std::runtime_error when that is missing, when the
+/// axes cannot be armed, or when an axis trips.
+BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene,
+                            const VirtualBoardConfig& config);
+
+std::string budget_table(const BudgetReport& report);
+std::string budget_json(const BudgetReport& report);
+
+}  // namespace kmax::virtual_board

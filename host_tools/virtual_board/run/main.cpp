@@ -1,0 +1,185 @@
+// kmax-board: runs the flashed image on an emulated ODrive v3.6.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <CLI/CLI.hpp>
+
+#include <iostream>
+#include <optional>
+
+#include "host_tools/kmax/exit_code.hpp"
+#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/serve/pseudo_terminal.hpp"
+#include "host_tools/simulated_board/file_flash.hpp"
+#include "host_tools/simulated_board/scene_parameters.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
+#include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
+#include "host_tools/virtual_board/run/budget.hpp"
+#include "host_tools/virtual_board/run/parameter_sectors.hpp"
+#include "host_tools/virtual_board/run/real_time_run.hpp"
+
+namespace {
+
+using namespace kmax;
+
+struct Options {
+  std::string elf, serial, can, gpio, scene = "motor_axes", store;
+  double duration = 0.0;
+  int volts = 24;
+  bool free_running = false, budget = false, json = false;
+};
+
+/// Parameter sectors from a file to the board's flash, and back again at the end.
+class StoreFile {
+ public:
+  StoreFile(const std::string& path, virtual_board::VirtualBoard& board)
+      : file_(path), sectors_(board.bus()) {
+    copy(file_, sectors_);
+  }
+  ~StoreFile() { copy(sectors_, file_); }
+  StoreFile(const StoreFile&) = delete;
+  StoreFile& operator=(const StoreFile&) = delete;
+
+ private:
+  static void copy(auto& from, auto& to) {
+    for (std::size_t sector = 0; sector < 2; ++sector) {
+      to.erase(sector);
+      for (std::size_t word = 0; word < virtual_board::ParameterSectors::words_per_sector; ++word) {
+        if (const std::uint32_t value = from.read(sector, word); value != 0xFFFF'FFFFU)
+          to.program(sector, word, value);
+      }
+    }
+  }
+
+  simulated_board::FileFlash file_;
+  virtual_board::ParameterSectors sectors_;
+};
+
+int run(const Options& options) {
+  const cli::Interruption interruption;
+  const simulation::Scene scene = simulated_board::open_scene(options.scene);
+  const auto image = virtual_board::ElfImage::load(options.elf);
+  virtual_board::SceneWorld world(scene);
+  if (options.budget && !(world.has_drive(0) && world.has_drive(1))) {
+    fmt::print(
+        stderr,
+        "kmax-board: --budget needs a scene with a motor on both axes, such as 'motor_axes'; '{}' has not\n",
+        scene.name);
+    return cli::wrong_usage;
+  }
+  if (!world.has_drive(0) && !world.has_drive(1)) {
+    fmt::print(
+        stderr,
+        "kmax-board: scene '{}' has no motors: the board's connectors are open, and it will refuse to arm\n",
+        scene.name);
+  }
+  virtual_board::VirtualBoardConfig config;
+  config.identity.volts = static_cast<std::uint8_t>(options.volts);
+  if (options.budget) {
+    const auto report = virtual_board::measure_budget(options.elf, scene, config);
+    fmt::print("{}", options.json ? virtual_board::budget_json(report) : virtual_board::budget_table(report));
+    return report.kept() ? cli::done : cli::verdict_is_no;
+  }
+  virtual_board::VirtualBoard board(image, &world, config);
+  std::optional<StoreFile> store;
+  if (!options.store.empty()) store.emplace(options.store, board);
+  virtual_board::store_parameters(board, simulated_board::assignments_of(scene));
+  std::optional<serve::PseudoTerminal> line;
+  std::optional<serve::CanConnection> can;
+  std::optional<virtual_board::GpioBridge> gpio;
+  std::vector<std::string> addresses;
+  if (!options.serial.empty()) {
+    line.emplace(options.serial);
+    addresses.push_back("serial:" + options.serial);
+  }
+  if (!options.can.empty()) {
+    can.emplace(options.can);
+    addresses.push_back("can:" + options.can);
+  }
+  if (!options.gpio.empty())
+    gpio.emplace(board, options.gpio, [](const std::string& text) { fmt::print(stderr, "{}\n", text); });
+  if (!addresses.empty()) {
+    fmt::print("{} on the virtual board with scene '{}', as {}\nset KMAX_DEVICE to that; Ctrl-C ends\n",
+               options.elf, scene.name, fmt::join(addresses, " and "));
+    std::cout.flush();
+  }
+  const auto report = virtual_board::run_board(
+      board, {line ? &*line : nullptr, can ? &*can : nullptr}, gpio ? &*gpio : nullptr, options.duration,
+      options.free_running, [&] { return interruption.requested(); });
+  fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", report.simulated_s,
+             board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
+  if (report.behind_s > 0.0)
+    fmt::print(stderr, "this machine was too slow or busy: {:.3f} s of real time were not simulated\n",
+               report.behind_s);
+  return cli::done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Runs a Kmax image, the very one that is flashed, on an emulated ODrive v3.6 with the motors and "
+      "handles of a "
+      "scene.\nWhat the firmware must not do (an unknown register, a clock that is off) stops it with the "
+      "place."};
+  app.footer(
+      "Examples:\n"
+      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --serial /tmp/board &\n"
+      "  kmax --device serial:/tmp/board info\n"
+      "  kmax --device serial:/tmp/board arm --hold      the person of the scene presses; Ctrl-C disarms\n"
+      "  kmax-board build/stm32f405/kmax-odrive_v3.elf --budget      instructions of each step of the "
+      "tick\n\n" +
+      std::string(cli::exit_code_text));
+  Options options;
+  app.add_option("ELF", options.elf, "The image, as linked")->required()->check(CLI::ExistingFile);
+  app.add_option("--serial", options.serial, "Name under which USART2 appears as a pseudo-terminal")
+      ->type_name("LINK");
+  app.add_option(
+         "--can", options.can,
+         "SocketCAN interface that CAN1 is bridged to; a name with a '/' is a bus that is served at that "
+         "Unix domain socket")
+      ->type_name("IFACE");
+  app.add_option(
+         "--gpio", options.gpio,
+         "Simulated GPIO chip (gpio-sim) whose lines 0 to 4 are NRST, BOOT0, ESTOP, FAULT and HEALTHY")
+      ->type_name("CHIP");
+  app.add_option("--scene", options.scene,
+                 "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
+                 "connector, its position stays 0")
+      ->type_name("SCENE")
+      ->capture_default_str();
+  app.add_option(
+         "--store", options.store,
+         "File that keeps what 'kmax save' saves (32 KiB, made if missing); written when this program "
+         "ends in order. What the scene says, its hardware and its [parameters], replaces the kept values "
+         "at each start")
+      ->type_name("FILE");
+  app.add_option("--voltage", options.volts, "Variant written into the board: 24 or 56")
+      ->check(CLI::IsMember({24, 56}))
+      ->capture_default_str();
+  app.add_option("--duration", options.duration, "Board time after which it ends; 0: at Ctrl-C")
+      ->type_name("SECONDS")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--free-running", options.free_running, "As fast as this machine goes instead of real time");
+  app.add_flag("--budget", options.budget,
+               "Counts the instructions and cycles of each step of the tick, and judges them");
+  app.add_flag("--json", options.json, "The budget as JSON");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? cli::done : cli::wrong_usage;
+  }
+  try {
+    if (options.json && !options.budget) {
+      fmt::print(stderr, "kmax-board: --json belongs to --budget\n");
+      return cli::wrong_usage;
+    }
+    return run(options);
+  } catch (const simulation::SceneError& error) {
+    fmt::print(stderr, "kmax-board: {}\n", error.what());
+    return cli::wrong_usage;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "kmax-board: {}\n", error.what());
+    return cli::failed;
+  }
+}

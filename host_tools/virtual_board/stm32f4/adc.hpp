@@ -1,0 +1,106 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+
+namespace kmax::virtual_board {
+
+/// ADC1, ADC2, ADC3 and their common registers as one block of 0x400 bytes at 0x4001'2000. RM0090, chapter
+/// Analog-to-digital converter, sections Injected channel management, Channel-wise programmable sampling
+/// time, Conversion on external trigger, ADC registers.
+///
+/// Injected groups of 1 to 4 conversions, started by TIM1's TRGO (rising edge) or JSWSTART; single regular
+/// conversions by SWSTART. A conversion takes its sampling time plus 12 ADC clocks; the input is held at the
+/// end of the sampling time. An injected start aborts a regular conversion, which begins anew afterwards; a
+/// regular start waits for the injected group. Writing JSQR while the injected group runs throws its work
+/// away and begins the new list at once (section Channel selection). Starts begin at once: the latency of up
+/// to 3 ADC clocks (data sheet) is not modelled.
+///
+/// Refused: all bits and registers beyond those (regular sequences, continuous and discontinuous mode,
+/// watchdog, DMA, offsets, left alignment, lower resolution, multi-ADC modes, EOCIE, internal channels, other
+/// triggers and edges); an ADC clock above 36 MHz; a start while the converter is off or less than 3 us after
+/// ADON; a list of several without SCAN; a channel that the converter cannot reach; changing a sampling time
+/// while a conversion runs.
+///
+/// Cost: a trigger that starts one conversion each on ADC2 and ADC3 and four on ADC1 makes three events: both
+/// holds, both ends, the end of the four. No allocation.
+class AdcModel final : public Peripheral {
+ public:
+  /// Volts at a channel's pin (0 to 15) at an instant. Channel numbers mean the same pin on all converters. A
+  /// group of one is asked at the very instant, a group of several when it ends or the firmware looks, that
+  /// is with instants of up to one group's length ago: a world that keeps no past may answer with the present
+  /// for what is that slow.
+  using Input = std::function<double(unsigned channel, BoardTime instant)>;
+
+  AdcModel(const BoardClocks& clocks, InterruptLines& interrupts, Input volts);
+
+  std::uint32_t read(const Access& access) override;
+  void write(const Access& access, std::uint32_t value) override;
+  void advance(BoardTime now) override;
+  BoardTime next_event() const override { return next_event_; }
+  void reset(BoardTime now) override;
+
+  /// Rising edge of TIM1's TRGO. Throws RefusedAccess when a converter that listens is not ready.
+  void trigger_injected(BoardTime now);
+
+  /// Triggers that found the injected group of the converter (1 to 3) still running, and did nothing.
+  std::uint64_t ignored_triggers(unsigned adc) const { return converters_.at(adc - 1).ignored_triggers; }
+  /// Groups that were thrown away because JSQR was written while they ran.
+  std::uint64_t restarted_groups(unsigned adc) const { return converters_.at(adc - 1).restarted_groups; }
+
+  /// 3.3 V full scale, nearest of 4096 codes; the first and the last take all beyond.
+  static std::uint32_t code_of(double volts);
+
+ private:
+  struct Conversion {
+    unsigned channel = 0;
+    BoardTime held_at = 0;
+    BoardTime ends_at = 0;
+    bool held = false;
+    std::uint32_t code = 0;
+  };
+  struct Converter {
+    unsigned number = 0;
+    std::uint32_t sr = 0, cr1 = 0, cr2 = 0, smpr1 = 0, smpr2 = 0, sqr3 = 0, jsqr = 0, dr = 0;
+    std::array<std::uint32_t, 4> jdr{};
+    BoardTime on_since = never;
+    bool injected_running = false;
+    unsigned index = 0, count = 0;  // of the conversion under way, of the group
+    Conversion injected;
+    BoardTime group_ends_at = 0;
+    bool regular_waiting = false, regular_running = false;
+    Conversion regular;
+    std::uint64_t ignored_triggers = 0, restarted_groups = 0;
+  };
+
+  std::uint32_t read_common(const Access& access) const;
+  void write_common(const Access& access, std::uint32_t value);
+  void write_cr1(Converter& adc, const Access& access, std::uint32_t value);
+  void write_cr2(Converter& adc, const Access& access, std::uint32_t value);
+  void write_list(Converter& adc, const Access& access, std::uint32_t value);
+  void write_sampling(Converter& adc, const Access& access, std::uint32_t& target, std::uint32_t value,
+                      unsigned channels);
+
+  void require_ready(const Converter& adc, BoardTime now) const;
+  void start_injected(Converter& adc, BoardTime now);
+  void start_regular(Converter& adc, BoardTime now);
+  Conversion conversion(const Converter& adc, unsigned channel, BoardTime begin) const;
+  bool step(Converter& adc, BoardTime now);
+  void hold(Conversion& conversion) const;
+  void settle();
+  BoardTime clock_period() const;
+
+  const BoardClocks& clocks_;
+  InterruptLines& interrupts_;
+  Input volts_;
+  std::array<Converter, 3> converters_;
+  std::uint32_t ccr_ = 0;
+  BoardTime next_event_ = never;
+  bool interrupt_ = false;
+};
+
+}  // namespace kmax::virtual_board

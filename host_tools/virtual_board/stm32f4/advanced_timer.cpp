@@ -1,0 +1,218 @@
+#include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
+
+#include "drivers/stm32f4/dead_time.hpp"
+#include "drivers/stm32f4/registers/timer.hpp"
+
+namespace kmax::virtual_board {
+
+namespace {
+
+using drivers::stm32f4::Interrupt;
+namespace timer_bdtr = drivers::stm32f4::timer_bdtr;
+namespace timer_ccer = drivers::stm32f4::timer_ccer;
+namespace timer_ccmr = drivers::stm32f4::timer_ccmr;
+namespace timer_cr1 = drivers::stm32f4::timer_cr1;
+namespace timer_cr2 = drivers::stm32f4::timer_cr2;
+namespace timer_dier = drivers::stm32f4::timer_dier;
+namespace timer_smcr = drivers::stm32f4::timer_smcr;
+namespace timer_sr = drivers::stm32f4::timer_sr;
+
+constexpr std::uint32_t longest_count = 0xFFFF;
+
+}  // namespace
+
+AdvancedTimerModel::AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks,
+                                       InterruptLines& interrupts)
+    : name_(unit == AdvancedTimer::tim1 ? "TIM1" : "TIM8"),
+      unit_(unit),
+      clocks_(clocks),
+      interrupts_(interrupts) {
+  reset(0);
+}
+
+void AdvancedTimerModel::reset(BoardTime now) {
+  counter_ = {};
+  cr1_ = cr2_ = smcr_ = dier_ = sr_ = ccer_ = rcr_ = bdtr_ = 0;
+  ccmr_ = {};
+  psc_ = {};
+  arr_ = {longest_count, longest_count};
+  ccr_ = {};
+  repetitions_ = 0;
+  lock_decided_ = waiting_ = trigger_level_ = false;
+  update_interrupts();
+  refresh_outputs(now);
+}
+
+void AdvancedTimerModel::advance(BoardTime now) {
+  while (counter_.next_turn() <= now) {
+    pass_turn();
+    // Between turns that nobody sees only the repetition counter could tell one period from the next.
+    if (next_event() == never && rcr_ == 0 && repetitions_ == 0) counter_.skip_whole_periods(now);
+  }
+  counter_.change_tick(now, tick());
+}
+
+BoardTime AdvancedTimerModel::next_event() const {
+  const bool triggers = timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_update && trigger_output_;
+  const bool interrupts = timer_dier::UpdateInterrupt::of(dier_) != 0 && timer_sr::Update::of(sr_) == 0;
+  const bool arms = timer_bdtr::AutomaticOutputEnable::of(bdtr_) != 0 && !moe();
+  return triggers || interrupts || arms || waiting_ ? counter_.next_turn() : never;
+}
+
+void AdvancedTimerModel::clock_changed(BoardTime now) {
+  advance(now);
+}
+
+bool AdvancedTimerModel::moe() const {
+  return timer_bdtr::MainOutputEnable::of(bdtr_) != 0;
+}
+
+bool AdvancedTimerModel::centre_aligned() const {
+  return timer_cr1::Alignment::of(cr1_) != 0;
+}
+
+void AdvancedTimerModel::start_counter(BoardTime now) {
+  counter_.start(now, tick(), arr_.active);
+  show_trigger_level(now);
+  refresh_outputs(now);
+}
+
+/// Over- or underflow. The repetition counter is reloaded by the update event alone, so RCR = 1 written
+/// before the start (repetition counter still 0) gives update events at overflows, as section Repetition
+/// counter says.
+void AdvancedTimerModel::pass_turn() {
+  const BoardTime now = counter_.next_turn();
+  const bool update = repetitions_ == 0;
+  bool changed = false;
+  if (update) {
+    changed = load_preloaded();
+  } else {
+    --repetitions_;
+  }
+  counter_.turn(tick(), arr_.active);
+  if (update) update_event(now, true, changed);
+}
+
+/// What follows from an update event once the registers are loaded.
+void AdvancedTimerModel::update_event(BoardTime now, bool flagged, bool changed) {
+  if (flagged) {
+    sr_ |= timer_sr::Update::mask;
+    update_interrupts();
+  }
+  if (timer_bdtr::AutomaticOutputEnable::of(bdtr_) != 0 && !moe()) {
+    bdtr_ |= timer_bdtr::MainOutputEnable::mask;
+    changed = true;
+  }
+  if (changed) refresh_outputs(now);
+  if (timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_update && trigger_output_) trigger_output_(now);
+}
+
+/// True when a register that shapes the outputs has changed.
+bool AdvancedTimerModel::load_preloaded() {
+  repetitions_ = rcr_;
+  if (!waiting_) return false;
+  psc_.active = psc_.preload;
+  arr_.active = arr_.preload;
+  for (Compare& compare : ccr_) compare.active = compare.preload;
+  waiting_ = false;
+  return true;
+}
+
+/// UG: registers TIMx_EGR and TIMx_CR1 (URS), section Counter modes.
+void AdvancedTimerModel::software_update(BoardTime now) {
+  load_preloaded();
+  if (!centre_aligned() && counter_.down()) {
+    counter_.set_count(arr_.active);
+  } else {
+    counter_.restart(now, tick(), arr_.active);
+  }
+  update_event(now, timer_cr1::UpdateRequestSource::of(cr1_) == 0, true);
+  if (timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_reset && trigger_output_) trigger_output_(now);
+}
+
+void AdvancedTimerModel::trigger_input(BoardTime now) {
+  advance(now);
+  if (timer_smcr::SlaveMode::of(smcr_) != timer_smcr::slave_trigger) return;
+  sr_ |= timer_sr::Trigger::mask;
+  if (!counter_.running()) start_counter(now);
+}
+
+void AdvancedTimerModel::clock_failure_break(BoardTime now) {
+  advance(now);
+  if (timer_bdtr::BreakEnable::of(bdtr_) != 0) break_event(now);
+}
+
+void AdvancedTimerModel::break_event(BoardTime now) {
+  bdtr_ &= ~timer_bdtr::MainOutputEnable::mask;
+  sr_ |= timer_sr::Break::mask;
+  update_interrupts();
+  refresh_outputs(now);
+}
+
+/// TRGO is a level with MMS = 1 only; its rising edge counts.
+void AdvancedTimerModel::show_trigger_level(BoardTime now) {
+  const bool level = timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_enable && counter_.running();
+  const bool rises = level && !trigger_level_;
+  trigger_level_ = level;
+  if (rises && trigger_output_) trigger_output_(now);
+}
+
+void AdvancedTimerModel::note_waiting() {
+  waiting_ = psc_.preload != psc_.active || arr_.preload != arr_.active;
+  for (const Compare& compare : ccr_) waiting_ = waiting_ || compare.preload != compare.active;
+}
+
+std::uint32_t AdvancedTimerModel::channel_mode(unsigned leg) const {
+  return timer_ccmr::CompareMode<1>::of(ccmr_[leg / 2] >> (timer_ccmr::bits_per_channel * (leg % 2)));
+}
+
+bool AdvancedTimerModel::preloaded(unsigned leg) const {
+  return timer_ccmr::ComparePreload<1>::of(ccmr_[leg / 2] >> (timer_ccmr::bits_per_channel * (leg % 2))) != 0;
+}
+
+/// Section PWM mode: mode 2 is active while counting up for CNT >= CCR, down for CNT > CCR, which is top -
+/// CCR ticks of either half period; mode 1 is its inverse. Stopped, the comparison stands still.
+PwmLegOutput AdvancedTimerModel::leg_output(unsigned leg) const {
+  const std::uint32_t both = timer_ccer::Enable<1>::mask | timer_ccer::ComplementaryEnable<1>::mask;
+  if (!moe() || (ccer_ >> (timer_ccer::bits_per_channel * leg) & both) == 0) return {};
+  const std::uint32_t compare = ccr_[leg].active;
+  double above = 0.0;
+  if (counter_.running()) {
+    const std::uint32_t top = arr_.active;
+    above = compare < top ? static_cast<double>(top - compare) / static_cast<double>(top) : 0.0;
+  } else {
+    const std::uint32_t count = counter_.count(0);
+    above = (counter_.down() ? count > compare : count >= compare) ? 1.0 : 0.0;
+  }
+  const BoardTime dead_time_clock = clocks_.apb2_timer << timer_cr1::ClockDivision::of(cr1_);
+  const auto code = static_cast<std::uint8_t>(timer_bdtr::DeadTime::of(bdtr_));
+  return {.enabled = true,
+          .high_duty = channel_mode(leg) == timer_ccmr::pwm_mode_2 ? above : 1.0 - above,
+          .dead_time = seconds(dead_time_clock * drivers::stm32f4::dead_time_ticks(code))};
+}
+
+void AdvancedTimerModel::refresh_outputs(BoardTime now) {
+  bool changed = false;
+  for (unsigned leg = 0; leg < outputs_.size(); ++leg) {
+    const PwmLegOutput output = leg_output(leg);
+    changed = changed || output != outputs_[leg];
+    outputs_[leg] = output;
+  }
+  if (changed && output_change_) output_change_(now);
+}
+
+void AdvancedTimerModel::update_interrupts() {
+  const bool update = timer_sr::Update::of(sr_) != 0 && timer_dier::UpdateInterrupt::of(dier_) != 0;
+  const bool broken = timer_sr::Break::of(sr_) != 0 && timer_dier::BreakInterrupt::of(dier_) != 0;
+  const bool first = unit_ == AdvancedTimer::tim1;
+  if (update != update_level_) {
+    update_level_ = update;
+    interrupts_.set_level(first ? Interrupt::tim1_up_tim10 : Interrupt::tim8_up_tim13, update);
+  }
+  if (broken != break_level_) {
+    break_level_ = broken;
+    interrupts_.set_level(first ? Interrupt::tim1_brk_tim9 : Interrupt::tim8_brk_tim12, broken);
+  }
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/stm32f4/centre_aligned_counter.hpp"
+
+namespace kmax::virtual_board {
+
+enum class AdvancedTimer : std::uint8_t { tim1, tim8 };
+
+/// What the gate signals of one half-bridge do at present, on average over half a PWM period.
+struct PwmLegOutput {
+  bool enabled = false;  ///< false: both gates off
+  double high_duty =
+      0.0;  ///< share of the time for which the high side is commanded, 0 to 1, by the active registers
+  double dead_time = 0.0;  ///< s, after each change
+  friend bool operator==(const PwmLegOutput&, const PwmLegOutput&) = default;
+};
+
+/// TIM1 or TIM8 as a motor's PWM generator: RM0090, chapter Advanced-control timers (TIM1&TIM8).
+///
+/// Modelled: centre-aligned counting; PSC, ARR and CCR1 to CCR3 with their preload; repetition counter;
+/// update event, UIF and its interrupt; UG, BG; TRGO as UG, CEN or update event; slave trigger mode from ITR0
+/// (TIM8 only, from TIM1); PWM modes 1 and 2 on channels 1 to 3 with complementary outputs; MOE, AOE, OSSI,
+/// OSSR, CKD and DTG; BIF and its interrupt; LOCK levels 1 to 3. No delay between the two timers (silicon: a
+/// tick or two through ITR0).
+///
+/// Refused: counting edge-aligned, UDIS, OPM, external clock and trigger, all DMA, CC interrupts, inputs,
+/// channel 4, active-low outputs, idle levels of 1, one output of a pair without the other, writing CNT or
+/// CMS or an ARR without preload while counting, a start with the count at the end of its direction. The
+/// compare flags CCxIF stay 0. No pin is mapped to BKIN on this board; it reads low, so BKE with BKP = 0
+/// would hold MOE at 0 and is refused.
+///
+/// The over- and underflow are events of the board only while somebody can see them: update interrupt,
+/// trigger output, a preloaded value that waits. At most two for each PWM period; otherwise they are made up
+/// for at the next access. Hence any write may bring next_event() forward.
+class AdvancedTimerModel final : public Peripheral {
+ public:
+  AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks, InterruptLines& interrupts);
+
+  std::uint32_t read(const Access& access) override;
+  void write(const Access& access, std::uint32_t value) override;
+  void advance(BoardTime now) override;
+  BoardTime next_event() const override;
+  void reset(BoardTime now) override;
+
+  /// Rising edges of TRGO. With MMS = 2 this is the update event.
+  void on_trigger_output(std::function<void(BoardTime)> listener) { trigger_output_ = std::move(listener); }
+  /// Called after outputs() has changed.
+  void on_output_change(std::function<void(BoardTime)> listener) { output_change_ = std::move(listener); }
+
+  /// A rising edge on ITR0.
+  void trigger_input(BoardTime now);
+  /// The clock security system has seen the crystal fail. Without BKE nothing happens.
+  void clock_failure_break(BoardTime now);
+  /// To be called when BoardClocks::apb2_timer has changed. Without it the change is noticed at the next
+  /// access or event.
+  void clock_changed(BoardTime now);
+
+  /// Legs A, B, C. The caller must have advanced the timer to the present.
+  const std::array<PwmLegOutput, 3>& outputs() const { return outputs_; }
+  bool moe() const;
+
+ private:
+  struct Compare {
+    std::uint32_t preload = 0;
+    std::uint32_t active = 0;
+  };
+
+  // Register writes, advanced_timer_registers.cpp.
+  void write_cr1(const Access& access, std::uint32_t value);
+  void write_cr2(const Access& access, std::uint32_t value);
+  void write_smcr(const Access& access, std::uint32_t value);
+  void write_egr(const Access& access, std::uint32_t value);
+  void write_ccmr(const Access& access, unsigned index, std::uint32_t value);
+  void write_ccer(const Access& access, std::uint32_t value);
+  void write_cnt(const Access& access, std::uint32_t value);
+  void write_arr(const Access& access, std::uint32_t value);
+  void write_ccr(const Access& access, unsigned index, std::uint32_t value);
+  void write_bdtr(const Access& access, std::uint32_t value);
+  void require_known(const Access& access, std::uint32_t value, std::uint32_t known, const char* name) const;
+  void require_16_bits(const Access& access, std::uint32_t value) const;
+  void require_defined_outputs(const Access& access) const;
+
+  // Counting and events, advanced_timer.cpp.
+  bool centre_aligned() const;
+  BoardTime tick() const { return clocks_.apb2_timer * (psc_.active + 1); }
+  void start_counter(BoardTime now);
+  void pass_turn();
+  void update_event(BoardTime now, bool flagged, bool changed);
+  bool load_preloaded();
+  void software_update(BoardTime now);
+  void break_event(BoardTime now);
+  void show_trigger_level(BoardTime now);
+  void note_waiting();
+  void refresh_outputs(BoardTime now);
+  PwmLegOutput leg_output(unsigned leg) const;
+  void update_interrupts();
+  std::uint32_t channel_mode(unsigned leg) const;
+  bool preloaded(unsigned leg) const;
+
+  const char* name_;
+  AdvancedTimer unit_;
+  const BoardClocks& clocks_;
+  InterruptLines& interrupts_;
+  std::function<void(BoardTime)> trigger_output_;
+  std::function<void(BoardTime)> output_change_;
+
+  CentreAlignedCounter counter_;
+  std::uint32_t cr1_ = 0;  // without CEN and DIR, which the counter has
+  std::uint32_t cr2_ = 0, smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0, rcr_ = 0, bdtr_ = 0;
+  std::array<std::uint32_t, 2> ccmr_{};
+  Compare psc_, arr_;
+  std::array<Compare, 3> ccr_{};
+  std::uint32_t repetitions_ = 0;
+  bool lock_decided_ = false;
+  bool waiting_ = false;  // a preloaded value differs from the active one
+  bool trigger_level_ = false;
+  bool update_level_ = false, break_level_ = false;  // as told to interrupts_
+  std::array<PwmLegOutput, 3> outputs_{};
+};
+
+}  // namespace kmax::virtual_board

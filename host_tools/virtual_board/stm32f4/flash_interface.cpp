@@ -1,0 +1,292 @@
+#include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
+namespace kmax::virtual_board {
+
+namespace {
+
+namespace stm32 = drivers::stm32f4;
+namespace acr = stm32::flash_acr;
+namespace cr = stm32::flash_cr;
+namespace sr = stm32::flash_sr;
+
+constexpr const char* block = "FLASH";
+
+constexpr std::uint32_t acr_bits = acr::Latency::mask | acr::Prefetch::mask | acr::InstructionCache::mask |
+                                   acr::DataCache::mask | acr::InstructionCacheReset::mask |
+                                   acr::DataCacheReset::mask;
+constexpr std::uint32_t cr_bits = cr::Program::mask | cr::SectorErase::mask | cr::Sector::mask |
+                                  cr::Parallelism::mask | cr::Start::mask | cr::Lock::mask;
+constexpr std::uint32_t sr_bits = sr::errors | sr::EndOfOperation::mask;
+
+constexpr BoardTime store_duration = 16 * units_per_microsecond;
+
+BoardTime erase_duration(unsigned sector) {
+  const BoardTime millisecond = 1000 * units_per_microsecond;
+  switch (stm32::flash_sector_bytes(sector)) {
+    case 16 * 1024:
+      return 250 * millisecond;
+    case 64 * 1024:
+      return 550 * millisecond;
+    default:
+      return 1000 * millisecond;
+  }
+}
+
+}  // namespace
+
+FlashInterface::FlashInterface(const BoardClocks& clocks, std::span<std::uint8_t> image)
+    : clocks_(clocks), image_(image) {
+  const std::uint32_t expected = stm32::flash_sector_offset(stm32::flash_sector_count);
+  if (image.size() == expected) return;
+  throw std::invalid_argument("flash image of " + std::to_string(image.size()) + " bytes; must be " +
+                              std::to_string(expected));
+}
+
+std::uint32_t FlashInterface::wait_states() const {
+  return acr::Latency::of(acr_);
+}
+
+std::uint32_t FlashInterface::wait_states_needed(BoardTime core_period) {
+  // One wait state per 30 MHz begun.
+  const BoardTime hz = units_per_second / core_period;
+  return static_cast<std::uint32_t>((hz - 1) / 30'000'000);
+}
+
+void FlashInterface::set_write_protected(unsigned sector, bool write_protected) {
+  write_protected_.at(sector) = write_protected;
+}
+
+void FlashInterface::cut_power_after(std::uint64_t operations, std::uint64_t seed) {
+  cut_at_ = operations == 0 ? 0 : operations_ + operations;
+  random_.seed(seed);
+}
+
+void FlashInterface::reset(BoardTime now) {
+  if (now < busy_until_ && latest_) tear();
+  busy_until_ = now;
+  latest_.reset();
+  acr_ = 0;
+  sr_ = 0;
+  cr_ = cr::Lock::mask;
+  first_key_given_ = false;
+  locked_up_ = false;
+  // The caches come out of reset disabled and must be assumed to hold anything until they are reset.
+}
+
+void FlashInterface::power_up(BoardTime now) {
+  power_is_cut_ = false;
+  cut_at_ = 0;
+  data_cache_is_stale_ = false;
+  latest_.reset();
+  reset(now);
+}
+
+std::uint32_t FlashInterface::read(const Access& access) {
+  require_word(access, block);
+  require_power();
+  switch (access.offset) {
+    case offsetof(stm32::FlashRegisters, acr):
+      return acr_;
+    case offsetof(stm32::FlashRegisters, sr):
+      return sr_ | sr::Busy::bits(access.now < busy_until_ ? 1 : 0);
+    case offsetof(stm32::FlashRegisters, cr):
+      return cr_;
+    case offsetof(stm32::FlashRegisters, keyr):
+    case offsetof(stm32::FlashRegisters, optkeyr):
+      refuse(access, block, "a key register cannot be read");
+    default:
+      refuse(access, block, "not modelled (option bytes)");
+  }
+}
+
+void FlashInterface::write(const Access& access, std::uint32_t value) {
+  require_word(access, block);
+  require_power();
+  switch (access.offset) {
+    case offsetof(stm32::FlashRegisters, acr):
+      return write_access_control(access, value);
+    case offsetof(stm32::FlashRegisters, keyr):
+      return write_key(access, value);
+    case offsetof(stm32::FlashRegisters, sr):
+      if ((value & ~sr_bits) != 0) refuse(access, block, "SR: a bit that is not a flag was written 1");
+      sr_ &= ~value;
+      return;
+    case offsetof(stm32::FlashRegisters, cr):
+      return write_control(access, value);
+    default:
+      refuse(access, block, "not modelled (option bytes)");
+  }
+}
+
+void FlashInterface::write_access_control(const Access& access, std::uint32_t value) {
+  if ((value & ~acr_bits) != 0) refuse(access, block, "ACR: reserved bit written 1");
+  const std::uint32_t needed = wait_states_needed(clocks_.core);
+  if (acr::Latency::of(value) < needed) {
+    refuse(access, block,
+           "ACR: " + std::to_string(acr::Latency::of(value)) + " wait states, the present HCLK needs " +
+               std::to_string(needed));
+  }
+  const bool resets_instructions = acr::InstructionCacheReset::of(value) != 0;
+  const bool resets_data = acr::DataCacheReset::of(value) != 0;
+  if ((resets_instructions && acr::InstructionCache::of(acr_ | value) != 0) ||
+      (resets_data && acr::DataCache::of(acr_ | value) != 0)) {
+    refuse(access, block, "ACR: a cache can be reset only while it is disabled");
+  }
+  if (resets_data) data_cache_is_stale_ = false;
+  acr_ = value;
+}
+
+void FlashInterface::write_key(const Access& access, std::uint32_t value) {
+  if (locked_up_) return;
+  const bool locked = cr::Lock::of(cr_) != 0;
+  if (locked && !first_key_given_ && value == stm32::flash_key_1) {
+    first_key_given_ = true;
+    return;
+  }
+  if (locked && first_key_given_ && value == stm32::flash_key_2) {
+    first_key_given_ = false;
+    cr_ &= ~cr::Lock::mask;
+    return;
+  }
+  first_key_given_ = false;
+  locked_up_ = true;
+  cr_ |= cr::Lock::mask;
+  refuse(access, block,
+         "KEYR: wrong key, or right key out of turn (bus error); CR is now locked until the next reset");
+}
+
+void FlashInterface::write_control(const Access& access, std::uint32_t value) {
+  if (access.now < busy_until_) refuse(access, block, "CR written while BSY is set: the bus would stall");
+  if ((value & ~cr_bits) != 0) refuse(access, block, "CR: MER, EOPIE, ERRIE or a reserved bit: not modelled");
+  if (cr::Lock::of(cr_) != 0) {
+    if (value == cr_) return;
+    refuse(access, block, "CR written while it is locked: ignored on silicon");
+  }
+  if (cr::Parallelism::of(value) == 3)
+    refuse(access, block, "CR: 64-bit parallelism needs Vpp, which the board does not have");
+  const bool start = cr::Start::of(value) != 0;
+  if (start && cr::Lock::of(value) != 0) refuse(access, block, "CR: STRT together with LOCK");
+  cr_ = value & ~cr::Start::mask;
+  if (start) start_erase(access);
+}
+
+void FlashInterface::start_erase(const Access& access) {
+  if (cr::SectorErase::of(cr_) == 0 || cr::Program::of(cr_) != 0)
+    refuse(access, block, "CR: STRT needs SER and no PG (RM0090: unpredictable)");
+  if (cr::Parallelism::of(cr_) != cr::by_word)
+    refuse(access, block, "CR: erase at other than x32: not modelled");
+  const std::uint32_t sector = cr::Sector::of(cr_);
+  if (sector >= stm32::flash_sector_count)
+    refuse(access, block, "CR: sector " + std::to_string(sector) + " does not exist; 0 to 11 do");
+  if ((sr_ & sr::errors) != 0)
+    refuse(access, block, "erase started with error flags set in SR: clear them first");
+  if (write_protected_[sector]) {
+    sr_ |= sr::WriteProtected::mask;
+    return;
+  }
+  const std::uint32_t offset = stm32::flash_sector_offset(sector);
+  const std::uint32_t bytes = stm32::flash_sector_bytes(sector);
+  begin(offset, bytes, access.now, erase_duration(sector));
+  std::ranges::fill(image_.subspan(offset, bytes), std::uint8_t{0xFF});
+  data_cache_is_stale_ = true;
+  cut_if_due();
+}
+
+void FlashInterface::store(std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime now) {
+  require_power();
+  const std::uint32_t offset = offset_of(address, bytes);
+  const Access access{offset, bytes, now};
+  if (now < busy_until_) refuse(access, "flash memory", "store while BSY is set: the bus would stall");
+  if ((sr_ & sr::errors) != 0)
+    refuse(access, "flash memory", "store with error flags set in SR: clear them first");
+  if (cr::Program::of(cr_) == 0 || cr::SectorErase::of(cr_) != 0) {
+    sr_ |= sr::SequenceError::mask;
+    return;
+  }
+  if (bytes != 1U << cr::Parallelism::of(cr_)) {
+    sr_ |= sr::ParallelismError::mask;
+    return;
+  }
+  if (write_protected_[sector_at(offset)]) {
+    sr_ |= sr::WriteProtected::mask;
+    return;
+  }
+  begin(offset, bytes, now, store_duration);
+  for (unsigned byte = 0; byte < bytes; ++byte)
+    image_[offset + byte] = static_cast<std::uint8_t>(image_[offset + byte] & (value >> (8 * byte)));
+  cut_if_due();
+}
+
+std::uint32_t FlashInterface::load(std::uint32_t address, unsigned bytes, BoardTime now) const {
+  require_power();
+  const std::uint32_t offset = offset_of(address, bytes);
+  if (data_cache_is_stale_ && acr::DataCache::of(acr_) != 0) {
+    refuse({offset, bytes, now}, "flash memory",
+           "load through a data cache that was not reset after an erase: it may give the old content");
+  }
+  std::uint32_t value = 0;
+  for (unsigned byte = 0; byte < bytes; ++byte)
+    value |= static_cast<std::uint32_t>(image_[offset + byte]) << (8 * byte);
+  return value;
+}
+
+void FlashInterface::begin(std::uint32_t offset, std::uint32_t bytes, BoardTime now, BoardTime duration) {
+  const auto changed = image_.subspan(offset, bytes);
+  latest_ = Operation{offset, {changed.begin(), changed.end()}};
+  busy_until_ = now + duration;
+  ++operations_;
+}
+
+void FlashInterface::cut_if_due() {
+  if (operations_ != cut_at_) return;
+  tear();
+  power_is_cut_ = true;
+  throw PowerCut("power cut in flash operation " + std::to_string(operations_));
+}
+
+void FlashInterface::tear() {
+  // Every bit that was to change has done so with the same probability, from none to all of them; in an erase
+  // whole words stay behind as well, since its pulses do not reach all rows alike.
+  constexpr std::array chances{0.0, 0.1, 0.5, 0.9, 1.0};
+  const double bit_chance = chances[random_() % chances.size()];
+  const double word_chance = chances[random_() % chances.size()];
+  std::bernoulli_distribution bit_done(bit_chance);
+  std::bernoulli_distribution word_done(word_chance);
+  const bool erase = latest_->before.size() > sizeof(std::uint32_t);
+  bool whole = false;
+  for (std::size_t i = 0; i < latest_->before.size(); ++i) {
+    const std::uint8_t old = latest_->before[i];
+    std::uint8_t& now = image_[latest_->offset + i];
+    if (erase && i % 4 == 0) whole = word_done(random_);
+    if (whole) continue;
+    const std::uint8_t to_change = old ^ now;
+    std::uint8_t changed = 0;
+    for (unsigned bit = 0; bit < 8; ++bit)
+      if ((to_change >> bit & 1U) != 0 && bit_done(random_))
+        changed = static_cast<std::uint8_t>(changed | 1U << bit);
+    now = old ^ changed;
+  }
+}
+
+void FlashInterface::require_power() const {
+  if (power_is_cut_) throw RefusedAccess("flash: access after the power was cut");
+}
+
+std::uint32_t FlashInterface::offset_of(std::uint32_t address, unsigned bytes) const {
+  const std::uint32_t offset = address - stm32::flash_memory_base;
+  if (offset < image_.size() && offset % bytes == 0) return offset;
+  throw RefusedAccess("flash memory: access of " + std::to_string(bytes) + " bytes at address " +
+                      std::to_string(address) + " is outside or not aligned");
+}
+
+unsigned FlashInterface::sector_at(std::uint32_t offset) {
+  unsigned sector = 0;
+  while (stm32::flash_sector_offset(sector + 1) <= offset) ++sector;
+  return sector;
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,244 @@
+#include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
+
+#include <cstddef>
+#include <utility>
+
+namespace kmax::virtual_board {
+
+namespace {
+
+using drivers::stm32f4::GpioMode;
+using drivers::stm32f4::GpioOutput;
+using drivers::stm32f4::GpioPort;
+using drivers::stm32f4::GpioPull;
+using Registers = drivers::stm32f4::GpioRegisters;
+
+constexpr unsigned pin_count = 16;
+constexpr std::uint32_t all_pins = 0xFFFFU;
+
+std::uint32_t two_bits(std::uint32_t word, unsigned pin) {
+  return word >> (2 * pin) & 3U;
+}
+
+}  // namespace
+
+GpioPortModel::GpioPortModel(GpioPort port)
+    : port_(port), name_(std::string("GPIO") + static_cast<char>('A' + static_cast<int>(port))) {
+  restore_reset_values();
+  update(0);
+}
+
+void GpioPortModel::restore_reset_values() {
+  moder_ = otyper_ = ospeedr_ = pupdr_ = odr_ = 0;
+  afr_ = {};
+  // The debug port: PA13 to PA15, PB3, PB4 in alternate function 0 with their pulls.
+  if (port_ == GpioPort::a) {
+    moder_ = 0xA800'0000U;
+    pupdr_ = 0x6400'0000U;
+  } else if (port_ == GpioPort::b) {
+    moder_ = 0x0000'0280U;
+    ospeedr_ = 0x0000'00C0U;
+    pupdr_ = 0x0000'0100U;
+  }
+}
+
+void GpioPortModel::reset(BoardTime now) {
+  restore_reset_values();
+  update(now);
+}
+
+std::uint32_t GpioPortModel::read(const Access& access) {
+  const std::uint32_t word = word_at(access);
+  if (access.bytes == 4) return word;
+  const std::uint32_t mask = access.bytes == 1 ? 0xFFU : 0xFFFFU;
+  return word >> (8 * (access.offset & 3U)) & mask;
+}
+
+std::uint32_t GpioPortModel::word_at(const Access& access) const {
+  const std::uint32_t offset = access.offset & ~3U;
+  switch (offset) {
+    case offsetof(Registers, idr):
+      return idr_;
+    case offsetof(Registers, odr):
+      return odr_;
+    case offsetof(Registers, bsrr):
+      return 0;
+    default:
+      break;
+  }
+  require_word(access, name_.c_str());
+  switch (offset) {
+    case offsetof(Registers, moder):
+      return moder_;
+    case offsetof(Registers, otyper):
+      return otyper_;
+    case offsetof(Registers, ospeedr):
+      return ospeedr_;
+    case offsetof(Registers, pupdr):
+      return pupdr_;
+    case offsetof(Registers, lckr):
+      refuse(access, name_.c_str(), "LCKR is not modelled");
+    case offsetof(Registers, afr):
+      return afr_[0];
+    case offsetof(Registers, afr) + 4:
+      return afr_[1];
+    default:
+      refuse(access, name_.c_str(), "no such register");
+  }
+}
+
+void GpioPortModel::write(const Access& access, std::uint32_t value) {
+  const unsigned shift = 8 * (access.offset & 3U);
+  const std::uint32_t lanes = access.bytes == 4 ? 0xFFFF'FFFFU : ((1U << (8 * access.bytes)) - 1U) << shift;
+  const std::uint32_t shifted = value << shift & lanes;
+  switch (access.offset & ~3U) {
+    case offsetof(Registers, idr):
+      refuse(access, name_.c_str(), "IDR cannot be written");
+    case offsetof(Registers, odr): {
+      const std::uint32_t merged = (odr_ & ~lanes) | shifted;
+      if ((merged & ~all_pins) != 0) refuse(access, name_.c_str(), "reserved bits of ODR are written 1");
+      odr_ = merged;
+      break;
+    }
+    case offsetof(Registers, bsrr):
+      // Set wins over reset (section GPIO port bit set/reset register).
+      odr_ = (odr_ & ~(shifted >> 16)) | (shifted & all_pins);
+      break;
+    default:
+      require_word(access, name_.c_str());
+      write_word(access, value);
+  }
+  update(access.now);
+}
+
+void GpioPortModel::write_word(const Access& access, std::uint32_t value) {
+  switch (access.offset) {
+    case offsetof(Registers, moder):
+      moder_ = value;
+      break;
+    case offsetof(Registers, otyper):
+      if ((value & ~all_pins) != 0) refuse(access, name_.c_str(), "reserved bits of OTYPER are written 1");
+      otyper_ = value;
+      break;
+    case offsetof(Registers, ospeedr):
+      ospeedr_ = value;
+      break;
+    case offsetof(Registers, pupdr):
+      for (unsigned pin = 0; pin < pin_count; ++pin) {
+        if (two_bits(value, pin) == 3) {
+          refuse(access, name_.c_str(),
+                 "PUPDR of pin " + std::to_string(pin) + " is 3; 0, 1 (up) and 2 (down) exist");
+        }
+      }
+      pupdr_ = value;
+      break;
+    case offsetof(Registers, lckr):
+      refuse(access, name_.c_str(), "LCKR is not modelled");
+    case offsetof(Registers, afr):
+      afr_[0] = value;
+      break;
+    case offsetof(Registers, afr) + 4:
+      afr_[1] = value;
+      break;
+    default:
+      refuse(access, name_.c_str(), "no such register");
+  }
+}
+
+void GpioPortModel::drive(unsigned pin, PinDrive drive, BoardTime now) {
+  if (std::exchange(drives_.at(pin), drive) != drive) update(now);
+}
+
+void GpioPortModel::drive_alternate(unsigned pin, PinOutput output, BoardTime now) {
+  if (std::exchange(alternates_.at(pin), output) != output && mode(pin) == GpioMode::alternate) update(now);
+}
+
+GpioMode GpioPortModel::mode(unsigned pin) const {
+  return static_cast<GpioMode>(two_bits(moder_, pin));
+}
+
+unsigned GpioPortModel::alternate_function(unsigned pin) const {
+  return afr_.at(pin / 8) >> (4 * (pin % 8)) & 0xFU;
+}
+
+PinOutput GpioPortModel::output_of(unsigned pin) const {
+  PinOutput wanted = PinOutput::released;
+  if (mode(pin) == GpioMode::output) wanted = (odr_ >> pin & 1U) != 0 ? PinOutput::high : PinOutput::low;
+  if (mode(pin) == GpioMode::alternate) wanted = alternates_[pin];
+  const bool open_drain = (otyper_ >> pin & 1U) == static_cast<std::uint32_t>(GpioOutput::open_drain);
+  return open_drain && wanted == PinOutput::high ? PinOutput::released : wanted;
+}
+
+bool GpioPortModel::pulled(unsigned pin, GpioPull pull) const {
+  // Section Analog configuration: the pull resistors are off.
+  return mode(pin) != GpioMode::analog && two_bits(pupdr_, pin) == static_cast<std::uint32_t>(pull);
+}
+
+GpioPortModel::Resolved GpioPortModel::resolve(unsigned pin) const {
+  const PinOutput own = output_of(pin);
+  const PinDrive outside = drives_[pin];
+  if (own != PinOutput::released) {
+    const bool high = own == PinOutput::high;
+    if (outside == (high ? PinDrive::low : PinDrive::high)) {
+      throw RefusedAccess(pin_name(pin) + " drives " + (high ? "high" : "low") +
+                          " against an outside drive: short circuit");
+    }
+    return {high, false};
+  }
+  if (outside != PinDrive::floating)
+    return {outside == PinDrive::high || outside == PinDrive::pulled_up, false};
+  if (pulled(pin, GpioPull::up)) return {true, false};
+  return {false, !pulled(pin, GpioPull::down)};
+}
+
+void GpioPortModel::update(BoardTime now) {
+  std::uint32_t levels = 0;
+  std::uint32_t floating = 0;
+  std::uint32_t idr = 0;
+  std::array<PinOutput, pin_count> outputs{};
+  for (unsigned pin = 0; pin < pin_count; ++pin) {
+    const Resolved resolved = resolve(pin);
+    outputs[pin] = output_of(pin);
+    if (resolved.level) levels |= 1U << pin;
+    if (resolved.floating) floating |= 1U << pin;
+    if (resolved.level && mode(pin) != GpioMode::analog) idr |= 1U << pin;
+  }
+  levels_ = levels;
+  floating_ = floating;
+  idr_ = idr;
+  outputs_ = outputs;
+  report(now);
+}
+
+void GpioPortModel::report(BoardTime now) {
+  // Whoever is called may drive a pin of this port in turn, which comes back here: each change is noted as
+  // told before it is told, so that the inner call finishes the work and the outer one finds nothing left
+  // that is out of date.
+  for (unsigned pin = 0; pin < pin_count; ++pin) {
+    if (output_change_ && told_outputs_[pin] != outputs_[pin]) {
+      told_outputs_[pin] = outputs_[pin];
+      output_change_(pin, outputs_[pin], now);
+    }
+    const std::uint32_t bit = 1U << pin;
+    if (input_change_ && ((told_idr_ ^ idr_) & bit) != 0) {
+      told_idr_ ^= bit;
+      input_change_(pin, (idr_ & bit) != 0, now);
+    }
+  }
+}
+
+void GpioPortModel::on_output_change(OutputChange callback) {
+  output_change_ = std::move(callback);
+  report(0);
+}
+
+void GpioPortModel::on_input_change(PinChange callback) {
+  input_change_ = std::move(callback);
+  report(0);
+}
+
+std::string GpioPortModel::pin_name(unsigned pin) const {
+  return std::string("P") + name_.back() + std::to_string(pin);
+}
+
+}  // namespace kmax::virtual_board

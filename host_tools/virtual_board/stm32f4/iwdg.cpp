@@ -1,0 +1,131 @@
+#include "host_tools/virtual_board/stm32f4/iwdg.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+
+namespace kmax::virtual_board {
+
+namespace {
+namespace stm32 = drivers::stm32f4;
+constexpr const char* block = "IWDG";
+constexpr std::uint64_t update_cycles = 5;
+}  // namespace
+
+void IwdgModel::set_oscillator_hz(std::uint32_t hz) {
+  if (hz < stm32::lsi_minimum_hz || hz > stm32::lsi_maximum_hz)
+    throw std::invalid_argument("LSI of " + std::to_string(hz) + " Hz; must be 17000 to 47000");
+  if (running_) throw std::logic_error("the LSI's frequency cannot be changed while the watchdog runs");
+  oscillator_hz_ = hz;
+}
+
+BoardTime IwdgModel::cycles(std::uint64_t count) const {
+  return (count * units_per_second + oscillator_hz_ - 1) / oscillator_hz_;
+}
+
+std::uint64_t IwdgModel::elapsed_cycles(BoardTime now) const {
+  return (now - counted_from_) * oscillator_hz_ / units_per_second;
+}
+
+BoardTime IwdgModel::fires_at() const {
+  if (!running_ || fired_) return never;
+  return counted_from_ + cycles(remaining_ * stm32::iwdg_pr::divider(active_pr_));
+}
+
+BoardTime IwdgModel::next_event() const {
+  if (!running_ || fired_) return never;
+  return std::min({fires_at(), pr_effective_, rlr_effective_});
+}
+
+void IwdgModel::take_prescaler_over(BoardTime now) {
+  const std::uint64_t counted = elapsed_cycles(now) / stm32::iwdg_pr::divider(active_pr_);
+  remaining_ -= std::min(counted, remaining_ - 1);
+  counted_from_ = now;
+  active_pr_ = pr_;
+}
+
+void IwdgModel::advance(BoardTime now) {
+  while (next_event() <= now) {
+    const BoardTime event = next_event();
+    if (event == fires_at()) {
+      fired_ = true;
+      if (on_reset_) on_reset_(event);
+      return;
+    }
+    if (event == pr_effective_) {
+      pr_effective_ = never;
+      take_prescaler_over(event);
+    } else {
+      rlr_effective_ = never;
+      active_rlr_ = rlr_;
+    }
+  }
+}
+
+std::uint32_t IwdgModel::read(const Access& access) {
+  require_word(access, block);
+  advance(access.now);
+  switch (access.offset) {
+    case offsetof(stm32::IwdgRegisters, pr):
+      return pr_;
+    case offsetof(stm32::IwdgRegisters, rlr):
+      return rlr_;
+    case offsetof(stm32::IwdgRegisters, sr):
+      return stm32::iwdg_sr::PrescalerUpdating::bits(pr_effective_ != never ? 1 : 0) |
+             stm32::iwdg_sr::ReloadUpdating::bits(rlr_effective_ != never ? 1 : 0);
+    default:
+      refuse(access, block, "KR is write only; nothing lies behind SR");
+  }
+}
+
+void IwdgModel::write(const Access& access, std::uint32_t value) {
+  require_word(access, block);
+  advance(access.now);
+  switch (access.offset) {
+    case offsetof(stm32::IwdgRegisters, kr):
+      return write_key(access, value);
+    case offsetof(stm32::IwdgRegisters, pr):
+      return write_setting(access, value, stm32::iwdg_pr::Prescaler::maximum, pr_, pr_effective_);
+    case offsetof(stm32::IwdgRegisters, rlr):
+      return write_setting(access, value, stm32::iwdg_rlr::Reload::maximum, rlr_, rlr_effective_);
+    default:
+      refuse(access, block, "SR is read only; nothing lies behind it");
+  }
+}
+
+void IwdgModel::write_key(const Access& access, std::uint32_t key) {
+  if (key != stm32::iwdg_kr::start && key != stm32::iwdg_kr::reload && key != stm32::iwdg_kr::unlock)
+    refuse(access, block, "KR: key " + std::to_string(key) + " means nothing");
+  unlocked_ = key == stm32::iwdg_kr::unlock;
+  const bool starts = key == stm32::iwdg_kr::start && !running_;
+  if (starts) {
+    running_ = true;
+    if (pr_effective_ != never) pr_effective_ = access.now + cycles(update_cycles);
+    if (rlr_effective_ != never) rlr_effective_ = access.now + cycles(update_cycles);
+  }
+  if (starts || key == stm32::iwdg_kr::reload) {
+    counted_from_ = access.now;
+    remaining_ = std::uint64_t{active_rlr_} + 1;
+  }
+  if (starts && on_started_) on_started_(access.now);
+}
+
+void IwdgModel::write_setting(const Access& access, std::uint32_t value, std::uint32_t maximum,
+                              std::uint32_t& setting, BoardTime& effective) {
+  if (!unlocked_) refuse(access, block, "PR and RLR need the unlock key 0x5555 first");
+  if (effective != never) refuse(access, block, "written again while PVU or RVU is set");
+  if (value > maximum)
+    refuse(access, block, "value " + std::to_string(value) + " is above " + std::to_string(maximum));
+  setting = value;
+  effective = running_ ? access.now + cycles(update_cycles) : 0;
+}
+
+void IwdgModel::reset(BoardTime) {
+  running_ = fired_ = unlocked_ = false;
+  pr_ = active_pr_ = 0;
+  rlr_ = active_rlr_ = stm32::iwdg_rlr::Reload::maximum;
+  pr_effective_ = rlr_effective_ = never;
+}
+
+}  // namespace kmax::virtual_board

@@ -1,0 +1,277 @@
+#include "host_tools/virtual_board/stm32f4/usart.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <string>
+
+namespace kmax::virtual_board {
+
+namespace {
+
+namespace stm32 = drivers::stm32f4;
+namespace sr = stm32::usart_sr;
+namespace cr1 = stm32::usart_cr1;
+namespace cr2 = stm32::usart_cr2;
+namespace cr3 = stm32::usart_cr3;
+using stm32::UsartRegisters;
+
+constexpr std::uint32_t sr_reset_value = sr::TransmissionComplete::mask | sr::TransmitEmpty::mask;
+constexpr std::uint32_t cleared_by_data_read =
+    sr::ParityError::mask | sr::FramingError::mask | sr::Noise::mask | sr::Overrun::mask | sr::Idle::mask;
+constexpr std::uint32_t cr1_bits =
+    cr1::ReceiverEnable::mask | cr1::TransmitterEnable::mask | cr1::IdleInterrupt::mask |
+    cr1::ReceiveInterrupt::mask | cr1::TransmissionCompleteInterrupt::mask |
+    cr1::TransmitEmptyInterrupt::mask | cr1::ParityErrorInterrupt::mask | cr1::OddParity::mask |
+    cr1::ParityEnable::mask | cr1::NineBits::mask | cr1::Enable::mask;
+constexpr std::uint32_t two_stop_bits = 2;
+constexpr std::uint32_t smallest_divisor = 16;
+
+}  // namespace
+
+UsartModel::UsartModel(const BoardClocks& clocks, InterruptLines& lines, stm32::Interrupt interrupt)
+    : clocks_(clocks),
+      lines_(lines),
+      interrupt_(interrupt),
+      block_(interrupt == stm32::Interrupt::uart4 ? "UART4" : "USART2"),
+      sr_(sr_reset_value) {}
+
+bool UsartModel::receiver_on() const {
+  return cr1::Enable::of(cr1_) != 0 && cr1::ReceiverEnable::of(cr1_) != 0 && brr_ != 0;
+}
+
+bool UsartModel::transmitter_on() const {
+  return cr1::Enable::of(cr1_) != 0 && cr1::TransmitterEnable::of(cr1_) != 0 && brr_ != 0;
+}
+
+BoardTime UsartModel::bit_time() const {
+  return brr_ * clocks_.apb1;
+}
+
+BoardTime UsartModel::frame_time() const {
+  const unsigned data_bits = cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
+  const unsigned stop_bits = cr2::StopBits::of(cr2_) == two_stop_bits ? 2 : 1;
+  return bit_time() * (1 + data_bits + stop_bits);
+}
+
+void UsartModel::receive(std::uint8_t byte, bool parity_ok, bool framing_ok, BoardTime now) {
+  incoming_.push_back({byte, parity_ok, framing_ok, noise_pending_, now});
+  noise_pending_ = false;
+}
+
+BoardTime UsartModel::reception_start() const {
+  if (receiving_ || incoming_.empty()) return never;
+  return std::max(incoming_.front().earliest, line_free_);
+}
+
+BoardTime UsartModel::next_event() const {
+  const BoardTime reception = receiving_ ? receiving_->sampled : reception_start();
+  return std::min({reception, idle_at_, frame_end_});
+}
+
+void UsartModel::advance(BoardTime now) {
+  for (BoardTime event = next_event(); event <= now; event = next_event()) {
+    if (event == frame_end_) {
+      end_frame(event);
+    } else if (receiving_ && event == receiving_->sampled) {
+      end_reception();
+    } else if (event == reception_start()) {
+      begin_reception(event);
+    } else {
+      idle_at_ = never;
+      sr_ |= sr::Idle::mask;
+    }
+    update_interrupt();
+  }
+}
+
+void UsartModel::begin_reception(BoardTime now) {
+  const Incoming incoming = incoming_.front();
+  incoming_.pop_front();
+  line_free_ = now + frame_time();
+  if (!receiver_on()) return;
+  idle_at_ = never;
+  const unsigned data_bits = cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
+  receiving_ = Reception{incoming, now + bit_time() * (2 * (1 + data_bits) + 1) / 2, line_free_};
+}
+
+void UsartModel::end_reception() {
+  const Reception reception = *receiving_;
+  receiving_.reset();
+  if (!receiver_on()) return;
+  idle_at_ = reception.end + frame_time();
+  if (sr::ReceiveNotEmpty::of(sr_) != 0) {
+    sr_ |= sr::Overrun::mask;
+    return;
+  }
+  const Incoming& incoming = reception.incoming;
+  received_ = incoming.byte;
+  sr_ |= sr::ReceiveNotEmpty::mask;
+  if (cr1::ParityEnable::of(cr1_) != 0) {
+    const auto ones = static_cast<std::uint32_t>(std::popcount(incoming.byte));
+    const std::uint32_t parity = (ones + cr1::OddParity::of(cr1_) + (incoming.parity_ok ? 0U : 1U)) & 1U;
+    received_ |= parity << 8;
+    if (!incoming.parity_ok) sr_ |= sr::ParityError::mask;
+  }
+  if (!incoming.framing_ok) sr_ |= sr::FramingError::mask;
+  if (incoming.noise) sr_ |= sr::Noise::mask;
+}
+
+void UsartModel::load_shift_register(BoardTime now) {
+  if (frame_end_ != never || !data_) return;
+  shifting_ = data_;
+  data_.reset();
+  sr_ |= sr::TransmitEmpty::mask;
+  frame_end_ = now + frame_time();
+  if (on_transmitting_) on_transmitting_(true, now);
+}
+
+void UsartModel::end_frame(BoardTime now) {
+  frame_end_ = never;
+  const std::optional<std::uint8_t> sent = shifting_;
+  shifting_.reset();
+  load_shift_register(now);
+  if (!sent) return;
+  if (frame_end_ == never) {
+    sr_ |= sr::TransmissionComplete::mask;
+    if (on_transmitting_) on_transmitting_(false, now);
+  }
+  if (on_transmitted_) on_transmitted_(*sent, now);
+}
+
+void UsartModel::drop_transmission(BoardTime now) {
+  const bool was_shifting = shifting_.has_value();
+  shifting_.reset();
+  data_.reset();
+  frame_end_ = never;
+  sr_ |= sr_reset_value;
+  if (was_shifting && on_transmitting_) on_transmitting_(false, now);
+}
+
+std::uint32_t UsartModel::read(const Access& access) {
+  require_word(access, block_);
+  advance(access.now);
+  switch (access.offset) {
+    case offsetof(UsartRegisters, sr):
+      status_seen_ = sr_;
+      return sr_;
+    case offsetof(UsartRegisters, dr):
+      return read_data(access);
+    case offsetof(UsartRegisters, brr):
+      return brr_;
+    case offsetof(UsartRegisters, cr1):
+      return cr1_;
+    case offsetof(UsartRegisters, cr2):
+      return cr2_;
+    case offsetof(UsartRegisters, cr3):
+      return 0;
+    default:
+      refuse(access, block_, "not modelled (smartcard, IrDA)");
+  }
+}
+
+std::uint32_t UsartModel::read_data(const Access& access) {
+  if (cr1::Enable::of(cr1_) == 0 && status_seen_ == 0) refuse(access, block_, "DR read while UE is 0");
+  sr_ &= ~(status_seen_ & cleared_by_data_read);
+  sr_ &= ~sr::ReceiveNotEmpty::mask;
+  status_seen_ = 0;
+  update_interrupt();
+  return received_;
+}
+
+void UsartModel::write(const Access& access, std::uint32_t value) {
+  require_word(access, block_);
+  advance(access.now);
+  switch (access.offset) {
+    case offsetof(UsartRegisters, sr):
+      sr_ &= value | ~(sr::ReceiveNotEmpty::mask | sr::TransmissionComplete::mask);
+      break;
+    case offsetof(UsartRegisters, dr):
+      write_data(access, value);
+      break;
+    case offsetof(UsartRegisters, brr):
+      if (cr1::Enable::of(cr1_) != 0) refuse(access, block_, "BRR changed while UE is 1");
+      if (value < smallest_divisor || value > 0xFFFF)
+        refuse(access, block_, "BRR = " + std::to_string(value) + ", must be 16 to 65535");
+      brr_ = value;
+      break;
+    case offsetof(UsartRegisters, cr1):
+      write_control_1(access, value);
+      break;
+    case offsetof(UsartRegisters, cr2):
+      if (value != 0 && value != cr2::StopBits::bits(two_stop_bits))
+        refuse(access, block_, "CR2: only one or two stop bits are modelled");
+      if (cr1::Enable::of(cr1_) != 0 && value != cr2_)
+        refuse(access, block_, "CR2: stop bits changed while UE is 1");
+      cr2_ = value;
+      break;
+    case offsetof(UsartRegisters, cr3):
+      if ((value & (cr3::ReceiveDma::mask | cr3::TransmitDma::mask)) != 0)
+        refuse(access, block_, "CR3: DMA (DMAR, DMAT) is not modelled");
+      if (value != 0) refuse(access, block_, "CR3: no bit of it is modelled");
+      break;
+    default:
+      refuse(access, block_, "not modelled (smartcard, IrDA)");
+  }
+  update_interrupt();
+}
+
+void UsartModel::write_data(const Access& access, std::uint32_t value) {
+  if (!transmitter_on()) refuse(access, block_, "DR written while UE or TE is 0: the byte would be lost");
+  if (data_) refuse(access, block_, "DR written while TXE is 0: the byte before would be lost");
+  if (value > 0xFF) refuse(access, block_, "DR = " + std::to_string(value) + ", must be a byte");
+  // RM0090: the sequence of reading SR and writing DR clears TC (and PE).
+  sr_ &= ~(status_seen_ & (sr::TransmissionComplete::mask | sr::ParityError::mask));
+  status_seen_ = 0;
+  data_ = static_cast<std::uint8_t>(value);
+  sr_ &= ~sr::TransmitEmpty::mask;
+  load_shift_register(access.now);
+}
+
+void UsartModel::write_control_1(const Access& access, std::uint32_t value) {
+  if ((value & ~cr1_bits) != 0)
+    refuse(access, block_, "CR1: SBK, RWU, WAKE, OVER8 or a reserved bit: not modelled");
+  if ((cr1::NineBits::of(value) != 0) != (cr1::ParityEnable::of(value) != 0))
+    refuse(access, block_, "CR1: only eight data bits are modelled: M must equal PCE");
+  constexpr std::uint32_t format = cr1::NineBits::mask | cr1::ParityEnable::mask | cr1::OddParity::mask;
+  if (((value ^ cr1_) & format) != 0 && cr1::Enable::of(value & cr1_) != 0)
+    refuse(access, block_, "CR1: frame format changed while UE is 1");
+  if (cr1::Enable::of(value) != 0 && brr_ == 0)
+    refuse(access, block_, "CR1: enabled without a baud rate in BRR");
+  const bool transmitter_was_on = transmitter_on();
+  cr1_ = value;
+  if (transmitter_was_on && !transmitter_on()) drop_transmission(access.now);
+  if (!transmitter_was_on && transmitter_on()) frame_end_ = access.now + frame_time();
+  if (!receiver_on()) {
+    receiving_.reset();
+    idle_at_ = never;
+  }
+}
+
+void UsartModel::update_interrupt() {
+  const auto asks = [this](std::uint32_t enable, std::uint32_t flags) {
+    return (cr1_ & enable) != 0 && (sr_ & flags) != 0;
+  };
+  const bool level = cr1::Enable::of(cr1_) != 0 &&
+                     (asks(cr1::ReceiveInterrupt::mask, sr::ReceiveNotEmpty::mask | sr::Overrun::mask) ||
+                      asks(cr1::TransmitEmptyInterrupt::mask, sr::TransmitEmpty::mask) ||
+                      asks(cr1::TransmissionCompleteInterrupt::mask, sr::TransmissionComplete::mask) ||
+                      asks(cr1::IdleInterrupt::mask, sr::Idle::mask) ||
+                      asks(cr1::ParityErrorInterrupt::mask, sr::ParityError::mask));
+  if (level == level_) return;
+  level_ = level;
+  lines_.set_level(interrupt_, level);
+}
+
+void UsartModel::reset(BoardTime now) {
+  drop_transmission(now);
+  sr_ = sr_reset_value;
+  brr_ = cr1_ = cr2_ = 0;
+  status_seen_ = 0;
+  received_ = 0;
+  receiving_.reset();
+  idle_at_ = never;
+  update_interrupt();
+}
+
+}  // namespace kmax::virtual_board

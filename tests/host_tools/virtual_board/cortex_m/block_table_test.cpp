@@ -1,0 +1,54 @@
+#include "host_tools/virtual_board/cortex_m/block_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace kmax::virtual_board {
+namespace {
+
+constexpr std::uint32_t address = 0x0800'1000;
+// str r1, [r0]; vldr s0, [r0, #8]; ldmia r0!, {r2, r3}; bne
+constexpr std::array<std::uint8_t, 10> code{0x01, 0x60, 0x90, 0xED, 0x02, 0x0A, 0x0C, 0xC8, 0xFE, 0xD1};
+
+TEST(BlockTable, AddsUpABlock) {
+  BlockTable table;
+  EXPECT_EQ(table.find(address, code.size()), nullptr);
+  const Block& block = table.add(address, code);
+  EXPECT_EQ(table.find(address, code.size()), &block);
+  EXPECT_EQ(block.instructions, 4U);
+  EXPECT_EQ(block.cycles, 1U + 2 + 3 + 1);
+  EXPECT_EQ(block.cycles_if_taken, 2U);
+  EXPECT_TRUE(block.floating_point);
+  EXPECT_EQ(block.first_floating_point, address + 2);
+  ASSERT_EQ(block.memory.size(), 3U);
+  EXPECT_EQ(block.memory[1].position, 2);
+  EXPECT_EQ(block.memory[1].instructions, 2);
+  EXPECT_EQ(block.memory[1].cycles, 3U);
+  EXPECT_EQ(block.memory[2].cycles, 6U);
+}
+
+TEST(BlockTable, TellsBlocksBySizeAndKeepsThoseThatShareASlot) {
+  BlockTable table;
+  const Block& whole = table.add(address, code);
+  const Block& part = table.add(address, std::span(code).first(2));
+  const Block& far = table.add(address + (2U << 16), std::span(code).first(6));
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_EQ(table.find(address, 10), &whole);
+    EXPECT_EQ(table.find(address, 2), &part);
+    EXPECT_EQ(table.find(address + (2U << 16), 6), &far);
+    EXPECT_EQ(table.find(address, 6), nullptr);
+  }
+  EXPECT_EQ(part.cycles, 1U);
+  EXPECT_FALSE(part.floating_point);
+  EXPECT_EQ(far.instructions, 2U);
+}
+
+TEST(BlockTable, EndsAtACodeThatIsCutOff) {
+  BlockTable table;
+  EXPECT_EQ(table.add(address, std::span(code).first(4)).instructions, 2U);
+  EXPECT_EQ(table.add(address + 100, {}).instructions, 0U);
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

@@ -1,0 +1,235 @@
+// What stops a run, in words that lead to the instruction; and the same as faults of the chip, when asked
+// for.
+
+#include <gtest/gtest.h>
+
+#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/stm32f4/registers/scb.hpp"
+#include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
+
+namespace kmax::virtual_board {
+namespace {
+
+using drivers::stm32f4::Interrupt;
+namespace chip = drivers::stm32f4;
+
+constexpr unsigned tim2 = exception_number::first_interrupt + static_cast<unsigned>(Interrupt::tim2);
+const ProcessorConfig as_on_the_chip{.units_per_instruction = 0, .faults_to_firmware = true};
+
+const Program load{0xBF00,   // nop
+                   0x6841,   // ldr r1, [r0, #4]
+                   0x3201,   // adds r2, #1
+                   0xBE01};  // bkpt 1
+const Program store{0xBF00,  // nop
+                    0x6041,  // str r1, [r0, #4]
+                    0x3201,  // adds r2, #1
+                    0xBE01};
+
+void expect_fault(ProgramOnCore& board, std::initializer_list<const char*> parts) {
+  ASSERT_EQ(board.run(), RunEnd::fault);
+  for (const char* part : parts) {
+    EXPECT_NE(board.processor.fault().find(part), std::string::npos)
+        << part << " is not in: " << board.processor.fault();
+  }
+  EXPECT_EQ(board.run(2 * units_per_second), RunEnd::fault) << "only a reset helps";
+}
+
+std::uint32_t scb(ProgramOnCore& board, std::size_t offset) {
+  return board.core.system_control.read({static_cast<std::uint32_t>(offset), 4, 0});
+}
+
+TEST(ProcessorFault, NamesTheStoreThatHasNoRegisterBlock) {
+  ProgramOnCore board({0x6001,          // str r1, [r0, #0]
+                       0x6041,          // str r1, [r0, #4]
+                       0x7241,          // strb r1, [r0, #9]
+                       0xF8C0, 0x1400,  // str.w r1, [r0, #1024]: the first one behind the block
+                       0x60C1,          // str r1, [r0, #12]
+                       0xBE01});
+  board.processor.name_functions_by([](std::uint32_t pc) { return pc == 0x0800'0206 ? "culprit+0x6" : ""; });
+  board.set(0, ProgramOnCore::block_base).set(1, 0x1234'5678);
+  expect_fault(board,
+               {"store", "0x12345678", "4 bytes", "0x40000400", "pc 0x08000206", "culprit+0x6", "nothing"});
+  ASSERT_EQ(board.block.records.size(), 3U) << "what follows in the block must not reach the registers";
+  EXPECT_EQ(board.block.records[2].bytes, 1U);
+  EXPECT_EQ(board.block.records[2].offset, 9U);
+  EXPECT_EQ(board.block.records[2].value, 0x78U);
+}
+
+TEST(ProcessorFault, NamesTheBlockThatRefusesAndItsReason) {
+  ProgramOnCore board(load);
+  board.set(0, ProgramOnCore::block_base);
+  board.block.on_read = [](const Access& access) -> std::uint32_t {
+    refuse(access, "BLOCK", "no such register");
+  };
+  expect_fault(board, {"load", "0x40000004", "(BLOCK)", "pc 0x08000202", "no such register"});
+}
+
+TEST(ProcessorFault, NamesTheClockThatIsOff) {
+  ProgramOnCore board(load);
+  board.set(0, ProgramOnCore::block_base);
+  board.clocked = false;
+  expect_fault(board, {"0x40000004", "BLOCK", "clock is off"});
+  EXPECT_TRUE(board.block.records.empty());
+}
+
+TEST(ProcessorFault, StopsAtUnalignedRegisterAccesses) {
+  ProgramOnCore board(load);
+  board.set(0, ProgramOnCore::block_base + 2);
+  expect_fault(board, {"0x4000000", "aligned"});
+}
+
+TEST(ProcessorFault, StopsWhereThereIsNoMemory) {
+  for (const std::uint32_t address :
+       {0x2002'0000U, 0x1001'0000U, 0x0810'0000U, 0x2200'0000U, 0x4200'0000U, 0x6000'0000U}) {
+    ProgramOnCore board(load);
+    board.set(0, address).set(2, 0);
+    expect_fault(board, {"load", "pc 0x08000202"});
+    EXPECT_EQ(board.get(2), 0U);
+  }
+  ProgramOnCore board(store);
+  board.set(0, 0x2001'FFFC).set(1, 0xABCD);
+  expect_fault(board, {"store of 0x0000ABCD", "0x20020000", "pc 0x08000202"});
+}
+
+TEST(ProcessorFault, StopsAtStoresToFlashButHandsOutThoseToTheParameterSectors) {
+  ProgramOnCore refused(store);
+  refused.set(0, 0x0800'C000);
+  expect_fault(refused, {"0x0800C004", "flash", "pc 0x08000202"});
+
+  ProgramOnCore without(store);
+  without.set(0, 0x0800'4000);
+  expect_fault(without, {"0x08004004", "parameter"});
+
+  ProgramOnCore board(store);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> stores;
+  board.bus.on_parameter_store([&](std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime) {
+    EXPECT_EQ(bytes, 4U);
+    stores.emplace_back(address, value);
+  });
+  board.set(0, 0x0800'BFF8).set(1, 77);
+  EXPECT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  const decltype(stores) expected{{0x0800'BFFC, 77}};
+  EXPECT_EQ(stores, expected);
+  EXPECT_EQ(board.bus.load(0x0800'BFFC), 0xFFFF'FFFFU) << "the store alone changes nothing";
+}
+
+TEST(ProcessorFault, ReadsTheParameterSectors) {
+  ProgramOnCore board(load);
+  board.bus.memory(0x0800'8004, 4)[1] = 0x12;
+  board.set(0, 0x0800'8000);
+  EXPECT_EQ(board.run(), RunEnd::stopped);
+  EXPECT_EQ(board.get(1), 0xFFFF'12FFU);
+}
+
+TEST(ProcessorFault, FetchesCodeFromFlashAndSramOnly) {
+  const Program jump{0x4700};  // bx r0
+  for (const std::uint32_t address : {0x1000'0001U, 0x0000'0001U, 0x0800'4001U, 0x4000'0001U, 0x2002'0001U}) {
+    ProgramOnCore board(jump);
+    board.set(0, address);
+    expect_fault(board, {});
+    EXPECT_NE(board.processor.fault().find("fetch"), std::string::npos)
+        << std::hex << address << board.processor.fault();
+  }
+  ProgramOnCore board(jump);
+  board.place(0x2000'0100, {0xBE05});
+  board.set(0, 0x2000'0101);
+  EXPECT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  EXPECT_EQ(board.processor.breakpoint(), 5);
+}
+
+TEST(ProcessorFault, FindsFloatingPointInstructionsBeforeCpacr_FloatingPointUnit) {
+  const Program fp{0xBF00,          // nop
+                   0xEE00, 0x0A10,  // vmov s0, r0
+                   0xEE10, 0x0A10,  // vmov r0, s0
+                   0xBE01};
+  ProgramOnCore board(fp);
+  expect_fault(board, {"floating-point", "pc 0x08000202", "CPACR"});
+  ProgramOnCore enabled(fp);
+  enabled.core.system_control.write({offsetof(chip::ScbRegisters, cpacr), 4, 0}, 0xFU << 20);
+  EXPECT_EQ(enabled.run(), RunEnd::stopped) << enabled.processor.fault();
+}
+
+TEST(ProcessorFault, StopsAtUndefinedInstructions) {
+  ProgramOnCore board({0xBF00, 0xDE03});  // nop; udf #3
+  expect_fault(board, {"undefined instruction", "pc 0x08000202"});
+}
+
+TEST(ProcessorFault, StopsWhenTheFrameDoesNotFitIntoMemory) {
+  ProgramOnCore board({0xBF30, 0xBE01});
+  board.core.exceptions.set_enabled(tim2, true);
+  board.handler(tim2, {0x4770});
+  board.set(13, 0x2000'0010);
+  board.core.exceptions.pend(tim2);
+  expect_fault(board, {"stack pointer 0x20000010", "outside RAM"});
+}
+
+TEST(ProcessorFault, StopsAtABrokenVectorOrReturn) {
+  ProgramOnCore even({0xBF30, 0xBE01});
+  even.core.exceptions.set_enabled(tim2, true);
+  even.vector(tim2, 0x0800'1000);
+  even.core.exceptions.pend(tim2);
+  expect_fault(even, {"vector", "0x08001000"});
+
+  ProgramOnCore overwritten({0xBF30, 0xBE01});
+  overwritten.core.exceptions.set_enabled(tim2, true);
+  overwritten.handler(tim2, {0x2000,    // movs r0, #0
+                             0x9007,    // str r0, [sp, #28]: xPSR
+                             0x4770});  // bx lr
+  overwritten.core.exceptions.pend(tim2);
+  expect_fault(overwritten, {"xPSR", "stack overwritten"});
+}
+
+TEST(ProcessorFault, RefusesUnprivilegedCodeWhenItIsInterrupted) {
+  ProgramOnCore board({0x2201,          // movs r2, #1
+                       0xF382, 0x8814,  // msr control, r2
+                       0xF3BF, 0x8F6F,  // isb
+                       0xE7FE});        // b here
+  board.core.exceptions.set_enabled(tim2, true);
+  board.handler(tim2, {0x4770});
+  EXPECT_EQ(board.run(1000), RunEnd::time_reached);
+  board.core.exceptions.pend(tim2);
+  expect_fault(board, {"nPRIV"});
+}
+
+TEST(ProcessorFault, BecomesHardFaultWithTheInstructionsAddress_FaultEscalation) {
+  ProgramOnCore board(load, as_on_the_chip);
+  board.handler(exception_number::hard_fault, {0xBE09});
+  board.set(0, 0x2002'0000).set(2, 0);
+  ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  EXPECT_EQ(board.processor.breakpoint(), 9);
+  EXPECT_EQ(board.bus.load(board.get(13) + 24), ProgramOnCore::program_base + 2);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, hfsr)), chip::scb_hfsr::Forced::mask);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)),
+            chip::scb_cfsr::PreciseBusFault::mask | chip::scb_cfsr::BusFaultAddressValid::mask);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, bfar)), 0x2002'0004U);
+}
+
+TEST(ProcessorFault, BecomesBusFaultWhenThatIsEnabled_BusFault) {
+  ProgramOnCore board(load, as_on_the_chip);
+  board.handler(exception_number::bus_fault, {0xBE08});
+  board.core.system_control.write({offsetof(chip::ScbRegisters, shcsr), 4, 0},
+                                  chip::scb_shcsr::BusFaultEnable::mask);
+  board.set(0, ProgramOnCore::block_base + 0x400);
+  ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  EXPECT_EQ(board.processor.breakpoint(), 8);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)), chip::scb_cfsr::ImpreciseBusFault::mask);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, hfsr)), 0U);
+}
+
+TEST(ProcessorFault, BecomesUsageFaultOfAnUndefinedInstruction_UsageFault) {
+  ProgramOnCore board({0xBF00, 0xDE03}, as_on_the_chip);
+  board.handler(exception_number::hard_fault, {0xBE09});
+  ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  EXPECT_EQ(board.bus.load(board.get(13) + 24), ProgramOnCore::program_base + 2);
+  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)), chip::scb_cfsr::UndefinedInstruction::mask);
+}
+
+TEST(ProcessorFault, LocksUpOnAFaultInTheHardFaultHandler_Lockup) {
+  ProgramOnCore board(load, as_on_the_chip);
+  board.handler(exception_number::hard_fault, load);
+  board.set(0, 0x2002'0000);
+  expect_fault(board, {"lock-up", "0x20020004"});
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

@@ -1,0 +1,186 @@
+// PM0214, system timer; and the driver drivers/stm32f4/system_tick.hpp on the model.
+
+#include "host_tools/virtual_board/cortex_m/system_tick.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
+namespace kmax::virtual_board {
+namespace {
+
+using namespace drivers::stm32f4;
+constexpr unsigned tick = exception_number::system_tick;
+constexpr BoardTime cycle = 2;
+
+constexpr std::size_t ctrl = offsetof(SystemTickRegisters, ctrl);
+constexpr std::size_t load = offsetof(SystemTickRegisters, load);
+constexpr std::size_t val = offsetof(SystemTickRegisters, val);
+constexpr std::uint32_t running = 7;
+
+struct Timer {
+  Timer() {
+    exceptions.reset();
+    clocks.core = cycle;
+  }
+  std::uint32_t read(std::size_t offset) { return timer.read({static_cast<std::uint32_t>(offset), 4, now}); }
+  void write(std::size_t offset, std::uint32_t value) {
+    timer.write({static_cast<std::uint32_t>(offset), 4, now}, value);
+  }
+  void start(std::uint32_t reload) {
+    write(load, reload);
+    write(val, 0);
+    write(ctrl, running);
+  }
+  /// Lets `cycles` core cycles pass as the event loop does.
+  void pass(BoardTime cycles) {
+    const BoardTime until = now + cycles * cycle;
+    while (timer.next_event() <= until) {
+      now = timer.next_event();
+      timer.advance(now);
+    }
+    now = until;
+  }
+  bool take() {
+    const bool pending = exceptions.pending(tick);
+    exceptions.clear_pending(tick);
+    return pending;
+  }
+
+  BoardClocks clocks;
+  ExceptionTable exceptions;
+  SystemTick timer{clocks, exceptions};
+  BoardTime now = 1000;
+};
+
+TEST(SystemTickModel, CountsDownFromTheReloadValueAndTicksAtTheStepToZero) {
+  Timer timer;
+  timer.start(9);
+  EXPECT_EQ(timer.read(val), 0U);
+  for (int round = 0; round < 3; ++round) {
+    for (std::uint32_t expected = 9; expected > 0; --expected) {
+      timer.pass(1);
+      EXPECT_EQ(timer.read(val), expected);
+      EXPECT_FALSE(timer.take());
+    }
+    timer.pass(1);
+    EXPECT_EQ(timer.read(val), 0U);
+    EXPECT_TRUE(timer.take());
+  }
+}
+
+TEST(SystemTickModel, ShowsTheEventExactly) {
+  Timer timer;
+  timer.start(167'999);
+  EXPECT_EQ(timer.timer.next_event(), 1000 + 168'000 * cycle);
+  timer.pass(168'000 * 5 + 1);
+  EXPECT_EQ(timer.timer.next_event(), 1000 + 6 * 168'000 * cycle);
+}
+
+TEST(SystemTickModel, ClearsCountFlagByReadingIt_CountFlag) {
+  Timer timer;
+  timer.start(3);
+  EXPECT_EQ(timer.read(ctrl), running);
+  timer.pass(4);
+  EXPECT_EQ(timer.read(ctrl), running | system_tick_ctrl::CountFlag::mask);
+  EXPECT_EQ(timer.read(ctrl), running);
+  timer.pass(4);
+  timer.write(val, 123);
+  EXPECT_EQ(timer.read(ctrl), running) << "writing VAL clears it";
+  EXPECT_EQ(timer.read(val), 0U) << "whatever is written";
+}
+
+TEST(SystemTickModel, IsUpToDateWhenAskedAfterItsEvent) {
+  Timer timer;
+  timer.start(9);
+  timer.now += 25 * cycle;
+  EXPECT_EQ(timer.read(val), 5U);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, RaisesNoInterruptUnlessAsked_Tickint) {
+  Timer timer;
+  timer.write(load, 9);
+  timer.write(ctrl, system_tick_ctrl::Enable::mask | system_tick_ctrl::ProcessorClock::mask);
+  timer.pass(100);
+  EXPECT_FALSE(timer.take());
+  EXPECT_NE(timer.read(ctrl) & system_tick_ctrl::CountFlag::mask, 0U);
+  timer.pass(3);
+  timer.write(ctrl, running);
+  EXPECT_EQ(timer.read(val), 7U) << "the count goes on";
+  timer.pass(7);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, CountsEveryEighthCycleOfTheReferenceClock_Clksource) {
+  Timer timer;
+  timer.write(load, 4);
+  timer.write(val, 0);
+  timer.write(ctrl, system_tick_ctrl::Enable::mask | system_tick_ctrl::TickInterrupt::mask);
+  timer.pass(39);
+  EXPECT_FALSE(timer.take());
+  timer.pass(1);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, HoldsItsValueWhileDisabled) {
+  Timer timer;
+  timer.start(9);
+  timer.pass(4);
+  timer.write(ctrl, running & ~system_tick_ctrl::Enable::mask);
+  EXPECT_EQ(timer.timer.next_event(), never);
+  timer.pass(100);
+  EXPECT_EQ(timer.read(val), 6U);
+  timer.write(ctrl, running);
+  timer.pass(5);
+  EXPECT_FALSE(timer.take());
+  timer.pass(1);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, NeverTicksWithAReloadOfZero_Load) {
+  Timer timer;
+  timer.start(0);
+  timer.pass(1000);
+  EXPECT_FALSE(timer.take());
+  EXPECT_EQ(timer.timer.next_event(), never);
+  timer.write(load, 9);
+  timer.pass(10);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, TakesANewReloadWithTheNextPeriod_Load) {
+  Timer timer;
+  timer.start(9);
+  timer.pass(5);
+  timer.write(load, 99);
+  timer.pass(5);
+  EXPECT_TRUE(timer.take());
+  timer.pass(99);
+  EXPECT_FALSE(timer.take());
+  timer.pass(1);
+  EXPECT_TRUE(timer.take());
+}
+
+TEST(SystemTickModel, ForgetsEverythingOnReset) {
+  Timer timer;
+  timer.start(9);
+  timer.pass(15);
+  timer.timer.reset(timer.now);
+  EXPECT_EQ(timer.read(ctrl), 0U);
+  EXPECT_EQ(timer.read(load), 0U);
+  EXPECT_EQ(timer.read(val), 0U);
+  EXPECT_EQ(timer.timer.next_event(), never);
+}
+
+TEST(SystemTickModel, RefusesWhatDoesNotExist) {
+  Timer timer;
+  EXPECT_EQ(timer.read(offsetof(SystemTickRegisters, calib)), 0x4000'493EU);
+  EXPECT_THROW(timer.write(offsetof(SystemTickRegisters, calib), 0), RefusedAccess);
+  EXPECT_THROW(timer.write(load, 0x0100'0000), RefusedAccess);
+  EXPECT_THROW(timer.write(ctrl, 8), RefusedAccess);
+  EXPECT_THROW(timer.timer.read({0, 1, 0}), RefusedAccess);
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

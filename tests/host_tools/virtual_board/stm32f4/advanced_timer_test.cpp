@@ -1,0 +1,259 @@
+// Against RM0090, chapter Advanced-control timers (TIM1&TIM8); section titles stand with the tests. Counting
+// here, outputs in advanced_timer_outputs_test.cpp.
+
+#include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <vector>
+
+#include "tests/host_tools/virtual_board/stm32f4/advanced_timer_bench.hpp"
+
+namespace kmax::virtual_board {
+namespace {
+
+using namespace testing;
+using Bench = AdvancedTimerBench;
+using drivers::stm32f4::Interrupt;
+
+// "Center-aligned mode (up/down counting)": 0 to ARR - 1, overflow, ARR to 1, underflow, and so on.
+TEST(AdvancedTimerModel, CountsUpAndDownOverTwiceAutoReload) {
+  Bench bench;
+  bench.load(6);
+  bench.count();
+  const std::vector<std::uint32_t> expected = {0, 1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1, 0, 1, 2};
+  for (const std::uint32_t count : expected) {
+    EXPECT_EQ(bench.cnt(), count) << bench.now;
+    const BoardTime phase = (bench.now - 1000) / tick % 12;
+    EXPECT_EQ(bench.down(), phase >= 6) << bench.now;
+    bench.now += tick;
+  }
+}
+
+// The same by arithmetic, from far away: no event was seen in between, so turns are made up for.
+RC_GTEST_PROP(AdvancedTimerModel, CountIsATriangleOfTime, ()) {
+  const auto top = *rc::gen::inRange<std::uint32_t>(1, 65536);
+  const auto prescaler = *rc::gen::inRange<std::uint32_t>(0, 300);
+  const auto elapsed = *rc::gen::inRange<BoardTime>(0, 1'000'000'000'000);
+  Bench bench;
+  bench.timer.psc = prescaler;
+  bench.load(top);
+  bench.count();
+  bench.now += elapsed;
+  const BoardTime phase = elapsed / (tick * (prescaler + 1)) % (2 * BoardTime{top});
+  RC_ASSERT(bench.cnt() == (phase < top ? phase : 2 * BoardTime{top} - phase));
+  RC_ASSERT(bench.down() == (phase >= top));
+}
+
+// "Center-aligned mode" and TIMx_CR2, MMS = 010: an update event at each over- and underflow.
+TEST(AdvancedTimerModel, UpdateTriggersAtBothTurns) {
+  Bench bench;
+  bench.load(4200);
+  bench.timer.cr2 = 2U << 4;
+  bench.count();
+  bench.run(5 * 4200 * tick);
+  ASSERT_EQ(bench.triggers.size(), 5U);
+  for (unsigned n = 0; n < 5; ++n) EXPECT_EQ(bench.triggers[n], 1000 + (n + 1) * 4200 * tick);
+}
+
+// TIMx_CR2, MMS = 000 and 001.
+TEST(AdvancedTimerModel, TriggerOutputShowsUpdateGenerationOrEnable) {
+  Bench bench;
+  bench.load(100);
+  bench.timer.egr = 1;
+  EXPECT_EQ(bench.triggers.size(), 1U);
+  bench.timer.cr2 = 1U << 4;
+  bench.timer.egr = 1;
+  EXPECT_EQ(bench.triggers.size(), 1U) << "UG is not shown with MMS = 1";
+  bench.count();
+  EXPECT_EQ(bench.triggers.size(), 2U);
+  bench.run(1000 * tick);
+  bench.timer.cr2 = 0;
+  EXPECT_EQ(bench.triggers.size(), 2U);
+  bench.timer.cr2 = 1U << 4;
+  EXPECT_EQ(bench.triggers.size(), 3U) << "the level of CEN comes back: a rising edge";
+}
+
+// "Repetition counter": written before the start, RCR = 1 gives update events at overflows; RCR = 2 every
+// third turn.
+TEST(AdvancedTimerModel, RepetitionCounterSkipsTurns) {
+  for (const std::uint32_t repetitions : {1U, 2U}) {
+    Bench bench;
+    bench.load(100);
+    bench.timer.cr2 = 2U << 4;
+    bench.timer.rcr = repetitions;
+    bench.count();
+    bench.run(8 * 100 * tick);
+    ASSERT_GE(bench.triggers.size(), 3U);
+    for (unsigned n = 0; n < bench.triggers.size(); ++n) {
+      EXPECT_EQ(bench.triggers[n], 1000 + (1 + n * (repetitions + 1)) * 100 * tick) << repetitions;
+    }
+  }
+}
+
+// Figure "Counter timing diagram, update event with ARPE=1 (counter overflow)": the count goes on from the
+// new ARR.
+TEST(AdvancedTimerModel, AutoReloadIsPreloaded) {
+  Bench bench;
+  bench.load(0xFD);
+  bench.count();
+  bench.run(100 * tick);
+  bench.timer.arr = 0x36;
+  EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.arr), 0x36U) << "reads show the preload";
+  bench.run((0xFC - 100) * tick);
+  EXPECT_EQ(bench.cnt(), 0xFCU) << "the old one still holds";
+  bench.run(tick);
+  EXPECT_EQ(bench.cnt(), 0x36U);
+  bench.run(0x36 * tick);
+  EXPECT_EQ(bench.cnt(), 0U);
+}
+
+// TIMx_EGR UG, TIMx_CR1 URS.
+TEST(AdvancedTimerModel, SoftwareUpdateRestartsAndLoads) {
+  Bench bench;
+  bench.timer.dier = 1;
+  bench.load(500);
+  EXPECT_FALSE(bench.update_flag()) << "URS = 1";
+  bench.count();
+  bench.run(700 * tick);
+  EXPECT_TRUE(bench.interrupts.level(Interrupt::tim1_up_tim10));
+  bench.timer.sr = ~1U;
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim1_up_tim10));
+  EXPECT_TRUE(bench.down());
+  bench.timer.cr1 = static_cast<std::uint32_t>(bench.timer.cr1) & ~urs;
+  bench.timer.arr = 40;
+  bench.timer.egr = 1;
+  EXPECT_TRUE(bench.update_flag());
+  EXPECT_EQ(bench.cnt(), 0U);
+  EXPECT_FALSE(bench.down()) << "up again";
+  bench.run(41 * tick);
+  EXPECT_EQ(bench.cnt(), 39U) << "the new ARR holds";
+}
+
+// "Hints on using center-aligned mode": it starts in the direction that DIR has; UG loads ARR while that is
+// down.
+TEST(AdvancedTimerModel, StartsDownwardsFromTheTop) {
+  Bench bench;
+  bench.timer.arr = 300;
+  bench.timer.cr1 = arpe | urs | dir;
+  bench.timer.egr = 1;
+  EXPECT_EQ(bench.cnt(), 300U);
+  bench.timer.cr1 = arpe | urs | dir | centre;
+  bench.timer.cr1 = arpe | urs | centre;
+  EXPECT_TRUE(bench.down()) << "DIR is read-only when centre-aligned";
+  bench.count();
+  bench.run(1 * tick);
+  EXPECT_EQ(bench.cnt(), 299U);
+  bench.run(300 * tick);
+  EXPECT_EQ(bench.cnt(), 1U);
+  EXPECT_FALSE(bench.down());
+}
+
+// "TIMx and external trigger synchronization", Slave mode: Trigger mode; TIMx_CR2 MMS = 001.
+TEST(AdvancedTimerModel, TriggerStartsTheSlaveOnce) {
+  Bench leader;
+  Bench follower(AdvancedTimer::tim8);
+  leader.model.on_trigger_output([&](BoardTime at) { follower.model.trigger_input(at); });
+  leader.load(100);
+  follower.load(100);
+  follower.timer.smcr = 6;
+  leader.timer.cr2 = 1U << 4;
+  EXPECT_FALSE((static_cast<std::uint32_t>(follower.timer.cr1) & cen) != 0);
+  leader.count();
+  EXPECT_TRUE((static_cast<std::uint32_t>(follower.timer.cr1) & cen) != 0);
+  EXPECT_TRUE((static_cast<std::uint32_t>(follower.timer.sr) & 1U << 6) != 0) << "TIF";
+  follower.now = leader.now = leader.now + 37 * tick;
+  EXPECT_EQ(follower.cnt(), leader.cnt());
+  follower.timer.cr1 = static_cast<std::uint32_t>(follower.timer.cr1) & ~cen;
+  leader.timer.cr1 = static_cast<std::uint32_t>(leader.timer.cr1);
+  EXPECT_FALSE((static_cast<std::uint32_t>(follower.timer.cr1) & cen) != 0) << "no new edge, no new start";
+}
+
+TEST(AdvancedTimerModel, ClockChangeKeepsTheCount) {
+  Bench bench;
+  bench.load(4200);
+  bench.count();
+  bench.run(1000 * tick);
+  bench.clocks.apb2_timer = 21;
+  bench.model.clock_changed(bench.now);
+  EXPECT_EQ(bench.cnt(), 1000U);
+  bench.run(10 * 21);
+  EXPECT_EQ(bench.cnt(), 1010U);
+  bench.run(3190 * 21);
+  EXPECT_EQ(bench.cnt(), 4200U);
+  EXPECT_TRUE(bench.down());
+}
+
+TEST(AdvancedTimerModel, EventsCostNothingUntilSomebodyLooks) {
+  Bench bench;
+  bench.pwm(4200);
+  EXPECT_EQ(bench.model.next_event(), never) << "nothing waits, nobody listens";
+  bench.timer.ccr[0] = 1234;
+  EXPECT_EQ(bench.model.next_event(), 1000 + 4200 * tick);
+  EXPECT_EQ(run_until(bench.now, bench.now + 10 * 8400 * tick, bench.model), 1U) << "one update loads it";
+  bench.timer.cr2 = 2U << 4;
+  EXPECT_EQ(run_until(bench.now, bench.now + 10 * 8400 * tick, bench.model), 20U);
+  bench.model.on_trigger_output({});
+  bench.timer.dier = 1;
+  EXPECT_EQ(run_until(bench.now, bench.now + 10 * 8400 * tick, bench.model), 0U)
+      << "UIF has been up since the turns that nobody saw";
+}
+
+TEST(AdvancedTimerModel, RefusesWhatIsNotModelled) {
+  const auto refused = [](auto&& action) {
+    Bench bench;
+    bench.load(100);
+    EXPECT_THROW(action(bench), RefusedAccess);
+  };
+  refused([](Bench& b) { b.timer.cr1 = udis; });
+  refused([](Bench& b) { b.timer.cr1 = opm; });
+  refused([](Bench& b) { b.timer.cr1 = 3U << 8; });
+  refused([](Bench& b) { b.timer.cr1 = arpe | dir; });  // CMS and DIR at once
+  refused([](Bench& b) { b.timer.cr1 = arpe | cen; });  // edge-aligned
+  refused([](Bench& b) { b.timer.cr2 = 7U << 4; });
+  refused([](Bench& b) { b.timer.cr2 = 1U << 8; });   // OIS1
+  refused([](Bench& b) { b.timer.smcr = 6; });        // TIM1 has no modelled trigger
+  refused([](Bench& b) { b.timer.dier = 1U << 1; });  // CC1IE
+  refused([](Bench& b) { b.timer.ccer = 1; });        // CC1E alone
+  refused([](Bench& b) { b.timer.ccer = 7; });        // active low
+  refused([](Bench& b) { b.timer.ccmr[1] = 0x6000; });
+  refused([](Bench& b) { b.timer.ccmr[0] = 0x30; });  // toggle
+  refused([](Bench& b) { b.timer.ccr[3] = 5; });
+  refused([](Bench& b) { b.timer.bdtr = bke; });  // active low break input without a pin
+  refused([](Bench& b) { b.timer.bdtr = 1U << 16; });
+  refused([](Bench& b) { b.timer.arr = 70000; });
+  refused([](Bench& b) {
+    b.timer.ccer = 5;
+    b.timer.bdtr = moe;  // no PWM mode
+  });
+  refused([](Bench& b) {
+    b.timer.cnt = 100;
+    b.count();  // already at its turn
+  });
+  refused([](Bench& b) {
+    b.count();
+    b.timer.cnt = 5;
+  });
+  refused([](Bench& b) { b.model.read({0x48, 4, b.now}); });  // DCR
+  refused([](Bench& b) { b.model.read({0x00, 2, b.now}); });
+}
+
+TEST(AdvancedTimerModel, ResetSwitchesOff) {
+  Bench bench;
+  bench.timer.dier = 1;
+  bench.pwm(4200);
+  bench.run(5000 * tick);
+  ASSERT_TRUE(bench.interrupts.level(Interrupt::tim1_up_tim10));
+  bench.changes.clear();
+  bench.model.reset(bench.now);
+  EXPECT_FALSE(bench.model.moe());
+  EXPECT_FALSE(bench.model.outputs()[0].enabled);
+  EXPECT_EQ(bench.changes, std::vector<BoardTime>{bench.now});
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim1_up_tim10));
+  EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.arr), 0xFFFFU);
+  EXPECT_EQ(bench.model.next_event(), never);
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

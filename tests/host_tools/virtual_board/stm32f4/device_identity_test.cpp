@@ -1,0 +1,43 @@
+#include "host_tools/virtual_board/stm32f4/device_identity.hpp"
+
+#include <gtest/gtest.h>
+
+// RM0090, chapters Embedded Flash memory interface (one-time programmable bytes) and Device electronic
+// signature.
+
+namespace kmax::virtual_board {
+namespace {
+
+std::uint32_t get(DeviceIdentity& model, std::uint32_t address, unsigned bytes) {
+  return model.read({address - DeviceIdentity::base, bytes, 0});
+}
+
+TEST(DeviceIdentity, WordsWhereTheManualSays) {
+  DeviceIdentity model{{.unique_id = {0x1122'3344, 0x5566'7788, 0x99AA'BBCC}, .volts = 24}};
+  EXPECT_EQ(get(model, 0x1FFF'7A10, 4), 0x1122'3344U);
+  EXPECT_EQ(get(model, 0x1FFF'7A18, 4), 0x99AA'BBCCU);
+  EXPECT_EQ(get(model, 0x1FFF'7A13, 1), 0x11U);
+  EXPECT_EQ(get(model, 0x1FFF'7A22, 2), 1024U);
+  EXPECT_EQ(get(model, 0x1FFF'7800, 1), 0xFEU);
+  EXPECT_EQ(get(model, 0x1FFF'7803, 1), 3U);
+  EXPECT_EQ(get(model, 0x1FFF'7804, 1), 6U);
+  EXPECT_EQ(get(model, 0x1FFF'7805, 1), 24U);
+  EXPECT_EQ(get(model, 0x1FFF'79FC, 4), 0xFFFF'FFFFU);
+  EXPECT_EQ(get(model, 0x1FFF'7A0C, 4), 0xFFFF'FFFFU) << "lock bytes: open";
+}
+
+TEST(DeviceIdentity, BlankBoardRecord) {
+  DeviceIdentity model{{.board_record = false}};
+  EXPECT_EQ(get(model, 0x1FFF'7800, 4), 0xFFFF'FFFFU);
+}
+
+TEST(DeviceIdentity, HolesAndWritesAreRefused) {
+  DeviceIdentity model;
+  EXPECT_THROW(get(model, 0x1FFF'7A1C, 4), RefusedAccess);
+  EXPECT_THROW(get(model, 0x1FFF'7A20, 4), RefusedAccess) << "only half of it is the flash size";
+  EXPECT_THROW(get(model, 0x1FFF'7A24, 4), RefusedAccess);
+  EXPECT_THROW(model.write({0, 4, 0}, 0), RefusedAccess);
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

@@ -1,0 +1,332 @@
+// Against RM0090, chapter General-purpose timers (TIM2 to TIM5); section titles stand with the tests.
+
+#include "host_tools/virtual_board/stm32f4/general_timer.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
+
+namespace kmax::virtual_board {
+namespace {
+
+using drivers::stm32f4::Interrupt;
+using testing::RecordedInterrupts;
+using testing::run_until;
+using testing::TimerOnModel;
+
+constexpr std::uint32_t cen = 1U << 0, urs = 1U << 2, dir = 1U << 4, arpe = 1U << 7;
+constexpr std::uint32_t cc1p = 1U << 1, cc2p = 1U << 5, cc4e = 1U << 12, cc4p = 1U << 13, cc4np = 1U << 15;
+constexpr std::uint32_t cc4if = 1U << 4, cc4of = 1U << 12;
+constexpr BoardTime tick = 4;  // 84 MHz
+
+struct Bench {
+  explicit Bench(GeneralTimer unit = GeneralTimer::tim3)
+      : model(unit, clocks, interrupts), timer(model, now) {}
+  static BoardClocks at_84_mhz() {
+    BoardClocks fast;
+    fast.apb1_timer = tick;
+    return fast;
+  }
+  void encoder(std::uint32_t polarity = 0) {
+    timer.ccmr[0] = 0x4141;
+    timer.ccer = polarity;
+    timer.smcr = 3;
+    timer.cr1 = cen;
+  }
+  void run(BoardTime duration) { run_until(now, now + duration, model); }
+  std::uint32_t cnt() { return static_cast<std::uint32_t>(timer.cnt); }
+  std::uint32_t sr() { return static_cast<std::uint32_t>(timer.sr); }
+  bool down() { return (static_cast<std::uint32_t>(timer.cr1) & dir) != 0; }
+
+  BoardTime now = 500;
+  BoardClocks clocks = at_84_mhz();
+  RecordedInterrupts interrupts;
+  GeneralTimerModel model;
+  TimerOnModel timer;
+};
+
+// "Encoder interface mode": between 0 and ARR, both ways round.
+TEST(GeneralTimerModel, EncoderWrapsBothWays) {
+  Bench bench;
+  bench.encoder();
+  bench.model.set_encoder_count(65535);
+  EXPECT_EQ(bench.cnt(), 65535U);
+  EXPECT_EQ(bench.sr() & 1U, 0U);
+  EXPECT_FALSE(bench.down());
+  bench.model.set_encoder_count(65536);
+  EXPECT_EQ(bench.cnt(), 0U);
+  EXPECT_EQ(bench.sr() & 1U, 1U) << "overflow is an update event";
+  bench.timer.sr = 0;
+  bench.model.set_encoder_count(65535);
+  EXPECT_EQ(bench.cnt(), 65535U);
+  EXPECT_EQ(bench.sr() & 1U, 1U) << "underflow";
+  EXPECT_TRUE(bench.down());
+  bench.timer.sr = 0;
+  bench.model.set_encoder_count(65531);
+  bench.model.set_encoder_count(0);
+  bench.model.set_encoder_count(65535);
+  EXPECT_EQ(bench.sr() & 1U, 0U) << "reaching 0 or ARR is no wrap";
+}
+
+RC_GTEST_PROP(GeneralTimerModel, EncoderIsModuloItsRange, (std::int64_t first, std::int64_t second)) {
+  Bench bench;
+  const auto arr = *rc::gen::inRange<std::uint32_t>(1, 65536);
+  bench.timer.arr = arr;
+  bench.encoder();
+  bench.model.set_encoder_count(first);
+  bench.model.set_encoder_count(second);
+  const auto range = static_cast<std::int64_t>(arr) + 1;
+  RC_PRE(first / 2 > -(std::int64_t{1} << 61) && first / 2 < (std::int64_t{1} << 61));
+  RC_PRE(second / 2 > -(std::int64_t{1} << 61) && second / 2 < (std::int64_t{1} << 61));
+  RC_ASSERT(bench.cnt() == static_cast<std::uint32_t>((second % range + range) % range));
+}
+
+TEST(GeneralTimerModel, EncoderJumpOverTheWholeInt64IsSurvived) {
+  Bench bench(GeneralTimer::tim2);
+  bench.encoder();
+  bench.model.set_encoder_count(std::numeric_limits<std::int64_t>::min());
+  EXPECT_EQ(bench.cnt(), 0U) << "2^63 is a multiple of 2^32";
+  bench.model.set_encoder_count(std::numeric_limits<std::int64_t>::max());
+  EXPECT_EQ(bench.cnt(), 0xFFFF'FFFFU);
+}
+
+// Table "Counting direction versus encoder signals"; TIMx_CCER, CC1P and CC2P.
+TEST(GeneralTimerModel, EachInvertedInputReversesTheDirection) {
+  struct Row {
+    std::uint32_t polarity, count;
+    bool down;
+  };
+  for (const Row& row :
+       {Row{0, 10, false}, Row{cc1p, 65526, true}, Row{cc2p, 65526, true}, Row{cc1p | cc2p, 10, false}}) {
+    Bench bench;
+    bench.encoder(row.polarity);
+    bench.model.set_encoder_count(10);
+    EXPECT_EQ(bench.cnt(), row.count);
+    EXPECT_EQ(bench.down(), row.down);
+  }
+}
+
+TEST(GeneralTimerModel, EncoderCountsOnlyWhileEnabled) {
+  Bench bench;
+  bench.model.set_encoder_count(1000);
+  bench.encoder();
+  EXPECT_EQ(bench.cnt(), 0U) << "only changes count";
+  bench.model.set_encoder_count(1003);
+  EXPECT_EQ(bench.cnt(), 3U);
+  bench.timer.cnt = 100;
+  bench.model.set_encoder_count(1002);
+  EXPECT_EQ(bench.cnt(), 99U);
+  bench.timer.cr1 = 0;
+  bench.model.set_encoder_count(5000);
+  bench.timer.cr1 = cen;
+  bench.model.set_encoder_count(5001);
+  EXPECT_EQ(bench.cnt(), 100U);
+  bench.run(1'000'000);
+  EXPECT_EQ(bench.cnt(), 100U) << "time does not count in encoder mode";
+}
+
+// "Input capture mode": TI4 copies the counter; reading CCR4 clears CC4IF; a second edge before that is an
+// overcapture.
+TEST(GeneralTimerModel, CapturesTheEncoderCount) {
+  Bench bench;
+  bench.timer.ccmr[1] = 0x4100;
+  bench.encoder(cc4e);
+  bench.timer.dier = cc4if;
+  bench.model.set_encoder_count(1234);
+  bench.model.capture_edge(4, false, bench.now);
+  EXPECT_EQ(bench.sr() & cc4if, 0U) << "the other edge";
+  bench.model.capture_edge(4, true, bench.now);
+  EXPECT_TRUE(bench.interrupts.level(Interrupt::tim3));
+  bench.model.set_encoder_count(1300);
+  EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.ccr[3]), 1234U);
+  EXPECT_EQ(bench.sr() & (cc4if | cc4of), 0U);
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim3));
+  bench.model.capture_edge(4, true, bench.now);
+  bench.model.set_encoder_count(1400);
+  bench.model.capture_edge(4, true, bench.now);
+  EXPECT_EQ(bench.sr() & (cc4if | cc4of), cc4if | cc4of);
+  EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.ccr[3]), 1400U) << "the later one";
+  EXPECT_EQ(bench.sr() & (cc4if | cc4of), cc4of) << "only a written 0 clears the overcapture";
+}
+
+TEST(GeneralTimerModel, CapturePolarity) {
+  for (const std::uint32_t polarity : {0U, cc4p, cc4p | cc4np}) {
+    for (const bool rising : {false, true}) {
+      Bench bench;
+      bench.timer.ccmr[1] = 0x0100;
+      bench.encoder(cc4e | polarity);
+      bench.model.capture_edge(4, rising, bench.now);
+      const bool expected = polarity == 0 ? rising : polarity == cc4p ? !rising : true;
+      EXPECT_EQ((bench.sr() & cc4if) != 0, expected) << polarity << rising;
+    }
+  }
+  Bench unused;
+  unused.encoder();
+  unused.model.capture_edge(4, true, unused.now);
+  EXPECT_EQ(unused.sr(), 0U) << "a channel that is off";
+  EXPECT_THROW(unused.model.capture_edge(5, true, unused.now), std::invalid_argument);
+}
+
+// "Upcounting mode" with the longest period there is: 2^32 ticks.
+TEST(GeneralTimerModel, FreeRunning32BitsWrapAfterTwoToThe32) {
+  Bench bench(GeneralTimer::tim2);
+  bench.timer.dier = 1;
+  bench.timer.cr1 = cen;
+  EXPECT_EQ(bench.model.next_event(), 500 + (tick << 32));
+  bench.now += (tick << 32) - 1;
+  EXPECT_EQ(bench.cnt(), 0xFFFF'FFFFU);
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim2));
+  bench.now += 1;
+  bench.model.advance(bench.now);
+  EXPECT_TRUE(bench.interrupts.level(Interrupt::tim2));
+  EXPECT_EQ(bench.cnt(), 0U);
+}
+
+RC_GTEST_PROP(GeneralTimerModel, FreeRunningIsTimeModuloPeriod, ()) {
+  Bench bench(GeneralTimer::tim5);
+  const auto prescaler = *rc::gen::inRange<std::uint32_t>(0, 65536);
+  const auto arr = *rc::gen::inRange<std::uint32_t>(1, 100'000);
+  const auto elapsed = *rc::gen::inRange<BoardTime>(0, 1'000'000'000'000'000);
+  bench.timer.psc = prescaler;
+  bench.timer.arr = arr;
+  bench.timer.cr1 = urs;
+  bench.timer.egr = 1;
+  bench.timer.cr1 = urs | cen;
+  bench.now += elapsed;
+  const BoardTime ticks = elapsed / (tick * (BoardTime{prescaler} + 1));
+  RC_ASSERT(bench.cnt() == ticks % (BoardTime{arr} + 1));
+  RC_ASSERT((bench.sr() & 1U) == (ticks > arr ? 1U : 0U));
+}
+
+// "Counter timing diagram, Update event" with ARPE = 0 and 1; the prescaler is always buffered.
+TEST(GeneralTimerModel, PrescalerAndAutoReloadWaitForTheUpdate) {
+  Bench bench;
+  bench.timer.arr = 99;
+  bench.timer.cr1 = cen | arpe;
+  bench.run(10 * tick);
+  bench.timer.psc = 1;
+  bench.timer.arr = 9;
+  bench.run(89 * tick);
+  EXPECT_EQ(bench.cnt(), 99U) << "the old ARR and PSC";
+  bench.run(tick);
+  EXPECT_EQ(bench.cnt(), 0U);
+  bench.run(2 * 9 * tick);
+  EXPECT_EQ(bench.cnt(), 9U) << "half speed";
+  bench.run(2 * tick);
+  EXPECT_EQ(bench.cnt(), 0U) << "short period";
+
+  Bench direct;
+  direct.timer.arr = 99;
+  direct.timer.cr1 = cen;
+  direct.run(10 * tick);
+  direct.timer.arr = 20;
+  direct.run(10 * tick);
+  EXPECT_EQ(direct.cnt(), 20U);
+  direct.run(tick);
+  EXPECT_EQ(direct.cnt(), 0U) << "ARPE = 0: at once";
+}
+
+// TIMx_EGR UG: 0, or ARR when the direction is down.
+TEST(GeneralTimerModel, SoftwareUpdateFollowsTheDirection) {
+  Bench bench;
+  bench.encoder();
+  bench.model.set_encoder_count(-5);
+  bench.timer.egr = 1;
+  EXPECT_EQ(bench.cnt(), 65535U);
+  EXPECT_EQ(bench.sr() & 1U, 1U);
+  bench.timer.sr = 0;
+  bench.model.set_encoder_count(0);
+  bench.timer.sr = 0;
+  bench.timer.cr1 = cen | urs;
+  bench.timer.egr = 1;
+  EXPECT_EQ(bench.cnt(), 0U);
+  EXPECT_EQ(bench.sr() & 1U, 0U) << "URS = 1";
+}
+
+TEST(GeneralTimerModel, ClockChangeKeepsTheCount) {
+  Bench bench;
+  bench.timer.cr1 = cen;
+  bench.run(100 * tick);
+  bench.clocks.apb1_timer = 21;
+  bench.model.clock_changed(bench.now);
+  bench.run(10 * 21);
+  EXPECT_EQ(bench.cnt(), 110U);
+}
+
+TEST(GeneralTimerModel, WrapIsAnEventOnlyForItsInterrupt) {
+  Bench bench;
+  bench.timer.arr = 9;
+  bench.timer.cr1 = cen;
+  EXPECT_EQ(bench.model.next_event(), never);
+  bench.timer.dier = 1;
+  EXPECT_EQ(bench.model.next_event(), 500 + 10 * tick);
+  bench.run(10 * tick);
+  EXPECT_TRUE(bench.interrupts.level(Interrupt::tim3));
+  EXPECT_EQ(bench.model.next_event(), never) << "the level is up already";
+  bench.timer.sr = ~1U;
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim3));
+  EXPECT_EQ(bench.model.next_event(), 500 + 20 * tick);
+}
+
+TEST(GeneralTimerModel, RefusesWhatIsNotModelled) {
+  const auto refused = [](auto&& action) {
+    Bench bench;
+    EXPECT_THROW(action(bench), RefusedAccess);
+  };
+  refused([](Bench& b) { b.timer.cr1 = cen | dir; });
+  refused([](Bench& b) { b.timer.cr1 = 1U << 1; });  // UDIS
+  refused([](Bench& b) { b.timer.cr1 = 1U << 5; });  // CMS
+  refused([](Bench& b) { b.timer.cr2 = 2U << 4; });
+  refused([](Bench& b) { b.timer.smcr = 1; });          // encoder mode 1
+  refused([](Bench& b) { b.timer.dier = 1U << 8; });    // UDE
+  refused([](Bench& b) { b.timer.ccmr[1] = 0x0060; });  // PWM
+  refused([](Bench& b) { b.timer.ccmr[0] = 0x0002; });  // crossed input
+  refused([](Bench& b) { b.timer.ccmr[0] = 0x0005; });  // prescaled capture
+  refused([](Bench& b) { b.timer.ccer = 1; });          // compare output
+  refused([](Bench& b) { b.timer.ccr[0] = 1; });
+  refused([](Bench& b) { b.timer.arr = 0x10000; });
+  refused([](Bench& b) { b.timer.bdtr = 1; });
+  refused([](Bench& b) { b.timer.rcr = 1; });
+  refused([](Bench& b) {
+    b.timer.smcr = 3;
+    b.timer.cr1 = cen;  // CC1S, CC2S are 0
+  });
+  refused([](Bench& b) {
+    b.encoder();
+    b.timer.smcr = 0;
+  });
+  refused([](Bench& b) {
+    b.timer.ccmr[1] = 0x0100;
+    b.timer.ccer = cc4e;
+    b.timer.ccmr[1] = 0;
+  });
+  refused([](Bench& b) {
+    b.timer.arr = 10;
+    b.timer.cnt = 11;
+  });
+  refused([](Bench& b) { b.model.read({0x24, 2, b.now}); });
+  refused([](Bench& b) { b.model.read({0x50, 4, b.now}); });  // OR
+}
+
+TEST(GeneralTimerModel, ResetStopsAndForgets) {
+  Bench bench(GeneralTimer::tim4);
+  bench.timer.arr = 9;
+  bench.timer.dier = 1;
+  bench.timer.cr1 = cen;
+  bench.run(100 * tick);
+  ASSERT_TRUE(bench.interrupts.level(Interrupt::tim4));
+  bench.model.reset(bench.now);
+  EXPECT_FALSE(bench.interrupts.level(Interrupt::tim4));
+  EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.arr), 0xFFFFU);
+  bench.run(1000);
+  EXPECT_EQ(bench.cnt(), 0U);
+  EXPECT_EQ(bench.model.next_event(), never);
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board

@@ -1,0 +1,252 @@
+#include "host_tools/virtual_board/stm32f4/rcc.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+
+#include "tests/host_tools/virtual_board/cortex_m/system_on_model.hpp"
+
+// RM0090, chapter Reset and clock control for STM32F405xx (RCC).
+
+namespace kmax::virtual_board {
+namespace {
+
+namespace stm32 = drivers::stm32f4;
+namespace cr = stm32::rcc_cr;
+namespace cfgr = stm32::rcc_cfgr;
+namespace pllcfgr = stm32::rcc_pllcfgr;
+using stm32::RccRegisters;
+using stm32::ResetCause;
+
+constexpr std::uint32_t full_speed_buses = cfgr::Apb1Prescaler::bits(5) | cfgr::Apb2Prescaler::bits(4);
+constexpr std::uint32_t divider_4_from_crystal = 0x0740'2A04;  // M 4, N 168, P 2, Q 7
+
+struct Chip : testing::SystemOnModel {
+  std::uint32_t get(std::size_t offset) { return bus.read(rcc, static_cast<std::uint32_t>(offset)); }
+  void put(std::size_t offset, std::uint32_t word) {
+    bus.write(rcc, static_cast<std::uint32_t>(offset), word);
+  }
+  void set(std::size_t offset, std::uint32_t bits) { put(offset, get(offset) | bits); }
+
+  /// The message of the refusal, "" when the write is accepted.
+  std::string refusal(std::size_t offset, std::uint32_t word) {
+    try {
+      put(offset, word);
+    } catch (const RefusedAccess& refused) {
+      return refused.what();
+    }
+    return {};
+  }
+  void wait_states(std::uint32_t count) { flash_registers.acr = count; }
+
+  void start_crystal() {
+    set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
+    bus.pass(RccModel::crystal_start_time);
+  }
+  void start_pll(std::uint32_t setting) {
+    put(offsetof(RccRegisters, pllcfgr), setting);
+    set(offsetof(RccRegisters, cr), cr::PllOn::mask);
+    bus.pass(RccModel::pll_lock_time);
+  }
+  void run_at_168_mhz() {
+    power_registers.cr = stm32::pwr_cr::VoltageScale1::mask;
+    wait_states(5);
+    start_crystal();
+    start_pll(divider_4_from_crystal);
+    put(offsetof(RccRegisters, cfgr), full_speed_buses | cfgr::Switch::bits(cfgr::pll));
+    bus.pass(RccModel::switch_time);
+  }
+  std::uint32_t source() { return cfgr::SwitchStatus::of(get(offsetof(RccRegisters, cfgr))); }
+};
+
+TEST(RccRegisterMap, ResetValues) {
+  Chip chip;
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)), 0x0000'0083U);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, pllcfgr)), 0x2400'3010U);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, cfgr)), 0U);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, ahb1enr)), 0x0010'0000U);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, apb1enr)), 0U);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, csr)), 0x0E00'0000U);
+  EXPECT_THROW(chip.get(0x50), RefusedAccess) << "AHB1LPENR";
+  EXPECT_THROW(chip.rcc.read({0, 2, 0}), RefusedAccess);
+}
+
+TEST(RccClocks, CrystalIsReadyNeitherEarlyNorLate) {
+  Chip chip;
+  chip.bus.access_time = 0;
+  chip.set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
+  chip.bus.pass(RccModel::crystal_start_time - 1);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
+  chip.bus.pass(1);
+  EXPECT_NE(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
+  chip.put(offsetof(RccRegisters, cr), 0x83);
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
+}
+
+TEST(RccClocks, TheSwitchWaitsForItsSource) {
+  Chip chip;
+  chip.set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
+  chip.put(offsetof(RccRegisters, cfgr), cfgr::Switch::bits(cfgr::crystal));
+  chip.bus.pass(RccModel::crystal_start_time / 2);
+  EXPECT_EQ(chip.source(), cfgr::internal);
+  EXPECT_EQ(chip.clocks.core, units_per_period(16'000'000));
+  chip.bus.pass(RccModel::crystal_start_time / 2);
+  EXPECT_EQ(chip.source(), cfgr::crystal);
+  EXPECT_EQ(chip.clocks.core, units_per_period(8'000'000));
+}
+
+TEST(RccClocks, PrescalersAndTheTimersDoubling) {
+  Chip chip;
+  chip.put(offsetof(RccRegisters, cfgr), cfgr::AhbPrescaler::bits(9) | cfgr::Apb1Prescaler::bits(7));
+  EXPECT_EQ(chip.clocks.core, units_per_period(4'000'000));
+  EXPECT_EQ(chip.clocks.apb1, units_per_period(250'000));
+  EXPECT_EQ(chip.clocks.apb1_timer, units_per_period(500'000)) << "divided bus: twice its clock";
+  EXPECT_EQ(chip.clocks.apb2, units_per_period(4'000'000));
+  EXPECT_EQ(chip.clocks.apb2_timer, units_per_period(4'000'000)) << "undivided bus: its clock";
+}
+
+TEST(RccLimits, PllInputAndVcoAreChecked) {
+  struct Row {
+    const char* what;
+    std::uint32_t m, n, q;
+    const char* expected;
+  };
+  for (const Row& row :
+       {Row{"input", 3, 120, 7, "PLL input 2.66 MHz"}, Row{"input", 9, 336, 7, "PLL input 0.88"},
+        Row{"VCO", 8, 191, 7, "VCO at 191.00 MHz"}, Row{"VCO", 8, 433, 15, "VCO at 433.00"},
+        Row{"M", 1, 24, 7, "M = 1"}, Row{"Q", 4, 168, 6, "Q = 6"}, Row{"Q", 4, 96, 1, "Q = 1"}}) {
+    Chip chip;
+    chip.start_crystal();
+    chip.put(offsetof(RccRegisters, pllcfgr),
+             pllcfgr::InputDivider::bits(row.m) | pllcfgr::Multiplier::bits(row.n) |
+                 pllcfgr::UsbDivider::bits(row.q) | pllcfgr::FromCrystal::mask);
+    const std::uint32_t on = chip.get(offsetof(RccRegisters, cr)) | cr::PllOn::mask;
+    const std::string refusal = chip.refusal(offsetof(RccRegisters, cr), on);
+    EXPECT_NE(refusal.find(row.expected), std::string::npos) << row.what << ": " << refusal;
+  }
+  for (const std::uint32_t n : {96U, 216U}) {  // the VCO's limits themselves
+    Chip chip;
+    chip.start_crystal();
+    EXPECT_NO_THROW(chip.start_pll(pllcfgr::InputDivider::bits(4) | pllcfgr::Multiplier::bits(n) |
+                                   pllcfgr::UsbDivider::bits(9) | pllcfgr::FromCrystal::mask));
+  }
+}
+
+TEST(RccLimits, PllNeedsItsSourceAndCannotBeChangedWhileOn) {
+  Chip chip;
+  chip.put(offsetof(RccRegisters, pllcfgr), divider_4_from_crystal);
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), 0x83 | cr::PllOn::mask), "") << "crystal off";
+  chip.start_crystal();
+  chip.start_pll(divider_4_from_crystal);
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, pllcfgr), divider_4_from_crystal), "");
+}
+
+TEST(RccLimits, FullSpeedNeedsWaitStatesVoltageAndBusDividers) {
+  const auto refusal_with = [](bool voltage, std::uint32_t wait_states, std::uint32_t buses) {
+    Chip chip;
+    if (voltage) chip.power_registers.cr = stm32::pwr_cr::VoltageScale1::mask;
+    chip.wait_states(wait_states);
+    chip.start_crystal();
+    chip.start_pll(divider_4_from_crystal);
+    return chip.refusal(offsetof(RccRegisters, cfgr), buses | cfgr::Switch::bits(cfgr::pll));
+  };
+  EXPECT_EQ(refusal_with(true, 5, full_speed_buses), "");
+  EXPECT_NE(refusal_with(true, 4, full_speed_buses).find("wait states"), std::string::npos);
+  EXPECT_NE(refusal_with(false, 5, full_speed_buses).find("voltage scale"), std::string::npos);
+  EXPECT_NE(refusal_with(true, 5, cfgr::Apb1Prescaler::bits(4) | cfgr::Apb2Prescaler::bits(4)).find("PCLK1"),
+            std::string::npos);
+  EXPECT_NE(refusal_with(true, 5, cfgr::Apb1Prescaler::bits(5)).find("PCLK2"), std::string::npos);
+}
+
+TEST(RccLimits, WhatTheCoreRunsOnCannotBeStoppedNorItsConditionsWithdrawn) {
+  Chip chip;
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), cr::InternalTrim::bits(16)), "") << "HSI";
+  chip.run_at_168_mhz();
+  const std::uint32_t control = chip.get(offsetof(RccRegisters, cr));
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::PllOn::mask), "");
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::CrystalOn::mask), "");
+  EXPECT_THROW(chip.wait_states(4), RefusedAccess);
+  EXPECT_THROW(chip.power_registers.cr = 0, RefusedAccess);
+  EXPECT_EQ(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::InternalOn::mask), "");
+  EXPECT_EQ(chip.clocks.core, units_per_period(168'000'000));
+}
+
+TEST(RccEnables, OneBitOneClock) {
+  Chip chip;
+  const auto offset = static_cast<std::uint32_t>(offsetof(RccRegisters, apb1enr));
+  EXPECT_FALSE(chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Usart2::mask));
+  chip.put(offset, stm32::rcc_apb1enr::Usart2::mask);
+  EXPECT_TRUE(chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Usart2::mask));
+  EXPECT_FALSE(chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Uart4::mask));
+  EXPECT_FALSE(
+      chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Usart2::mask | stm32::rcc_apb1enr::Uart4::mask));
+  EXPECT_NE(chip.refusal(offset, 1U << 11), "") << "WWDG is not on the board";
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, ahb1enr), 1U << 22), "") << "DMA2";
+}
+
+TEST(RccEnables, PeripheralResetIsReportedOnItsRisingEdge) {
+  Chip chip;
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, apb2rstr), 1), "") << "not connected";
+  std::uint32_t seen = 0;
+  unsigned calls = 0;
+  chip.rcc.on_peripheral_reset([&](std::uint32_t offset, std::uint32_t mask, BoardTime) {
+    EXPECT_EQ(offset, offsetof(RccRegisters, apb2rstr));
+    seen = mask;
+    ++calls;
+  });
+  chip.put(offsetof(RccRegisters, apb2rstr), stm32::rcc_apb2rstr::Adc::mask);
+  chip.put(offsetof(RccRegisters, apb2rstr), stm32::rcc_apb2rstr::Adc::mask);
+  chip.put(offsetof(RccRegisters, apb2rstr), 0);
+  EXPECT_EQ(seen, stm32::rcc_apb2rstr::Adc::mask);
+  EXPECT_EQ(calls, 1U);
+}
+
+// Section Clock control & status register (RCC_CSR).
+TEST(RccResetFlags, SurviveAResetAndAreRemovedByRmvf) {
+  Chip chip;
+  EXPECT_EQ(stm32::take_reset_cause(chip.rcc_registers), ResetCause::power_on);
+  EXPECT_EQ(stm32::take_reset_cause(chip.rcc_registers), ResetCause::none);
+  for (const ResetCause cause : {ResetCause::pin, ResetCause::software, ResetCause::independent_watchdog,
+                                 ResetCause::window_watchdog, ResetCause::low_power, ResetCause::brown_out}) {
+    chip.rcc.reset(chip.bus.now);
+    chip.rcc.note_reset(cause);
+    EXPECT_EQ(stm32::take_reset_cause(chip.rcc_registers), cause);
+  }
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, csr), stm32::rcc_csr::LowSpeedOn::mask), "");
+}
+
+// Section Clock security system (CSS).
+TEST(RccClockSecurity, CrystalFailureGivesNmiAndTheInternalOscillator) {
+  Chip chip;
+  std::optional<bool> nmi;
+  unsigned breaks = 0;
+  chip.rcc.on_clock_security_interrupt([&](bool level, BoardTime) { nmi = level; });
+  chip.rcc.on_clock_failure([&](BoardTime) { ++breaks; });
+  chip.run_at_168_mhz();
+  chip.set(offsetof(RccRegisters, cr), cr::ClockSecurity::mask);
+  chip.rcc.fail_crystal(chip.bus.now);
+  EXPECT_EQ(nmi, true);
+  EXPECT_EQ(breaks, 1U);
+  EXPECT_EQ(chip.source(), cfgr::internal);
+  EXPECT_EQ(chip.clocks.core, units_per_period(16'000'000));
+  EXPECT_EQ(chip.clocks.apb1, units_per_period(4'000'000)) << "the prescalers stay";
+  EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)) & (cr::CrystalOn::mask | cr::PllOn::mask), 0U);
+  EXPECT_FALSE(chip.rcc.core_clock_lost());
+  chip.put(offsetof(RccRegisters, cir), stm32::rcc_cir::ClockSecurityClear::mask);
+  EXPECT_EQ(nmi, false);
+}
+
+TEST(RccClockSecurity, WithoutItTheCoreStops) {
+  Chip chip;
+  chip.run_at_168_mhz();
+  chip.rcc.fail_crystal(chip.bus.now);
+  EXPECT_TRUE(chip.rcc.core_clock_lost());
+  Chip on_internal;
+  on_internal.start_crystal();
+  on_internal.rcc.fail_crystal(on_internal.bus.now);
+  EXPECT_FALSE(on_internal.rcc.core_clock_lost()) << "nothing depended on it";
+}
+
+}  // namespace
+}  // namespace kmax::virtual_board
