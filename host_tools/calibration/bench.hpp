@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/calibration/calibration_settings.hpp"
 #include "host_tools/calibration/excitation_plan.hpp"
 #include "host_tools/calibration/held_up.hpp"
@@ -14,7 +15,6 @@
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/errors.hpp"
 
 namespace kmax::calibration {
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/calibration/compensation_step.hpp"
 #include "host_tools/calibration/current_offset_step.hpp"
 #include "host_tools/calibration/field_turn_step.hpp"
@@ -15,7 +16,6 @@
 #include "host_tools/calibration/torque_constant_step.hpp"
 #include "host_tools/calibration/trip_diagnosis.hpp"
 #include "host_tools/calibration/winding_step.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/device/store.hpp"
 
 namespace kmax::calibration {

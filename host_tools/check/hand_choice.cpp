@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 

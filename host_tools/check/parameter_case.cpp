@@ -5,7 +5,7 @@
 #include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
 #include "firmware/haptic_configuration.hpp"
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
 
 namespace kmax::check {
 

@@ -11,7 +11,7 @@
 #include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/nmt.hpp"
 #include "firmware/canopen/object_places.hpp"
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/device/parameter.hpp"
 
 namespace kmax::description {

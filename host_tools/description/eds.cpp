@@ -13,8 +13,8 @@
 #include "firmware/application.hpp"
 #include "firmware/canopen/cob_id.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/description/described_objects.hpp"
-#include "host_tools/device/number_text.hpp"
 
 namespace kmax::description {
 

@@ -8,8 +8,8 @@
 
 #include "firmware/capture.hpp"
 #include "firmware/haptic_configuration.hpp"
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/suggestion.hpp"
 
 namespace kmax::device {
 

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/register_plan.hpp"
 
 namespace kmax::device {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "firmware/refusal.hpp"
+#include "host_tools/device/link.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"
-#include "host_tools/link/link.hpp"
 
 namespace kmax::device {
 

@@ -5,9 +5,9 @@
 #include <bit>
 
 #include "firmware/fault.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/device/guard_words.hpp"
-#include "host_tools/device/number_text.hpp"
 
 namespace kmax::device {
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
 
 namespace kmax::device {
 

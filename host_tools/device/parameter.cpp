@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/suggestion.hpp"
 
 namespace kmax::device {
 

@@ -9,8 +9,8 @@
 #include <iterator>
 #include <tuple>
 
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/suggestion.hpp"
 
 namespace kmax::device {
 

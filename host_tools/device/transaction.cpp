@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/device/guard_words.hpp"
 #include "host_tools/device/register_plan.hpp"
-#include "host_tools/device/stood_still.hpp"
 
 namespace kmax::device {
 

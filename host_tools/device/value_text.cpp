@@ -8,10 +8,10 @@
 #include <limits>
 
 #include "firmware/parameter_values.hpp"
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/number_text.hpp"
-#include "host_tools/device/suggestion.hpp"
-#include "host_tools/device/unit.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/suggestion.hpp"
+#include "host_tools/base/units.hpp"
 
 namespace kmax::device {
 

@@ -4,9 +4,9 @@
 
 #include <utility>
 
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/device/drive_fault.hpp"
-#include "host_tools/device/number_text.hpp"
-#include "host_tools/device/stood_still.hpp"
 
 namespace kmax::experiment {
 

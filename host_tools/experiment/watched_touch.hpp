@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/device/trace_reader.hpp"
 #include "host_tools/simulation/contact_measure.hpp"
 

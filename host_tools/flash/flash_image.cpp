@@ -8,9 +8,6 @@
 namespace kmax::flash {
 namespace {
 
-using virtual_board::ElfImage;
-using virtual_board::ElfSegment;
-
 constexpr std::uint8_t erased = 0xFF;
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
@@ -83,7 +80,7 @@ std::uint32_t crc_of(const std::vector<std::uint8_t>& bytes) {
 FlashImage FlashImage::load(const std::filesystem::path& elf) {
   try {
     return from(ElfImage::load(elf), elf.string());
-  } catch (const virtual_board::ElfError& error) {
+  } catch (const ElfError& error) {
     throw ImageError(error.what());
   }
 }

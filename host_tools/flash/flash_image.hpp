@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/virtual_board/elf_image.hpp"
+#include "host_tools/base/elf_image.hpp"
 
 // What has to be written of a firmware image: its load segments, joined where they lie in the same or in
 // neighbouring sectors, padded with erased bytes to whole words.
@@ -38,7 +38,7 @@ class FlashImage {
   /// segments overlap, does not open flash with a plausible vector table, or was linked for other parameter
   /// sectors.
   static FlashImage load(const std::filesystem::path& elf);
-  static FlashImage from(const virtual_board::ElfImage& elf, const std::string& name);
+  static FlashImage from(const ElfImage& elf, const std::string& name);
 
   /// By address; the first holds the vector table.
   const std::vector<FlashPiece>& pieces() const { return pieces_; }

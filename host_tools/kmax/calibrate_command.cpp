@@ -4,12 +4,12 @@
 
 #include <string>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 
 namespace kmax::cli {

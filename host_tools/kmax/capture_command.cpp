@@ -10,14 +10,14 @@
 #include <memory>
 #include <optional>
 
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/output_file.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 
 namespace kmax::cli {
 

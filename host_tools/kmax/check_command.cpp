@@ -6,17 +6,17 @@
 #include <bit>
 
 #include "firmware/parameter_rules.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/suggestion.hpp"
 #include "host_tools/check/check_table.hpp"
 #include "host_tools/check/hand_choice.hpp"
 #include "host_tools/check/judgement.hpp"
 #include "host_tools/check/stability_map.hpp"
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/number_text.hpp"
-#include "host_tools/device/suggestion.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/output_file.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::cli {

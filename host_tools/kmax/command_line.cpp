@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <set>
 
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/suggestion.hpp"
+#include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/link/device_address.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"

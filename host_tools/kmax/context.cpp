@@ -1,6 +1,6 @@
 #include "host_tools/kmax/context.hpp"
 
-#include "host_tools/link/device_address.hpp"
+#include "host_tools/device/device_address.hpp"
 
 namespace kmax::cli {
 

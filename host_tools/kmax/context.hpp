@@ -8,10 +8,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/base/exit_code.hpp"
+#include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/device.hpp"
-#include "host_tools/kmax/exit_code.hpp"
-#include "host_tools/link/can/can_port.hpp"
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 
 namespace kmax::cli {
 

@@ -6,12 +6,12 @@
 #include <ctime>
 #include <map>
 
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/suggestion.hpp"
 #include "host_tools/description/dbc.hpp"
 #include "host_tools/description/eds.hpp"
-#include "host_tools/device/suggestion.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/reachable_devices.hpp"
 
 namespace kmax::cli {

@@ -7,13 +7,13 @@
 #include <thread>
 
 #include "firmware/fault.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/device/guard_words.hpp"
-#include "host_tools/device/number_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 

@@ -4,15 +4,15 @@
 
 #include <algorithm>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/contact/contact_report.hpp"
 #include "host_tools/experiment/touch_journal.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 
 namespace kmax::cli {

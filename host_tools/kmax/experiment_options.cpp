@@ -5,9 +5,9 @@
 
 #include <map>
 
+#include "host_tools/base/print.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 

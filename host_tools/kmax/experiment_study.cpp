@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "host_tools/kmax/print.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/report/terminal_text.hpp"
 
 namespace kmax::cli {

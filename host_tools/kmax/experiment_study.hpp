@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
@@ -18,8 +20,6 @@
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/report/page.hpp"
 

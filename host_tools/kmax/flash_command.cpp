@@ -8,16 +8,16 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/flash/flash_image.hpp"
 #include "host_tools/flash/flash_plan.hpp"
 #include "host_tools/flash/flash_run.hpp"
 #include "host_tools/flash/method_choice.hpp"
 #include "host_tools/kmax/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 

@@ -4,10 +4,10 @@
 
 #include <map>
 
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/crash_words.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 

@@ -6,11 +6,11 @@
 #include <chrono>
 #include <cmath>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/kmax/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/held_lines.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 

@@ -3,13 +3,13 @@
 
 #include <filesystem>
 
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/report/terminal_text.hpp"
 

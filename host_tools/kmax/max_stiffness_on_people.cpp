@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_pictures.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
 #include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
@@ -11,8 +13,6 @@
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/report/page_files.hpp"
 #include "host_tools/report/terminal_text.hpp"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/interruption.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/kmax/context.hpp"
-#include "host_tools/kmax/interruption.hpp"
 
 namespace kmax::cli {
 

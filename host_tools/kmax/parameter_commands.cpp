@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/suggestion.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameter_table.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {

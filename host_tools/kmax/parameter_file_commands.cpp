@@ -6,11 +6,11 @@
 #include <fstream>
 
 #include "firmware/parameter_rules.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/parameter_file.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/output_file.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 

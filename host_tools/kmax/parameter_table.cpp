@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/value_text.hpp"
-#include "host_tools/kmax/print.hpp"
 
 namespace kmax::cli {
 

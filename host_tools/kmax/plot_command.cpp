@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
+#include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/figure.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "firmware/application.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
-#include "host_tools/link/device_address.hpp"
+#include "host_tools/device/device_address.hpp"
 
 namespace kmax::cli {
 

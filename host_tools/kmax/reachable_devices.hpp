@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/link/can/can_discovery.hpp"
+#include "host_tools/device/can/can_discovery.hpp"
 
 namespace kmax::cli {
 

@@ -8,12 +8,12 @@
 #include <memory>
 #include <optional>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
+#include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/output_file.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
-#include "host_tools/link/device_address.hpp"
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
 #include "host_tools/record/recording.hpp"

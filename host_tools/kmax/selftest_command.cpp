@@ -6,10 +6,10 @@
 #include <memory>
 #include <optional>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
-#include "host_tools/kmax/progress.hpp"
 #include "host_tools/selftest/selftest.hpp"
 
 namespace kmax::cli {

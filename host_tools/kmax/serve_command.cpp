@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/serve/real_time.hpp"
 #include "host_tools/simulated_board/file_flash.hpp"
 

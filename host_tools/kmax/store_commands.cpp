@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/kmax/store_text.hpp"
 #include "host_tools/kmax/value_json.hpp"
 

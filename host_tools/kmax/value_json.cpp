@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::cli {

@@ -5,11 +5,11 @@
 #include <filesystem>
 
 #include "firmware/parameter_rules.hpp"
-#include "host_tools/device/errors.hpp"
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/print.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/print.hpp"
 #include "host_tools/wall/force_curve.hpp"
 #include "host_tools/wall/wall_table.hpp"
 

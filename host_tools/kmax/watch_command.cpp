@@ -11,11 +11,11 @@
 #include <optional>
 #include <thread>
 
+#include "host_tools/base/interruption.hpp"
 #include "host_tools/device/drive.hpp"
+#include "host_tools/device/regular_loan.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/interruption.hpp"
 #include "host_tools/kmax/watch_view.hpp"
-#include "host_tools/link/regular_loan.hpp"
 
 namespace kmax::cli {
 

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "firmware/refusal.hpp"
-#include "host_tools/device/number_text.hpp"
+#include "host_tools/base/numbers.hpp"
 
 namespace kmax::cli {
 

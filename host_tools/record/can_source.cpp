@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "firmware/canopen/cob_id.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 
 namespace kmax::record {
 

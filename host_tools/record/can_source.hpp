@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cstdint>
 
-#include "host_tools/link/can/can_port.hpp"
+#include "host_tools/device/can/can_port.hpp"
 #include "host_tools/record/pdo_plan.hpp"
 #include "host_tools/record/pdo_rows.hpp"
 #include "host_tools/record/row_source.hpp"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "firmware/canopen/object_places.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/count_length.hpp"
-#include "host_tools/device/errors.hpp"
 
 namespace kmax::record {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "host_tools/device/device.hpp"
-#include "host_tools/link/regular_loan.hpp"
+#include "host_tools/device/regular_loan.hpp"
 #include "host_tools/record/row_source.hpp"
 
 namespace kmax::record {

@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/device/drive_fault.hpp"
-#include "host_tools/device/errors.hpp"
 
 namespace kmax::selftest {
 

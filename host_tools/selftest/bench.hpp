@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/selftest/evidence.hpp"
 #include "host_tools/selftest/recording.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 
 namespace kmax::selftest {
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 
 namespace kmax::serve {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "drivers/can_frame.hpp"
-#include "host_tools/link/can/can_port.hpp"
-#include "host_tools/link/can/unix_can_hub.hpp"
+#include "host_tools/device/can/can_port.hpp"
+#include "host_tools/device/can/unix_can_hub.hpp"
 
 namespace kmax::serve {
 

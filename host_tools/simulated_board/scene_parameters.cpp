@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/parameter.hpp"
 
 namespace kmax::simulated_board {

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "host_tools/device/suggestion.hpp"
+#include "host_tools/base/suggestion.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulation {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 #include "tests/board/bench.hpp"
 
 namespace kmax::host_tools_test {

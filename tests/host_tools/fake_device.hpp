@@ -10,7 +10,7 @@
 #include "firmware/device_registers.hpp"
 #include "firmware/modbus/register_bank.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 
 namespace kmax::host_tools_test {
 

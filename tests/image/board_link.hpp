@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "firmware/modbus/crc.hpp"
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 
 namespace kmax::tests {

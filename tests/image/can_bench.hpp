@@ -3,8 +3,8 @@
 #include <deque>
 #include <memory>
 
-#include "host_tools/link/can/can_port.hpp"
-#include "host_tools/link/can/sdo_client.hpp"
+#include "host_tools/device/can/can_port.hpp"
+#include "host_tools/device/can/sdo_client.hpp"
 #include "host_tools/virtual_board/run/can_host_node.hpp"
 #include "tests/image/image_bench.hpp"
 

@@ -24,8 +24,8 @@ inline std::string image_path() {
   return path;
 }
 
-inline const virtual_board::ElfImage& image() {
-  static const virtual_board::ElfImage loaded = virtual_board::ElfImage::load(image_path());
+inline const ElfImage& image() {
+  static const ElfImage loaded = ElfImage::load(image_path());
   return loaded;
 }
 

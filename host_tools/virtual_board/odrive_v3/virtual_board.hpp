@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "host_tools/base/elf_image.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "host_tools/virtual_board/cortex_m/dwt.hpp"
 #include "host_tools/virtual_board/cortex_m/processor.hpp"
-#include "host_tools/virtual_board/elf_image.hpp"
 #include "host_tools/virtual_board/event_loop.hpp"
 #include "host_tools/virtual_board/odrive_v3/as5047p_chip.hpp"
 #include "host_tools/virtual_board/odrive_v3/board_world.hpp"

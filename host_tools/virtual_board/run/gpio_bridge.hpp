@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "host_tools/link/file_descriptor.hpp"
+#include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 
 namespace kmax::virtual_board {

@@ -6,8 +6,8 @@
 #include <iostream>
 #include <optional>
 
-#include "host_tools/kmax/exit_code.hpp"
-#include "host_tools/kmax/interruption.hpp"
+#include "host_tools/base/exit_code.hpp"
+#include "host_tools/base/interruption.hpp"
 #include "host_tools/serve/pseudo_terminal.hpp"
 #include "host_tools/simulated_board/file_flash.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
@@ -58,7 +58,7 @@ class StoreFile {
 int run(const Options& options) {
   const cli::Interruption interruption;
   const simulation::Scene scene = simulated_board::open_scene(options.scene);
-  const auto image = virtual_board::ElfImage::load(options.elf);
+  const auto image = ElfImage::load(options.elf);
   virtual_board::SceneWorld world(scene);
   if (options.budget && !(world.has_drive(0) && world.has_drive(1))) {
     fmt::print(

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "host_tools/calibration/procedure.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/device/store.hpp"
-#include "host_tools/link/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::calibration_test {

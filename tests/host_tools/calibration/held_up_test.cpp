@@ -2,8 +2,8 @@
 // and no reason to throw away what has been measured.
 #include "host_tools/calibration/held_up.hpp"
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/calibration/bench.hpp"
-#include "host_tools/device/errors.hpp"
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "tests/host_tools/temporary_folder.hpp"

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/check/judgement.hpp"
-#include "host_tools/device/errors.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -6,7 +6,7 @@
 
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/link/sim_link.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 
 namespace kmax::device {
 namespace {

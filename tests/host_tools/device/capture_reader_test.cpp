@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "firmware/haptic_configuration.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/capturing_link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

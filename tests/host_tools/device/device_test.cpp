@@ -5,9 +5,8 @@
 #include <bit>
 #include <optional>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/register_plan.hpp"
-#include "host_tools/device/stood_still.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

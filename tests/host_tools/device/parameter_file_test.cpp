@@ -10,7 +10,7 @@
 #include <set>
 
 #include "firmware/parameter_values.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

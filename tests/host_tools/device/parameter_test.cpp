@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device {

@@ -10,7 +10,7 @@
 #include "firmware/haptic_configuration.hpp"
 #include "firmware/trace.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/link/sim_link.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 
 namespace kmax::device {
 namespace {

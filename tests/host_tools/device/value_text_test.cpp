@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "firmware/parameter_values.hpp"
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device {

@@ -9,7 +9,7 @@
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/link/sim_link.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 
 namespace kmax::experiment {
 

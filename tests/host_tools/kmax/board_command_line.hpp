@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/board_services.hpp"
-#include "host_tools/link/device_address.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"

@@ -5,8 +5,8 @@
 #include <csignal>
 #include <sstream>
 
-#include "host_tools/device/errors.hpp"
-#include "host_tools/link/device_address.hpp"
+#include "host_tools/base/errors.hpp"
+#include "host_tools/device/device_address.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 
 namespace kmax::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <sstream>
 
+#include "host_tools/base/exit_code.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
-#include "host_tools/kmax/exit_code.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "host_tools/device/parameter_file.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/kmax/command_line.hpp"
-#include "host_tools/link/sim_link.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

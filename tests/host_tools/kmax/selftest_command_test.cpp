@@ -1,6 +1,6 @@
 #include <csignal>
 
-#include "host_tools/link/sim_link.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 

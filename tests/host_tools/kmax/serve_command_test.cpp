@@ -4,7 +4,7 @@
 #include <csignal>
 #include <thread>
 
-#include "host_tools/link/can/unix_can.hpp"
+#include "host_tools/device/can/unix_can.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
 namespace kmax::cli {

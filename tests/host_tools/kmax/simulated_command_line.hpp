@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/device/open_link.hpp"
 #include "host_tools/kmax/command_line.hpp"
 #include "host_tools/kmax/context.hpp"
-#include "host_tools/link/open_link.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

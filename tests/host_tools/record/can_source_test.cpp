@@ -6,7 +6,7 @@
 #include <deque>
 #include <thread>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::record {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 
 namespace kmax::record {
 namespace {

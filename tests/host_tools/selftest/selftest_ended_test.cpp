@@ -1,5 +1,5 @@
 // What the self-test does when it cannot go on as planned, and what it leaves behind.
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -1,5 +1,5 @@
 // A program that is not run for more than link.timeout finds its axis off. That is no finding about the axis.
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/thrown_message.hpp"

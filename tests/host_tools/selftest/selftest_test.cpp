@@ -1,6 +1,6 @@
 #include "host_tools/selftest/selftest.hpp"
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
 namespace kmax::selftest {

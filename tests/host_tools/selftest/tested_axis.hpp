@@ -12,7 +12,7 @@
 
 #include "firmware/modbus/crc.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/link/link.hpp"
+#include "host_tools/device/link.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <set>
 
-#include "host_tools/device/errors.hpp"
+#include "host_tools/base/errors.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/device/drive.hpp"
-#include "host_tools/link/sim_link.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -17,8 +17,8 @@
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/timer.hpp"
 #include "drivers/stm32f4/registers/usart.hpp"
+#include "host_tools/base/elf_image.hpp"
 #include "host_tools/virtual_board/cortex_m/processor.hpp"
-#include "host_tools/virtual_board/elf_image.hpp"
 #include "host_tools/virtual_board/event_loop.hpp"
 #include "tests/board/core_self_test/float_loop.hpp"
 

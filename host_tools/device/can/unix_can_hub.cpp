@@ -1,0 +1,149 @@
+#include "host_tools/device/can/unix_can_hub.hpp"
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "host_tools/device/can/kernel_frame.hpp"
+#include "host_tools/device/link.hpp"
+
+namespace kmax::link {
+
+namespace {
+[[noreturn]] void fail(const std::string& path, const std::string& words) {
+  throw LinkError(fmt::format("{}: {}", path, words));
+}
+
+sockaddr_un address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path)
+    fail(path, fmt::format("the path has {} characters; a socket's can have 1 to {}", path.size(),
+                           sizeof address.sun_path - 1));
+  std::copy(path.begin(), path.end(), address.sun_path);
+  return address;
+}
+
+/// Somebody accepts, or could.
+bool is_served(const sockaddr_un& address) {
+  const FileDescriptor probe(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  return connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
+         errno != ECONNREFUSED;
+}
+
+/// The system's own size holds some 200 frames, 0.05 s of four PDOs a millisecond; beyond its limit only root
+/// gets it. What waits for a client counts against the sender (unix(7)), whatever the client's SO_RCVBUF.
+void ask_for_room(int client) {
+  const int bytes = 4 << 20;
+  if (setsockopt(client, SOL_SOCKET, SO_SNDBUFFORCE, &bytes, sizeof bytes) != 0)
+    setsockopt(client, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+}
+
+void watch(int events, int descriptor) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.fd = descriptor;
+  epoll_ctl(events, EPOLL_CTL_ADD, descriptor, &event);
+}
+
+unsigned long long inode_at(const std::string& path) {
+  struct stat status {};
+  return lstat(path.c_str(), &status) == 0 && S_ISSOCK(status.st_mode) ? status.st_ino : 0;
+}
+}  // namespace
+
+UnixCanHub::UnixCanHub(const std::string& path) : path_(path) {
+  listen_at_path();
+  events_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
+  if (!events_) fail(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
+  watch(events_.number(), listener_.number());
+}
+
+void UnixCanHub::listen_at_path() {
+  const sockaddr_un address = address_of(path_);
+  listener_ = FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const auto bind_it = [&] {
+    return bind(listener_.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  };
+  if (!bind_it()) {
+    if (errno == EADDRINUSE) {
+      if (inode_at(path_) == 0)
+        fail(path_, "there is something here that is not a socket; give another path for the CAN bus");
+      if (is_served(address))
+        fail(path_, "another program serves a CAN bus here; end that one or give another path");
+      unlink(path_.c_str());
+      errno = bind_it() ? 0 : errno;
+    }
+    if (errno != 0)
+      fail(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
+  }
+  inode_ = inode_at(path_);
+  if (listen(listener_.number(), 64) != 0)
+    fail(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
+}
+
+UnixCanHub::~UnixCanHub() {
+  if (inode_ != 0 && inode_at(path_) == inode_) unlink(path_.c_str());
+}
+
+void UnixCanHub::admit() {
+  for (;;) {
+    FileDescriptor client(accept4(listener_.number(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!client) return;
+    watch(events_.number(), client.number());
+    ask_for_room(client.number());
+    const int number = client.number();
+    clients_.emplace(number, std::move(client));
+  }
+}
+
+void UnixCanHub::deliver(const can_frame& frame, int except) {
+  for (const auto& [number, client] : clients_) {
+    if (number == except) continue;
+    // One that has just left is noticed when it is read from.
+    if (::send(number, &frame, sizeof frame, MSG_NOSIGNAL | MSG_DONTWAIT) < 0 &&
+        (errno == EAGAIN || errno == ENOBUFS))
+      ++counters_.lost;
+  }
+}
+
+bool UnixCanHub::drain(int client, std::vector<drivers::CanFrame>& frames) {
+  for (int i = 0; i < frames_per_client; ++i) {
+    can_frame kernel{};
+    const ssize_t got = recv(client, &kernel, sizeof kernel, MSG_TRUNC);
+    if (got < 0) return errno == EAGAIN || errno == EINTR;
+    if (got == 0) return false;
+    const auto frame = got == static_cast<ssize_t>(sizeof kernel) ? from_kernel(kernel) : std::nullopt;
+    if (!frame) {
+      ++counters_.malformed;
+      continue;
+    }
+    ++counters_.received;
+    deliver(to_kernel(*frame), client);
+    frames.push_back(*frame);
+  }
+  return true;
+}
+
+std::vector<drivers::CanFrame> UnixCanHub::poll() {
+  admit();
+  std::vector<drivers::CanFrame> frames;
+  std::vector<int> left;
+  for (const auto& [number, client] : clients_) {
+    if (!drain(number, frames)) left.push_back(number);
+  }
+  for (const int number : left) clients_.erase(number);
+  return frames;
+}
+
+void UnixCanHub::send(const drivers::CanFrame& frame) {
+  deliver(to_kernel(frame), -1);
+}
+
+}  // namespace kmax::link

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+
+#include "host_tools/device/device_address.hpp"
+#include "host_tools/device/link.hpp"
+
+namespace kmax::link {
+
+/// Opens the link an address names. `notice` is told when opening has to wait.
+/// Errors: LinkError, or AddressError for a kind of link this version does not have.
+std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& notice = {});
+
+}  // namespace kmax::link

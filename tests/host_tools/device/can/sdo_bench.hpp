@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+
+#include "host_tools/device/can/sdo_client.hpp"
+#include "tests/host_tools/device/can/fake_sdo_node.hpp"
+
+namespace kmax::host_tools_test {
+
+/// For what is answered sooner or later: a machine that is busy must not look like a silent node.
+inline link::SdoSettings patient_sdo() {
+  link::SdoSettings settings;
+  settings.response_timeout = std::chrono::seconds(20);
+  settings.block_silence = std::chrono::milliseconds(100);
+  return settings;
+}
+
+/// For what is never answered. Waited for whenever an answer is lost; a node that a busy machine holds up for
+/// longer is asked once more, which not every test allows.
+inline link::SdoSettings quick_sdo() {
+  link::SdoSettings settings = patient_sdo();
+  settings.response_timeout = std::chrono::milliseconds(500);
+  return settings;
+}
+
+/// Node 5 and its client.
+struct SdoBench {
+  explicit SdoBench(FakeSdoNode::Misbehave misbehave = {}, const link::SdoSettings& settings = patient_sdo())
+      : node(std::move(misbehave)), settings_(settings) {}
+
+  link::SdoClient& client() {
+    if (client_) return *client_;
+    node.start();
+    link::CanPortOptions options;
+    options.filters = link::SdoClient::filters_for(5);
+    port = link::open_can_port(node.path(), options);
+    return client_.emplace(*port, std::uint8_t{5}, settings_);
+  }
+
+  FakeSdoNode node;
+  std::unique_ptr<link::CanPort> port;
+
+ private:
+  link::SdoSettings settings_;
+  std::optional<link::SdoClient> client_;
+};
+
+inline FakeSdoNode::Bytes some_bytes(std::size_t count) {
+  FakeSdoNode::Bytes bytes(count);
+  for (std::size_t i = 0; i < count; ++i) bytes[i] = static_cast<std::uint8_t>(i * 7 + i / 251 + 1);
+  return bytes;
+}
+
+}  // namespace kmax::host_tools_test
