@@ -6,9 +6,10 @@
 #include <span>
 
 #include "board/odrive_v3/priorities.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
-#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "firmware/application.hpp"
 
 namespace kmax::board::odrive_v3 {
@@ -19,7 +20,7 @@ namespace kmax::board::odrive_v3 {
 /// the serial line's priority: they and the main loop never wait for each other.
 class CanLine {
  public:
-  CanLine(drivers::stm32f4::InterruptController<>& interrupts, std::uint32_t peripheral_clock_hz)
+  CanLine(drivers::cortex_m::InterruptController<>& interrupts, std::uint32_t peripheral_clock_hz)
       : interrupts_(interrupts),
         peripheral_clock_hz_(peripheral_clock_hz),
         can_(drivers::stm32f4::can1(), PendTransmit{interrupts}) {
@@ -75,7 +76,7 @@ class CanLine {
 
  private:
   struct PendTransmit {
-    drivers::stm32f4::InterruptController<>& interrupts;
+    drivers::cortex_m::InterruptController<>& interrupts;
     void operator()() const { interrupts.pend(drivers::stm32f4::Interrupt::can1_tx); }
   };
   static constexpr std::array all_interrupts = {
@@ -119,6 +120,8 @@ class CanLine {
   /// A bit rate that this clock cannot make, or a controller that does not answer, leaves the node off the
   /// bus. Other identifiers alone do not interrupt what is under way.
   void configure(const firmware::CanSettings& wanted) {
+    using namespace drivers::cortex_m;
+    using namespace drivers::cortex_m;
     using namespace drivers::stm32f4;
     const bool same_rate = configured_ && wanted.bit_rate == settings_.bit_rate;
     settings_ = wanted;
@@ -141,7 +144,7 @@ class CanLine {
     for (const auto interrupt : all_interrupts) interrupts_.enable(interrupt);
   }
 
-  drivers::stm32f4::InterruptController<>& interrupts_;
+  drivers::cortex_m::InterruptController<>& interrupts_;
   std::uint32_t peripheral_clock_hz_;
   drivers::stm32f4::Can<PendTransmit> can_;
   firmware::CanSettings settings_{.bit_rate = 0};

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "board/odrive_v3/pins.hpp"
+#include "drivers/cortex_m/cycle_counter.hpp"
 #include "drivers/current_sense.hpp"
 #include "drivers/drv8301.hpp"
-#include "drivers/stm32f4/cycle_counter.hpp"
 #include "drivers/stm32f4/gpio.hpp"
 #include "drivers/stm32f4/spi_master.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
@@ -50,7 +50,7 @@ class GateDrivers {
   static void delay_us(std::uint32_t microseconds) {
     // By the cycle counter: at 168 MHz; longer on a slower clock, which these delays may be.
     constexpr std::uint32_t cycles_per_us = 168;
-    drivers::stm32f4::CycleCounter counter{drivers::stm32f4::dwt(), drivers::stm32f4::core_debug()};
+    drivers::cortex_m::CycleCounter counter{drivers::cortex_m::dwt(), drivers::cortex_m::core_debug()};
     const std::uint32_t start = counter.now();
     // Bounded in case the counter stands still.
     for (std::uint32_t spins = 0;

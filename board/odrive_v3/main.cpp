@@ -16,14 +16,15 @@
 #include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/core_instructions.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
 #include "drivers/stm32f4/external_interrupt.hpp"
 #include "drivers/stm32f4/flash_sectors.hpp"
 #include "drivers/stm32f4/independent_watchdog.hpp"
-#include "drivers/stm32f4/peripheral_clock.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
+#include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/system_memory.hpp"
 #include "drivers/stm32f4/reset_cause.hpp"
-#include "drivers/stm32f4/system_tick.hpp"
 
 extern "C" {
 extern volatile std::uint32_t kmax_parameters_begin[];
@@ -44,8 +45,8 @@ constexpr std::uint32_t clock_rate_hz = 1'000;
 constexpr std::uint32_t watchdog_ms = 1'000;
 static_assert(watchdog_ms > stm32::longest_erase_ms);
 
-stm32::InterruptController interrupts{stm32::nvic(), stm32::scb()};
-stm32::SystemTick system_tick{stm32::system_tick(), stm32::scb()};
+drivers::cortex_m::InterruptController interrupts{drivers::cortex_m::nvic(), drivers::cortex_m::scb()};
+drivers::cortex_m::SystemTick system_tick{drivers::cortex_m::system_tick(), drivers::cortex_m::scb()};
 stm32::ExternalInterrupts line_interrupts{stm32::exti(), stm32::syscfg()};
 stm32::IndependentWatchdog watchdog{stm32::iwdg(), stm32::dbgmcu()};
 
@@ -136,7 +137,8 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
   apply(line_pins);
   apply(bus_pins);
   // The chips' delays count cycles.
-  static_cast<void>(stm32::CycleCounter{stm32::dwt(), stm32::core_debug()}.start());
+  static_cast<void>(
+      drivers::cortex_m::CycleCounter{drivers::cortex_m::dwt(), drivers::cortex_m::core_debug()}.start());
   if (!power->bus.configure({})) return false;
   if (!power->drives.configure(clocks.apb2_hz)) return false;
   const std::uint32_t converters_on_us = system_tick.now_us();
@@ -188,7 +190,7 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
                       emulator_without_clocks ? std::span<std::uint32_t>{} : capture_memory);
   if (!emulator_without_clocks) application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
-  interrupts.set_priority(stm32::SystemException::system_tick, priority::clock);
+  interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, priority::clock);
   // Each core clock of the clock tree is a whole number of MHz and of periods.
   if (!system_tick.start(clocks.core_hz, clock_rate_hz)) stop_on_unexpected_interrupt();
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
@@ -228,7 +230,7 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
       if (power_runs) poll_power(now, applied_changes);
     }
     // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
-    stm32::wait_for_interrupt();
+    drivers::cortex_m::wait_for_interrupt();
   }
 }
 

@@ -6,8 +6,9 @@
 
 #include "board/odrive_v3/pins.hpp"
 #include "board/odrive_v3/priorities.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
-#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/usart.hpp"
 #include "firmware/application.hpp"
 
@@ -19,7 +20,7 @@ namespace kmax::board::odrive_v3 {
 /// cannot make leaves the line as it was.
 class SerialLine {
  public:
-  SerialLine(drivers::stm32f4::InterruptController<>& interrupts, std::uint32_t kernel_clock_hz)
+  SerialLine(drivers::cortex_m::InterruptController<>& interrupts, std::uint32_t kernel_clock_hz)
       : interrupts_(interrupts), kernel_clock_hz_(kernel_clock_hz) {}
 
   /// Pins and clock are on.
@@ -76,7 +77,7 @@ class SerialLine {
     return configured;
   }
 
-  drivers::stm32f4::InterruptController<>& interrupts_;
+  drivers::cortex_m::InterruptController<>& interrupts_;
   std::uint32_t kernel_clock_hz_;
   drivers::stm32f4::Usart<> usart_{drivers::stm32f4::usart2()};
   firmware::SerialSettings settings_{};

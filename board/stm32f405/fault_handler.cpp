@@ -1,9 +1,9 @@
 #include "board/stm32f405/fault_handler.hpp"
 
-#include "drivers/stm32f4/core_instructions.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
-using namespace kmax::drivers::stm32f4;
+using namespace kmax::drivers::cortex_m;
 
 extern "C" {
 extern std::uint32_t kmax_stack_bottom[];

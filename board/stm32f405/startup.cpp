@@ -3,10 +3,10 @@
 #include <cstdint>
 
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/core_instructions.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
-using namespace kmax::drivers::stm32f4;
+using namespace kmax::drivers::cortex_m;
 
 int main();
 

@@ -3,7 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 // The vector table of the STM32F405 and the names of its handlers. Vector table in RM0090; exceptions in
 // PM0214.

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "drivers/can_frame.hpp"
-#include "drivers/stm32f4/bounded_wait.hpp"
+#include "drivers/register_field.hpp"
 #include "drivers/stm32f4/can_bit_timing.hpp"
 #include "drivers/stm32f4/can_bus_off.hpp"
 #include "drivers/stm32f4/can_filter.hpp"
@@ -139,9 +139,7 @@ class Can {
   }
 
   /// Main loop: send() would find a free slot.
-  bool has_room() const {
-    return !transmitter_.halted() && bus_off_.may_send() && transmitter_.has_room();
-  }
+  bool has_room() const { return !transmitter_.halted() && bus_off_.may_send() && transmitter_.has_room(); }
 
   /// Main loop.
   [[nodiscard]] CanSendResult send(const CanFrame& frame) {

@@ -2,8 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/bounded_wait.hpp"
-#include "drivers/stm32f4/peripheral_clock.hpp"
+#include "drivers/register_field.hpp"
 #include "drivers/stm32f4/registers/flash.hpp"
 #include "drivers/stm32f4/registers/pwr.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"

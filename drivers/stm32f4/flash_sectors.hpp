@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/stm32f4/bounded_wait.hpp"
-#include "drivers/stm32f4/core_instructions.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/register_field.hpp"
 #include "drivers/stm32f4/registers/flash.hpp"
 
 // Erases and programs two sectors of 16 KiB of the on-chip flash, and no others: the parameter sectors.
@@ -131,7 +131,7 @@ class FlashSectors {
     flash_.cr = operation | flash_cr::Parallelism::bits(flash_cr::by_word);
     start();
     // The store must have reached the flash before its status says anything.
-    data_synchronization_barrier();
+    cortex_m::data_synchronization_barrier();
     const bool ended = idle_within(polls);
     const FlashResult outcome =
         ended ? decode(static_cast<std::uint32_t>(flash_.sr)) : FlashResult::timed_out;
@@ -160,8 +160,8 @@ class FlashSectors {
     flash_.acr = (access_control & ~caches) | cache_resets;
     flash_.acr = access_control & ~caches;
     flash_.acr = access_control;
-    data_synchronization_barrier();
-    instruction_synchronization_barrier();
+    cortex_m::data_synchronization_barrier();
+    cortex_m::instruction_synchronization_barrier();
   }
 
   static FlashResult decode(std::uint32_t status) {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/bounded_wait.hpp"
+#include "drivers/register_field.hpp"
 #include "drivers/stm32f4/registers/dbgmcu.hpp"
 #include "drivers/stm32f4/registers/iwdg.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "drivers/stm32f4/bounded_wait.hpp"
+#include "drivers/register_field.hpp"
 #include "drivers/stm32f4/registers/spi.hpp"
 
 // SPI master, 16 bits a frame, most significant bit first, clock idle low, data sampled at its falling edge

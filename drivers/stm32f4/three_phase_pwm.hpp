@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "drivers/stm32f4/core_instructions.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/stm32f4/dead_time.hpp"
 #include "drivers/stm32f4/registers/timer.hpp"
 
@@ -116,7 +116,7 @@ class ThreePhasePwm {
     registers_.bdtr = disarmed_ | timer_bdtr::MainOutputEnable::mask;
     // The write acts on the asynchronous bit, the read sees the synchronised one (RM0090, Using the break
     // function).
-    data_synchronization_barrier();
+    cortex_m::data_synchronization_barrier();
     return armed();
   }
 

@@ -5,13 +5,13 @@
 #include <array>
 #include <string_view>
 
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
 namespace kmax::device {
 
 namespace {
-namespace cfsr = drivers::stm32f4::scb_cfsr;
-namespace hfsr = drivers::stm32f4::scb_hfsr;
+namespace cfsr = drivers::cortex_m::scb_cfsr;
+namespace hfsr = drivers::cortex_m::scb_hfsr;
 
 struct BitWords {
   std::uint32_t mask;

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/board_time.hpp"
 
 namespace kmax::virtual_board {

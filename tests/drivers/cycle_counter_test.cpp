@@ -1,10 +1,10 @@
-#include "drivers/stm32f4/cycle_counter.hpp"
+#include "drivers/cortex_m/cycle_counter.hpp"
 
 #include <gtest/gtest.h>
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 namespace {
 
 using testing::FakeRegister;
@@ -49,4 +49,4 @@ TEST(CycleCounter, MissingCounterIsReported) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

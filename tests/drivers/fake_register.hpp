@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-namespace kmax::drivers::stm32f4::testing {
+namespace kmax::drivers::testing {
 
 /// A register that acts: `on_read` may compute what is seen, `on_write` may react. Counts its reads, keeps
 /// its writes.
@@ -27,4 +27,4 @@ struct FakeRegister {
   }
 };
 
-}  // namespace kmax::drivers::stm32f4::testing
+}  // namespace kmax::drivers::testing

@@ -2,7 +2,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4::testing {
+namespace kmax::drivers::testing {
 
 /// A timer's register block of acting registers; plain memory otherwise.
 struct FakeTimer {
@@ -13,4 +13,4 @@ struct FakeTimer {
   FakeRegister bdtr;
 };
 
-}  // namespace kmax::drivers::stm32f4::testing
+}  // namespace kmax::drivers::testing

@@ -1,10 +1,9 @@
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "drivers/stm32f4/bounded_wait.hpp"
-#include "drivers/stm32f4/peripheral_clock.hpp"
+#include "drivers/stm32f4/registers/rcc.hpp"
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4 {

@@ -1,10 +1,14 @@
-#include "drivers/stm32f4/interrupt_controller.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::drivers::stm32f4 {
+#include "drivers/stm32f4/interrupts.hpp"
+
+namespace kmax::drivers::cortex_m {
 namespace {
+
+using stm32f4::Interrupt;
 
 struct Blocks {
   NvicRegisters nvic{};
@@ -72,4 +76,4 @@ RC_GTEST_PROP(InterruptController, PriorityLeavesItsNeighboursAlone,
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

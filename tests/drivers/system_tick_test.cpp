@@ -1,4 +1,4 @@
-#include "drivers/stm32f4/system_tick.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -8,7 +8,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 namespace {
 
 using testing::FakeRegister;
@@ -240,4 +240,4 @@ TEST(SystemTick, HeldUpAtEveryAccess) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

@@ -11,6 +11,7 @@
 #include "board/odrive_v3/pins.hpp"
 #include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 extern "C" {
 std::uint32_t kmax_stack_top[1];

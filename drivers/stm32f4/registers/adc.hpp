@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Analog-to-digital converters 1 to 3 and the registers they share, RM0090 chapter on ADC.
 

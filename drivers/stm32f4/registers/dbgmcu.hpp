@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Debug support for the peripherals, RM0090 chapter on debug support (DBGMCU): what stops when a debugger
 // halts the core. Cleared by power-on reset only.

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "drivers/stm32f4/registers/field.hpp"
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/register_field.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 // External interrupt/event controller, RM0090 chapter on interrupts and events, section EXTI. One bit per
 // line in each register; lines 0 to 15 are the pins of that number of one port each (see syscfg.hpp).

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Embedded flash interface, RM0090 chapter on the flash memory interface.
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // General-purpose I/O, RM0090 chapter on GPIO. The fields repeat once per pin (two bits each, four in AFR),
 // so their position is a run-time number and drivers/stm32f4/gpio.hpp shifts by itself.

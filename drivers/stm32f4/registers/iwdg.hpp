@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Independent watchdog, RM0090 chapter on IWDG. Runs on the low-speed oscillator (LSI) alone, which it starts
 // by itself.

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Serial peripheral interface, RM0090 chapter on SPI, section SPI and I2S registers.
 

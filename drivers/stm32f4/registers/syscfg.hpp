@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // System configuration controller, RM0090 chapter on SYSCFG: which port feeds an EXTI line. Four bits per
 // line, four lines per register, so their position is a run-time number.

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/field.hpp"
+#include "drivers/register_field.hpp"
 
 // Timers with capture/compare channels: RM0090, chapters Advanced-control timers (TIM1 and TIM8) and
 // General-purpose timers (TIM2 to TIM5). One layout for all: TIM2 to TIM5 have no RCR and no BDTR, and the

@@ -6,7 +6,7 @@
 
 namespace kmax::virtual_board {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 
 std::uint32_t CoreDebug::read(const Access& access) {
   require_word(access, "core debug");

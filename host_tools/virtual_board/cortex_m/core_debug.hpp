@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/core_debug.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
 // Debug control of the core: TRCENA, which the cycle counter needs, and DHCSR, which says that no debugger is
@@ -12,7 +12,7 @@ namespace kmax::virtual_board {
 
 class CoreDebug final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::CoreDebugRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::CoreDebugRegisters);
 
   std::uint32_t read(const Access& access) override;
   void write(const Access& access, std::uint32_t value) override;

@@ -23,13 +23,15 @@ struct CorePeripherals {
         system_control(exceptions),
         system_tick(clocks, exceptions) {
     namespace chip = drivers::stm32f4;
-    bus.attach(chip::nvic_base, Nvic::size, "NVIC", nvic);
-    bus.attach(chip::software_trigger_base, sizeof(chip::SoftwareTriggerRegisters), "STIR", software_trigger);
-    bus.attach(chip::scb_base, SystemControl::size, "SCB", system_control);
-    bus.attach(chip::system_tick_base, SystemTick::size, "SysTick", system_tick);
-    bus.attach(chip::mpu_base, MemoryProtection::size, "MPU", memory_protection);
-    bus.attach(chip::floating_point_base, FloatingPointControl::size, "FPU control", floating_point);
-    bus.attach(chip::core_debug_base, CoreDebug::size, "core debug", core_debug);
+    bus.attach(drivers::cortex_m::nvic_base, Nvic::size, "NVIC", nvic);
+    bus.attach(drivers::cortex_m::software_trigger_base, sizeof(drivers::cortex_m::SoftwareTriggerRegisters),
+               "STIR", software_trigger);
+    bus.attach(drivers::cortex_m::scb_base, SystemControl::size, "SCB", system_control);
+    bus.attach(drivers::cortex_m::system_tick_base, SystemTick::size, "SysTick", system_tick);
+    bus.attach(drivers::cortex_m::mpu_base, MemoryProtection::size, "MPU", memory_protection);
+    bus.attach(drivers::cortex_m::floating_point_base, FloatingPointControl::size, "FPU control",
+               floating_point);
+    bus.attach(drivers::cortex_m::core_debug_base, CoreDebug::size, "core debug", core_debug);
   }
 
   /// System reset of all of them.

@@ -9,7 +9,7 @@ namespace {
 namespace stm32 = drivers::stm32f4;
 constexpr const char* block = "DWT";
 /// Four comparators (Cortex-M4 of the STM32F405), a cycle counter.
-constexpr std::uint32_t fixed_bits = stm32::dwt_ctrl::Comparators::bits(4);
+constexpr std::uint32_t fixed_bits = drivers::cortex_m::dwt_ctrl::Comparators::bits(4);
 }  // namespace
 
 DwtModel::DwtModel(std::function<std::uint64_t()> cycles, std::function<bool()> trace_enabled)
@@ -22,21 +22,21 @@ std::uint32_t DwtModel::count() const {
 std::uint32_t DwtModel::read(const Access& access) {
   require_word(access, block);
   if (!trace_enabled_()) refuse(access, block, "DEMCR.TRCENA is not set");
-  if (access.offset == offsetof(stm32::DwtRegisters, ctrl))
-    return fixed_bits | stm32::dwt_ctrl::CycleCounterEnable::bits(counting_ ? 1 : 0);
-  if (access.offset == offsetof(stm32::DwtRegisters, cyccnt)) return count();
+  if (access.offset == offsetof(drivers::cortex_m::DwtRegisters, ctrl))
+    return fixed_bits | drivers::cortex_m::dwt_ctrl::CycleCounterEnable::bits(counting_ ? 1 : 0);
+  if (access.offset == offsetof(drivers::cortex_m::DwtRegisters, cyccnt)) return count();
   refuse(access, block, "only CTRL and CYCCNT are modelled");
 }
 
 void DwtModel::write(const Access& access, std::uint32_t value) {
   require_word(access, block);
   if (!trace_enabled_()) refuse(access, block, "DEMCR.TRCENA is not set");
-  if (access.offset == offsetof(stm32::DwtRegisters, ctrl)) {
-    if ((value & ~(fixed_bits | stm32::dwt_ctrl::CycleCounterEnable::mask)) != 0)
+  if (access.offset == offsetof(drivers::cortex_m::DwtRegisters, ctrl)) {
+    if ((value & ~(fixed_bits | drivers::cortex_m::dwt_ctrl::CycleCounterEnable::mask)) != 0)
       refuse(access, block, "CTRL: only CYCCNTENA is modelled");
     count_ = count();
-    counting_ = stm32::dwt_ctrl::CycleCounterEnable::of(value) != 0;
-  } else if (access.offset == offsetof(stm32::DwtRegisters, cyccnt)) {
+    counting_ = drivers::cortex_m::dwt_ctrl::CycleCounterEnable::of(value) != 0;
+  } else if (access.offset == offsetof(drivers::cortex_m::DwtRegisters, cyccnt)) {
     count_ = value;
   } else {
     refuse(access, block, "only CTRL and CYCCNT are modelled");

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "drivers/stm32f4/registers/dwt.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
 namespace kmax::virtual_board {
@@ -12,7 +12,7 @@ namespace kmax::virtual_board {
 /// and CYCCNT; comparators, sampling and the event counters are refused. System reset does not touch it.
 class DwtModel final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::DwtRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::DwtRegisters);
 
   /// `cycles`: core cycles executed since power-up. `trace_enabled`: DEMCR.TRCENA; while it is false all
   /// accesses are refused (unpredictable on silicon) and the counter stands still.

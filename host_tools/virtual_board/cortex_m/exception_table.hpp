@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 // The state of all exceptions and the decision which of them runs: PM0214, exception model (states,
 // priorities, pre-emption) and NVIC (level-sensitive and pulse interrupts). NVIC, SCB and SysTick are faces

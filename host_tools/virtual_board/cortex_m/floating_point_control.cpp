@@ -7,7 +7,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 constexpr const char* name = "FPU control";
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/floating_point_unit.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
 // FPCCR and its neighbours, PM0214 floating-point unit: how the FP registers survive an exception.
@@ -15,7 +15,7 @@ namespace kmax::virtual_board {
 
 class FloatingPointControl final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::FloatingPointRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::FloatingPointRegisters);
   /// PM0214: single precision with division and square root, 16 double-word registers; fused multiply-add.
   static constexpr std::uint32_t feature_word_0 = 0x1011'0021;
   static constexpr std::uint32_t feature_word_1 = 0x1100'0011;
@@ -24,7 +24,7 @@ class FloatingPointControl final : public Peripheral {
   void write(const Access& access, std::uint32_t value) override;
   void reset(BoardTime now) override;
 
-  bool lazy() const { return drivers::stm32f4::floating_point_fpccr::LazyPreservation::of(fpccr_) != 0; }
+  bool lazy() const { return drivers::cortex_m::floating_point_fpccr::LazyPreservation::of(fpccr_) != 0; }
 
   /// A frame with room for the registers was made, at this address, and they count as not yet written.
   void begin_lazy_frame(std::uint32_t address);
@@ -33,8 +33,8 @@ class FloatingPointControl final : public Peripheral {
 
  private:
   static constexpr std::uint32_t fpccr_reset =
-      drivers::stm32f4::floating_point_fpccr::AutomaticPreservation::mask |
-      drivers::stm32f4::floating_point_fpccr::LazyPreservation::mask;
+      drivers::cortex_m::floating_point_fpccr::AutomaticPreservation::mask |
+      drivers::cortex_m::floating_point_fpccr::LazyPreservation::mask;
 
   std::uint32_t fpccr_ = fpccr_reset;
   std::uint32_t fpcar_ = 0;

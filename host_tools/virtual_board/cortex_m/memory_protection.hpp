@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/mpu.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
 // Memory protection unit, PM0214: eight regions, kept and checked for being well-formed. Enabling it is
@@ -15,7 +15,7 @@ namespace kmax::virtual_board {
 
 class MemoryProtection final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::MpuRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::MpuRegisters);
 
   struct Region {
     std::uint32_t address = 0;
@@ -33,7 +33,7 @@ class MemoryProtection final : public Peripheral {
   void write_address(const Access& access, std::uint32_t value);
   void write_attributes(const Access& access, std::uint32_t value);
 
-  std::array<Region, drivers::stm32f4::mpu_region_count> regions_{};
+  std::array<Region, drivers::cortex_m::mpu_region_count> regions_{};
   std::uint32_t ctrl_ = 0;
   std::uint32_t selected_ = 0;
 };

@@ -1,4 +1,5 @@
 #include "host_tools/virtual_board/cortex_m/nvic.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 #include <bit>
 #include <cstddef>
@@ -7,7 +8,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using Registers = drivers::stm32f4::NvicRegisters;
+using Registers = drivers::cortex_m::NvicRegisters;
 using drivers::stm32f4::interrupt_count;
 
 constexpr const char* name = "NVIC";
@@ -108,7 +109,7 @@ std::uint32_t SoftwareTrigger::read(const Access& access) {
 
 void SoftwareTrigger::write(const Access& access, std::uint32_t value) {
   require_word(access, "STIR");
-  const std::uint32_t interrupt = drivers::stm32f4::nvic_stir::InterruptNumber::of(value);
+  const std::uint32_t interrupt = drivers::cortex_m::nvic_stir::InterruptNumber::of(value);
   if (interrupt >= interrupt_count) {
     refuse(access, "STIR", "interrupt " + std::to_string(interrupt) + " does not exist, 81 is the last one");
   }

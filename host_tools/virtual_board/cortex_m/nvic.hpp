@@ -1,6 +1,7 @@
 #pragma once
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
@@ -14,7 +15,7 @@ namespace kmax::virtual_board {
 
 class Nvic final : public Peripheral, public InterruptLines {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::NvicRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::NvicRegisters);
 
   explicit Nvic(ExceptionTable& exceptions) : exceptions_(exceptions) {}
 

@@ -207,7 +207,7 @@ void Processor::after_trap(int error) {
     if (code == wait_for_event || code == yield) return;
     if (!config_.faults_to_firmware) return fail(fmt::format("undefined instruction at {}", place(pc_)));
     if (!core_.system_control.raise_fault(exception_number::usage_fault,
-                                          drivers::stm32f4::scb_cfsr::UndefinedInstruction::mask,
+                                          drivers::cortex_m::scb_cfsr::UndefinedInstruction::mask,
                                           core_.exceptions.execution_level(masks()))) {
       fail(fmt::format("lock-up: undefined instruction at {} in a fault handler", place(pc_)));
     }
@@ -228,7 +228,7 @@ void Processor::report_bad_access() {
     return fail(fmt::format("{} 0x{:08X}{} at {}: {}", action, bad.address,
                             block.empty() ? "" : " (" + block + ")", place(bad.pc), bad.why));
   }
-  using namespace drivers::stm32f4;
+  using namespace drivers::cortex_m;
   std::uint32_t status = scb_cfsr::ImpreciseBusFault::mask;
   unsigned exception = exception_number::bus_fault;
   if (bad.fetch) {

@@ -7,7 +7,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 namespace number = exception_number;
 
 constexpr const char* name = "SCB";

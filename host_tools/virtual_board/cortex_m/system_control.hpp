@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
@@ -19,7 +19,7 @@ namespace kmax::virtual_board {
 
 class SystemControl final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::ScbRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::ScbRegisters);
   /// Cortex-M4 r0p1 (PM0214, CPUID).
   static constexpr std::uint32_t cpuid = 0x410F'C241;
 

@@ -5,7 +5,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 
 constexpr const char* name = "SysTick";
 constexpr std::uint32_t ctrl_settings = system_tick_ctrl::Enable::mask |

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "drivers/stm32f4/registers/system_tick.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 #include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
@@ -19,10 +19,10 @@ namespace kmax::virtual_board {
 
 class SystemTick final : public Peripheral {
  public:
-  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::SystemTickRegisters);
+  static constexpr std::uint32_t size = sizeof(drivers::cortex_m::SystemTickRegisters);
   static constexpr std::uint32_t calibration =
-      drivers::stm32f4::system_tick_calib::Skewed::mask |
-      drivers::stm32f4::system_tick_calib::TenMilliseconds::bits(18750);
+      drivers::cortex_m::system_tick_calib::Skewed::mask |
+      drivers::cortex_m::system_tick_calib::TenMilliseconds::bits(18750);
 
   SystemTick(const BoardClocks& clocks, ExceptionTable& exceptions)
       : clocks_(clocks), exceptions_(exceptions) {}

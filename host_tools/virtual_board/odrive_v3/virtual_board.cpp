@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "board/odrive_v3/pins.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "drivers/stm32f4/registers/can.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
@@ -108,7 +109,7 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(chip::flash_interface_base, FlashInterface::size, "FLASH", *flash_);
   attach(chip::iwdg_base, IwdgModel::size, "IWDG", *iwdg_);
   attach(chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU", *dbgmcu_);
-  attach(chip::dwt_base, DwtModel::size, "DWT", *dwt_);
+  attach(drivers::cortex_m::dwt_base, DwtModel::size, "DWT", *dwt_);
   attach(DeviceIdentity::base, DeviceIdentity::size, "system memory", *identity_);
   // Only those that do something by themselves: the loop asks each of them at every event. At one instant in
   // this order: an update event comes before the conversions that it starts.

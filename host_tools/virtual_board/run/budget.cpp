@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"

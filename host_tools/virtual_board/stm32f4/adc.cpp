@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
 
 namespace kmax::virtual_board {

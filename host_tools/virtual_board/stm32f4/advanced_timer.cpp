@@ -1,6 +1,7 @@
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 
 #include "drivers/stm32f4/dead_time.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/timer.hpp"
 
 namespace kmax::virtual_board {

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "drivers/stm32f4/can_filter.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 // What happens in time and on the bus; the registers are in can_controller_registers.cpp.
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/syscfg.hpp"
 
 namespace kmax::virtual_board {

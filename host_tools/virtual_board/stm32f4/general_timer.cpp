@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/timer.hpp"
 
 namespace kmax::virtual_board {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 #include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
 

@@ -1,4 +1,5 @@
 #include "host_tools/virtual_board/stm32f4/usart.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 #include <algorithm>
 #include <bit>

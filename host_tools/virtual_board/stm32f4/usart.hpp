@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/usart.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 #include "host_tools/virtual_board/stm32f4/board_clocks.hpp"

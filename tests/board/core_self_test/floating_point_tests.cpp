@@ -1,8 +1,7 @@
 // The FP registers over pre-emption, and single precision to the last bit. PM0214, floating-point unit.
 
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
-#include "drivers/stm32f4/registers/system_tick.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "tests/board/core_self_test/float_loop.hpp"
 #include "tests/board/core_self_test/lines.hpp"
 #include "tests/board/core_self_test/report.hpp"
@@ -10,6 +9,8 @@
 
 namespace kmax::core_self_test {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {

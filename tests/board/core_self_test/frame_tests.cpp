@@ -1,13 +1,16 @@
 // What entry and return do to stacks, LR and flags. PM0214, exception entry and return.
 
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/board/core_self_test/lines.hpp"
 #include "tests/board/core_self_test/report.hpp"
 #include "tests/board/core_self_test/tests.hpp"
 
 namespace kmax::core_self_test {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 // Written by the naked handler of EXTI2 below.

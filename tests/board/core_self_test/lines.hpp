@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 
-#include "drivers/stm32f4/core_instructions.hpp"
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
 // Interrupts of the self-test. No peripheral raises them, the test pends them in the NVIC; what a handler
 // does beyond noting that it ran is set by the test.
@@ -15,15 +15,15 @@ struct Line {
   std::uint32_t number;
 
   std::uint32_t bit() const { return 1U << (number % 32); }
-  void enable() const { drivers::stm32f4::nvic().iser[number / 32] = bit(); }
-  void disable() const { drivers::stm32f4::nvic().icer[number / 32] = bit(); }
-  void pend() const { drivers::stm32f4::nvic().ispr[number / 32] = bit(); }
-  void clear_pending() const { drivers::stm32f4::nvic().icpr[number / 32] = bit(); }
-  bool pending() const { return (drivers::stm32f4::nvic().ispr[number / 32] & bit()) != 0; }
-  bool active() const { return (drivers::stm32f4::nvic().iabr[number / 32] & bit()) != 0; }
+  void enable() const { drivers::cortex_m::nvic().iser[number / 32] = bit(); }
+  void disable() const { drivers::cortex_m::nvic().icer[number / 32] = bit(); }
+  void pend() const { drivers::cortex_m::nvic().ispr[number / 32] = bit(); }
+  void clear_pending() const { drivers::cortex_m::nvic().icpr[number / 32] = bit(); }
+  bool pending() const { return (drivers::cortex_m::nvic().ispr[number / 32] & bit()) != 0; }
+  bool active() const { return (drivers::cortex_m::nvic().iabr[number / 32] & bit()) != 0; }
   /// 0 to 15; by a byte access, as firmware does it.
   void set_priority(std::uint32_t priority) const {
-    auto* bytes = reinterpret_cast<volatile std::uint8_t*>(&drivers::stm32f4::nvic().ipr[0]);
+    auto* bytes = reinterpret_cast<volatile std::uint8_t*>(&drivers::cortex_m::nvic().ipr[0]);
     bytes[number] = static_cast<std::uint8_t>(priority << 4);
   }
 };
@@ -38,8 +38,8 @@ extern void (*volatile line_action[lines.size()])();
 void prepare_lines();
 
 inline void synchronize() {
-  drivers::stm32f4::data_synchronization_barrier();
-  drivers::stm32f4::instruction_synchronization_barrier();
+  drivers::cortex_m::data_synchronization_barrier();
+  drivers::cortex_m::instruction_synchronization_barrier();
 }
 
 inline void pend_and_wait(const Line& line) {

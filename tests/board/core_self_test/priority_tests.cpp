@@ -1,12 +1,14 @@
 // Who runs when: nesting, order, masks and grouping of priorities. PM0214, exception model.
 
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "tests/board/core_self_test/lines.hpp"
 #include "tests/board/core_self_test/report.hpp"
 #include "tests/board/core_self_test/tests.hpp"
 
 namespace kmax::core_self_test {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {

@@ -1,12 +1,14 @@
 #include "tests/board/core_self_test/report.hpp"
 
 #include "board/stm32f405/fault_handler.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
 #include "drivers/stm32f4/registers/usart.hpp"
 
 namespace kmax::core_self_test {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {
@@ -72,7 +74,7 @@ void end_report() {
 void kmax::board::enter_safe_state() {
   using namespace kmax::core_self_test;
   send("fault ");
-  send_hexadecimal(drivers::stm32f4::scb().cfsr);
+  send_hexadecimal(drivers::cortex_m::scb().cfsr);
   send(" -\n");
   end_report();
 }

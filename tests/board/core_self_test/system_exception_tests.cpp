@@ -3,13 +3,15 @@
 #include <cstring>
 
 #include "board/stm32f405/vectors.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
 #include "tests/board/core_self_test/lines.hpp"
 #include "tests/board/core_self_test/report.hpp"
 #include "tests/board/core_self_test/tests.hpp"
 
 namespace kmax::core_self_test {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {

@@ -4,7 +4,8 @@
 
 #include <stdexcept>
 
-#include "drivers/stm32f4/registers/system_tick.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board {
@@ -93,7 +94,7 @@ TEST(EventLoop, TicksWithoutDrift) {
   ProgramOnCore board(sleep_for_ever);
   board.handler(exception_number::system_tick, count_handler);
   board.set(6, 0);
-  using drivers::stm32f4::SystemTickRegisters;
+  using drivers::cortex_m::SystemTickRegisters;
   board.core.system_tick.write({offsetof(SystemTickRegisters, load), 4, 0}, 167'999);
   board.core.system_tick.write({offsetof(SystemTickRegisters, val), 4, 0}, 0);
   board.core.system_tick.write({offsetof(SystemTickRegisters, ctrl), 4, 0}, 7);

@@ -1,4 +1,4 @@
-// The drivers of the core's own peripherals on the models: drivers/stm32f4/system_tick.hpp and
+// The drivers of the core's own peripherals on the models: drivers/cortex_m/system_tick.hpp and
 // interrupt_controller.hpp.
 
 #include <gtest/gtest.h>
@@ -7,14 +7,18 @@
 #include <cstddef>
 #include <utility>
 
-#include "drivers/stm32f4/interrupt_controller.hpp"
-#include "drivers/stm32f4/system_tick.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
 namespace kmax::virtual_board {
 namespace {
 
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 using testing::RegisterOnModel;
 
@@ -103,7 +107,7 @@ TEST(SystemTickOnModel, GivesMicroseconds) {
   Core core;
   SystemTickOnModel registers(core);
   ScbOnModel scb(core);
-  drivers::stm32f4::SystemTick<SystemTickOnModel, ScbOnModel> driver(registers, scb);
+  drivers::cortex_m::SystemTick<SystemTickOnModel, ScbOnModel> driver(registers, scb);
   ASSERT_TRUE(driver.start(168'000'000, 1000));
   std::uint32_t served = 0;
   for (std::uint32_t microsecond = 1; microsecond < 5000; ++microsecond) {

@@ -25,6 +25,7 @@
 namespace kmax::virtual_board {
 namespace {
 
+using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 constexpr std::uint32_t rcc_base_address = 0x4002'3800;

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "drivers/stm32f4/cycle_counter.hpp"
+#include "drivers/cortex_m/cycle_counter.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
 // ARMv7-M architecture reference manual, C1.8 (DWT).
@@ -20,8 +20,8 @@ struct Core {
   bool trace = true;
   BoardTime now = 0;
   DwtModel model{[this] { return cycles; }, [this] { return trace; }};
-  RegisterOnModel ctrl{model, offsetof(stm32::DwtRegisters, ctrl), now};
-  RegisterOnModel cyccnt{model, offsetof(stm32::DwtRegisters, cyccnt), now};
+  RegisterOnModel ctrl{model, offsetof(drivers::cortex_m::DwtRegisters, ctrl), now};
+  RegisterOnModel cyccnt{model, offsetof(drivers::cortex_m::DwtRegisters, cyccnt), now};
   std::uint32_t count() { return static_cast<std::uint32_t>(cyccnt); }
 };
 
@@ -61,7 +61,7 @@ TEST(Dwt, DriverMeasures) {
   struct {
     std::uint32_t demcr = 0;
   } core_debug;
-  stm32::CycleCounter counter{dwt, core_debug};
+  drivers::cortex_m::CycleCounter counter{dwt, core_debug};
   ASSERT_TRUE(counter.start());
   const std::uint32_t start = counter.now();
   core.cycles += 8'400;

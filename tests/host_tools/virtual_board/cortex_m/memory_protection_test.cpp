@@ -9,7 +9,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 
 constexpr std::uint32_t ctrl = offsetof(MpuRegisters, ctrl);
 constexpr std::uint32_t rnr = offsetof(MpuRegisters, rnr);

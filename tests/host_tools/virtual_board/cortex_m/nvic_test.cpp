@@ -1,6 +1,7 @@
 // PM0214, nested vectored interrupt controller.
 
 #include "host_tools/virtual_board/cortex_m/nvic.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +10,8 @@
 namespace kmax::virtual_board {
 namespace {
 
+using drivers::cortex_m::NvicRegisters;
 using drivers::stm32f4::Interrupt;
-using drivers::stm32f4::NvicRegisters;
 
 struct Controller {
   Controller() { exceptions.reset(); }

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board {
@@ -145,7 +145,7 @@ TEST(ProcessorFault, FindsFloatingPointInstructionsBeforeCpacr_FloatingPointUnit
   ProgramOnCore board(fp);
   expect_fault(board, {"floating-point", "pc 0x08000202", "CPACR"});
   ProgramOnCore enabled(fp);
-  enabled.core.system_control.write({offsetof(chip::ScbRegisters, cpacr), 4, 0}, 0xFU << 20);
+  enabled.core.system_control.write({offsetof(drivers::cortex_m::ScbRegisters, cpacr), 4, 0}, 0xFU << 20);
   EXPECT_EQ(enabled.run(), RunEnd::stopped) << enabled.processor.fault();
 }
 
@@ -198,22 +198,25 @@ TEST(ProcessorFault, BecomesHardFaultWithTheInstructionsAddress_FaultEscalation)
   ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
   EXPECT_EQ(board.processor.breakpoint(), 9);
   EXPECT_EQ(board.bus.load(board.get(13) + 24), ProgramOnCore::program_base + 2);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, hfsr)), chip::scb_hfsr::Forced::mask);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)),
-            chip::scb_cfsr::PreciseBusFault::mask | chip::scb_cfsr::BusFaultAddressValid::mask);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, bfar)), 0x2002'0004U);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, hfsr)),
+            drivers::cortex_m::scb_hfsr::Forced::mask);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, cfsr)),
+            drivers::cortex_m::scb_cfsr::PreciseBusFault::mask |
+                drivers::cortex_m::scb_cfsr::BusFaultAddressValid::mask);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, bfar)), 0x2002'0004U);
 }
 
 TEST(ProcessorFault, BecomesBusFaultWhenThatIsEnabled_BusFault) {
   ProgramOnCore board(load, as_on_the_chip);
   board.handler(exception_number::bus_fault, {0xBE08});
-  board.core.system_control.write({offsetof(chip::ScbRegisters, shcsr), 4, 0},
-                                  chip::scb_shcsr::BusFaultEnable::mask);
+  board.core.system_control.write({offsetof(drivers::cortex_m::ScbRegisters, shcsr), 4, 0},
+                                  drivers::cortex_m::scb_shcsr::BusFaultEnable::mask);
   board.set(0, ProgramOnCore::block_base + 0x400);
   ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
   EXPECT_EQ(board.processor.breakpoint(), 8);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)), chip::scb_cfsr::ImpreciseBusFault::mask);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, hfsr)), 0U);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, cfsr)),
+            drivers::cortex_m::scb_cfsr::ImpreciseBusFault::mask);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, hfsr)), 0U);
 }
 
 TEST(ProcessorFault, BecomesUsageFaultOfAnUndefinedInstruction_UsageFault) {
@@ -221,7 +224,8 @@ TEST(ProcessorFault, BecomesUsageFaultOfAnUndefinedInstruction_UsageFault) {
   board.handler(exception_number::hard_fault, {0xBE09});
   ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
   EXPECT_EQ(board.bus.load(board.get(13) + 24), ProgramOnCore::program_base + 2);
-  EXPECT_EQ(scb(board, offsetof(chip::ScbRegisters, cfsr)), chip::scb_cfsr::UndefinedInstruction::mask);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, cfsr)),
+            drivers::cortex_m::scb_cfsr::UndefinedInstruction::mask);
 }
 
 TEST(ProcessorFault, LocksUpOnAFaultInTheHardFaultHandler_Lockup) {

@@ -6,8 +6,8 @@
 
 #include <stdexcept>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board {
@@ -17,7 +17,8 @@ using drivers::stm32f4::Interrupt;
 namespace chip = drivers::stm32f4;
 
 constexpr unsigned tim2 = exception_number::first_interrupt + static_cast<unsigned>(Interrupt::tim2);
-constexpr std::uint32_t pend_word = chip::nvic_base + offsetof(chip::NvicRegisters, ispr);
+constexpr std::uint32_t pend_word =
+    drivers::cortex_m::nvic_base + offsetof(drivers::cortex_m::NvicRegisters, ispr);
 constexpr std::uint32_t tim2_bit = 1U << static_cast<unsigned>(Interrupt::tim2);
 
 const Program count_handler{0x3601,   // adds r6, #1
@@ -92,8 +93,8 @@ TEST(Processor, StacksEightWordsBelowAStackAlignedToEight_ExceptionEntry) {
     EXPECT_EQ(board.bus.load(frame + 20), 0x0800'0777U);
     EXPECT_EQ(board.bus.load(frame + 24), ProgramOnCore::program_base + 8);
     EXPECT_EQ(*board.bus.load(frame + 28) & 0x0100'0200U, 0x0100'0000U | (misaligned != 0 ? 0x200U : 0U));
-    EXPECT_EQ(chip::scb_icsr::ActiveVector::of(
-                  board.core.system_control.read({offsetof(chip::ScbRegisters, icsr), 4, 0})),
+    EXPECT_EQ(drivers::cortex_m::scb_icsr::ActiveVector::of(
+                  board.core.system_control.read({offsetof(drivers::cortex_m::ScbRegisters, icsr), 4, 0})),
               tim2);
   }
 }
@@ -181,7 +182,9 @@ TEST(Processor, ReturnsToTheHandlerLevelThatIsStillAsserted_LevelSensitiveInterr
 
 TEST(Processor, EndsTheRunForAResetRequest_SystemReset) {
   ProgramOnCore board(pend_then_more);
-  board.set(0, chip::scb_base + offsetof(chip::ScbRegisters, aircr)).set(1, 0x05FA'0004).set(2, 0);
+  board.set(0, drivers::cortex_m::scb_base + offsetof(drivers::cortex_m::ScbRegisters, aircr))
+      .set(1, 0x05FA'0004)
+      .set(2, 0);
   BoardTime requested = 0;
   board.core.system_control.on_reset_request([&](BoardTime now) { requested = now; });
   EXPECT_EQ(board.run(), RunEnd::reset_requested);

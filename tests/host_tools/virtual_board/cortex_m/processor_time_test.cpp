@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
-#include "drivers/stm32f4/registers/system_tick.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board {
@@ -145,9 +144,10 @@ TEST(ProcessorTime, ChargesFloatingPointFramesWhenTheHandlerUsesTheUnit_LazyPres
                              0xBE01};
   const auto cycles_of = [&](const Program& handler, bool lazy) {
     ProgramOnCore board(use_and_wait);
-    board.core.system_control.write({offsetof(chip::ScbRegisters, cpacr), 4, 0}, 0xFU << 20);
+    board.core.system_control.write({offsetof(drivers::cortex_m::ScbRegisters, cpacr), 4, 0}, 0xFU << 20);
     if (!lazy)
-      board.core.floating_point.write({0, 4, 0}, chip::floating_point_fpccr::AutomaticPreservation::mask);
+      board.core.floating_point.write({0, 4, 0},
+                                      drivers::cortex_m::floating_point_fpccr::AutomaticPreservation::mask);
     board.handler(tim2, handler);
     board.core.exceptions.set_enabled(tim2, true);
     EXPECT_EQ(board.processor.run_until(1000), RunEnd::sleeping);

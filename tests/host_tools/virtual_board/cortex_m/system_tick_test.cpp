@@ -1,4 +1,4 @@
-// PM0214, system timer; and the driver drivers/stm32f4/system_tick.hpp on the model.
+// PM0214, system timer; and the driver drivers/cortex_m/system_tick.hpp on the model.
 
 #include "host_tools/virtual_board/cortex_m/system_tick.hpp"
 
@@ -9,7 +9,7 @@
 namespace kmax::virtual_board {
 namespace {
 
-using namespace drivers::stm32f4;
+using namespace drivers::cortex_m;
 constexpr unsigned tick = exception_number::system_tick;
 constexpr BoardTime cycle = 2;
 

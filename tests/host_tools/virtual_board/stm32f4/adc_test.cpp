@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 

@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/advanced_timer_bench.hpp"
 
 namespace kmax::virtual_board {

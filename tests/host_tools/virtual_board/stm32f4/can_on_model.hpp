@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/stm32f4/can.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/run/can_host_node.hpp"
 #include "host_tools/virtual_board/stm32f4/can_controller.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"

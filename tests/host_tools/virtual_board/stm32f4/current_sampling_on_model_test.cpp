@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "drivers/stm32f4/current_sampling.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 

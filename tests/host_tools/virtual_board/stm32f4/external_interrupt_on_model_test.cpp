@@ -7,6 +7,7 @@
 
 #include "drivers/stm32f4/external_interrupt.hpp"
 #include "drivers/stm32f4/gpio.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/stm32f4/exti_and_syscfg.hpp"
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/syscfg.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 

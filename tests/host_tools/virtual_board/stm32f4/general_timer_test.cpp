@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
 
 namespace kmax::virtual_board {

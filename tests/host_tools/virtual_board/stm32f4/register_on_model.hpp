@@ -3,14 +3,15 @@
 #include <cstdint>
 #include <map>
 
-#include "drivers/stm32f4/registers/nvic.hpp"
+#include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
 // Lets a driver run on a model without a processor: registers whose loads and stores are bus accesses.
 
 namespace kmax::virtual_board::testing {
 
-/// Satisfies drivers::stm32f4::Register.
+/// Satisfies drivers::Register.
 class RegisterOnModel {
  public:
   RegisterOnModel(Peripheral& model, std::size_t offset, const BoardTime& now)

@@ -56,7 +56,7 @@ class TimedBus {
   std::vector<Peripheral*> models_;
 };
 
-/// Satisfies drivers::stm32f4::Register.
+/// Satisfies drivers::Register.
 class TimedRegister {
  public:
   TimedRegister(TimedBus& bus, Peripheral& model, std::size_t offset)

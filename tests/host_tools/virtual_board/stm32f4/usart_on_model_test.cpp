@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/usart.hpp"
 #include "host_tools/virtual_board/stm32f4/usart.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"

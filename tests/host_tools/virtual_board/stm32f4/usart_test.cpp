@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
 // RM0090, chapter Universal synchronous asynchronous receiver transmitter (USART).

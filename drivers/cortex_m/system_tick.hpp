@@ -2,8 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/scb.hpp"
-#include "drivers/stm32f4/registers/system_tick.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
 // SysTick as the source of the periodic tick, and a microsecond clock made of the tick count and the
 // counter's value. PM0214, system timer; ICSR in the system control block.
@@ -23,7 +22,7 @@
 //
 // Cost of now_us: at most six loads and two 32-bit divisions (by hardware), no loop.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 
 template <typename Registers = SystemTickRegisters, typename Scb = ScbRegisters>
 class SystemTick {
@@ -89,4 +88,4 @@ class SystemTick {
   volatile std::uint32_t tick_us_ = 0;
 };
 
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

@@ -13,7 +13,7 @@
 // Cost: `Field::write` is one load, a few register instructions and one store: not atomic. Two contexts may
 // write fields of the same register only if the driver says why that is safe.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers {
 
 /// Anything that reads as a 32-bit word and takes one: `volatile std::uint32_t`, or a test's stand-in for it.
 template <typename Candidate>
@@ -53,4 +53,15 @@ Block& peripheral_at(std::uintptr_t address) {
   return *reinterpret_cast<Block*>(address);  // NOLINT(performance-no-int-to-ptr)
 }
 
-}  // namespace kmax::drivers::stm32f4
+/// Reads `source` until the bits in `mask` equal `expected`; false when they did not within `polls` reads (at
+/// least one). The bound is a number of reads because no clock can be trusted while the clocks themselves are
+/// being set up.
+[[nodiscard]] bool wait_until(const Register auto& source, std::uint32_t mask, std::uint32_t expected,
+                              std::uint32_t polls) {
+  do {
+    if ((static_cast<std::uint32_t>(source) & mask) == expected) return true;
+  } while (polls-- > 1);
+  return false;
+}
+
+}  // namespace kmax::drivers

@@ -1,19 +1,20 @@
 #pragma once
 
+#include <concepts>
 #include <cstdint>
+#include <type_traits>
 
-#include "drivers/stm32f4/core_instructions.hpp"
-#include "drivers/stm32f4/registers/nvic.hpp"
-#include "drivers/stm32f4/registers/scb.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
 // Priorities, enable and pend of the NVIC and of the system exceptions that have a settable priority. PM0214,
 // NVIC and SCB.
 //
-// The part implements the upper four of the eight priority bits: 0 is the most urgent, 15 the least. All four
-// bits pre-empt (PRIGROUP stays 0). Priorities are set once at start-up, from one context; `enable`,
-// `disable` and `pend` are single stores and may be called from any.
+// Parts with 16 levels (all STM32) implement the upper four of the eight priority bits: 0 is the most urgent,
+// 15 the least. All four bits pre-empt (PRIGROUP stays 0). Priorities are set once at start-up, from one
+// context; `enable`, `disable` and `pend` are single stores and may be called from any.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 
 enum class SystemException : std::uint8_t {
   memory_management = 4,
@@ -24,12 +25,16 @@ enum class SystemException : std::uint8_t {
   system_tick = 15,
 };
 
+/// A chip's names for its interrupts; the values are the positions in the vector table minus 16.
+template <typename Candidate>
+concept InterruptName = std::is_enum_v<Candidate> && !std::same_as<Candidate, SystemException>;
+
 template <typename Nvic = NvicRegisters, typename Scb = ScbRegisters>
 class InterruptController {
  public:
   constexpr InterruptController(Nvic& nvic, Scb& scb) : nvic_(nvic), scb_(scb) {}
 
-  void set_priority(Interrupt interrupt, std::uint8_t priority) {
+  void set_priority(InterruptName auto interrupt, std::uint8_t priority) {
     write_byte(nvic_.ipr[index(interrupt) / 4], index(interrupt) % 4, priority);
   }
 
@@ -38,23 +43,23 @@ class InterruptController {
     write_byte(scb_.shpr[number / 4 - 1], number % 4, priority);
   }
 
-  void enable(Interrupt interrupt) { nvic_.iser[index(interrupt) / 32] = bit(interrupt); }
+  void enable(InterruptName auto interrupt) { nvic_.iser[index(interrupt) / 32] = bit(interrupt); }
 
   /// The handler does not start after this returns (PM0214 asks for both barriers).
-  void disable(Interrupt interrupt) {
+  void disable(InterruptName auto interrupt) {
     nvic_.icer[index(interrupt) / 32] = bit(interrupt);
     data_synchronization_barrier();
     instruction_synchronization_barrier();
   }
 
   /// Runs the handler as if the peripheral had asked for it.
-  void pend(Interrupt interrupt) { nvic_.ispr[index(interrupt) / 32] = bit(interrupt); }
+  void pend(InterruptName auto interrupt) { nvic_.ispr[index(interrupt) / 32] = bit(interrupt); }
 
-  void clear_pending(Interrupt interrupt) { nvic_.icpr[index(interrupt) / 32] = bit(interrupt); }
+  void clear_pending(InterruptName auto interrupt) { nvic_.icpr[index(interrupt) / 32] = bit(interrupt); }
 
  private:
-  static constexpr unsigned index(Interrupt interrupt) { return static_cast<unsigned>(interrupt); }
-  static constexpr std::uint32_t bit(Interrupt interrupt) { return 1U << (index(interrupt) % 32); }
+  static constexpr unsigned index(InterruptName auto interrupt) { return static_cast<unsigned>(interrupt); }
+  static constexpr std::uint32_t bit(InterruptName auto interrupt) { return 1U << (index(interrupt) % 32); }
 
   static void write_byte(Register auto& word, unsigned byte, std::uint8_t priority) {
     const unsigned shift = 8 * byte;
@@ -66,4 +71,4 @@ class InterruptController {
   Scb& scb_;
 };
 
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

@@ -2,14 +2,13 @@
 
 #include <cstdint>
 
-#include "drivers/stm32f4/registers/core_debug.hpp"
-#include "drivers/stm32f4/registers/dwt.hpp"
+#include "drivers/cortex_m/registers.hpp"
 
 // Core cycles, counted by the debug unit: what a piece of code costs, sleep included. ARMv7-M architecture
 // reference manual, C1.8 (DWT). 32 bits wrap after 25 s at 168 MHz; differences stay right if what is
 // measured is shorter. `now` is one load.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 
 template <typename Dwt = DwtRegisters, typename CoreDebug = CoreDebugRegisters>
 class CycleCounter {
@@ -33,4 +32,4 @@ class CycleCounter {
   CoreDebug& core_debug_;
 };
 
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m

@@ -5,7 +5,7 @@
 // The core instructions that C++ has no word for. On any other architecture (unit tests) they only keep the
 // compiler from moving memory accesses across them.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::cortex_m {
 
 /// Completes all earlier memory accesses before the next instruction (PM0214, DSB).
 inline void data_synchronization_barrier() {
@@ -34,4 +34,4 @@ inline void wait_for_interrupt() {
 #endif
 }
 
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::cortex_m
