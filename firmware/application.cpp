@@ -104,7 +104,8 @@ void Application::make_scales() {
 }
 
 void Application::offer_settings_if_changed() {
-  const std::array<Circumstances, axis_count> now{circumstances_of(0), circumstances_of(1)};
+  std::array<Circumstances, axis_count> now;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) now[axis] = circumstances_of(axis);
   if (registers_.changes() == offered_changes_ && now == offered_) return;
   offered_ = now;
   if (registers_.changes() != offered_changes_) {
@@ -346,7 +347,7 @@ DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t 
   if (const Refusal refusal = check_value(descriptors[entry], raw); refusal != Refusal::none)
     return {refusal, register_address(entry, axis)};
   std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
-  const auto needed = words_of(descriptors[entry].type);
+  const auto needed = register_count(descriptors[entry].type);
   const auto result =
       registers_.write(register_address(entry, axis), std::span(words).last(needed), armed_axes(), now_us_);
   offer_settings_if_changed();

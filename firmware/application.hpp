@@ -16,11 +16,11 @@
 #include "firmware/commutation.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/device_registers.hpp"
-#include "firmware/handover.hpp"
+#include "firmware/double_buffer.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameter_keeper.hpp"
-#include "firmware/snapshot.hpp"
+#include "firmware/seqlock.hpp"
 #include "firmware/stability_guard.hpp"
 #include "firmware/thermal_supervisor.hpp"
 #include "firmware/trace.hpp"
@@ -58,8 +58,12 @@ struct SerialSettings {
 
 /// What a board measures slowly and counts, for a host to read and for the main loop's trips.
 struct BoardReadings {
-  std::array<float, axis_count> power_stage_temperature{25.0f, 25.0f};  ///< degC
-  float supply_voltage = 0.0f;                                          ///< V; 0: not measured
+  std::array<float, axis_count> power_stage_temperature = [] {
+    std::array<float, axis_count> at_room_temperature{};
+    at_room_temperature.fill(25.0f);
+    return at_room_temperature;
+  }();                          ///< degC
+  float supply_voltage = 0.0f;  ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
   bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
   bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
@@ -69,12 +73,13 @@ struct BoardReadings {
 /// interrupt that follows the axis' current sample, ISR_serial_byte() from its serial receive interrupt, and
 /// everything else from its main loop.
 ///
-/// The two axes' ticks never interrupt each other, and axis 0's comes first: it takes over new settings for
-/// both and counts the ticks. Half a tick apart or one right after the other makes no difference.
+/// The axes' ticks never interrupt each other, and axis 0's comes first: it takes over new settings for
+/// all and counts the ticks. Half a tick apart or one right after the other makes no difference.
 ///
 /// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
-/// What crosses: settings, enables and torques main -> tick (Handover, atomics), reports and the trace tick
-/// -> main (Snapshot, Trace), a capture's plan and its samples (Capture), serial bytes and CAN frames -> main
+/// What crosses: settings, enables and torques main -> tick (DoubleBuffer, atomics), reports and the trace
+/// tick
+/// -> main (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN frames -> main
 /// (InterruptQueue). Nothing else is shared.
 ///
 /// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines. Whoever wrote
@@ -98,12 +103,15 @@ class Application {
 
   /// The result is valid until the axis' next tick.
   const AxisOutput& ISR_tick(std::size_t axis, const AxisInput& input);
-  /// Both axes, for a board that samples them at the same time.
+  /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
-    return {{{ISR_tick(0, input.axis[0]), ISR_tick(1, input.axis[1])}}};
+    TickOutput output;
+    for (std::size_t axis = 0; axis < axis_count; ++axis)
+      output.axis[axis] = ISR_tick(axis, input.axis[axis]);
+    return output;
   }
-  /// Between two ticks: the last one began a round, in which both axes report. Behind axis 1's tick the main
-  /// loop should be woken: what it reads then is of this tick.
+  /// Between two ticks: the last one began a round, in which both axes report. Behind the last axis' tick the
+  /// main loop should be woken: what it reads then is of this tick.
   bool ISR_round_begins() const { return ISR_tick_ % round_ticks == 1; }
   void ISR_serial_byte(std::uint8_t byte, bool line_error, std::uint32_t time_us);
 
@@ -281,8 +289,8 @@ class Application {
   std::uint32_t round_ = 0, round_us_ = 0, round_clock_us_ = 0;
   bool started_ = false;
 
-  Handover<Settings> handover_;
-  std::array<Snapshot<AxisReport>, axis_count> snapshots_;
+  DoubleBuffer<Settings> handover_;
+  std::array<Seqlock<AxisReport>, axis_count> snapshots_;
   InterruptQueue<SerialByte, 512> serial_queue_;
   InterruptQueue<drivers::CanFrame, 64> can_queue_;
   ApplicationObjects objects_;

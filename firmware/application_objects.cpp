@@ -282,9 +282,9 @@ Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
   }
   const std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16),
                                            static_cast<std::uint16_t>(raw)};
-  const auto result =
-      app_.write_registers(register_address(entry, axis), std::span(words).last(words_of(descriptor.type)),
-                           Application::Commander::can);
+  const auto result = app_.write_registers(register_address(entry, axis),
+                                           std::span(words).last(register_count(descriptor.type)),
+                                           Application::Commander::can);
   return abort_for(result.refusal, descriptor, raw);
 }
 

@@ -16,7 +16,7 @@ const AxisOutput& Application::ISR_tick(std::size_t axis, const AxisInput& input
   Axis& ticked = axes_[axis];
   const float external = takes_command_[axis].load(std::memory_order_relaxed)
                              ? commanded_force_[axis].load(std::memory_order_relaxed)
-                             : tangential_[1 - axis];
+                             : tangential_[(axis + 1) % axis_count];
   const AxisOutput& output = ticked.ISR_tick(settings[axis], input, enable, external, ISR_tick_);
   tangential_[axis] = output.tangential_force;
   if (ticked.ISR_changed() || ISR_round_begins())

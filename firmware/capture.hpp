@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "firmware/capture_channel.hpp"
-#include "firmware/handover.hpp"
+#include "firmware/double_buffer.hpp"
 
 namespace kmax::firmware {
 
@@ -78,8 +78,8 @@ struct CaptureReadings {
 /// (trigger_sample), more after; the capture always ends with all `samples`, unless it is stopped.
 ///
 /// Contexts: arm(), stop() and reading in the main loop, ISR_... in the tick that may preempt it. The plan
-/// crosses through a Handover, and takes effect in the axis' next tick: arming anew is safe at any time. Of
-/// what the tick writes, each value has this one writer, and the words are read only while the state is
+/// crosses through a DoubleBuffer, and takes effect in the axis' next tick: arming anew is safe at any time.
+/// Of what the tick writes, each value has this one writer, and the words are read only while the state is
 /// complete and no plan is on its way: the tick then writes none. Until then every word reads as 0 and
 /// readable() is false.
 ///
@@ -179,7 +179,7 @@ class Capture {
   std::uint32_t number_ = 0;
   bool arming_ = false;  ///< what the plan on its way asks for
   std::atomic<std::uint8_t> watched_axis_{no_axis};
-  Handover<Plan> plan_;
+  DoubleBuffer<Plan> plan_;
 
   // Written by the tick. Those without a lock of their own are read after state_, which is stored after them.
   std::atomic<CaptureState> state_{CaptureState::idle};

@@ -28,7 +28,7 @@ static_assert(
     [] {
       for (const std::size_t entry : setpoint_entries) {
         const SlotDescriptor& d = descriptors[entry];
-        if (words_of(d.type) != 1 || d.disarmed_only || !d.writable || !d.per_axis) return false;
+        if (register_count(d.type) != 1 || d.disarmed_only || !d.writable || !d.per_axis) return false;
       }
       return true;
     }(),

@@ -125,7 +125,9 @@ class DeviceRegisters {
 
   WriteResult last_refusal() const { return last_; }
 
-  bool controlword_waits() const { return commanded_[0] || commanded_[1]; }
+  bool controlword_waits() const {
+    return std::find(commanded_.begin(), commanded_.end(), true) != commanded_.end();
+  }
   /// Controlwords written since they were last fetched, per axis.
   bool fetch_controlword(std::size_t axis, std::uint16_t& word) {
     if (!commanded_[axis]) return false;
@@ -147,7 +149,7 @@ class DeviceRegisters {
       if (after == entries.begin()) continue;
       const std::size_t entry = *(after - 1);
       const SlotDescriptor& d = descriptors[entry];
-      const std::uint16_t words = words_of(d.type);
+      const std::uint16_t words = register_count(d.type);
       if (address - offset < std::uint32_t{d.address} + words && (axis == 0 || d.per_axis))
         return {{static_cast<std::uint16_t>(d.address + offset), words, slot_of(entry, axis)}};
     }

@@ -21,7 +21,9 @@
 /// without believing its length. Space begins after the last word of a sector that is not erased.
 namespace kmax::firmware::record {
 
-inline constexpr std::uint32_t magic = 0x4B4D'5031;
+/// "KMP2". Records of "KMP1" name the device's parameters by indices that are a third axis' now; they are not
+/// read.
+inline constexpr std::uint32_t magic = 0x4B4D'5032;
 /// All bits cleared: programming cannot change it any more, and any bit that rises makes it invalid.
 inline constexpr std::uint32_t commit = 0;
 inline constexpr std::uint32_t erased = 0xFFFF'FFFF;

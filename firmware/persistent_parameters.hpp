@@ -8,7 +8,7 @@
 namespace kmax::firmware {
 
 /// Which parameter a stored value belongs to, whatever else the dictionary gains or loses: object index
-/// (axis 1's is 0x800 higher), sub-index and type in one word. A parameter whose type has changed is
+/// (axis n's is n x 0x800 higher), sub-index and type in one word. A parameter whose type has changed is
 /// another one: its old pattern would mean another number.
 struct ParameterIdentity {
   std::uint16_t index = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -68,11 +69,14 @@ constexpr void publish_profile(ParameterValues& values, std::size_t axis, const 
   values.set_whole<"telemetry.current">(integer16_of(current), axis);
 }
 
-/// The device's own: `flags` are both axes' measured.flags, whose low 8 bits are told; `tick` is that of the
-/// values.
+/// The device's own: `flags` are the axes' measured.flags; the low 8 bits of the first two are reported.
+/// `tick` is that of the values.
 constexpr void publish_telemetry(ParameterValues& values, const std::array<std::uint32_t, axis_count>& flags,
                                  std::uint32_t tick) {
-  values.set_whole<"telemetry.flags">((flags[0] & 0xFFu) | (flags[1] & 0xFFu) << 8);
+  std::uint32_t first_axes = 0;
+  for (std::size_t axis = 0; axis < std::min<std::size_t>(axis_count, 2); ++axis)
+    first_axes |= (flags[axis] & 0xFFu) << (8 * axis);
+  values.set_whole<"telemetry.flags">(first_axes);
   values.set_whole<"telemetry.tick">(tick & 0xFFFFu);
 }
 

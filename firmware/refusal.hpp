@@ -92,7 +92,7 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
      "refuse); 'kmax check' explains it"},
 });
 
-constexpr std::string_view words_of(Refusal refusal) {
+constexpr std::string_view to_string(Refusal refusal) {
   for (const RefusalText& text : refusal_texts) {
     if (text.refusal == refusal) return text.words;
   }

@@ -18,7 +18,7 @@
 #include "drivers/stm32f4/quadrature_timer.hpp"
 #include "drivers/supply_divider.hpp"
 #include "firmware/application.hpp"
-#include "firmware/handover.hpp"
+#include "firmware/double_buffer.hpp"
 #include "firmware/watchdog_gate.hpp"
 
 namespace kmax::board::odrive_v3 {
@@ -146,7 +146,7 @@ class Drives {
   control::BrakeChopper brake_;
   firmware::WatchdogGate watchdog_gate_;
   Settings settings_{};
-  firmware::Handover<Settings> handover_{Settings{}};
+  firmware::DoubleBuffer<Settings> handover_{Settings{}};
   std::atomic<bool> calibrating_{false};
   std::atomic<bool> main_loop_due_{false};
   std::atomic<bool> brake_inhibited_{false};

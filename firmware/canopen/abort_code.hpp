@@ -76,7 +76,7 @@ inline constexpr std::array abort_texts = std::to_array<AbortText>({
     {Abort::device_state, "the data cannot be transferred or stored in the present state of the device"},
 });
 
-constexpr std::string_view words_of(Abort code) {
+constexpr std::string_view to_string(Abort code) {
   for (const AbortText& text : abort_texts) {
     if (text.code == code) return text.words;
   }

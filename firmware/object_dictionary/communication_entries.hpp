@@ -10,24 +10,24 @@ namespace kmax::firmware {
 /// CANopen's own settings (CiA 301): which messages there are, what is in them and when they go. All of them
 /// are kept by save.
 namespace group {
-inline constexpr Group communication{"canopen", 0x301D, Scope::device, 0x1000};
-inline constexpr Group heartbeat_consumer{"heartbeat_consumer", 0x1016, Scope::device, 0x1020};
-inline constexpr Group rpdo1{"rpdo1", 0x1400, Scope::device, 0x1100};
-inline constexpr Group rpdo1_mapping{"rpdo1", 0x1600, Scope::device, 0x1110};
-inline constexpr Group rpdo2{"rpdo2", 0x1401, Scope::device, 0x1140};
-inline constexpr Group rpdo2_mapping{"rpdo2", 0x1601, Scope::device, 0x1150};
-inline constexpr Group rpdo3{"rpdo3", 0x1402, Scope::device, 0x1180};
-inline constexpr Group rpdo3_mapping{"rpdo3", 0x1602, Scope::device, 0x1190};
-inline constexpr Group rpdo4{"rpdo4", 0x1403, Scope::device, 0x11C0};
-inline constexpr Group rpdo4_mapping{"rpdo4", 0x1603, Scope::device, 0x11D0};
-inline constexpr Group tpdo1{"tpdo1", 0x1800, Scope::device, 0x1300};
-inline constexpr Group tpdo1_mapping{"tpdo1", 0x1A00, Scope::device, 0x1310};
-inline constexpr Group tpdo2{"tpdo2", 0x1801, Scope::device, 0x1340};
-inline constexpr Group tpdo2_mapping{"tpdo2", 0x1A01, Scope::device, 0x1350};
-inline constexpr Group tpdo3{"tpdo3", 0x1802, Scope::device, 0x1380};
-inline constexpr Group tpdo3_mapping{"tpdo3", 0x1A02, Scope::device, 0x1390};
-inline constexpr Group tpdo4{"tpdo4", 0x1803, Scope::device, 0x13C0};
-inline constexpr Group tpdo4_mapping{"tpdo4", 0x1A03, Scope::device, 0x13D0};
+inline constexpr Group communication{"canopen", 0x581D, Scope::device, 0x2800};
+inline constexpr Group heartbeat_consumer{"heartbeat_consumer", 0x1016, Scope::device, 0x2820};
+inline constexpr Group rpdo1{"rpdo1", 0x1400, Scope::device, 0x2900};
+inline constexpr Group rpdo1_mapping{"rpdo1", 0x1600, Scope::device, 0x2910};
+inline constexpr Group rpdo2{"rpdo2", 0x1401, Scope::device, 0x2940};
+inline constexpr Group rpdo2_mapping{"rpdo2", 0x1601, Scope::device, 0x2950};
+inline constexpr Group rpdo3{"rpdo3", 0x1402, Scope::device, 0x2980};
+inline constexpr Group rpdo3_mapping{"rpdo3", 0x1602, Scope::device, 0x2990};
+inline constexpr Group rpdo4{"rpdo4", 0x1403, Scope::device, 0x29C0};
+inline constexpr Group rpdo4_mapping{"rpdo4", 0x1603, Scope::device, 0x29D0};
+inline constexpr Group tpdo1{"tpdo1", 0x1800, Scope::device, 0x2B00};
+inline constexpr Group tpdo1_mapping{"tpdo1", 0x1A00, Scope::device, 0x2B10};
+inline constexpr Group tpdo2{"tpdo2", 0x1801, Scope::device, 0x2B40};
+inline constexpr Group tpdo2_mapping{"tpdo2", 0x1A01, Scope::device, 0x2B50};
+inline constexpr Group tpdo3{"tpdo3", 0x1802, Scope::device, 0x2B80};
+inline constexpr Group tpdo3_mapping{"tpdo3", 0x1A02, Scope::device, 0x2B90};
+inline constexpr Group tpdo4{"tpdo4", 0x1803, Scope::device, 0x2BC0};
+inline constexpr Group tpdo4_mapping{"tpdo4", 0x1A03, Scope::device, 0x2BD0};
 }  // namespace group
 
 constexpr Entry communication(std::string_view name, Group group, std::uint8_t subindex, Type type,
@@ -215,8 +215,8 @@ inline constexpr std::array communication_entries = std::to_array<Entry>({
                   "Objects in the PDO."),
     mapped("tpdo4.mapped_1", group::tpdo4_mapping, 1, mapping_of(0x2019, 1, 16)),
     mapped("tpdo4.mapped_2", group::tpdo4_mapping, 2, mapping_of(0x2819, 1, 16)),
-    mapped("tpdo4.mapped_3", group::tpdo4_mapping, 3, mapping_of(0x301C, 1, 16)),
-    mapped("tpdo4.mapped_4", group::tpdo4_mapping, 4, mapping_of(0x301C, 2, 16)),
+    mapped("tpdo4.mapped_3", group::tpdo4_mapping, 3, mapping_of(0x581C, 1, 16)),
+    mapped("tpdo4.mapped_4", group::tpdo4_mapping, 4, mapping_of(0x581C, 2, 16)),
     mapped("tpdo4.mapped_5", group::tpdo4_mapping, 5, 0),
     mapped("tpdo4.mapped_6", group::tpdo4_mapping, 6, 0),
     mapped("tpdo4.mapped_7", group::tpdo4_mapping, 7, 0),

@@ -7,28 +7,28 @@
 
 namespace kmax::firmware {
 
-/// Records that exist once per device.
+/// Records that exist once per device, behind the places of the last axis that there can be.
 namespace group {
-inline constexpr Group supply{"supply", 0x3000, Scope::device, 0x0800};
-inline constexpr Group link{"link", 0x3001, Scope::device, 0x0810};
-inline constexpr Group node{"node", 0x3002, Scope::device, 0x0820};
-inline constexpr Group can{"can", 0x3003, Scope::device, 0x0828};
-inline constexpr Group modbus{"modbus", 0x3004, Scope::device, 0x0830};
-inline constexpr Group trace{"trace", 0x3005, Scope::device, 0x0840};
-inline constexpr Group transaction{"transaction", 0x3010, Scope::device, 0x0900};
-inline constexpr Group info{"info", 0x3011, Scope::device, 0x0800};
-inline constexpr Group counters{"counters", 0x3012, Scope::device, 0x0840};
-inline constexpr Group refusal{"refusal", 0x3013, Scope::device, 0x0880};
-inline constexpr Group trace_state{"trace", 0x3014, Scope::device, 0x08A0};
-inline constexpr Group supply_state{"supply", 0x3015, Scope::device, 0x08B0};
-inline constexpr Group store{"store", 0x3016, Scope::device, 0x0910};
-inline constexpr Group store_status{"store", 0x3017, Scope::device, 0x08C0};
-inline constexpr Group capture{"capture", 0x3018, Scope::device, 0x0920};
+inline constexpr Group supply{"supply", 0x5800, Scope::device, 0x2000};
+inline constexpr Group link{"link", 0x5801, Scope::device, 0x2010};
+inline constexpr Group node{"node", 0x5802, Scope::device, 0x2020};
+inline constexpr Group can{"can", 0x5803, Scope::device, 0x2028};
+inline constexpr Group modbus{"modbus", 0x5804, Scope::device, 0x2030};
+inline constexpr Group trace{"trace", 0x5805, Scope::device, 0x2040};
+inline constexpr Group transaction{"transaction", 0x5810, Scope::device, 0x2100};
+inline constexpr Group info{"info", 0x5811, Scope::device, 0x2000};
+inline constexpr Group counters{"counters", 0x5812, Scope::device, 0x2040};
+inline constexpr Group refusal{"refusal", 0x5813, Scope::device, 0x2080};
+inline constexpr Group trace_state{"trace", 0x5814, Scope::device, 0x20A0};
+inline constexpr Group supply_state{"supply", 0x5815, Scope::device, 0x20B0};
+inline constexpr Group store{"store", 0x5816, Scope::device, 0x2110};
+inline constexpr Group store_status{"store", 0x5817, Scope::device, 0x20C0};
+inline constexpr Group capture{"capture", 0x5818, Scope::device, 0x2120};
 /// Apart from the settings, so that no write covers both.
-inline constexpr Group capture_command{"capture", 0x301A, Scope::device, 0x0940};
-inline constexpr Group capture_status{"capture", 0x3019, Scope::device, 0x08F0};
-inline constexpr Group can_status{"can", 0x301B, Scope::device, 0x0960};
-inline constexpr Group telemetry_state{"telemetry", 0x301C, Scope::device, 0x09C0};
+inline constexpr Group capture_command{"capture", 0x581A, Scope::device, 0x2140};
+inline constexpr Group capture_status{"capture", 0x5819, Scope::device, 0x20F0};
+inline constexpr Group can_status{"can", 0x581B, Scope::device, 0x2160};
+inline constexpr Group telemetry_state{"telemetry", 0x581C, Scope::device, 0x21C0};
 }  // namespace group
 
 namespace names {
@@ -86,7 +86,7 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     rate_choice("modbus.baud_rate", group::modbus, 2, "baud", names::baud_rate, 115200,
                 "Serial baud rate, 8 data bits, even parity, 1 stop bit; takes effect after the reply."),
 
-    whole("trace.axis", group::trace, 1, Type::unsigned8, "", 0, 1, 0, "Axis that is traced.")
+    whole("trace.axis", group::trace, 1, Type::unsigned8, "", 0, axis_count - 1, 0, "Axis that is traced.")
         .volatile_value(),
     whole("trace.interval", group::trace, 2, Type::unsigned16, "samples", 0, 65535, 0,
           "Haptic samples per trace record; 0 stops the trace.")
@@ -193,7 +193,8 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     reading("store.defaulted_2", group::store_status, 15, Type::unsigned32, "", "Second such parameter."),
     reading("store.defaulted_3", group::store_status, 16, Type::unsigned32, "", "Third such parameter."),
 
-    whole("capture.axis", group::capture, 1, Type::unsigned8, "", 0, 1, 0, "Axis that is captured.")
+    whole("capture.axis", group::capture, 1, Type::unsigned8, "", 0, axis_count - 1, 0,
+          "Axis that is captured.")
         .volatile_value(),
     choice("capture.channel_1", group::capture, 2, names::capture_channel, 0,
            "What a capture records first; 'none' is left out. Positions are read as counts, angles as 2^-32 "

@@ -14,12 +14,7 @@
 
 namespace kmax::firmware {
 
-inline constexpr std::size_t axis_count = 2;
 inline constexpr std::uint32_t tick_rate_hz = 20000;
-
-/// Axis 1 is axis 0 plus this (CiA 402's convention for several axes, and its Modbus counterpart).
-inline constexpr std::uint16_t axis_index_offset = 0x800;
-inline constexpr std::uint16_t axis_modbus_offset = 0x400;
 
 /// All that exists once per axis: settings, then readings.
 inline constexpr auto axis_entries = []<std::size_t... i>(std::index_sequence<i...>) {
@@ -73,8 +68,9 @@ inline constexpr auto modbus_addresses = [] {
     std::size_t after = i;
     while (after > 0 && entry_at(after - 1).group.index != group) --after;
     addresses[i] =
-        after == 0 ? entry_at(i).group.modbus_base
-                   : static_cast<std::uint16_t>(addresses[after - 1] + words_of(entry_at(after - 1).type));
+        after == 0
+            ? entry_at(i).group.modbus_base
+            : static_cast<std::uint16_t>(addresses[after - 1] + register_count(entry_at(after - 1).type));
   }
   return addresses;
 }();
@@ -84,7 +80,7 @@ constexpr std::uint16_t modbus_address(std::size_t entry, std::size_t axis) {
                                     (entry_at(entry).scope() == Scope::axis ? axis * axis_modbus_offset : 0));
 }
 
-/// Values are kept in one array: axis 0's, axis 1's, the device's.
+/// Values are kept in one array: each axis', then the device's.
 inline constexpr std::size_t slot_count = (axis_count - 1) * axis_entries.size() + entry_count;
 
 constexpr std::size_t slot_of(std::size_t entry, std::size_t axis) {

@@ -1,17 +1,15 @@
 // Compile-time checks of the object dictionary, in a file of their own because they compare every entry
 // with every other: once per build is enough.
-#include <algorithm>
+#include "firmware/object_dictionary/dictionary_checks.hpp"
 
-#include "firmware/object_dictionary/dictionary.hpp"
+#include <algorithm>
 
 namespace kmax::firmware {
 namespace {
-constexpr bool names_and_places_are_unique() {
+constexpr bool names_are_unique() {
   for (std::size_t i = 0; i < entry_count; ++i) {
     for (std::size_t j = i + 1; j < entry_count; ++j) {
-      const Entry &a = entry_at(i), &b = entry_at(j);
-      if (a.name == b.name) return false;
-      if (a.index() == b.index() && a.object_subindex() == b.object_subindex()) return false;
+      if (entry_at(i).name == entry_at(j).name) return false;
     }
   }
   return true;
@@ -21,22 +19,6 @@ constexpr bool subindices_rise() {
   for (std::size_t i = 0; i < entry_count; ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (entry_at(j).group.index == entry_at(i).group.index && entry_at(j).subindex >= entry_at(i).subindex)
-        return false;
-    }
-  }
-  return true;
-}
-
-constexpr bool registers_do_not_overlap() {
-  for (std::size_t i = 0; i < slot_count; ++i) {
-    const auto a = owner_of(i);
-    for (std::size_t j = i + 1; j < slot_count; ++j) {
-      const auto b = owner_of(j);
-      const bool a_held = entry_at(a.entry).access == Access::read_write;
-      if (a_held != (entry_at(b.entry).access == Access::read_write)) continue;
-      const int first = modbus_address(a.entry, a.axis), second = modbus_address(b.entry, b.axis);
-      if (first < second + words_of(entry_at(b.entry).type) &&
-          second < first + words_of(entry_at(a.entry).type))
         return false;
     }
   }
@@ -66,11 +48,11 @@ constexpr bool defaults_are_allowed() {
   return true;
 }
 
-static_assert(names_and_places_are_unique());
+static_assert(names_are_unique());
 static_assert(subindices_rise());
 static_assert(groups_hold_one_access());
 static_assert(defaults_are_allowed());
-static_assert(registers_do_not_overlap());
+static_assert(dictionary_checks::places_hold<axis_count>);
 }  // namespace
 
 }  // namespace kmax::firmware

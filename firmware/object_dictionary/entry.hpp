@@ -1,11 +1,28 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
 
+// How many axes the firmware is built for, a fact of the build and 2 unless it says otherwise. All that is
+// linked together is compiled with the same number.
+#ifndef KMAX_AXIS_COUNT
+#define KMAX_AXIS_COUNT 2
+#endif
+
 namespace kmax::firmware {
+
+inline constexpr std::size_t axis_count = KMAX_AXIS_COUNT;
+
+/// Axis n is axis 0 plus n times this (CiA 402's convention for several axes, and its Modbus counterpart).
+inline constexpr std::uint16_t axis_index_offset = 0x800;
+inline constexpr std::uint16_t axis_modbus_offset = 0x400;
+/// Places are kept free for so many: objects 0x2000 to 0x57FF, registers 0x0000 to 0x1BFF. CiA 402 has room
+/// for 8.
+inline constexpr std::size_t most_axes = 7;
+static_assert(axis_count >= 1 && axis_count <= most_axes);
 
 /// How a value is stored and sent. Every value fits 32 bits; a Modbus register holds 16 of them.
 /// The numbers are in stored parameters: only ever appended to.
@@ -28,7 +45,7 @@ enum class Access : std::uint8_t { read_only, read_write, communication };
 /// the hand.
 enum class Change : std::uint8_t { any_time, disarmed_only };
 
-/// An axis entry exists once per axis (axis 1: index + 0x800), a device entry once.
+/// An axis entry exists once per axis (axis n: index + n x 0x800), a device entry once.
 enum class Scope : std::uint8_t { axis, device };
 
 struct NamedValue {
@@ -99,13 +116,13 @@ struct Entry {
   }
 };
 
-constexpr std::uint16_t words_of(Type type) {
+constexpr std::uint16_t register_count(Type type) {
   return type == Type::unsigned32 || type == Type::integer32 || type == Type::float32 ? 2 : 1;
 }
 
 /// Bytes of a value as a CANopen object.
 constexpr std::uint8_t bytes_of(Type type) {
-  if (words_of(type) == 2) return 4;
+  if (register_count(type) == 2) return 4;
   return type == Type::unsigned8 || type == Type::integer8 ? 1 : 2;
 }
 

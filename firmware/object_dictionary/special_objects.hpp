@@ -14,7 +14,7 @@ namespace kmax::firmware {
 /// than four bytes. With the entries and each record's sub-index 0 they are all that SDO reaches and the EDS
 /// lists.
 enum class SpecialObject : std::uint8_t {
-  device_type,          ///< 0x1000: CiA 402, several devices in one (CiA 301: 0xFFFF, see 0x67FF and 0x6FFF)
+  device_type,          ///< 0x1000: CiA 402, several devices in one (CiA 301: 0xFFFF, see 0x67FF)
   error_register,       ///< 0x1001
   error_history_count,  ///< 0x1003:0; writing 0 erases
   error_history,        ///< 0x1003:1 to 8, newest first; those beyond the count are not there
@@ -23,9 +23,9 @@ enum class SpecialObject : std::uint8_t {
   software_version,     ///< 0x100A
   store_parameters,     ///< 0x1010:1, writes 'save' to
   restore_defaults,     ///< 0x1011:1, writes 'load' to; takes effect at the next reset
-  trace_records,        ///< 0x3020:1 to 64, eight records of the trace window each, little-endian
-  capture_samples,      ///< 0x3021:1, all values of a complete capture, 32 bits each
-  scratch,              ///< 0x3022:1, keeps what is written, for trying transfers
+  trace_records,        ///< 0x5820:1 to 64, eight records of the trace window each, little-endian
+  capture_samples,      ///< 0x5821:1, all values of a complete capture, 32 bits each
+  scratch,              ///< 0x5822:1, keeps what is written, for trying transfers
 };
 
 enum class ObjectType : std::uint8_t { unsigned8, unsigned32, visible_string, domain };
@@ -55,7 +55,7 @@ inline constexpr std::size_t scratch_bytes = 2048;
 inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
     {SpecialObject::device_type, "Device type", 0x1000, 0, 0, ObjectType::unsigned32,
      ObjectAccessKind::constant, device_type_of_several_axes,
-     "CiA 402, one device per axis; their types are at 0x67FF and 0x6FFF."},
+     "CiA 402, one device per axis; axis n's type is at 0x67FF + n x 0x800."},
     {SpecialObject::error_register, "Error register", 0x1001, 0, 0, ObjectType::unsigned8,
      ObjectAccessKind::read_only, 0,
      "Bit 0 any error, 1 current, 2 voltage, 3 temperature, 4 communication, 5 device."},
@@ -75,11 +75,11 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
      ObjectAccessKind::read_write, 1,
      "Writing 'load' (0x64616F6C): all parameters are at their defaults after the "
      "next reset; reads 1."},
-    {SpecialObject::trace_records, "Trace records", 0x3020, 1, trace_objects, ObjectType::domain,
+    {SpecialObject::trace_records, "Trace records", 0x5820, 1, trace_objects, ObjectType::domain,
      ObjectAccessKind::read_only, 0, "Eight records each of tick, count, force, magnetic coefficient."},
-    {SpecialObject::capture_samples, "Capture samples", 0x3021, 1, 1, ObjectType::domain,
+    {SpecialObject::capture_samples, "Capture samples", 0x5821, 1, 1, ObjectType::domain,
      ObjectAccessKind::read_only, 0, "All values of a complete capture, 32 bits each."},
-    {SpecialObject::scratch, "Scratch pad", 0x3022, 1, 1, ObjectType::domain, ObjectAccessKind::read_write, 0,
+    {SpecialObject::scratch, "Scratch pad", 0x5822, 1, 1, ObjectType::domain, ObjectAccessKind::read_write, 0,
      "Keeps up to 2048 bytes in RAM, for trying a bus and its transfers."},
 });
 

@@ -213,7 +213,7 @@ BackEmfFit fit_back_emf(std::span<const BackEmfRecord> records, const BackEmfCon
   return best;
 }
 
-std::string_view words_of(BackEmfCause cause) {
+std::string_view to_string(BackEmfCause cause) {
   switch (cause) {
     case BackEmfCause::none:
       return "";

@@ -64,7 +64,7 @@ enum class BackEmfCause {
   reversed,         // k is negative: phases or encoder reversed; found: N m/A
   not_resolved,     // found: relative standard error
 };
-std::string_view words_of(BackEmfCause cause);
+std::string_view to_string(BackEmfCause cause);
 
 struct BackEmfFit {
   Estimate torque_constant{.unit = "N m/A"};

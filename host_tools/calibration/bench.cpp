@@ -115,7 +115,7 @@ std::optional<Trip> Bench::trip() {
   armed_ = false;
   if (!status.faulty())
     throw device::DeviceError(fmt::format("axis {}: somebody else has disarmed it: {}", settings_.axis,
-                                          device::words_of(status.state())));
+                                          device::to_string(status.state())));
   return cleared(status);
 }
 

@@ -312,7 +312,7 @@ CoggingFit fit_cogging(std::span<const CoggingSweep> sweeps, const CoggingFitCon
   return fit;
 }
 
-std::string_view words_of(CoggingCause cause) {
+std::string_view to_string(CoggingCause cause) {
   switch (cause) {
     case CoggingCause::none:
       return "";

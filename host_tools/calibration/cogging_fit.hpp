@@ -61,7 +61,7 @@ enum class CoggingCause {
   range_too_short,    // less than 2 periods swept; gravity constant and friction are valid; found: turns
   periods_ambiguous,  // another number of periods fits nearly as well; found: that number
 };
-std::string_view words_of(CoggingCause cause);
+std::string_view to_string(CoggingCause cause);
 
 struct CoggingFit {
   Estimate friction{.unit = "N"};

@@ -91,7 +91,7 @@ void CompensationStep::run(Bench& bench, MotorKnowledge& known, StepReport& repo
   const CoggingFit fit = fit_cogging(views, config);
   // A short travel shows no cogging; friction and the constant force are valid all the same.
   if (!fit.finding.is_none() && fit.finding.cause != CoggingCause::range_too_short)
-    throw StepFailed({"compensation_not_resolved", words_of(fit.finding), "allow more --travel"});
+    throw StepFailed({"compensation_not_resolved", to_string(fit.finding), "allow more --travel"});
   const auto add = [&](const char* name, const Estimate& estimate) {
     report.values.push_back({fmt::format("compensation.{}", name), estimate.known() ? estimate.value : 0.0,
                              estimate.known() ? estimate.standard_error : 0.0, std::string(estimate.unit),

@@ -38,7 +38,7 @@ CurrentOffset check_current_offset(std::span<const double> current, const Curren
   return result;
 }
 
-std::string_view words_of(CurrentOffsetCause cause) {
+std::string_view to_string(CurrentOffsetCause cause) {
   switch (cause) {
     case CurrentOffsetCause::none:
       return "";

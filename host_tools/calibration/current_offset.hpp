@@ -24,7 +24,7 @@ enum class CurrentOffsetCause {
   noise_large,      // found: A
   railed,           // constant and far from zero: amplifier or converter stuck; found: A
 };
-std::string_view words_of(CurrentOffsetCause cause);
+std::string_view to_string(CurrentOffsetCause cause);
 
 struct CurrentOffset {
   Estimate mean{.unit = "A"};

@@ -21,7 +21,7 @@ void CurrentOffsetStep::run(Bench& bench, MotorKnowledge& known, StepReport& rep
     if (!offset.finding.is_none())
       throw StepFailed(
           {fmt::format("current_{}_offset", phase),
-           fmt::format("current sensor {} with the bridge off: {}", phase, words_of(offset.finding)),
+           fmt::format("current sensor {} with the bridge off: {}", phase, to_string(offset.finding)),
            "check the shunt and its amplifier; nothing may turn the motor meanwhile"});
   }
   report.values.push_back({"supply.voltage", known.supply, 0.0, "V", std::nullopt});

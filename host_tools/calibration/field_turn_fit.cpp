@@ -206,7 +206,7 @@ FieldTurnFit fit_field_turn(const FieldTurn& forwards, const FieldTurn& backward
   return fit;
 }
 
-std::string_view words_of(FieldTurnCause cause) {
+std::string_view to_string(FieldTurnCause cause) {
   switch (cause) {
     case FieldTurnCause::none:
       return "";

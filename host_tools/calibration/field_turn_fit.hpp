@@ -58,7 +58,7 @@ enum class FieldTurnCause {
   direction_differs,  // the shaft turned the same way in both sweeps; found: ratio
   pole_pairs_differ,  // whole, but not what was claimed; found: pole pairs
 };
-std::string_view words_of(FieldTurnCause cause);
+std::string_view to_string(FieldTurnCause cause);
 
 struct FieldTurnFit {
   Estimate pole_pairs{.unit = ""};  // not rounded

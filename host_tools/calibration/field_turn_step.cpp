@@ -15,7 +15,7 @@ namespace kmax::calibration {
 // The fit's cause is the device's defect only after a thought: a motor that follows the field and an encoder
 // that does not give its share of it looks like another number of pole pairs.
 void FieldTurnStep::judge(const FieldTurnFit& fit) const {
-  const std::string words = words_of(fit.finding);
+  const std::string words = to_string(fit.finding);
   switch (fit.finding.cause) {
     case FieldTurnCause::none:
     case FieldTurnCause::pole_pairs_differ:

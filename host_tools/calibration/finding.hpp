@@ -1,6 +1,6 @@
 #pragma once
 // Why a fit gave no result, with the numbers that decided it. Every fit has an enum of causes whose first
-// enumerator is `none`, and a function words_of(cause) that says what was wrong and what to look at.
+// enumerator is `none`, and a function to_string(cause) that says what was wrong and what to look at.
 
 #include <fmt/format.h>
 
@@ -21,9 +21,9 @@ struct Finding {
 
 // The cause in words, then "(found ..., bound ...)". "" for none.
 template <typename Cause>
-std::string words_of(const Finding<Cause>& finding) {
+std::string to_string(const Finding<Cause>& finding) {
   if (finding.is_none()) return "";
-  return fmt::format("{} (found {:.4g} {}, bound {:.4g} {})", words_of(finding.cause), finding.found,
+  return fmt::format("{} (found {:.4g} {}, bound {:.4g} {})", to_string(finding.cause), finding.found,
                      finding.unit, finding.allowed, finding.unit);
 }
 

@@ -238,7 +238,7 @@ MotionFit fit_motion(std::span<const MotionRecord> records, const MotionFitConfi
   return fit;
 }
 
-std::string_view words_of(MotionCause cause) {
+std::string_view to_string(MotionCause cause) {
   switch (cause) {
     case MotionCause::none:
       return "";

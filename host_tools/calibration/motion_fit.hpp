@@ -55,7 +55,7 @@ enum class MotionCause {
   negative_friction,  // held or pushed meanwhile; found: N
   not_resolved,       // found: relative standard error of the mass
 };
-std::string_view words_of(MotionCause cause);
+std::string_view to_string(MotionCause cause);
 
 struct MotionFit {
   Estimate mass{.unit = "kg"};

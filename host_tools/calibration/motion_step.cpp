@@ -30,7 +30,7 @@ Motion motion_of(const Recording& seen, const MotorKnowledge& known) {
 }
 
 [[noreturn]] void fail(const MotionFit& fit) {
-  const std::string words = words_of(fit.finding);
+  const std::string words = to_string(fit.finding);
   switch (fit.finding.cause) {
     case MotionCause::no_motion:
       throw StepFailed({"motor_blocked", words, "free the handle, or raise --current"});

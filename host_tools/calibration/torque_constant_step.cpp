@@ -35,7 +35,7 @@ BackEmfConfig config_of(const MotorKnowledge& known) {
 }
 
 [[noreturn]] void fail(const BackEmfFit& fit) {
-  const std::string words = words_of(fit.finding);
+  const std::string words = to_string(fit.finding);
   switch (fit.finding.cause) {
     case BackEmfCause::no_motion:
       throw StepFailed({"motor_blocked", words, "free the handle, or raise --current"});

@@ -34,7 +34,7 @@ void require_no_trip(const Recording& recording) {
 }
 
 Diagnosis diagnosis_of(Refusal refusal, double supply, double supply_min, double supply_max) {
-  std::string words = fmt::format("the axis was not armed: {}", firmware::words_of(refusal));
+  std::string words = fmt::format("the axis was not armed: {}", firmware::to_string(refusal));
   switch (refusal) {
     case Refusal::supply_out_of_range:
       words =

@@ -336,7 +336,7 @@ WindingFit fit_winding(std::span<const WindingRecord> records, const WindingFitC
   return fit;
 }
 
-std::string_view words_of(WindingCause cause) {
+std::string_view to_string(WindingCause cause) {
   switch (cause) {
     case WindingCause::none:
       return "";

@@ -83,7 +83,7 @@ enum class WindingCause {
   not_resolved,      // R or L is not determined by this record; found: relative standard error
   bad_fit,           // the residual is far above the noise: not a winding; found: A rms
 };
-std::string_view words_of(WindingCause cause);
+std::string_view to_string(WindingCause cause);
 
 struct WindingFit {
   Estimate resistance{.unit = "ohm"};

@@ -47,7 +47,7 @@ Recording record(Bench& bench, const ExcitationPlan& excitation, const RecordPla
 WindingFit resolved(WindingFit fit) {
   if (!fit.finding.is_none())
     throw StepFailed(
-        {"winding_not_resolved", words_of(fit.finding), "raise --current; nobody may hold the handle"});
+        {"winding_not_resolved", to_string(fit.finding), "raise --current; nobody may hold the handle"});
   return fit;
 }
 
@@ -150,7 +150,7 @@ WindingFit WindingStep::rough_fit(Bench& bench, const MotorKnowledge& known) {
   config.motion = WindingMotion::free;
   WindingFit fit = fit_winding({&record, 1}, config);
   if (!fit.resistance.known() || !fit.inductance.known() || !(fit.resistance.value > 0.0))
-    throw StepFailed({"winding_not_resolved", words_of(fit.finding), "raise --current"});
+    throw StepFailed({"winding_not_resolved", to_string(fit.finding), "raise --current"});
   return fit;
 }
 

@@ -148,7 +148,7 @@ std::string region_text(const control::StabilityCase<double>& c) {
   using control::DiolaitiRegion;
   if (!(c.stiffness > 0)) return "";
   const double speed = escape_speed_of(c);
-  const std::string_view name = words_of(region_of(c));
+  const std::string_view name = to_string(region_of(c));
   return fmt::format(
       "  region of Diolaiti: {}{}\n", name,
       speed > 0 && !is_infinite(speed) ? fmt::format(", at rest again from below {:.3g} m/s", speed) : "");

@@ -54,7 +54,7 @@ double escape_speed_of(const control::StabilityCase<double>& c) {
                                control::period_with_delay(c.period, c.delay), c.quantum);
 }
 
-std::string_view words_of(control::DiolaitiRegion region) {
+std::string_view to_string(control::DiolaitiRegion region) {
   switch (region) {
     case control::DiolaitiRegion::passive:
       return "passive";

@@ -58,7 +58,7 @@ bool has_no_wall(const control::StabilityCase<double>& c);
 
 /// Where the wall stands among Diolaiti's regions, and that in words.
 control::DiolaitiRegion region_of(const control::StabilityCase<double>& c);
-std::string_view words_of(control::DiolaitiRegion region);
+std::string_view to_string(control::DiolaitiRegion region);
 /// The speed below which it comes to rest again, m/s; see control/diolaiti_criterion.hpp.
 double escape_speed_of(const control::StabilityCase<double>& c);
 

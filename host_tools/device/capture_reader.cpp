@@ -151,7 +151,7 @@ void CaptureReader::arm(const CaptureSettings& settings) {
     const firmware::Refusal reason = device_.last_refusal().reason;
     throw DeviceError(fmt::format(
         "{}: the capture could not be armed: {}", device_.description(),
-        reason == firmware::Refusal::none ? std::string_view(error.what()) : firmware::words_of(reason)));
+        reason == firmware::Refusal::none ? std::string_view(error.what()) : firmware::to_string(reason)));
   }
 }
 

@@ -55,7 +55,7 @@ std::string_view name_of(DriveState state) {
   return "unknown";
 }
 
-std::string_view words_of(DriveState state) {
+std::string_view to_string(DriveState state) {
   switch (state) {
     case DriveState::not_ready_to_switch_on:
       return "Not ready to switch on";
@@ -116,7 +116,7 @@ void Drive::command(std::uint16_t controlword, bool idempotent) {
     device_.write(Parameter::of<"drive.controlword">(axis_), controlword, idempotent);
   } catch (const link::RefusedError&) {
     throw DeviceError(fmt::format("axis {}: the device refused controlword {}: {}", axis_, controlword,
-                                  firmware::words_of(device_.last_refusal().reason)));
+                                  firmware::to_string(device_.last_refusal().reason)));
   }
 }
 
@@ -139,7 +139,7 @@ void Drive::advance(std::uint16_t controlword, DriveState wanted) {
   if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
   if (seen.state() != wanted)
     throw DeviceError(fmt::format("axis {}: stays in '{}' instead of going to '{}'; look at 'kmax state'",
-                                  axis_, words_of(seen.state()), words_of(wanted)));
+                                  axis_, to_string(seen.state()), to_string(wanted)));
 }
 
 void Drive::enable() {
@@ -160,10 +160,10 @@ void Drive::enable() {
       throw DeviceError(fmt::format("axis {} was not armed: refused: stability check: {}", axis_, words));
   }
   if (seen.refusal != Refusal::none)
-    throw DeviceError(fmt::format("axis {} was not armed: {}", axis_, firmware::words_of(seen.refusal)));
+    throw DeviceError(fmt::format("axis {} was not armed: {}", axis_, firmware::to_string(seen.refusal)));
   throw DeviceError(
       fmt::format("axis {} was not armed: it stays in '{}' and gives no reason; look at 'kmax state'", axis_,
-                  words_of(seen.state())));
+                  to_string(seen.state())));
 }
 
 void Drive::arm() {
@@ -194,8 +194,8 @@ void Drive::disarm() {
     return s.state() == DriveState::switch_on_disabled || s.state() == DriveState::fault;
   });
   if (seen.state() == DriveState::switch_on_disabled || seen.state() == DriveState::fault) return;
-  throw DeviceError(
-      fmt::format("axis {} is not disarmed: it stays in '{}'; cut its power", axis_, words_of(seen.state())));
+  throw DeviceError(fmt::format("axis {} is not disarmed: it stays in '{}'; cut its power", axis_,
+                                to_string(seen.state())));
 }
 
 void Drive::stop() {
@@ -207,7 +207,7 @@ void Drive::stop() {
   const auto seen = wait_until(stopped);
   if (!stopped(seen))
     throw DeviceError(fmt::format("axis {} is not stopped: it stays in '{}'; cut its power", axis_,
-                                  words_of(seen.state())));
+                                  to_string(seen.state())));
 }
 
 bool Drive::clear() {

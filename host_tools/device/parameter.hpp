@@ -33,7 +33,7 @@ class Parameter {
   constexpr bool writable() const { return definition().access == firmware::Access::read_write; }
   constexpr Table table() const { return writable() ? Table::holding : Table::input; }
   constexpr std::uint16_t address() const { return firmware::modbus_address(entry_, axis_); }
-  constexpr std::uint16_t words() const { return firmware::words_of(definition().type); }
+  constexpr std::uint16_t words() const { return firmware::register_count(definition().type); }
   constexpr std::uint32_t default_raw() const {
     return firmware::raw_from_number(definition().type, definition().default_value);
   }

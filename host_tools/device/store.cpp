@@ -84,7 +84,7 @@ void Store::command(StoreCommand wanted, const char* what) {
     device_.write(Parameter::of<"store.command">(), static_cast<std::uint32_t>(wanted), false);
   } catch (const link::RefusedError&) {
     throw DeviceError(
-        fmt::format("{}: the device refused: {}", what, firmware::words_of(device_.last_refusal().reason)));
+        fmt::format("{}: the device refused: {}", what, firmware::to_string(device_.last_refusal().reason)));
   }
 }
 

@@ -259,8 +259,8 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
     about += ": ";
     if (report.reason == Refusal::guard_refused) numbers = guard_numbers(*this, assignments, owner->axis());
   }
-  const std::string message =
-      fmt::format("{}the device refused: {}{}; {}", about, words_of(report.reason), numbers, nothing_changed);
+  const std::string message = fmt::format("{}the device refused: {}{}; {}", about, to_string(report.reason),
+                                          numbers, nothing_changed);
   if (is_about_values(report.reason)) throw ValueError(message);
   throw DeviceError(message);
 }

@@ -54,7 +54,7 @@ class ArmedWhile {
   [[noreturn]] static void fail_without_force(const device::DriveStatus& status) {
     throw device::DeviceError(
         fmt::format("the axis lost its force during the trial: {}",
-                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+                    status.faulty() ? status.fault_words() : std::string(device::to_string(status.state()))));
   }
 
   device::Drive drive_;

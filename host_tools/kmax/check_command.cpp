@@ -60,7 +60,7 @@ firmware::ParameterValues values_of(Context& context, const CheckOptions& option
   for (std::size_t i = 0; i < read.size(); ++i) values.set_raw(slot_of(read[i]), raw[i]);
   for (const auto& assignment : assignments) values.set_raw(slot_of(assignment.parameter), assignment.raw);
   if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
-    throw device::ValueError(std::string(firmware::words_of(broken.refusal)));
+    throw device::ValueError(std::string(firmware::to_string(broken.refusal)));
   return values;
 }
 
@@ -106,7 +106,7 @@ Json judgement_json(const check::Judgement& judgement, const std::string& hand) 
           {"guaranteed", judgement.guaranteed()},
           {"criteria", criteria},
           {"changes", changes_json(judgement.changes)},
-          {"diolaiti_region", std::string(check::words_of(check::region_of(c)))},
+          {"diolaiti_region", std::string(check::to_string(check::region_of(c)))},
           {"case",
            {{"stiffness_n_per_m", c.stiffness},
             {"wall_damping_n_s_per_m", c.wall_damping},

@@ -71,11 +71,11 @@ Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding
           {"warning", status.warning()},
           {"stability_check", guard_json(guard)},
           {"fault", fault_json(status)},
-          {"refusal", refused ? Json(std::string(firmware::words_of(status.refusal))) : Json(nullptr)}};
+          {"refusal", refused ? Json(std::string(firmware::to_string(status.refusal))) : Json(nullptr)}};
 }
 
 std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
-  std::string line = fmt::format("axis {}: {}", axis, device::words_of(status.state()));
+  std::string line = fmt::format("axis {}: {}", axis, device::to_string(status.state()));
   if (status.armed()) line += " (armed: force is on)";
   if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";
   if (status.faulty()) line += fmt::format(": {}; then 'kmax clear --axis {}'", status.fault_words(), axis);
@@ -83,7 +83,7 @@ std::string status_line(std::size_t axis, const DriveStatus& status, const Guard
   if (!status.armed() && status.refusal == Refusal::guard_refused && !check.empty())
     return line + fmt::format("; the last attempt to arm was refused: stability check: {}", check);
   if (!status.armed() && status.refusal != Refusal::none)
-    line += fmt::format("; the last attempt to arm was refused: {}", firmware::words_of(status.refusal));
+    line += fmt::format("; the last attempt to arm was refused: {}", firmware::to_string(status.refusal));
   if (!check.empty()) line += fmt::format("; stability check: {}", check);
   return line;
 }

@@ -30,7 +30,7 @@ Json condition_json(const experiment::ContactResult& result) {
           {"figure", result.condition.figure},
           {"assignments", result.condition.assignments},
           {"peak_to_peak_m", result.measure.peak_to_peak},
-          {"verdict", std::string(experiment::words_of(result.measure.verdict))},
+          {"verdict", std::string(experiment::to_string(result.measure.verdict))},
           {"trials", result.trials},
           {"unstable_trials", result.unstable_trials},
           {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},

@@ -43,7 +43,7 @@ struct StudyReport {
 /// The document's beginning: "origin" and "circumstances".
 template <typename Study>
 Json document_of(const Study& study) {
-  return {{"origin", std::string(report::words_of(study.origin))}, {"circumstances", study.circumstances}};
+  return {{"origin", std::string(report::to_string(study.origin))}, {"circumstances", study.circumstances}};
 }
 
 /// The parts of one command.

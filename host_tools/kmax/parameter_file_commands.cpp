@@ -156,7 +156,7 @@ void check_rules_with(const std::vector<FileSetting>& settings, const std::vecto
   const Parameter parameter(owner.entry, owner.axis);
   throw device::ValueError(fmt::format("{} = {}: the device would refuse: {}", parameter.name(),
                                        value_with_unit(parameter, values.raw(broken.slot)),
-                                       firmware::words_of(broken.refusal)));
+                                       firmware::to_string(broken.refusal)));
 }
 
 /// The file's line that a refusal is about, if it has one.

@@ -132,14 +132,14 @@ Json parts_json(const simulation::Scene& scene) {
 Json result_json(const simulation::Scene& scene, const RunResult& result) {
   Json contact = nullptr;
   if (result.contact) {
-    contact = {{"verdict", std::string(experiment::words_of(result.contact->verdict))},
+    contact = {{"verdict", std::string(experiment::to_string(result.contact->verdict))},
                {"peak_to_peak_m", result.contact->peak_to_peak},
                {"deepest_m", result.contact->deepest},
                {"judged_from_s", result.judged_from},
                {"judged_to_s", result.judged_to}};
   }
   return {{"scene", scene.name},
-          {"integrator", simulation::words_of(scene.integrator)},
+          {"integrator", simulation::to_string(scene.integrator)},
           {"parts", parts_json(scene)},
           {"state", std::string(device::name_of(result.end_state))},
           {"fault", std::string(firmware::text_of(result.fault).name)},
@@ -158,7 +158,7 @@ int run_simulate(Context& context, const SimulateOptions& options) {
   const std::string axis = scene.axes.size() > 1 ? fmt::format("axis {}", result.axis) : "the axis";
   if (result.samples.empty())
     throw std::runtime_error(
-        fmt::format("{}: {} could not be armed: {}", scene.name, axis, firmware::words_of(result.refusal)));
+        fmt::format("{}: {} could not be armed: {}", scene.name, axis, firmware::to_string(result.refusal)));
   if (!options.csv.empty()) write_csv(scene, result, options.csv);
   if (!options.picture.empty()) write_picture(scene, result, options.picture);
   if (context.json) {
@@ -167,19 +167,19 @@ int run_simulate(Context& context, const SimulateOptions& options) {
     print(context.out, "{}: {}\n", scene.name, scene.description);
     print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
           result.simulated_s / result.real_s);
-    print(context.out, "  integrator: {}\n", simulation::words_of(scene.integrator));
+    print(context.out, "  integrator: {}\n", simulation::to_string(scene.integrator));
     for (std::size_t n = 0; n < scene.axes.size(); ++n)
       print(context.out, "  axis {} integrates: {}\n", n,
             fmt::join(simulation::integrated_parts(scene.axes[n]), ", "));
     if (result.contact)
       print(context.out,
             "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm\n",
-            experiment::words_of(result.contact->verdict), result.contact->peak_to_peak * 1e3,
+            experiment::to_string(result.contact->verdict), result.contact->peak_to_peak * 1e3,
             result.judged_from, result.judged_to, result.contact->deepest * 1e3);
     print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
           result.limited_share * 100, result.clipped_share * 100);
     if (result.lost_edges > 0) print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
-    print(context.out, "  at the end: {}\n", device::words_of(result.end_state));
+    print(context.out, "  at the end: {}\n", device::to_string(result.end_state));
     for (const std::string& file : {options.csv, options.picture}) {
       if (!file.empty()) print(context.out, "  {}\n", file);
     }

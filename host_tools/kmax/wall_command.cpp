@@ -29,7 +29,7 @@ firmware::ParameterValues values_of(const WallOptions& options, std::size_t axis
     values.set_raw(firmware::slot_of(assignment.parameter.entry(), assignment.parameter.axis()),
                    assignment.raw);
   if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
-    throw device::ValueError(std::string(firmware::words_of(broken.refusal)));
+    throw device::ValueError(std::string(firmware::to_string(broken.refusal)));
   return values;
 }
 

@@ -50,7 +50,7 @@ std::string trouble_of(const WatchedAxis& axis) {
   const device::DriveStatus& status = axis.status;
   if (status.faulty()) return fmt::format("{}; then 'kmax clear --axis {}'", status.fault_words(), axis.axis);
   if (!status.armed() && status.refusal != firmware::Refusal::none)
-    return fmt::format("the last attempt to arm was refused: {}", firmware::words_of(status.refusal));
+    return fmt::format("the last attempt to arm was refused: {}", firmware::to_string(status.refusal));
   return {};
 }
 
@@ -58,7 +58,7 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
   using Cell = std::function<std::string(const WatchedAxis&)>;
   const std::vector<std::pair<const char*, Cell>> rows = {
       {"", [](const auto& a) { return fmt::format("axis {}", a.axis); }},
-      {"state", [](const auto& a) { return std::string(device::words_of(a.status.state())); }},
+      {"state", [](const auto& a) { return std::string(device::to_string(a.status.state())); }},
       {"position", [](const auto& a) { return fmt::format("{:+12.6f} m", a.measured.position); }},
       {"velocity", [](const auto& a) { return fmt::format("{:+12.6f} m/s", a.measured.velocity); }},
       {"force", [](const auto& a) { return fmt::format("{:+12.4f} N", a.measured.force); }},
@@ -97,9 +97,10 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
 std::string watch_line(double seconds, const std::vector<WatchedAxis>& axes) {
   std::string line = fmt::format("{:.1f} s", seconds);
   for (const WatchedAxis& axis : axes) {
-    line += fmt::format(" | axis {}: {}, {:+.6f} m, {:+.6f} m/s, {:+.4f} N, {:+.4f} A, flags: {}", axis.axis,
-                        device::words_of(axis.status.state()), axis.measured.position, axis.measured.velocity,
-                        axis.measured.force, axis.measured.current, joined(flag_words(axis.measured.flags)));
+    line +=
+        fmt::format(" | axis {}: {}, {:+.6f} m, {:+.6f} m/s, {:+.4f} N, {:+.4f} A, flags: {}", axis.axis,
+                    device::to_string(axis.status.state()), axis.measured.position, axis.measured.velocity,
+                    axis.measured.force, axis.measured.current, joined(flag_words(axis.measured.flags)));
     const std::string trouble = trouble_of(axis);
     if (!trouble.empty()) line += ", " + trouble;
   }

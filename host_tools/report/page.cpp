@@ -6,7 +6,7 @@
 
 namespace kmax::report {
 
-std::string_view words_of(Origin origin) {
+std::string_view to_string(Origin origin) {
   switch (origin) {
     case Origin::calibrated:
       return "calibrated";

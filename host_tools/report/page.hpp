@@ -39,7 +39,7 @@ struct Page {
 /// Where a number comes from: fitted to the paper's own result, following from a fit to something else, taken
 /// on a device, or printed in a paper.
 enum class Origin { calibrated, predicted, measured, paper };
-std::string_view words_of(Origin origin);
+std::string_view to_string(Origin origin);
 
 /// Throws std::invalid_argument that names the table and the row.
 void require_rectangular(const Table& table);

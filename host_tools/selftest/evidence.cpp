@@ -9,7 +9,7 @@ namespace kmax::selftest {
 std::string ArmingTrial::words() const {
   if (armed) return "it was armed";
   if (fault != firmware::Fault::none) return std::string(firmware::text_of(fault).what);
-  return std::string(firmware::words_of(refusal));
+  return std::string(firmware::to_string(refusal));
 }
 
 bool Evidence::measures_currents() const {

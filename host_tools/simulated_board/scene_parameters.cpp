@@ -131,7 +131,7 @@ void preset(firmware::Application& application, const std::vector<device::Assign
   const auto refuse = [](firmware::Refusal refusal, std::uint16_t address) {
     const auto owner = device::owner_of_holding_register(address);
     throw simulation::SceneError(fmt::format("[parameters] {}: {}", owner ? owner->name() : "of the scene",
-                                             firmware::words_of(refusal)));
+                                             firmware::to_string(refusal)));
   };
   application.preset(transaction_entry, 0, 1);
   for (const device::Assignment& assignment : assignments) {

@@ -4,7 +4,7 @@
 
 namespace kmax::simulation {
 
-std::string words_of(const IntegratorConfig& integrator) {
+std::string to_string(const IntegratorConfig& integrator) {
   const std::string_view name = integrator_names[static_cast<std::size_t>(integrator.kind)];
   switch (integrator.kind) {
     case IntegratorKind::exact:

@@ -9,7 +9,7 @@
 namespace kmax::simulation {
 
 // "exact", or a reference integrator with what it goes by: "rk4, 40 substeps per 2 ms".
-std::string words_of(const IntegratorConfig& integrator);
+std::string to_string(const IntegratorConfig& integrator);
 
 // The parts of an axis that are there and so are integrated or computed, in the order from the actuator to
 // the person: "DC motor", "device", "delay of 0.5 ms", "structure", "hand and arm", "encoder noise", ... A

@@ -84,9 +84,9 @@ void round_trips(tests::CanBench& bench, const std::string& what, firmware::cano
 
 /// A complete capture: 49,152 bytes in blocks of 127 segments.
 void block_upload(tests::CanBench& bench, const std::string& what) {
-  bench.write(0x3018, 2, 1, 1);  // capture.channel_1 = position
-  bench.write(0x3018, 9, 0, 1);  // trigger: now
-  bench.write(0x301A, 1, 1, 1);  // arm
+  bench.write(0x5818, 2, 1, 1);  // capture.channel_1 = position
+  bench.write(0x5818, 9, 0, 1);  // trigger: now
+  bench.write(0x581A, 1, 1, 1);  // arm
   bench.board->run_for(0.7);
   double first = 0.0, last = 0.0, frames_us = 0.0;
   std::uint64_t segments = 0;
@@ -98,7 +98,7 @@ void block_upload(tests::CanBench& bench, const std::string& what) {
     ++segments;
     frames_us += frame_us(frame) + virtual_board::can_intermission_bits;
   });
-  const auto bytes = bench.sdo.upload({0x3021, 1}, 49152);
+  const auto bytes = bench.sdo.upload({0x5821, 1}, 49152);
   const double taken = last - first;
   // The limit: 7 bytes a frame, frames one behind the other.
   const double share = 1e-6 * frames_us / taken;
@@ -140,7 +140,7 @@ void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
   bench.board->run_for(0.01);
   const auto least = *std::min_element(received.begin(), received.end());
   const auto wanted = static_cast<std::uint64_t>(1000.0 * duration_s);
-  const std::uint32_t held_back = bench.number(0x301B, 16);
+  const std::uint32_t held_back = bench.number(0x581B, 16);
   row(fmt::format("4 PDOs at 1 kHz for {:.0f} s, {}", duration_s, what),
       fmt::format(
           "{} of each at least, {} held back; period {:.0f} to {:.0f} us, RMS deviation {:.1f} us; bus load "
@@ -170,10 +170,10 @@ int main(int argc, char** argv) {
     }
     round_trips(bench, what + ", a setting", {0x2000, 4});
     round_trips(bench, what + ", a reading", {0x2012, 2});
-    round_trips(bench, what + ", a counter", {0x3012, 1});
+    round_trips(bench, what + ", a counter", {0x5812, 1});
     block_upload(bench, what);
     pdos(bench, what, armed ? duration_s : std::min(duration_s, 10.0));
-    const std::uint32_t missed = bench.number(0x3012, 10);
+    const std::uint32_t missed = bench.number(0x5812, 10);
     row(fmt::format("control ticks missed meanwhile, {}", what), fmt::format("{}", missed), "0", missed == 0);
   }
   return all_kept ? 0 : 3;

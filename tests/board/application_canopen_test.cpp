@@ -63,7 +63,7 @@ TEST_F(OnCan, NeitherDoPdosThatAreTooShort) {
 TEST_F(OnCan, WritingIsASignOfLife) {
   arm_torque(300);
   for (std::uint32_t i = 0; i < 100; ++i) {
-    EXPECT_EQ(write(0x3001, 2, i, 2), 0U);
+    EXPECT_EQ(write(0x5801, 2, i, 2), 0U);
     run_ms(18);
   }
   EXPECT_TRUE(armed());
@@ -187,7 +187,7 @@ TEST_F(OnCan, LssStoresNothingWhileATransactionIsOpen) {
 
 TEST_F(OnCan, TheFirstWordOverCanDoesNotTripWhatSerialHasArmed) {
   nmt(1);
-  EXPECT_EQ(write(0x3001, 2, 1, 2), 0U);
+  EXPECT_EQ(write(0x5801, 2, 1, 2), 0U);
   run_ms(1500);
   ASSERT_TRUE(bench.arm());
   rpdo(15, 0);

@@ -37,7 +37,7 @@ class GuardOnCan : public testing::Test, public CanOpenHost {
     return armed();
   }
   static constexpr std::uint16_t wall = 0x2000, guard = 0x2007, drive_status = 0x2011, finding = 0x201A,
-                                 refusal = 0x3013;
+                                 refusal = 0x5813;
   static constexpr std::uint8_t stiffness = 4;
 };
 

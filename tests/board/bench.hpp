@@ -75,7 +75,7 @@ class BenchWith {
     const firmware::Entry& entry = firmware::entry_at(firmware::entry_named(name));
     const std::uint8_t function = entry.access == firmware::Access::read_write ? 3 : 4;
     const Words words = read(function, firmware::address_of(name, axis),
-                             static_cast<std::uint8_t>(firmware::words_of(entry.type)));
+                             static_cast<std::uint8_t>(firmware::register_count(entry.type)));
     if (words.empty()) {
       ADD_FAILURE() << "no value for " << name;
       return -12345;

@@ -30,7 +30,7 @@ class LinkedRegisters : public testing::Test {
     return registers.write(address_of("transaction.control"), Words{request}, armed, now).refusal;
   }
   double get(std::string_view name, std::size_t axis = 0) {
-    Words words(words_of(entry_at(entry_named(name)).type));
+    Words words(register_count(entry_at(entry_named(name)).type));
     registers.read(true, address_of(name, axis), words);
     return number_in(name, words);
   }

@@ -20,7 +20,7 @@ TEST(DeviceRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
     const auto [entry, axis] = owner_of(slot);
     const auto raw = static_cast<std::uint32_t>(0x1234'8000U + 7 * slot);
     registers.values().set_raw(slot, raw);
-    const std::size_t words = words_of(entry_at(entry).type);
+    const std::size_t words = register_count(entry_at(entry).type);
     for (std::size_t word = 0; word < words; ++word) {
       Word& at = tables[entry_at(entry).access == Access::read_write][modbus_address(entry, axis) + word];
       EXPECT_FALSE(at.there) << entry_at(entry).name;

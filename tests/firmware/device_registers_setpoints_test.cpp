@@ -20,7 +20,7 @@ class Registers : public testing::Test {
   Refusal control(std::uint16_t request) { return write("transaction.control", {request}); }
   double get(std::string_view name, std::size_t axis = 0) {
     const Entry& entry = entry_at(entry_named(name));
-    Words words(words_of(entry.type));
+    Words words(register_count(entry.type));
     registers.read(entry.access == Access::read_write, address_of(name, axis), words);
     return number_in(name, words);
   }
@@ -160,7 +160,7 @@ TEST_F(Communication, SettingsAreSetOneByOneWithinTheirRangeAndCountedApart) {
       EXPECT_EQ(registers.communication_changes(), counted + 1) << e.name;
     }
     // Any link reads it, among the readings.
-    Words words(words_of(e.type));
+    Words words(register_count(e.type));
     ASSERT_TRUE(registers.readable(false, modbus_address(i, 0), words.size())) << e.name;
     registers.read(false, modbus_address(i, 0), words);
     EXPECT_EQ(words, words_of_raw(e.type, value)) << e.name;

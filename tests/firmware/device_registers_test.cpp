@@ -103,7 +103,7 @@ TEST(DeviceRegisters, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNo
       wrong.push_back({words_of_float(std::nextafter(high, 1e30f)), outside});
       wrong.push_back({words_of_float(std::numeric_limits<float>::quiet_NaN()), Refusal::not_finite});
       wrong.push_back({words_of_float(-std::numeric_limits<float>::infinity()), Refusal::not_finite});
-    } else if (words_of(e.type) == 1) {
+    } else if (register_count(e.type) == 1) {
       // Of a signed number all 16 bits may be allowed.
       const bool all = e.type == Type::integer16 && e.values.empty() && e.minimum <= -32768;
       if (e.maximum < 65535 && !all) wrong.push_back({{static_cast<std::uint16_t>(e.maximum + 1)}, outside});
@@ -149,7 +149,7 @@ TEST(DeviceRegisters, HalfOfATwoRegisterValueIsRefusedWhereverTheRangeCutsIt) {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
-    if (e.access != Access::read_write || words_of(e.type) != 2) continue;
+    if (e.access != Access::read_write || register_count(e.type) != 2) continue;
     const std::uint16_t first = modbus_address(entry, axis);
     const Words words = words_for(e.name, e.default_value);
     Written w;
@@ -233,7 +233,7 @@ TEST(DeviceRegisters, ReadableIsExactlyTheRegistersThereAre) {
     for (std::size_t slot = 0; slot < slot_count; ++slot) {
       const auto [entry, axis] = owner_of(slot);
       if ((entry_at(entry).access == Access::read_write) != holding) continue;
-      for (int word = 0; word < words_of(entry_at(entry).type); ++word)
+      for (int word = 0; word < register_count(entry_at(entry).type); ++word)
         there[static_cast<std::size_t>(modbus_address(entry, axis) + word)] = true;
     }
     for (std::uint32_t address = 0; address <= 0xFFFF; ++address) {

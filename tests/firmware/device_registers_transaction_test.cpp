@@ -19,7 +19,7 @@ class Transaction : public testing::Test {
     return registers.write(address_of(name), words_for(name, number), armed, now).refusal;
   }
   double get(std::string_view name) {
-    Words words(words_of(entry_at(entry_named(name)).type));
+    Words words(register_count(entry_at(entry_named(name)).type));
     registers.read(true, address_of(name), words);
     return number_in(name, words);
   }

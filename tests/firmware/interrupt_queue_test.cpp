@@ -90,8 +90,9 @@ RC_GTEST_PROP(InterruptQueue, IsAQueueThatRefusesWhenFull, ()) {
 }
 
 // The queue needs nothing that a single core gives: its acquire/release pairs make it a queue between two
-// threads as well, which is what this shows (run it under a thread sanitizer too). Handover and Snapshot rely
-// on an interrupt running to its end and would be data races between threads, so they are not stressed so.
+// threads as well, which is what this shows (run it under a thread sanitizer too). DoubleBuffer and Seqlock
+// rely on an interrupt running to its end and would be data races between threads, so they are not stressed
+// so.
 TEST(InterruptQueue, BetweenTwoThreadsNothingIsTornReorderedOrInvented) {
   struct Pair {
     std::uint32_t number, complement;

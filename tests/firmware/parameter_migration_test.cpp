@@ -214,7 +214,7 @@ TEST(PersistentParameters, IdentitiesAreUniqueAndThoseOfTheBus) {
   }
   EXPECT_EQ(identity<"wall.stiffness">(0), 0x2000'0405U);
   EXPECT_EQ(identity<"wall.stiffness">(1), 0x2800'0405U);
-  EXPECT_EQ(identity<"supply.voltage_min">(), 0x3000'0105U);
+  EXPECT_EQ(identity<"supply.voltage_min">(), 0x5800'0105U);
   const auto parts = ParameterIdentity::of_word(0x2800'0405U);
   EXPECT_EQ(parts.index, 0x2800);
   EXPECT_EQ(parts.subindex, 4);

@@ -11,7 +11,7 @@ TEST(Refusal, NumbersAreTheProtocolsAndEveryOneHasItsOwnWords) {
   std::set<std::string_view> words;
   for (std::uint16_t number = 0; number < refusal_texts.size(); ++number) {
     const auto refusal = static_cast<Refusal>(number);
-    EXPECT_TRUE(words.insert(words_of(refusal)).second) << number << ": " << words_of(refusal);
+    EXPECT_TRUE(words.insert(to_string(refusal)).second) << number << ": " << to_string(refusal);
     EXPECT_EQ(refusal_texts[number].refusal, refusal);
   }
   EXPECT_EQ(static_cast<int>(Refusal::encoder_invalid), 15);
@@ -22,8 +22,8 @@ TEST(Refusal, NumbersAreTheProtocolsAndEveryOneHasItsOwnWords) {
 }
 
 TEST(Refusal, NumberOfALaterFirmwareIsSaidToBeUnknown) {
-  EXPECT_FALSE(words_of(static_cast<Refusal>(999)).empty());
-  EXPECT_NE(words_of(static_cast<Refusal>(999)), words_of(Refusal::none));
+  EXPECT_FALSE(to_string(static_cast<Refusal>(999)).empty());
+  EXPECT_NE(to_string(static_cast<Refusal>(999)), to_string(Refusal::none));
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ inline std::uint16_t address_of(std::string_view name, std::size_t axis = 0) {
 }
 
 inline Words words_of_raw(Type type, std::uint32_t raw) {
-  if (words_of(type) == 1) return {static_cast<std::uint16_t>(raw)};
+  if (register_count(type) == 1) return {static_cast<std::uint16_t>(raw)};
   return {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
 }
 
@@ -42,8 +42,8 @@ inline Words words_for(std::string_view name, double number) {
 inline double number_in(std::string_view name, const Words& words) {
   const Type type = entry_at(entry_named(name)).type;
   std::uint32_t raw = words.at(0);
-  if (words_of(type) == 2) raw = raw << 16 | words.at(1);
-  if (words_of(type) == 1 && is_signed(type))
+  if (register_count(type) == 2) raw = raw << 16 | words.at(1);
+  if (register_count(type) == 1 && is_signed(type))
     raw = static_cast<std::uint32_t>(static_cast<std::int16_t>(words.at(0)));
   return number_from_raw(type, raw);
 }

@@ -27,7 +27,7 @@ class BusFaults : public testing::Test {
   /// By way of the serial line, which has nothing to do with the bus.
   std::uint32_t serial_number(std::string_view name) {
     const std::size_t entry = firmware::find_entry(name);
-    const auto words = firmware::words_of(firmware::entry_at(entry).type);
+    const auto words = firmware::register_count(firmware::entry_at(entry).type);
     const auto read = bench.master->read_input(firmware::register_address(entry, 0), words);
     return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
   }

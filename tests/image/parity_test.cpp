@@ -151,7 +151,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
   virtual_board::ModbusMaster master(board);
   const auto write = [&master](std::size_t entry, std::size_t axis, std::uint32_t raw) {
     const std::uint16_t address = firmware::register_address(entry, axis);
-    if (firmware::words_of(firmware::descriptors[entry].type) == 1)
+    if (firmware::register_count(firmware::descriptors[entry].type) == 1)
       return master.write_register(address, static_cast<std::uint16_t>(raw));
     master.write_registers(address, {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
   };

@@ -16,8 +16,8 @@ namespace {
 constexpr std::uint8_t read_holding_function = 3, read_input_function = 4, write_function = 16;
 constexpr std::uint8_t illegal_address = 2, illegal_value = 3;
 
-constexpr SdoClient::Object capture_object{0x3021, 1};
-constexpr std::uint16_t trace_index = 0x3020;
+constexpr SdoClient::Object capture_object{0x5821, 1};
+constexpr std::uint16_t trace_index = 0x5820;
 constexpr std::uint16_t registers_per_trace_object = firmware::trace_object_bytes / 2;
 
 std::string name_of(const RegisterObject& value) {
@@ -29,8 +29,8 @@ RefusedError refusal(const SdoAborted& aborted, std::uint8_t function, std::uint
   return {exception_of(aborted.code()), function, address,
           fmt::format("the device refused to {} object {}: {} (SDO abort {:08X}){}",
                       function == write_function ? "write" : "read", object,
-                      firmware::canopen::words_of(aborted.code()), static_cast<std::uint32_t>(aborted.code()),
-                      more)};
+                      firmware::canopen::to_string(aborted.code()),
+                      static_cast<std::uint32_t>(aborted.code()), more)};
 }
 
 /// 32-bit numbers, low byte first, as registers, high word first.

@@ -16,8 +16,8 @@ namespace kmax::link {
 /// other here: they may be some milliseconds apart. Writing several values at once is not whole or nothing
 /// either; an error says how many were written before it. Device::apply() makes it whole by a transaction.
 ///
-/// The windows of the trace and of a capture are read in long pieces: 0x3020:k has 64 registers of the
-/// former, 0x3021:1 all of the latter.
+/// The windows of the trace and of a capture are read in long pieces: 0x5820:k has 64 registers of the
+/// former, 0x5821:1 all of the latter.
 ///
 /// For the device only writing is a sign of life on CAN (link.timeout). From a controlword that enables an
 /// axis on, until one that does not, reading through this link therefore writes link.sign_of_life ten times a

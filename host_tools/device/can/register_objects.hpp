@@ -17,7 +17,7 @@ struct RegisterObject {
   firmware::canopen::ObjectAddress object;
 
   const firmware::Entry& definition() const { return firmware::entry_at(entry); }
-  std::uint16_t words() const { return firmware::words_of(definition().type); }
+  std::uint16_t words() const { return firmware::register_count(definition().type); }
   std::size_t bytes() const { return firmware::bytes_of(definition().type); }
 };
 

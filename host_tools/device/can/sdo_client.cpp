@@ -44,7 +44,7 @@ bool is_about_transfer(Abort code) {
 // Objects every node must have (CiA 301, 7.5.1), as markers.
 constexpr SdoClient::Object markers[] = {{0x1000, 0}, {0x1001, 0}, {0x1018, 0}, {0x1018, 1}};
 
-const char* words_of_state(std::uint8_t state) {
+const char* state_text(std::uint8_t state) {
   switch (state) {
     case 4:
       return "stopped, in which it answers no SDO; start it with the NMT command 'enter pre-operational' "
@@ -65,7 +65,7 @@ std::string text_of(SdoClient::Object object) {
 
 SdoAborted::SdoAborted(Abort code, SdoClient::Object object)
     : std::runtime_error(fmt::format("the node refused object {}: {} (SDO abort {:08X})", text_of(object),
-                                     canopen::words_of(code), static_cast<std::uint32_t>(code))),
+                                     canopen::to_string(code), static_cast<std::uint32_t>(code))),
       code_(code),
       object_(object) {}
 
@@ -188,7 +188,7 @@ void SdoClient::fail(Object object, const Failed& last, int attempts) {
       "check that the device is powered, the wiring, and that node ID and bit rate are the device's, or it "
       "was "
       "stopped by an NMT master";
-  if (state_) check = fmt::format("the device is there, its state is {}", words_of_state(*state_));
+  if (state_) check = fmt::format("the device is there, its state is {}", state_text(*state_));
   if (!trouble.empty()) check = trouble;
   throw LinkError(fmt::format("{}: no answer from node {} within {} ms (object {}, {}); {}",
                               port_.description(), node_, settings_.response_timeout.count(), text_of(object),

@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::microseconds;
 
-std::string words_of(int error) {
+std::string last_error_text(int error) {
   switch (error) {
     case ENOENT:
       return "there is no bus at this path; start one with 'kmax serve --can PATH'";
@@ -50,7 +50,7 @@ UnixCan::UnixCan(const std::string& path, const CanPortOptions& options)
                                 sizeof address.sun_path - 1));
   std::copy(path.begin(), path.end(), address.sun_path);
   if (!socket_ || connect(socket_.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    throw LinkError(fmt::format("{}: {}", path, words_of(errno)));
+    throw LinkError(fmt::format("{}: {}", path, last_error_text(errno)));
 }
 
 void UnixCan::send(const drivers::CanFrame& frame) {

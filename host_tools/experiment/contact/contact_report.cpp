@@ -11,7 +11,7 @@
 
 namespace kmax::experiment {
 
-std::string_view words_of(simulation::ContactVerdict verdict) {
+std::string_view to_string(simulation::ContactVerdict verdict) {
   switch (verdict) {
     case simulation::ContactVerdict::stable:
       return "stable";
@@ -29,7 +29,7 @@ std::string contact_table(const std::vector<ContactResult>& results) {
                   "unstable in", "limited", "figure", "paper 1 says", "agrees");
   for (const ContactResult& result : results) {
     table += fmt::format("{:<22}{:>11.3f} mm  {:<11}{:<13}{:>6.1f} %  {:<9}{:<33}{}\n", result.condition.name,
-                         result.measure.peak_to_peak * 1e3, words_of(result.measure.verdict),
+                         result.measure.peak_to_peak * 1e3, to_string(result.measure.verdict),
                          fmt::format("{} of {}", result.unstable_trials, result.trials),
                          result.limited_share * 100, "Fig. " + result.condition.figure,
                          result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no");
@@ -73,7 +73,7 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
 
   plot::Figure figure;
   figure.title = fmt::format("{}: {}, {:.2f} mm peak to peak", result.condition.name,
-                             words_of(result.measure.verdict), result.measure.peak_to_peak * 1e3);
+                             to_string(result.measure.verdict), result.measure.peak_to_peak * 1e3);
   figure.x_label = "time since the first touch (s)";
   const std::vector<plot::Mark> judged = {{result.judged_from, true, "judged"}, {result.judged_to, true, ""}};
   const std::vector<plot::Mark> unnamed = {{result.judged_from, true, ""}, {result.judged_to, true, ""}};
@@ -106,7 +106,7 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
                                                       const std::vector<std::filesystem::path>& pictures,
                                                       const std::filesystem::path& folder,
                                                       report::Origin origin) {
-  const std::string ours(report::words_of(origin)), theirs(report::words_of(report::Origin::paper));
+  const std::string ours(report::to_string(origin)), theirs(report::to_string(report::Origin::paper));
   report::Table table;
   table.columns = {"wall",
                    "peak to peak (mm), " + ours,
@@ -124,12 +124,12 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
   for (std::size_t i = 0; i < results.size(); ++i) {
     const ContactResult& result = results[i];
     table.rows.push_back({result.condition.name, fmt::format("{:.3f}", result.measure.peak_to_peak * 1e3),
-                          std::string(words_of(result.measure.verdict)),
+                          std::string(to_string(result.measure.verdict)),
                           fmt::format("{} of {}", result.unstable_trials, result.trials),
                           fmt::format("{:.1f} %", result.limited_share * 100), result.condition.figure,
                           result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no"});
     section.pictures.push_back({fmt::format("{}: position, force and coefficient over time, {}",
-                                            result.condition.name, words_of(result.measure.verdict)),
+                                            result.condition.name, to_string(result.measure.verdict)),
                                 pictures.at(i)});
   }
   section.tables.push_back(table);

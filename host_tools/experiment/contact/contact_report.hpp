@@ -31,6 +31,6 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
                                                       const std::filesystem::path& folder,
                                                       report::Origin origin);
 
-std::string_view words_of(simulation::ContactVerdict verdict);
+std::string_view to_string(simulation::ContactVerdict verdict);
 
 }  // namespace kmax::experiment

@@ -56,7 +56,7 @@ DeviationStudy study_deviation(const DeviationSettings& settings,
 }
 
 report::Table deviation_table(const DeviationStudy& study) {
-  const std::string origin(report::words_of(study.origin));
+  const std::string origin(report::to_string(study.origin));
   const bool simulated = !study.without_stiffening.empty();
   report::Table table{"Table II of paper 1: deviation (Dev) along the surface",
                       {"F_B (N)", "F_I (N)", "Dev, paper (mm)", fmt::format("Dev, {} (mm)", origin),
@@ -92,7 +92,7 @@ report::Table deviation_claims_table(const DeviationStudy& study) {
       table.rows.push_back({name, fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
                             ratio(trend), rank_text(trend.rank), yes_no(trend.falls(), "not shown")});
   };
-  rows(std::string(report::words_of(study.origin)), study.verdict.trends);
+  rows(std::string(report::to_string(study.origin)), study.verdict.trends);
   if (!study.without_stiffening.empty()) rows("activation_gain = 0", study.verdict_without_stiffening.trends);
   for (const BackgroundTrend& trend : printed_deviation_trends())
     table.rows.push_back({"paper", fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
@@ -179,7 +179,7 @@ std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
     const auto series = [&](const std::string& name) {
       return plot::Series{fmt::format("{:g} N, {}", interference, name), {}, {}, false, true};
     };
-    plot::Series ours = series(std::string(report::words_of(study.origin))), flat = series("no stiffening"),
+    plot::Series ours = series(std::string(report::to_string(study.origin))), flat = series("no stiffening"),
                  theirs = series("paper"), fitted = series("fitted, gamma");
     const DeviationFit* fit = fit_named(study, fit_stiffening.name);
     fitted.points = false;

@@ -65,7 +65,7 @@ class BothArmed {
   [[noreturn]] static void fail_without_force(std::size_t axis, const device::DriveStatus& status) {
     throw device::DeviceError(
         fmt::format("axis {} lost its force during the touch: {}", axis,
-                    status.faulty() ? status.fault_words() : std::string(device::words_of(status.state()))));
+                    status.faulty() ? status.fault_words() : std::string(device::to_string(status.state()))));
   }
   void disarm_quietly() {
     for (device::Drive& drive : drives_) {

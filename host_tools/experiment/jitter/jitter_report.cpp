@@ -67,7 +67,7 @@ JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simul
 }
 
 report::Table jitter_table(const JitterStudy& study) {
-  const std::string origin(report::words_of(study.origin));
+  const std::string origin(report::to_string(study.origin));
   report::Table table{
       "Table I of paper 1: jitter (Jit) and adjustment time (AT)",
       {"F_B (N)", "F_I (N)", "Jit, paper (mm)", fmt::format("Jit, {} (mm)", origin), "AT, paper (ms)",
@@ -181,7 +181,7 @@ plot::Panel trend_panel(const JitterStudy& study, const std::string& label, doub
   plot::Panel panel{label, {}, {}, {}};
   for (const double interference : {3.0, 5.0, 7.0}) {
     plot::Series mine{
-        fmt::format("{:g} N, {}", interference, report::words_of(study.origin)), {}, {}, false, true};
+        fmt::format("{:g} N, {}", interference, report::to_string(study.origin)), {}, {}, false, true};
     plot::Series paper{fmt::format("{:g} N, paper", interference), {}, {}, false, true};
     for (const JitterResult& result : study.results) {
       if (result.paper.interference != interference) continue;

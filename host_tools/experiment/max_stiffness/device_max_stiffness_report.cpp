@@ -62,8 +62,8 @@ void draw(const std::vector<DeviceStiffnessResult>& results, double threshold,
 report::Table device_stiffness_table(const std::vector<DeviceStiffnessResult>& results) {
   report::Table table;
   table.columns = {"wall",
-                   fmt::format("K_max (N/mm), {}", report::words_of(report::Origin::measured)),
-                   fmt::format("K_max (N/mm), {} 1", report::words_of(report::Origin::paper)),
+                   fmt::format("K_max (N/mm), {}", report::to_string(report::Origin::measured)),
+                   fmt::format("K_max (N/mm), {} 1", report::to_string(report::Origin::paper)),
                    "touches",
                    "force limited",
                    "remark"};
@@ -82,7 +82,7 @@ report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& resul
   for (const DeviceStiffnessResult& result : results) {
     for (const DeviceStiffnessTouch& touch : result.touches)
       table.rows.push_back({result.condition.name, fmt::format("{}", touch.stiffness),
-                            std::to_string(touch.trial), std::string(words_of(touch.verdict)),
+                            std::to_string(touch.trial), std::string(to_string(touch.verdict)),
                             fmt::format("{}", touch.peak_to_peak), fmt::format("{}", touch.limited_share),
                             touch.aborted ? "yes" : "no", std::to_string(touch.lost_records)});
   }

@@ -24,7 +24,7 @@ report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldW
          fmt::format("{:.2f}", result.named.worst * 1e3), result.named.stable() ? "stable" : "unstable",
          result.named.stable() == result.paper_stable ? "yes" : "no",
          fmt::format("{}", result.stable_people()), fmt::format("{:.2f}", result.median_worst() * 1e3),
-         std::string(report::words_of(result.condition.origin))});
+         std::string(report::to_string(result.condition.origin))});
   }
   section.tables.push_back(std::move(table));
   return section;

@@ -32,7 +32,7 @@ const ConditionResult* constant_of(const MaxStiffnessStudy& study, double coeffi
 std::string origin_words(const std::vector<MaxStiffnessStudy>& studies, std::size_t condition) {
   std::vector<std::string_view> words;
   for (const MaxStiffnessStudy& study : studies) {
-    const std::string_view word = report::words_of(study.conditions[condition].condition.origin);
+    const std::string_view word = report::to_string(study.conditions[condition].condition.origin);
     if (std::find(words.begin(), words.end(), word) == words.end()) words.push_back(word);
   }
   return fmt::format("{}", fmt::join(words, " / "));

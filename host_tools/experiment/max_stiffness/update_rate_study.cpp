@@ -9,7 +9,7 @@ namespace {
 
 using control::VelocityEstimatorKind;
 
-std::string_view words_of(VelocityEstimatorKind kind) {
+std::string_view to_string(VelocityEstimatorKind kind) {
   switch (kind) {
     case VelocityEstimatorKind::difference:
       return "difference";
@@ -46,7 +46,7 @@ std::vector<double> study_rates() {
 
 std::string name_of(const RateCase& setting) {
   if (setting.wall_damping > 0.0)
-    return fmt::format("damping {:g} N s/m, {}", setting.wall_damping, words_of(setting.estimator));
+    return fmt::format("damping {:g} N s/m, {}", setting.wall_damping, to_string(setting.estimator));
   if (setting.delay_samples > 0.0) return fmt::format("{:g} sample of delay", setting.delay_samples);
   if (setting.delay > 0.0) return fmt::format("{:g} ms of delay", setting.delay * 1e3);
   return "no damping";

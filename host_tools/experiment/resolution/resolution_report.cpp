@@ -58,7 +58,7 @@ void record(const ResolutionSettings& settings, const simulation::OperatorModel&
 }
 }  // namespace
 
-std::string words_of(const ResolutionHand& hand) {
+std::string to_string(const ResolutionHand& hand) {
   return fmt::format("grip x {:g}, delay {:g} ms", hand.grip, hand.delay * 1e3);
 }
 
@@ -95,7 +95,7 @@ ResolutionStudy study_resolution(const ResolutionSettings& settings,
 report::Table resolution_table(const ResolutionStudy& study) {
   report::Table table{"Paper 2, section 3: what vibrates", {"asked (mm)", "step (mm)", "speed (m/s)"}, {}};
   for (const ResolutionRun& run : study.runs)
-    table.columns.push_back(study.pushes.empty() ? "measured" : words_of(run.hand));
+    table.columns.push_back(study.pushes.empty() ? "measured" : to_string(run.hand));
   table.columns.push_back("K max(eta, v T) (N)");
   if (!study.pushes.empty()) table.columns.push_back("pushes that meet it");
   for (std::size_t i = 0; i < study.runs.back().cells.size(); ++i) {
@@ -120,7 +120,7 @@ report::Table resolution_claims_table(const ResolutionStudy& study) {
                       {}};
   for (const ResolutionRun& run : study.runs) {
     const ResolutionVerdict verdict = judge_resolution(run.cells);
-    table.rows.push_back({study.pushes.empty() ? "measured" : words_of(run.hand),
+    table.rows.push_back({study.pushes.empty() ? "measured" : to_string(run.hand),
                           claim_text(verdict.coarse_vibrates), claim_text(verdict.fine_is_still),
                           claim_text(verdict.fine_vibrates_fast), onset_text(run, 0.4e-3),
                           onset_text(run, 0.1e-3), onset_text(run, 0.0)});
@@ -131,7 +131,7 @@ report::Table resolution_claims_table(const ResolutionStudy& study) {
 
 report::Table resolution_variations_table(const ResolutionStudy& study) {
   report::Table table{
-      fmt::format("With {}, and one number changed", words_of(study.runs.back().hand)),
+      fmt::format("With {}, and one number changed", to_string(study.runs.back().hand)),
       {"changed to", "0.4 mm vibrates at every speed", "0.1 mm still below 0.1 m/s",
        "0.1 mm vibrates above 0.1 m/s", "both claims", "onset at 0.4 mm (m/s)", "onset at 0.1 mm (m/s)"},
       {}};
@@ -175,7 +175,7 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study) {
                                 : full.claim_met() == false
                                     ? "nothing vibrates, at any step and speed: the claims do not appear"
                                     : "nothing vibrates of what was touched"));
-    const std::string hand = words_of(study.runs.back().hand);
+    const std::string hand = to_string(study.runs.back().hand);
     words.push_back(claim_met == true    ? fmt::format("With {} both claims appear. These two numbers were "
                                                           "chosen so that they do: calibrated, not predicted.",
                                                        hand)
@@ -262,7 +262,7 @@ std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study
         {"How much hangs on the numbers chosen", {}, {resolution_variations_table(study)}, {}});
   if (!study.trace_time.empty()) {
     plot::Figure touch{fmt::format("Touched at 0.05 m/s with {:g} N: {}", study.pushes.front(),
-                                   words_of(study.runs.back().hand)),
+                                   to_string(study.runs.back().hand)),
                        "time (s)",
                        {}};
     for (const auto& [label, values] : {std::pair("0.1 mm: position (mm)", &study.trace_fine),

@@ -27,7 +27,7 @@ ResolutionStudy study_resolution(const ResolutionSettings& settings,
                                  const std::vector<simulation::OperatorModel>& people,
                                  const ProgressReport& tell = {});
 
-std::string words_of(const ResolutionHand& hand);
+std::string to_string(const ResolutionHand& hand);
 
 /// One row per resolution and speed, a column for each hand.
 report::Table resolution_table(const ResolutionStudy& study);

@@ -89,7 +89,7 @@ void ModbusMaster::arm(std::size_t axis) {
   const auto refusal =
       read_input(firmware::register_address(firmware::entry_of<"drive.refusal">(), axis), 1)[0];
   throw std::runtime_error(fmt::format("axis {} cannot be armed: {}", axis,
-                                       firmware::words_of(static_cast<firmware::Refusal>(refusal))));
+                                       firmware::to_string(static_cast<firmware::Refusal>(refusal))));
 }
 
 }  // namespace kmax::virtual_board

@@ -9,6 +9,8 @@
 #include <tuple>
 #include <vector>
 
+#include "firmware/object_dictionary/dictionary_checks.hpp"
+
 namespace kmax::firmware {
 namespace {
 
@@ -193,10 +195,10 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"profile.torque", 0x00C7, 0x04C7},
       {"profile.device_type", 0x00CB, 0x04CB},
       {"telemetry.current", 0x00E0, 0x04E0},
-      {"canopen.sync_cob_id", 0x1000, 0x1000},
-      {"rpdo1.cob_id", 0x1100, 0x1100},
-      {"rpdo1.mapped_count", 0x1110, 0x1110},
-      {"tpdo4.mapped_8", 0x13DF, 0x13DF},
+      {"canopen.sync_cob_id", 0x2800, 0x2800},
+      {"rpdo1.cob_id", 0x2900, 0x2900},
+      {"rpdo1.mapped_count", 0x2910, 0x2910},
+      {"tpdo4.mapped_8", 0x2BDF, 0x2BDF},
       {"drive.statusword", 0x0000, 0x0400},
       {"drive.error_code", 0x0001, 0x0401},
       {"drive.refusal", 0x0002, 0x0402},
@@ -204,24 +206,24 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"measured.position", 0x0022, 0x0422},
       {"measured.force", 0x0026, 0x0426},
       {"measured.armed_samples", 0x0037, 0x0437},
-      {"supply.voltage_min", 0x0800, 0x0800},
-      {"link.timeout", 0x0810, 0x0810},
-      {"modbus.unit", 0x0830, 0x0830},
-      {"modbus.baud_rate", 0x0831, 0x0831},
-      {"trace.axis", 0x0840, 0x0840},
-      {"trace.interval", 0x0841, 0x0841},
-      {"transaction.control", 0x0900, 0x0900},
-      {"info.vendor_id", 0x0800, 0x0800},
-      {"info.uptime", 0x080F, 0x080F},
-      {"info.reset_cause", 0x0813, 0x0813},
-      {"info.crash_program_counter", 0x0818, 0x0818},
-      {"store.command", 0x0910, 0x0910},
-      {"store.state", 0x08C0, 0x08C0},
-      {"store.sequence", 0x08C1, 0x08C1},
-      {"store.write_errors", 0x08C8, 0x08C8},
-      {"counters.queue_overflows", 0x0850, 0x0850},
-      {"refusal.reason", 0x0880, 0x0880},
-      {"trace.next", 0x08A0, 0x08A0},
+      {"supply.voltage_min", 0x2000, 0x2000},
+      {"link.timeout", 0x2010, 0x2010},
+      {"modbus.unit", 0x2030, 0x2030},
+      {"modbus.baud_rate", 0x2031, 0x2031},
+      {"trace.axis", 0x2040, 0x2040},
+      {"trace.interval", 0x2041, 0x2041},
+      {"transaction.control", 0x2100, 0x2100},
+      {"info.vendor_id", 0x2000, 0x2000},
+      {"info.uptime", 0x200F, 0x200F},
+      {"info.reset_cause", 0x2013, 0x2013},
+      {"info.crash_program_counter", 0x2018, 0x2018},
+      {"store.command", 0x2110, 0x2110},
+      {"store.state", 0x20C0, 0x20C0},
+      {"store.sequence", 0x20C1, 0x20C1},
+      {"store.write_errors", 0x20C8, 0x20C8},
+      {"counters.queue_overflows", 0x2050, 0x2050},
+      {"refusal.reason", 0x2080, 0x2080},
+      {"trace.next", 0x20A0, 0x20A0},
   };
   for (const Pin& pin : pins) {
     const std::size_t entry = find_entry(pin.name);
@@ -313,7 +315,7 @@ TEST(Dictionary, NoTwoValuesShareARegisterAndAxesDoNotRunIntoEachOther) {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
-    for (int word = 0; word < words_of(e.type); ++word) {
+    for (int word = 0; word < register_count(e.type); ++word) {
       const std::pair<bool, int> place{e.access == Access::read_write, modbus_address(entry, axis) + word};
       const auto [at, is_new] = owner.insert({place, std::string(e.name)});
       EXPECT_TRUE(is_new) << e.name << " and " << at->second << " at " << place.second;
@@ -321,10 +323,18 @@ TEST(Dictionary, NoTwoValuesShareARegisterAndAxesDoNotRunIntoEachOther) {
       if (e.scope() == Scope::axis) {
         EXPECT_EQ(place.second / 0x400, static_cast<int>(axis)) << e.name;
       } else {
-        EXPECT_GE(place.second, 0x800) << e.name;
+        EXPECT_GE(place.second, 0x2000) << e.name;
       }
     }
   }
+}
+
+TEST(Dictionary, HasRoomForSevenAxes) {
+  static_assert(dictionary_checks::places_hold<3>);
+  static_assert(dictionary_checks::places_hold<6>);
+  static_assert(dictionary_checks::places_hold<most_axes>);
+  static_assert(!dictionary_checks::places_hold<most_axes + 1>,
+                "axis 7 would begin where the device's objects do");
 }
 
 TEST(Dictionary, SlotsAndOwnersAreInverse) {

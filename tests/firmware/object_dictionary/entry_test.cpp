@@ -12,13 +12,13 @@ namespace {
 constexpr Group plain_group{"group", 0x2000, Scope::axis, 0x10};
 
 TEST(Entry, WordsOfEveryType) {
-  EXPECT_EQ(words_of(Type::unsigned8), 1);
-  EXPECT_EQ(words_of(Type::integer8), 1);
-  EXPECT_EQ(words_of(Type::integer16), 1);
-  EXPECT_EQ(words_of(Type::unsigned16), 1);
-  EXPECT_EQ(words_of(Type::unsigned32), 2);
-  EXPECT_EQ(words_of(Type::integer32), 2);
-  EXPECT_EQ(words_of(Type::float32), 2);
+  EXPECT_EQ(register_count(Type::unsigned8), 1);
+  EXPECT_EQ(register_count(Type::integer8), 1);
+  EXPECT_EQ(register_count(Type::integer16), 1);
+  EXPECT_EQ(register_count(Type::unsigned16), 1);
+  EXPECT_EQ(register_count(Type::unsigned32), 2);
+  EXPECT_EQ(register_count(Type::integer32), 2);
+  EXPECT_EQ(register_count(Type::float32), 2);
 }
 
 TEST(Entry, BytesOfEveryTypeAsAnObject) {

@@ -46,7 +46,7 @@ TEST_P(BackEmfOfMotors, TorqueConstantWithinThreePercent) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     MotorBench bench(motor, seed, 1e-3 * static_cast<double>(seed));
     const BackEmfFit fit = fit_of(swing(bench, motor.current, 6e-3, 6000), config_of(motor));
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     worst = std::max(worst, std::abs(fit.torque_constant.value / motor.torque_constant() - 1.0));
     EXPECT_LT(std::abs(fit.torque_constant.value - motor.torque_constant()),
               4.0 * fit.torque_constant.standard_error + 0.002 * motor.torque_constant());
@@ -64,7 +64,7 @@ TEST_P(BackEmfOfMotors, TorqueConstantWithinThreePercentFromASmallMotion) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     MotorBench bench(motor, seed, 1e-3 * static_cast<double>(seed));
     const BackEmfFit fit = fit_of(swing(bench, 0.5 * motor.current, 1e-3, 6000), config_of(motor));
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     worst = std::max(worst, std::abs(fit.torque_constant.value / motor.torque_constant() - 1.0));
     most = std::max(most, fit.induced_voltage);
   }
@@ -96,7 +96,7 @@ test::TorqueRecord ideal(double resistance, double k, std::size_t samples) {
 TEST(BackEmfFit, AnExactMotorIsFound) {
   BackEmfConfig config;
   const BackEmfFit fit = fit_of(ideal(2.0, 0.03, 6000), config);
-  ASSERT_EQ(words_of(fit.finding), "");
+  ASSERT_EQ(to_string(fit.finding), "");
   EXPECT_NEAR(fit.torque_constant.value, 0.03, 0.0003);
   EXPECT_NEAR(fit.resistance.value, 2.0, 0.05);
   EXPECT_NEAR(fit.speed_current_correlation, 0.0, 0.05);
@@ -124,7 +124,7 @@ TEST(BackEmfFit, WhatIsWrongIsNamed) {
   for (double& volts : bad.voltage) volts += 0.05 * random.gaussian();
   EXPECT_EQ(fit_of(bad, config).finding.cause, BackEmfCause::no_voltage);
   for (int n = 1; n <= static_cast<int>(BackEmfCause::not_resolved); ++n)
-    EXPECT_GT(words_of(static_cast<BackEmfCause>(n)).size(), 20u);
+    EXPECT_GT(to_string(static_cast<BackEmfCause>(n)).size(), 20u);
 }
 
 TEST(BackEmfFit, BlockedMotorDoesNotMove) {

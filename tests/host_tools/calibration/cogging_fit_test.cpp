@@ -67,7 +67,7 @@ TEST_P(CoggingOfMotors, CoggingAndFriction) {
     config.interval = 10 * test::tick;
     config.counts_per_turn = motor.counts_per_turn;
     const CoggingFit fit = fit_cogging(views, config);
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     const double amplitude = motor.brushed() ? 0.0 : motor.pmsm().cogging_torque / motor.transmission;
     if (!motor.brushed()) {
       EXPECT_EQ(fit.cogging_periods, static_cast<int>(motor.pmsm().cogging_periods));
@@ -127,7 +127,7 @@ TEST(CoggingFit, AllTermsOfAWholeTurn) {
   truth.cosine = 0.08;
   truth.sine = -0.05;
   const CoggingFit fit = fit_of(truth, 1.1);
-  ASSERT_EQ(words_of(fit.finding), "");
+  ASSERT_EQ(to_string(fit.finding), "");
   EXPECT_EQ(fit.cogging_periods, 42);
   EXPECT_TRUE(fit.gravity_turns);
   EXPECT_NEAR(fit.friction.value, truth.friction, 0.006);
@@ -150,7 +150,7 @@ TEST(CoggingFit, PeriodsAreFoundOverAFifthOfATurn) {
     truth.periods = periods;
     const CoggingFit fit = fit_of(truth, periods < 20 ? 0.4 : 0.2);
     if (fit.finding.cause == CoggingCause::periods_ambiguous) continue;
-    ASSERT_EQ(words_of(fit.finding), "") << periods;
+    ASSERT_EQ(to_string(fit.finding), "") << periods;
     EXPECT_EQ(fit.cogging_periods, periods);
   }
 }
@@ -210,7 +210,7 @@ TEST(CoggingFit, WhatIsWrongIsNamed) {
     for (double& angle : sweep->angle) angle = std::floor(angle * 42.0 / test::two_pi) / 42.0 * test::two_pi;
   EXPECT_NE(cause(jumping, jumping_back), CoggingCause::none);
   for (int n = 1; n <= static_cast<int>(CoggingCause::periods_ambiguous); ++n)
-    EXPECT_GT(words_of(static_cast<CoggingCause>(n)).size(), 20u);
+    EXPECT_GT(to_string(static_cast<CoggingCause>(n)).size(), 20u);
 }
 
 }  // namespace

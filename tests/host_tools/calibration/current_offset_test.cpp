@@ -16,7 +16,7 @@ TEST(CurrentOffset, ASensorOfTheSimulationIsGood) {
     std::vector<double> current;
     for (int k = 0; k < 2000; ++k) current.push_back(bench.sample().current_b);
     const CurrentOffset offset = check_current_offset(current);
-    EXPECT_EQ(words_of(offset.finding), "") << motor.name;
+    EXPECT_EQ(to_string(offset.finding), "") << motor.name;
     EXPECT_NEAR(offset.mean.value, 0.0, 0.01);
     EXPECT_NEAR(offset.noise, 0.03, 0.015);
   }
@@ -26,7 +26,7 @@ TEST(CurrentOffset, WhatIsWrongIsNamed) {
   simulation::NoiseGenerator random(1);
   std::vector<double> current(500);
   for (double& i : current) i = 0.03 * random.gaussian();
-  ASSERT_EQ(words_of(check_current_offset(current).finding), "");
+  ASSERT_EQ(to_string(check_current_offset(current).finding), "");
   EXPECT_NEAR(check_current_offset(current).noise, 0.03, 0.005);
   EXPECT_EQ(check_current_offset({}).finding.cause, CurrentOffsetCause::too_little_data);
   EXPECT_EQ(check_current_offset(std::span(current).first(99)).finding.cause,
@@ -44,10 +44,10 @@ TEST(CurrentOffset, WhatIsWrongIsNamed) {
   for (double& i : bad) i *= 10.0;
   EXPECT_EQ(check_current_offset(bad).finding.cause, CurrentOffsetCause::noise_large);
   for (double& i : bad) i = 0.0;
-  EXPECT_EQ(words_of(check_current_offset(bad).finding), "") << "a quiet sensor within one step";
+  EXPECT_EQ(to_string(check_current_offset(bad).finding), "") << "a quiet sensor within one step";
   EXPECT_GT(check_current_offset(bad).mean.standard_error, 0.0);
   for (int n = 1; n <= static_cast<int>(CurrentOffsetCause::railed); ++n)
-    EXPECT_GT(words_of(static_cast<CurrentOffsetCause>(n)).size(), 20u);
+    EXPECT_GT(to_string(static_cast<CurrentOffsetCause>(n)).size(), 20u);
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ TEST_P(FieldTurnOfMotors, OffsetWithinHalfAnElectricalDegree) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     MotorBench bench(motor, seed, 1e-3 * static_cast<double>(seed));
     const FieldTurnFit fit = fit_of(turn_both_ways(bench, 0.3 * static_cast<double>(seed)), config_of(motor));
-    ASSERT_EQ(words_of(fit.finding), "") << fit.pole_pairs.value;
+    ASSERT_EQ(to_string(fit.finding), "") << fit.pole_pairs.value;
     EXPECT_EQ(fit.direction, 1);
     EXPECT_EQ(fit.whole_pole_pairs, static_cast<int>(motor.pmsm().pole_pairs));
     worst = std::max(
@@ -107,7 +107,7 @@ TEST(FieldTurnFit, SwappedWiresAndAReversedEncoderTurnTheDirectionAround) {
   const BenchMotor motor = test::bench_motors()[2];
   MotorBench bench(motor, 2);
   const FieldTurnFit swapped = fit_of(turn_both_ways(bench, 0.3, 1.0, true), config_of(motor));
-  EXPECT_EQ(words_of(swapped.finding), "");
+  EXPECT_EQ(to_string(swapped.finding), "");
   EXPECT_EQ(swapped.direction, -1);
   EXPECT_EQ(swapped.whole_pole_pairs, 7);
 
@@ -116,7 +116,7 @@ TEST(FieldTurnFit, SwappedWiresAndAReversedEncoderTurnTheDirectionAround) {
   for (Sweep* sweep : {&reversed.there, &reversed.back})
     for (double& count : sweep->count) count = -count;
   const FieldTurnFit fit = fit_of(reversed, config_of(motor));
-  EXPECT_EQ(words_of(fit.finding), "");
+  EXPECT_EQ(to_string(fit.finding), "");
   EXPECT_EQ(fit.direction, -1);
   // With the direction applied, the angle is the motor's own again.
   EXPECT_LT(
@@ -203,7 +203,7 @@ TEST(FieldTurnFit, FrictionCancelsAndTheLagIsReported) {
   FieldTurnConfig config;
   for (const double first : {0.0, 123.0, -777.0}) {
     const FieldTurnFit fit = fit_of(ideal(4000.0 / 7.0, 0.4, 4.2, first), config);
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     const double offset = -(first - 0.5) / 4000.0 * 7.0 * test::two_pi;  // half a count: the counter's floor
     EXPECT_LT(degrees * std::abs(std::remainder(fit.offset.value - offset, test::two_pi)), 0.1) << first;
     EXPECT_GE(fit.offset.value, 0.0);
@@ -231,10 +231,10 @@ TEST(FieldTurnFit, RecordsThatHoldNothingAreNamed) {
   EXPECT_EQ(fit_of(ideal(4000.0 / 7.0, 0.1, 0.9), config).finding.cause, FieldTurnCause::too_little_data);
   // One whole turn after settling: a value, but nobody knows how good.
   const FieldTurnFit one = fit_of(ideal(4000.0 / 7.0, 0.1, 1.3), config);
-  EXPECT_TRUE(one.finding.is_none()) << words_of(one.finding);
+  EXPECT_TRUE(one.finding.is_none()) << to_string(one.finding);
   EXPECT_FALSE(one.offset.known());
   for (int n = 1; n <= static_cast<int>(FieldTurnCause::pole_pairs_differ); ++n)
-    EXPECT_GT(words_of(static_cast<FieldTurnCause>(n)).size(), 20u);
+    EXPECT_GT(to_string(static_cast<FieldTurnCause>(n)).size(), 20u);
 }
 
 }  // namespace

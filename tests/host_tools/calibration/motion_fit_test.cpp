@@ -51,7 +51,7 @@ TEST_P(MotionOfMotors, MassAndFrictionWithinTenPercent) {
       config.cogging_periods = motor.pmsm().cogging_periods;
     }
     const MotionFit fit = fit_motion(views, config);
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     const double mass = std::abs(fit.mass.value / motor.device.mass - 1.0);
     const double friction = std::abs(fit.friction.value / motor.device.friction - 1.0);
     worst_mass = std::max(worst_mass, mass);
@@ -102,7 +102,7 @@ TEST(MotionFit, MassDampingFrictionAndGravityOfAnExactHandle) {
   MotionFitConfig config;
   config.count_length = 5e-6;
   const MotionFit fit = fit_motion(views, config);
-  ASSERT_EQ(words_of(fit.finding), "");
+  ASSERT_EQ(to_string(fit.finding), "");
   EXPECT_NEAR(fit.mass.value, 0.05, 0.0015);
   EXPECT_NEAR(fit.damping.value, 0.8, 0.12);
   EXPECT_NEAR(fit.friction.value, 0.3, 0.03);
@@ -122,7 +122,7 @@ TEST(MotionFit, PhasesOfStickingAreLeftOut) {
     handle.advance(force, 0.0, test::tick);
   }
   const MotionFit fit = fit_of(track, 5e-6);
-  ASSERT_EQ(words_of(fit.finding), "");
+  ASSERT_EQ(to_string(fit.finding), "");
   EXPECT_GT(fit.sticking_share, 0.1);
   EXPECT_NEAR(fit.mass.value, 0.05, 0.005);
   EXPECT_NEAR(fit.friction.value, 0.5, 0.05);
@@ -131,7 +131,7 @@ TEST(MotionFit, PhasesOfStickingAreLeftOut) {
 TEST(MotionFit, WhatIsWrongIsNamed) {
   const simulation::DeviceModel device{0.05, 0.1, 0.1, 0.0};
   const Track good = ideal(device, 1.0, 400, 6000, 16e-6);
-  ASSERT_EQ(words_of(fit_of(good, 16e-6).finding), "");
+  ASSERT_EQ(to_string(fit_of(good, 16e-6).finding), "");
   EXPECT_EQ(fit_motion({}, {}).finding.cause, MotionCause::too_little_data);
   Track bad = good;
   bad.force.pop_back();
@@ -153,7 +153,7 @@ TEST(MotionFit, WhatIsWrongIsNamed) {
     bad.force[k] -= std::copysign(0.6, good.position[k + 30] - good.position[k - 30]);
   EXPECT_EQ(fit_of(bad, 16e-6).finding.cause, MotionCause::negative_friction);
   for (int n = 1; n <= static_cast<int>(MotionCause::not_resolved); ++n)
-    EXPECT_GT(words_of(static_cast<MotionCause>(n)).size(), 20u);
+    EXPECT_GT(to_string(static_cast<MotionCause>(n)).size(), 20u);
 }
 
 TEST(MotionFit, HalfAWaveOnlyIsNotAResult) {

@@ -69,7 +69,7 @@ WindingExcitation excitation_of(const BenchMotor& motor) {
 
 std::string fit_words(const Record& record, const WindingFitConfig& config = {}) {
   const WindingRecord view[] = {record.view()};
-  return words_of(fit_winding(view, config).finding);
+  return to_string(fit_winding(view, config).finding);
 }
 WindingCause cause_of(const Record& record, const WindingFitConfig& config = {}) {
   const WindingRecord view[] = {record.view()};
@@ -95,7 +95,7 @@ TEST_P(WindingOfMotors, ResistanceAndInductanceWithinThreePercent) {
     std::vector<WindingRecord> views;
     for (const Record& record : records) views.push_back(record.view());
     const WindingFit fit = fit_winding(views, config_of(motor));
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     worst_resistance = std::max(worst_resistance, std::abs(fit.resistance.value / motor.resistance() - 1.0));
     worst_inductance = std::max(worst_inductance, std::abs(fit.inductance.value / motor.inductance() - 1.0));
     if (motor.brushed()) {
@@ -116,7 +116,7 @@ TEST_P(WindingOfMotors, ResistanceAndInductanceWithinThreePercent) {
     free.fit_dead_time = false;
     free.known_resistance = fit.resistance;
     const WindingFit q_fit = fit_winding(q, free);
-    ASSERT_EQ(words_of(q_fit.finding), "");
+    ASSERT_EQ(to_string(q_fit.finding), "");
     worst_across = std::max(worst_across, std::abs(q_fit.inductance.value / motor.pmsm().inductance_q - 1.0));
   }
   std::printf("%s, worst of 20: R %.2f %%, L %.2f %%, L_q %.2f %%\n", motor.name.c_str(),
@@ -154,7 +154,7 @@ TEST(WindingFit, SupplyThatSagsDuringThePulseIsTakenIntoAccount) {
   const Record record = run(bench, excitation_of(motor), false);
   const WindingRecord view[] = {record.view()};
   const WindingFit fit = fit_winding(view, config_of(motor));
-  EXPECT_EQ(words_of(fit.finding), "");
+  EXPECT_EQ(to_string(fit.finding), "");
   EXPECT_NEAR(fit.resistance.value / motor.resistance(), 1.0, 0.03);
   EXPECT_NEAR(fit.inductance.value / motor.inductance(), 1.0, 0.03);
 }
@@ -189,7 +189,7 @@ TEST(WindingFit, TimeConstantsFromAThirdOfATickToAHundred) {
     const Record low = fine_steps(4.0, inductance, 0.15, half, 4000, 1.5, 0.0, 2, 0.03);
     const WindingRecord views[] = {high.view(), low.view()};
     const WindingFit fit = fit_winding(views);
-    ASSERT_EQ(words_of(fit.finding), "") << ticks;
+    ASSERT_EQ(to_string(fit.finding), "") << ticks;
     EXPECT_NEAR(fit.resistance.value, 4.0, 0.03 * 4.0) << ticks;
     EXPECT_NEAR(fit.inductance.value / inductance, 1.0, 0.03) << ticks;
     EXPECT_NEAR(fit.dead_time_voltage.value, 0.15, 0.05) << ticks;
@@ -204,7 +204,7 @@ TEST(WindingFit, StandardErrorsAreWhatTheValuesScatter) {
     const Record record = fine_steps(4.0, 1e-3, 0.0, 15, 1000, 2.0, 3.0, seed, 0.03);
     const WindingRecord view[] = {record.view()};
     const WindingFit fit = fit_winding(view);
-    ASSERT_EQ(words_of(fit.finding), "");
+    ASSERT_EQ(to_string(fit.finding), "");
     squares += std::pow((fit.inductance.value - 1e-3) / fit.inductance.standard_error, 2);
   }
   EXPECT_NEAR(std::sqrt(squares / runs), 1.0, 0.35);
@@ -274,8 +274,8 @@ TEST(WindingFit, OnePeriodOnlyGivesAResultOrSaysWhyNot) {
 
 TEST(WindingFit, EveryCauseHasWordsAndTheNumbersFollow) {
   for (int n = 1; n <= static_cast<int>(WindingCause::bad_fit); ++n)
-    EXPECT_GT(words_of(static_cast<WindingCause>(n)).size(), 20u);
-  EXPECT_EQ(words_of(WindingCause::none), "");
+    EXPECT_GT(to_string(static_cast<WindingCause>(n)).size(), 20u);
+  EXPECT_EQ(to_string(WindingCause::none), "");
   const Record still = fine_steps(4.0, 1e-3, 0.0, 15, 400, 0.0, 3.0, 1, 0.03);
   EXPECT_NE(fit_words(still).find("found 0 V, bound 0.001 V"), std::string::npos) << fit_words(still);
 }

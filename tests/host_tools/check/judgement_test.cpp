@@ -100,7 +100,7 @@ TEST(Judgement, AHandMovesTheEigenvalueBoundOnly) {
 
 TEST(Judgement, RegionsOfDiolaiti) {
   ParameterValues values = good();
-  const auto region = [&values] { return words_of(region_of(parameter_case(values, 0))); };
+  const auto region = [&values] { return to_string(region_of(parameter_case(values, 0))); };
   EXPECT_EQ(region(), "passive");
   values.set_real<"guard.friction">(0);
   EXPECT_EQ(region(), "limit cycle");

@@ -105,8 +105,8 @@ TEST(DescribedIndices, KindsAndNames) {
   EXPECT_EQ(by_index[0x2000].name, "wall");
   EXPECT_EQ(by_index[0x2800].name, "axis1.wall");
   EXPECT_EQ(by_index[0x6840].name, "axis1.drive.controlword");
-  EXPECT_EQ(by_index[0x3020].kind, ObjectKind::array);
-  EXPECT_EQ(by_index[0x3020].objects.size(), 1u + firmware::trace_objects);
+  EXPECT_EQ(by_index[0x5820].kind, ObjectKind::array);
+  EXPECT_EQ(by_index[0x5820].objects.size(), 1u + firmware::trace_objects);
 }
 
 }  // namespace

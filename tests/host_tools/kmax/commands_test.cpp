@@ -14,7 +14,7 @@ namespace kmax::cli {
 namespace {
 
 /// The words of a command line, up to what a shell would take for itself.
-std::vector<std::string> words_of(const std::string& line) {
+std::vector<std::string> words_in(const std::string& line) {
   std::vector<std::string> words;
   std::istringstream all(line);
   for (std::string word; all >> word;) {
@@ -62,7 +62,7 @@ TEST_F(Commands, EveryExampleInTheHelpIsACommandLineThatParses) {
   collect_examples(*program(), examples);
   EXPECT_GT(examples.size(), 60u);
   for (const std::string& example : examples) {
-    std::vector<std::string> words = words_of(example);
+    std::vector<std::string> words = words_in(example);
     words.erase(words.begin());
     std::vector<std::string> reversed(words.rbegin(), words.rend());
     try {

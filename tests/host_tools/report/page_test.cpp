@@ -13,10 +13,10 @@ namespace {
 using host_tools_test::thrown_message;
 
 TEST(Page, OriginsHaveTheWordsOfTheReports) {
-  EXPECT_EQ(words_of(Origin::calibrated), "calibrated");
-  EXPECT_EQ(words_of(Origin::predicted), "predicted");
-  EXPECT_EQ(words_of(Origin::measured), "measured");
-  EXPECT_EQ(words_of(Origin::paper), "paper");
+  EXPECT_EQ(to_string(Origin::calibrated), "calibrated");
+  EXPECT_EQ(to_string(Origin::predicted), "predicted");
+  EXPECT_EQ(to_string(Origin::measured), "measured");
+  EXPECT_EQ(to_string(Origin::paper), "paper");
 }
 
 TEST(Page, ARowThatDoesNotFitIsRefusedByEveryWriter) {

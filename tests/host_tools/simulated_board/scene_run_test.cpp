@@ -57,7 +57,7 @@ TEST(SceneRun, PersonsPressAgainstWallsThatMotorsMake) {
   for (const char* name : {"motor_axes", "single_motor"}) {
     const simulation::Scene scene = open_scene(name);
     const RunResult result = run_scene(scene);
-    EXPECT_EQ(result.end_state, DriveState::operation_enabled) << name << firmware::words_of(result.refusal);
+    EXPECT_EQ(result.end_state, DriveState::operation_enabled) << name << firmware::to_string(result.refusal);
     EXPECT_EQ(result.fault, firmware::Fault::none) << name;
     ASSERT_TRUE(result.contact) << name;
     EXPECT_LT(result.contact->peak_to_peak, 0.1e-3) << name;

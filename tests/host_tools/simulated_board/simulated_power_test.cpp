@@ -21,7 +21,7 @@ TEST(SimulatedPower, TheForceOfTheWallArrivesThroughEveryMotor) {
     MotorBench bench(identified(name));
     bench.drives().plant(0, Defect::motor_blocked);
     bench.prepare_wall();
-    ASSERT_TRUE(bench.arm()) << name << ": " << firmware::words_of(bench.application().refusal(0));
+    ASSERT_TRUE(bench.arm()) << name << ": " << firmware::to_string(bench.application().refusal(0));
     bench.run(0.01);
     EXPECT_NEAR(bench.current_force(), 0.0, 0.12) << name;
     for (const double force : {2.0, 0.5, 3.0}) {
@@ -134,7 +134,7 @@ class PowerLines : public testing::Test {
     bench.run(0.3);
     bench.clear();
     bench.set_wall_force(0.0);
-    EXPECT_TRUE(bench.arm()) << firmware::words_of(bench.application().refusal(0));
+    EXPECT_TRUE(bench.arm()) << firmware::to_string(bench.application().refusal(0));
   }
 
   MotorBench bench;

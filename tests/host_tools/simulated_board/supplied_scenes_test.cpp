@@ -62,7 +62,7 @@ TEST(SuppliedScenes, AllRunWithoutAFaultAndAreNamedAsTheirFiles) {
     const RunResult result = run_scene(scene);
     EXPECT_EQ(result.fault, firmware::Fault::none) << supplied.name;
     EXPECT_EQ(result.end_state, firmware::DriveState::operation_enabled)
-        << supplied.name << ": axis " << result.axis << ", " << firmware::words_of(result.refusal);
+        << supplied.name << ": axis " << result.axis << ", " << firmware::to_string(result.refusal);
     EXPECT_EQ(result.second_samples.empty(), scene.axes.size() < 2) << supplied.name;
     if (scene.axes[0].motion) {
       EXPECT_TRUE(result.contact) << supplied.name << ": the run ends before the hold";

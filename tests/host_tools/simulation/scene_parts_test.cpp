@@ -31,11 +31,11 @@ TEST(SceneParts, EveryPartInItsOrder) {
 }
 
 TEST(SceneParts, IntegratorsInWords) {
-  EXPECT_EQ(words_of(IntegratorConfig{}), "exact");
-  EXPECT_EQ(words_of({.kind = IntegratorKind::rk4, .substeps = 40}), "rk4, 40 substeps per 2 ms");
-  EXPECT_EQ(words_of({.kind = IntegratorKind::semi_implicit_euler}),
+  EXPECT_EQ(to_string(IntegratorConfig{}), "exact");
+  EXPECT_EQ(to_string({.kind = IntegratorKind::rk4, .substeps = 40}), "rk4, 40 substeps per 2 ms");
+  EXPECT_EQ(to_string({.kind = IntegratorKind::semi_implicit_euler}),
             "semi_implicit_euler, 10 substeps per 2 ms");
-  EXPECT_EQ(words_of({.kind = IntegratorKind::adaptive, .tolerance = 1e-9}), "adaptive, tolerance 1e-09");
+  EXPECT_EQ(to_string({.kind = IntegratorKind::adaptive, .tolerance = 1e-9}), "adaptive, tolerance 1e-09");
 }
 
 }  // namespace

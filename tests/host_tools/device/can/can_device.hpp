@@ -38,7 +38,7 @@ class CanDevice {
     if (!slot) return Abort::no_object;
     const auto [entry, axis] = firmware::owner_of(*slot);
     const auto& definition = firmware::entry_at(entry);
-    std::vector<std::uint16_t> words(firmware::words_of(definition.type));
+    std::vector<std::uint16_t> words(firmware::register_count(definition.type));
     const std::uint16_t address = firmware::modbus_address(entry, axis);
     if (definition.access == firmware::Access::read_write) {
       device.read_holding(address, words);
@@ -64,7 +64,7 @@ class CanDevice {
     if (definition.type == firmware::Type::integer8)
       raw = static_cast<std::uint32_t>(static_cast<std::int8_t>(raw));
     std::vector<std::uint16_t> words{static_cast<std::uint16_t>(raw)};
-    if (firmware::words_of(definition.type) == 2)
+    if (firmware::register_count(definition.type) == 2)
       words.insert(words.begin(), static_cast<std::uint16_t>(raw >> 16));
     switch (device.write_holding(firmware::modbus_address(entry, axis), words)) {
       case FakeDevice::Exception::none:

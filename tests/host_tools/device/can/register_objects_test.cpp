@@ -15,7 +15,7 @@ using Bytes = std::vector<std::uint8_t>;
 using Table = RegisterTable;
 
 RegisterObject one(Table table, std::size_t entry, std::size_t axis = 0) {
-  return objects_in(table, modbus_address(entry, axis), firmware::words_of(entry_at(entry).type))
+  return objects_in(table, modbus_address(entry, axis), firmware::register_count(entry_at(entry).type))
       .value()
       .at(0);
 }

@@ -6,18 +6,20 @@
 
 namespace kmax::firmware {
 
-/// One value from the main loop (single writer) to an interrupt (single reader) that may preempt it: the
-/// interrupt sees the old value or the new one, whole, and changes over between two ticks.
+/// A double buffer for the newest value from the main loop to an interrupt: one writer, one reader, which may
+/// preempt the writer and which the writer cannot preempt, on one core.
 ///
-/// Two places: the reader holds one; the writer fills the other and then offers it. While an offer has not
-/// been taken, the writer may replace it: it is withdrawn first, which is safe because the interrupt cannot
-/// be interrupted by the main loop. No lock, no loop, no copying in the interrupt.
+/// The reader holds one of two places, the writer fills the other and offers it. Guarantees, at whatever
+/// instruction the interrupt comes: ISR_take() gives the value before an offer or the offered one, each
+/// whole; a value that has been taken does not change until the next ISR_take(); the last offer is taken in
+/// the end, those before it may be skipped. No lock, no loop, and in the interrupt no copy.
 template <typename Value>
-class Handover {
+class DoubleBuffer {
  public:
-  explicit Handover(const Value& initial) : places_{initial, initial} {}
+  explicit DoubleBuffer(const Value& initial) : places_{initial, initial} {}
 
-  /// Main loop.
+  /// Main loop. An offer that has not been taken is withdrawn first and replaced; since the writer cannot
+  /// preempt the reader, the place is free from then on. Cost: one copy.
   void offer(const Value& value) {
     offered_.store(false, std::memory_order_release);
     std::atomic_signal_fence(std::memory_order_seq_cst);
@@ -29,7 +31,7 @@ class Handover {
   /// Main loop: the last offer has been taken.
   bool taken() const { return !offered_.load(std::memory_order_acquire); }
 
-  /// Interrupt: the value to use in this tick.
+  /// Interrupt: changes over to an offered value, and gives the one to use in this tick. Constant time.
   const Value& ISR_take() {
     if (offered_.load(std::memory_order_acquire)) {
       held_.store(static_cast<std::uint8_t>(1 - held_.load(std::memory_order_relaxed)),

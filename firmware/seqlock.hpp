@@ -6,11 +6,15 @@
 
 namespace kmax::firmware {
 
-/// The latest value from an interrupt (single writer) to the main loop (single reader), never torn: the
-/// reader repeats its copy when the interrupt came in between. The interrupt never waits; the reader's
-/// loop ends because a tick is much longer than a copy.
+/// A seqlock for the newest value from an interrupt to the main loop: one writer, which may preempt the
+/// reader at any instruction and is never preempted by it, and one reader, on one core.
+///
+/// Guarantees: read() gives one published value whole, the newest of the moment at which it returns; before
+/// the first publication an empty one. The writer never waits; the reader copies again when a publication
+/// came in between, and ends since publications are much further apart than a copy takes. The value must be
+/// trivially copyable in effect: a torn copy is made and thrown away.
 template <typename Value>
-class Snapshot {
+class Seqlock {
  public:
   void ISR_publish(const Value& value) {
     ISR_publish([&value](Value& place) { place = value; });

@@ -1,4 +1,4 @@
-#include "firmware/handover.hpp"
+#include "firmware/double_buffer.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -48,7 +48,7 @@ class HandoverTest : public testing::Test {
 };
 
 TEST_F(HandoverTest, StartsWithTheInitialValueTaken) {
-  Handover<int> handover(7);
+  DoubleBuffer<int> handover(7);
   EXPECT_TRUE(handover.taken());
   EXPECT_EQ(handover.ISR_take(), 7);
   handover.offer(8);
@@ -59,7 +59,7 @@ TEST_F(HandoverTest, StartsWithTheInitialValueTaken) {
 }
 
 TEST_F(HandoverTest, LastOfSeveralOffersWins) {
-  Handover<int> handover(0);
+  DoubleBuffer<int> handover(0);
   for (int i = 1; i <= 5; ++i) handover.offer(i);
   EXPECT_FALSE(handover.taken());
   EXPECT_EQ(handover.ISR_take(), 5);
@@ -73,7 +73,7 @@ TEST_F(HandoverTest, InterruptAtEveryPointOfEveryOfferSeesAWholeValueOldOrNew) {
   for (int point = 0; point <= static_cast<int>(Interrupted::pieces); ++point) {
     for (const bool one_waits : {false, true}) {
       for (const bool odd : {false, true}) {  // both places get their turn
-        Handover<Interrupted> handover(Interrupted(1));
+        DoubleBuffer<Interrupted> handover(Interrupted(1));
         if (odd) {
           handover.offer(Interrupted(1));
           (void)handover.ISR_take();
@@ -98,8 +98,8 @@ TEST_F(HandoverTest, InterruptAtEveryPointOfEveryOfferSeesAWholeValueOldOrNew) {
   }
 }
 
-RC_GTEST_PROP(Handover, TheInterruptNeverGoesBackAndAlwaysEndsWithTheLastOffer, ()) {
-  Handover<Interrupted> handover(Interrupted(0));
+RC_GTEST_PROP(DoubleBuffer, TheInterruptNeverGoesBackAndAlwaysEndsWithTheLastOffer, ()) {
+  DoubleBuffer<Interrupted> handover(Interrupted(0));
   int offered = 0, seen = 0;
   const auto look = [&] {
     const Interrupted& value = handover.ISR_take();

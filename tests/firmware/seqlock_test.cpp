@@ -1,4 +1,4 @@
-#include "firmware/snapshot.hpp"
+#include "firmware/seqlock.hpp"
 
 #include <gtest/gtest.h>
 
@@ -30,18 +30,18 @@ struct Interrupted {
   Interrupted& operator=(const Interrupted&) = default;
 };
 
-TEST(Snapshot, BeforeTheFirstPublicationTheValueIsEmpty) {
-  Snapshot<int> snapshot;
+TEST(Seqlock, BeforeTheFirstPublicationTheValueIsEmpty) {
+  Seqlock<int> snapshot;
   EXPECT_EQ(snapshot.read(), 0);
   snapshot.ISR_publish(5);
   EXPECT_EQ(snapshot.read(), 5);
   EXPECT_EQ(snapshot.read(), 5);
 }
 
-TEST(Snapshot, InterruptAtEveryPointOfTheCopyGivesTheNewestWholeValue) {
+TEST(Seqlock, InterruptAtEveryPointOfTheCopyGivesTheNewestWholeValue) {
   for (std::size_t point = 0; point <= Interrupted::pieces; ++point) {
     for (const int times : {1, 2, 5}) {  // also again during the repetition
-      Snapshot<Interrupted> snapshot;
+      Seqlock<Interrupted> snapshot;
       int published = 1;
       snapshot.ISR_publish(Interrupted(published));
       Interrupted::interrupt = [&] { snapshot.ISR_publish(Interrupted(++published)); };
