@@ -4,7 +4,7 @@
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/board/canopen_host.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_canopen_test {
 namespace {
 
 using firmware::Fault;
@@ -202,4 +202,4 @@ TEST_F(OnCan, ATwinIsToldAndForgotten) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_canopen_test

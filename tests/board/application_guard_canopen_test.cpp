@@ -7,7 +7,7 @@
 #include "firmware/stability_guard.hpp"
 #include "tests/board/canopen_host.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_guard_canopen_test {
 namespace {
 
 using firmware::canopen::Abort;
@@ -108,4 +108,4 @@ TEST_F(GuardOnCan, AWarningIsBit7OfTheStatusword) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_guard_canopen_test

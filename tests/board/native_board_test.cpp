@@ -4,7 +4,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::native_board_test {
 namespace {
 
 TEST(NativeBoard, OneAdvanceIsOneTickOfFiftyMicroseconds) {
@@ -92,4 +92,4 @@ TEST(NativeBoard, TwoBoardsWithTheSameCallsMakeTheSameBits) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::native_board_test

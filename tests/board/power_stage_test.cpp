@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board::odrive_v3::power_stage_test {
 namespace {
 
 using firmware::Fault;
@@ -137,4 +137,4 @@ TEST_F(PowerStageTest, AStopPressedSincePowerUpIsSeenWithoutAnEdge) {
 }
 
 }  // namespace
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board::odrive_v3::power_stage_test

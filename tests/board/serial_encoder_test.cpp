@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board::odrive_v3::serial_encoder_test {
 namespace {
 
 /// An AS5047P on a bus that the main loop may take.
@@ -108,4 +108,4 @@ TEST(SerialEncoder, AFaultOfTheEncoderStaysAlsoWhenTheBusWasTakenThen) {
 }
 
 }  // namespace
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board::odrive_v3::serial_encoder_test

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board::odrive_v3::voltage_variant_test {
 namespace {
 
 class Otp {
@@ -56,4 +56,4 @@ TEST(VoltageVariant, BlankBoardsGetTheDividerThatReadsHigh) {
 }
 
 }  // namespace
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board::odrive_v3::voltage_variant_test

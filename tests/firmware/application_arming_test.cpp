@@ -3,7 +3,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_arming_test {
 namespace {
 
 class Arming : public testing::Test {
@@ -204,4 +204,4 @@ TEST_F(Arming, StatuswordTellsTheStateAndTheLimit) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_arming_test

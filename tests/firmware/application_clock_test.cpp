@@ -7,7 +7,7 @@
 #include "tests/firmware/modbus/rtu_line.hpp"
 #include "tests/firmware/register_words.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::application_clock_test {
 namespace {
 
 using modbus::Bytes;
@@ -333,4 +333,4 @@ TEST(Interleaving, AnyNumberOfTicksBetweenPollsArmsAndDisarms) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::application_clock_test

@@ -9,7 +9,7 @@
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_guard_test {
 namespace {
 
 using control::Criterion;
@@ -281,4 +281,4 @@ TEST_F(GuardedArming, DefaultsAndTheStoreBringTheGuardsSettingsAndItsVerdictAlon
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_guard_test

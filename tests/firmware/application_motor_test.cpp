@@ -7,7 +7,7 @@
 #include "tests/board/bench.hpp"
 #include "tests/board/scripted_power.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_motor_test {
 namespace {
 
 using firmware::Fault;
@@ -264,4 +264,4 @@ TEST_F(MotorOfABoard, ACaptureIsCommandedAndReadThroughTheRegisters) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_motor_test

@@ -9,7 +9,7 @@
 #include "firmware/haptic_configuration.hpp"
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_safety_test {
 namespace {
 
 // Which settings a random host turns at: all that move the wall, the origin or the scale, and some that do
@@ -134,4 +134,4 @@ RC_GTEST_PROP(Safety, NoiseOnTheLineNeitherArmsNorDeafens, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_safety_test

@@ -6,7 +6,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_settings_test {
 namespace {
 
 class Settings : public testing::Test {
@@ -292,4 +292,4 @@ TEST_F(Settings, PresetIsRefusedLikeAHostsWrite) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_settings_test

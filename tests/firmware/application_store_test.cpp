@@ -4,7 +4,7 @@
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_store_test {
 namespace {
 
 using firmware::AnyFlashSectors;
@@ -219,4 +219,4 @@ TEST(ApplicationIdentity, ResetCauseAndCrashAreShown) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_store_test

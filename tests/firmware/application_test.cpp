@@ -10,7 +10,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_test {
 namespace {
 
 using firmware::Entry;
@@ -236,4 +236,4 @@ TEST(Application, IsDeterministicWhateverTheMemoryHeldBefore) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_test

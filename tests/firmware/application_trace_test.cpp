@@ -6,7 +6,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_trace_test {
 namespace {
 
 struct Record {
@@ -123,4 +123,4 @@ TEST_F(TraceOfABoard, WindowReadsWholeAtItsEdgesAndNotBeyond) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_trace_test

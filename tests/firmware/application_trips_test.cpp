@@ -5,7 +5,7 @@
 
 #include "tests/board/bench.hpp"
 
-namespace kmax::board {
+namespace kmax::board::application_trips_test {
 namespace {
 
 using firmware::Fault;
@@ -285,4 +285,4 @@ TEST_F(Trips, ATripThatMeetsTheHostsDisarmIsStillReported) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::application_trips_test

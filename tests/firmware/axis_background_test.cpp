@@ -5,7 +5,7 @@
 #include "firmware/axis.hpp"
 #include "firmware/haptic_configuration.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_background_test {
 namespace {
 
 constexpr std::uint32_t outside = 1000, inside = static_cast<std::uint32_t>(-1000);  // counts of 1 um
@@ -107,4 +107,4 @@ TEST_F(AxisBackground, WithoutInterferenceItIsTheFieldAlone) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_background_test

@@ -7,7 +7,7 @@
 
 #include "firmware/axis.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_compensation_test {
 namespace {
 
 class AxisCompensation : public testing::Test {
@@ -123,4 +123,4 @@ TEST_F(AxisCompensation, ComesWithTheSoftStartAtEveryHapticRate) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_compensation_test

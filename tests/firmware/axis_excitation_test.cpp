@@ -8,7 +8,7 @@
 
 #include "firmware/axis.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_excitation_test {
 namespace {
 
 constexpr double count_length = 1e-5;  // m
@@ -394,4 +394,4 @@ TEST_F(AxisExcitationTest, AMotionAgainstTheForceMadeTripsInHapticModeIfItIsWatc
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_excitation_test

@@ -9,7 +9,7 @@
 #include "firmware/axis.hpp"
 #include "tests/control/motor_winding.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_motion_test {
 namespace {
 
 constexpr double turn = 6.283185307179586;
@@ -296,4 +296,4 @@ TEST_F(AxisMotion, AReversedEncoderWithItsDirectionSetIsNoSpinOut) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_motion_test

@@ -5,7 +5,7 @@
 
 #include "firmware/axis.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_record_test {
 namespace {
 
 class AxisRecord : public testing::Test {
@@ -129,4 +129,4 @@ TEST_F(AxisRecord, TheReportIsWhatTheTickMade) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_record_test

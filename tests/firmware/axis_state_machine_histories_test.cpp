@@ -9,7 +9,7 @@
 
 #include "tests/firmware/drive_model.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_state_machine_histories_test {
 namespace {
 
 using enum DriveState;
@@ -150,4 +150,4 @@ TEST(AxisStateMachine, EveryStateIsReachedAndOnlyAsTheStandardDraws) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_state_machine_histories_test

@@ -10,7 +10,7 @@
 
 #include "tests/firmware/drive_model.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_state_machine_test {
 namespace {
 
 using enum DriveState;
@@ -249,4 +249,4 @@ TEST(Statusword, MasksOfTheStandardTellEveryStateWhateverTheOtherBits) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_state_machine_test

@@ -7,7 +7,7 @@
 
 #include "firmware/haptic_configuration.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::axis_test {
 namespace {
 
 AxisSetting setting_from(const ParameterValues& values, std::uint32_t generation = 1) {
@@ -204,4 +204,4 @@ TEST_F(AxisTest, SaysWhenTheMainLoopMustSeeItsReport) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::axis_test

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-namespace kmax::firmware {
+namespace kmax::firmware::capture_channel_test {
 namespace {
 
 // Numbers of the protocol: hosts in the field know them.
@@ -51,4 +51,4 @@ TEST(CaptureFlag, BitsAreApart) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::capture_channel_test

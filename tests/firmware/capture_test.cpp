@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace kmax::firmware {
+namespace kmax::firmware::capture_test {
 namespace {
 
 using enum CaptureChannel;
@@ -393,4 +393,4 @@ RC_GTEST_PROP(CaptureProperty, TheSamplesAreThoseOfTheTicksTheyAreSaidToBe, ()) 
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::capture_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace kmax::firmware {
+namespace kmax::firmware::crc32_test {
 namespace {
 
 std::uint32_t crc_of(const std::vector<std::uint32_t>& words) {
@@ -52,4 +52,4 @@ TEST(Crc32, OrderMatters) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::crc32_test

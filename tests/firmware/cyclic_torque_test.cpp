@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kmax::firmware {
+namespace kmax::firmware::cyclic_torque_test {
 namespace {
 
 ParameterValues in_mode_torque(std::int32_t target, std::size_t axis = 0) {
@@ -117,4 +117,4 @@ RC_GTEST_PROP(CyclicTorque, IsFiniteAndAsExactAsFloatForAllParameters, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::cyclic_torque_test

@@ -11,7 +11,7 @@
 #include "firmware/persistent_parameters.hpp"
 #include "tests/firmware/register_words.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::device_registers_linked_test {
 namespace {
 
 struct Pair {
@@ -204,4 +204,4 @@ RC_GTEST_PROP(LinkedParametersOfRegisters, AlwaysAgreeWhateverIsDone, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::device_registers_linked_test

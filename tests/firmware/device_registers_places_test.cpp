@@ -6,7 +6,7 @@
 
 #include "firmware/device_registers.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::device_registers_places_test {
 namespace {
 
 TEST(DeviceRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
@@ -41,4 +41,4 @@ TEST(DeviceRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::device_registers_places_test

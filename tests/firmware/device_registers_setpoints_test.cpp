@@ -9,7 +9,7 @@
 #include "firmware/persistent_parameters.hpp"
 #include "tests/firmware/register_words.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::device_registers_setpoints_test {
 namespace {
 
 class Registers : public testing::Test {
@@ -223,4 +223,4 @@ TEST_F(Communication, SetDuringATransactionStaysAtItsCommit) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::device_registers_setpoints_test

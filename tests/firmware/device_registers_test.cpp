@@ -11,7 +11,7 @@
 
 #include "tests/firmware/register_words.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::device_registers_test {
 namespace {
 
 // All parameters' bits, for "nothing has changed".
@@ -368,4 +368,4 @@ RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::device_registers_test

@@ -7,7 +7,7 @@
 #include "firmware/device_registers.hpp"
 #include "tests/firmware/register_words.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::device_registers_transaction_test {
 namespace {
 
 class Transaction : public testing::Test {
@@ -217,4 +217,4 @@ TEST_F(Transaction, ChangesOnlyWhatWasWrittenInIt) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::device_registers_transaction_test

@@ -6,7 +6,7 @@
 #include <array>
 #include <functional>
 
-namespace kmax::firmware {
+namespace kmax::firmware::double_buffer_test {
 namespace {
 
 // A value whose copy is interrupted: between any two of its pieces `interrupt` may run. On one core an
@@ -122,4 +122,4 @@ RC_GTEST_PROP(DoubleBuffer, TheInterruptNeverGoesBackAndAlwaysEndsWithTheLastOff
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::double_buffer_test

@@ -3,7 +3,7 @@
 
 #include "firmware/excitation.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::excitation_start_test {
 namespace {
 
 ExcitationConfig of_kind(ExcitationKind kind) {
@@ -89,4 +89,4 @@ TEST_F(ExcitationStart, AnotherRunStartsAnewInMidRamp) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::excitation_start_test

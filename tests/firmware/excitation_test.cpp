@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace kmax::firmware {
+namespace kmax::firmware::excitation_test {
 namespace {
 
 constexpr double turn = 6.283185307179586;
@@ -360,4 +360,4 @@ TEST_F(ExcitationTest, ANewStrokeIsApproachedFromWhereThePointIs) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::excitation_test

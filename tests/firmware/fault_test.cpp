@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace kmax::firmware {
+namespace kmax::firmware::fault_test {
 namespace {
 
 TEST(Fault, EveryFaultHasItsOwnCodeAndWords) {
@@ -33,4 +33,4 @@ TEST(Fault, UnknownCodeIsNoFault) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::fault_test

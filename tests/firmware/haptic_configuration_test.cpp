@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::firmware {
+namespace kmax::firmware::haptic_configuration_test {
 namespace {
 
 TEST(HapticConfiguration, CountLengthIsTravelPerTurnOverCounts) {
@@ -98,4 +98,4 @@ TEST(HapticConfiguration, EveryAllowedRateGivesItsDivider) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::haptic_configuration_test

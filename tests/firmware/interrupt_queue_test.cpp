@@ -6,7 +6,7 @@
 #include <deque>
 #include <thread>
 
-namespace kmax::firmware {
+namespace kmax::firmware::interrupt_queue_test {
 namespace {
 
 TEST(InterruptQueue, HoldsExactlyItsCapacityDropsTheNewestAndCounts) {
@@ -126,4 +126,4 @@ TEST(InterruptQueue, BetweenTwoThreadsNothingIsTornReorderedOrInvented) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::interrupt_queue_test

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace kmax::firmware {
+namespace kmax::firmware::linked_parameters_test {
 namespace {
 
 // From the vocabulary and CiA 402-2 (0x6060 and 0x607E), apart from the code under test.
@@ -91,4 +91,4 @@ TEST(LinkedParameters, OfASetFromElsewhereTheOneThatDiffersFromNowWins) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::linked_parameters_test

@@ -12,7 +12,7 @@
 #include "firmware/motor_control.hpp"
 #include "tests/control/motor_winding.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::motor_control_excitation_test {
 namespace {
 
 using control::test::DcMotor;
@@ -380,4 +380,4 @@ TEST(MotorControlExcitation, ItsFlagsGoWhenTheAxisIsNotDriven) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::motor_control_excitation_test

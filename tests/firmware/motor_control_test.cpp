@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-namespace kmax::firmware {
+namespace kmax::firmware::motor_control_test {
 namespace {
 
 constexpr double turn = 6.283185307179586;
@@ -274,4 +274,4 @@ TEST(MotorControl, CurrentsOfADcMotorThatDoNotAddUpAreTold) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::motor_control_test

@@ -9,7 +9,7 @@
 
 #include "tests/firmware/fake_flash.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::parameter_migration_test {
 namespace {
 
 struct Pair {
@@ -222,4 +222,4 @@ TEST(PersistentParameters, IdentitiesAreUniqueAndThoseOfTheBus) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::parameter_migration_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::firmware {
+namespace kmax::firmware::parameter_rules_test {
 namespace {
 
 constexpr std::size_t rate_entry = entry_of<"haptic.rate">();
@@ -52,4 +52,4 @@ TEST(ParameterRules, IntervalsMayBeAPointButNotTurnedRound) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::parameter_rules_test

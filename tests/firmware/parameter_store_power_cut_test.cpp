@@ -7,7 +7,7 @@
 #include "firmware/parameter_store.hpp"
 #include "tests/firmware/fake_flash.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::parameter_store_power_cut_test {
 namespace {
 
 constexpr std::size_t stride = record::aligned_up(Store::length);
@@ -169,4 +169,4 @@ TEST(ParameterStorePowerCut, OnAMemoryWithBrokenWords) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::parameter_store_power_cut_test

@@ -7,7 +7,7 @@
 
 #include "tests/firmware/fake_flash.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::parameter_store_test {
 namespace {
 
 constexpr std::size_t stride = record::aligned_up(Store::length);
@@ -317,4 +317,4 @@ TEST(ParameterStore, SavesOnABadMemorySayTheTruth) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::parameter_store_test

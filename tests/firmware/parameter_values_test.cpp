@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::firmware {
+namespace kmax::firmware::parameter_values_test {
 namespace {
 
 std::uint32_t bits(float value) {
@@ -130,4 +130,4 @@ TEST(RegisterAddress, IsTheTables) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::parameter_values_test

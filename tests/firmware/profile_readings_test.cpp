@@ -10,7 +10,7 @@
 
 #include "firmware/haptic_configuration.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::profile_readings_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -177,4 +177,4 @@ TEST(ProfileReadings, FlagsOfBothAxesShareAWordAndTheTickIsItsLowHalf) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::profile_readings_test

@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace kmax::firmware {
+namespace kmax::firmware::refusal_test {
 namespace {
 
 TEST(Refusal, NumbersAreTheProtocolsAndEveryOneHasItsOwnWords) {
@@ -27,4 +27,4 @@ TEST(Refusal, NumberOfALaterFirmwareIsSaidToBeUnknown) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::refusal_test

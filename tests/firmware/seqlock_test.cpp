@@ -5,7 +5,7 @@
 #include <array>
 #include <functional>
 
-namespace kmax::firmware {
+namespace kmax::firmware::seqlock_test {
 namespace {
 
 // Reading copies by construction, publishing by assignment: the interrupt runs in the middle of the former.
@@ -57,4 +57,4 @@ TEST(Seqlock, InterruptAtEveryPointOfTheCopyGivesTheNewestWholeValue) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::seqlock_test

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace kmax::firmware {
+namespace kmax::firmware::slot_descriptors_test {
 namespace {
 
 TEST(SharedRows, AddsARowOnlyIfItIsNotThere) {
@@ -74,4 +74,4 @@ TEST(SlotDescriptors, AreStoredOnce) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::slot_descriptors_test

@@ -11,7 +11,7 @@
 #include "firmware/parameter_migration.hpp"
 #include "tests/firmware/guarded_parameters.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::stability_guard_properties_test {
 namespace {
 
 using control::Criterion;
@@ -234,4 +234,4 @@ TEST(GuardNames, AreThoseOfTheCriteria) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::stability_guard_properties_test

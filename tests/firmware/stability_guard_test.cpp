@@ -7,7 +7,7 @@
 
 #include "tests/firmware/guarded_parameters.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::stability_guard_test {
 namespace {
 
 using control::Criterion;
@@ -324,4 +324,4 @@ TEST_F(Guard, LargestCoefficientOfEachLaw) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::stability_guard_test

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace kmax::firmware {
+namespace kmax::firmware::statusword_test {
 namespace {
 
 using enum DriveState;
@@ -81,4 +81,4 @@ TEST(Statusword, OfADriveThatDoesNothingIsTheStatesPattern) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::statusword_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::firmware {
+namespace kmax::firmware::thermal_supervisor_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -160,4 +160,4 @@ TEST(ThermalSupervisor, TheResistanceFollowsInSteps) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::thermal_supervisor_test

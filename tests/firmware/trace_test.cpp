@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-namespace kmax::firmware {
+namespace kmax::firmware::trace_test {
 namespace {
 
 TraceRecord record_at(const Trace& trace, std::uint32_t number) {
@@ -53,4 +53,4 @@ TEST(Trace, KeepsTheLast512RecordsWithTheirExactBits) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::trace_test

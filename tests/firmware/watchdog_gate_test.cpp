@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::firmware {
+namespace kmax::firmware::watchdog_gate_test {
 namespace {
 
 TEST(WatchdogGate, FeedsOnlyWhenBothAxesHaveTicked) {
@@ -29,4 +29,4 @@ TEST(WatchdogGate, EachFeedingNeedsBothTicksAgain) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::watchdog_gate_test

@@ -9,7 +9,7 @@
 
 #include "tests/firmware/canopen/communication_writes.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::communication_rules_test {
 namespace {
 
 using Writes = CommunicationWrites;
@@ -345,4 +345,4 @@ RC_GTEST_PROP(CommunicationRules, NoSequenceOfWritesLeavesAnIllegalPdo, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::communication_rules_test

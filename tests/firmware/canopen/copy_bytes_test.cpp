@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::copy_bytes_test {
 namespace {
 
 TEST(CopyBytes, CopiesAllOfTheSourceAndNothingBehindIt) {
@@ -22,4 +22,4 @@ TEST(CopyBytes, TakesNothingFromNowhere) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::copy_bytes_test

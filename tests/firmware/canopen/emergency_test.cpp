@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::emergency_test {
 namespace {
 
 using drivers::CanFrame;
@@ -394,4 +394,4 @@ RC_GTEST_PROP(Emergency, InTheEndTheBusKnowsTheState, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::emergency_test

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::heartbeat_consumer_test {
 namespace {
 
 using drivers::CanFrame;
@@ -207,4 +207,4 @@ TEST(HeartbeatConsumer, StartingAgainWaitsForTheAliveAndKeepsTheLost) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::heartbeat_consumer_test

@@ -9,7 +9,7 @@
 #include "firmware/canopen/lss_slave.hpp"
 #include "tests/firmware/canopen/lss_bench.hpp"
 
-namespace kmax::firmware::canopen::lss_test {
+namespace kmax::firmware::canopen::lss_test::lss_slave_identification_test {
 namespace {
 
 CanFrame scan(std::uint32_t number, unsigned check, unsigned sub, unsigned next) {
@@ -199,4 +199,4 @@ RC_GTEST_PROP(LssSlave, FastscanFindsEveryDeviceOnTheBus, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen::lss_test
+}  // namespace kmax::firmware::canopen::lss_test::lss_slave_identification_test

@@ -8,7 +8,7 @@
 
 #include "tests/firmware/canopen/lss_bench.hpp"
 
-namespace kmax::firmware::canopen::lss_test {
+namespace kmax::firmware::canopen::lss_test::lss_slave_test {
 namespace {
 
 TEST(LssSlave, SwitchStateGlobalIsNeverAnswered) {
@@ -252,4 +252,4 @@ TEST(LssSlave, InquireIdentity) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen::lss_test
+}  // namespace kmax::firmware::canopen::lss_test::lss_slave_test

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::mappable_test {
 namespace {
 
 const Entry& named_entry(std::string_view name) {
@@ -54,4 +54,4 @@ TEST(Mappable, TheCompactTableSaysTheSame) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::mappable_test

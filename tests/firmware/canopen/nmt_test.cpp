@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::nmt_test {
 namespace {
 
 using drivers::CanFrame;
@@ -246,4 +246,4 @@ TEST(Nmt, TheDevicesOwnChangeOfState) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::nmt_test

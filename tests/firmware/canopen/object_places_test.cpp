@@ -4,7 +4,7 @@
 
 #include <map>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::object_places_test {
 namespace {
 
 /// Index of an entry as an object of an axis, from the dictionary itself.
@@ -59,4 +59,4 @@ TEST(ObjectPlaces, TheHighestSubindexIsTheLastThatThereIs) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::object_places_test

@@ -4,7 +4,7 @@
 
 #include <initializer_list>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::pdo_mapping_test {
 namespace {
 
 constexpr auto receive = PdoKind::receive;
@@ -136,4 +136,4 @@ TEST(PdoMapping, TheSettingsAreWhereTheStandardHasThem) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::pdo_mapping_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::pdo_settings_test {
 namespace {
 
 struct Read {
@@ -71,4 +71,4 @@ TEST(PdoSettings, AllowsTheTypesThatThereAre) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::pdo_settings_test

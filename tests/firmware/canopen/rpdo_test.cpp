@@ -9,7 +9,7 @@
 
 #include "tests/firmware/canopen/communication_writes.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::rpdo_test {
 namespace {
 
 using drivers::CanFrame;
@@ -229,4 +229,4 @@ RC_GTEST_PROP(Rpdo, UnpacksWhatWasPacked, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::rpdo_test

@@ -7,7 +7,7 @@
 #include "tests/firmware/canopen/in_memory_objects.hpp"
 #include "tests/firmware/canopen/sdo_bench.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_block_download_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -133,4 +133,4 @@ TEST_F(SdoBlockDownloadTest, TheEndOutOfPlace) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_block_download_test

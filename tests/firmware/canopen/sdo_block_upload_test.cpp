@@ -7,7 +7,7 @@
 #include "tests/firmware/canopen/in_memory_objects.hpp"
 #include "tests/firmware/canopen/sdo_bench.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_block_upload_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -92,4 +92,4 @@ TEST_F(SdoBlockUploadTest, OutOfPlace) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_block_upload_test

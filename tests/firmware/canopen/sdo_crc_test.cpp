@@ -8,7 +8,7 @@
 
 #include "tests/firmware/canopen/sdo_test_client.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_crc_test {
 namespace {
 
 constexpr std::array<std::uint8_t, 9> digits{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
@@ -38,4 +38,4 @@ TEST(SdoCrc, EverySingleByteAfterEveryHighByte) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_crc_test

@@ -12,7 +12,7 @@
 #include "tests/firmware/canopen/sdo_bench.hpp"
 #include "tests/firmware/canopen/sdo_test_client.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_faults_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -265,4 +265,4 @@ RC_GTEST_PROP(SdoFaults, WhatIsReadIsWhatIsThereWhateverGetsLost, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_faults_test

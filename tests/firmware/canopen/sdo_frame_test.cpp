@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_frame_test {
 namespace {
 
 constexpr SdoBytes bytes{0xC6, 0x34, 0x12, 0x56, 0x78, 0x9A, 0xBC, 0xDE};
@@ -20,4 +20,4 @@ TEST(SdoFrame, EachCommandIsTheThreeHighestBits) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_frame_test

@@ -11,7 +11,7 @@
 #include "tests/firmware/canopen/sdo_bench.hpp"
 #include "tests/firmware/canopen/sdo_test_client.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_garbage_test {
 namespace {
 
 constexpr ObjectAddress device_type = InMemoryObjects::device_type;
@@ -127,4 +127,4 @@ RC_GTEST_PROP(SdoGarbage, ASegmentedDownloadIsWrittenWholeOrNotAtAll, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_garbage_test

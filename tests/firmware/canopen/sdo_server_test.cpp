@@ -8,7 +8,7 @@
 // Requests and answers byte by byte, after the frame tables of CiA 301 v4.2, 7.2.4.3. Whole transfers of all
 // sizes are in sdo_transfers_test.cpp.
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_server_test {
 namespace {
 
 constexpr ObjectAddress device_type = InMemoryObjects::device_type;
@@ -289,4 +289,4 @@ TEST_F(SdoServerTest, AnotherNodeIdTakesEffectWithTheStart) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_server_test

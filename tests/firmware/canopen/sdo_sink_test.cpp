@@ -6,7 +6,7 @@
 
 #include "tests/firmware/canopen/in_memory_objects.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_sink_test {
 namespace {
 
 constexpr ObjectAddress text{0x2013, 0};  // 2 to 10 bytes
@@ -74,4 +74,4 @@ TEST_F(SdoSinkTest, EachBeginForgetsTheValueBefore) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_sink_test

@@ -8,7 +8,7 @@
 #include "tests/firmware/canopen/in_memory_objects.hpp"
 #include "tests/firmware/canopen/sdo_bench.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_source_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -80,4 +80,4 @@ RC_GTEST_PROP(SdoSource, AnyPieceAtAnyOffset, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_source_test

@@ -10,7 +10,7 @@
 #include "tests/firmware/canopen/sdo_bench.hpp"
 #include "tests/firmware/canopen/sdo_test_client.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sdo_transfers_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -289,4 +289,4 @@ TEST(SdoTransfers, ANewInitiateReplacesEveryTransferAtEveryPoint) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sdo_transfers_test

@@ -6,7 +6,7 @@
 #include <initializer_list>
 #include <vector>
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::sync_test {
 namespace {
 
 using drivers::CanFrame;
@@ -109,4 +109,4 @@ TEST(Sync, ACounterThatCannotBeIsCountedButIsASync) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::sync_test

@@ -8,7 +8,7 @@
 
 #include "tests/firmware/canopen/tpdo_bench.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::tpdo_test {
 namespace {
 
 using Identifiers = std::vector<std::uint32_t>;
@@ -292,4 +292,4 @@ RC_GTEST_PROP(Tpdo, PacksTheValuesOneAfterTheOther, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::tpdo_test

@@ -8,7 +8,7 @@
 #include "firmware/canopen/tpdo.hpp"
 #include "tests/firmware/canopen/tpdo_bench.hpp"
 
-namespace kmax::firmware::canopen {
+namespace kmax::firmware::canopen::tpdo_timing_test {
 namespace {
 
 constexpr std::uint64_t wrap = std::uint64_t{1} << 32;
@@ -263,4 +263,4 @@ RC_GTEST_PROP(TpdoTiming, InhibitAndChangesAtAnyTime, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen
+}  // namespace kmax::firmware::canopen::tpdo_timing_test

@@ -9,7 +9,7 @@
 
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::crc_test {
 namespace {
 
 // Published frames: the standard's guide (02 07 -> 41 12), the "123456789" check value of the CRC-16/MODBUS
@@ -67,4 +67,4 @@ RC_GTEST_PROP(ModbusCrc, EveryBurstOfUpTo16BitsIsDetected, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::crc_test

@@ -12,7 +12,7 @@
 #include "tests/firmware/modbus/in_memory_bank.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::device_identification_test {
 namespace {
 
 using Objects = std::map<std::uint8_t, std::string>;
@@ -220,4 +220,4 @@ RC_GTEST_PROP(ModbusDeviceIdentification, StreamDeliversEveryObjectOnce, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::device_identification_test

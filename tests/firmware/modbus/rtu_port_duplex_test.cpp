@@ -1,7 +1,7 @@
 // Full-duplex lines: nothing that comes in is an echo.
 #include "tests/firmware/modbus/rtu_client.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::rtu_port_duplex_test {
 namespace {
 
 const Bytes read_pdu = {4, 0, 1, 0, 1};
@@ -45,4 +45,4 @@ TEST(RtuPortDuplex, RequestCompleteWhileSendingIsCountedAndLeavesTheReplyAlone) 
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::rtu_port_duplex_test

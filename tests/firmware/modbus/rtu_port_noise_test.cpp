@@ -9,7 +9,7 @@
 #include "tests/firmware/modbus/rtu_client.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::rtu_port_noise_test {
 namespace {
 
 Bytes some_request(std::uint8_t unit) {
@@ -94,4 +94,4 @@ RC_GTEST_PROP(RtuPortNoise, NoiseNeverGetsAReplyAndNeverStopsThePort, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::rtu_port_noise_test

@@ -9,7 +9,7 @@
 #include "tests/firmware/modbus/rtu_client.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::rtu_port_test {
 namespace {
 
 using Port = RtuPort<InMemoryBank>;
@@ -381,4 +381,4 @@ TEST(RtuPort, AReplyMayWaitForHours) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::rtu_port_test

@@ -9,7 +9,7 @@
 
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::rtu_receiver_test {
 namespace {
 
 constexpr double resolution_us = 4.0;  // rounding of limits and time stamps
@@ -389,4 +389,4 @@ RC_GTEST_PROP(RtuReceiver, FramesFollowTheDefinitionHoweverOftenItIsPolled, ()) 
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::rtu_receiver_test

@@ -7,7 +7,7 @@
 
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::rtu_timing_test {
 namespace {
 
 static_assert(CharacterFormat{}.bits() == 11);
@@ -60,4 +60,4 @@ TEST(ElapsedUs, WrapsAndNeverGoesBackwards) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::rtu_timing_test

@@ -12,7 +12,7 @@
 #include "tests/firmware/modbus/in_memory_bank.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 
-namespace kmax::firmware::modbus {
+namespace kmax::firmware::modbus::server_test {
 namespace {
 
 struct Fixture {
@@ -368,4 +368,4 @@ RC_GTEST_PROP(ModbusServer, AnyRequestGetsAWellFormedResponse, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::modbus
+}  // namespace kmax::firmware::modbus::server_test

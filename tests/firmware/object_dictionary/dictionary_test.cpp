@@ -11,7 +11,7 @@
 
 #include "firmware/object_dictionary/dictionary_checks.hpp"
 
-namespace kmax::firmware {
+namespace kmax::firmware::dictionary_test {
 namespace {
 
 const Entry& named(std::string_view name) {
@@ -375,4 +375,4 @@ TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::dictionary_test

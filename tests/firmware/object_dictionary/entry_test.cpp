@@ -6,7 +6,7 @@
 #include <bit>
 #include <limits>
 
-namespace kmax::firmware {
+namespace kmax::firmware::entry_test {
 namespace {
 
 constexpr Group plain_group{"group", 0x2000, Scope::axis, 0x10};
@@ -87,4 +87,4 @@ TEST(Entry, WordsOfARowSetWhatTheySay) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware
+}  // namespace kmax::firmware::entry_test

@@ -213,7 +213,7 @@ std::uint8_t trace_byte(unsigned k, unsigned b) {
 TEST(CanLink, TheTraceWindowIsMadeOfItsObjects) {
   Bench bench;
   bench.can.special = [](Object object) -> std::variant<Bytes, Abort> {
-    if (object.index != 0x3020) return Abort::none;
+    if (object.index != 0x5820) return Abort::none;
     Bytes bytes;
     for (unsigned b = 0; b < 128; ++b) bytes.push_back(trace_byte(object.subindex, b));
     return bytes;
@@ -245,7 +245,7 @@ Words window_of(const Bytes& bytes) {
 TEST(CanLink, ACaptureIsOneTransfer) {
   Bench bench;
   const Bytes all = host_tools_test::some_bytes(49152);
-  bench.can.by_index[0x3021] = all;
+  bench.can.by_index[0x5821] = all;
   std::vector<std::size_t> told;
   const auto words =
       bench.link().read_input_window(0x5000, 24576, [&](std::size_t done) { told.push_back(done); });
@@ -260,7 +260,7 @@ TEST(CanLink, ACaptureIsOneTransfer) {
 TEST(CanLink, APartOfACapture) {
   Bench bench;
   const Bytes all = host_tools_test::some_bytes(4000);
-  bench.can.by_index[0x3021] = all;
+  bench.can.by_index[0x5821] = all;
   const Words window = window_of(all);
   EXPECT_EQ(bench.link().read_input(0x5000 + 501, 100), Words(window.begin() + 501, window.begin() + 601));
   EXPECT_EQ(bench.link().read_input_window(0x5000, 2, {}), Words(window.begin(), window.begin() + 2));
@@ -274,14 +274,14 @@ TEST(CanLink, APartOfACapture) {
 TEST(CanLink, ACaptureThatIsNotCompleteIsRefused) {
   Bench bench;
   bench.can.special = [](Object object) -> std::variant<Bytes, Abort> {
-    return object.index == 0x3021 ? Abort::device_state : Abort::none;
+    return object.index == 0x5821 ? Abort::device_state : Abort::none;
   };
   try {
     bench.link().read_input_window(0x5000, 100, {});
     FAIL();
   } catch (const RefusedError& error) {
     EXPECT_EQ(error.exception(), 4);
-    EXPECT_CONTAINS(error.what(), "0x3021:01");
+    EXPECT_CONTAINS(error.what(), "0x5821:01");
   }
 }
 

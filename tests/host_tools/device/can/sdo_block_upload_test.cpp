@@ -17,7 +17,7 @@ using host_tools_test::some_bytes;
 using host_tools_test::thrown_message;
 using Frames = FakeSdoNode::Frames;
 
-constexpr SdoClient::Object object{0x3021, 1};
+constexpr SdoClient::Object object{0x5821, 1};
 constexpr std::size_t largest = 49152;
 
 TEST(SdoBlockUpload, EveryLength) {

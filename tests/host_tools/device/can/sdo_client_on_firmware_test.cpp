@@ -22,7 +22,7 @@ using host_tools_test::quick_sdo;
 using host_tools_test::some_bytes;
 using host_tools_test::thrown_message;
 
-constexpr ObjectAddress long_one{0x3022, 1}, number{0x2000, 4};
+constexpr ObjectAddress long_one{0x5822, 1}, number{0x2000, 4};
 
 /// One object that keeps what is written, one number of four bytes.
 struct Objects {
