@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 using Phase = CaptureProgress::Phase;
 
 namespace {
-constexpr milliseconds poll_interval{20};
+constexpr milliseconds capture_poll_interval{20};
 // The device acts in its next tick; this is for a line that is slow.
 constexpr milliseconds grace{1'000};
 
@@ -197,7 +197,7 @@ void CaptureReader::wait(microseconds patience, const Tell& tell) {
       throw DeviceError(fmt::format("{}: the capture stands still at {} of {} samples: the axis has no ticks",
                                     device_.description(), now.taken, all));
     }
-    device_.link().wait(std::min<microseconds>(poll_interval, deadline - device_.link().now()));
+    device_.link().wait(std::min<microseconds>(capture_poll_interval, deadline - device_.link().now()));
   }
 }
 

@@ -26,8 +26,8 @@ constexpr std::uint16_t switch_on_now = shutdown | switch_on;
 constexpr std::uint16_t enable_now = switch_on_now | enable_operation;
 }  // namespace word
 
-constexpr milliseconds patience{1000};
-constexpr milliseconds poll_interval{10};
+constexpr milliseconds transition_patience{1000};
+constexpr milliseconds transition_poll_interval{10};
 // The device keeps the last refusal until the next attempt has been judged, which takes it at most one
 // haptic sample. A refusal that is shown for longer after the attempt is the attempt's own.
 constexpr milliseconds judgement{50};
@@ -128,8 +128,8 @@ DriveStatus Drive::wait_until(Predicate done) {
     // has had all of it.
     const auto asked = device_.link().now();
     const DriveStatus seen = status();
-    if (done(seen) || asked - start > patience) return seen;
-    device_.link().wait(poll_interval);
+    if (done(seen) || asked - start > transition_patience) return seen;
+    device_.link().wait(transition_poll_interval);
   }
 }
 

@@ -18,9 +18,9 @@ using std::chrono::milliseconds;
 namespace {
 // 240 words and one erase take 0.6 s; a device that steps over bad words, or is busy with another's save,
 // takes longer.
-constexpr milliseconds patience{10'000};
-constexpr milliseconds poll_interval{20};
-constexpr int attempts = 3;
+constexpr milliseconds save_patience{10'000};
+constexpr milliseconds save_poll_interval{20};
+constexpr int save_attempts = 3;
 }  // namespace
 
 std::string name_of_identity(std::uint32_t identity) {
@@ -93,11 +93,11 @@ StoreStatus Store::wait_until_done(const StoreStatus& before) {
   for (;;) {
     const StoreStatus seen = status();
     if (seen.state != StoreState::busy) return seen;
-    if (device_.link().now() - start > patience)
+    if (device_.link().now() - start > save_patience)
       throw DeviceError(fmt::format(
           "the device is still saving after {} s; record {} is kept until it has done so, 'kmax info' tells",
-          patience.count() / 1000, before.sequence));
-    device_.link().wait(poll_interval);
+          save_patience.count() / 1000, before.sequence));
+    device_.link().wait(save_poll_interval);
   }
 }
 
@@ -114,7 +114,7 @@ StoreStatus Store::save() {
       break;
     } catch (const LinkError& error) {
       if (carried_out(status())) break;
-      if (attempt == attempts) throw LinkError(fmt::format("{}; nothing was saved", error.what()));
+      if (attempt == save_attempts) throw LinkError(fmt::format("{}; nothing was saved", error.what()));
     }
   }
   const StoreStatus after = wait_until_done(before);

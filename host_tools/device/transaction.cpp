@@ -20,9 +20,9 @@ namespace {
 constexpr Parameter control = Parameter::of<"transaction.control">();
 constexpr std::uint32_t drop = 0, begin = 1, commit = 2;
 
-constexpr int attempts = 3;
+constexpr int commit_attempts = 3;
 // The device drops a transaction 2 s after its last write; a bit more for the polling.
-constexpr milliseconds patience{2500};
+constexpr milliseconds transaction_patience{2500};
 constexpr milliseconds retry_interval{100};
 // A write that reached the device after it has dropped the transaction would act at once and alone. So no
 // write is repeated inside a transaction, and if this program was stopped for this long (suspended, swapped
@@ -85,7 +85,7 @@ class Device::Transaction {
         break;
       } catch (const RefusedError&) {
         const bool occupied = device_.last_refusal().reason == Refusal::transaction_open;
-        if (!occupied || device_.link_->now() - start > patience) throw;
+        if (!occupied || device_.link_->now() - start > transaction_patience) throw;
         if (!noticed && device_.notice_)
           device_.notice_("waiting for the device to drop a transaction that was left open");
       } catch (const LinkError&) {
@@ -181,9 +181,9 @@ void Device::apply(std::span<const Assignment> assignments) {
     } catch (const LostCommit& error) {
       return settle_lost_commit(assignments, error.what());
     } catch (const LinkError& error) {
-      if (attempt == attempts) throw LinkError(fmt::format("{}; {}", error.what(), nothing_changed));
+      if (attempt == commit_attempts) throw LinkError(fmt::format("{}; {}", error.what(), nothing_changed));
     } catch (const StoodStill&) {
-      if (attempt == attempts) throw;
+      if (attempt == commit_attempts) throw;
     }
   }
   follow_line_settings(assignments);

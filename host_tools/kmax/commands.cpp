@@ -10,7 +10,7 @@
 namespace kmax::cli {
 
 std::span<const AddCommand> all_commands() {
-  static constexpr std::array commands = {
+  static constexpr AddCommand commands[] = {
       &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_info_command,
       &add_devices_command,    &add_drive_commands,          &add_watch_command,      &add_record_command,
       &add_capture_command,    &add_calibrate_command,       &add_selftest_command,   &add_wall_command,

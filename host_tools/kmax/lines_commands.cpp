@@ -163,12 +163,12 @@ int watch_lines(Context& context, const BoardServices& services, const LinesOpti
   return done;
 }
 
-struct Assignment {
+struct LineAssignment {
   LineRole role;
   bool active;
 };
 
-Assignment parsed(const std::string& text) {
+LineAssignment parsed(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
     throw UsageError(fmt::format("'{}': write NAME=STATE, as in emergency_stop=stop", text));
@@ -190,9 +190,9 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
               const LinesConfig& config) {
   check_duration(options);
   if (options.texts.empty()) throw UsageError("write NAME=STATE, as in 'kmax lines set emergency_stop=stop'");
-  std::vector<Assignment> assignments;
+  std::vector<LineAssignment> assignments;
   for (const std::string& text : options.texts) {
-    const Assignment one = parsed(text);
+    const LineAssignment one = parsed(text);
     if (std::ranges::any_of(assignments, [&](const auto& other) { return other.role == one.role; }))
       throw UsageError(fmt::format("'{}': {} is named twice", text, lines::facts_of(one.role).name));
     config.required(one.role);

@@ -13,9 +13,9 @@
 namespace kmax::cli {
 
 namespace {
-constexpr std::size_t width = 120;
+constexpr std::size_t table_width = 120;
 constexpr std::size_t range_width_max = 24;
-constexpr std::size_t indent = 4;
+constexpr std::size_t help_indent = 4;
 
 struct Cells {
   std::string name, value, unit, range, default_value, help;
@@ -54,11 +54,11 @@ std::string cut(const std::string& text, std::size_t length) {
 void print_wrapped(std::ostream& out, std::string_view text) {
   while (!text.empty()) {
     std::size_t end = text.size();
-    if (end > width - indent) {
-      end = text.rfind(' ', width - indent);
-      if (end == std::string_view::npos) end = width - indent;
+    if (end > table_width - help_indent) {
+      end = text.rfind(' ', table_width - help_indent);
+      if (end == std::string_view::npos) end = table_width - help_indent;
     }
-    print(out, "{:{}}{}\n", "", indent, text.substr(0, end));
+    print(out, "{:{}}{}\n", "", help_indent, text.substr(0, end));
     text.remove_prefix(std::min(text.size(), end + 1));
   }
 }
@@ -73,11 +73,11 @@ void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows
     for (const Cells& cells : table) most = std::max(most, (cells.*cell).size());
     return std::min(most, limit);
   };
-  const std::size_t name = widest(&Cells::name, width), value = widest(&Cells::value, width);
-  const std::size_t unit = widest(&Cells::unit, width), range = widest(&Cells::range, range_width_max);
-  const std::size_t default_value = widest(&Cells::default_value, width);
+  const std::size_t name = widest(&Cells::name, table_width), value = widest(&Cells::value, table_width);
+  const std::size_t unit = widest(&Cells::unit, table_width), range = widest(&Cells::range, range_width_max);
+  const std::size_t default_value = widest(&Cells::default_value, table_width);
   const std::size_t used = name + value + unit + range + default_value + 10;
-  const std::size_t help = used < width && !whole_texts ? width - used : 0;
+  const std::size_t help = used < table_width && !whole_texts ? table_width - used : 0;
 
   for (const Cells& cells : table) {
     std::string line = fmt::format("{:<{}}  {:>{}}  {:<{}}  {:<{}}  {:>{}}  {}", cells.name, name,

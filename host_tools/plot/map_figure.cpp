@@ -11,7 +11,7 @@ namespace {
 
 // Okabe and Ito's palette without its yellow, which white swallows, then two dark ones that stand apart from
 // it.
-constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
+constexpr std::array line_colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
                                 "#56B4E9", "#000000", "#7A4A1E", "#5A5A5A"};
 constexpr std::size_t dash_patterns = 5;
 
@@ -78,7 +78,7 @@ std::string script_for(const MapFigure& figure) {
     if (line.strokes.empty()) continue;
     script += data_block(fmt::format("l{}", i), line.strokes, false);
     add(fmt::format("$l{} using 1:2 with lines lw 2.5 dt {} lc rgb '{}' {}", i,
-                    line.style % dash_patterns + 1, colours[line.style % colours.size()],
+                    line.style % dash_patterns + 1, line_colours[line.style % line_colours.size()],
                     title_of(line.label)));
   }
   if (figure.point) {

@@ -48,7 +48,7 @@ std::string shown(const std::string& text) {
   return lines + html_escaped(text.substr(begin));
 }
 
-void add_table(std::string& text, const Table& table) {
+void add_html_table(std::string& text, const Table& table) {
   const std::vector<bool> number = number_columns(table);
   if (table.columns.empty()) {
     if (!table.caption.empty()) text += "<p>" + shown(table.caption) + "</p>\n";
@@ -106,7 +106,7 @@ std::string html(const Page& page) {
     text += "<section>\n";
     if (!section.heading.empty()) text += "<h2>" + html_escaped(section.heading) + "</h2>\n";
     for (const std::string& paragraph : section.paragraphs) text += "<p>" + shown(paragraph) + "</p>\n";
-    for (const Table& table : section.tables) add_table(text, table);
+    for (const Table& table : section.tables) add_html_table(text, table);
     for (const Picture& picture : section.pictures) {
       const std::string caption = html_escaped(picture.caption);
       text += "<figure>\n<img src=\"" + url_path(picture.file) + "\" alt=\"" + caption + "\">\n";

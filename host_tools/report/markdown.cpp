@@ -27,7 +27,7 @@ std::string as_paragraph(const std::string& text) {
   return escaped;
 }
 
-void add_table(std::string& text, const Table& table) {
+void add_markdown_table(std::string& text, const Table& table) {
   const std::vector<bool> right = number_columns(table);
   if (!table.caption.empty()) text += as_paragraph(table.caption) + "\n\n";
   if (table.columns.empty()) return;
@@ -97,7 +97,7 @@ std::string markdown(const Page& page) {
       const std::string written = as_paragraph(paragraph);
       if (!written.empty()) text += written + "\n\n";
     }
-    for (const Table& table : section.tables) add_table(text, table);
+    for (const Table& table : section.tables) add_markdown_table(text, table);
     for (const Picture& picture : section.pictures)
       text += "![" + markdown_escaped(picture.caption) + "](" + url_path(picture.file) + ")\n\n";
   }

@@ -17,7 +17,7 @@ namespace odeint = boost::numeric::odeint;
 
 constexpr double absolute_share = 1e-3;  // of the tolerance, in m and m/s
 constexpr int points = 8;                // of the dense output that are looked at per step
-constexpr long most_steps = 1'000'000;
+constexpr long most_integrator_steps = 1'000'000;
 constexpr int most_events = 64;
 
 template <std::size_t masses>
@@ -58,9 +58,9 @@ class AdaptiveRun {
         const Vector current = dense_.current_state();
         dense_.initialize(current, t_, duration_ - t_);
       }
-      if (++steps_ > most_steps) {
+      if (++steps_ > most_integrator_steps) {
         throw std::runtime_error(fmt::format(
-            "the adaptive integrator needs more than {} steps: choose a larger tolerance", most_steps));
+            "the adaptive integrator needs more than {} steps: choose a larger tolerance", most_integrator_steps));
       }
       const auto [begin, end] = dense_.do_step(system);
       if (may_change) {

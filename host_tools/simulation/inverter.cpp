@@ -14,7 +14,7 @@ constexpr double band_share = 0.5;      // of a PWM period; the band's time cons
 constexpr double fine_turn = 0.1;       // rad of the electrical angle in a fine step
 constexpr double no_current = 1e-9;     // A; what a diode does not notice
 constexpr int bisections = 30;          // 2^-30 = 1e-9
-constexpr int most_steps = 10'000'000;  // per call; more is a defect of this file
+constexpr int most_inverter_steps = 10'000'000;  // per call; more is a defect of this file
 
 enum class Path : unsigned char { absent, blocked, leg, lower_diode, upper_diode };
 
@@ -45,7 +45,7 @@ class Propagation {
     } else {
       double left = duration;
       for (int step = 0; left > 1e-12 * duration; ++step) {
-        if (step == most_steps) throw std::logic_error("inverter: too many steps");
+        if (step == most_inverter_steps) throw std::logic_error("inverter: too many steps");
         const double used = advance_step(shaft, left);
         left -= used;
         shaft.angle += shaft.speed * used;

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kmax {
+namespace kmax::include_floors_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -185,4 +185,4 @@ TEST(Files, AreShortEnoughToBeReadInOneGo) {
 }
 
 }  // namespace
-}  // namespace kmax
+}  // namespace kmax::include_floors_test

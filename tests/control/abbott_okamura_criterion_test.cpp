@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::abbott_okamura_criterion_test {
 namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -78,4 +78,4 @@ RC_GTEST_PROP(AbbottOkamuraCriterion, Monotone, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::abbott_okamura_criterion_test

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace kmax::control {
+namespace kmax::control::adaptive_coefficient_test {
 namespace {
 
 using Config = AdaptiveCoefficientConfig<double>;
@@ -176,4 +176,4 @@ TEST(AdaptiveCoefficient, ANotANumberDoesNotPoisonTheMemory) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::adaptive_coefficient_test

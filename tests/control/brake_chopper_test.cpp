@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::brake_chopper_test {
 namespace {
 
 constexpr auto fitted = BrakeChopper::prepare({25.0f, 0.5f});
@@ -50,4 +50,4 @@ TEST(BrakeChopper, TakesAVoltageThatIsNoNumberAsLow) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::brake_chopper_test

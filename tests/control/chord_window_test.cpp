@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace kmax::control {
+namespace kmax::control::chord_window_test {
 namespace {
 
 // The definition in whole numbers: the chord to sample n passes within 1 of sample j when n D_j - j D_n is
@@ -125,4 +125,4 @@ TEST(ChordWindow, TheLargestBendsEndTheWindow) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::chord_window_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::closed_form_criteria_test {
 namespace {
 
 // Numbers that no two formulas share, and every part of a minimum the smaller one in turn.
@@ -145,4 +145,4 @@ TEST(ClosedFormCriteria, WhatIsLeftOutDoesNotApplyAndTheRestIsTheSame) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::closed_form_criteria_test

@@ -10,7 +10,7 @@
 #include "control/sampled_stability.hpp"
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::control {
+namespace kmax::control::colgate_criterion_test {
 namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -88,4 +88,4 @@ TEST(ColgateCriterion, EveryPassiveHandIsStableBelowTheLimit) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::colgate_criterion_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace kmax::control {
+namespace kmax::control::count_extender_test {
 namespace {
 
 TEST(CountExtender, SixteenBitsWrapForwardsAndBackwards) {
@@ -97,4 +97,4 @@ TEST(CountExtender, ADayOfWrapsLosesNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::count_extender_test

@@ -7,7 +7,7 @@
 
 #include "control/current_loop_gains.hpp"
 
-namespace kmax::control {
+namespace kmax::control::current_loop_delay_test {
 namespace {
 
 constexpr double rate = 20000.0;
@@ -62,4 +62,4 @@ TEST(CurrentLoopDelay, KnownNumbers) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::current_loop_delay_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-namespace kmax::control {
+namespace kmax::control::current_loop_gains_test {
 namespace {
 
 constexpr double period = 5e-5;
@@ -111,4 +111,4 @@ TEST(CurrentLoopGains, FloatFollowsDouble) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::current_loop_gains_test

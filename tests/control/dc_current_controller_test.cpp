@@ -11,7 +11,7 @@
 #include "tests/control/dc_current_loop.hpp"
 #include "tests/control/motor_winding.hpp"
 
-namespace kmax::control {
+namespace kmax::control::dc_current_controller_test {
 namespace {
 
 using test::Belief;
@@ -260,4 +260,4 @@ TEST(DcCurrentController, ResetEmptiesTheIntegrator) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::dc_current_controller_test

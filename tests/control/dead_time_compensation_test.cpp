@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::dead_time_compensation_test {
 namespace {
 
 TEST(DeadTimeCompensation, IsTheShareBeyondTheBandAndAStraightLineWithin) {
@@ -68,4 +68,4 @@ TEST(DeadTimeCompensation, WhatMakesNoSenseSwitchesItOff) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::dead_time_compensation_test

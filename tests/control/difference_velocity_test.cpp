@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::difference_velocity_test {
 namespace {
 
 TEST(DifferenceVelocity, OneCountIsOneQuantumPerPeriod) {
@@ -50,4 +50,4 @@ RC_GTEST_PROP(DifferenceVelocity, EveryPairOfCountsGivesAFiniteValue,
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::difference_velocity_test

@@ -8,7 +8,7 @@
 
 #include "control/abbott_okamura_criterion.hpp"
 
-namespace kmax::control {
+namespace kmax::control::diolaiti_criterion_test {
 namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -73,4 +73,4 @@ RC_GTEST_PROP(DiolaitiCriterion, EscapeIsHarderWithFrictionAndEasierWithStiffnes
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::diolaiti_criterion_test

@@ -7,7 +7,7 @@
 
 #include "control/wall_law.hpp"
 
-namespace kmax::control {
+namespace kmax::control::field_criterion_test {
 namespace {
 
 TEST(FieldCriterion, KnownNumbers) {
@@ -67,4 +67,4 @@ RC_GTEST_PROP(FieldCriterion, IsTheLawsSteepestSlope, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::field_criterion_test

@@ -10,7 +10,7 @@
 #include "tests/control/field_oriented_loop.hpp"
 #include "tests/control/motor_winding.hpp"
 
-namespace kmax::control {
+namespace kmax::control::field_oriented_controller_at_speed_test {
 namespace {
 
 using test::AxisLoop;
@@ -188,4 +188,4 @@ TEST(FieldOrientedControllerAtSpeed, TheSupplyIsHalvedInMidStep) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::field_oriented_controller_at_speed_test

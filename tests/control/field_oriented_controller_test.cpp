@@ -12,7 +12,7 @@
 #include "tests/control/field_oriented_loop.hpp"
 #include "tests/control/motor_winding.hpp"
 
-namespace kmax::control {
+namespace kmax::control::field_oriented_controller_test {
 namespace {
 
 using test::Belief;
@@ -363,4 +363,4 @@ TEST(FieldOrientedController, PositiveTorqueIsInTheDirectionOfGrowingAngle) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::field_oriented_controller_test

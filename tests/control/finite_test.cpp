@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-namespace kmax::control {
+namespace kmax::control::finite_test {
 namespace {
 
 RC_GTEST_PROP(Finite, AgreesWithTheStandardLibraryOnEveryPattern, (std::uint32_t bits)) {
@@ -46,4 +46,4 @@ TEST(BoundedShare, StaysBetweenNothingAndAll) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::finite_test

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace kmax::control {
+namespace kmax::control::foaw_velocity_test {
 namespace {
 
 struct Choice {
@@ -269,4 +269,4 @@ TEST(FoawVelocity, WindowsOutsideTheRangeAreTakenAsTheNearerLimit) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::foaw_velocity_test

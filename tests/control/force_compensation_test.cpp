@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::force_compensation_test {
 namespace {
 
 using Compensation = ForceCompensation<float>;
@@ -337,4 +337,4 @@ TEST(ForceCompensation, BeyondTheFrictionAHandleIsMoved) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::force_compensation_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::force_limiter_test {
 namespace {
 
 using Limiter = ForceLimiter<float>;
@@ -99,4 +99,4 @@ TEST(ForceLimiter, NotFiniteGivesZeroAndTheSoftStartAgain) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::force_limiter_test

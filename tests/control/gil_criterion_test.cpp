@@ -10,7 +10,7 @@
 #include "control/sampled_stability.hpp"
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::control {
+namespace kmax::control::gil_criterion_test {
 namespace {
 
 TEST(GilCriterion, KnownNumbers) {
@@ -64,4 +64,4 @@ TEST(GilCriterion, ErrsWithHighDamping) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::gil_criterion_test

@@ -8,7 +8,7 @@
 
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::control {
+namespace kmax::control::handle_transition_test {
 namespace {
 
 using Model = HandleModel<double>;
@@ -118,4 +118,4 @@ TEST(HandleTransition, NoTimeIsNoChange) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::handle_transition_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace kmax::control {
+namespace kmax::control::haptic_loop_test {
 namespace {
 
 // A plain wall without soft start, sampled at every tick.
@@ -268,4 +268,4 @@ TEST(HapticLoop, ParallelInterferenceIsReportedForTheOtherAxis) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::haptic_loop_test

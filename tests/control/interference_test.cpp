@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::control {
+namespace kmax::control::interference_test {
 namespace {
 
 TEST(Interference, PerpendicularIsEquationTwo) {
@@ -57,4 +57,4 @@ TEST(Interference, NoneDoesNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::interference_test

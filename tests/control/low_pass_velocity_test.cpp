@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace kmax::control {
+namespace kmax::control::low_pass_velocity_test {
 namespace {
 
 constexpr double period = 5e-5;
@@ -76,4 +76,4 @@ TEST(LowPassVelocity, FloatIsTheSameFarFromZeroAndCloseToDouble) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::low_pass_velocity_test

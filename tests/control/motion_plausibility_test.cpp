@@ -10,7 +10,7 @@
 
 #include "control/foaw_velocity.hpp"
 
-namespace kmax::control {
+namespace kmax::control::motion_plausibility_test {
 namespace {
 
 using Watch = MotionPlausibility<float>;
@@ -316,4 +316,4 @@ TEST(MotionPlausibility, ResetForgets) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::motion_plausibility_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::motor_transmission_test {
 namespace {
 
 MotorTransmissionConfig<float> capstan() {
@@ -80,4 +80,4 @@ TEST(MotorTransmission, ALimitOfZeroMeansNoCurrent) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::motor_transmission_test

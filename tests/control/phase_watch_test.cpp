@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::phase_watch_test {
 namespace {
 
 using Watch = PhaseWatch<float>;
@@ -226,4 +226,4 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::phase_watch_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace kmax::control {
+namespace kmax::control::resampler_test {
 namespace {
 
 __extension__ using Wide = __int128;
@@ -218,4 +218,4 @@ TEST(ResamplerStep, NonsenseAndExcessAreBounded) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::resampler_test

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::resolution_criterion_test {
 namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -42,4 +42,4 @@ RC_GTEST_PROP(ResolutionCriterion, TheSpeedLimitIsWhereTheStepMeetsTheForce, ())
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::resolution_criterion_test

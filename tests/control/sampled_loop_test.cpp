@@ -10,7 +10,7 @@
 
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::control {
+namespace kmax::control::sampled_loop_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -165,4 +165,4 @@ TEST(LoopEquation, KnowsWhatCannotBeComputed) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::sampled_loop_test

@@ -14,7 +14,7 @@
 
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::control {
+namespace kmax::control::sampled_stability_test {
 namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::max();
@@ -350,4 +350,4 @@ RC_GTEST_PROP(SampledStability, ScalesWithTimeAndMass, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::sampled_stability_test

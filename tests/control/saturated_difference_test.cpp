@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::saturated_difference_test {
 namespace {
 
 constexpr std::int64_t largest = std::numeric_limits<std::int32_t>::max();
@@ -62,4 +62,4 @@ RC_GTEST_PROP(DifferenceToFourBits, IsTheDifferenceCutToItsRange, (std::int32_t 
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::saturated_difference_test

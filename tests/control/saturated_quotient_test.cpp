@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::saturated_quotient_test {
 namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -36,4 +36,4 @@ RC_GTEST_PROP(SaturatedQuotient, FiniteForFinite, (float numerator, float denomi
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::saturated_quotient_test

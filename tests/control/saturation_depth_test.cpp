@@ -8,7 +8,7 @@
 
 #include "control/wall_law.hpp"
 
-namespace kmax::control {
+namespace kmax::control::saturation_depth_test {
 namespace {
 
 TEST(SaturationDepth, PaperOnesStiffestWallSaturatesWithinThreeCounts) {
@@ -39,4 +39,4 @@ RC_GTEST_PROP(SaturationDepth, IsWhereTheLawMeetsTheLimit, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::saturation_depth_test

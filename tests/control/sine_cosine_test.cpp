@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace kmax::control {
+namespace kmax::control::sine_cosine_test {
 namespace {
 
 long double radians(TurnFraction angle) {
@@ -91,4 +91,4 @@ TEST(SineCosine, AngleUnit) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::sine_cosine_test

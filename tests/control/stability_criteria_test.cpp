@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::stability_criteria_test {
 namespace {
 
 template <typename Scalar>
@@ -297,4 +297,4 @@ static_assert(judge(Criterion::colgate, desktop_case<float>()).applies);
 static_assert(!judge(Criterion::colgate, desktop_case<float>()).pass);
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::stability_criteria_test

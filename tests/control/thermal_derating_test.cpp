@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::control {
+namespace kmax::control::thermal_derating_test {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -60,4 +60,4 @@ TEST(ThermalDerating, BoundsFarApartDoNotOverflow) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::thermal_derating_test

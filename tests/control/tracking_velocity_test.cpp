@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace kmax::control {
+namespace kmax::control::tracking_velocity_test {
 namespace {
 
 constexpr double period = 5e-5;
@@ -110,4 +110,4 @@ TEST(TrackingVelocity, FloatDoesNotDriftOnALongRamp) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::tracking_velocity_test

@@ -13,7 +13,7 @@
 #include "control/count_extender.hpp"
 #include "control/resampler.hpp"
 
-namespace kmax::control {
+namespace kmax::control::velocity_estimator_test {
 namespace {
 
 using Kind = VelocityEstimatorKind;
@@ -249,4 +249,4 @@ RC_GTEST_PROP(VelocityEstimator, EveryOutputIsFinite, (const std::vector<std::in
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::velocity_estimator_test

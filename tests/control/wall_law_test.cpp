@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace kmax::control {
+namespace kmax::control::wall_law_test {
 namespace {
 
 template <typename Scalar>
@@ -180,4 +180,4 @@ TEST(WallLaw, NotANumberIsNotHidden) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::wall_law_test

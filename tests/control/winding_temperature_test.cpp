@@ -8,7 +8,7 @@
 
 #include "control/thermal_derating.hpp"
 
-namespace kmax::control {
+namespace kmax::control::winding_temperature_test {
 namespace {
 
 using Model = WindingTemperature<float>;
@@ -255,4 +255,4 @@ TEST(WindingTemperature, DeratingSettlesBelowTheLimit) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::winding_temperature_test

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace kmax::control {
+namespace kmax::control::word_transfer_test {
 namespace {
 
 TEST(WordTransfer, PairsAreReadAndWrittenWhereTheIndexSays) {
@@ -31,4 +31,4 @@ TEST(WordTransfer, FoursMoveOn) {
 }
 
 }  // namespace
-}  // namespace kmax::control
+}  // namespace kmax::control::word_transfer_test

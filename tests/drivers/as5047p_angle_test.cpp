@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <functional>
 
-namespace kmax::drivers {
+namespace kmax::drivers::as5047p_angle_test {
 namespace {
 
 /// A chip by its data sheet, one frame late, and a line in between.
@@ -320,4 +320,4 @@ RC_GTEST_PROP(As5047pAngle, RandomNoiseNeverLosesATurn, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::as5047p_angle_test

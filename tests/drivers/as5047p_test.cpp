@@ -4,7 +4,7 @@
 
 #include <deque>
 
-namespace kmax::drivers {
+namespace kmax::drivers::as5047p_test {
 namespace {
 
 /// Answers from a script of replies; 0x0000 when it has run out.
@@ -99,4 +99,4 @@ TEST(As5047p, BusThatDoesNotMoveIsNamedAtOnce) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::as5047p_test

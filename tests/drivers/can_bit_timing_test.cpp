@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::can_bit_timing_test {
 namespace {
 
 constexpr std::uint32_t board_clock = 42'000'000;
@@ -67,4 +67,4 @@ TEST(CanBitTiming, ValidKnowsTheFields) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::can_bit_timing_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::can_bus_off_test {
 namespace {
 
 using Action = CanBusOffAction;
@@ -86,4 +86,4 @@ TEST(CanBusOff, StoppedDoesNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::can_bus_off_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::can_filter_test {
 namespace {
 
 bool accepts(const CanFilter& filter, const CanFrame& frame) {
@@ -35,4 +35,4 @@ TEST(CanFilter, AcceptWhatTheySay) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::can_filter_test

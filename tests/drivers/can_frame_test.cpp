@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::drivers {
+namespace kmax::drivers::can_frame_test {
 namespace {
 
 TEST(CanFrame, ValidKnowsItsRanges) {
@@ -30,4 +30,4 @@ TEST(CanFrame, ArbitrationOfTheSameUpperBits) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::can_frame_test

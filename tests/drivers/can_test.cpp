@@ -6,7 +6,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::can_test {
 namespace {
 
 using testing::FakeRegister;
@@ -293,4 +293,4 @@ TEST(Can, ErrorsByName) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::can_test

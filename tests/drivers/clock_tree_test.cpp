@@ -7,7 +7,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::clock_tree_test {
 namespace {
 
 using testing::FakeRegister;
@@ -259,4 +259,4 @@ RC_GTEST_PROP(ClockTree, EveryMixOfDefectsEndsWithAnHonestResult,
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::clock_tree_test

@@ -6,7 +6,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::current_sampling_test {
 namespace {
 
 using testing::FakeRegister;
@@ -232,4 +232,4 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::current_sampling_test

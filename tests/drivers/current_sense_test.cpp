@@ -9,7 +9,7 @@
 #include <numeric>
 #include <vector>
 
-namespace kmax::drivers {
+namespace kmax::drivers::current_sense_test {
 namespace {
 
 TEST(CurrentSense, RangeAndResolutionOfEachGain) {
@@ -145,4 +145,4 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::current_sense_test

@@ -4,7 +4,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::cortex_m {
+namespace kmax::drivers::cortex_m::cycle_counter_test {
 namespace {
 
 using testing::FakeRegister;
@@ -49,4 +49,4 @@ TEST(CycleCounter, MissingCounterIsReported) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::cortex_m
+}  // namespace kmax::drivers::cortex_m::cycle_counter_test

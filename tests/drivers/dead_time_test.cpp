@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <type_traits>
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::dead_time_test {
 namespace {
 
 // RM0090, TIMx_BDTR, DTG: its four lines, written out with the manual's own symbols.
@@ -65,4 +65,4 @@ TEST(DeadTime, DoesNotCompileOutOfRange) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::dead_time_test

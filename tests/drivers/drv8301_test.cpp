@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-namespace kmax::drivers {
+namespace kmax::drivers::drv8301_test {
 namespace {
 
 /// A minimal chip by the frame rules alone, and a line that can be tampered with.
@@ -201,4 +201,4 @@ TEST(Drv8301, ControlWords) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::drv8301_test

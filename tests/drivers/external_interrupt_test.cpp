@@ -7,7 +7,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::external_interrupt_test {
 namespace {
 
 using testing::FakeRegister;
@@ -118,4 +118,4 @@ TEST(ExtiInterrupt, VectorOfEachLine) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::external_interrupt_test

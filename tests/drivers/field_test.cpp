@@ -6,7 +6,7 @@
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::field_test {
 namespace {
 
 using testing::FakeRegister;
@@ -77,4 +77,4 @@ TEST(PeripheralClock, KeepsWhatIsOnAndReadsBackTwice) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::field_test

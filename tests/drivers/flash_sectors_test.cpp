@@ -12,7 +12,7 @@
 // On fake registers: what is written in which order, and each way out. On the flash model:
 // tests/host_tools/virtual_board/stm32f4/flash_sectors_on_model_test.cpp.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::flash_sectors_test {
 namespace {
 
 using testing::FakeRegister;
@@ -217,4 +217,4 @@ TEST(FlashSectors, CachesThatWereOffStayOff) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::flash_sectors_test

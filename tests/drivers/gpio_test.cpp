@@ -7,7 +7,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::gpio_test {
 namespace {
 
 using testing::FakeRegister;
@@ -102,4 +102,4 @@ TEST(GpioPin, LevelBeforeDirectionAndFunctionBeforeHandOver) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::gpio_test

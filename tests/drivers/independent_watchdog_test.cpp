@@ -10,7 +10,7 @@
 
 // On the model: tests/host_tools/virtual_board/stm32f4/independent_watchdog_on_model_test.cpp.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::independent_watchdog_test {
 namespace {
 
 using testing::FakeRegister;
@@ -112,4 +112,4 @@ TEST(IndependentWatchdog, UpdateThatNeverEndsIsReportedAndStillFed) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::independent_watchdog_test

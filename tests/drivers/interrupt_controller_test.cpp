@@ -5,7 +5,7 @@
 
 #include "drivers/stm32f4/interrupts.hpp"
 
-namespace kmax::drivers::cortex_m {
+namespace kmax::drivers::cortex_m::interrupt_controller_test {
 namespace {
 
 using stm32f4::Interrupt;
@@ -76,4 +76,4 @@ RC_GTEST_PROP(InterruptController, PriorityLeavesItsNeighboursAlone,
 }
 
 }  // namespace
-}  // namespace kmax::drivers::cortex_m
+}  // namespace kmax::drivers::cortex_m::interrupt_controller_test

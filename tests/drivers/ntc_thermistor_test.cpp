@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kmax::drivers {
+namespace kmax::drivers::ntc_thermistor_test {
 namespace {
 
 constexpr NtcThermistor board_ntc{};
@@ -88,4 +88,4 @@ TEST(NtcThermistor, OtherPartsAndResistors) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::ntc_thermistor_test

@@ -6,7 +6,7 @@
 
 // What needs hardware that acts is tested on the virtual board's timers; here, what happens when it does not.
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::phase_shifted_pwm_test {
 namespace {
 
 using testing::FakeTimer;
@@ -68,4 +68,4 @@ TEST(StartPhaseShifted, LeavesTheUpdateEventAsTriggerAndTheFollowerFree) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::phase_shifted_pwm_test

@@ -8,7 +8,7 @@
 #include <initializer_list>
 #include <utility>
 
-namespace kmax::drivers {
+namespace kmax::drivers::quadrature_index_watch_test {
 namespace {
 
 constexpr QuadratureIndexConfig config{8192, 4};
@@ -243,4 +243,4 @@ TEST(QuadratureIndexWatch, ResetBelievesAgain) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::quadrature_index_watch_test

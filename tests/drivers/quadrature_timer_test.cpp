@@ -7,7 +7,7 @@
 
 #include "tests/drivers/fake_timer.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::quadrature_timer_test {
 namespace {
 
 using testing::FakeTimer;
@@ -111,4 +111,4 @@ TEST(QuadratureTimer, FilterTable) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::quadrature_timer_test

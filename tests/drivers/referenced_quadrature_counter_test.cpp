@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::drivers {
+namespace kmax::drivers::referenced_quadrature_counter_test {
 namespace {
 
 /// An encoder of 8192 counts a turn whose index is three counts wide, on a 16-bit timer.
@@ -155,4 +155,4 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::referenced_quadrature_counter_test

@@ -4,7 +4,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::reset_cause_test {
 namespace {
 
 TEST(ResetCause, EachAsTheChipShowsIt) {
@@ -37,4 +37,4 @@ TEST(ResetCause, TakingItRemovesTheFlagsAndLeavesTheOscillatorOn) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::reset_cause_test

@@ -4,7 +4,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::spi_master_test {
 namespace {
 
 using testing::FakeRegister;
@@ -110,4 +110,4 @@ TEST(SpiMaster, OneHolderAtATime) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::spi_master_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::drivers {
+namespace kmax::drivers::supply_divider_test {
 namespace {
 
 TEST(SupplyDivider, FullScaleOfBothBoards) {
@@ -24,4 +24,4 @@ TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers
+}  // namespace kmax::drivers::supply_divider_test

@@ -8,7 +8,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::cortex_m {
+namespace kmax::drivers::cortex_m::system_tick_test {
 namespace {
 
 using testing::FakeRegister;
@@ -240,4 +240,4 @@ TEST(SystemTick, HeldUpAtEveryAccess) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::cortex_m
+}  // namespace kmax::drivers::cortex_m::system_tick_test

@@ -11,7 +11,7 @@
 
 #include "tests/drivers/fake_timer.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::three_phase_pwm_test {
 namespace {
 
 using testing::FakeTimer;
@@ -161,4 +161,4 @@ RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::three_phase_pwm_test

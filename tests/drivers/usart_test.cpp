@@ -10,7 +10,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-namespace kmax::drivers::stm32f4 {
+namespace kmax::drivers::stm32f4::usart_test {
 namespace {
 
 using testing::FakeRegister;
@@ -389,4 +389,4 @@ RC_GTEST_PROP(Usart, AnyInterleaving, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::drivers::stm32f4
+}  // namespace kmax::drivers::stm32f4::usart_test

@@ -11,7 +11,7 @@
 #include "tests/image/board_link.hpp"
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::calibration_test {
 namespace {
 
 /// A board with the motor of a scene that nobody has identified.
@@ -85,4 +85,4 @@ TEST(ImageSelfTest, NamesTheSupplyTheEmergencyStopAndAPhase) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::calibration_test

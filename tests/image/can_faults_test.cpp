@@ -8,7 +8,7 @@
 #include "firmware/can_port.hpp"
 #include "tests/image/can_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::can_faults_test {
 namespace {
 
 using firmware::DriveState;
@@ -221,4 +221,4 @@ TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::can_faults_test

@@ -5,7 +5,7 @@
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/image/can_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::canopen_test {
 namespace {
 
 using firmware::DriveState;
@@ -133,4 +133,4 @@ TEST(CanOpen, PdosTellOfOneTickAndOfRegularOnes) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::canopen_test

@@ -6,7 +6,7 @@
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::closed_loop_test {
 namespace {
 
 using firmware::Fault;
@@ -214,4 +214,4 @@ TEST_F(ClosedLoop, AnEncoderThatCameOffStaysWrong) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::closed_loop_test

@@ -8,7 +8,7 @@
 #include "firmware/modbus/crc.hpp"
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::edge_to_duty_test {
 namespace {
 
 using virtual_board::BoardTime;
@@ -122,4 +122,4 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::edge_to_duty_test

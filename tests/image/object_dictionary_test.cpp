@@ -6,7 +6,7 @@
 #include "host_tools/description/described_objects.hpp"
 #include "tests/image/can_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::object_dictionary_test {
 namespace {
 
 using description::DataType;
@@ -200,4 +200,4 @@ TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::object_dictionary_test

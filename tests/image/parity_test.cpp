@@ -10,7 +10,7 @@
 #include "firmware/axis.hpp"
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::parity_test {
 namespace {
 
 using firmware::Axis;
@@ -237,4 +237,4 @@ TEST(Parity, AContactIsBitIdentical) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::parity_test

@@ -6,7 +6,7 @@
 
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::power_cut_test {
 namespace {
 
 using firmware::entry_of;
@@ -165,4 +165,4 @@ TEST(PowerCut, AlongASaveThatChangesTheSectorToo) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::power_cut_test

@@ -25,7 +25,7 @@
 
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests {
+namespace kmax::tests::scene_parity_test {
 namespace {
 
 using firmware::Axis;
@@ -356,4 +356,4 @@ TEST(SceneParityItself, SeesAStiffnessThatDiffersInItsLastBit) {
 }
 
 }  // namespace
-}  // namespace kmax::tests
+}  // namespace kmax::tests::scene_parity_test

@@ -19,7 +19,7 @@ namespace cob_id = canopen::cob_id;
 namespace {
 using Clock = std::chrono::steady_clock;
 constexpr SdoClient::Object device_type{0x1000, 0};
-constexpr std::uint8_t upload_request = 0x40;
+constexpr std::uint8_t discovery_request = 0x40;
 constexpr std::uint32_t function_code = 0x780, node_part = 0x7F;
 
 class Search {
@@ -68,7 +68,7 @@ class Search {
     drivers::CanFrame request;
     request.identifier = cob_id::sdo_request + id;
     request.length = 8;
-    request.data = canopen::sdo_bytes(upload_request, device_type);
+    request.data = canopen::sdo_bytes(discovery_request, device_type);
     port_->send(request);
     locks_[id] = std::move(lock);
     ever_asked_.insert(id);

@@ -23,13 +23,13 @@ std::string key_of(const std::string& bus, std::uint8_t node) {
   return fmt::format("kmax/can/{}/node/{}", bus, node);
 }
 
-struct Address {
+struct LockAddress {
   sockaddr_un address{};
   socklen_t length = 0;
 };
 
-Address address_of(const std::string& key) {
-  Address result;
+LockAddress lock_address(const std::string& key) {
+  LockAddress result;
   result.address.sun_family = AF_UNIX;
   // The first character stays zero: an abstract name.
   const std::size_t length = std::min(key.size(), sizeof result.address.sun_path - 1);
@@ -58,7 +58,7 @@ std::unique_ptr<CanNodeLock> CanNodeLock::try_to_take(const std::string& bus, st
 }
 
 bool CanNodeLock::try_take() {
-  const Address address = address_of(key_);
+  const LockAddress address = lock_address(key_);
   FileDescriptor attempt = make_socket();
   if (bind(attempt.number(), reinterpret_cast<const sockaddr*>(&address.address), address.length) != 0) {
     if (errno == EADDRINUSE) return false;
@@ -74,7 +74,7 @@ std::string CanNodeLock::name() const {
 }
 
 std::string CanNodeLock::words_for_in_use() const {
-  const Address address = address_of(key_);
+  const LockAddress address = lock_address(key_);
   const FileDescriptor question = make_socket();
   ucred holder{};
   socklen_t size = sizeof holder;

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::instruction_budget {
+namespace kmax::instruction_budget::fingerprint_test {
 namespace {
 
 // The image for the Cortex-M4F compares its own with the same number.
@@ -11,4 +11,4 @@ TEST(Fingerprint, IsTheKnownOneOnThisMachineToo) {
 }
 
 }  // namespace
-}  // namespace kmax::instruction_budget
+}  // namespace kmax::instruction_budget::fingerprint_test

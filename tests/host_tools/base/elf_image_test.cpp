@@ -8,7 +8,7 @@
 #include <cstring>
 #include <functional>
 
-namespace kmax {
+namespace kmax::elf_image_test {
 namespace {
 
 struct File {
@@ -139,4 +139,4 @@ TEST(ElfImage, SaysWhichFileCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace kmax
+}  // namespace kmax::elf_image_test

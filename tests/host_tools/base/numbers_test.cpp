@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <limits>
 
-namespace kmax::device {
+namespace kmax::device::number_text_test::numbers_test {
 namespace {
 
 TEST(NumberText, IsShortAndPlainWherePeopleReadIt) {
@@ -53,4 +53,4 @@ RC_GTEST_PROP(NumberText, EveryFiniteDoubleComesBack, (std::uint64_t pattern)) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::number_text_test::numbers_test

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-namespace kmax::cli {
+namespace kmax::cli::print_test {
 namespace {
 
 template <typename... Values>
@@ -43,4 +43,4 @@ TEST(Print, AStreamThatFailsSaysSo) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::print_test

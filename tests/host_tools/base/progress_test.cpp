@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace kmax::cli {
+namespace kmax::cli::progress_test {
 namespace {
 
 TEST(Progress, ElsewhereThanOnATerminalItIsALineNowAndThen) {
@@ -30,4 +30,4 @@ TEST(Progress, NothingShownLeavesNoTrace) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::progress_test

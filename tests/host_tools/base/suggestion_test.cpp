@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::device {
+namespace kmax::device::suggestion_test {
 namespace {
 
 const std::vector<std::string> names = {"wall.stiffness", "wall.damping",   "guard.damping",    "force.limit",
@@ -46,4 +46,4 @@ TEST(Closest, NoMoreThanThreeAndNothingFarFetched) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::suggestion_test

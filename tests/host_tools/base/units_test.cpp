@@ -4,7 +4,7 @@
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
-namespace kmax::device {
+namespace kmax::device::unit_test::units_test {
 namespace {
 
 double convert(double number, std::string_view suffix, std::string_view unit) {
@@ -55,4 +55,4 @@ TEST(Unit, SuffixesStartWithTheUnitItself) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::unit_test::units_test

@@ -7,7 +7,7 @@
 #include "control/dc_current_controller.hpp"
 #include "control/field_oriented_controller.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::applied_voltage_test {
 namespace {
 
 double ticks(float duty) {
@@ -62,4 +62,4 @@ TEST(AppliedVoltage, IsBoundedByTheSupplyAndZeroWithoutOne) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::applied_voltage_test

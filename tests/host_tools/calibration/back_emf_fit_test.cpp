@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::back_emf_fit_test {
 namespace {
 
 using test::BenchMotor;
@@ -136,4 +136,4 @@ TEST(BackEmfFit, BlockedMotorDoesNotMove) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::back_emf_fit_test

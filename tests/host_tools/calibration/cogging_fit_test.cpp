@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::cogging_fit_test {
 namespace {
 
 using test::BenchMotor;
@@ -214,4 +214,4 @@ TEST(CoggingFit, WhatIsWrongIsNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::cogging_fit_test

@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::current_offset_test {
 namespace {
 
 TEST(CurrentOffset, ASensorOfTheSimulationIsGood) {
@@ -51,4 +51,4 @@ TEST(CurrentOffset, WhatIsWrongIsNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::current_offset_test

@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::field_turn_fit_test {
 namespace {
 
 using test::BenchMotor;
@@ -238,4 +238,4 @@ TEST(FieldTurnFit, RecordsThatHoldNothingAreNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::field_turn_fit_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::calibration_test {
+namespace kmax::calibration_test::held_up_test {
 namespace {
 
 using calibration::Bench;
@@ -148,4 +148,4 @@ TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration_test
+}  // namespace kmax::calibration_test::held_up_test

@@ -6,7 +6,7 @@
 
 #include "host_tools/simulation/noise_generator.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::least_squares_test {
 namespace {
 
 TEST(LeastSquares, ALineWithItsStandardErrors) {
@@ -64,4 +64,4 @@ TEST(LeastSquares, ResidualsThatAreNotFiniteEndWithoutAResult) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::least_squares_test

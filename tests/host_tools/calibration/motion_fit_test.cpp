@@ -9,7 +9,7 @@
 #include "host_tools/calibration/mechanical_excitation.hpp"
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::motion_fit_test {
 namespace {
 
 using test::BenchMotor;
@@ -165,4 +165,4 @@ TEST(MotionFit, HalfAWaveOnlyIsNotAResult) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::motion_fit_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/fake_device.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::parameter_journal_test {
 namespace {
 
 class Journal : public testing::Test {
@@ -68,4 +68,4 @@ TEST_F(Journal, PutsBackWhatSomebodyElseChanged) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::parameter_journal_test

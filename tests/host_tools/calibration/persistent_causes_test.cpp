@@ -3,7 +3,7 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::calibration_test {
+namespace kmax::calibration_test::persistent_causes_test {
 namespace {
 
 using simulation::Defect;
@@ -79,4 +79,4 @@ TEST(PutBack, AnInterruptionSaysSoWhenItIsDone) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration_test
+}  // namespace kmax::calibration_test::persistent_causes_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace kmax::calibration {
+namespace kmax::calibration::phase_response_test {
 namespace {
 
 /// B and C of a motor of 1 ohm at 1 V along 0 and along 90 degrees, phase resistances a, b, c; infinite:
@@ -108,4 +108,4 @@ TEST(PhaseResponse, IsNothingWithoutAWave) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::phase_response_test

@@ -3,7 +3,7 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::calibration_test {
+namespace kmax::calibration_test::procedure_defects_test {
 namespace {
 
 using calibration::CalibrationSettings;
@@ -183,4 +183,4 @@ TEST(IndexSearch, FindsTheIndexAndRefersTheOffsetToIt) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration_test
+}  // namespace kmax::calibration_test::procedure_defects_test

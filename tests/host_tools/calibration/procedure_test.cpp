@@ -6,7 +6,7 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::calibration_test {
+namespace kmax::calibration_test::procedure_test {
 namespace {
 
 using calibration::CalibrationSettings;
@@ -153,4 +153,4 @@ TEST(Procedure, KeepsAShortLinkTimeoutAlive) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration_test
+}  // namespace kmax::calibration_test::procedure_test

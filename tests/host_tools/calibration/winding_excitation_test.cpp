@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::calibration {
+namespace kmax::calibration::winding_excitation_test {
 namespace {
 
 TEST(WindingExcitation, HalfPeriodIsThreeTimeConstantsWithinItsBounds) {
@@ -31,4 +31,4 @@ TEST(WindingExcitation, NoPhaseCurrentChangesItsSign) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::winding_excitation_test

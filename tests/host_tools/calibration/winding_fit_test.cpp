@@ -10,7 +10,7 @@
 #include "host_tools/calibration/winding_excitation.hpp"
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
-namespace kmax::calibration {
+namespace kmax::calibration::winding_fit_test {
 namespace {
 
 using test::BenchMotor;
@@ -281,4 +281,4 @@ TEST(WindingFit, EveryCauseHasWordsAndTheNumbersFollow) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::winding_fit_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace kmax::calibration {
+namespace kmax::calibration::winding_model_test {
 namespace {
 
 // The definition's equation in steps of 25 ns, over 100 ticks of a wave.
@@ -63,4 +63,4 @@ TEST(WindingModel, NothingToSimulateIsNoAccess) {
 }
 
 }  // namespace
-}  // namespace kmax::calibration
+}  // namespace kmax::calibration::winding_model_test

@@ -8,7 +8,7 @@
 
 #include "firmware/parameter_rules.hpp"
 
-namespace kmax::check {
+namespace kmax::check::change_search_test {
 namespace {
 using control::Criterion;
 using device::Parameter;
@@ -119,4 +119,4 @@ RC_GTEST_PROP(ChangeSearch, WhatIsProposedWorksAndLittleLessDoesNot, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::change_search_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::check {
+namespace kmax::check::check_table_test {
 namespace {
 using firmware::ParameterValues;
 
@@ -119,4 +119,4 @@ TEST(CheckTable, LinesFitATerminal) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::check_table_test

@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::check {
+namespace kmax::check::criterion_text_test {
 namespace {
 using control::Criterion;
 
@@ -75,4 +75,4 @@ TEST(CriterionText, LinesAreShortAndWhole) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::criterion_text_test

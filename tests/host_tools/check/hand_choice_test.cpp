@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::check {
+namespace kmax::check::hand_choice_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -54,4 +54,4 @@ TEST(HandChoice, WhatIsNoHandIsRefusedWithThePlace) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::hand_choice_test

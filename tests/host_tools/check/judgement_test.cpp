@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::check {
+namespace kmax::check::judgement_test {
 namespace {
 using control::Criterion;
 using control::CriterionResult;
@@ -153,4 +153,4 @@ TEST(Judgement, TheAdaptiveLawIsSaidNotToBeJudgedWhole) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::judgement_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kmax::check {
+namespace kmax::check::map_contour_test {
 namespace {
 
 template <typename Function>
@@ -87,4 +87,4 @@ TEST(MapContour, OneSignHasNoLine) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::map_contour_test

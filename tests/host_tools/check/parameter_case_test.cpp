@@ -8,7 +8,7 @@
 
 #include "firmware/stability_guard.hpp"
 
-namespace kmax::check {
+namespace kmax::check::parameter_case_test {
 namespace {
 using firmware::ParameterValues;
 
@@ -182,4 +182,4 @@ RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::parameter_case_test

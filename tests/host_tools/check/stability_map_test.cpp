@@ -10,7 +10,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::check {
+namespace kmax::check::stability_map_test {
 namespace {
 using control::Criterion;
 using device::Parameter;
@@ -143,4 +143,4 @@ TEST(StabilityMap, AMapWithoutABorderIsDrawnToo) {
 }
 
 }  // namespace
-}  // namespace kmax::check
+}  // namespace kmax::check::stability_map_test

@@ -8,7 +8,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::description {
+namespace kmax::description::dbc_test {
 namespace {
 std::string dbc(std::uint8_t node) {
   std::ostringstream out;
@@ -52,4 +52,4 @@ TEST(Dbc, NamesAreUniqueAndShortEnough) {
 }
 
 }  // namespace
-}  // namespace kmax::description
+}  // namespace kmax::description::dbc_test

@@ -8,7 +8,7 @@
 
 #include "firmware/canopen/object_places.hpp"
 
-namespace kmax::description {
+namespace kmax::description::described_objects_test {
 namespace {
 const DescribedObject* find(const std::vector<DescribedObject>& all, std::uint16_t index,
                             std::uint8_t subindex) {
@@ -110,4 +110,4 @@ TEST(DescribedIndices, KindsAndNames) {
 }
 
 }  // namespace
-}  // namespace kmax::description
+}  // namespace kmax::description::described_objects_test

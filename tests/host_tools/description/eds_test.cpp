@@ -7,7 +7,7 @@
 
 #include "host_tools/description/described_objects.hpp"
 
-namespace kmax::description {
+namespace kmax::description::eds_test {
 namespace {
 using Section = std::map<std::string, std::string>;
 
@@ -107,4 +107,4 @@ TEST_F(Eds, NumbersAreWrittenAsReadersExpect) {
 }
 
 }  // namespace
-}  // namespace kmax::description
+}  // namespace kmax::description::eds_test

@@ -8,7 +8,7 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 
-namespace kmax::device {
+namespace kmax::device::capture_reader_on_simulated_board_test {
 namespace {
 
 using firmware::CaptureTrigger;
@@ -133,4 +133,4 @@ TEST(CaptureReaderOnSimulatedBoard, AnExcitationIsSeenFromItsFirstTick) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::capture_reader_on_simulated_board_test

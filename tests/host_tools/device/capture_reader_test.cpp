@@ -10,7 +10,7 @@
 #include "tests/host_tools/capturing_link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::capture_reader_test {
 namespace {
 
 using firmware::CaptureChannel;
@@ -283,4 +283,4 @@ TEST(CaptureChannels, HaveUnitsAndNoneIsNotOne) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::capture_reader_test

@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::crash_words_test {
 namespace {
 using firmware::CrashCause;
 using firmware::CrashRecord;
@@ -53,4 +53,4 @@ TEST(CrashWords, OneLine) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::crash_words_test

@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::device_address_test {
 namespace {
 using host_tools_test::thrown_message;
 using Kind = DeviceAddress::Kind;
@@ -96,4 +96,4 @@ TEST(DefaultDeviceAddress, ComesFromTheEnvironment) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::device_address_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::device_test {
 namespace {
 using firmware::Refusal;
 using host_tools_test::FakeDevice;
@@ -280,4 +280,4 @@ TEST(Device, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::device_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::device {
+namespace kmax::device::drive_fault_test {
 namespace {
 using firmware::DriveState;
 using firmware::Fault;
@@ -29,4 +29,4 @@ TEST(FaultOf, IsNoneWithoutAFaultOrForACodeThatIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::drive_fault_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::drive_test {
 namespace {
 using firmware::DriveState;
 using firmware::Fault;
@@ -183,4 +183,4 @@ TEST_F(DriveTest, ALostMessageWhileArmingLeavesNoForce) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::drive_test

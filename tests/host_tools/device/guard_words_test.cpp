@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::guard_words_test {
 namespace {
 using control::Criterion;
 using firmware::GuardFinding;
@@ -75,4 +75,4 @@ TEST(GuardWords, ACriterionOfALaterFirmwareIsNotMadeUp) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::guard_words_test

@@ -14,7 +14,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::parameter_file_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -254,4 +254,4 @@ TEST(ParameterFile, IsReadFromDisk) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::parameter_file_test

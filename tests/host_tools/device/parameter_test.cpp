@@ -7,7 +7,7 @@
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::parameter_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -66,4 +66,4 @@ TEST(OwnerOfHoldingRegister, FindsBothWordsOfAValueAndNothingBetween) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::parameter_test

@@ -5,7 +5,7 @@
 
 #include <set>
 
-namespace kmax::device {
+namespace kmax::device::register_plan_test {
 namespace {
 
 std::set<std::uint16_t> registers_of(const RegisterRange& range) {
@@ -70,4 +70,4 @@ RC_GTEST_PROP(RegisterPlan, CoversWhatWasAskedAndNothingElse, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::register_plan_test

@@ -12,7 +12,7 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 
-namespace kmax::device {
+namespace kmax::device::trace_reader_test {
 namespace {
 using std::chrono::milliseconds;
 
@@ -174,4 +174,4 @@ TEST(TraceReader, PositionsAndForcesAreThoseOfTheDevice) {
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::trace_reader_test

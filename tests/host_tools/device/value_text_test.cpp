@@ -10,7 +10,7 @@
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device {
+namespace kmax::device::value_text_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -167,4 +167,4 @@ RC_GTEST_PROP(ParseValue, AgreesWithTheDeviceOnEveryFloat, (std::uint32_t patter
 }
 
 }  // namespace
-}  // namespace kmax::device
+}  // namespace kmax::device::value_text_test

@@ -4,7 +4,7 @@
 
 #include "host_tools/experiment/paper_numbers.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::background_trend_test {
 namespace {
 
 struct Result {
@@ -80,4 +80,4 @@ TEST(AllFall, NeedsATrendAndNoneThatStays) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::background_trend_test

@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-namespace kmax::experiment {
+namespace kmax::experiment::job_pool_test {
 namespace {
 
 RC_GTEST_PROP(JobPoolProperty, ResultsAreInOrderWhateverTheThreads, ()) {
@@ -172,4 +172,4 @@ TEST(JobPool, WithoutANumberThereAreAsManyAsProcessors) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::job_pool_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::journal_fields_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -82,4 +82,4 @@ TEST(JournalFields, OneThatIsMissingOrOfAnotherKindIsRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::journal_fields_test

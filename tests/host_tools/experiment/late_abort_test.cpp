@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::experiment {
+namespace kmax::experiment::late_abort_test {
 namespace {
 using firmware::DriveState;
 using firmware::Fault;
@@ -56,4 +56,4 @@ TEST(LateAbort, IsNoneIfTheDeviceDidNotTripForSilenceOrOnlyAfterTheLastLook) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::late_abort_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::limited_touches_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -189,4 +189,4 @@ TEST_F(Limited, SettingsForAJournalAreTheDevicesTheExperimentsAndTheLimits) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::limited_touches_test

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace kmax::experiment {
+namespace kmax::experiment::progress_report_test {
 namespace {
 
 using Told = std::vector<std::pair<std::size_t, std::size_t>>;
@@ -25,4 +25,4 @@ TEST(PartOf, NobodyNeedsToBeTold) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::progress_report_test

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace kmax::experiment {
+namespace kmax::experiment::rank_correlation_test {
 namespace {
 
 using Numbers = std::vector<double>;
@@ -48,4 +48,4 @@ RC_GTEST_PROP(RankCorrelationProperty, OnlyTheOrderCounts, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::rank_correlation_test

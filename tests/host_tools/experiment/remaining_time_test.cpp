@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace kmax::experiment {
+namespace kmax::experiment::remaining_time_test {
 namespace {
 
 TEST(RemainingTime, IsTheMeanOfTheJobsDoneTimesTheRest) {
@@ -62,4 +62,4 @@ TEST(ProgressWords, NameTheRestOnlyWhenItIsKnown) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::remaining_time_test

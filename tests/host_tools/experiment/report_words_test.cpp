@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-namespace kmax::experiment {
+namespace kmax::experiment::report_words_test {
 namespace {
 
 TEST(ReportWords, AreThoseOfEveryReport) {
@@ -50,4 +50,4 @@ TEST(ReportWords, TheStiffeningIsTheCauseOnlyOfWhatFallsWithItAndNotWithoutIt) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::report_words_test

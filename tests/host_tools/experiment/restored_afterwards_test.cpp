@@ -6,7 +6,7 @@
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::restored_afterwards_test {
 namespace {
 
 using Restored = TouchedBoard;
@@ -54,4 +54,4 @@ TEST_F(Restored, ANoticeThatFailsEndsNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::restored_afterwards_test

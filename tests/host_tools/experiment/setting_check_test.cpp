@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::setting_check_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -38,4 +38,4 @@ TEST(SettingCheck, SomebodyMustHoldTheHandle) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::setting_check_test

@@ -8,7 +8,7 @@
 
 #include "host_tools/simulated_board/scene_run.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::simulated_touch_test {
 namespace {
 
 using simulation::ContactVerdict;
@@ -215,4 +215,4 @@ TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::simulated_touch_test

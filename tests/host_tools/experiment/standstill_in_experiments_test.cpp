@@ -9,7 +9,7 @@
 #include "tests/host_tools/experiment/two_held_axes.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::standstill_in_experiments_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -146,4 +146,4 @@ TEST_F(DisturbedExperiment, AFaultOfTheSecondAxisIsNotRepeated) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::standstill_in_experiments_test

@@ -13,7 +13,7 @@
 #include "tests/host_tools/experiment/stalled_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::standstill_test {
 namespace {
 using firmware::Fault;
 using host_tools_test::thrown_message;
@@ -285,4 +285,4 @@ TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::standstill_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::experiment {
+namespace kmax::experiment::tested_claim_test {
 namespace {
 
 constexpr std::optional<bool> untested;
@@ -26,4 +26,4 @@ TEST(TestedClaim, OfNoneNothingIsSaid) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::tested_claim_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/experiment/stalled_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::watched_touch_test {
 namespace {
 using device::TraceSample;
 using host_tools_test::thrown_message;
@@ -286,4 +286,4 @@ TEST_F(Protective, TheLinkIsWatchedByTheDevice) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::watched_touch_test

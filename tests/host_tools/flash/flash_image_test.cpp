@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::flash_image_test {
 namespace {
 
 class FlashImageFile : public testing::Test {
@@ -137,4 +137,4 @@ TEST(FlashCrc, IsTheOneOfZip) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::flash_image_test

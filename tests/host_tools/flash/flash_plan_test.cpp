@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::flash_plan_test {
 namespace {
 
 class FlashPlanText : public testing::Test {
@@ -107,4 +107,4 @@ TEST_F(FlashPlanText, TheFirstStepsChangeNothingWhereStepsAreSeparate) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::flash_plan_test

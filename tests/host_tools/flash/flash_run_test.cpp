@@ -7,7 +7,7 @@
 #include "tests/host_tools/flash/made_elf.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::flash_run_test {
 namespace {
 
 class FlashRun : public testing::TestWithParam<Method> {
@@ -166,4 +166,4 @@ TEST_P(FlashRun, AFailedStartSaysThatTheImageIsThere) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::flash_run_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::method_choice_test {
 namespace {
 
 constexpr const char* swd =
@@ -103,4 +103,4 @@ TEST_F(MethodChoice, EveryBoardSaysWhyForEveryMethod) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::method_choice_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::program_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -133,4 +133,4 @@ TEST(CommandText, IsWhatAShellUnderstands) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::program_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::flash {
+namespace kmax::flash::usb_devices_test {
 namespace {
 
 TEST(UsbDevices, AreReadFromTheKernelsFiles) {
@@ -40,4 +40,4 @@ TEST(UsbDevices, StLinksAreKnownByVendorAndProduct) {
 }
 
 }  // namespace
-}  // namespace kmax::flash
+}  // namespace kmax::flash::usb_devices_test

@@ -5,7 +5,7 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::calibrate_command_test {
 namespace {
 
 /// The program with a device that has a motor, fresh for every call.
@@ -106,4 +106,4 @@ TEST_F(Calibrate, BadOptionsAreWrongUsage) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::calibrate_command_test

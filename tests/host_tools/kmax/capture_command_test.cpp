@@ -6,7 +6,7 @@
 #include "tests/host_tools/capturing_link.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::capture_command_test {
 namespace {
 using Capture = SimulatedCommandLine;
 using host_tools_test::CapturingLink;
@@ -146,4 +146,4 @@ TEST(CaptureCommand, CtrlCStopsTheCaptureInTheDeviceAndDisarms) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::capture_command_test

@@ -1,7 +1,7 @@
 #include "host_tools/check/criterion_text.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::check_command_test {
 namespace {
 
 class Check : public SimulatedCommandLine {
@@ -219,4 +219,4 @@ TEST_F(Check, BadMapsAreWrongUsageAndLeaveNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::check_command_test

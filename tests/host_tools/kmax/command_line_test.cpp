@@ -10,7 +10,7 @@
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::command_line_test {
 namespace {
 using firmware::DriveState;
 using firmware::Fault;
@@ -365,4 +365,4 @@ TEST_F(CommandLine, OutputThatCannotBeWrittenIsAnError) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::command_line_test

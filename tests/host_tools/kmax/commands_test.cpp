@@ -10,7 +10,7 @@
 
 #include "host_tools/device/link.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::commands_test {
 namespace {
 
 /// The words of a command line, up to what a shell would take for itself.
@@ -86,4 +86,4 @@ TEST_F(Commands, TheAxisIsTakenWhereItIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::commands_test

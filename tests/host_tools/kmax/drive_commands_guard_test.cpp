@@ -8,7 +8,7 @@
 #include "tests/host_tools/bench_link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::drive_commands_guard_test {
 namespace {
 
 /// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.23 N s/m allow 4000 N/m.
@@ -114,4 +114,4 @@ TEST_F(GuardOnCommandLine, ASetThatIsRefusedWhileArmedNamesTheParameterAndChange
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::drive_commands_guard_test

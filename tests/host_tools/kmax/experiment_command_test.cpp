@@ -3,7 +3,7 @@
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_command_test {
 namespace {
 using Experiment = SimulatedCommandLine;
 
@@ -67,4 +67,4 @@ TEST_F(Experiment, AJournalIsKeptWhereThereIsAFolderAndResumedFromThereOnly) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_command_test

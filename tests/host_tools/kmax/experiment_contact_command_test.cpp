@@ -4,7 +4,7 @@
 #include "host_tools/device/sim/sim_link.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_contact_command_test {
 namespace {
 using ContactCommand = SimulatedCommandLine;
 
@@ -109,4 +109,4 @@ TEST_F(ContactCommand, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_contact_command_test

@@ -1,6 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_deviation_command_test {
 namespace {
 
 class DeviationCommand : public ExperimentCommandLine {
@@ -95,4 +95,4 @@ TEST_F(DeviationCommand, BadValuesAreRefusedWithTheirOption) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_deviation_command_test

@@ -1,6 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_jitter_command_test {
 namespace {
 
 class JitterCommand : public ExperimentCommandLine {
@@ -86,4 +86,4 @@ TEST_F(JitterCommand, BadValuesAreRefusedWithTheirOption) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_jitter_command_test

@@ -4,7 +4,7 @@
 #include "host_tools/kmax/max_stiffness_options.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_max_stiffness_command_test {
 namespace {
 
 /// A simulated board that is reached under the address of a real one.
@@ -166,4 +166,4 @@ TEST(ConditionJson, AnAdaptiveWallHasNoCoefficientAndAPictureNoNumber) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_max_stiffness_command_test

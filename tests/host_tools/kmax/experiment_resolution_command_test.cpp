@@ -1,6 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_resolution_command_test {
 namespace {
 
 class ResolutionCommand : public ExperimentCommandLine {
@@ -83,4 +83,4 @@ TEST_F(ResolutionCommand, BadValuesAreRefusedWithTheirOption) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_resolution_command_test

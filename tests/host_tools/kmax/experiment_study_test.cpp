@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::experiment_study_test {
 namespace {
 
 using host_tools_test::thrown_message;
@@ -92,4 +92,4 @@ TEST_F(ExperimentStudy, TheGainIsEverybodysOnlyIfItIsGiven) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::experiment_study_test

@@ -3,7 +3,7 @@
 
 #include "tests/host_tools/kmax/board_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::flash_command_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -188,4 +188,4 @@ TEST_F(FlashCommand, AHangingToolIsEndedAfterTheTimeout) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::flash_command_test

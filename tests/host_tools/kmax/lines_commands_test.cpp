@@ -5,7 +5,7 @@
 
 #include "tests/host_tools/kmax/board_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::lines_commands_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -191,4 +191,4 @@ TEST_F(LinesCommands, WithoutAConfigurationTheyTellWhatToWrite) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::lines_commands_test

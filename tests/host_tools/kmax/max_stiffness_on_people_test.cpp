@@ -11,7 +11,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::max_stiffness_on_people_test {
 namespace {
 
 class MaxStiffnessOnPeople : public testing::Test {
@@ -100,4 +100,4 @@ TEST_F(MaxStiffnessOnPeople, WhatASetWasFittedToIsNoReasonToRefuseItsJournal) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::max_stiffness_on_people_test

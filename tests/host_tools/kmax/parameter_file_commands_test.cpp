@@ -10,7 +10,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::parameter_file_commands_test {
 namespace {
 
 /// A wire to a device that stays, whose address is what a serial port's would be. It can lose a write.
@@ -288,4 +288,4 @@ TEST_F(ParameterFileCommands, AMissingFileNameIsWrongUsage) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::parameter_file_commands_test

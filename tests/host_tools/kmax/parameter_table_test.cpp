@@ -5,7 +5,7 @@
 #include <bit>
 #include <sstream>
 
-namespace kmax::cli {
+namespace kmax::cli::parameter_table_test {
 namespace {
 using device::Parameter;
 
@@ -59,4 +59,4 @@ TEST(ParameterTable, WholeTextsLoseNoWord) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::parameter_table_test

@@ -1,6 +1,6 @@
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::plot_command_test {
 namespace {
 using Plot = SimulatedCommandLine;
 
@@ -39,4 +39,4 @@ TEST_F(Plot, ColumnNamesAreNoCommands) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::plot_command_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::reachable_devices_test {
 namespace {
 namespace fs = std::filesystem;
 
@@ -66,4 +66,4 @@ TEST(ReachableDevices, NodesThatAreKmaxDevicesHaveAnAddress) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::reachable_devices_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::record_command_test {
 namespace {
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
@@ -159,4 +159,4 @@ TEST_F(RecordCommand, OtherLinksArePolled) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::record_command_test

@@ -4,7 +4,7 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::selftest_command_test {
 namespace {
 
 class SelfTestCommand : public SimulatedCommandLine {
@@ -143,4 +143,4 @@ TEST_F(SelfTestCommand, WrongOptionsAreUsageErrors) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::selftest_command_test

@@ -7,7 +7,7 @@
 #include "host_tools/device/can/unix_can.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::serve_command_test {
 namespace {
 using Serve = SimulatedCommandLine;
 
@@ -82,4 +82,4 @@ TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::serve_command_test

@@ -1,7 +1,7 @@
 #include "host_tools/plot/csv_table.hpp"
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::simulate_command_test {
 namespace {
 
 class Simulate : public SimulatedCommandLine {
@@ -103,4 +103,4 @@ TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::simulate_command_test

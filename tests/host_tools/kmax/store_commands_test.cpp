@@ -7,7 +7,7 @@
 #include "host_tools/kmax/command_line.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::store_commands_test {
 namespace {
 using firmware::DriveState;
 
@@ -199,4 +199,4 @@ TEST_F(StoreCommands, HelpSaysWhatSaveAndDefaultsDo) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::store_commands_test

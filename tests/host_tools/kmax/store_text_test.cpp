@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::store_text_test {
 namespace {
 using device::StoreStatus;
 using firmware::StoreState;
@@ -64,4 +64,4 @@ TEST(StoreText, TroublesHaveLinesOfTheirOwnAndNames) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::store_text_test

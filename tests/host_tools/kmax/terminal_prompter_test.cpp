@@ -9,7 +9,7 @@
 #include "host_tools/calibration/step_report.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::terminal_prompter_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -112,4 +112,4 @@ TEST_F(Prompter, TheCheckMayGiveUpAtAnyTime) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::terminal_prompter_test

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-namespace kmax::cli {
+namespace kmax::cli::value_json_test {
 namespace {
 using device::Parameter;
 
@@ -45,4 +45,4 @@ RC_GTEST_PROP(ValueJson, EveryFiniteFloatComesBack, (std::uint32_t pattern)) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::value_json_test

@@ -1,6 +1,6 @@
 #include "tests/host_tools/kmax/simulated_command_line.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::wall_command_test {
 namespace {
 using Wall = SimulatedCommandLine;
 
@@ -76,4 +76,4 @@ TEST_F(Wall, FilesThatCannotBeReadOrWrittenAreNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::wall_command_test

@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::cli {
+namespace kmax::cli::watch_view_test {
 namespace {
 std::vector<WatchedAxis> axes() {
   WatchedAxis good{.axis = 0};
@@ -77,4 +77,4 @@ TEST(LiveLines, NoneScrollsAwayOnASmallTerminal) {
 }
 
 }  // namespace
-}  // namespace kmax::cli
+}  // namespace kmax::cli::watch_view_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/lines/fake_gpio_lines.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::lines {
+namespace kmax::lines::board_reset_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -55,4 +55,4 @@ TEST_F(BoardReset, Boot0IsLetGoWhenTheResetLineCannotBeHad) {
 }
 
 }  // namespace
-}  // namespace kmax::lines
+}  // namespace kmax::lines::board_reset_test

@@ -11,7 +11,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::lines {
+namespace kmax::lines::gpio_lines_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -157,4 +157,4 @@ TEST_F(SimulatedChip, ALineBeyondTheChipIsRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::lines
+}  // namespace kmax::lines::gpio_lines_test

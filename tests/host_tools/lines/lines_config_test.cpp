@@ -6,7 +6,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::lines {
+namespace kmax::lines::lines_config_test {
 namespace {
 
 std::string refusal(const std::string& text) {
@@ -149,4 +149,4 @@ TEST_F(LinesFile, TheDefaultIsInTheHomeWithoutXdg) {
 }
 
 }  // namespace
-}  // namespace kmax::lines
+}  // namespace kmax::lines::lines_config_test

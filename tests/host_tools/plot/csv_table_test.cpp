@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::plot {
+namespace kmax::plot::csv_table_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -91,4 +91,4 @@ RC_GTEST_PROP(CsvTableProperty, GarbageIsATableOrACsvError, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::plot
+}  // namespace kmax::plot::csv_table_test

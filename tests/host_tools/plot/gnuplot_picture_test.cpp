@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::plot {
+namespace kmax::plot::gnuplot_picture_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -114,4 +114,4 @@ TEST(GnuplotPicture, MissingGnuplotIsSaid) {
 }
 
 }  // namespace
-}  // namespace kmax::plot
+}  // namespace kmax::plot::gnuplot_picture_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::plot {
+namespace kmax::plot::map_figure_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -83,4 +83,4 @@ TEST(MapFigure, TextIsNeverRun) {
 }
 
 }  // namespace
-}  // namespace kmax::plot
+}  // namespace kmax::plot::map_figure_test

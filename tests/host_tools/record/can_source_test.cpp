@@ -9,7 +9,7 @@
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::record {
+namespace kmax::record::can_source_test {
 namespace {
 using drivers::CanFrame;
 using std::chrono::microseconds;
@@ -188,4 +188,4 @@ TEST(CanSource, TheFiltersPassWhatItNeeds) {
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::can_source_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::record {
+namespace kmax::record::pdo_plan_test {
 namespace {
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
@@ -77,4 +77,4 @@ TEST_F(PdoPlanTest, SoAreTimesThatDiffer) {
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::pdo_plan_test

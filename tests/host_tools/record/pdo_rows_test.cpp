@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-namespace kmax::record {
+namespace kmax::record::pdo_rows_test {
 namespace {
 using drivers::CanFrame;
 using std::chrono::microseconds;
@@ -233,4 +233,4 @@ RC_GTEST_PROP(PdoRowsProperty, WhateverIsLostNoRowIsMixedAndAllAreAccountedFor,
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::pdo_rows_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::record {
+namespace kmax::record::polled_source_test {
 namespace {
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
@@ -94,4 +94,4 @@ TEST_F(PolledSourceTest, TheLinkIsLentTwiceASecond) {
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::polled_source_test

@@ -7,7 +7,7 @@
 
 #include "host_tools/device/link.hpp"
 
-namespace kmax::record {
+namespace kmax::record::recording_test {
 namespace {
 /// A row every 20 ticks, none at every third question, and perhaps an end.
 class MadeUpSource final : public RowSource {
@@ -110,4 +110,4 @@ TEST(Recording, OneRowOrNoneHasNoRate) {
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::recording_test

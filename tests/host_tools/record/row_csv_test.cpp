@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::record {
+namespace kmax::record::row_csv_test {
 namespace {
 Row row() {
   Row made{.tick = 1'000'020};
@@ -39,4 +39,4 @@ TEST(RowCsv, TimesOfLongRecordingsKeepTheTick) {
 }
 
 }  // namespace
-}  // namespace kmax::record
+}  // namespace kmax::record::row_csv_test

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::report {
+namespace kmax::report::column_alignment_test {
 namespace {
 
 TEST(ReadsAsNumber, WithSignPointExponentAndUnit) {
@@ -36,4 +36,4 @@ TEST(NumberColumns, EmptyCellsAndMarksDoNotCountAndDoNotMakeOne) {
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::column_alignment_test

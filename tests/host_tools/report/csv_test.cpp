@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::report {
+namespace kmax::report::csv_test {
 namespace {
 
 TEST(Csv, FieldsAreQuotedWhereRfc4180AsksForIt) {
@@ -61,4 +61,4 @@ RC_GTEST_PROP(CsvProperty, ComesBackFromAnyBytes, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::csv_test

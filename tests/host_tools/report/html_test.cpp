@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::report {
+namespace kmax::report::html_test {
 namespace {
 
 TEST(Html, HasEverythingInItsOrder) {
@@ -83,4 +83,4 @@ RC_GTEST_PROP(HtmlProperty, TagsAreThoseOfTheEmptyPageWhateverTheTexts,
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::html_test

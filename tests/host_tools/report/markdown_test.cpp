@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::report {
+namespace kmax::report::markdown_test {
 namespace {
 
 TEST(Markdown, HasEverythingInItsOrder) {
@@ -80,4 +80,4 @@ RC_GTEST_PROP(MarkdownProperty, ARowIsALineWithAsManyBarsWhateverIsInIt,
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::markdown_test

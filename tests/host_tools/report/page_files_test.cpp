@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::report {
+namespace kmax::report::page_files_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -53,4 +53,4 @@ TEST(PageFiles, WhatCannotBeWrittenIsNamedAndLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::page_files_test

@@ -8,7 +8,7 @@
 #include "host_tools/report/terminal_text.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::report {
+namespace kmax::report::page_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -31,4 +31,4 @@ TEST(Page, ARowThatDoesNotFitIsRefusedByEveryWriter) {
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::page_test

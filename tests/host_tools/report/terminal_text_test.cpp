@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace kmax::report {
+namespace kmax::report::terminal_text_test {
 namespace {
 
 TEST(TerminalText, NumbersStandRightAndWordsLeft) {
@@ -86,4 +86,4 @@ RC_GTEST_PROP(TerminalTextProperty, AnyBytesGiveALinePerRow, (const std::vector<
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::terminal_text_test

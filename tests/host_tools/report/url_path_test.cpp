@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::report {
+namespace kmax::report::url_path_test {
 namespace {
 
 TEST(UrlPath, IsTheNameAloneWithoutAnythingThatMeansSomething) {
@@ -15,4 +15,4 @@ TEST(UrlPath, IsTheNameAloneWithoutAnythingThatMeansSomething) {
 }
 
 }  // namespace
-}  // namespace kmax::report
+}  // namespace kmax::report::url_path_test

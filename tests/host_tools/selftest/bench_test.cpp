@@ -2,7 +2,7 @@
 
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::bench_test {
 namespace {
 
 constexpr const char* scenes[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
@@ -104,4 +104,4 @@ TEST(Bench, ArmsWithTheRunThatWasThereAndStartsPulsesByChangingIt) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::bench_test

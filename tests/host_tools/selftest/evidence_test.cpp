@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace kmax::selftest {
+namespace kmax::selftest::evidence_test {
 namespace {
 
 using firmware::Fault;
@@ -98,4 +98,4 @@ TEST(Evidence, WithoutAPowerStageNothingOfItIsJudged) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::evidence_test

@@ -2,7 +2,7 @@
 
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::hand_checks_test {
 namespace {
 
 TEST(HandChecks, AnEmergencyStopThatIsPressedAndReleased) {
@@ -39,4 +39,4 @@ TEST(HandChecks, AHandleThatNobodyMoves) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::hand_checks_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::selftest {
+namespace kmax::selftest::linear_fit_test {
 namespace {
 
 TEST(LinearFit, FindsWhatItWasMadeOfWhateverTheUnits) {
@@ -34,4 +34,4 @@ TEST(LinearFit, HasNoAnswerWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::linear_fit_test

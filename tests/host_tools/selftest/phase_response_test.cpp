@@ -7,7 +7,7 @@
 
 #include "host_tools/selftest/winding_model.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::phase_response_test {
 namespace {
 
 /// Pulses whose sensors answer b and c times the winding's current.
@@ -110,4 +110,4 @@ TEST(PhaseResponse, WhatFitsNothingIsUnclear) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::phase_response_test

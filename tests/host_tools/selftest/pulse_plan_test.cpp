@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kmax::selftest {
+namespace kmax::selftest::pulse_plan_test {
 namespace {
 
 /// m: largest span of a free handle without friction whose current follows the square wave at once.
@@ -50,4 +50,4 @@ TEST(PulsePlan, ASwingEndsAlmostAtRest) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::pulse_plan_test

@@ -4,7 +4,7 @@
 #include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::selftest_ended_test {
 namespace {
 
 using host_tools_test::thrown_message;
@@ -136,4 +136,4 @@ TEST(SelfTestLeaves, AHandThatMovesTheHandleIsAFailedCheck) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::selftest_ended_test

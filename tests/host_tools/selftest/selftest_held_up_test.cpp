@@ -4,7 +4,7 @@
 #include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::selftest_held_up_test {
 namespace {
 
 using host_tools_test::thrown_message;
@@ -91,4 +91,4 @@ TEST(SelfTestHeldUp, AgainAndAgainTheTestCannotBeCarriedOut) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::selftest_held_up_test

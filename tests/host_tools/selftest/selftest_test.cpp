@@ -3,7 +3,7 @@
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
-namespace kmax::selftest {
+namespace kmax::selftest::selftest_test {
 namespace {
 
 using simulation::Defect;
@@ -205,4 +205,4 @@ TEST(SelfTest, ATripInTheMidstOfASwingIsReportedAndLeavesNothingBehind) {
 }
 
 }  // namespace
-}  // namespace kmax::selftest
+}  // namespace kmax::selftest::selftest_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::serve {
+namespace kmax::serve::pseudo_terminal_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -118,4 +118,4 @@ TEST(PseudoTerminal, AMissingFolderIsSaidAndNothingStaysOpen) {
 }
 
 }  // namespace
-}  // namespace kmax::serve
+}  // namespace kmax::serve::pseudo_terminal_test

@@ -9,7 +9,7 @@
 
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::serve {
+namespace kmax::serve::real_time_test {
 namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
@@ -63,4 +63,4 @@ TEST(RealTime, StopsBeforeItBegins) {
 }
 
 }  // namespace
-}  // namespace kmax::serve
+}  // namespace kmax::serve::real_time_test

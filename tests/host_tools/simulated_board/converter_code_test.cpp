@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::converter_code_test {
 namespace {
 
 TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
@@ -21,4 +21,4 @@ TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::converter_code_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::file_flash_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -101,4 +101,4 @@ TEST_F(FileFlashTest, KeptParametersReplaceDefaultsAndTheScenesOwnReplaceThem) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::file_flash_test

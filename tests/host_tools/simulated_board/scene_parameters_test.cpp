@@ -8,7 +8,7 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::scene_parameters_test {
 namespace {
 using host_tools_test::thrown_message;
 using simulation::ParameterValue;
@@ -151,4 +151,4 @@ TEST(SceneParameters, CommandsInASceneDoNotArmIt) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::scene_parameters_test

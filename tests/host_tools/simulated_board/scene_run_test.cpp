@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::scene_run_test {
 namespace {
 using firmware::DriveState;
 
@@ -190,4 +190,4 @@ TEST(SceneRun, AFaultEndsTheForceAndIsReported) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::scene_run_test

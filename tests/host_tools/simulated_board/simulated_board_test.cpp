@@ -5,7 +5,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_board_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -70,4 +70,4 @@ TEST(SimulatedBoard, FactorySceneHasOnlyWhatDescribesTheHardware) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_board_test

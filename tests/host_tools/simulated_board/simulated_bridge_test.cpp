@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_bridge_test {
 namespace {
 
 firmware::MotorControl::Output duties(float a, float b, float c) {
@@ -78,4 +78,4 @@ TEST(SimulatedBridge, DeadTimeAndFrequencyAreTheTimers) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_bridge_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_counter_test {
 namespace {
 
 using simulation::Defect;
@@ -151,4 +151,4 @@ TEST(SimulatedCounter, AHandleThatStartsAtItsRestKeepsItsOrigin) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_counter_test

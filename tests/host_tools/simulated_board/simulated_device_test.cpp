@@ -4,7 +4,7 @@
 
 #include "host_tools/simulated_board/simulated_board.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_device_test {
 namespace {
 
 firmware::AxisOutput output(float force, bool enabled) {
@@ -186,4 +186,4 @@ TEST(SimulatedDevice, ABoardHasTwoAxes) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_device_test

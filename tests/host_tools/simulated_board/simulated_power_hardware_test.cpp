@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_power_hardware_test {
 namespace {
 
 using board::odrive_v3::OffsetProgress;
@@ -122,4 +122,4 @@ TEST_F(PowerHardware, TemperaturesAreThoseOfTheSensors) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_power_hardware_test

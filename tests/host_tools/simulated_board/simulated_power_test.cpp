@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::simulated_power_test {
 namespace {
 
 using firmware::DriveState;
@@ -236,4 +236,4 @@ TEST(SimulatedPower, AMotorThatBrakesIsTakenByTheBrakeResistor) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::simulated_power_test

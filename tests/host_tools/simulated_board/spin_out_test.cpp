@@ -10,7 +10,7 @@
 #include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulation/scene.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::spin_out_test {
 namespace {
 
 using firmware::Fault;
@@ -186,4 +186,4 @@ TEST(SpinOutOfAMotor, WhatAHandCouldDoDoesNotTrip) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::spin_out_test

@@ -9,7 +9,7 @@
 
 #include "host_tools/simulated_board/scene_run.hpp"
 
-namespace kmax::simulated_board {
+namespace kmax::simulated_board::supplied_scenes_test {
 namespace {
 
 using simulation::ContactVerdict;
@@ -225,4 +225,4 @@ TEST(SuppliedScenes, ANoisyEncoderLosesTheWall) {
 }
 
 }  // namespace
-}  // namespace kmax::simulated_board
+}  // namespace kmax::simulated_board::supplied_scenes_test

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-namespace kmax::torque_ripple {
+namespace kmax::torque_ripple::torque_ripple_test {
 namespace {
 
 simulation::Scene scene(const std::string& name) {
@@ -105,4 +105,4 @@ TEST(TorqueRippleRig, NeedsAMotor) {
 }
 
 }  // namespace
-}  // namespace kmax::torque_ripple
+}  // namespace kmax::torque_ripple::torque_ripple_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::axis_encoder_test {
 namespace {
 
 constexpr double count = 0x1p-20;  // m
@@ -84,4 +84,4 @@ TEST(AxisEncoder, RefusesWhatCannotBeCounted) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::axis_encoder_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::brushed_dc_motor_test {
 namespace {
 
 TerminalDrive between(double u_b, double u_c, double leg_resistance = 0.0) {
@@ -124,4 +124,4 @@ TEST(BrushedDcMotor, RefusesWhatIsNoMotor) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::brushed_dc_motor_test

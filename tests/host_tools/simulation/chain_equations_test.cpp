@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::chain_equations_test {
 namespace {
 
 ChainDynamics three_masses() {
@@ -85,4 +85,4 @@ TEST(ChainEquations, StepsAreEqualAndNoLongerThanAsked) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::chain_equations_test

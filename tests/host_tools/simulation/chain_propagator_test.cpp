@@ -11,7 +11,7 @@
 
 #include "host_tools/simulation/chain_motion.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::chain_propagator_test {
 namespace {
 
 class RandomChains {
@@ -182,4 +182,4 @@ TEST(ChainPropagator, AcceptsNothingThatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::chain_propagator_test

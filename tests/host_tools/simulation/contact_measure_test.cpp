@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-namespace kmax::simulation {
+namespace kmax::simulation::contact_measure_test {
 namespace {
 
 std::vector<ContactSample> record(const std::function<double(double)>& position, double begin = 2.0,
@@ -149,4 +149,4 @@ TEST(ContactMeasure, ThreeCountsAreStableWhateverTheRounding) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::contact_measure_test

@@ -14,7 +14,7 @@
 #include "host_tools/simulation/contact_measure.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::contact_study_test {
 namespace {
 
 enum class Field { constant, instant, latched, peak_hold };
@@ -219,4 +219,4 @@ TEST(ContactStudy, LargestStableStiffnessRisesWithTheField) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::contact_study_test

@@ -14,7 +14,7 @@
 #include "host_tools/simulation/held_chain.hpp"
 #include "tests/host_tools/simulation/precise_chain.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::coupled_handle_hard_cases_test {
 namespace {
 
 using Real = PreciseChain::Real;
@@ -306,4 +306,4 @@ TEST(CoupledHandleHardCases, NoEnergyIsGainedOrLostInTenMillionIntervals) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::coupled_handle_hard_cases_test

@@ -12,7 +12,7 @@
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "tests/host_tools/simulation/energy_balance.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::coupled_handle_parts_test {
 namespace {
 
 constexpr double period = 0.002;
@@ -264,4 +264,4 @@ RC_GTEST_PROP(CoupledHandleParts, DissipationOnlyTakesEnergy, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::coupled_handle_parts_test

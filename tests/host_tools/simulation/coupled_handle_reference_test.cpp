@@ -12,7 +12,7 @@
 #include "tests/host_tools/simulation/drawn_models.hpp"
 #include "tests/host_tools/simulation/reference_handle.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::coupled_handle_reference_test {
 namespace {
 
 constexpr double period = 0.002;
@@ -120,4 +120,4 @@ RC_GTEST_PROP(CoupledHandleReference, AgreesForAnyParameters, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::coupled_handle_reference_test

@@ -11,7 +11,7 @@
 
 #include "tests/host_tools/simulation/energy_balance.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::coupled_handle_test {
 namespace {
 
 constexpr double period = 0.002;
@@ -364,4 +364,4 @@ TEST(CoupledHandle, ALongIntervalIsDividedIntoPieces) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::coupled_handle_test

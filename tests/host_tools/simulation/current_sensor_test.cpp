@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::current_sensor_test {
 namespace {
 
 using Channel = CurrentSensor::Channel;
@@ -99,4 +99,4 @@ TEST(CurrentSensor, RefusesWhatIsNotANumberOrNoSensor) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::current_sensor_test

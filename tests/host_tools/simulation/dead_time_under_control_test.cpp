@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/simulation/sine_through_zero.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::dead_time_under_control_test {
 namespace {
 
 using test::DeadTimeShare;
@@ -86,4 +86,4 @@ TEST(DeadTimeUnderControl, TheMeasuredCurrentFeedsBackOnItself) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::dead_time_under_control_test

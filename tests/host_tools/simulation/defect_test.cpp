@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::simulation {
+namespace kmax::simulation::defect_test {
 namespace {
 
 TEST(Defect, NamesAndDefectsBelongTogether) {
@@ -17,4 +17,4 @@ TEST(Defect, NamesAndDefectsBelongTogether) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::defect_test

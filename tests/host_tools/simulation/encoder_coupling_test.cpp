@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::encoder_coupling_test {
 namespace {
 
 TEST(EncoderCoupling, WithoutDefectsTheDiscIsExactlyWhereTheShaftIs) {
@@ -84,4 +84,4 @@ TEST(EncoderCoupling, RefusesWhatIsNoShareOrTorque) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::encoder_coupling_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::encoder_model_test {
 namespace {
 
 TEST(EncoderModel, CountsDownwardsFromZeroAndWraps) {
@@ -51,4 +51,4 @@ RC_GTEST_PROP(EncoderModel, DifferencesSurviveTheWrap, (std::int32_t from, std::
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::encoder_model_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::simulation {
+namespace kmax::simulation::event_search_test {
 namespace {
 
 TEST(EventSearch, FindsTheZeroOfSmoothAndOfBentFunctions) {
@@ -46,4 +46,4 @@ TEST(EventSearch, AStartFromZeroIsFollowedUntilItMoves) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::event_search_test

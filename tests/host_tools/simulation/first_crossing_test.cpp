@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace kmax::simulation {
+namespace kmax::simulation::first_crossing_test {
 namespace {
 
 std::vector<double> times_root(const std::vector<double>& c, double root) {
@@ -97,4 +97,4 @@ RC_GTEST_PROP(FirstCrossing, AgreesWithADenseScanForRandomCoefficients, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::first_crossing_test

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace kmax::simulation {
+namespace kmax::simulation::force_delay_test {
 namespace {
 
 struct Piece {
@@ -124,4 +124,4 @@ RC_GTEST_PROP(ForceDelay, IsTheCommandedStaircaseShifted, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::force_delay_test

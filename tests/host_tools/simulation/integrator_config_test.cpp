@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::integrator_config_test {
 namespace {
 
 using host_tools_test::thrown_message;
@@ -46,4 +46,4 @@ TEST(IntegratorConfig, ValuesOutOfRangeAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::integrator_config_test

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace kmax::simulation {
+namespace kmax::simulation::intended_motion_test {
 namespace {
 
 IntendedMotionConfig example() {
@@ -194,4 +194,4 @@ RC_GTEST_PROP(IntendedMotion, IsContinuousNeverTooFastAndCoversTheTime, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::intended_motion_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::inverter_test {
 namespace {
 
 constexpr double supply = 24.0;
@@ -276,4 +276,4 @@ TEST(Inverter, RefusesWhatIsNotAllowedAndLeavesTheMotorAlone) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::inverter_test

@@ -10,7 +10,7 @@
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::model_field_test {
 namespace {
 
 template <typename Model, std::size_t count>
@@ -65,4 +65,4 @@ TEST(ModelField, MessageGivesValueAndRange) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::model_field_test

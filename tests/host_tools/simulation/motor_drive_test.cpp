@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::motor_drive_test {
 namespace {
 
 using Channel = CurrentSensor::Channel;
@@ -387,4 +387,4 @@ TEST(MotorDrive, RefusesWhatIsNotANumber) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::motor_drive_test

@@ -10,7 +10,7 @@
 #include "host_tools/simulation/scene.hpp"
 #include "tests/host_tools/simulation/scene_file.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::motor_under_control_test {
 namespace {
 
 constexpr float tick = 50e-6f;
@@ -144,4 +144,4 @@ TEST(MotorUnderControl, APersonPressesBothHandlesAgainstTheirWalls) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::motor_under_control_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::simulation {
+namespace kmax::simulation::noise_generator_test {
 namespace {
 
 // The sequence that the authors' reference implementation gives for seed 1234567.
@@ -55,4 +55,4 @@ TEST(NoiseGenerator, GaussianHasMeanVarianceAndIsWhite) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::noise_generator_test

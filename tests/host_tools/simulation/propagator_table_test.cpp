@@ -10,7 +10,7 @@
 
 #include "host_tools/simulation/coupled_handle.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::propagator_table_test {
 namespace {
 
 TEST(GainGrid, RoundsToTheNearestOfItsNumbers) {
@@ -180,4 +180,4 @@ TEST(PropagatorTable, RoundsTheGainOfAFieldAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::propagator_table_test

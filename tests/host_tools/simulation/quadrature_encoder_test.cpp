@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::quadrature_encoder_test {
 namespace {
 
 constexpr double count = 0x1p-20;  // m; a power of two, so that positions have no rounding of their own
@@ -158,4 +158,4 @@ TEST(QuadratureEncoder, RefusesWhatCannotBeCounted) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::quadrature_encoder_test

@@ -12,7 +12,7 @@
 #include "tests/host_tools/simulation/integrator_functions.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::reference_integrators_refusals_test {
 namespace {
 
 using host_tools_test::thrown_message;
@@ -122,4 +122,4 @@ TEST(ReferenceIntegratorsRefuse, StepsThatAreTooLongInWordsAndNotInNumbers) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::reference_integrators_refusals_test

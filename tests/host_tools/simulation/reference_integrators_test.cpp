@@ -13,7 +13,7 @@
 #include "tests/host_tools/simulation/drawn_models.hpp"
 #include "tests/host_tools/simulation/integrator_functions.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::reference_integrators_test {
 namespace {
 
 struct Named {
@@ -353,4 +353,4 @@ RC_GTEST_PROP(ReferenceIntegrators, AdaptiveAgreesWithTheExactMethodForAnyParame
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::reference_integrators_test

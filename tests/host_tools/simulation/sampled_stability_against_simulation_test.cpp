@@ -16,7 +16,7 @@
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "tests/control/drawn_loop.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::sampled_stability_against_simulation_test {
 namespace {
 
 using Loop = control::SampledLoop<double>;
@@ -191,4 +191,4 @@ TEST(SampledStabilityAgainstSimulation, EscapeSpeedWithFriction) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::sampled_stability_against_simulation_test

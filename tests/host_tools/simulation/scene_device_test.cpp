@@ -7,7 +7,7 @@
 #include "host_tools/simulation/scene.hpp"
 #include "tests/host_tools/simulation/scene_refusal.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_device_test {
 namespace {
 
 TEST(SceneDevice, ReadsStructureDelayAndIntegrator) {
@@ -96,4 +96,4 @@ TEST(SceneDevice, TheSamePersonHoldsBothAxes) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_device_test

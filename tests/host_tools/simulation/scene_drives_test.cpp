@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_drives_test {
 namespace {
 
 using Channel = CurrentSensor::Channel;
@@ -257,4 +257,4 @@ TEST(Defects, ASceneMayBeginWithThem) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_drives_test

@@ -10,7 +10,7 @@
 #include "host_tools/simulation/scene_drives.hpp"
 #include "tests/host_tools/simulation/scene_keys.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_extremes_test {
 namespace {
 
 std::optional<Scene> accepted(const std::string& text) {
@@ -101,4 +101,4 @@ TEST(SceneExtremes, StiffOnLightAndSoftOnHeavy) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_extremes_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/simulation/scene_file.hpp"
 #include "tests/host_tools/simulation/scene_refusal.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_motor_test {
 namespace {
 
 TEST(SceneMotor, WithoutTheTablesThereIsNoMotor) {
@@ -248,4 +248,4 @@ TEST(SceneMotor, TheSuppliedScenesAgreeWithTheirParameters) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_motor_test

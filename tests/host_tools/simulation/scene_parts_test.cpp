@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_parts_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -39,4 +39,4 @@ TEST(SceneParts, IntegratorsInWords) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_parts_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/simulation/scene_keys.hpp"
 #include "tests/host_tools/simulation/scene_refusal.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_refusals_test {
 namespace {
 
 void expect_refused(const Key& key, const std::string& value) {
@@ -182,4 +182,4 @@ TEST(SceneRefusals, PartsThatContradictEachOther) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_refusals_test

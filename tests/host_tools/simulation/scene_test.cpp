@@ -8,7 +8,7 @@
 #include "tests/host_tools/simulation/scene_file.hpp"
 #include "tests/host_tools/simulation/scene_refusal.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::scene_test {
 namespace {
 
 TEST(Scene, DefaultsAreThoseOfTheModels) {
@@ -235,4 +235,4 @@ TEST(Scene, AxisZeroByItsNameIsTheSameParameter) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::scene_test

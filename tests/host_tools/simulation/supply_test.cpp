@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::supply_test {
 namespace {
 
 void run(Supply& supply, double current, double duration, double interval = 25e-6) {
@@ -129,4 +129,4 @@ TEST(Supply, RefusesWhatIsNotAllowed) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::supply_test

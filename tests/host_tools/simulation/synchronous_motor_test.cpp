@@ -9,7 +9,7 @@
 
 #include "tests/host_tools/simulation/reference_synchronous_motor.hpp"
 
-namespace kmax::simulation {
+namespace kmax::simulation::synchronous_motor_test {
 namespace {
 
 constexpr double pi = 3.141592653589793;
@@ -216,4 +216,4 @@ TEST(SynchronousMotor, RefusesWhatIsNoMotor) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::synchronous_motor_test

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kmax::simulation {
+namespace kmax::simulation::temperature_sensor_test {
 namespace {
 
 // Shares of the reference published for the ODrive v3.6 circuit.
@@ -38,4 +38,4 @@ TEST(TemperatureSensor, RefusesWhatIsNoTemperature) {
 }
 
 }  // namespace
-}  // namespace kmax::simulation
+}  // namespace kmax::simulation::temperature_sensor_test

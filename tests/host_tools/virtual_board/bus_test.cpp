@@ -8,7 +8,7 @@
 
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::bus_test {
 namespace {
 
 std::string refusal(const std::function<void()>& access) {
@@ -121,4 +121,4 @@ TEST(Bus, HandsOutStoresToTheParameterSectors) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::bus_test

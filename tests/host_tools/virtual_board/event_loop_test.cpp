@@ -8,7 +8,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::event_loop_test {
 namespace {
 
 namespace chip = drivers::stm32f4;
@@ -131,4 +131,4 @@ TEST(EventLoop, FindsAPeripheralThatDoesNotMoveOn) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::event_loop_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::wall {
+namespace kmax::wall::force_curve_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -43,4 +43,4 @@ TEST(ForceCurves, ErrorsAreTheFigures) {
 }
 
 }  // namespace
-}  // namespace kmax::wall
+}  // namespace kmax::wall::force_curve_test

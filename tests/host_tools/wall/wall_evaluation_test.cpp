@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace kmax::wall {
+namespace kmax::wall::wall_evaluation_test {
 namespace {
 using control::WallKind;
 
@@ -79,4 +79,4 @@ RC_GTEST_PROP(WallEvaluatorProperty, NothingIsRemembered, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::wall
+}  // namespace kmax::wall::wall_evaluation_test

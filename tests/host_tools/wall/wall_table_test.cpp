@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::wall {
+namespace kmax::wall::wall_table_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -145,4 +145,4 @@ RC_GTEST_PROP(WallTableProperty, RowsAreTheSingleEvaluations,
 }
 
 }  // namespace
-}  // namespace kmax::wall
+}  // namespace kmax::wall::wall_table_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/device/can/fake_sdo_node.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_discovery_test {
 namespace {
 using drivers::CanFrame;
 using host_tools_test::FakeSdoNode;
@@ -175,4 +175,4 @@ TEST(CanDiscovery, ABusThatIsClosedMeanwhile) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_discovery_test

@@ -5,7 +5,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_faults_test {
 namespace {
 
 can_frame report(canid_t classes, std::uint8_t controller = 0, std::uint8_t violation = 0) {
@@ -87,4 +87,4 @@ TEST(CanFaults, AGoodFrameOrARecoveryEndsTheRest) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_faults_test

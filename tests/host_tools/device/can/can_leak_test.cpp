@@ -15,7 +15,7 @@
 #include "tests/host_tools/device/can/fake_sdo_server.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_leak_test {
 namespace {
 using device::Parameter;
 using host_tools_test::FakeSdoServer;
@@ -120,4 +120,4 @@ TEST(CanLeak, AHundredLinksAndRefusals) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_leak_test

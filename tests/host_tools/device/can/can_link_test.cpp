@@ -9,7 +9,7 @@
 #include "tests/host_tools/device/can/sdo_bench.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_link_test {
 namespace {
 using device::Parameter;
 using drivers::CanFrame;
@@ -326,4 +326,4 @@ TEST(CanLink, ABusThatIsNotThereIsNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_link_test

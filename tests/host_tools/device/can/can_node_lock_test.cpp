@@ -12,7 +12,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_node_lock_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -110,4 +110,4 @@ TEST(CanNodeLock, DisappearsWithAProcessThatIsKilled) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_node_lock_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::can_port_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -35,4 +35,4 @@ TEST(CanPort, AFilterIsAboutStandardDataFrames) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::can_port_test

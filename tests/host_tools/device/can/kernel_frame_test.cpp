@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::link {
+namespace kmax::link::kernel_frame_test {
 namespace {
 using drivers::CanFrame;
 
@@ -56,4 +56,4 @@ TEST(KernelFrame, WhatIsNoFrameIsNone) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::kernel_frame_test

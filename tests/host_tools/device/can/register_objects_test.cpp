@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace kmax::link {
+namespace kmax::link::register_objects_test {
 namespace {
 using firmware::entry_at;
 using firmware::entry_of;
@@ -105,4 +105,4 @@ TEST(RegisterObjects, APredefinedIdentifierLosesTheNodeIdAndAnotherKeepsIt) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::register_objects_test

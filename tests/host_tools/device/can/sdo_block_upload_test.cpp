@@ -5,7 +5,7 @@
 #include "tests/host_tools/device/can/sdo_bench.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::sdo_block_upload_test {
 namespace {
 using drivers::CanFrame;
 using firmware::canopen::Abort;
@@ -220,4 +220,4 @@ TEST(SdoBlockUpload, AnInterruptionEndsTheTransferInTheNode) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::sdo_block_upload_test

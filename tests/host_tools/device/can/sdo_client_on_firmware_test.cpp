@@ -12,7 +12,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::sdo_client_on_firmware_test {
 namespace {
 using drivers::CanFrame;
 using firmware::canopen::Abort;
@@ -158,4 +158,4 @@ TEST(SdoClientOnFirmware, Aborts) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::sdo_client_on_firmware_test

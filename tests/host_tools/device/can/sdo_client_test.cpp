@@ -6,7 +6,7 @@
 #include "tests/host_tools/device/can/sdo_bench.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::sdo_client_test {
 namespace {
 using drivers::CanFrame;
 using firmware::canopen::Abort;
@@ -292,4 +292,4 @@ TEST(SdoClient, MoreOrLessThanAnnouncedIsNotTaken) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::sdo_client_test

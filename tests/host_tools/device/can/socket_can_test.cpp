@@ -9,7 +9,7 @@
 #include "host_tools/device/link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::socket_can_test {
 namespace {
 using drivers::CanFrame;
 using host_tools_test::thrown_message;
@@ -153,4 +153,4 @@ TEST_F(SocketCanTest, AnInterfaceThatGoesDownIsToldAndHowToBringItUp) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::socket_can_test

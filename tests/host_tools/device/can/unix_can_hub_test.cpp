@@ -12,7 +12,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::unix_can_hub_test {
 namespace {
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
@@ -212,4 +212,4 @@ TEST(UnixCanHub, TheSocketOfASuccessorIsNotRemoved) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::unix_can_hub_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::unix_can_test {
 namespace {
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
@@ -144,4 +144,4 @@ TEST(UnixCan, WhatIsNoBusIsNamed) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::unix_can_test

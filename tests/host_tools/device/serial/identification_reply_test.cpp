@@ -7,7 +7,7 @@
 #include "firmware/modbus/server.hpp"
 #include "tests/host_tools/fake_device.hpp"
 
-namespace kmax::link::identification {
+namespace kmax::link::identification::identification_reply_test {
 namespace {
 
 std::vector<std::uint8_t> with_crc(std::vector<std::uint8_t> frame) {
@@ -79,4 +79,4 @@ TEST(IdentificationReply, Names) {
 }
 
 }  // namespace
-}  // namespace kmax::link::identification
+}  // namespace kmax::link::identification::identification_reply_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/device/serial/pty_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::serial_port_lock_test {
 namespace {
 using host_tools_test::PtyDevice;
 using host_tools_test::thrown_message;
@@ -63,4 +63,4 @@ TEST(SerialPortLock, MissingPermissionNamesTheGroup) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::serial_port_lock_test

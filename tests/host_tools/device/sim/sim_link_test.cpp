@@ -7,7 +7,7 @@
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link {
+namespace kmax::link::sim_link_test {
 namespace {
 using device::Parameter;
 using host_tools_test::thrown_message;
@@ -150,4 +150,4 @@ RC_GTEST_PROP(SimLinkProperty, AnyReadIsAnsweredOrRefused, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::link
+}  // namespace kmax::link::sim_link_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::contact_experiment_test {
 namespace {
 using host_tools_test::thrown_message;
 using simulation::ContactVerdict;
@@ -211,4 +211,4 @@ TEST(ContactResult, NoContactNeverAgreesWithThePaper) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::contact_experiment_test

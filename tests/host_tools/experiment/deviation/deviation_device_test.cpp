@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::deviation_device_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -225,4 +225,4 @@ TEST_F(DeviationWithoutAPerson, NoTouchWithinPatienceIsAnError) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::deviation_device_test

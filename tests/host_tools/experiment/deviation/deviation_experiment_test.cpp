@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kmax::experiment {
+namespace kmax::experiment::deviation_experiment_test {
 namespace {
 
 DeviationProtocol quick() {
@@ -158,4 +158,4 @@ TEST(SimulateDeviation, SettingsOutOfRangeAreRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::deviation_experiment_test

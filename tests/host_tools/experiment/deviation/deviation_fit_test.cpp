@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace kmax::experiment {
+namespace kmax::experiment::deviation_fit_test {
 namespace {
 
 std::vector<paper::DeviationCell> made_by(const HandResistance& hand) {
@@ -62,4 +62,4 @@ TEST(FitDeviation, FewerCellsThanNumbersAreRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::deviation_fit_test

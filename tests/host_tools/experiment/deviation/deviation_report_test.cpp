@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::deviation_report_test {
 namespace {
 
 DeviationSettings few() {
@@ -121,4 +121,4 @@ TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::deviation_report_test

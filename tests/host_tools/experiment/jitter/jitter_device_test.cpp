@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::jitter_device_test {
 namespace {
 using host_tools_test::thrown_message;
 
@@ -158,4 +158,4 @@ TEST(JitterOfAServedPerson, FallsWithTheBackgroundForceIfThePersonStiffens) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::jitter_device_test

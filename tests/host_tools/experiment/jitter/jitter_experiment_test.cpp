@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kmax::experiment {
+namespace kmax::experiment::jitter_experiment_test {
 namespace {
 
 std::vector<JitterSample> course(const std::vector<double>& outside, double begin = 0.0) {
@@ -205,4 +205,4 @@ TEST(PaperTables, HaveTheSamePairsOfForcesAndTimesOfWhole15Milliseconds) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::jitter_experiment_test

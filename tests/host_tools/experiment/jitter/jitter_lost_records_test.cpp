@@ -8,7 +8,7 @@
 #include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::jitter_lost_records_test {
 namespace {
 
 class JitterOverASlowLink : public TouchedBoard {
@@ -70,4 +70,4 @@ TEST_F(JitterOverASlowLink, OneThatAlwaysLosesSomeIsNotCountedAndIsTold) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::jitter_lost_records_test

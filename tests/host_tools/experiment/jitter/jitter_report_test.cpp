@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::jitter_report_test {
 namespace {
 
 JitterSettings few() {
@@ -109,4 +109,4 @@ TEST(JitterReport, APairThatNobodyTouchedHasNoNumberAmongTheCauses) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::jitter_report_test

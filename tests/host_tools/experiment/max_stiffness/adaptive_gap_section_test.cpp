@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::adaptive_gap_section_test {
 namespace {
 
 ApproachResult approach(double speed, double best) {
@@ -46,4 +46,4 @@ TEST(AdaptiveGapSection, MarksMeansThatHoldBounds) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::adaptive_gap_section_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::adaptive_gap_test {
 namespace {
 
 TEST(AdaptiveGap, AHeldCoefficientIsWorthMoreTheFasterTheApproach) {
@@ -22,4 +22,4 @@ TEST(AdaptiveGap, AHeldCoefficientIsWorthMoreTheFasterTheApproach) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::adaptive_gap_test

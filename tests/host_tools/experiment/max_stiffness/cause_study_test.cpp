@@ -6,7 +6,7 @@
 
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::cause_study_test {
 namespace {
 
 TEST(CauseStudy, TakesTheEffectApart) {
@@ -57,4 +57,4 @@ TEST(CauseStudy, LooksBelowTheFirstStiffnessOfOtherSearches) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::cause_study_test

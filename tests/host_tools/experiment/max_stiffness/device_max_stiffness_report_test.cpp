@@ -6,7 +6,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::device_max_stiffness_report_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -77,4 +77,4 @@ TEST(DeviceStiffnessReport, WithoutATouchThereIsNoPicture) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::device_max_stiffness_report_test

@@ -12,7 +12,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::device_max_stiffness_test {
 namespace {
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -309,4 +309,4 @@ TEST(OrderOfThePaper, IsContradictedByAFieldThatDoesNotHelp) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::device_max_stiffness_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::held_wall_section_test {
 namespace {
 
 TEST(HeldWallSection, SaysWhatAgreesWithThePaper) {
@@ -28,4 +28,4 @@ TEST(HeldWallSection, SaysWhatAgreesWithThePaper) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::held_wall_section_test

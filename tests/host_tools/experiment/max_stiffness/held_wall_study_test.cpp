@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::held_wall_study_test {
 namespace {
 
 TEST(HeldWallStudy, CountsPeopleAndTouches) {
@@ -49,4 +49,4 @@ TEST(HeldWallStudy, TheMedianIsTheMiddleOne) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::held_wall_study_test

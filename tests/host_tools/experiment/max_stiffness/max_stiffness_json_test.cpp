@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::experiment {
+namespace kmax::experiment::max_stiffness_json_test {
 namespace {
 
 TEST(MaxStiffnessJson, ReadsBackToTheLastBit) {
@@ -23,4 +23,4 @@ TEST(MaxStiffnessJson, ReadsBackToTheLastBit) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::max_stiffness_json_test

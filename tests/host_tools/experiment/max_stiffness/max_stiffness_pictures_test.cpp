@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::max_stiffness_pictures_test {
 namespace {
 
 const std::vector<double> as_in_the_paper{3580, 4000, 5000, 7000, 8410, 8020, 6000, 6000};
@@ -82,4 +82,4 @@ TEST(DrawRates, ShowsOneEncoderAndMeasureOnly) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::max_stiffness_pictures_test

@@ -6,7 +6,7 @@
 
 #include "host_tools/experiment/people/subject_set.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::max_stiffness_search_test {
 namespace {
 
 TouchSetup plain(const simulation::OperatorModel& person) {
@@ -104,4 +104,4 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::max_stiffness_search_test

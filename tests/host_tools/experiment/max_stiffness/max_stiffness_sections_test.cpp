@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::max_stiffness_sections_test {
 namespace {
 
 const std::vector<double> as_in_the_paper{3580, 4000, 5000, 7000, 8410, 8020, 6000, 6000};
@@ -170,4 +170,4 @@ TEST(VariationSection, TheWordsFollowTheShare) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::max_stiffness_sections_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::max_stiffness_study_test {
 namespace {
 
 TEST(MaxStiffnessStudy, DoesNotDependOnTheThreads) {
@@ -114,4 +114,4 @@ TEST(MaxStiffnessStudy, TheSuppliedSetsMeetThePaperWhereTheyWereFitted) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::max_stiffness_study_test

@@ -4,7 +4,7 @@
 
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::operator_calibration_test {
 namespace {
 
 // A target made by known numbers is met by the numbers that are found for it.
@@ -59,4 +59,4 @@ TEST(OperatorCalibration, LeavesTheFrictionWhereItIsToldTo) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::operator_calibration_test

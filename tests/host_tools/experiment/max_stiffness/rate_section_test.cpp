@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::rate_section_test {
 namespace {
 
 TEST(RateSection, HasOneTableForEachEncoderAndMeasureAndGapsWhereNothingWasRun) {
@@ -34,4 +34,4 @@ TEST(RateSection, HasOneTableForEachEncoderAndMeasureAndGapsWhereNothingWasRun) 
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::rate_section_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace kmax::experiment {
+namespace kmax::experiment::stiffness_climb_test {
 namespace {
 
 /// The stiffnesses it asks for while everything up to `limit` is stable.
@@ -94,4 +94,4 @@ TEST(StiffnessClimb, RefusesAbsurdSteps) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::stiffness_climb_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::experiment {
+namespace kmax::experiment::stiffness_condition_test {
 namespace {
 
 TEST(StiffnessCondition, AreThoseOfThePaper) {
@@ -36,4 +36,4 @@ TEST(CauseCondition, NothingOfTheFieldIsLeftWhereItIsSwitchedOff) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::stiffness_condition_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::stiffness_studies_test {
 namespace {
 
 TEST(StiffnessStudies, AnUnknownNameIsRefusedWithThoseThereAre) {
@@ -49,4 +49,4 @@ TEST(StiffnessStudies, CausesOfAllSetsStandInOneTable) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::stiffness_studies_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::study_variation_test {
 namespace {
 
 TEST(StudyVariation, VariesOneThingAtATime) {
@@ -98,4 +98,4 @@ TEST(StudyVariation, OtherPeopleAreNotTheFittedOnes) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::study_variation_test

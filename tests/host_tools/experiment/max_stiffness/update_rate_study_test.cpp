@@ -8,7 +8,7 @@
 
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::update_rate_study_test {
 namespace {
 
 TEST(UpdateRateStudy, AFasterLoopRendersAStifferWallAndADelayEatsIt) {
@@ -32,4 +32,4 @@ TEST(UpdateRateStudy, NamesEveryCaseOfAnEncoderOnce) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::update_rate_study_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::subject_set_test {
 namespace {
 
 using simulation::SceneError;
@@ -169,4 +169,4 @@ TEST(SubjectSet, RefusesAFitThatIsNotAllThere) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::subject_set_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::resolution_device_test {
 namespace {
 
 class ResolutionDevice : public testing::Test {
@@ -121,4 +121,4 @@ TEST(TouchSpeed, IsTowardsTheWallOverTheLastMoment) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::resolution_device_test

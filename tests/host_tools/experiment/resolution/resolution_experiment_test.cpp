@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kmax::experiment {
+namespace kmax::experiment::resolution_experiment_test {
 namespace {
 
 ResolutionCell cell(double resolution, double speed, bool vibrates) {
@@ -158,4 +158,4 @@ TEST(VaryResolution, EveryVariationDiffersFromTheSettings) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::resolution_experiment_test

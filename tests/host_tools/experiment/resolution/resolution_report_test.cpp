@@ -7,7 +7,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::experiment {
+namespace kmax::experiment::resolution_report_test {
 namespace {
 
 ResolutionSettings few() {
@@ -90,4 +90,4 @@ TEST(ResolutionReport, WhatNoTouchTestedIsNeitherYesNorNo) {
 }
 
 }  // namespace
-}  // namespace kmax::experiment
+}  // namespace kmax::experiment::resolution_report_test

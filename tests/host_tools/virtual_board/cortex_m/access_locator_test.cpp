@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::access_locator_test {
 namespace {
 
 constexpr std::uint32_t address = 0x0800'1000;
@@ -31,4 +31,4 @@ TEST(AccessLocator, FindsTheInstructionByItsEffectiveAddress) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::access_locator_test

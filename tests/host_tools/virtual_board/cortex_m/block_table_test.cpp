@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::block_table_test {
 namespace {
 
 constexpr std::uint32_t address = 0x0800'1000;
@@ -51,4 +51,4 @@ TEST(BlockTable, EndsAtACodeThatIsCutOff) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::block_table_test

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::core_debug_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -32,4 +32,4 @@ TEST(CoreDebug, HasNoDebugger_Dhcsr) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::core_debug_test

@@ -13,7 +13,7 @@
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::core_peripherals_on_model_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -124,4 +124,4 @@ TEST(SystemTickOnModel, GivesMicroseconds) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::core_peripherals_on_model_test

@@ -22,7 +22,7 @@
 #include "host_tools/virtual_board/event_loop.hpp"
 #include "tests/board/core_self_test/float_loop.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::core_self_test_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -192,4 +192,4 @@ TEST_F(CoreSelfTest, ComputesTheSameBitsAsTheHost) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::core_self_test_test

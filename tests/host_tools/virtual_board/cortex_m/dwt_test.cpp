@@ -9,7 +9,7 @@
 
 // ARMv7-M architecture reference manual, C1.8 (DWT).
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::dwt_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -69,4 +69,4 @@ TEST(Dwt, DriverMeasures) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::dwt_test

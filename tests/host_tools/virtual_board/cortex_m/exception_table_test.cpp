@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::exception_table_test {
 namespace {
 
 constexpr unsigned a = 20;
@@ -178,4 +178,4 @@ TEST(ExceptionTable, KeepsLinesOverAReset) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::exception_table_test

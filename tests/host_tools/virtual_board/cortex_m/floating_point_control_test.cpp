@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::floating_point_control_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -46,4 +46,4 @@ TEST(FloatingPointControl, RefusesOtherModes) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::floating_point_control_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::instruction_test {
 namespace {
 
 using Operand = std::optional<MemoryOperand>;
@@ -170,4 +170,4 @@ TEST(Instruction, CountsLiteralsFromTheAlignedProgramCounter) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::instruction_test

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::memory_protection_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -80,4 +80,4 @@ TEST(MemoryProtection, RefusesRegionsThatTheUnitCannotHave) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::memory_protection_test

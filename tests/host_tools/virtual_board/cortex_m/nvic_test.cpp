@@ -7,7 +7,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::nvic_test {
 namespace {
 
 using drivers::cortex_m::NvicRegisters;
@@ -119,4 +119,4 @@ TEST(Nvic, TakesLinesOfPeripherals) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::nvic_test

@@ -7,7 +7,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::processor_faults_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
@@ -236,4 +236,4 @@ TEST(ProcessorFault, LocksUpOnAFaultInTheHardFaultHandler_Lockup) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::processor_faults_test

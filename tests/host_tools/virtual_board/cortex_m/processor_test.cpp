@@ -10,7 +10,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::processor_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
@@ -260,4 +260,4 @@ TEST(Processor, KeepsTheConditionOfAnIfThenThatThePageEndCuts_IfThenBlocks) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::processor_test

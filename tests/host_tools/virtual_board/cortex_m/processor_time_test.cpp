@@ -6,7 +6,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::processor_time_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
@@ -164,4 +164,4 @@ TEST(ProcessorTime, ChargesFloatingPointFramesWhenTheHandlerUsesTheUnit_LazyPres
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::processor_time_test

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::system_control_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -175,4 +175,4 @@ TEST(SystemControl, RefusesModesThatAreNotModelled) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::system_control_test

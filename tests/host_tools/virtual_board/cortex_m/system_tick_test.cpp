@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::system_tick_test {
 namespace {
 
 using namespace drivers::cortex_m;
@@ -183,4 +183,4 @@ TEST(SystemTickModel, RefusesWhatDoesNotExist) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::system_tick_test

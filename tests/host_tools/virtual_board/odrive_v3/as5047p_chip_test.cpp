@@ -5,7 +5,7 @@
 
 #include "host_tools/virtual_board/peripheral.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::as5047p_chip_test {
 namespace {
 
 struct Bench {
@@ -73,4 +73,4 @@ TEST(As5047pChip, RefusesWrites) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::as5047p_chip_test

@@ -5,7 +5,7 @@
 
 #include "host_tools/virtual_board/peripheral.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::drv8301_chip_test {
 namespace {
 
 using drivers::Drv8301Fault;
@@ -146,4 +146,4 @@ TEST(Drv8301Chip, RefusesWhatTheDataSheetDoesNotAllow) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::drv8301_chip_test

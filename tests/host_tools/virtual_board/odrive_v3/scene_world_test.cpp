@@ -12,7 +12,7 @@
 #include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::scene_world_test {
 namespace {
 
 using simulation::Defect;
@@ -188,4 +188,4 @@ TEST(SceneWorld, AnOpenConnectorHasNoCurrentAndNoEdges) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::scene_world_test

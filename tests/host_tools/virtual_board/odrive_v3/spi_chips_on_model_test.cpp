@@ -8,7 +8,7 @@
 #include "drivers/drv8301.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/spi_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::spi_chips_on_model_test {
 namespace {
 
 using drivers::As5047pResult;
@@ -148,4 +148,4 @@ TEST(SpiChipsOnModel, WholeFrameTakesSixMicroseconds) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::spi_chips_on_model_test

@@ -13,7 +13,7 @@
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::adc_test {
 namespace {
 
 using drivers::stm32f4::AdcRegisters;
@@ -367,4 +367,4 @@ TEST(AdcModel, ResetStopsAndClears) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::adc_test

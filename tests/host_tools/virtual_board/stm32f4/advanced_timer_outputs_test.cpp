@@ -10,7 +10,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/advanced_timer_bench.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::advanced_timer_outputs_test {
 namespace {
 
 using namespace testing;
@@ -165,4 +165,4 @@ TEST(AdvancedTimerModel, StoppedCounterFreezesTheOutputs) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::advanced_timer_outputs_test

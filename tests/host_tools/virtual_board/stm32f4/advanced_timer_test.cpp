@@ -11,7 +11,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/advanced_timer_bench.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::advanced_timer_test {
 namespace {
 
 using namespace testing;
@@ -257,4 +257,4 @@ TEST(AdvancedTimerModel, ResetSwitchesOff) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::advanced_timer_test

@@ -7,7 +7,7 @@
 
 #include "host_tools/virtual_board/run/can_host_node.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::can_bus_test {
 namespace {
 
 using drivers::CanFrame;
@@ -178,4 +178,4 @@ TEST(RecessiveBits, EndsOnABusThatIsNeverIdle) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::can_bus_test

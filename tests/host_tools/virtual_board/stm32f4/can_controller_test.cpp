@@ -7,7 +7,7 @@
 #include "host_tools/virtual_board/run/can_host_node.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::can_controller_test {
 namespace {
 
 using drivers::CanFrame;
@@ -326,4 +326,4 @@ TEST(CanFilters, Protection) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::can_controller_test

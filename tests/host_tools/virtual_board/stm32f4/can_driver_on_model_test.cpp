@@ -7,7 +7,7 @@
 #include "tests/host_tools/virtual_board/stm32f4/can_on_model.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/random_can_frame.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::can_driver_on_model_test {
 namespace {
 
 using drivers::CanFrame;
@@ -247,4 +247,4 @@ TEST(CanDriverOnModel, ConfiguredAgainWhileFramesAreWaiting) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::can_driver_on_model_test

@@ -8,7 +8,7 @@
 
 #include "tests/host_tools/virtual_board/stm32f4/random_can_frame.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::can_frame_bits_test {
 namespace {
 
 using drivers::CanFrame;
@@ -99,4 +99,4 @@ RC_GTEST_PROP(CanFrameBits, ArbitrationAgreesWithTheBits, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::can_frame_bits_test

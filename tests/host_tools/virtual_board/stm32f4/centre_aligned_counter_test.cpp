@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::centre_aligned_counter_test {
 namespace {
 
 TEST(CentreAlignedCounter, StoppedItStandsStill) {
@@ -54,4 +54,4 @@ RC_GTEST_PROP(CentreAlignedCounter, SkippingEqualsTurning, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::centre_aligned_counter_test

@@ -4,7 +4,7 @@
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "tests/host_tools/virtual_board/cortex_m/system_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::clock_tree_on_model_test {
 namespace {
 
 using drivers::stm32f4::ClockFrequencies;
@@ -77,4 +77,4 @@ TEST(ClockTreeOnModel, ResetBringsTheInternalOscillatorBack) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::clock_tree_on_model_test

@@ -9,7 +9,7 @@
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::current_sampling_on_model_test {
 namespace {
 
 using drivers::stm32f4::adc_stride;
@@ -220,4 +220,4 @@ TEST(CurrentSamplingOnModel, StartTooSoonAfterConfigureIsRefusedByTheConverter) 
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::current_sampling_on_model_test

@@ -6,7 +6,7 @@
 
 // RM0090, chapter Debug support (DBG), section MCU debug component (DBGMCU).
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::dbgmcu_test {
 namespace {
 
 using drivers::stm32f4::DbgmcuRegisters;
@@ -32,4 +32,4 @@ TEST(Dbgmcu, RefusesTheRest) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::dbgmcu_test

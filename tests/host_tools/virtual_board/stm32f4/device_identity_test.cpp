@@ -5,7 +5,7 @@
 // RM0090, chapters Embedded Flash memory interface (one-time programmable bytes) and Device electronic
 // signature.
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::device_identity_test {
 namespace {
 
 std::uint32_t get(DeviceIdentity& model, std::uint32_t address, unsigned bytes) {
@@ -40,4 +40,4 @@ TEST(DeviceIdentity, HolesAndWritesAreRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::device_identity_test

@@ -12,7 +12,7 @@
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::external_interrupt_on_model_test {
 namespace {
 
 using drivers::stm32f4::Edge;
@@ -125,4 +125,4 @@ TEST(ExternalInterruptOnModel, EdgeBetweenConfigureAndEnableIsNotLost) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::external_interrupt_on_model_test

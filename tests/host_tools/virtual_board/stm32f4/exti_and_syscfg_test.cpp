@@ -10,7 +10,7 @@
 #include "drivers/stm32f4/registers/syscfg.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::exti_and_syscfg_test {
 namespace {
 
 using drivers::stm32f4::ExtiRegisters;
@@ -174,4 +174,4 @@ TEST(ExtiModel, ResetForgetsButPinsStay) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::exti_and_syscfg_test

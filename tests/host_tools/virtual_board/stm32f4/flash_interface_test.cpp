@@ -10,7 +10,7 @@
 
 // RM0090, chapter Embedded Flash memory interface.
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::flash_interface_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -247,4 +247,4 @@ TEST(FlashPowerCut, TornErasesLeaveOldErasedAndHalfErasedWords) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::flash_interface_test

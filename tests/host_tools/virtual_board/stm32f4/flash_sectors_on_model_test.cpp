@@ -9,7 +9,7 @@
 
 #include "tests/host_tools/virtual_board/cortex_m/system_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::flash_sectors_on_model_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -157,4 +157,4 @@ RC_GTEST_PROP(FlashSectorsOnModel, PowerCutTearsOneOperation, (std::uint64_t see
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::flash_sectors_on_model_test

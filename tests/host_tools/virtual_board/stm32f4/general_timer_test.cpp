@@ -12,7 +12,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::general_timer_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
@@ -330,4 +330,4 @@ TEST(GeneralTimerModel, ResetStopsAndForgets) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::general_timer_test

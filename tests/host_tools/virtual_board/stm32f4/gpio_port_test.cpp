@@ -9,7 +9,7 @@
 #include "drivers/stm32f4/gpio.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::gpio_port_test {
 namespace {
 
 using drivers::stm32f4::GpioMode;
@@ -285,4 +285,4 @@ TEST(GpioPortModel, DriverNeverShowsAWrongLevelOnTheWay) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::gpio_port_test

@@ -11,7 +11,7 @@
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timed_register.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::independent_watchdog_on_model_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -89,4 +89,4 @@ TEST(IndependentWatchdogOnModel, StartIsOverWithinAMillisecond) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::independent_watchdog_on_model_test

@@ -8,7 +8,7 @@
 
 // RM0090, chapter Independent watchdog (IWDG).
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::iwdg_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -154,4 +154,4 @@ TEST(Iwdg, AResetStopsIt) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::iwdg_test

@@ -12,7 +12,7 @@
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::phase_shifted_pwm_on_model_test {
 namespace {
 
 using drivers::stm32f4::ThreePhasePwm;
@@ -201,4 +201,4 @@ TEST(PhaseShiftedPwmOnModel, ThreeEventsForEachPeriod) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::phase_shifted_pwm_on_model_test

@@ -4,7 +4,7 @@
 
 // RM0090, chapter Power controller (PWR), PWR power control register. The rule with HCLK: rcc_test.cpp.
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::pwr_test {
 namespace {
 
 TEST(Pwr, VoltageScaleMustBeChosen) {
@@ -29,4 +29,4 @@ TEST(Pwr, RefusesTheRest) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::pwr_test

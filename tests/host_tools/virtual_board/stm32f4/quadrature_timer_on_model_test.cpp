@@ -11,7 +11,7 @@
 #include "host_tools/virtual_board/stm32f4/general_timer.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::quadrature_timer_on_model_test {
 namespace {
 
 using drivers::stm32f4::IndexCapture;
@@ -115,4 +115,4 @@ TEST(QuadratureTimerOnModel, SamplingTakesThePresentCount) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::quadrature_timer_on_model_test

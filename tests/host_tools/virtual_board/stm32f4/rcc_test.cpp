@@ -9,7 +9,7 @@
 
 // RM0090, chapter Reset and clock control for STM32F405xx (RCC).
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::rcc_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -249,4 +249,4 @@ TEST(RccClockSecurity, WithoutItTheCoreStops) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::rcc_test

@@ -7,7 +7,7 @@
 
 #include "drivers/stm32f4/registers/spi.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::spi_test {
 namespace {
 
 constexpr std::uint32_t cr1 = 0x00, cr2 = 0x04, sr = 0x08, dr = 0x0C;
@@ -153,4 +153,4 @@ TEST(SpiModel, RefusesWhatWouldLoseBits) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::spi_test

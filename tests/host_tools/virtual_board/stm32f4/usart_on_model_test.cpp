@@ -11,7 +11,7 @@
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timed_register.hpp"
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::usart_on_model_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -160,4 +160,4 @@ TEST(UsartOnModel, ReconfiguredInTheMiddleOfATelegram) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::usart_on_model_test

@@ -10,7 +10,7 @@
 
 // RM0090, chapter Universal synchronous asynchronous receiver transmitter (USART).
 
-namespace kmax::virtual_board {
+namespace kmax::virtual_board::usart_test {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
@@ -269,4 +269,4 @@ TEST(UsartModel, WhatIsNotModelledIsRefused) {
 }
 
 }  // namespace
-}  // namespace kmax::virtual_board
+}  // namespace kmax::virtual_board::usart_test
