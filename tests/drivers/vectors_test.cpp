@@ -30,6 +30,9 @@ void stop_on_unexpected_interrupt() {
   throw std::runtime_error("unexpected interrupt");
 }
 
+}  // namespace kmax::board
+
+namespace kmax::board::vectors_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
@@ -94,4 +97,4 @@ TEST(OdriveV3Pins, GatesAreOffAndTheMasterSwitchComesFirst) {
 }
 
 }  // namespace
-}  // namespace kmax::board
+}  // namespace kmax::board::vectors_test
