@@ -35,10 +35,15 @@ class CountExtender {
   }
 
   std::int64_t update(Counter raw) {
-    // The inner cast undoes the promotion of 16-bit operands to int; the outer one is modular since C++20.
-    count_ += static_cast<Step>(static_cast<Counter>(raw - raw_));
+    count_ = peek(raw);
     raw_ = raw;
     return count_;
+  }
+
+  // What update() would give; nothing changes.
+  std::int64_t peek(Counter raw) const {
+    // The inner cast undoes the promotion of 16-bit operands to int; the outer one is modular since C++20.
+    return count_ + static_cast<Step>(static_cast<Counter>(raw - raw_));
   }
 
   std::int64_t count() const { return count_; }

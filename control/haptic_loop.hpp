@@ -40,6 +40,9 @@ struct HapticLoopConfig {
 /// exact to the count wherever the wall is (as long as it is itself below 2^24 counts, in float; a distance
 /// beyond 2^31 counts is taken as that).
 ///
+/// Either tick() renders the wall, or follow() makes the force that it is given; which one may change from
+/// tick to tick. Limits, soft start and faults are the same.
+///
 /// A value that is not finite anywhere gives zero force and `not_finite`; a velocity beyond the limit
 /// gives zero force and `over_speed`. Both are reported on every tick until the next haptic sample; to
 /// latch them is the axis' business. While not enabled, everything is still estimated and evaluated, so
@@ -54,7 +57,7 @@ class HapticLoop {
     Scalar wall_fraction{};       ///< counts, 0 <= fraction < 1
     Scalar count_length{};        ///< m
     Scalar
-        velocity_per_count{};  ///< m/s that one count in one tick is, for who follows the counts themselves
+        velocity_per_count{};  ///< m/s that one count per tick is, for whoever follows the counts themselves
     Scalar side{};             ///< +1 or -1
     Scalar velocity_limit{};   ///< m/s; the largest number: none
     std::uint32_t divider = 1;
@@ -66,12 +69,12 @@ class HapticLoop {
   };
 
   struct Output {
-    Scalar force{};                 ///< N along +x, what the device is asked for
-    Scalar tangential_force{};      ///< N along the surface (parallel interference), for another axis
-    std::int64_t position{};        ///< counts, re-sampled
-    Scalar outside_distance{};      ///< m, > 0 in free space
-    Scalar velocity{};              ///< m/s along +x
-    Scalar magnetic_force{};        ///< N, outwards
+    Scalar force{};             ///< N along +x, what the device is asked for
+    Scalar tangential_force{};  ///< N along the surface (parallel interference), for a law over several axes
+    std::int64_t position{};    ///< counts, re-sampled
+    Scalar outside_distance{};  ///< m, > 0 in free space
+    Scalar velocity{};          ///< m/s along +x
+    Scalar magnetic_force{};    ///< N, outwards
     Scalar magnetic_coefficient{};  ///< N
     bool inside = false;
     bool limited = false;  ///< force.limit took something away
@@ -93,75 +96,45 @@ class HapticLoop {
     wall_.reset();
     interference_.reset();
     limiter_.reset();
-    background_force_ = Scalar(0);
     ticks_until_sample_ = 0;
     held_ = Output{};
   }
 
-  /// A function of its own even where the caller is flattened: FOAW needs all the registers there are.
+  /// One tick of a rendered wall. `added`: N along +x that comes from elsewhere, limited with the wall's
+  /// force.
   ///
-  /// One tick. `external_force`: N along +x, added before the limiter (another axis' tangential force).
-  [[gnu::noinline]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
-                                       Scalar external_force = Scalar(0)) {
-    if (ticks_until_sample_ != 0) {
-      --ticks_until_sample_;
-      held_.new_sample = false;
-      if (!enabled) disable();
-      return held_;
-    }
-    ticks_until_sample_ = c.divider - 1;
-
-    Output& out = held_;
-    out.new_sample = true;
-    const Resampler::Sample sample = resampler_.sample(c.resampler, count);
-    out.position = sample.count;
-    if (!settled_) {
-      velocity_.reset(out.position);
-      settled_ = true;
-    }
-    out.velocity = velocity_.update(c.velocity, sample);
-    out.outside_distance = outside_distance(c, out.position);
-
-    const auto wall = wall_.update(c.wall, out.outside_distance, c.side * out.velocity);
+  /// A function of its own even where its caller is flattened, with all of its steps in it: the velocity
+  /// estimator needs all registers.
+  [[gnu::noinline, gnu::flatten]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
+                                                     Scalar added = Scalar(0)) {
+    if (!sample_is_due(c)) return hold(enabled);
+    const Motion motion = observe(c, count);
+    const auto wall = wall_.update(c.wall, motion.outside_distance, c.side * motion.velocity);
     const auto disturbance = interference_.update(c.interference, wall.inside);
-    out.inside = wall.inside;
-    out.magnetic_force = wall.magnetic_force;
-    out.magnetic_coefficient = wall.magnetic_coefficient;
-    out.tangential_force = disturbance.tangential;
-    background_force_ = wall.magnetic_force + disturbance.background;
+    show(wall, disturbance);
+    return limit(c, motion, along_axis(c, wall.force + disturbance.normal, added), enabled);
+  }
 
-    Scalar requested = c.side * (wall.force + disturbance.normal) + external_force;
-    // The same unless it overflows.
-    if (!is_finite(requested)) [[unlikely]]
-      requested = saturate(c.side * saturate(wall.force + disturbance.normal) + external_force);
-    // A velocity within the limit is finite, since the limit is.
-    const bool sound = magnitude(out.velocity) <= c.velocity_limit && is_finite(out.outside_distance) &&
-                       is_finite(requested);
-    out.over_speed = out.not_finite = false;
-    if (!sound) [[unlikely]]
-      tell(c, requested);
-
-    if (enabled && sound) [[likely]] {
-      const auto limited = limiter_.update(c.force, requested);
-      out.force = limited.force;
-      out.limited = limited.limited;
-      out.slew_limited = limited.slew_limited;
-      out.ramping = limited.ramping;
-    } else {
-      disable();
-    }
-    return held_;
+  /// One tick without a wall: `force` (N along +x) is what is asked for.
+  [[gnu::noinline]] const Output& follow(const Coefficients& c, std::int64_t count, bool enabled,
+                                         Scalar force) {
+    if (!sample_is_due(c)) return hold(enabled);
+    const Motion motion = observe(c, count);
+    show({.inside = !(motion.outside_distance > Scalar(0))}, {});
+    return limit(c, motion, force, enabled);
   }
 
   /// 0 to 1: the share of the force that the soft start lets pass; 0 while not enabled.
   Scalar ramp() const { return limiter_.ramp(); }
 
-  /// N, outwards: what papers call the background force, the field's force and the interference's F_B, as
-  /// evaluated in the last haptic sample, before soft start and limits. Not part of Output, which is copied
-  /// in every tick; only a person who is simulated asks for it.
-  Scalar background_force() const { return background_force_; }
+  /// N, outwards: what papers call the background force, the field's force and the interference's F_B, in the
+  /// last haptic sample of tick(), before soft start and limits. Nothing but a simulated person asks for it,
+  /// so it is worked out only then.
+  Scalar background_force(const Coefficients& c) const {
+    return held_.magnetic_force + interference_.background(c.interference);
+  }
 
-  /// What the last tick() gave.
+  /// What the last tick() or follow() gave.
   const Output& output() const { return held_; }
 
   /// Distance of a count from the surface, m, > 0 in free space.
@@ -174,12 +147,85 @@ class HapticLoop {
   }
 
  private:
-  [[gnu::noinline, gnu::cold]] void tell(const Coefficients& c, Scalar requested) {
+  struct Motion {
+    Scalar velocity{};          ///< m/s along +x
+    Scalar outside_distance{};  ///< m, > 0 in free space
+  };
+
+  bool sample_is_due(const Coefficients& c) {
+    if (ticks_until_sample_ != 0) {
+      --ticks_until_sample_;
+      return false;
+    }
+    ticks_until_sample_ = c.divider - 1;
+    return true;
+  }
+
+  /// Between two samples.
+  const Output& hold(bool enabled) {
+    held_.new_sample = false;
+    if (!enabled) release();
+    return held_;
+  }
+
+  /// Where the handle is, and how fast.
+  Motion observe(const Coefficients& c, std::int64_t count) {
+    const Resampler::Sample sample = resampler_.sample(c.resampler, count);
+    if (!settled_) {
+      velocity_.reset(sample.count);
+      settled_ = true;
+    }
+    held_.new_sample = true;
+    held_.position = sample.count;
+    held_.velocity = velocity_.update(c.velocity, sample);
+    held_.outside_distance = outside_distance(c, sample.count);
+    return {held_.velocity, held_.outside_distance};
+  }
+
+  void show(const typename WallLaw<Scalar>::Output& wall,
+            const typename Interference<Scalar>::Output& disturbance) {
+    held_.inside = wall.inside;
+    held_.magnetic_force = wall.magnetic_force;
+    held_.magnetic_coefficient = wall.magnetic_coefficient;
+    held_.tangential_force = disturbance.tangential;
+  }
+
+  /// An outward force and one along +x as one along +x. What overflows is brought back to the largest number.
+  static Scalar along_axis(const Coefficients& c, Scalar outward, Scalar added) {
+    const Scalar sum = c.side * outward + added;
+    if (is_finite(sum)) [[likely]]
+      return sum;
+    return saturate(c.side * saturate(outward) + added);
+  }
+
+  /// From what is asked for to what the device gets, with what must keep it from getting anything.
+  const Output& limit(const Coefficients& c, const Motion& motion, Scalar requested, bool enabled) {
+    // A velocity within the limit is finite, since the limit is.
+    const bool sound = magnitude(motion.velocity) <= c.velocity_limit && is_finite(motion.outside_distance) &&
+                       is_finite(requested);
+    held_.over_speed = held_.not_finite = false;
+    if (!sound) [[unlikely]]
+      name_fault(c, requested);
+    if (!enabled || !sound) [[unlikely]] {
+      release();
+      return held_;
+    }
+    const auto limited = limiter_.update(c.force, requested);
+    held_.force = limited.force;
+    held_.limited = limited.limited;
+    held_.slew_limited = limited.slew_limited;
+    held_.ramping = limited.ramping;
+    return held_;
+  }
+
+  [[gnu::noinline, gnu::cold]] void name_fault(const Coefficients& c, Scalar requested) {
     Output& out = held_;
     out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
     out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
   }
-  void disable() {
+
+  /// No force, and the soft start is wound back.
+  void release() {
     limiter_.reset();
     held_.force = Scalar(0);
     held_.tangential_force = Scalar(0);
@@ -191,7 +237,6 @@ class HapticLoop {
   WallLaw<Scalar> wall_;
   Interference<Scalar> interference_;
   ForceLimiter<Scalar> limiter_;
-  Scalar background_force_{};
   std::uint32_t ticks_until_sample_ = 0;
   bool settled_ = false;  // the velocity estimator has seen a position
   Output held_;

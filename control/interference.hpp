@@ -36,8 +36,7 @@ class Interference {
     std::uint32_t onset_samples = 0;
   };
   struct Output {
-    Scalar normal{};      ///< N, outwards
-    Scalar background{};  ///< N, outwards: F_B's share of it in this sample
+    Scalar normal{};      ///< N, outwards, F_B's share included
     Scalar tangential{};  ///< N, along the surface
   };
 
@@ -69,13 +68,19 @@ class Interference {
       ++samples_inside_;
     }
     if (c.mode == InterferenceMode::perpendicular) {
-      out.background = c.background_force;
       out.normal = inside ? saturate(c.background_force + c.force) : c.background_force;
     } else if (c.mode == InterferenceMode::parallel && inside) {
       out.tangential = c.force;
-      if (elapsed >= c.onset_samples) out.normal = out.background = c.background_force;
+      if (elapsed >= c.onset_samples) out.normal = c.background_force;
     }
     return out;
+  }
+
+  /// N, outwards: F_B's share of the last sample's normal force.
+  Scalar background(const Coefficients& c) const {
+    const bool acts = c.mode == InterferenceMode::perpendicular ||
+                      (c.mode == InterferenceMode::parallel && samples_inside_ > c.onset_samples);
+    return acts ? c.background_force : Scalar(0);
   }
 
  private:

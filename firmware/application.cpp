@@ -37,7 +37,6 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
       bank_(*this),
       port_(bank_, port_configuration(registers_.values())),
       settings_(make_settings()),
-      handover_(settings_),
       objects_(*this),
       node_(objects_,
             {.vendor = vendor_id,
@@ -45,7 +44,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
              .revision = firmware_version,
              .serial = board.serial_number},
             round_interval_us),
-      capture_(capture_memory) {
+      tick_(settings_, capture_memory) {
   for (AxisStateMachine& machine : machines_) machine.initialised();
   configure_thermal();
   make_scales();
@@ -68,14 +67,7 @@ Application::Settings Application::make_settings() const {
     settings[axis].generation = generation_;
     // Near the position by the new origin: the resampler starts from there.
     const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
-    control::HapticLoopConfig<float> haptic = haptic_configuration(values, axis);
-    if (mode(axis) == DriveMode::torque) {
-      // No wall: the force is what the host asks for, with all limits, trips and the soft start of the
-      // others.
-      haptic.wall.kind = control::WallKind::none;
-      haptic.interference.mode = control::InterferenceMode::none;
-    }
-    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic, position);
+    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
     const Circumstances now = offered_[axis];
     settings[axis].motor =
         MotorControl::prepare(motor_configuration(values, axis, now.winding_temperature, now.current_share));
@@ -85,7 +77,7 @@ Application::Settings Application::make_settings() const {
         plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
     settings[axis].watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
     settings[axis].excitation = Excitation::prepare(excitation_configuration(values, axis));
-    settings[axis].mode = mode(axis) == DriveMode::excitation ? DriveMode::excitation : DriveMode::haptic;
+    settings[axis].mode = mode(axis);
     settings[axis].commutated = now.commutated;
     settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
     settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
@@ -118,12 +110,10 @@ void Application::offer_settings_if_changed() {
     ++generation_;
   }
   settings_ = make_settings();
-  handover_.offer(settings_);
+  tick_.offer(settings_);
   port_.configure(port_configuration(registers_.values()));
-  trace_axis_.store(static_cast<std::uint8_t>(registers_.values().whole<"trace.axis">()),
-                    std::memory_order_relaxed);
-  trace_interval_.store(static_cast<std::uint32_t>(registers_.values().whole<"trace.interval">()),
-                        std::memory_order_relaxed);
+  tick_.trace_axis(static_cast<std::size_t>(registers_.values().whole<"trace.axis">()),
+                   static_cast<std::uint32_t>(registers_.values().whole<"trace.interval">()));
 }
 
 /// So that readings and arming never go by an older set, and nothing is worked out twice.
@@ -136,7 +126,7 @@ void Application::judge_if_changed() {
 
 /// The tick works by the present settings, and knows of the axis' last disarming.
 bool Application::settled(std::size_t of_axis) const {
-  if (!handover_.taken() || report_[of_axis].enabled) return false;
+  if (!tick_.settings_taken() || report_[of_axis].enabled) return false;
   for (const AxisReport& axis : report_) {
     if (axis.generation != generation_) return false;
   }
@@ -164,7 +154,7 @@ bool Application::commutation_known(std::size_t axis) const {
 
 void Application::take_reports() {
   // The last axis' first: that it is of a round says that those of the others are of the same.
-  for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = snapshots_[axis].read();
+  for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = tick_.report(axis);
 }
 
 /// The main loop's news of a link come at any time; what goes regularly goes with the rounds of the tick, on
@@ -197,8 +187,9 @@ Refusal Application::obstacle_to_arming(std::size_t axis) const {
       registers_.values().choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
     return Refusal::guard_refused;
   const auto& haptic = report_[axis].haptic;
-  const bool makes_force = settings_[axis].haptic.wall.kind != control::WallKind::none ||
-                           settings_[axis].haptic.interference.mode != control::InterferenceMode::none;
+  const bool makes_force = mode(axis) == DriveMode::haptic &&
+                           (settings_[axis].haptic.wall.kind != control::WallKind::none ||
+                            settings_[axis].haptic.interference.mode != control::InterferenceMode::none);
   if (makes_force && haptic.inside) return Refusal::handle_inside_wall;
   return Refusal::none;
 }
@@ -259,7 +250,7 @@ void Application::supervise(std::size_t axis) {
 
   // Before the commands: a fault is reported even if the host disarms in the same moment.
   if (machine.armed()) {
-    if (report.fault != Fault::none && enable_[axis].load(std::memory_order_relaxed)) {
+    if (report.fault != Fault::none && tick_.enabled(axis)) {
       trip(axis, report.fault, report.fault_value, bound_of(report.fault, axis));
     }
     if (thermal_[axis].power_stage_too_hot()) {
@@ -305,7 +296,7 @@ void Application::supervise(std::size_t axis) {
       halted_[axis] = halted(pending);
     }
   }
-  enable_[axis].store(machine.armed(), std::memory_order_relaxed);
+  tick_.enable(axis, machine.armed());
   machine.reaction_done();
 }
 
@@ -324,7 +315,7 @@ void Application::poll(std::uint32_t now_us) {
     uptime_second_us_ = now_us;
   }
   now_us_ = now_us;
-  polls_.store(polls_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  tick_.keep_alive();
   while (now_us - uptime_second_us_ >= 1'000'000) {
     uptime_second_us_ += 1'000'000;
     ++uptime_s_;

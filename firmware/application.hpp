@@ -1,29 +1,24 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "drivers/can_frame.hpp"
 #include "firmware/application_objects.hpp"
-#include "firmware/axis.hpp"
 #include "firmware/axis_state_machine.hpp"
 #include "firmware/can_port.hpp"
 #include "firmware/canopen/node.hpp"
-#include "firmware/capture.hpp"
 #include "firmware/commutation.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/device_registers.hpp"
-#include "firmware/double_buffer.hpp"
+#include "firmware/drive/axes_tick.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameter_keeper.hpp"
-#include "firmware/seqlock.hpp"
 #include "firmware/stability_guard.hpp"
 #include "firmware/thermal_supervisor.hpp"
-#include "firmware/trace.hpp"
 
 namespace kmax::firmware {
 
@@ -90,9 +85,8 @@ struct BoardReadings {
 /// or a counter, all of which a host can read. Memory: about 36 KiB on the target, no heap.
 class Application {
  public:
-  /// The main loop's rhythm: every so many ticks each axis reports, besides at once when something has
-  /// changed.
-  static constexpr std::uint32_t round_ticks = 4;
+  /// The main loop's rhythm.
+  static constexpr std::uint32_t round_ticks = AxesTick<axis_count>::round_ticks;
   static constexpr std::uint32_t round_interval_us = round_ticks * 1'000'000 / tick_rate_hz;
 
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
@@ -110,9 +104,9 @@ class Application {
       output.axis[axis] = ISR_tick(axis, input.axis[axis]);
     return output;
   }
-  /// Between two ticks: the last one began a round, in which both axes report. Behind the last axis' tick the
+  /// Between two ticks: the last one began a round, in which all axes report. Behind the last axis' tick the
   /// main loop should be woken: what it reads then is of this tick.
-  bool ISR_round_begins() const { return ISR_tick_ % round_ticks == 1; }
+  bool ISR_round_begins() const { return tick_.ISR_round_begins(); }
   void ISR_serial_byte(std::uint8_t byte, bool line_error, std::uint32_t time_us);
 
   void poll(std::uint32_t now_us);
@@ -158,7 +152,9 @@ class Application {
   Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
   Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
   /// Of the last tick; for interrupt context, or where nothing interrupts.
-  AxisReport ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
+  AxisReport ISR_report(std::size_t axis) const { return tick_.ISR_report(axis); }
+  /// Likewise, N, outwards: what a simulated person answers to.
+  float ISR_background_force(std::size_t axis) const { return tick_.ISR_background_force(axis); }
 
  private:
   friend class ApplicationObjects;
@@ -180,7 +176,7 @@ class Application {
     Application& app_;
   };
 
-  using Settings = std::array<AxisSetting, axis_count>;
+  using Settings = AxesTick<axis_count>::Settings;
   /// What an axis' settings depend on beside the parameters.
   struct Circumstances {
     float current_share = 1.0f;         ///< of current.limit that the temperatures leave
@@ -239,10 +235,6 @@ class Application {
   void note_saving(const ParameterValues& values);
   std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
   float bound_of(Fault fault, std::size_t axis) const;
-  void ISR_supervise_main_loop();
-  void ISR_trace(const control::HapticLoop<float>::Output& traced);
-  // Rare, and kept out of the tick's one function, whose registers it would take.
-  [[gnu::noinline]] void ISR_capture(std::size_t axis, const AxisInput& input, const AxisOutput& output);
 
   BoardIdentity board_;
   DeviceRegisters registers_;
@@ -289,29 +281,11 @@ class Application {
   std::uint32_t round_ = 0, round_us_ = 0, round_clock_us_ = 0;
   bool started_ = false;
 
-  DoubleBuffer<Settings> handover_;
-  std::array<Seqlock<AxisReport>, axis_count> snapshots_;
   InterruptQueue<SerialByte, 512> serial_queue_;
   InterruptQueue<drivers::CanFrame, 64> can_queue_;
   ApplicationObjects objects_;
   canopen::Node<ApplicationObjects> node_;
-  Trace trace_;
-  Capture capture_;
-  std::array<std::atomic<bool>, axis_count> enable_{};
-  /// N at the handle, of mode torque; 0 in all others.
-  std::array<std::atomic<float>, axis_count> commanded_force_{};
-  std::array<std::atomic<bool>, axis_count> takes_command_{};
-  std::atomic<std::uint32_t> polls_{0};  ///< by which the tick sees that the main loop runs
-  std::atomic<std::uint8_t> trace_axis_{0};
-  std::atomic<std::uint32_t> trace_interval_{0};
-
-  // Interrupt context only.
-  std::array<Axis, axis_count> axes_;
-  std::array<float, axis_count> tangential_{};
-  std::uint32_t ISR_tick_ = 0;
-  bool ISR_main_loop_stands_ = false;
-  std::uint32_t ISR_polls_seen_ = 0, ISR_ticks_without_poll_ = 0;
-  std::uint32_t ISR_trace_countdown_ = 0;
+  AxesTick<axis_count> tick_;
 };
 
 }  // namespace kmax::firmware

@@ -137,7 +137,7 @@ void Application::finish_saves() {
 void Application::disarm(std::size_t axis) {
   command_pending_[axis] = false;
   machines_[axis].disable();
-  enable_[axis].store(machines_[axis].armed(), std::memory_order_relaxed);
+  tick_.enable(axis, machines_[axis].armed());
 }
 
 /// Every fault of an axis, when it comes and when it goes.
@@ -183,9 +183,7 @@ void Application::publish_torques() {
     const bool armed = machines_[axis].armed();
     // A torque that was asked for while nothing could follow must not act later.
     if (!armed) values.set_whole<"profile.target_torque">(0, axis);
-    commanded_force_[axis].store(commanded_force(values, axis, armed, halted_[axis]),
-                                 std::memory_order_relaxed);
-    takes_command_[axis].store(mode(axis) == DriveMode::torque, std::memory_order_relaxed);
+    tick_.command_force(axis, commanded_force(values, axis, armed, halted_[axis]));
   }
 }
 

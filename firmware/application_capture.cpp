@@ -6,7 +6,7 @@ namespace kmax::firmware {
 DeviceRegisters::WriteResult Application::command_capture(std::uint16_t command) {
   const std::uint16_t address = register_address(entry_of<"capture.command">(), 0);
   if (command == static_cast<std::uint16_t>(CaptureCommand::stop)) {
-    capture_.stop();
+    tick_.capture().stop();
     return registers_.refuse(Refusal::none, address);
   }
   if (command != static_cast<std::uint16_t>(CaptureCommand::arm))
@@ -22,14 +22,14 @@ DeviceRegisters::WriteResult Application::command_capture(std::uint16_t command)
   config.pre_trigger = static_cast<std::uint32_t>(v.whole<"capture.pre_trigger">());
   config.trigger = v.choice<CaptureTrigger, "capture.trigger">();
   config.level = v.real<"capture.trigger_level">();
-  if (capture_.arm(config)) return registers_.refuse(Refusal::none, address);
+  if (tick_.capture().arm(config)) return registers_.refuse(Refusal::none, address);
   const bool chosen = config.channels != CaptureConfig{}.channels;
   return registers_.refuse(chosen ? Refusal::capture_missing : Refusal::capture_without_channels, address);
 }
 
 void Application::refresh_capture_readings() {
   ParameterValues& v = registers_.values();
-  const CaptureReadings readings = capture_.readings();
+  const CaptureReadings readings = tick_.capture().readings();
   v.set_whole<"capture.state">(static_cast<std::uint32_t>(readings.state));
   v.set_whole<"capture.taken">(readings.taken);
   v.set_whole<"capture.trigger_sample">(readings.trigger_sample);

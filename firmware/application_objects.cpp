@@ -121,8 +121,8 @@ Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::
       size = trace_object_bytes;
       return Abort::none;
     case SpecialObject::capture_samples: {
-      if (!app_.capture_.readable()) return Abort::device_state;
-      const CaptureReadings readings = app_.capture_.readings();
+      if (!app_.tick_.capture().readable()) return Abort::device_state;
+      const CaptureReadings readings = app_.tick_.capture().readings();
       size = 4 * readings.taken * readings.channels;
       return Abort::none;
     }
@@ -180,14 +180,14 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
       const auto first = trace_window + (subindex - 1U) * (trace_object_bytes / 2);
       put_words(offset, out, [&](std::uint32_t word) {
         const auto high = static_cast<std::uint16_t>(first + 2 * word);
-        return std::uint32_t{app_.trace_.word_at(high)} << 16 |
-               app_.trace_.word_at(static_cast<std::uint16_t>(high + 1));
+        return std::uint32_t{app_.tick_.trace().word_at(high)} << 16 |
+               app_.tick_.trace().word_at(static_cast<std::uint16_t>(high + 1));
       });
       return Abort::none;
     }
     case SpecialObject::capture_samples:
-      if (!app_.capture_.readable()) return Abort::device_state;  // begun anew in the middle
-      put_words(offset, out, [&](std::uint32_t word) { return app_.capture_.value_at(word); });
+      if (!app_.tick_.capture().readable()) return Abort::device_state;  // begun anew in the middle
+      put_words(offset, out, [&](std::uint32_t word) { return app_.tick_.capture().value_at(word); });
       return Abort::none;
     case SpecialObject::scratch:
       canopen::copy_bytes(std::span(scratch_).subspan(offset, out.size()), out);

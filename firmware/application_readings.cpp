@@ -137,7 +137,7 @@ void Application::refresh_device_readings() {
   refresh_can_readings();
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers_.last_refusal().refusal));
   v.set_whole<"refusal.register">(registers_.last_refusal().address);
-  v.set_whole<"trace.next">(trace_.next());
+  v.set_whole<"trace.next">(tick_.trace().next());
 }
 
 }  // namespace kmax::firmware

@@ -42,14 +42,14 @@ Exception Application::Bank::read_input(std::uint16_t address, std::span<std::ui
   const auto last = static_cast<std::uint32_t>(address + out.size() - 1);
   if (Trace::contains(address) && Trace::contains(last)) {
     for (std::size_t i = 0; i < out.size(); ++i)
-      out[i] = app_.trace_.word_at(static_cast<std::uint16_t>(address + i));
+      out[i] = app_.tick_.trace().word_at(static_cast<std::uint16_t>(address + i));
     return Exception::none;
   }
   if (Capture::contains(address) && Capture::contains(last)) {
     // Zeros must not be taken for data.
-    if (!app_.capture_.readable()) return Exception::server_device_busy;
+    if (!app_.tick_.capture().readable()) return Exception::server_device_busy;
     for (std::size_t i = 0; i < out.size(); ++i)
-      out[i] = app_.capture_.word_at(static_cast<std::uint16_t>(address + i));
+      out[i] = app_.tick_.capture().word_at(static_cast<std::uint16_t>(address + i));
     return Exception::none;
   }
   if (!app_.registers_.readable(false, address, out.size())) return Exception::illegal_data_address;

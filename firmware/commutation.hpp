@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "firmware/parameter_values.hpp"
 
 namespace kmax::firmware {

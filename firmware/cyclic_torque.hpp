@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "control/finite.hpp"
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "firmware/parameter_values.hpp"
 
 namespace kmax::firmware {

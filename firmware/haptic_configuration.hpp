@@ -3,8 +3,8 @@
 #include "control/force_compensation.hpp"
 #include "control/haptic_loop.hpp"
 #include "control/motion_plausibility.hpp"
-#include "firmware/excitation.hpp"
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/excitation.hpp"
+#include "firmware/drive/motor_control.hpp"
 #include "firmware/parameter_values.hpp"
 #include "firmware/thermal_supervisor.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "control/finite.hpp"
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "firmware/cyclic_torque.hpp"
 #include "firmware/linked_parameters.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"

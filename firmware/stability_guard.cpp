@@ -3,7 +3,7 @@
 
 #include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "firmware/haptic_configuration.hpp"
 
 namespace kmax::firmware {

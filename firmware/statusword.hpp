@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "firmware/axis_state_machine.hpp"
 
 namespace kmax::firmware {

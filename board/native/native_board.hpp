@@ -38,6 +38,12 @@ concept PoweredDevice = SimulatedDevice<Device> &&
   {device.poll(application, now_us)};
 };
 
+/// A device that a person holds, who answers to the background force (N, outwards) behind the rendered one.
+template <typename Device>
+concept HeldDevice = requires(Device device, std::size_t axis, float force) {
+  {device.set_background_force(axis, force)};
+};
+
 /// The firmware on x86: the same Application, fed by a simulated device, in virtual time.
 ///
 /// Time passes only in advance(), in ticks of 50 us, and everything in it is deterministic: the same calls
@@ -155,7 +161,11 @@ class NativeBoard {
     firmware::TickInput input;
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) input.axis[axis] = sample(axis);
     output_ = application_->ISR_tick(input);
-    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) device_.drive(axis, output_.axis[axis]);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if constexpr (HeldDevice<Device>)
+        device_.set_background_force(axis, application_->ISR_background_force(axis));
+      device_.drive(axis, output_.axis[axis]);
+    }
     device_.advance(static_cast<double>(tick_us) * 1e-6);
     now_us_ += tick_us;
 

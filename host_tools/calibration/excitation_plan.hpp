@@ -6,7 +6,7 @@
 
 namespace kmax::calibration {
 
-// The parameters excitation.*; see firmware/excitation.hpp for what they do.
+// The parameters excitation.*; see firmware/drive/excitation.hpp for what they do.
 struct ExcitationPlan {
   std::string kind = "off";
   double bias = 0.0;         // V or A

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 
 namespace kmax::calibration {
 

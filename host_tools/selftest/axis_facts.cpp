@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 
 namespace kmax::selftest {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "drivers/stm32f4/three_phase_pwm.hpp"
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 #include "host_tools/simulation/inverter.hpp"
 
 namespace kmax::simulated_board {

@@ -17,7 +17,8 @@ SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(s
     }
     simulation::CoupledHandle handle = scene.make_handle(i);
     const simulation::AxisEncoder encoder(axis.encoder, handle.position(), scene.seed_of(i));
-    axes_[i].emplace(Axis{std::move(handle), encoder, {}, axis.motion.has_value(), axis.same_person, false});
+    axes_[i].emplace(
+        Axis{std::move(handle), encoder, {}, 0.0f, axis.motion.has_value(), axis.same_person, false});
   }
   encoder_connected_.fill(true);
 }
@@ -48,6 +49,11 @@ void SimulatedDevice::drive(std::size_t axis, const firmware::AxisOutput& output
   if (armed_now && axes_[axis]->moves) axes_[axis]->handle.begin_motion();
 }
 
+void SimulatedDevice::set_background_force(std::size_t axis, float force) {
+  if (has_motor(axis)) return power_->set_background_force(axis, force);
+  if (axes_[axis]) axes_[axis]->background_force = force;
+}
+
 void SimulatedDevice::advance(double duration) {
   for (auto& axis : axes_) {
     if (!axis || (!axis->let_go && !axis->handle.has_operator())) continue;
@@ -58,10 +64,9 @@ void SimulatedDevice::advance(double duration) {
 
 /// What the hand on the axis answers to: the two axes stand at right angles.
 double SimulatedDevice::background_force(const Axis& axis) const {
-  if (!axes_[0] || !axes_[1] || !axes_[1]->same_person)
-    return static_cast<double>(axis.output.background_force);
-  return std::hypot(static_cast<double>(axes_[0]->output.background_force),
-                    static_cast<double>(axes_[1]->output.background_force));
+  if (!axes_[0] || !axes_[1] || !axes_[1]->same_person) return static_cast<double>(axis.background_force);
+  return std::hypot(static_cast<double>(axes_[0]->background_force),
+                    static_cast<double>(axes_[1]->background_force));
 }
 
 void SimulatedDevice::connect_encoder(std::size_t axis, bool connected) {

@@ -22,7 +22,7 @@ namespace kmax::simulated_board {
 ///
 /// A person who has a motion begins the approach when the axis is armed, as one would who was told "now";
 /// arming again begins another trial. The person answers to the background force that the firmware renders,
-/// the field's and the interference's F_B (AxisOutput::background_force). A handle that nobody holds stays at
+/// the field's and the interference's F_B (set_background_force()). A handle that nobody holds stays at
 /// its start until its axis is armed for the first time, and is let go then.
 class SimulatedDevice {
  public:
@@ -35,6 +35,8 @@ class SimulatedDevice {
   std::uint32_t count(std::size_t axis) const;
   bool count_valid(std::size_t axis) const;
   void drive(std::size_t axis, const firmware::AxisOutput& output);
+  /// N, outwards, from now on.
+  void set_background_force(std::size_t axis, float force);
   void advance(double duration);
   firmware::BoardReadings readings() const { return power_ ? power_->readings() : firmware::BoardReadings{}; }
   void poll(const firmware::Application& application, std::uint32_t now_us) {
@@ -60,8 +62,9 @@ class SimulatedDevice {
     simulation::CoupledHandle handle;
     simulation::AxisEncoder encoder;
     firmware::AxisOutput output{};
-    bool moves = false;        ///< somebody holds it who has a motion
-    bool same_person = false;  ///< as axis 0's
+    float background_force = 0.0f;  ///< N, outwards
+    bool moves = false;             ///< somebody holds it who has a motion
+    bool same_person = false;       ///< as axis 0's
     bool let_go = false;
   };
 

@@ -50,7 +50,6 @@ Fault SimulatedPower::condition(std::size_t axis) const {
 
 void SimulatedPower::drive(std::size_t index, const firmware::AxisOutput& output) {
   Axis& axis = axes_[index];
-  drives_.drive(index).set_background_force(static_cast<double>(output.background_force));
   if (!output.enabled || !axis.bridge.set_duty(output.motor)) {
     axis.bridge.disarm();
     axis.driving = false;

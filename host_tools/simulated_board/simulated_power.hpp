@@ -43,6 +43,9 @@ class SimulatedPower {
   /// Of an axis that has a motor, once in a tick.
   firmware::AxisInput sample(std::size_t axis);
   void drive(std::size_t axis, const firmware::AxisOutput& output);
+  void set_background_force(std::size_t axis, float force) {
+    drives_.drive(axis).set_background_force(static_cast<double>(force));
+  }
   void advance(double duration);
 
   firmware::BoardReadings readings() const;

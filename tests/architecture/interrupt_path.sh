@@ -62,16 +62,16 @@ END
 
 failed=0
 check "control/haptic_loop.hpp" "$work/haptic_loop.cpp" || failed=1
-check "firmware/motor_control_tick.cpp" "$source_dir/firmware/motor_control_tick.cpp" || failed=1
+check "firmware/drive/motor_control_tick.cpp" "$source_dir/firmware/drive/motor_control_tick.cpp" || failed=1
 # Those of motor_control_tick.cpp, which has just been looked at.
 motor='^_ZNK?4kmax8firmware12MotorControl(6excite|4tell)E'
 allowed="$allowed|$motor"
-check "firmware/axis.cpp" "$source_dir/firmware/axis.cpp" || failed=1
+check "firmware/drive/axis.cpp" "$source_dir/firmware/drive/axis.cpp" || failed=1
 # Those of axis.cpp, likewise.
 axis='^_ZNK?4kmax8firmware4Axis(8ISR_(tick|fill)E|4tripE)'
 allowed="$allowed|$axis"
-check "firmware/application_tick.cpp" "$source_dir/firmware/application_tick.cpp" || failed=1
-# That of application_tick.cpp.
+check "firmware/drive/axes_tick.cpp" "$source_dir/firmware/drive/axes_tick.cpp" || failed=1
+# That of axes_tick.cpp.
 application='^_ZN4kmax8firmware11Application8ISR_tickE'
 allowed="$allowed|$application"
 check "board/odrive_v3/drives_tick.cpp" "$source_dir/board/odrive_v3/drives_tick.cpp" || failed=1

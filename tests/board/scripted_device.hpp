@@ -24,8 +24,7 @@ class ScriptedDevice {
   void drive(std::size_t axis, const firmware::AxisOutput& output) {
     last[axis] = output;
     if (recording) forces[axis].push_back(output.force);
-    for (const float value : {output.force, output.tangential_force, output.background_force})
-      mix(std::bit_cast<std::uint32_t>(value));
+    mix(std::bit_cast<std::uint32_t>(output.force));
     mix(output.enabled ? 1 : 0);
   }
   void advance(double) { ++tick; }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 
 namespace kmax::firmware::axis_compensation_test {
 namespace {
@@ -30,7 +30,7 @@ class AxisCompensation : public testing::Test {
     Axis::Input in{};
     in.count = static_cast<std::uint32_t>(count);
     in.count_valid = true;
-    return axis.ISR_tick(setting, in, enable, 0.0f, ++ticks);
+    return axis.ISR_tick(setting, in, enable, {}, ++ticks);
   }
 
   Axis axis;

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 
 namespace kmax::firmware::axis_excitation_test {
 namespace {
@@ -68,7 +68,7 @@ class AxisExcitationTest : public testing::Test {
     return in;
   }
   Axis::Output tick(std::int32_t count, bool enable) {
-    return axis.ISR_tick(setting, input(count), enable, 0.0f, ++ticks);
+    return axis.ISR_tick(setting, input(count), enable, {}, ++ticks);
   }
   Fault fault() const { return axis.ISR_report().fault; }
 
@@ -84,11 +84,10 @@ TEST_F(AxisExcitationTest, NoWallForceButItsVoltageAndTheEstimatesGoOn) {
   tick(-5000, false);
   tick(-5000, true);
   begin();
-  const auto out = axis.ISR_tick(setting, input(-4990), true, 5.0f, ++ticks);  // deep inside
+  const auto out = axis.ISR_tick(setting, input(-4990), true, {5.0f, 5.0f}, ++ticks);  // deep inside
   EXPECT_TRUE(out.enabled);
   EXPECT_EQ(out.force, 0.0f);
-  EXPECT_EQ(out.tangential_force, 0.0f);
-  EXPECT_EQ(out.background_force, 0.0f);
+  EXPECT_EQ(axis.ISR_background_force(setting), 0.0f);
   EXPECT_EQ(out.motor.voltage, 1.0f);
   EXPECT_GT(out.motor.duty_b, 0.5f);
   const auto report = axis.ISR_report();
@@ -350,7 +349,7 @@ TEST_F(AxisExcitationTest, AReferenceWaitsForAValidCount) {
   reference_generation = 1;
   Axis::Input in = input(-99);
   in.count_valid = false;
-  axis.ISR_tick(setting, in, false, 0.0f, ++ticks);
+  axis.ISR_tick(setting, in, false, {}, ++ticks);
   EXPECT_EQ(axis.ISR_report().haptic.position, 500);
   tick(-100, false);
   EXPECT_EQ(axis.ISR_report().haptic.position, -100);
@@ -380,11 +379,11 @@ TEST_F(AxisExcitationTest, AMotionAgainstTheForceMadeTripsInHapticModeIfItIsWatc
     measured = {true, 24.0f, current, -current};
     double position = 1e5, velocity = 0.0;
     Fault found = Fault::none;
-    fresh.ISR_tick(setting, input(100'000), false, 0.0f, 1);
+    fresh.ISR_tick(setting, input(100'000), false, {}, 1);
     for (std::uint32_t i = 2; i < 2000 && found == Fault::none; ++i) {
       velocity -= 6.0 / 0.05 * 5e-5;
       position += velocity * 5e-5 / count_length;
-      fresh.ISR_tick(setting, input(static_cast<std::int32_t>(position)), true, 0.0f, i);
+      fresh.ISR_tick(setting, input(static_cast<std::int32_t>(position)), true, {}, i);
       found = fresh.ISR_report().fault;
     }
     const bool trips = watched && against && mode == DriveMode::haptic;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::firmware::axis_motion_test {
@@ -116,7 +116,7 @@ class AxisMotion : public testing::Test {
   /// False: a fault.
   bool run(MovingHandle& handle, const AxisSetting& setting, double seconds, bool enable = true) {
     for (double time = 0.0; time < seconds; time += tick) {
-      const auto out = axis.ISR_tick(setting, handle.input(), enable, 0.0f, ++ticks);
+      const auto out = axis.ISR_tick(setting, handle.input(), enable, {}, ++ticks);
       handle.run(out.motor, out.enabled);
       made = out.motor;
       if (axis.ISR_report().fault != Fault::none) return false;

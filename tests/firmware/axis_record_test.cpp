@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 
 namespace kmax::firmware::axis_record_test {
 namespace {
@@ -30,7 +30,7 @@ class AxisRecord : public testing::Test {
     in.count = static_cast<std::uint32_t>(count);
     in.count_valid = true;
     in.motor = measured;
-    return axis.ISR_tick(setting, in, enable, 0.0f, ++ticks);
+    return axis.ISR_tick(setting, in, enable, {}, ++ticks);
   }
   Axis axis;
   AxisSetting setting;

@@ -1,4 +1,4 @@
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ ParameterValues plain_wall() {
 class AxisTest : public testing::Test {
  protected:
   Axis::Output tick(std::uint32_t count, bool enable, bool valid = true, float external = 0.0f) {
-    return axis.ISR_tick(setting, {count, valid}, enable, external, ++ticks);
+    return axis.ISR_tick(setting, {count, valid}, enable, {.from_axes = external}, ++ticks);
   }
   Axis axis;
   AxisSetting setting = setting_from(plain_wall());
@@ -144,7 +144,7 @@ TEST_F(AxisTest, TripsOnTheBoardsConditionAtOnce) {
     (void)tick(at(-1000), false);
     ASSERT_TRUE(tick(at(-1000), true).enabled);
     const auto out =
-        axis.ISR_tick(setting, {at(-1000), true, condition, {false, 24.0f, 0.0f, 0.0f}}, true, 0.0f, ++ticks);
+        axis.ISR_tick(setting, {at(-1000), true, condition, {false, 24.0f, 0.0f, 0.0f}}, true, {}, ++ticks);
     EXPECT_FALSE(out.enabled);
     EXPECT_EQ(out.force, 0.0f);
     EXPECT_EQ(axis.ISR_report().fault, condition);
@@ -158,7 +158,7 @@ TEST_F(AxisTest, SupplyOutsideItsBoundsTripsWithTheVoltage) {
   setting.supply_voltage_max = 26.0f;
   setting.motor = MotorControl::prepare({});
   const auto with_supply = [&](float voltage) {
-    return axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, voltage, 0.0f, 0.0f}}, true, 0.0f,
+    return axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, voltage, 0.0f, 0.0f}}, true, {},
                          ++ticks);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -180,7 +180,7 @@ TEST_F(AxisTest, ATripOfTheMotorLeavesNoDuty) {
   setting.supply_voltage_max = 26.0f;
   setting.motor = MotorControl::prepare({});
   const auto out =
-      axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, 24.0f, 9.0f, -9.0f}}, true, 0.0f, ++ticks);
+      axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, 24.0f, 9.0f, -9.0f}}, true, {}, ++ticks);
   EXPECT_FALSE(out.enabled);
   EXPECT_EQ(out.motor.duty_b, 0.5f);
   EXPECT_EQ(axis.ISR_report().fault, Fault::over_current);

@@ -1,7 +1,7 @@
 // What starts an excitation and what ends it before its time.
 #include <gtest/gtest.h>
 
-#include "firmware/excitation.hpp"
+#include "firmware/drive/excitation.hpp"
 
 namespace kmax::firmware::excitation_start_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "firmware/excitation.hpp"
+#include "firmware/drive/excitation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::firmware::motor_control_excitation_test {

@@ -1,4 +1,4 @@
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "drivers/stm32f4/current_sampling.hpp"
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::parity_test {
@@ -16,7 +16,8 @@ namespace {
 using firmware::Axis;
 using virtual_board::BoardTime;
 
-constexpr const char* tick_symbol = "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbfm";
+constexpr const char* tick_symbol =
+    "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbNS1_6DemandEm";
 
 /// Listens to the image and computes along.
 class Companion {
@@ -29,7 +30,7 @@ class Companion {
     });
   }
 
-  std::uint64_t ticks = 0, driven = 0, excited = 0, differences = 0;
+  std::uint64_t ticks = 0, driven = 0, excited = 0, commanded = 0, differences = 0;
   std::string first_difference;
 
  private:
@@ -48,12 +49,12 @@ class Companion {
     axis_ = self == first_self_ || first_self_ == 0 ? 0 : 1;
     if (first_self_ == 0) first_self_ = self;
     const auto setting = at<firmware::AxisSetting>(processor.core_register(1));
-    excited_mode_ = setting.mode == firmware::DriveMode::excitation;
+    mode_ = setting.mode;
     const auto input = at<Axis::Input>(processor.core_register(2));
     const bool enable = (processor.core_register(3) & 0xFFU) != 0;
-    const float external = processor.fp_register(0);
+    const Axis::Demand demand{processor.fp_register(0), processor.fp_register(1)};
     const auto tick = at<std::uint32_t>(processor.core_register(13));
-    expected_ = axes_[axis_].ISR_tick(setting, input, enable, external, tick);
+    expected_ = axes_[axis_].ISR_tick(setting, input, enable, demand, tick);
     return_to_ = processor.core_register(14) & ~1U;
   }
 
@@ -62,10 +63,9 @@ class Companion {
     return_to_ = 0;
     ++ticks;
     driven += made.enabled ? 1 : 0;
-    excited += made.enabled && excited_mode_ ? 1 : 0;
+    excited += made.enabled && mode_ == firmware::DriveMode::excitation ? 1 : 0;
+    commanded += made.enabled && mode_ == firmware::DriveMode::torque && made.force != 0.0f ? 1 : 0;
     compare("force", made.force, expected_.force);
-    compare("tangential_force", made.tangential_force, expected_.tangential_force);
-    compare("background_force", made.background_force, expected_.background_force);
     compare("current_reference", made.motor.current_reference, expected_.motor.current_reference);
     compare("current", made.motor.current, expected_.motor.current);
     compare("duty_a", made.motor.duty_a, expected_.motor.duty_a);
@@ -89,7 +89,7 @@ class Companion {
   virtual_board::VirtualBoard& board_;
   std::uint32_t entry_, return_to_ = 0, first_self_ = 0;
   std::size_t axis_ = 0;
-  bool excited_mode_ = false;
+  firmware::DriveMode mode_ = firmware::DriveMode::haptic;
   std::array<Axis, 2> axes_;
   Axis::Output expected_{};
 };
@@ -192,8 +192,8 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       write(firmware::entry_of<"compensation.cogging_sine_1">(), axis, real(world.uniform(-0.3, 0.3)));
       // What jumps cannot be plausible: watched, but seldom tripped.
       write(firmware::entry_of<"device.hand_force">(), axis, real(world.uniform(0, 1) < 0.1 ? 5.0 : 1000.0));
-      const bool excited = world.uniform(0, 1) < 0.25;
-      write(firmware::entry_of<"drive.mode">(), axis, excited ? 1 : 0);
+      const double mode = world.uniform(0, 1);
+      write(firmware::entry_of<"drive.mode">(), axis, mode < 0.25 ? 1 : mode < 0.4 ? 2 : 0);
       write(firmware::entry_of<"excitation.kind">(), axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
       write(firmware::entry_of<"excitation.bias">(), axis, real(world.uniform(-5, 5)));
       write(firmware::entry_of<"excitation.alternation">(), axis, real(world.uniform(-5, 5)));
@@ -215,6 +215,8 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       } catch (const std::runtime_error&) {
         // Inside the wall: it computes all the same.
       }
+      write(firmware::entry_of<"profile.target_torque">(), axis,
+            static_cast<std::uint16_t>(world.uniform(-1000, 1000)));
     }
     world.quiet = false;
     board.run_for(0.8);
@@ -223,6 +225,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
   expect_equal(companion);
   EXPECT_GT(companion.driven, 100'000u) << "the comparison must see forces";
   EXPECT_GT(companion.excited, 10'000u) << "and excitation";
+  EXPECT_GT(companion.commanded, 10'000u) << "and forces that the host asks for";
 }
 
 TEST(Parity, AContactIsBitIdentical) {

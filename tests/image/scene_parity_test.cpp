@@ -34,7 +34,8 @@ using virtual_board::BoardTime;
 
 constexpr std::uint32_t tick_us = board::NativeBoard<SimulatedDevice>::tick_us;
 
-constexpr const char* tick_symbol = "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbfm";
+constexpr const char* tick_symbol =
+    "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbNS1_6DemandEm";
 
 /// One tick of one axis: the handle as it was sampled, and what the firmware made of it.
 struct AxisTick {
@@ -55,9 +56,9 @@ AxisTick seen(const SimulatedDevice& device, std::size_t axis) {
   return tick;
 }
 
-void add_output(AxisTick& tick, const Axis::Output& output) {
+void add_output(AxisTick& tick, const Axis::Output& output, float background_force) {
   tick.force = output.force;
-  tick.background_force = output.background_force;
+  tick.background_force = background_force;
   tick.current = output.motor.current;
   tick.duty_a = output.motor.duty_a;
   tick.duty_b = output.motor.duty_b;
@@ -150,15 +151,24 @@ class ImageSide {
     return bytes;
   }
 
+  /// The same layout on both sides: whole numbers, floats and flags.
+  template <typename Value>
+  Value value_at(std::uint32_t address) {
+    static_assert(std::is_trivially_copyable_v<Value>);
+    Value value;
+    std::memcpy(static_cast<void*>(&value), bytes_at<Value>(address).data(), sizeof value);
+    return value;
+  }
+
   void enter() {
     const auto& processor = board_->processor();
     const std::uint32_t self = processor.core_register(0);
     if (first_self_ == 0) first_self_ = self;
     axis_ = self == first_self_ ? 0 : 1;
     return_to_ = processor.core_register(14) & ~1U;
-    firmware::AxisSetting setting;
-    std::memcpy(static_cast<void*>(&setting),
-                bytes_at<firmware::AxisSetting>(processor.core_register(1)).data(), sizeof setting);
+    self_[axis_] = self;
+    firmware::AxisSetting& setting = setting_[axis_];
+    setting = value_at<firmware::AxisSetting>(processor.core_register(1));
     // The axis starts afresh, and with it its haptic samples.
     if (axis_ == 0 && (!device_ || setting.generation != generation_)) start();
     if (axis_ == 0) generation_ = setting.generation;
@@ -176,10 +186,11 @@ class ImageSide {
 
   void leave() {
     return_to_ = 0;
-    Axis::Output output;
-    std::memcpy(static_cast<void*>(&output),
-                bytes_at<Axis::Output>(board_->processor().core_register(0)).data(), sizeof output);
-    add_output(tick_[axis_], output);
+    const auto output = value_at<Axis::Output>(board_->processor().core_register(0));
+    // The image does not work it out: what it has, the same source makes into it here.
+    const float background_force = value_at<Axis>(self_[axis_]).ISR_background_force(setting_[axis_]);
+    add_output(tick_[axis_], output, background_force);
+    device_->set_background_force(axis_, background_force);
     device_->drive(axis_, output);
     if (axis_ != 1) return;
     trace_.push_back(tick_);
@@ -194,6 +205,8 @@ class ImageSide {
   EmptyWorld world_;
   std::unique_ptr<virtual_board::VirtualBoard> board_;
   std::uint32_t entry_, return_to_ = 0, first_self_ = 0;
+  std::array<std::uint32_t, 2> self_{};
+  std::array<firmware::AxisSetting, 2> setting_{};
   std::size_t axis_ = 0;
   std::uint32_t generation_ = 0, now_us_ = 0;
   std::optional<SimulatedDevice> device_;
@@ -244,7 +257,8 @@ Trace native_trace(const simulation::Scene& scene, const Trace& image) {
     Tick tick{seen(simulation.device(), 0), seen(simulation.device(), 1)};
     simulation.board().advance(1);
     for (std::size_t axis = 0; axis < tick.size(); ++axis)
-      add_output(tick[axis], simulation.board().output().axis[axis]);
+      add_output(tick[axis], simulation.board().output().axis[axis],
+                 simulation.board().application().ISR_background_force(axis));
     trace.push_back(tick);
   }
   return trace;

@@ -148,11 +148,10 @@ TEST(SimulatedDevice, OnePersonOnBothAxesAnswersToBothBackgroundForces) {
   const auto activation = [&](bool same_person) {
     scene.axes[1].same_person = same_person;
     SimulatedDevice device(scene);
-    firmware::AxisOutput out = output(0.0f, true);
-    out.background_force = 3.0f;
-    device.drive(0, out);
-    out.background_force = 4.0f;
-    device.drive(1, out);
+    device.drive(0, output(0.0f, true));
+    device.drive(1, output(0.0f, true));
+    device.set_background_force(0, 3.0f);
+    device.set_background_force(1, 4.0f);
     pass(device, 3.0);
     return std::pair(device.handle(0).activation(), device.handle(1).activation());
   };

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulation/scene.hpp"
 
@@ -118,7 +118,7 @@ class SpinOut {
       in.motor = {true, static_cast<float>(supply.voltage()),
                   static_cast<float>((pin(Channel::b) - zero_b) * per_volt),
                   static_cast<float>((pin(Channel::c) - zero_c) * per_volt)};
-      const auto& out = axis.ISR_tick(setting_, in, true, static_cast<float>(force), n);
+      const auto& out = axis.ISR_tick(setting_, in, true, {.from_axes = static_cast<float>(force)}, n);
       if (axis.ISR_fault() != Fault::none) return {axis.ISR_fault(), n * tick, drive.handle().position()};
       const auto leg = [&](float duty) { return simulation::LegCommand{true, static_cast<double>(duty)}; };
       simulation::InverterCommand next = command;

@@ -21,7 +21,7 @@
 #include <variant>
 #include <vector>
 
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 #include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulation/scene.hpp"
 
@@ -248,7 +248,8 @@ class Rig {
     in.count = static_cast<std::uint32_t>(count());
     in.count_valid = true;
     in.motor = {true, static_cast<float>(supply_.voltage()), amperes(0), amperes(1)};
-    const auto& out = controlled_.ISR_tick(setting_, in, true, static_cast<float>(asked_force), ticks_++);
+    const auto& out =
+        controlled_.ISR_tick(setting_, in, true, {.from_axes = static_cast<float>(asked_force)}, ticks_++);
     if (controlled_.ISR_fault() != firmware::Fault::none) {
       throw std::runtime_error("the axis has tripped: fault " +
                                std::to_string(static_cast<int>(controlled_.ISR_fault())));

@@ -1,4 +1,4 @@
-#include "firmware/axis.hpp"
+#include "firmware/drive/axis.hpp"
 
 #include <bit>
 #include <cstddef>
@@ -21,17 +21,34 @@ float velocity_of_tick(const AxisSetting& setting, std::int32_t moved) {
   return static_cast<float>(along) * setting.haptic.velocity_per_count;
 }
 
-/// Whole words, where an assignment would go around the padding byte by byte.
+/// An assignment would go around the padding byte by byte; this copies whole words.
 [[gnu::always_inline]] inline void copy_words(void* to, const void* from, std::size_t size) {
   std::memcpy(__builtin_assume_aligned(to, alignof(std::uint32_t)),
               __builtin_assume_aligned(from, alignof(std::uint32_t)), size);
+}
+
+/// `a` or `b`, without a branch: asked one after the other, both answers would be kept in registers.
+constexpr bool either(bool a, bool b) {
+  return static_cast<bool>(static_cast<int>(a) | static_cast<int>(b));
+}
+
+/// low <= value <= high for bounds >= 0, with comparisons of whole numbers, which are shorter: from 0 up,
+/// numbers are ordered as their bits are, and what is negative or not a number lies above all of them.
+constexpr bool is_within(float value, float low, float high) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return bits >= std::bit_cast<std::uint32_t>(low) && bits <= std::bit_cast<std::uint32_t>(high);
+}
+
+/// value > 0, by its bits: shorter than a comparison of floats.
+constexpr bool is_positive(float value) {
+  return std::bit_cast<std::int32_t>(value) > 0;
 }
 
 }  // namespace
 
 // Flattened: the calls between its parts cost a tenth of the tick.
 [[gnu::flatten]] const Axis::Output& Axis::ISR_tick(const AxisSetting& setting, const Input& input,
-                                                    bool enable, float external_force, std::uint32_t tick) {
+                                                    bool enable, Demand demand, std::uint32_t tick) {
   if (!enable) trip_ = Fault::none;
   tick_ = tick;
   supply_ = input.motor.supply_voltage;
@@ -42,21 +59,21 @@ float velocity_of_tick(const AxisSetting& setting, std::int32_t moved) {
   std::int32_t moved = 0;
   if (input.count_valid) [[likely]] {
     if (!started_ || reference_generation_ != input.reference_generation) [[unlikely]]
-      refer_anew(input, enable);
+      take_reference(input, enable);
     const std::uint32_t before = low_word(extender_.count());
     moved = static_cast<std::int32_t>(low_word(extender_.update(input.count)) - before);
   }
   const std::int64_t position = position_of(extender_.count(), setting);
   std::uint32_t state = state_word(trip_, condition_of(setting, input), enable, input);
   const bool sound = (state & ~referenced_bit) == (enabled_bit | count_valid_bit);
-  const bool rendering = sound && setting.mode == DriveMode::haptic;
-  const auto& out = loop_.tick(setting.haptic, position, rendering, external_force);
-  // One question: asked as two, both answers would be kept in registers until there is a zero to store.
-  const bool wrong = static_cast<bool>(out.not_finite | out.over_speed);
-  if (rendering && !wrong) [[likely]] {
-    output_.enabled = render(setting, input, low_word(position), moved);
+  const bool by_force = sound && setting.mode != DriveMode::excitation;
+  const auto& out = setting.mode == DriveMode::torque
+                        ? loop_.follow(setting.haptic, position, by_force, demand.from_host)
+                        : loop_.tick(setting.haptic, position, by_force, demand.from_axes);
+  if (by_force && !either(out.not_finite, out.over_speed)) [[likely]] {
+    output_.enabled = drive(setting, input, low_word(position), moved);
   } else {
-    output_.enabled = do_otherwise(setting, input, state, moved);
+    output_.enabled = excite_or_release(setting, input, state, moved);
   }
   if (!output_.enabled) [[unlikely]]
     state |= static_cast<std::uint32_t>(trip_);
@@ -76,11 +93,11 @@ float velocity_of_tick(const AxisSetting& setting, std::int32_t moved) {
 void Axis::start_afresh() {
   loop_.reset();
   plausibility_.reset();
-  state_ |= unheard_bit;
+  state_ |= unreported_bit;
 }
 
 /// The counts mean something else from now on.
-void Axis::refer_anew(const Input& input, bool enable) {
+void Axis::take_reference(const Input& input, bool enable) {
   // A force that jumps with the position must never be.
   if (started_ && enable && trip_ == Fault::none) trip(Fault::encoder, 0.0f, loop_.output().position);
   // What the counter held before its first valid count means nothing, and neither does the jump to it.
@@ -94,10 +111,7 @@ void Axis::refer_anew(const Input& input, bool enable) {
 Fault Axis::condition_of(const AxisSetting& setting, const Input& input) {
   if (input.condition != Fault::none || !input.motor.present) return input.condition;
   const float supply = input.motor.supply_voltage;
-  // From 0 up numbers are ordered as their bits are; what is negative or not a number lies above all of them.
-  const auto bits = std::bit_cast<std::uint32_t>(supply);
-  if (bits >= std::bit_cast<std::uint32_t>(setting.supply_voltage_min) &&
-      bits <= std::bit_cast<std::uint32_t>(setting.supply_voltage_max)) [[likely]]
+  if (is_within(supply, setting.supply_voltage_min, setting.supply_voltage_max)) [[likely]]
     return Fault::none;
   return supply > setting.supply_voltage_max ? Fault::over_voltage : Fault::under_voltage;
 }
@@ -130,16 +144,12 @@ void Axis::find_trips(const AxisSetting& setting, const Input& input, Fault cond
   }
 }
 
-/// From the wall's force to duty. False: it has tripped, and there is neither.
-bool Axis::render(const AxisSetting& setting, const Input& input, std::uint32_t position,
-                  std::int32_t moved) {
+/// From the loop's force to duty. False: it has tripped, and there is neither.
+bool Axis::drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved) {
   const auto& out = loop_.output();
   float force = out.force;
-  // Above 0, by its bits.
-  if (std::bit_cast<std::int32_t>(setting.compensation.limit) > 0) force = compensated(setting, position);
+  if (is_positive(setting.compensation.limit)) force = compensated(setting, position);
   output_.force = force;
-  output_.tangential_force = out.tangential_force;
-  output_.background_force = loop_.background_force();
   motor_.update(setting.motor, input.motor, force, position, out.velocity, true, output_.motor);
   if (output_.motor.fault != Fault::none) [[unlikely]]
     return trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);
@@ -153,8 +163,8 @@ bool Axis::render(const AxisSetting& setting, const Input& input, std::uint32_t 
 }
 
 /// Excitation, a trip, or nothing at all. True: the axis is driven.
-bool Axis::do_otherwise(const AxisSetting& setting, const Input& input, std::uint32_t state,
-                        std::int32_t moved) {
+bool Axis::excite_or_release(const AxisSetting& setting, const Input& input, std::uint32_t state,
+                             std::int32_t moved) {
   const bool enable = (state & enabled_bit) != 0;
   plausibility_.follow(setting.plausibility, velocity_of_tick(setting, moved));
   if (enable && (state_ & enabled_bit) == 0) {
@@ -165,12 +175,11 @@ bool Axis::do_otherwise(const AxisSetting& setting, const Input& input, std::uin
     find_trips(setting, input, condition_in(state));
     if (trip_ == Fault::none) {
       output_.force = excite(setting, input);
-      output_.tangential_force = output_.background_force = 0.0f;
       return output_.motor.fault == Fault::none ||
              trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);
     }
   }
-  output_.force = output_.tangential_force = output_.background_force = 0.0f;
+  output_.force = 0.0f;
   excitation_.stand_by(setting.excitation);
   motor_.update(setting.motor, input.motor, 0.0f, 0, 0.0f, false, output_.motor);
   return false;
@@ -180,7 +189,7 @@ bool Axis::do_otherwise(const AxisSetting& setting, const Input& input, std::uin
 bool Axis::trip_in_drive(Fault fault, float value, const AxisSetting& setting) {
   trip(fault, value, position_of(extender_.count(), setting));
   output_.motor.duty_a = output_.motor.duty_b = output_.motor.duty_c = 0.5f;
-  output_.force = output_.tangential_force = output_.background_force = 0.0f;
+  output_.force = 0.0f;
   return false;
 }
 
@@ -199,8 +208,8 @@ float Axis::excite(const AxisSetting& setting, const Input& input) {
   return motor_.excite(setting.motor, input.motor, asked, low_word(position), velocity, output_.motor);
 }
 
-/// The wall's force with what makes the handle lighter, which comes with the soft start like the wall's does;
-/// the sum keeps to the wall's limit.
+/// The loop's force with what makes the handle lighter, which comes with the soft start like the loop's does;
+/// the sum keeps to the same limit.
 float Axis::compensated(const AxisSetting& setting, std::uint32_t position) const {
   const auto& out = loop_.output();
   const float added = control::ForceCompensation<float>::update(

@@ -8,7 +8,7 @@
 #include "control/motor_transmission.hpp"
 #include "control/phase_watch.hpp"
 #include "control/sine_cosine.hpp"
-#include "firmware/excitation.hpp"
+#include "firmware/drive/excitation.hpp"
 #include "firmware/fault.hpp"
 
 namespace kmax::firmware {

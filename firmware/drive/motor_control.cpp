@@ -1,4 +1,4 @@
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 
 #include "control/current_loop_gains.hpp"
 #include "control/winding_temperature.hpp"

@@ -6,9 +6,9 @@
 #include "control/force_compensation.hpp"
 #include "control/haptic_loop.hpp"
 #include "control/motion_plausibility.hpp"
-#include "firmware/excitation.hpp"
+#include "firmware/drive/excitation.hpp"
+#include "firmware/drive/motor_control.hpp"
 #include "firmware/fault.hpp"
-#include "firmware/motor_control.hpp"
 
 namespace kmax::firmware {
 
@@ -16,7 +16,7 @@ namespace kmax::firmware {
 enum class DriveMode : std::uint8_t {
   haptic = 0,
   excitation = 1,  ///< follows excitation.*, without a wall
-  torque = 2,      ///< makes profile.target_torque, without a wall
+  torque = 2,      ///< makes the force that the host asks for, without a wall
 };
 
 /// What the tick of one axis works by; made in the main loop, handed over whole.
@@ -31,7 +31,7 @@ struct AxisSetting {
   std::int32_t encoder_direction = 1;                          ///< +1 or -1
   std::uint32_t generation = 0;  ///< differs from the last one: estimators start afresh
   DriveMode mode = DriveMode::haptic;
-  bool watch_motion = false;  ///< `plausibility` trips, in mode haptic
+  bool watch_motion = false;  ///< `plausibility` trips, except in mode excitation
   /// False: nobody knows the rotor's angle yet. Excitations of a synchronous motor that need it then ask for
   /// nothing; mode haptic is the main loop's to refuse.
   bool commutated = true;
@@ -88,20 +88,31 @@ class Axis {
     bool referenced = false;  ///< the counts are those from the encoder's index
   };
   struct Output {
-    /// N along +x, with compensation; 0 unless enabled. In mode haptic within force.limit.
+    /// N along +x, with compensation; 0 unless enabled. Within force.limit, except in mode excitation.
     float force;
-    float tangential_force;  ///< N, to be made by the other axis
-    /// N, outwards, while enabled: field and F_B, what a simulated person answers to. The board has no use
-    /// for it.
-    float background_force;
     bool enabled;  ///< false: the bridge must be off
     MotorControl::Output motor{};
   };
 
+  /// Forces from outside the axis, N along +x.
+  struct Demand {
+    float from_axes = 0.0f;  ///< mode haptic: what a law over several axes adds to the wall
+    float from_host = 0.0f;  ///< mode torque: all of the force
+  };
+
   /// Defined apart, so that it is one function in the image whose arguments and result a test can follow.
   /// The result is valid until the next call.
-  const Output& ISR_tick(const AxisSetting& setting, const Input& input, bool enable, float external_force,
+  const Output& ISR_tick(const AxisSetting& setting, const Input& input, bool enable, Demand demand,
                          std::uint32_t tick);
+
+  /// Where another axis' slot finds this one, which does not tick in it: counts, by this axis' last setting.
+  /// Needs input.count_valid and a reference that this axis' own tick has taken over, see ISR_follows().
+  std::int64_t ISR_position(std::uint32_t count, const AxisSetting& setting) const {
+    return position_of(extender_.peek(count), setting);
+  }
+  bool ISR_follows(const Input& input) const {
+    return input.count_valid && started_ && reference_generation_ == input.reference_generation;
+  }
 
   /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled.
   void ISR_trip(Fault fault) {
@@ -118,6 +129,12 @@ class Axis {
   /// on what was before.
   bool ISR_changed() const { return changes_ != 0; }
   const control::HapticLoop<float>::Output& ISR_haptic() const { return loop_.output(); }
+  /// Of the last tick, N, outwards: field and F_B while a wall is rendered. What a simulated person answers
+  /// to; no board asks for it, and none pays for it.
+  float ISR_background_force(const AxisSetting& setting) const {
+    const bool rendering = output_.enabled && setting.mode == DriveMode::haptic;
+    return rendering ? loop_.background_force(setting.haptic) : 0.0f;
+  }
   /// Of the last tick: the encoder's extended count, before offset and direction.
   std::int64_t ISR_counted() const { return extender_.count(); }
   Fault ISR_fault() const { return trip_; }
@@ -130,10 +147,9 @@ class Axis {
 
  private:
   static constexpr std::uint32_t enabled_bit = 1U << 16, count_valid_bit = 1U << 17,
-                                 referenced_bit = 1U << 18, unheard_bit = 1U << 31;
+                                 referenced_bit = 1U << 18, unreported_bit = 1U << 31;
 
-  /// All that the main loop must hear of at once, in one word, since comparing words is what the tick can
-  /// afford.
+  /// All that the main loop must hear of at once, in one word: one comparison finds any change.
   static constexpr std::uint32_t state_word(Fault trip, Fault condition, bool enabled, const Input& input) {
     return static_cast<std::uint32_t>(trip) | static_cast<std::uint32_t>(condition) << 8 |
            (enabled ? enabled_bit : 0U) | (input.count_valid ? count_valid_bit : 0U) |
@@ -144,16 +160,16 @@ class Axis {
   // What is rare, or for identification, is kept out of the tick's one function, whose registers it would
   // take.
   [[gnu::noinline, gnu::cold]] void start_afresh();
-  [[gnu::noinline, gnu::cold]] void refer_anew(const Input& input, bool enable);
+  [[gnu::noinline, gnu::cold]] void take_reference(const Input& input, bool enable);
   [[gnu::noinline, gnu::cold]] void trip(Fault fault, float value, std::int64_t position);
   [[gnu::noinline, gnu::cold]] bool trip_in_drive(Fault fault, float value, const AxisSetting& setting);
-  [[gnu::noinline]] bool do_otherwise(const AxisSetting& setting, const Input& input, std::uint32_t state,
-                                      std::int32_t moved);
+  [[gnu::noinline]] bool excite_or_release(const AxisSetting& setting, const Input& input,
+                                           std::uint32_t state, std::int32_t moved);
   void find_trips(const AxisSetting& setting, const Input& input, Fault condition);
   float excite(const AxisSetting& setting, const Input& input);
   [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
   static Fault condition_of(const AxisSetting& setting, const Input& input);
-  bool render(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved);
+  bool drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved);
 
   control::CountExtender<std::uint32_t> extender_;
   control::HapticLoop<float> loop_;

@@ -1,6 +1,6 @@
 // The rare parts of the motor's tick: excitation, and what a fault has to tell. The usual one is inline in
 // the header.
-#include "firmware/motor_control.hpp"
+#include "firmware/drive/motor_control.hpp"
 
 namespace kmax::firmware {
 

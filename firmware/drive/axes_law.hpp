@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+#include "control/haptic_loop.hpp"
+
+namespace kmax::firmware {
+
+/// Where the handles of all axes are at the moment of one axis' sample.
+template <std::size_t axes>
+struct AxesPositions {
+  std::array<std::int64_t, axes> position{};  ///< counts along +x, offset and direction applied
+  std::array<bool, axes> valid{};             ///< false: nobody knows, and no force may follow from it
+};
+
+/// A law over several axes: what stands between the counts of all axes and the force of each, beside the wall
+/// that each axis renders on its own. AxesTick asks it in the slot of every axis, and in that slot only for
+/// the force of that axis, so that every force goes by counts that are as fresh as the axis' own.
+///
+///   ISR_force(axis, at)              N along +x of this axis. It is added to the axis' wall and keeps, with
+///                                    it, to the axis' force limit, slew limit, soft start and trips.
+///   ISR_rendered(axis, loop, driven) what the axis' own loop has made of it; `driven`: the motor follows
+///   needs_all_positions              true: the board reads the counters of all axes in each slot, and `at`
+///                                    holds them. False: `at` is not filled, and costs nothing.
+///
+/// Which law it is, is chosen when AxesTick is compiled: a device whose axes have nothing to do with each
+/// other pays nothing for the place.
+template <typename Law, std::size_t axes>
+concept AxesLaw = requires(Law law, std::size_t axis, const AxesPositions<axes>& at,
+                           const control::HapticLoop<float>::Output& loop, bool driven) {
+  { Law::needs_all_positions } -> std::convertible_to<bool>;
+  { law.ISR_force(axis, at) } -> std::same_as<float>;
+  { law.ISR_rendered(axis, loop, driven) } -> std::same_as<void>;
+};
+
+/// Axes at right angles to each other: the interference along the surface of one axis' wall (eq. 4 of paper
+/// 1) is felt along the next axis; the last one's along the first. Each axis takes what the other made last.
+template <std::size_t axes>
+class TangentialInterference {
+ public:
+  static constexpr bool needs_all_positions = false;
+
+  float ISR_force(std::size_t axis, const AxesPositions<axes>& /*at*/) const { return along_[axis]; }
+  void ISR_rendered(std::size_t axis, const control::HapticLoop<float>::Output& loop, bool driven) {
+    if constexpr (axes > 1) along_[(axis + 1) % axes] = driven ? loop.tangential_force : 0.0f;
+  }
+
+ private:
+  std::array<float, axes> along_{};  ///< N
+};
+
+}  // namespace kmax::firmware
