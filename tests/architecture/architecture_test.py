@@ -32,8 +32,9 @@ HOST_TOOLS = [
     ["base"],
     ["plot", "report", "lines", "simulation"],
     ["flash", "wall", "device"],
-    ["description", "record", "check", "bench", "simulated_board", "calibration", "selftest"],
-    ["device/sim", "serve", "experiment"],
+    ["description", "record", "check", "bench", "simulated_board"],
+    ["device/sim", "serve", "calibration", "selftest"],
+    ["experiment"],
     ["virtual_board", "kmax"],
 ]
 # Standard headers whose contents need a heap, an operating system or libm.
