@@ -49,9 +49,10 @@ TEST_P(ImageCalibration, FindsTheMotorWithinItsBounds) {
   std::string last;
   const auto report = calibration::calibrate(
       bench.device, {}, nullptr, [&](const std::string& text) { last = text.empty() ? last : text; });
-  ASSERT_TRUE(report.pass()) << calibration_test::cause_of(report) << "; " << last;
+  ASSERT_TRUE(report.pass()) << kmax::calibration_test::cause_of(report) << "; " << last;
   EXPECT_TRUE(report.stored);
-  for (const calibration_test::Judged& one : calibration_test::judge(bench.image.scene.axes[0], report))
+  for (const kmax::calibration_test::Judged& one :
+       kmax::calibration_test::judge(bench.image.scene.axes[0], report))
     EXPECT_TRUE(one.good()) << one.name << ": " << one.found << ", truth " << one.truth;
 }
 
