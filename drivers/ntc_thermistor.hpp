@@ -77,7 +77,7 @@ class NtcThermistor {
   }
 
   /// Codes 0 to 4095; larger ones read as 4095.
-  constexpr NtcReading ISR_read(std::uint16_t code) const {
+  constexpr NtcReading read(std::uint16_t code) const {
     if (code < open_below_) return {NtcState::open, celsius(open_below_)};
     if (code > shorted_above_) return {NtcState::shorted, celsius(shorted_above_)};
     return {NtcState::ok, celsius(code)};

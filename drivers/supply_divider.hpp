@@ -23,9 +23,9 @@ class SupplyDivider {
       : volts_per_code_(config.reference_volt * (1.0F / 4096.0F) * config.ratio) {}
 
   constexpr float volts_per_code() const { return volts_per_code_; }
-  constexpr float ISR_volts(std::uint16_t code) const { return static_cast<float>(code) * volts_per_code_; }
+  constexpr float volts(std::uint16_t code) const { return static_cast<float>(code) * volts_per_code_; }
   /// The supply may be anything above what the code says.
-  constexpr bool ISR_saturated(std::uint16_t code) const { return code >= 4095; }
+  constexpr bool saturated(std::uint16_t code) const { return code >= 4095; }
 
  private:
   float volts_per_code_;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/pins.hpp"
 #include "drivers/cortex_m/cycle_counter.hpp"
 #include "drivers/current_sense.hpp"
@@ -48,8 +49,8 @@ class GateDrivers {
 
  private:
   static void delay_us(std::uint32_t microseconds) {
-    // By the cycle counter: at 168 MHz; longer on a slower clock, which these delays may be.
-    constexpr std::uint32_t cycles_per_us = 168;
+    // By the cycle counter; longer on a slower clock, which these delays may be.
+    constexpr std::uint32_t cycles_per_us = description.core_clock_hz / 1'000'000;
     drivers::cortex_m::CycleCounter counter{drivers::cortex_m::dwt(), drivers::cortex_m::core_debug()};
     const std::uint32_t start = counter.now();
     // Bounded in case the counter stands still.

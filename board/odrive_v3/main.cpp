@@ -8,10 +8,12 @@
 #include <span>
 
 #include "board/odrive_v3/can_line.hpp"
+#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/pins.hpp"
 #include "board/odrive_v3/power_hardware.hpp"
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
+#include "board/odrive_v3/voltage_variant.hpp"
 #include "board/stm32f405/crash_record.hpp"
 #include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
@@ -60,20 +62,12 @@ ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, p
 /// In the memory beside the buses' RAM, which emulators without clocks do not have.
 [[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
-/// All that drives motors. Made in main, once the clocks are known; no interrupt is enabled before.
-struct Power {
-  explicit Power(VoltageVariant variant)
-      : bus(stm32::spi3()), drives(variant, bus), hardware(drives, bus), stage(hardware) {}
-  ChipBus bus;
-  Drives drives;
-  PowerHardware hardware;
-  PowerStage<PowerHardware> stage;
-};
-
 std::optional<firmware::Application> application;
 std::optional<SerialLine> serial;
 std::optional<CanLine> can_line;
-std::optional<Power> power;
+ChipBus chip_bus{stm32::spi3()};
+/// Made in main, once the clocks are known; no interrupt is enabled before.
+std::optional<Power<PowerHardware>> power;
 /// Set by the clock's interrupt and never taken back: only a restart brings the ticks back.
 std::atomic<bool> ticks_have_stopped{false};
 bool power_runs = false;  ///< written before the interrupts that read it are enabled
@@ -139,41 +133,29 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
   // The chips' delays count cycles.
   static_cast<void>(
       drivers::cortex_m::CycleCounter{drivers::cortex_m::dwt(), drivers::cortex_m::core_debug()}.start());
-  if (!power->bus.configure({})) return false;
-  if (!power->drives.configure(clocks.apb2_hz)) return false;
+  if (!chip_bus.configure({})) return false;
+  if (!power->hardware().configure(clocks.apb2_hz)) return false;
   const std::uint32_t converters_on_us = system_tick.now_us();
   // Only now: until here the gates were inputs with pull-downs.
   apply(gate_pins);
-  power->drives.apply(application->values());
+  power->take_parameters(*application);
   power_runs = true;
   start_line_interrupts();
   interrupts.set_priority(stm32::Interrupt::adc, priority::tick);
   interrupts.enable(stm32::Interrupt::adc);
   while (system_tick.now_us() - converters_on_us <= stm32::adc_stabilization_us) {
   }
-  return power->drives.start();
+  return power->hardware().start();
 }
 
 /// What the main loop does for the power stage.
-void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
-  static bool was_ready = false;
-  if (power->stage.ready() != was_ready) {
-    was_ready = power->stage.ready();
-    if (was_ready) power->drives.restart_serial_encoder();
-  }
-  if (!application->any_armed()) {
-    if (application->parameter_changes() != applied_changes) {
-      applied_changes = application->parameter_changes();
-      power->drives.apply(application->values());
-    }
-    if (power->stage.ready() && power->hardware.gain_has_changed()) power->stage.restart(now_us);
-  }
-  power->stage.poll(now_us, application->any_armed());
-  bool healthy = power->stage.ISR_condition() == firmware::Fault::none;
+void poll_power(std::uint32_t now_us) {
+  power->poll(*application, now_us);
+  bool healthy = power->condition() == firmware::Fault::none;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     healthy = healthy && application->fault(axis) == firmware::Fault::none;
-  power->hardware.show_healthy(healthy);
-  if (power->drives.watchdog_gate().may_feed()) watchdog.feed();
+  power->hardware().show_healthy(healthy);
+  if (power->drives().watchdog_gate().may_feed()) watchdog.feed();
 }
 
 /// A reset by software: the bridges are off before it, and every pin is what it is at power-on.
@@ -203,31 +185,29 @@ void poll_power(std::uint32_t now_us, std::uint32_t& applied_changes) {
     can_line.emplace(interrupts, clocks.apb1_hz);
   }
 
-  std::uint32_t applied_changes = application->parameter_changes();
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
   // say that they have no encoder.
   if (!emulator_without_clocks && clocks.source != stm32::ClockSource::unresponsive &&
-      clocks.core_hz == 168'000'000) {
-    power.emplace(voltage_variant());
+      clocks.core_hz == description.core_clock_hz) {
+    power.emplace(supply_divider_ratio(voltage_variant()), chip_bus);
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
   }
   for (;;) {
     const bool due =
-        !power_runs || power->drives.main_loop_due() || serial->news() || (can_line && can_line->news());
+        !power_runs || power->drives().main_loop_due() || serial->news() || (can_line && can_line->news());
     if (due) {
       const std::uint32_t now = system_tick.now_us();
       if (power_runs) {
-        firmware::BoardReadings readings = power->drives.readings();
+        firmware::BoardReadings readings = power->drives().readings();
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
         application->set_readings(readings);
-        power->drives.inhibit_brake(application->store_busy());
       }
       if (can_line) can_line->poll(*application, now);
       application->poll(now);
       serial->poll(*application, now);
       if (can_line) can_line->send(*application);
       if (application->restart_wanted()) restart();
-      if (power_runs) poll_power(now, applied_changes);
+      if (power_runs) poll_power(now);
     }
     // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
     drivers::cortex_m::wait_for_interrupt();
@@ -251,20 +231,18 @@ void enter_safe_state() {
 
 void ISR_adc() {
   using namespace kmax::board;
-  power->drives.ISR_tick(*application, power->stage);
+  odrive_v3::ISR_tick(*power, *application);
 }
 
 void ISR_exti2() {
   using namespace kmax::board;
-  power->drives.ISR_disarm();
-  power->stage.ISR_fault_line();
+  power->ISR_fault_line();
   static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::gate_driver_fault.number));
 }
 
 void ISR_exti4() {
   using namespace kmax::board;
-  power->drives.ISR_disarm();
-  power->stage.ISR_emergency_stop();
+  power->ISR_emergency_stop();
   static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::emergency_stop.number));
 }
 
@@ -273,7 +251,7 @@ void ISR_system_tick() {
   board::system_tick.ISR_count();
   if (board::power_runs) {
     // Not before the first ticks: the power stage takes longer to become ready than this takes to settle.
-    if (board::power->stage.ready() && board::power->drives.ISR_ticks_have_stopped())
+    if (board::power->ready() && board::power->drives().ISR_ticks_have_stopped())
       board::ticks_have_stopped.store(true, std::memory_order_relaxed);
     return;
   }

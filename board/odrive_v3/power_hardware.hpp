@@ -1,30 +1,76 @@
 #pragma once
 
-#include "board/odrive_v3/drives.hpp"
+#include <cstdint>
+
+#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/gate_drivers.hpp"
 #include "board/odrive_v3/pins.hpp"
-#include "board/odrive_v3/power_stage.hpp"
+#include "board/power/power.hpp"
+#include "board/power/serial_encoder.hpp"
+#include "drivers/stm32f4/current_sampling.hpp"
+#include "drivers/stm32f4/phase_shifted_pwm.hpp"
+#include "drivers/stm32f4/quadrature_timer.hpp"
 
 namespace kmax::board::odrive_v3 {
 
-/// The lines and chips behind the power stage's sequence (PowerStageHardware).
+/// Timers, converters, lines and gate drivers of both axes (board::MotorHardware).
+///
+/// The conversions' interrupt comes 0.7 us after the middle of an axis' low-side window, the two axes' every
+/// 25 us in turn: TIM1 counts up after its underflow (axis 0), down after its overflow (axis 1). A duty is
+/// active from the timer's next turn on, 25 us after the sample.
 class PowerHardware {
  public:
-  PowerHardware(Drives& drives, ChipBus& bus) : drives_(drives), gate_drivers_(bus) {}
+  explicit PowerHardware(ChipBus& bus)
+      : gate_drivers_(bus),
+        serial_encoder_(bus, pin(pins::encoder_select)),
+        bridge0_(drivers::stm32f4::tim1(), pwm_config),
+        bridge1_(drivers::stm32f4::tim8(), pwm_config),
+        encoder0_(drivers::stm32f4::tim3()),
+        encoder1_(drivers::stm32f4::tim4()),
+        sampling_(drivers::stm32f4::adc(1), drivers::stm32f4::adc(2), drivers::stm32f4::adc(3),
+                  drivers::stm32f4::adc_common()) {}
+
+  /// Timers and converters, outputs off. False: the hardware does not do what it is told.
+  [[nodiscard]] bool configure(std::uint32_t apb2_hz) {
+    return bridge0_.configure() && bridge1_.configure() && encoder0_.configure({}) &&
+           encoder1_.configure({}) && sampling_.configure(apb2_hz);
+  }
+  /// Begins the ticks. False like configure().
+  [[nodiscard]] bool start() {
+    // The start itself triggers once: as a sample of axis 0.
+    sampling_.start(0);
+    return drivers::stm32f4::start_phase_shifted(bridge0_, bridge1_);
+  }
+  /// In the conversions' interrupt: whose they are.
+  bool ISR_sampled_axis_1() const { return bridge0_.counting_down(); }
+
+  static constexpr bool has(std::size_t) { return true; }
+  auto& bridge(std::size_t axis) { return axis == 0 ? bridge0_ : bridge1_; }
+  const drivers::stm32f4::CurrentSample& ISR_sample(std::size_t axis) {
+    return sampling_.ISR_read(static_cast<unsigned>(axis));
+  }
+  std::uint16_t ISR_counter(std::size_t axis) const {
+    return axis == 0 ? encoder0_.count() : encoder1_.count();
+  }
+  bool ISR_index_line(std::size_t axis) const {
+    return pin(axis == 0 ? pins::encoder0_index : pins::encoder1_index).read();
+  }
+  auto& serial_encoder() { return serial_encoder_; }
+  void set_brake(bool on) { pin(pins::brake_high_side).write(on); }
+
+  std::uint16_t supply_code() const { return sampling_.latest().supply; }
+  std::uint16_t temperature_code(std::size_t axis) const { return sampling_.latest().temperatures[axis]; }
+  std::uint32_t missed_ticks() const {
+    return sampling_.counters().overruns + sampling_.counters().axis_mismatches;
+  }
 
   void set_gate_enable(bool level) { pin(pins::gate_enable).write(level); }
   bool fault_line_low() const { return !pin(pins::gate_driver_fault).read(); }
   /// The contact to ground is closed while all is well; an open line is pulled up.
   bool emergency_stop_open() const { return pin(pins::emergency_stop).read(); }
-
-  bool configure_gate_driver(std::size_t axis) {
-    configured_gain_ = drives_.gain();
-    return gate_drivers_.configure(axis, configured_gain_);
+  bool configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
+    return gate_drivers_.configure(axis, gain);
   }
-  void restart_offset_calibration() { drives_.restart_offset_calibration(); }
-  OffsetProgress offset_progress() { return drives_.offset_progress(); }
-
-  bool gain_has_changed() const { return configured_gain_ != drives_.gain(); }
   void show_healthy(bool healthy) { pin(pins::healthy).write(healthy); }
 
  private:
@@ -32,10 +78,14 @@ class PowerHardware {
     return {drivers::stm32f4::gpio(location.port), location.number};
   }
 
-  Drives& drives_;
   GateDrivers gate_drivers_;
-  drivers::CurrentSenseGain configured_gain_ = drivers::CurrentSenseGain::x80;
+  SerialEncoder<ChipBus, drivers::stm32f4::GpioPin<>> serial_encoder_;
+  drivers::stm32f4::ThreePhasePwm<> bridge0_, bridge1_;
+  drivers::stm32f4::QuadratureTimer<> encoder0_, encoder1_;
+  drivers::stm32f4::CurrentSampling<> sampling_;
 };
-static_assert(PowerStageHardware<PowerHardware>);
+
+/// The conversions' interrupt. In a file of its own, compiled for speed.
+void ISR_tick(Power<PowerHardware>& power, firmware::Application& application);
 
 }  // namespace kmax::board::odrive_v3

@@ -142,6 +142,12 @@ class ThreePhasePwm {
     return true;
   }
 
+  /// All legs alike, in the middle: no voltage between them.
+  void ISR_set_no_voltage() {
+    const auto middle = static_cast<std::uint16_t>(config_.half_period_ticks / 2);
+    ISR_set_ticks({middle, middle, middle});
+  }
+
   /// Values above maximum_ticks() are limited.
   void ISR_set_ticks(const PhaseTicks& high) {
     registers_.ccr[0] = compare_of(high.a);

@@ -1,90 +1,69 @@
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
 
-#include <limits>
-
-#include "drivers/ntc_thermistor.hpp"
+#include "drivers/as5047p_frames.hpp"
 #include "host_tools/simulated_board/converter_code.hpp"
 
 namespace kmax::simulated_board {
 
-namespace {
 using Channel = simulation::CurrentSensor::Channel;
-using board::odrive_v3::OffsetProgress;
 
-constexpr drivers::NtcThermistor thermistor{};
-constexpr double lowest_gate_driver_supply = 5.9;  // V; DRV8301 data sheet, PVDD under-voltage
-}  // namespace
+SimulatedSerialEncoder::Sample SimulatedSerialEncoder::ISR_take() {
+  sample_.valid = false;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (!drives_.has(axis) || drives_.encoder_kind(axis) != simulation::EncoderKind::as5047p) continue;
+    if (!drives_.drive(axis).encoder().plugged()) continue;
+    const std::int64_t angle = drives_.serial_angle(axis);
+    if (!started_) {
+      started_ = true;
+      constexpr auto turn = static_cast<std::int64_t>(drivers::as5047p::counts_per_turn);
+      turns_before_ = angle - (angle % turn + turn) % turn;
+    }
+    sample_.count = static_cast<std::uint32_t>(angle - turns_before_);
+    sample_.valid = true;
+  }
+  return sample_;
+}
+
+void SimulatedSerialEncoder::restart_anew() {
+  if (started_) ++sample_.reference_generation;
+  started_ = false;
+}
 
 SimulatedPowerHardware::SimulatedPowerHardware(simulation::SceneDrives& drives)
-    : drives_(drives),
-      divider_({.ratio = static_cast<float>(drives.supply().config().divider_ratio)}),
-      supply_code_(converter_code(drives.supply().pin_voltage())) {}
+    : drives_(drives), supply_code_(converter_code(drives.supply().pin_voltage())) {}
 
-firmware::MotorControl::Measured SimulatedPowerHardware::measured(std::size_t index) {
-  Sensors& axis = axes_[index];
-  simulation::MotorDrive& drive = drives_.drive(index);
-  axis.code_b = converter_code(drive.current_pin(Channel::b, true));
-  axis.code_c = converter_code(drive.current_pin(Channel::c, true));
+const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::size_t axis) {
+  simulation::MotorDrive& drive = drives_.drive(axis);
   supply_code_ = converter_code(drives_.supply().pin_voltage());
-  if (calibrating_) {
-    axis.offset_b.ISR_add(axis.code_b);
-    axis.offset_c.ISR_add(axis.code_c);
-  }
-  firmware::MotorControl::Measured measured{};
-  measured.present = true;
-  measured.supply_voltage = supply_voltage();
-  measured.current_b = axis.sense_b.ISR_amperes(axis.code_b);
-  measured.current_c = axis.sense_c.ISR_amperes(axis.code_c);
-  return measured;
+  samples_[axis].phase_b = converter_code(drive.current_pin(Channel::b, true));
+  samples_[axis].phase_c = converter_code(drive.current_pin(Channel::c, true));
+  samples_[axis].supply = supply_code_;
+  return samples_[axis];
 }
 
-bool SimulatedPowerHardware::currents_saturated(std::size_t index) const {
-  const Sensors& axis = axes_[index];
-  return axis.sense_b.ISR_saturated(axis.code_b) || axis.sense_c.ISR_saturated(axis.code_c);
+std::uint32_t SimulatedPowerHardware::ISR_counter(std::size_t axis) const {
+  if (drives_.encoder_kind(axis) == simulation::EncoderKind::as5047p) return 0;
+  return static_cast<std::uint32_t>(drives_.drive(axis).encoder().edges());
 }
 
-float SimulatedPowerHardware::temperature(std::size_t axis) const {
-  const auto reading = thermistor.ISR_read(converter_code(drives_.temperature(axis).pin_voltage()));
-  return reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
+bool SimulatedPowerHardware::ISR_index_line(std::size_t axis) const {
+  // What is not there is pulled up.
+  return drives_.encoder_kind(axis) == simulation::EncoderKind::as5047p ||
+         drives_.drive(axis).encoder().lines().z;
+}
+
+std::uint16_t SimulatedPowerHardware::temperature_code(std::size_t axis) const {
+  return converter_code(drives_.temperature(axis).pin_voltage());
 }
 
 bool SimulatedPowerHardware::supply_suffices() const {
-  return drives_.supply().voltage() >= lowest_gate_driver_supply;
+  return drives_.supply().voltage() >= board::odrive_v3::description.gate_driver_supply_minimum;
 }
 
-bool SimulatedPowerHardware::configure_gate_driver(std::size_t axis) {
-  configured_gain_ = gain_;
+bool SimulatedPowerHardware::configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
   if (drives_.has(axis))
-    drives_.drive(axis).current_sensor().set_gain(static_cast<double>(drivers::gain_factor(gain_)));
+    drives_.drive(axis).current_sensor().set_gain(static_cast<double>(drivers::gain_factor(gain)));
   return supply_suffices();
-}
-
-void SimulatedPowerHardware::restart_offset_calibration() {
-  for (Sensors& axis : axes_) {
-    axis.sense_b = axis.sense_c = drivers::CurrentSense{{.gain = gain_}};
-    axis.offset_b.restart();
-    axis.offset_c.restart();
-  }
-  calibrating_ = true;
-}
-
-OffsetProgress SimulatedPowerHardware::offset_progress() {
-  using drivers::OffsetResult;
-  bool refused = false;
-  for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
-    if (!drives_.has(axis)) continue;
-    for (const auto* offset : {&axes_[axis].offset_b, &axes_[axis].offset_c}) {
-      if (offset->result() == OffsetResult::running) return OffsetProgress::running;
-      refused = refused || offset->result() != OffsetResult::accepted;
-    }
-  }
-  calibrating_ = false;
-  if (refused) return OffsetProgress::refused;
-  for (Sensors& axis : axes_) {
-    axis.sense_b.set_offset(axis.offset_b.offset());
-    axis.sense_c.set_offset(axis.offset_c.offset());
-  }
-  return OffsetProgress::accepted;
 }
 
 }  // namespace kmax::simulated_board

@@ -4,63 +4,88 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "board/odrive_v3/power_stage.hpp"
-#include "drivers/current_sense.hpp"
-#include "drivers/supply_divider.hpp"
-#include "firmware/application.hpp"
+#include "board/power/power.hpp"
+#include "host_tools/simulated_board/simulated_bridge.hpp"
 #include "host_tools/simulation/scene_drives.hpp"
 
 namespace kmax::simulated_board {
 
-/// What an ODrive v3.6 has between a scene's motors and its processor: shunt amplifiers and divider behind
-/// 12-bit converters, gate drivers, and the lines that stop everything
-/// (board::odrive_v3::PowerStageHardware).
+/// The AS5047P of a scene, whichever axis it is mounted on (as board::SerialEncoder). Its angle is that of
+/// the tick itself, and its count begins within one turn; a chip that is not there does not answer.
+class SimulatedSerialEncoder {
+ public:
+  struct Sample {
+    std::uint32_t count = 0;
+    bool valid = false;
+    std::uint32_t reference_generation = 0;
+  };
+
+  explicit SimulatedSerialEncoder(const simulation::SceneDrives& drives) : drives_(drives) {}
+
+  void ISR_begin() {}
+  Sample ISR_take();
+  bool under_way() const { return false; }
+  void ISR_abandon() {}
+  void restart() {}
+  void restart_anew();
+
+ private:
+  const simulation::SceneDrives& drives_;
+  Sample sample_;
+  bool started_ = false;
+  std::int64_t turns_before_ = 0;
+};
+
+/// What an ODrive v3.6 has between a scene's motors and its processor: bridges, encoder inputs, shunt
+/// amplifiers and divider behind 12-bit converters, gate drivers, and the lines that stop everything
+/// (board::MotorHardware).
+///
+/// Quadrature lines that are pulled up stand still and look valid, unless the index line tells
+/// (drivers::QuadratureIndexWatch). They are counted in 32 bits, since a scene's handle may start anywhere.
 class SimulatedPowerHardware {
  public:
+  /// Codes of an axis' last conversion.
+  struct Sample {
+    static constexpr bool valid = true;
+    static constexpr std::uint8_t slow_age = 0;
+    std::uint16_t phase_b = 2048, phase_c = 2048, supply = 0;
+  };
+
   explicit SimulatedPowerHardware(simulation::SceneDrives& drives);
-
-  /// Converts the currents of an axis that has a motor, and the supply; once in a tick.
-  firmware::MotorControl::Measured measured(std::size_t axis);
-  /// By the codes taken last.
-  bool currents_saturated(std::size_t axis) const;
-  bool supply_saturated() const { return divider_.ISR_saturated(supply_code_); }
-  float supply_voltage() const { return divider_.ISR_volts(supply_code_); }
-  /// degC; not a number when the sensor is broken.
-  float temperature(std::size_t axis) const;
-
-  /// The largest current that must be read, A. The amplifiers take a new gain when they are configured anew.
-  void set_range(float largest_current) { gain_ = drivers::gain_for_current(largest_current); }
-  drivers::CurrentSenseGain gain() const { return gain_; }
-  bool gain_has_changed() const { return configured_gain_ != gain_; }
 
   void press_emergency_stop(bool pressed) { emergency_stop_pressed_ = pressed; }
   void set_gate_driver_fault(bool fault) { gate_driver_fault_ = fault; }
+  SimulatedBridge& simulated_bridge(std::size_t axis) { return bridges_[axis]; }
 
-  // PowerStageHardware. The level of EN_GATE has no model of its own: while it is low no axis is armed.
+  // board::DriveHardware.
+  bool has(std::size_t axis) const { return drives_.has(axis); }
+  drivers::stm32f4::ThreePhasePwm<>& bridge(std::size_t axis) { return bridges_[axis].pwm(); }
+  /// Converts the currents of an axis that has a motor, and the supply; once in a tick.
+  const Sample& ISR_sample(std::size_t axis);
+  std::uint32_t ISR_counter(std::size_t axis) const;
+  bool ISR_index_line(std::size_t axis) const;
+  SimulatedSerialEncoder& serial_encoder() { return serial_encoder_; }
+  void set_brake(bool on) { drives_.supply().set_brake(on ? 1.0 : 0.0); }
+  std::uint16_t supply_code() const { return supply_code_; }
+  std::uint16_t temperature_code(std::size_t axis) const;
+  static constexpr std::uint32_t missed_ticks() { return 0; }
+
+  // board::MotorHardware. The level of EN_GATE has no model of its own: while it is low no axis is armed.
   void set_gate_enable(bool) {}
   /// A fault, or a supply below what the gate drivers need.
   bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
-  bool configure_gate_driver(std::size_t axis);
-  void restart_offset_calibration();
-  board::odrive_v3::OffsetProgress offset_progress();
+  bool configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
 
  private:
-  struct Sensors {
-    drivers::CurrentSense sense_b{}, sense_c{};
-    drivers::OffsetCalibration offset_b{}, offset_c{};
-    std::uint16_t code_b = 2048, code_c = 2048;
-  };
-
   bool supply_suffices() const;
 
   simulation::SceneDrives& drives_;
-  std::array<Sensors, firmware::axis_count> axes_;
-  drivers::SupplyDivider divider_;
+  std::array<SimulatedBridge, firmware::axis_count> bridges_;
+  std::array<Sample, firmware::axis_count> samples_;
+  SimulatedSerialEncoder serial_encoder_{drives_};
   std::uint16_t supply_code_;
-  drivers::CurrentSenseGain gain_ = drivers::CurrentSenseGain::x80, configured_gain_ = gain_;
-  bool calibrating_ = false, emergency_stop_pressed_ = false, gate_driver_fault_ = false;
+  bool emergency_stop_pressed_ = false, gate_driver_fault_ = false;
 };
-static_assert(board::odrive_v3::PowerStageHardware<SimulatedPowerHardware>);
 
 }  // namespace kmax::simulated_board

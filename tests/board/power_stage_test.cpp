@@ -1,8 +1,8 @@
-#include "board/odrive_v3/power_stage.hpp"
+#include "board/power/power_stage.hpp"
 
 #include <gtest/gtest.h>
 
-namespace kmax::board::odrive_v3::power_stage_test {
+namespace kmax::board::power_stage_test {
 namespace {
 
 using firmware::Fault;
@@ -40,24 +40,24 @@ class PowerStageTest : public testing::Test {
 };
 
 TEST_F(PowerStageTest, IsNotReadyBeforeItHasRun) {
-  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
   EXPECT_FALSE(stage.ready());
 }
 
 TEST_F(PowerStageTest, WaitsForTheChipsBeforeItWritesToThem) {
   run(20'900);
   EXPECT_EQ(hardware.configured, 0);
-  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
   run(500);
   EXPECT_EQ(hardware.configured, 2);
   EXPECT_TRUE(stage.ready());
-  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+  EXPECT_EQ(stage.condition(), Fault::none);
 }
 
 TEST_F(PowerStageTest, WaitsForTheOffsets) {
   hardware.offsets = OffsetProgress::running;
   run(500'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
   hardware.offsets = OffsetProgress::accepted;
   run(200);
   EXPECT_TRUE(stage.ready());
@@ -66,7 +66,7 @@ TEST_F(PowerStageTest, WaitsForTheOffsets) {
 TEST_F(PowerStageTest, AChipThatDoesNotAnswerIsTriedAgain) {
   hardware.answers[1] = false;
   run(1'000'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::power_stage);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
   EXPECT_GE(hardware.gate_rises, 4);
   hardware.answers[1] = true;
   run(300'000);
@@ -76,7 +76,7 @@ TEST_F(PowerStageTest, AChipThatDoesNotAnswerIsTriedAgain) {
 TEST_F(PowerStageTest, OffsetsOutOfBoundsAreNamedAndMeasuredAgain) {
   hardware.offsets = OffsetProgress::refused;
   run(100'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::current_sense);
+  EXPECT_EQ(stage.condition(), Fault::current_sense);
   hardware.offsets = OffsetProgress::accepted;
   run(300'000);
   EXPECT_TRUE(stage.ready());
@@ -87,12 +87,12 @@ TEST_F(PowerStageTest, AFaultEdgeActsAtOnceAndIsResetOnlyWhenNobodyIsArmed) {
   run(100'000);
   ASSERT_TRUE(stage.ready());
   stage.ISR_fault_line();  // a pulse: the line is high again
-  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  EXPECT_EQ(stage.condition(), Fault::gate_driver);
   run(50'000, true);
   EXPECT_TRUE(hardware.gate) << "the other axis may still be braking";
-  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  EXPECT_EQ(stage.condition(), Fault::gate_driver);
   run(100'000, false);
-  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+  EXPECT_EQ(stage.condition(), Fault::none);
   EXPECT_EQ(hardware.gate_rises, 2);
 }
 
@@ -101,40 +101,40 @@ TEST_F(PowerStageTest, AFaultThatStaysKeepsTheBridgesOff) {
   hardware.fault_low = true;
   stage.ISR_fault_line();
   run(2'000'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  EXPECT_EQ(stage.condition(), Fault::gate_driver);
   hardware.fault_low = false;
   run(300'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+  EXPECT_EQ(stage.condition(), Fault::none);
 }
 
 TEST_F(PowerStageTest, AFaultLineThatIsLowWithoutAnEdgeIsSeenToo) {
   run(100'000);
   hardware.fault_low = true;
   run(100);
-  EXPECT_EQ(stage.ISR_condition(), Fault::gate_driver);
+  EXPECT_EQ(stage.condition(), Fault::gate_driver);
 }
 
 TEST_F(PowerStageTest, TheEmergencyStopLeavesTheBrakesSupplyOn) {
   run(100'000);
   hardware.stop_open = true;
   stage.ISR_emergency_stop();
-  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+  EXPECT_EQ(stage.condition(), Fault::emergency_stop);
   run(100'000, false);
   EXPECT_TRUE(hardware.gate);
   EXPECT_EQ(hardware.gate_rises, 1);
-  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+  EXPECT_EQ(stage.condition(), Fault::emergency_stop);
   hardware.stop_open = false;
   run(100'000, true);
-  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop) << "an armed axis has not yet seen it";
+  EXPECT_EQ(stage.condition(), Fault::emergency_stop) << "an armed axis has not yet seen it";
   run(200, false);
-  EXPECT_EQ(stage.ISR_condition(), Fault::none);
+  EXPECT_EQ(stage.condition(), Fault::none);
 }
 
 TEST_F(PowerStageTest, AStopPressedSincePowerUpIsSeenWithoutAnEdge) {
   hardware.stop_open = true;
   run(200'000);
-  EXPECT_EQ(stage.ISR_condition(), Fault::emergency_stop);
+  EXPECT_EQ(stage.condition(), Fault::emergency_stop);
 }
 
 }  // namespace
-}  // namespace kmax::board::odrive_v3::power_stage_test
+}  // namespace kmax::board::power_stage_test

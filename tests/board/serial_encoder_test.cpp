@@ -1,8 +1,8 @@
-#include "board/odrive_v3/serial_encoder.hpp"
+#include "board/power/serial_encoder.hpp"
 
 #include <gtest/gtest.h>
 
-namespace kmax::board::odrive_v3::serial_encoder_test {
+namespace kmax::board::serial_encoder_test {
 namespace {
 
 /// An AS5047P on a bus that the main loop may take.
@@ -108,4 +108,4 @@ TEST(SerialEncoder, AFaultOfTheEncoderStaysAlsoWhenTheBusWasTakenThen) {
 }
 
 }  // namespace
-}  // namespace kmax::board::odrive_v3::serial_encoder_test
+}  // namespace kmax::board::serial_encoder_test

@@ -24,7 +24,7 @@ double largest_error(double from_celsius, double to_celsius) {
   double worst = 0.0;
   const auto last = static_cast<std::uint16_t>(exact_code(to_celsius));
   for (auto code = static_cast<std::uint16_t>(exact_code(from_celsius) + 1.0); code <= last; ++code) {
-    const NtcReading reading = board_ntc.ISR_read(code);
+    const NtcReading reading = board_ntc.read(code);
     EXPECT_EQ(reading.state, NtcState::ok) << code;
     worst = std::max(worst, std::abs(static_cast<double>(reading.celsius) - exact_celsius(code)));
   }
@@ -44,34 +44,34 @@ TEST(NtcThermistor, KnownPointsOfTheBoard) {
   };
   for (const Row& row : {Row{0.248, 25}, Row{0.446, 50}, Row{0.665, 80}, Row{0.770, 100}, Row{0.842, 120}}) {
     const auto code = static_cast<std::uint16_t>(std::lround(4096 * row.ratio));
-    EXPECT_NEAR(static_cast<double>(board_ntc.ISR_read(code).celsius), row.celsius, 0.2) << row.celsius;
+    EXPECT_NEAR(static_cast<double>(board_ntc.read(code).celsius), row.celsius, 0.2) << row.celsius;
   }
 }
 
 TEST(NtcThermistor, HotterMeansALargerCodeEverywhere) {
   for (std::uint16_t code = 49; code <= 3936; ++code) {
-    EXPECT_GT(board_ntc.ISR_read(code).celsius,
-              board_ntc.ISR_read(static_cast<std::uint16_t>(code - 1)).celsius)
+    EXPECT_GT(board_ntc.read(code).celsius,
+              board_ntc.read(static_cast<std::uint16_t>(code - 1)).celsius)
         << code;
   }
 }
 
 TEST(NtcThermistor, OpenAndShorted) {
-  EXPECT_EQ(board_ntc.ISR_read(0).state, NtcState::open);
-  EXPECT_EQ(board_ntc.ISR_read(47).state, NtcState::open);
-  EXPECT_EQ(board_ntc.ISR_read(48).state, NtcState::ok);
-  EXPECT_EQ(board_ntc.ISR_read(3936).state, NtcState::ok);
-  EXPECT_EQ(board_ntc.ISR_read(3937).state, NtcState::shorted);
-  EXPECT_EQ(board_ntc.ISR_read(4095).state, NtcState::shorted);
-  EXPECT_EQ(board_ntc.ISR_read(0xFFFF).state, NtcState::shorted);
-  EXPECT_NEAR(static_cast<double>(board_ntc.ISR_read(0).celsius), -42, 1.5);
-  EXPECT_NEAR(static_cast<double>(board_ntc.ISR_read(4095).celsius), 203, 1.5);
+  EXPECT_EQ(board_ntc.read(0).state, NtcState::open);
+  EXPECT_EQ(board_ntc.read(47).state, NtcState::open);
+  EXPECT_EQ(board_ntc.read(48).state, NtcState::ok);
+  EXPECT_EQ(board_ntc.read(3936).state, NtcState::ok);
+  EXPECT_EQ(board_ntc.read(3937).state, NtcState::shorted);
+  EXPECT_EQ(board_ntc.read(4095).state, NtcState::shorted);
+  EXPECT_EQ(board_ntc.read(0xFFFF).state, NtcState::shorted);
+  EXPECT_NEAR(static_cast<double>(board_ntc.read(0).celsius), -42, 1.5);
+  EXPECT_NEAR(static_cast<double>(board_ntc.read(4095).celsius), 203, 1.5);
 }
 
 TEST(NtcThermistor, StatedStepsPerCode) {
   const auto step = [](std::uint16_t code) {
-    return static_cast<double>(board_ntc.ISR_read(static_cast<std::uint16_t>(code + 1)).celsius -
-                               board_ntc.ISR_read(code).celsius);
+    return static_cast<double>(board_ntc.read(static_cast<std::uint16_t>(code + 1)).celsius -
+                               board_ntc.read(code).celsius);
   };
   EXPECT_NEAR(step(1016), 0.034, 0.001);
   EXPECT_NEAR(step(3450), 0.081, 0.004);
@@ -83,7 +83,7 @@ TEST(NtcThermistor, OtherPartsAndResistors) {
   for (const double celsius : {0.0, 25.0, 60.0, 90.0}) {
     const double resistance = 47'000.0 * std::exp(4050.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15));
     const auto code = static_cast<std::uint16_t>(std::lround(4096.0 * 10'000.0 / (10'000.0 + resistance)));
-    EXPECT_NEAR(static_cast<double>(other.ISR_read(code).celsius), celsius, 0.1) << celsius;
+    EXPECT_NEAR(static_cast<double>(other.read(code).celsius), celsius, 0.1) << celsius;
   }
 }
 

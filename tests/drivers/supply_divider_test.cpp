@@ -6,21 +6,21 @@ namespace kmax::drivers::supply_divider_test {
 namespace {
 
 TEST(SupplyDivider, FullScaleOfBothBoards) {
-  EXPECT_NEAR((SupplyDivider{{.ratio = 11.0F}}.ISR_volts(4095)), 36.29, 0.01);
-  EXPECT_NEAR((SupplyDivider{{.ratio = 19.0F}}.ISR_volts(4095)), 62.68, 0.01);
-  EXPECT_EQ(SupplyDivider{}.ISR_volts(0), 0.0F);
+  EXPECT_NEAR((SupplyDivider{{.ratio = 11.0F}}.volts(4095)), 36.29, 0.01);
+  EXPECT_NEAR((SupplyDivider{{.ratio = 19.0F}}.volts(4095)), 62.68, 0.01);
+  EXPECT_EQ(SupplyDivider{}.volts(0), 0.0F);
 }
 
 TEST(SupplyDivider, TwentyFourVoltsComeBack) {
   // 24 V / 11 = 2.1818 V at the tap.
   const SupplyDivider divider{{.ratio = 11.0F}};
-  EXPECT_NEAR(divider.ISR_volts(2708), 24.0F, 0.5F * divider.volts_per_code());
+  EXPECT_NEAR(divider.volts(2708), 24.0F, 0.5F * divider.volts_per_code());
 }
 
 TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {
   const SupplyDivider divider;
-  EXPECT_FALSE(divider.ISR_saturated(4094));
-  EXPECT_TRUE(divider.ISR_saturated(4095));
+  EXPECT_FALSE(divider.saturated(4094));
+  EXPECT_TRUE(divider.saturated(4095));
 }
 
 }  // namespace

@@ -207,6 +207,13 @@ TEST_F(PowerLines, ASerialEncoderThatFallsSilent) {
   expect_recovery();
 }
 
+TEST_F(PowerLines, ABridgeThatFallsWithoutACause) {
+  bench.power().break_bridge(0);
+  EXPECT_TRUE(legs_off());
+  expect_trip(Fault::power_stage);
+  expect_recovery();
+}
+
 TEST_F(PowerLines, AnOpenPhase) {
   bench.drives().plant(0, Defect::phase_b_open);
   bench.run(0.1);
@@ -233,6 +240,28 @@ TEST(SimulatedPower, AMotorThatBrakesIsTakenByTheBrakeResistor) {
   EXPECT_GT(highest(0.0).first, 26.5) << "no resistor is fitted";
   EXPECT_LT(highest(25.0).first, 25.1);
   EXPECT_GT(highest(25.0).second, 0.01);
+}
+
+// A save may stop the processor for half a second, and nobody would switch the resistor off.
+TEST(SimulatedPower, TheBrakeResistorIsOffWhileASaveIsUnderWay) {
+  MotorBench bench(identified("dc_coreless_a"));
+  bench.set<"supply.brake_voltage">(25.0);
+  bench.prepare_wall();
+  ASSERT_TRUE(bench.arm());
+  const auto brakes_for = [&bench] {
+    bench.drives().supply().set_voltage(27.0);
+    const double before = bench.drives().supply().brake_energy();
+    bench.tick();
+    bench.tick();
+    return bench.drives().supply().brake_energy() > before;
+  };
+  EXPECT_TRUE(brakes_for());
+  bench.disarm();
+  EXPECT_TRUE(brakes_for()) << "a moment after driving";
+  bench.set<"store.command">(1);
+  bench.tick();
+  ASSERT_TRUE(bench.application().store_busy());
+  EXPECT_FALSE(brakes_for());
 }
 
 }  // namespace

@@ -104,27 +104,24 @@ Record respond(const simulation::Scene& scene, std::optional<Defect> defect) {
   Record record;
   simulated_board::SimulatedBridge before, after;
   for (auto* bridge : {&before, &after}) {
-    bridge->choose_legs(drives().drive(0).brushed() ? firmware::MotorKind::dc : firmware::MotorKind::pmsm);
-    bridge->arm();
+    EXPECT_TRUE(bridge->pwm().enable_legs({.a = !drives().drive(0).brushed()}));
+    EXPECT_TRUE(bridge->pwm().arm());
   }
   // The share of 24 V that drives some amperes through the winding, and makes up for the dead time.
   const double resistance =
       std::visit([](const auto& motor) { return motor.resistance; }, *scene.axes[0].motor);
   const auto amperes = static_cast<float>((resistance + 0.15) / 24.0);
   for (int n = 0; n < 400; ++n) {
-    firmware::MotorControl::Output out{};
     const float step = n % 100 < 50 ? amperes : -0.5f * amperes;
-    out.duty_a = 0.5f - step;
-    out.duty_b = 0.5f + step;
-    out.duty_c = 0.5f - step;
-    static_cast<void>(after.set_duty(out));
+    const drivers::stm32f4::PhaseDuty duty{0.5f - step, 0.5f + step, 0.5f - step};
+    static_cast<void>(after.pwm().ISR_set_duty(duty));
     after.update();
     if (n == 200) {
       board.look();
       if (defect) drives().plant(0, *defect);
     }
     board.tick(before, after, record);
-    static_cast<void>(before.set_duty(out));
+    static_cast<void>(before.pwm().ISR_set_duty(duty));
     before.update();
   }
   return record;

@@ -7,7 +7,7 @@
 #include "firmware/fault.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board {
 
 enum class OffsetProgress : std::uint8_t { running, accepted, refused };
 
@@ -53,7 +53,7 @@ class PowerStage {
   void ISR_emergency_stop() { stop_edge_.store(true, std::memory_order_relaxed); }
 
   /// Why no axis may be driven now; none: it may.
-  firmware::Fault ISR_condition() const {
+  firmware::Fault condition() const {
     if (stop_edge_.load(std::memory_order_relaxed)) return firmware::Fault::emergency_stop;
     if (fault_edge_.load(std::memory_order_relaxed)) return firmware::Fault::gate_driver;
     return condition_.load(std::memory_order_relaxed);
@@ -151,4 +151,4 @@ class PowerStage {
   std::atomic<firmware::Fault> condition_{firmware::Fault::power_stage};
 };
 
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board

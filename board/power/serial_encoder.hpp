@@ -3,20 +3,21 @@
 #include <atomic>
 #include <optional>
 
-#include "board/odrive_v3/gate_drivers.hpp"
 #include "drivers/as5047p_angle.hpp"
-#include "drivers/stm32f4/gpio.hpp"
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board {
 
-/// The AS5047P on SPI3 with its select on GPIO7, read from the tick without waiting: the other axis' tick
-/// begins a frame, which takes 6 us, and the axis' own tick, 25 us later, takes it. The angle is that of the
-/// frame before (50 us), since the chip answers one frame late.
+/// An AS5047P on a bus that it shares, read from the tick without waiting: the other axis' tick begins a
+/// frame, which takes 6 us, and the axis' own tick, 25 us later, takes it. The angle is that of the frame
+/// before (50 us), since the chip answers one frame late.
+///
+/// `Bus`: claim(), release(), start(word) and finish() of drivers::stm32f4::SpiMaster. `Select`: write(level)
+/// of the chip's select line, low while it is selected.
 ///
 /// A bus that the main loop has claimed for the gate drivers costs a frame, which counts as missed. When that
 /// was longer than missed frames are forgiven, the encoder itself has done nothing wrong: reading starts
 /// again with the first frame after, which is soon enough to know the turns still (As5047pAngle).
-template <typename Bus = ChipBus, typename Select = drivers::stm32f4::GpioPin<>>
+template <typename Bus, typename Select>
 class SerialEncoder {
  public:
   SerialEncoder(Bus& bus, Select select) : bus_(bus), select_(select) {}
@@ -84,4 +85,4 @@ class SerialEncoder {
   std::atomic<bool> restart_{false}, anew_{false};
 };
 
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board

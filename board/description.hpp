@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace kmax::board {
+
+/// What code above a board must know of its chip and its power stage: data, written once per board.
+struct BoardDescription {
+  std::string_view name;              ///< as info.board_name says
+  std::uint32_t core_clock_hz;        ///< with which alone the power stage runs
+  std::uint32_t timer_clock_hz;       ///< of the PWM
+  std::uint16_t half_period_ticks;    ///< steps from no duty to all of it
+  std::uint16_t dead_time_ticks;      ///< between the two switches of a leg
+  std::uint16_t minimum_low_ticks;    ///< for which a low side must stay on, so that its shunt can be read
+  double supply_ratio;                ///< of the supply to the voltage at the converter's pin
+  double gate_driver_supply_minimum;  ///< V; below it the gate drivers report a fault
+
+  constexpr double pwm_hz() const { return timer_clock_hz / (2.0 * half_period_ticks); }
+  constexpr double dead_time() const { return static_cast<double>(dead_time_ticks) / timer_clock_hz; }  ///< s
+  /// The greatest duty of a leg, 0 to 1.
+  constexpr double largest_duty() const {
+    return static_cast<double>(half_period_ticks - minimum_low_ticks) / half_period_ticks;
+  }
+};
+
+}  // namespace kmax::board

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "board/description.hpp"
+#include "drivers/stm32f4/three_phase_pwm.hpp"
+#include "firmware/drive/motor_control.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+inline constexpr drivers::stm32f4::ThreePhasePwmConfig pwm_config{};
+
+/// The board for 24 V; that for 56 V differs in the divider alone (voltage_variant.hpp).
+inline constexpr BoardDescription description{
+    .name = "odrive_v3",
+    .core_clock_hz = 168'000'000,
+    .timer_clock_hz = 168'000'000,
+    .half_period_ticks = pwm_config.half_period_ticks,
+    .dead_time_ticks = drivers::stm32f4::dead_time_ticks(pwm_config.dead_time_code),
+    .minimum_low_ticks = pwm_config.minimum_low_ticks,
+    .supply_ratio = 11.0,
+    // DRV8301 data sheet, PVDD under-voltage.
+    .gate_driver_supply_minimum = 5.9,
+};
+static_assert(description.pwm_hz() == firmware::tick_rate_hz);
+static_assert(0.5 + 0.5 * static_cast<double>(firmware::MotorControlConfig{}.modulation_limit) <=
+                  description.largest_duty() + 1e-6,
+              "what the current controllers ask for would be cut off, and they would not know");
+
+}  // namespace kmax::board::odrive_v3

@@ -1,0 +1,434 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <concepts>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "board/power/power_stage.hpp"
+#include "control/brake_chopper.hpp"
+#include "drivers/current_sense.hpp"
+#include "drivers/ntc_thermistor.hpp"
+#include "drivers/referenced_quadrature_counter.hpp"
+#include "drivers/supply_divider.hpp"
+#include "firmware/application.hpp"
+#include "firmware/double_buffer.hpp"
+#include "firmware/watchdog_gate.hpp"
+
+namespace kmax::board {
+
+/// What the drives need of a board's chip. What begins with ISR_, and the bridge but for enable_legs(), is
+/// called in the tick.
+template <typename Hardware>
+concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, std::size_t axis, bool level) {
+  /// False: an axis that this board does not drive. Its other functions are not called.
+  { constant.has(axis) } -> std::same_as<bool>;
+
+  /// An axis' three half-bridges (drivers::stm32f4::ThreePhasePwm). A duty is active from the middle of the
+  /// PWM period after the sample on; arm() and disarm() act at once.
+  { hardware.bridge(axis).arm() } -> std::same_as<bool>;
+  { hardware.bridge(axis).armed() } -> std::same_as<bool>;
+  {hardware.bridge(axis).disarm()};
+  { hardware.bridge(axis).ISR_set_duty({0.5f, 0.5f, 0.5f}) } -> std::same_as<bool>;
+  {hardware.bridge(axis).ISR_set_no_voltage()};
+  {hardware.bridge(axis).enable_legs({.a = level})};
+
+  /// Codes of the phase currents of an axis and of the supply, of 12 bits. `slow_age`: ticks since the supply
+  /// was converted last.
+  { hardware.ISR_sample(axis).valid } -> std::convertible_to<bool>;
+  { hardware.ISR_sample(axis).phase_b } -> std::convertible_to<std::uint16_t>;
+  { hardware.ISR_sample(axis).phase_c } -> std::convertible_to<std::uint16_t>;
+  { hardware.ISR_sample(axis).supply } -> std::convertible_to<std::uint16_t>;
+  { hardware.ISR_sample(axis).slow_age } -> std::convertible_to<std::uint8_t>;
+
+  /// The free-running counter of the axis' quadrature lines, and its index line at the same moment.
+  { constant.ISR_counter(axis) } -> std::unsigned_integral;
+  { constant.ISR_index_line(axis) } -> std::same_as<bool>;
+  /// The AS5047P, of which a board has one (SerialEncoder).
+  { hardware.serial_encoder().ISR_take().count } -> std::convertible_to<std::uint32_t>;
+  {hardware.serial_encoder().ISR_begin()};
+  {hardware.serial_encoder().restart_anew()};
+
+  /// The high side of the brake's half-bridge. Any context.
+  {hardware.set_brake(level)};
+
+  // Main loop: codes converted last, and ticks that came too late or not at all.
+  { constant.supply_code() } -> std::same_as<std::uint16_t>;
+  { constant.temperature_code(axis) } -> std::same_as<std::uint16_t>;
+  { constant.missed_ticks() } -> std::same_as<std::uint32_t>;
+};
+
+/// Encoders, current sensors and bridges of all axes, and what the tick does with them: the same code on a
+/// board and on x86.
+///
+/// A tick of an axis, in the interrupt that follows its sample:
+///   1  currents and supply are read
+///   2  the encoder's counter and its index line, or the frame that the other axis' tick has begun
+///   3  the application's tick: force, current reference, duty, trips
+///   4  the duty is written
+///   5  the brake, if there is one, in the first axis' tick
+///
+/// A tick that may not drive disarms the bridge. It is armed only when an axis begins to drive, and the power
+/// stage's condition is looked at once more after that: a line interrupt in between wins.
+///
+/// The axes' ticks follow each other in their order and never overlap.
+template <typename Hardware>
+class Drives {
+ public:
+  /// `supply_ratio`: of the supply to the voltage at the converter's pin. The rest makes the hardware.
+  template <typename... Arguments>
+  explicit Drives(float supply_ratio, Arguments&&... hardware)
+      : hardware_(std::forward<Arguments>(hardware)...), supply_({.ratio = supply_ratio}) {
+    static_assert(DriveHardware<Hardware>);
+  }
+
+  Hardware& hardware() { return hardware_; }
+  const Hardware& hardware() const { return hardware_; }
+
+  /// The whole tick of an axis. The condition is asked twice, so it comes as the object that has it.
+  template <typename Stage>
+  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, firmware::Application& application,
+                                              const Stage& stage) {
+    const firmware::AxisInput input = ISR_measure(axis, stage);
+    ISR_drive(axis, application.ISR_tick(axis, input), input.motor.supply_voltage, stage);
+    if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
+      main_loop_due_.store(true, std::memory_order_relaxed);
+  }
+
+  /// The two parts of ISR_tick(), before and after the application's, for a board in which all axes are
+  /// sampled together.
+  template <typename Stage>
+  [[gnu::always_inline]] inline firmware::AxisInput ISR_measure(std::size_t axis, const Stage& stage);
+  template <typename Stage>
+  [[gnu::always_inline]] inline void ISR_drive(std::size_t axis, const firmware::AxisOutput& output,
+                                               float supply_voltage, const Stage& stage);
+
+  /// The line interrupts: all bridges off, nothing else.
+  void ISR_disarm() {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (hardware_.has(axis)) hardware_.bridge(axis).disarm();
+    }
+  }
+
+  /// A slow clock's interrupt: true when an axis has not ticked between three calls. All bridges are off
+  /// then.
+  bool ISR_ticks_have_stopped();
+
+  /// Main loop: what the parameters say, when no axis is armed.
+  void apply(const firmware::ParameterValues& values);
+  /// Amplifier gain that the present current limits need.
+  drivers::CurrentSenseGain gain() const { return gain_; }
+
+  /// Main loop, with the bridges off: the current sensors' zero. Ticks must run.
+  void restart_offset_calibration();
+  OffsetProgress offset_progress();
+
+  /// Main loop: for the application.
+  firmware::BoardReadings readings() const;
+
+  /// Main loop: keeps the brake resistor off while the tick cannot look after it.
+  void inhibit_brake(bool inhibited) {
+    brake_inhibited_.store(inhibited, std::memory_order_relaxed);
+    if (inhibited) hardware_.set_brake(false);
+  }
+
+  /// All axes have ticked since the last call that said so.
+  firmware::WatchdogGate& watchdog_gate() { return watchdog_gate_; }
+
+  /// Once a round of the application, when all axes have reported: the main loop need not look more often.
+  bool main_loop_due() { return main_loop_due_.exchange(false, std::memory_order_relaxed); }
+
+ private:
+  using Counter = drivers::ReferencedQuadratureCounter<decltype(std::declval<Hardware>().ISR_counter(0))>;
+  using Count = typename Counter::Reading;
+  /// Generations of the AS5047P's counts have the uppermost bit, so that a change of encoder.kind is one too.
+  static constexpr std::uint32_t serial_generations = 0x8000'0000U;
+  /// Motors brake while they are driven and a moment after; a supply that is too high for longer is not
+  /// theirs.
+  static constexpr std::uint32_t braking_ticks_after_driving = firmware::tick_rate_hz / 5;
+  static constexpr drivers::NtcThermistor thermistor{};
+
+  /// What an axis' tick does for its count.
+  enum class EncoderRole : std::uint8_t {
+    lines,              ///< quadrature
+    lines_beside_chip,  ///< the same, and begins the frame for the axis whose encoder is the AS5047P
+    chip,               ///< takes that frame
+    missing,            ///< asks for that chip too and has none; begins the frame like the one above
+  };
+
+  /// What the tick works by; made in the main loop.
+  struct Settings {
+    std::array<EncoderRole, firmware::axis_count> role{};
+    std::array<drivers::ReferencedQuadratureConfig, firmware::axis_count> quadrature{};
+    /// Raised with each change of the above.
+    std::array<std::uint32_t, firmware::axis_count> encoder_generation{};
+    control::BrakeChopper::Coefficients brake{};
+    bool has_brake = false;
+  };
+
+  struct Axis {
+    drivers::CurrentSense sense_b{}, sense_c{};
+    drivers::OffsetCalibration offset_b{}, offset_c{};
+    Counter counter{};
+    std::uint32_t encoder_generation = 0;  ///< of the settings that have been taken over
+    bool driving = false, arm_failed = false;
+  };
+
+  /// The axis whose tick begins a round: it takes settings over and looks after the brake.
+  constexpr std::size_t first_axis() const {
+    std::size_t axis = 0;
+    while (axis + 1 < firmware::axis_count && !hardware_.has(axis)) ++axis;
+    return axis;
+  }
+
+  [[gnu::always_inline]] inline Count ISR_read_count(std::size_t axis, const Settings& settings,
+                                                     bool driving);
+  void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
+  // Rare, and kept out of the tick's one function, whose registers they would take.
+  template <typename Sample>
+  [[gnu::noinline, gnu::cold]] void ISR_calibrate(Axis& axis, const Sample& sample) {
+    if (!sample.valid) return;
+    axis.offset_b.ISR_add(sample.phase_b);
+    axis.offset_c.ISR_add(sample.phase_c);
+  }
+  [[gnu::noinline, gnu::cold]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
+  [[gnu::noinline]] Count ISR_take_serial();
+  [[gnu::noinline]] void ISR_begin_serial() { hardware_.serial_encoder().ISR_begin(); }
+
+  Hardware hardware_;
+  drivers::SupplyDivider supply_;
+  std::array<Axis, firmware::axis_count> axes_{};
+  drivers::CurrentSenseGain gain_ = drivers::CurrentSenseGain::x80;
+  control::BrakeChopper brake_;
+  firmware::WatchdogGate watchdog_gate_;
+  Settings settings_{};
+  firmware::DoubleBuffer<Settings> double_buffer_{Settings{}};
+  std::atomic<bool> calibrating_{false}, main_loop_due_{false}, brake_inhibited_{false};
+  bool ISR_brake_on_ = false;
+  std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
+  std::array<std::atomic<std::uint32_t>, firmware::axis_count> axis_ticks_{};
+  std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{};
+};
+
+template <typename Hardware>
+template <typename Stage>
+inline firmware::AxisInput Drives<Hardware>::ISR_measure(std::size_t index, const Stage& stage) {
+  Axis& axis = axes_[index];
+  const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
+  const auto& sample = hardware_.ISR_sample(index);
+  // Before anything is stored that may lie where the compiler takes the sample to be: they stay in registers.
+  const std::uint16_t phase_b = sample.phase_b, phase_c = sample.phase_c, supply = sample.supply;
+  const bool driving = axis.driving;
+  firmware::Fault condition = firmware::Fault::none;
+  // 2 triggers are 50 us: the converter of supply and temperatures stands still.
+  if (!sample.valid || sample.slow_age > 2) [[unlikely]] {
+    condition = firmware::Fault::tick_missed;
+  } else if (supply_.saturated(supply)) [[unlikely]] {
+    condition = firmware::Fault::over_voltage;
+  } else if (axis.sense_b.ISR_saturated(phase_b) || axis.sense_c.ISR_saturated(phase_c)) [[unlikely]] {
+    // Amplifiers of a bridge that is off may read anything.
+    if (driving) condition = firmware::Fault::current_sense;
+  }
+  if (calibrating_.load(std::memory_order_relaxed)) [[unlikely]]
+    ISR_calibrate(axis, sample);
+  const float current_b = axis.sense_b.ISR_amperes(phase_b);
+  const float current_c = axis.sense_c.ISR_amperes(phase_c);
+  const Count count = ISR_read_count(index, settings, driving);
+  // Before the condition: a line interrupt in between must be found as what it is.
+  const bool bridge_fell = axis.arm_failed || (driving && !hardware_.bridge(index).armed());
+  if (const firmware::Fault cause = stage.condition(); cause != firmware::Fault::none) condition = cause;
+  // The bridge fell, or would not rise, without anybody saying why: the timer's break input.
+  if (bridge_fell && condition == firmware::Fault::none) condition = firmware::Fault::power_stage;
+  // Named in full: what is filled with zeros first is filled by a function of the library.
+  return {.count = count.count,
+          .count_valid = count.valid,
+          .condition = condition,
+          .motor = {.present = true,
+                    .supply_voltage = supply_.volts(supply),
+                    .current_b = current_b,
+                    .current_c = current_c},
+          .reference_generation = count.reference_generation,
+          .referenced = count.referenced};
+}
+
+template <typename Hardware>
+inline typename Drives<Hardware>::Count Drives<Hardware>::ISR_read_count(std::size_t axis,
+                                                                         const Settings& settings,
+                                                                         bool driving) {
+  if (axes_[axis].encoder_generation != settings.encoder_generation[axis]) [[unlikely]]
+    ISR_configure_encoder(axis, settings);
+  if (settings.role[axis] != EncoderRole::lines) [[unlikely]] {
+    if (settings.role[axis] == EncoderRole::chip) return ISR_take_serial();
+    ISR_begin_serial();
+    if (settings.role[axis] == EncoderRole::missing) return {};
+  }
+  const auto index_line = [this, axis] { return hardware_.ISR_index_line(axis); };
+  return axes_[axis].counter.ISR_read(hardware_.ISR_counter(axis), index_line, driving);
+}
+
+template <typename Hardware>
+typename Drives<Hardware>::Count Drives<Hardware>::ISR_take_serial() {
+  const auto angle = hardware_.serial_encoder().ISR_take();
+  return {.count = angle.count,
+          .valid = angle.valid,
+          .referenced = false,
+          .reference_generation = serial_generations | angle.reference_generation};
+}
+
+template <typename Hardware>
+void Drives<Hardware>::ISR_configure_encoder(std::size_t axis, const Settings& settings) {
+  axes_[axis].encoder_generation = settings.encoder_generation[axis];
+  axes_[axis].counter.configure(settings.quadrature[axis]);
+  // Nobody would take the frame any more.
+  auto& serial = hardware_.serial_encoder();
+  if (settings.role[axis] == EncoderRole::lines && serial.under_way()) serial.ISR_abandon();
+}
+
+template <typename Hardware>
+template <typename Stage>
+inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisOutput& output,
+                                        float supply_voltage, const Stage& stage) {
+  Axis& axis = axes_[index];
+  auto& bridge = hardware_.bridge(index);
+  const bool has_duty =
+      output.enabled && bridge.ISR_set_duty({output.motor.duty_a, output.motor.duty_b, output.motor.duty_c});
+  if (!has_duty) {
+    bridge.disarm();
+    axis.driving = axis.arm_failed = false;
+    // The next arming begins without voltage.
+    bridge.ISR_set_no_voltage();
+  } else if (!axis.driving) {
+    axis.driving = bridge.arm();
+    axis.arm_failed = !axis.driving;
+    if (stage.condition() != firmware::Fault::none) bridge.disarm();
+  }
+  watchdog_gate_.ISR_ticked(index);
+  axis_ticks_[index].store(axis_ticks_[index].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  if (index == first_axis()) {
+    const Settings& settings = double_buffer_.ISR_current();
+    if (settings.has_brake || ISR_brake_on_) ISR_brake(settings.brake, supply_voltage);
+  }
+}
+
+template <typename Hardware>
+void Drives<Hardware>::ISR_brake(const control::BrakeChopper::Coefficients& coefficients,
+                                 float supply_voltage) {
+  bool driving = false;
+  for (const Axis& axis : axes_) driving = driving || axis.driving;
+  if (driving) {
+    ISR_braking_for_ = braking_ticks_after_driving;
+  } else if (ISR_braking_for_ != 0) {
+    --ISR_braking_for_;
+  }
+  const bool wanted = brake_.update(coefficients, supply_voltage);
+  const bool allowed = ISR_braking_for_ != 0 && !brake_inhibited_.load(std::memory_order_relaxed);
+  ISR_brake_on_ = wanted && allowed;
+  hardware_.set_brake(ISR_brake_on_);
+}
+
+template <typename Hardware>
+bool Drives<Hardware>::ISR_ticks_have_stopped() {
+  bool stopped = false;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (!hardware_.has(axis)) continue;
+    const std::uint32_t ticks = axis_ticks_[axis].load(std::memory_order_relaxed);
+    stopped = stopped || ticks == axis_ticks_seen_[axis];
+    axis_ticks_seen_[axis] = ticks;
+  }
+  // Twice in a row: after an erase, in which the core stood still, this may come before the last axis' tick.
+  ISR_silent_calls_ = stopped ? ISR_silent_calls_ + 1 : 0;
+  if (ISR_silent_calls_ < 2) return false;
+  ISR_disarm();
+  main_loop_due_.store(true, std::memory_order_relaxed);
+  return true;
+}
+
+template <typename Hardware>
+void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
+  Settings settings;
+  float largest_current = 0.0f;
+  // There is one chip: the first axis that asks for it has it.
+  bool chip_asked_for = false, chip_moves = false;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (values.whole<"encoder.kind">(axis) == 1) {
+      settings.role[axis] = chip_asked_for ? EncoderRole::missing : EncoderRole::chip;
+      chip_asked_for = true;
+    }
+  }
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (chip_asked_for && settings.role[axis] == EncoderRole::lines)
+      settings.role[axis] = EncoderRole::lines_beside_chip;
+    const bool has_index = values.whole<"encoder.index">(axis) != 0;
+    settings.quadrature[axis] = {
+        .has_index = has_index,
+        // A handle that starts at its rest has its origin there.
+        .from_index = has_index && values.whole<"encoder.start">(axis) == 0,
+        .counts_per_turn = static_cast<std::uint32_t>(values.whole<"encoder.counts_per_turn">(axis))};
+    const auto role = settings.role[axis], role_before = settings_.role[axis];
+    chip_moves = chip_moves || (role == EncoderRole::chip) != (role_before == EncoderRole::chip);
+    const bool same = role == role_before && settings.quadrature[axis] == settings_.quadrature[axis];
+    settings.encoder_generation[axis] = settings_.encoder_generation[axis] + (same ? 0U : 1U);
+    const float trip = firmware::over_current_factor * values.real<"current.limit">(axis);
+    if (trip > largest_current) largest_current = trip;
+    const auto motor = values.choice<firmware::MotorKind, "motor.kind">(axis);
+    // A brushed motor lies between B and C.
+    if (hardware_.has(axis))
+      static_cast<void>(hardware_.bridge(axis).enable_legs({.a = motor != firmware::MotorKind::dc}));
+  }
+  settings.brake = control::BrakeChopper::prepare({.on_voltage = values.real<"supply.brake_voltage">()});
+  settings.has_brake = settings.brake.on_voltage > 0.0f;
+  if (chip_moves) hardware_.serial_encoder().restart_anew();
+  settings_ = settings;
+  double_buffer_.offer(settings_);
+  gain_ = drivers::gain_for_current(largest_current);
+}
+
+template <typename Hardware>
+void Drives<Hardware>::restart_offset_calibration() {
+  calibrating_.store(false, std::memory_order_relaxed);
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  for (Axis& axis : axes_) {
+    axis.sense_b = axis.sense_c = drivers::CurrentSense{{.gain = gain_}};
+    axis.offset_b.restart();
+    axis.offset_c.restart();
+  }
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  calibrating_.store(true, std::memory_order_relaxed);
+}
+
+template <typename Hardware>
+OffsetProgress Drives<Hardware>::offset_progress() {
+  bool refused = false;
+  for (std::size_t index = 0; index < firmware::axis_count; ++index) {
+    if (!hardware_.has(index)) continue;
+    for (const auto* offset : {&axes_[index].offset_b, &axes_[index].offset_c}) {
+      if (offset->result() == drivers::OffsetResult::running) return OffsetProgress::running;
+      refused = refused || offset->result() != drivers::OffsetResult::accepted;
+    }
+  }
+  calibrating_.store(false, std::memory_order_relaxed);
+  if (refused) return OffsetProgress::refused;
+  for (Axis& axis : axes_) {
+    axis.sense_b.set_offset(axis.offset_b.offset());
+    axis.sense_c.set_offset(axis.offset_c.offset());
+  }
+  return OffsetProgress::accepted;
+}
+
+template <typename Hardware>
+firmware::BoardReadings Drives<Hardware>::readings() const {
+  firmware::BoardReadings readings;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const drivers::NtcReading reading = thermistor.read(hardware_.temperature_code(axis));
+    readings.power_stage_temperature[axis] =
+        reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
+  }
+  readings.has_power_stage = true;
+  readings.supply_voltage = supply_.volts(hardware_.supply_code());
+  readings.missed_ticks = hardware_.missed_ticks();
+  return readings;
+}
+
+}  // namespace kmax::board

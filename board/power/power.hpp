@@ -1,0 +1,109 @@
+#pragma once
+
+#include "board/power/drives.hpp"
+
+namespace kmax::board {
+
+/// What a board's hardware must have beside what its drives need (DriveHardware): the lines and chips of the
+/// power stage. All calls come from the main loop.
+template <typename Hardware>
+concept MotorHardware = DriveHardware<Hardware> &&
+    requires(Hardware& hardware, const Hardware& constant, std::size_t axis, bool level,
+             drivers::CurrentSenseGain gain) {
+  // As in PowerStageHardware.
+  {hardware.set_gate_enable(level)};
+  { constant.fault_line_low() } -> std::same_as<bool>;
+  { constant.emergency_stop_open() } -> std::same_as<bool>;
+  /// Writes and reads back one gate driver; false: it does not answer or does not keep what is written.
+  { hardware.configure_gate_driver(axis, gain) } -> std::same_as<bool>;
+};
+
+/// All that drives motors: the drives and the sequence of their power stage.
+template <typename Hardware>
+class Power {
+ public:
+  template <typename... Arguments>
+  explicit Power(float supply_ratio, Arguments&&... hardware)
+      : drives_(supply_ratio, std::forward<Arguments>(hardware)...) {
+    static_assert(MotorHardware<Hardware>);
+  }
+  Power(const Power&) = delete;
+  Power& operator=(const Power&) = delete;
+
+  Drives<Hardware>& drives() { return drives_; }
+  const Drives<Hardware>& drives() const { return drives_; }
+  Hardware& hardware() { return drives_.hardware(); }
+  const Hardware& hardware() const { return drives_.hardware(); }
+
+  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, firmware::Application& application) {
+    drives_.ISR_tick(axis, application, stage_);
+  }
+  /// The two parts of ISR_tick(), for a board in which all axes are sampled together.
+  firmware::AxisInput ISR_measure(std::size_t axis) { return drives_.ISR_measure(axis, stage_); }
+  void ISR_drive(std::size_t axis, const firmware::AxisOutput& output, float supply_voltage) {
+    drives_.ISR_drive(axis, output, supply_voltage, stage_);
+  }
+
+  /// The falling edge of the gate drivers' fault line.
+  void ISR_fault_line() {
+    drives_.ISR_disarm();
+    stage_.ISR_fault_line();
+  }
+  /// The opening of the emergency stop's contact.
+  void ISR_emergency_stop() {
+    drives_.ISR_disarm();
+    stage_.ISR_emergency_stop();
+  }
+
+  bool ready() const { return stage_.ready(); }
+  firmware::Fault condition() const { return stage_.condition(); }
+
+  /// Main loop, with the ticks not yet running or no axis armed.
+  void take_parameters(const firmware::Application& application) {
+    taken_changes_ = application.parameter_changes();
+    taken_ = true;
+    drives_.apply(application.values());
+  }
+
+  /// Main loop, after the application's poll(), at least every few milliseconds: takes parameters over while
+  /// nothing is armed, leads through the power-up sequence, and keeps the brake off while a save is under
+  /// way, whose next step may stop the processor.
+  void poll(const firmware::Application& application, std::uint32_t now_us) {
+    const bool armed = application.any_armed();
+    drives_.inhibit_brake(application.store_busy());
+    // Nobody has taken frames while the stage was not ready.
+    if (stage_.ready() && !was_ready_) drives_.hardware().serial_encoder().restart();
+    was_ready_ = stage_.ready();
+    if (!armed) {
+      if (!taken_ || application.parameter_changes() != taken_changes_) take_parameters(application);
+      if (stage_.ready() && lines_.configured_gain != drives_.gain()) stage_.restart(now_us);
+    }
+    stage_.poll(now_us, armed);
+  }
+
+ private:
+  /// What the stage's sequence sees of them (PowerStageHardware).
+  struct Lines {
+    void set_gate_enable(bool level) { drives.hardware().set_gate_enable(level); }
+    bool fault_line_low() const { return drives.hardware().fault_line_low(); }
+    bool emergency_stop_open() const { return drives.hardware().emergency_stop_open(); }
+    bool configure_gate_driver(std::size_t axis) {
+      configured_gain = drives.gain();
+      return drives.hardware().configure_gate_driver(axis, configured_gain);
+    }
+    void restart_offset_calibration() { drives.restart_offset_calibration(); }
+    OffsetProgress offset_progress() { return drives.offset_progress(); }
+
+    Drives<Hardware>& drives;
+    drivers::CurrentSenseGain configured_gain = drivers::CurrentSenseGain::x80;
+  };
+  static_assert(PowerStageHardware<Lines>);
+
+  Drives<Hardware> drives_;
+  Lines lines_{drives_};
+  PowerStage<Lines> stage_{lines_};
+  bool was_ready_ = false, taken_ = false;
+  std::uint32_t taken_changes_ = 0;
+};
+
+}  // namespace kmax::board
