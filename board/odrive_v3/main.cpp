@@ -39,8 +39,8 @@ namespace {
 namespace stm32 = drivers::stm32f4;
 using namespace odrive_v3;
 
-/// The main loop's heartbeat and the microsecond clock; also the tick of the axes where there are no timers
-/// (QEMU), so that parameters can be set and read there.
+/// The main loop's heartbeat and the microsecond clock; also the tick of the axes where the clock is too slow
+/// for the power stage, so that parameters can be set and read there.
 constexpr std::uint32_t clock_rate_hz = 1'000;
 
 /// Longer than an erase of the parameter flash, during which nothing runs.
@@ -59,7 +59,7 @@ std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_se
 }
 ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, parameter_sector(1)}}}};
 
-/// In the memory beside the buses' RAM, which emulators without clocks do not have.
+/// In the memory beside the buses' RAM.
 [[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
 std::optional<firmware::Application> application;
@@ -93,10 +93,7 @@ VoltageVariant voltage_variant() {
 firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   firmware::BoardIdentity identity{};
   identity.board_name = "odrive_v3";
-  // An emulator without clocks does not have the identity words either, and reading them there is a bus
-  // fault.
-  identity.serial_number =
-      clocks.source == stm32::ClockSource::unreadable ? 0 : serial_number_from_unique_id();
+  identity.serial_number = serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
@@ -167,10 +164,8 @@ void poll_power(std::uint32_t now_us) {
 [[noreturn]] void run() {
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
-  const bool emulator_without_clocks = clocks.source == stm32::ClockSource::unreadable;
-  application.emplace(identity(clocks),
-                      emulator_without_clocks ? std::span<std::uint32_t>{} : capture_memory);
-  if (!emulator_without_clocks) application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
+  application.emplace(identity(clocks), capture_memory);
+  application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
   interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, priority::clock);
   // Each core clock of the clock tree is a whole number of MHz and of periods.
@@ -179,22 +174,18 @@ void poll_power(std::uint32_t now_us) {
   apply(serial_pins);
   serial.emplace(interrupts, clocks.apb1_hz);
   serial->start(*application);
-  if (!emulator_without_clocks) {
-    stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Can1::mask);
-    apply(can_pins);
-    can_line.emplace(interrupts, clocks.apb1_hz);
-  }
+  stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Can1::mask);
+  apply(can_pins);
+  can_line.emplace(interrupts, clocks.apb1_hz);
 
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
   // say that they have no encoder.
-  if (!emulator_without_clocks && clocks.source != stm32::ClockSource::unresponsive &&
-      clocks.core_hz == description.core_clock_hz) {
+  if (clocks.source != stm32::ClockSource::unresponsive && clocks.core_hz == description.core_clock_hz) {
     power.emplace(supply_divider_ratio(voltage_variant()), chip_bus);
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
   }
   for (;;) {
-    const bool due =
-        !power_runs || power->drives().main_loop_due() || serial->news() || (can_line && can_line->news());
+    const bool due = !power_runs || power->drives().main_loop_due() || serial->news() || can_line->news();
     if (due) {
       const std::uint32_t now = system_tick.now_us();
       if (power_runs) {
@@ -202,10 +193,10 @@ void poll_power(std::uint32_t now_us) {
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
         application->set_readings(readings);
       }
-      if (can_line) can_line->poll(*application, now);
+      can_line->poll(*application, now);
       application->poll(now);
       serial->poll(*application, now);
-      if (can_line) can_line->send(*application);
+      can_line->send(*application);
       if (application->restart_wanted()) restart();
       if (power_runs) poll_power(now);
     }

@@ -36,12 +36,7 @@ class SerialLine {
   /// Main loop, after the application's poll().
   void poll(firmware::Application& application, std::uint32_t now_us) {
     if (reply_sent_.exchange(false)) application.serial_reply_sent(reply_sent_us_);
-    if (usart_.transmitting()) {
-      // On silicon TXE and TC ask for the interrupt themselves. QEMU's USART never does, and a handler that
-      // finds nothing to do costs little, so a reply that is under way is pushed along once per pass.
-      interrupts_.pend(drivers::stm32f4::Interrupt::usart2);
-      return;
-    }
+    if (usart_.transmitting()) return;
     const std::span<const std::uint8_t> reply = application.serial_reply_due(now_us);
     if (usart_.transmit(reply)) return;
     const firmware::SerialSettings wanted = application.serial_settings();
@@ -63,6 +58,9 @@ class SerialLine {
     }
     news_.store(true, std::memory_order_relaxed);
   }
+
+  /// A reply is under way.
+  bool transmitting() const { return usart_.transmitting(); }
 
   /// The interrupt has left something for the main loop since the last call.
   bool news() { return news_.exchange(false, std::memory_order_relaxed); }

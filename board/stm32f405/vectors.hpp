@@ -37,6 +37,94 @@ extern const VectorTable vector_table;
 
 }  // namespace kmax::board
 
+/// Interrupts 0 to 81 in their order: HANDLER(name) for ISR_name, RESERVED() for a number that does not
+/// exist.
+// clang-format off
+#define KMAX_STM32F405_INTERRUPTS(HANDLER, RESERVED) \
+  HANDLER(window_watchdog) \
+  HANDLER(voltage_detector) \
+  HANDLER(tamper_stamp) \
+  HANDLER(rtc_wakeup) \
+  HANDLER(flash) \
+  HANDLER(rcc) \
+  HANDLER(exti0) \
+  HANDLER(exti1) \
+  HANDLER(exti2) \
+  HANDLER(exti3) \
+  HANDLER(exti4) \
+  HANDLER(dma1_stream0) \
+  HANDLER(dma1_stream1) \
+  HANDLER(dma1_stream2) \
+  HANDLER(dma1_stream3) \
+  HANDLER(dma1_stream4) \
+  HANDLER(dma1_stream5) \
+  HANDLER(dma1_stream6) \
+  HANDLER(adc) \
+  HANDLER(can1_tx) \
+  HANDLER(can1_rx0) \
+  HANDLER(can1_rx1) \
+  HANDLER(can1_sce) \
+  HANDLER(exti9_5) \
+  HANDLER(tim1_brk_tim9) \
+  HANDLER(tim1_up_tim10) \
+  HANDLER(tim1_trg_com_tim11) \
+  HANDLER(tim1_cc) \
+  HANDLER(tim2) \
+  HANDLER(tim3) \
+  HANDLER(tim4) \
+  HANDLER(i2c1_event) \
+  HANDLER(i2c1_error) \
+  HANDLER(i2c2_event) \
+  HANDLER(i2c2_error) \
+  HANDLER(spi1) \
+  HANDLER(spi2) \
+  HANDLER(usart1) \
+  HANDLER(usart2) \
+  HANDLER(usart3) \
+  HANDLER(exti15_10) \
+  HANDLER(rtc_alarm) \
+  HANDLER(otg_fs_wakeup) \
+  HANDLER(tim8_brk_tim12) \
+  HANDLER(tim8_up_tim13) \
+  HANDLER(tim8_trg_com_tim14) \
+  HANDLER(tim8_cc) \
+  HANDLER(dma1_stream7) \
+  HANDLER(fsmc) \
+  HANDLER(sdio) \
+  HANDLER(tim5) \
+  HANDLER(spi3) \
+  HANDLER(uart4) \
+  HANDLER(uart5) \
+  HANDLER(tim6_dac) \
+  HANDLER(tim7) \
+  HANDLER(dma2_stream0) \
+  HANDLER(dma2_stream1) \
+  HANDLER(dma2_stream2) \
+  HANDLER(dma2_stream3) \
+  HANDLER(dma2_stream4) \
+  RESERVED() \
+  RESERVED() \
+  HANDLER(can2_tx) \
+  HANDLER(can2_rx0) \
+  HANDLER(can2_rx1) \
+  HANDLER(can2_sce) \
+  HANDLER(otg_fs) \
+  HANDLER(dma2_stream5) \
+  HANDLER(dma2_stream6) \
+  HANDLER(dma2_stream7) \
+  HANDLER(usart6) \
+  HANDLER(i2c3_event) \
+  HANDLER(i2c3_error) \
+  HANDLER(otg_hs_ep1_out) \
+  HANDLER(otg_hs_ep1_in) \
+  HANDLER(otg_hs_wakeup) \
+  HANDLER(otg_hs) \
+  RESERVED() \
+  RESERVED() \
+  HANDLER(random) \
+  HANDLER(fpu)
+// clang-format on
+
 extern "C" {
 [[noreturn]] void ISR_reset();
 void ISR_non_maskable();
@@ -45,82 +133,9 @@ void ISR_supervisor_call();
 void ISR_debug_monitor();
 void ISR_pend_supervisor();
 void ISR_system_tick();
-void ISR_window_watchdog();
-void ISR_voltage_detector();
-void ISR_tamper_stamp();
-void ISR_rtc_wakeup();
-void ISR_flash();
-void ISR_rcc();
-void ISR_exti0();
-void ISR_exti1();
-void ISR_exti2();
-void ISR_exti3();
-void ISR_exti4();
-void ISR_dma1_stream0();
-void ISR_dma1_stream1();
-void ISR_dma1_stream2();
-void ISR_dma1_stream3();
-void ISR_dma1_stream4();
-void ISR_dma1_stream5();
-void ISR_dma1_stream6();
-void ISR_adc();
-void ISR_can1_tx();
-void ISR_can1_rx0();
-void ISR_can1_rx1();
-void ISR_can1_sce();
-void ISR_exti9_5();
-void ISR_tim1_brk_tim9();
-void ISR_tim1_up_tim10();
-void ISR_tim1_trg_com_tim11();
-void ISR_tim1_cc();
-void ISR_tim2();
-void ISR_tim3();
-void ISR_tim4();
-void ISR_i2c1_event();
-void ISR_i2c1_error();
-void ISR_i2c2_event();
-void ISR_i2c2_error();
-void ISR_spi1();
-void ISR_spi2();
-void ISR_usart1();
-void ISR_usart2();
-void ISR_usart3();
-void ISR_exti15_10();
-void ISR_rtc_alarm();
-void ISR_otg_fs_wakeup();
-void ISR_tim8_brk_tim12();
-void ISR_tim8_up_tim13();
-void ISR_tim8_trg_com_tim14();
-void ISR_tim8_cc();
-void ISR_dma1_stream7();
-void ISR_fsmc();
-void ISR_sdio();
-void ISR_tim5();
-void ISR_spi3();
-void ISR_uart4();
-void ISR_uart5();
-void ISR_tim6_dac();
-void ISR_tim7();
-void ISR_dma2_stream0();
-void ISR_dma2_stream1();
-void ISR_dma2_stream2();
-void ISR_dma2_stream3();
-void ISR_dma2_stream4();
-void ISR_can2_tx();
-void ISR_can2_rx0();
-void ISR_can2_rx1();
-void ISR_can2_sce();
-void ISR_otg_fs();
-void ISR_dma2_stream5();
-void ISR_dma2_stream6();
-void ISR_dma2_stream7();
-void ISR_usart6();
-void ISR_i2c3_event();
-void ISR_i2c3_error();
-void ISR_otg_hs_ep1_out();
-void ISR_otg_hs_ep1_in();
-void ISR_otg_hs_wakeup();
-void ISR_otg_hs();
-void ISR_random();
-void ISR_fpu();
+#define KMAX_DECLARE(name) void ISR_##name();
+#define KMAX_NOTHING()
+KMAX_STM32F405_INTERRUPTS(KMAX_DECLARE, KMAX_NOTHING)
+#undef KMAX_DECLARE
+#undef KMAX_NOTHING
 }

@@ -28,9 +28,8 @@ enum class ClockSource : std::uint8_t {
   crystal_pll = 0,
   internal_pll = 1,
   internal = 2,
-  /// RCC reads zero throughout. Silicon cannot do that (the core would have no clock to read it with): the
-  /// program runs in an emulator without an RCC model, such as QEMU's netduinoplus2. The nominal frequencies
-  /// are assumed.
+  /// Of the image for an emulator without a clock tree: the nominal frequencies are assumed. No board says
+  /// so.
   unreadable = 3,
   /// RCC is there but does not obey: the core could not even be returned to the RC oscillator. Frequencies
   /// are a guess.
@@ -61,7 +60,6 @@ class ClockTree {
       : rcc_(rcc), pwr_(pwr), flash_(flash), waits_(waits) {}
 
   ClockFrequencies start() {
-    if (reads_all_zero()) return full_speed(ClockSource::unreadable);
     if (!return_to_internal()) return base_speed(ClockSource::unresponsive);
 
     enable_peripheral_clock(rcc_.apb1enr, rcc_apb1enr::Power::mask);
@@ -99,12 +97,6 @@ class ClockTree {
   }
   static constexpr ClockFrequencies base_speed(ClockSource source) {
     return {source, 16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000};
-  }
-
-  /// PLLCFGR is included because its reset value is not zero either.
-  bool reads_all_zero() const {
-    return static_cast<std::uint32_t>(rcc_.cr) == 0 && static_cast<std::uint32_t>(rcc_.pllcfgr) == 0 &&
-           static_cast<std::uint32_t>(rcc_.cfgr) == 0;
   }
 
   /// Core on the RC oscillator, buses undivided, PLL off. The order keeps every bus below its limit on the

@@ -10,9 +10,10 @@
 
 namespace kmax::board {
 
-class CanOpenHost {
+template <typename Device>
+class CanOpenHostWith {
  public:
-  CanOpenHost() {
+  CanOpenHostWith() {
     bench.application().attach_store(firmware::AnyFlashSectors::of(flash));
     bench.board().connect_can(true);
     run_ms(5);
@@ -58,7 +59,7 @@ class CanOpenHost {
     return number_in(answer) << unused >> unused;
   }
   void command(std::uint16_t word) { EXPECT_EQ(write(0x6040, 0, word, 2), 0U); }
-  bool armed() const { return const_cast<Bench&>(bench).state() == DriveState::operation_enabled; }
+  bool armed() { return bench.state() == DriveState::operation_enabled; }
   firmware::Fault fault() { return bench.application().fault(0); }
   /// Axis 0 in mode torque, armed through transfers.
   void arm_torque(std::int16_t torque) {
@@ -70,7 +71,7 @@ class CanOpenHost {
   }
 
   firmware::FakeFlash flash;
-  Bench bench;
+  BenchWith<Device> bench;
   std::vector<drivers::CanFrame> heard;
 
  private:
@@ -91,5 +92,7 @@ class CanOpenHost {
     return {};
   }
 };
+
+using CanOpenHost = CanOpenHostWith<ScriptedDevice>;
 
 }  // namespace kmax::board

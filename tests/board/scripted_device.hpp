@@ -41,7 +41,11 @@ class ScriptedDevice {
   }
 
   std::array<Script, firmware::axis_count> script;
-  std::array<bool, firmware::axis_count> valid{true, true};
+  std::array<bool, firmware::axis_count> valid = [] {
+    std::array<bool, firmware::axis_count> all{};
+    all.fill(true);
+    return all;
+  }();
   std::array<firmware::AxisOutput, firmware::axis_count> last{};
   std::array<std::vector<float>, firmware::axis_count> forces;
   bool recording = false;

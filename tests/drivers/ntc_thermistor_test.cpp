@@ -50,8 +50,7 @@ TEST(NtcThermistor, KnownPointsOfTheBoard) {
 
 TEST(NtcThermistor, HotterMeansALargerCodeEverywhere) {
   for (std::uint16_t code = 49; code <= 3936; ++code) {
-    EXPECT_GT(board_ntc.read(code).celsius,
-              board_ntc.read(static_cast<std::uint16_t>(code - 1)).celsius)
+    EXPECT_GT(board_ntc.read(code).celsius, board_ntc.read(static_cast<std::uint16_t>(code - 1)).celsius)
         << code;
   }
 }

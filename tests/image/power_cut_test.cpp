@@ -1,5 +1,5 @@
-// The power goes away while a save erases and writes, with the word torn that is being written: what the image
-// finds at its next start is the old set or the new one, whole.
+// The power goes away while a save erases and writes, with the word torn that is being written: what the
+// image finds at its next start is the old set or the new one, whole.
 #include <gtest/gtest.h>
 
 #include <bit>

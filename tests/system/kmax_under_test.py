@@ -75,10 +75,10 @@ class Serve(_Process):
 
 
 class QemuBoard(_Process):
-    """The ARM image in QEMU."""
+    """The ARM image for QEMU: the board's without what QEMU does not have."""
 
     def __init__(self):
-        super().__init__([os.environ["KMAX_QEMU_BOARD"], ELF, "LINK"])
+        super().__init__([os.environ["KMAX_QEMU_BOARD"], os.path.join(os.path.dirname(ELF), "kmax-qemu.elf"), "LINK"])
 
 
 class VirtualBoard(_Process):

@@ -1,4 +1,4 @@
-"""mbpoll and kmax against the very image that is flashed, in QEMU, over its emulated USART.
+"""mbpoll and kmax against the firmware on a foreign ARM core: its image for QEMU, over the emulated USART.
 
 QEMU's line can lose a character when the machine is busy; a client's retry is part of Modbus, so a time-out
 is forgiven a few times. A wrong value never is."""

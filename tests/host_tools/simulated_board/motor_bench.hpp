@@ -25,6 +25,7 @@ class MotorBench {
   explicit MotorBench(const simulation::Scene& scene) : simulation_(scene) {}
 
   firmware::Application& application() { return simulation_.board().application(); }
+  board::NativeBoard<SimulatedDevice>& board() { return simulation_.board(); }
   SimulatedPower& power() { return simulation_.device().power(); }
   simulation::SceneDrives& drives() { return power().drives(); }
   simulation::MotorDrive& drive(std::size_t axis = 0) { return drives().drive(axis); }

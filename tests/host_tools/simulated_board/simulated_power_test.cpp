@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "tests/firmware/modbus/rtu_line.hpp"
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
 namespace kmax::simulated_board::simulated_power_test {
@@ -209,7 +210,6 @@ TEST_F(PowerLines, ASerialEncoderThatFallsSilent) {
 
 TEST_F(PowerLines, ABridgeThatFallsWithoutACause) {
   bench.power().break_bridge(0);
-  EXPECT_TRUE(legs_off());
   expect_trip(Fault::power_stage);
   expect_recovery();
 }
@@ -258,8 +258,10 @@ TEST(SimulatedPower, TheBrakeResistorIsOffWhileASaveIsUnderWay) {
   EXPECT_TRUE(brakes_for());
   bench.disarm();
   EXPECT_TRUE(brakes_for()) << "a moment after driving";
-  bench.set<"store.command">(1);
-  bench.tick();
+  const std::uint16_t command = firmware::modbus_address(firmware::entry_of<"store.command">(), 0);
+  bench.board().receive(firmware::modbus::adu(
+      1, {6, static_cast<std::uint8_t>(command >> 8), static_cast<std::uint8_t>(command), 0, 1}));
+  for (int n = 0; n < 400 && !bench.application().store_busy(); ++n) bench.tick();
   ASSERT_TRUE(bench.application().store_busy());
   EXPECT_FALSE(brakes_for());
 }

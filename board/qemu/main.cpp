@@ -1,0 +1,65 @@
+// Composition root of the image for QEMU: the application behind the serial line of the ODrive, and SysTick.
+
+#include <cstdint>
+#include <optional>
+
+#include "board/odrive_v3/priorities.hpp"
+#include "board/odrive_v3/serial_line.hpp"
+#include "board/stm32f405/fault_handler.hpp"
+#include "board/stm32f405/vectors.hpp"
+#include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
+
+namespace kmax::board {
+
+namespace {
+
+/// As of a board whose crystal runs.
+constexpr drivers::stm32f4::ClockFrequencies clocks{
+    drivers::stm32f4::ClockSource::unreadable, 168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000};
+
+drivers::cortex_m::InterruptController interrupts{drivers::cortex_m::nvic(), drivers::cortex_m::scb()};
+drivers::cortex_m::SystemTick system_tick{drivers::cortex_m::system_tick(), drivers::cortex_m::scb()};
+std::optional<firmware::Application> application;
+std::optional<odrive_v3::SerialLine> serial;
+
+[[noreturn]] void run() {
+  application.emplace(firmware::BoardIdentity{.board_name = "qemu",
+                                              .core_clock_hz = clocks.core_hz,
+                                              .clock_source = static_cast<std::uint8_t>(clocks.source)});
+  interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, odrive_v3::priority::clock);
+  if (!system_tick.start(clocks.core_hz, 1'000)) stop_on_unexpected_interrupt();
+  serial.emplace(interrupts, clocks.apb1_hz);
+  serial->start(*application);
+  for (;;) {
+    const std::uint32_t now = system_tick.now_us();
+    application->poll(now);
+    serial->poll(*application, now);
+    // QEMU's USART never asks for the interrupt when it has sent.
+    if (serial->transmitting()) interrupts.pend(drivers::stm32f4::Interrupt::usart2);
+    if (application->restart_wanted()) reset_core();
+    drivers::cortex_m::wait_for_interrupt();
+  }
+}
+
+}  // namespace
+
+void enter_safe_state() {}
+
+}  // namespace kmax::board
+
+void ISR_system_tick() {
+  using namespace kmax;
+  board::system_tick.ISR_count();
+  // There is no encoder: the axes tick, and refuse to be armed.
+  static_cast<void>(board::application->ISR_tick(firmware::TickInput{}));
+}
+
+void ISR_usart2() {
+  using namespace kmax::board;
+  serial->ISR_serve(*application, system_tick);
+}
+
+int main() {
+  kmax::board::run();
+}
