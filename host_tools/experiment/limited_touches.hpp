@@ -28,6 +28,7 @@ struct TouchLimits {
   double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
   double abort_amplitude = 0.01;                  ///< m; TouchWatch::abort_amplitude
   double patience = 20.0;                         ///< s for the person to come to the wall
+  double wall_abort_amplitude = 1e-3;  ///< m, against a wall that forces act along: two_axis_touch.hpp
 };
 
 /// The watch of one touch: `name` is what is touched, `hold_time` in s.
@@ -79,6 +80,7 @@ class LimitedTouches {
   WatchedTouch watch(const std::string& name, double hold_time) const;
 
   const Tell& tell() const { return session_.tell; }
+  const TouchSession& session() const { return session_; }
 
  private:
   device::Device& device_;

@@ -61,10 +61,6 @@ class ArmedWhile {
   bool armed_ = true;
 };
 
-double number(device::Device& device, std::size_t axis, const char* name) {
-  return device.read_number(fmt::format("axis{}.{}", axis, name));
-}
-
 /// Whether contact_measure.hpp has enough to judge: two samples in every quarter of the window.
 bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
                    const simulation::ContactCriterion& criterion) {
@@ -84,7 +80,7 @@ void wait_until_outside(device::Device& device, const WatchedTouch& touch, const
                         const Tell& tell) {
   const auto begin = device.link().now();
   const auto outside = [&] {
-    return touch.side * (number(device, watch.axis, "measured.position") - touch.surface) > 0.0;
+    return touch.side * (axis_number(device, watch.axis, "measured.position") - touch.surface) > 0.0;
   };
   while (!outside() && device.link().now() - begin < std::chrono::duration<double>(watch.contact_patience)) {
     tell(fmt::format("{}: take the handle out of the wall", watch.name));
@@ -135,6 +131,10 @@ class Progress {
 };
 }  // namespace
 
+double axis_number(device::Device& device, std::size_t axis, const char* name) {
+  return device.read_number(fmt::format("axis{}.{}", axis, name));
+}
+
 double oscillation(std::span<const TraceSample> samples, double window) {
   if (samples.empty()) return 0.0;
   const double begin = samples.back().time - window;
@@ -166,10 +166,11 @@ void require_sound(const TouchWatch& watch) {
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell) {
   require_sound(watch);
   WatchedTouch touch;
-  touch.surface = number(device, watch.axis, "wall.position");
-  touch.side = number(device, watch.axis, "wall.side");
+  touch.surface = axis_number(device, watch.axis, "wall.position");
+  touch.side = axis_number(device, watch.axis, "wall.side");
   wait_until_outside(device, touch, watch, tell);
-  const double thinning = std::max(1.0, std::round(number(device, watch.axis, "haptic.rate") / trace_rate));
+  const double thinning =
+      std::max(1.0, std::round(axis_number(device, watch.axis, "haptic.rate") / trace_rate));
   device::TraceReader trace(device, watch.axis, static_cast<std::uint16_t>(thinning));
   Progress progress(watch, touch);
   LateAbort late;
@@ -198,8 +199,8 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
     if (touch.aborted_at) armed.require_force_until(progress.touched_at() + *touch.aborted_at, late);
   }
   trace.stop();
-  const double all = number(device, watch.axis, "measured.armed_samples");
-  touch.limited_share = all > 0 ? number(device, watch.axis, "measured.limited_samples") / all : 0.0;
+  const double all = axis_number(device, watch.axis, "measured.armed_samples");
+  touch.limited_share = all > 0 ? axis_number(device, watch.axis, "measured.limited_samples") / all : 0.0;
   touch.lost_records = trace.lost();
   for (TraceSample& sample : touch.samples) sample.time -= progress.touched_at();
   return touch;
@@ -230,7 +231,7 @@ simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_
 std::vector<std::string> protective_assignments(device::Device& device, std::size_t axis,
                                                 double force_limit) {
   std::vector<std::string> assignments;
-  if (number(device, axis, "force.limit") > force_limit)
+  if (axis_number(device, axis, "force.limit") > force_limit)
     assignments.push_back(fmt::format("axis{}.force.limit={}", axis, force_limit));
   const double timeout = device.read_number("link.timeout");
   if (timeout <= 0.0 || timeout > longest_timeout)

@@ -57,6 +57,9 @@ using Tell = std::function<void(const std::string&)>;
 /// a trace that stops, an axis that cannot be armed or disarmed), link::LinkError.
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell);
 
+/// A parameter of one axis, by its name without prefix.
+double axis_number(device::Device& device, std::size_t axis, const char* name);
+
 /// Times and amplitudes that can end a touch. Throws std::invalid_argument naming them if not.
 void require_sound(const TouchWatch& watch);
 

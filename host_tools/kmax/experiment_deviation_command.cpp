@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "host_tools/experiment/deviation/deviation_device.hpp"
 #include "host_tools/experiment/deviation/deviation_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
@@ -14,49 +13,28 @@ namespace kmax::cli {
 namespace {
 
 struct DeviationOptions : StudyOptions {
-  experiment::DeviationSettings simulated;
-  experiment::DeviationDeviceSettings device;
-  PeopleOptions people;
+  DeviationOptions() {
+    hands = experiment::deviation_hands();
+    limits = experiment::deviation_limits();
+  }
+  experiment::DeviationSettings settings;
 };
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
                                     const Interruption& interruption) {
-  return simulate_force_pairs(context, interruption, options.simulated, options.people,
-                              experiment::study_deviation);
+  experiment::SimulatedHands hands = options.hands;
+  const auto people = people_of(options.people, hands.device);
+  return simulate_study(context, interruption, force_pairs_words,
+                        [&](const experiment::ProgressReport& tell) {
+                          return experiment::study_deviation(options.settings, hands, people, tell);
+                        });
 }
 
 experiment::DeviationStudy measure(Context& context, const DeviationOptions& options,
                                    const Interruption& interruption) {
-  experiment::DeviationDeviceSettings settings = options.device;
-  settings.axis = context.axis();
-  settings.protocol = options.simulated.protocol;
-  device::Device device = context.connect();
-  const experiment::DeviationDeviceResult result = make_touches(
-      context, interruption, device, "deviation", settings, options, experiment::run_deviation_on_device);
-  experiment::DeviationStudy study;
-  study.origin = report::Origin::measured;
-  study.results = result.results;
-  study.verdict = experiment::judge_deviation(study.results);
-  study.fits = experiment::fit_table_2();
-  study.circumstances = fmt::format(
-      "Measured on {}: wall of {:g} N/mm at {:g} Hz on axis {}, pulses of {:g} s on axis {}, force limit "
-      "{:g} N, which "
-      "took something away in up to {:.0f} % of a touch's samples; {} trace records lost.",
-      device.description(), settings.protocol.stiffness / 1000, settings.protocol.haptic_rate, settings.axis,
-      settings.protocol.pulse_on, 1 - settings.axis, result.force_limit, 100 * result.limited_share,
-      result.lost_records);
-  for (const experiment::DeviationResult& one : study.results) {
-    if (one.without_contact > 0)
-      context.note(fmt::format(
-          "F_B = {:g} N, F_I = {:g} N: not counted, the wall was touched less than {:.0f} % of the time",
-          one.paper.background, one.paper.interference, 100 * experiment::least_contact));
-    if (one.aborted > 0)
-      context.note(fmt::format(
-          "F_B = {:g} N, F_I = {:g} N: not counted, the handle swung too far or left the wall before the "
-          "{:g} s of the touch were over",
-          one.paper.background, one.paper.interference, settings.protocol.duration()));
-  }
-  return study;
+  return measure_study(context, interruption, "deviation", options.settings, options,
+                       experiment::RigAxes::wall_along,
+                       [&](experiment::DeviceRig& rig) { return study_deviation(rig, options.settings); });
 }
 
 Json pairs_json(const std::vector<experiment::DeviationResult>& results) {
@@ -147,8 +125,7 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
        "Exit code 3: the deviation did not fall, or too little was touched to tell."},
       Takes::device);
   auto options = std::make_shared<DeviationOptions>();
-  experiment::DeviationSettings& simulated = options->simulated;
-  experiment::DeviationProtocol& protocol = simulated.protocol;
+  experiment::DeviationProtocol& protocol = options->settings.protocol;
   command->add_option("--stiffness", protocol.stiffness, "Stiffness of the wall, N/m; the paper gives none")
       ->check(finite_number() & CLI::Range(1.0, 1e6))
       ->capture_default_str();
@@ -171,7 +148,7 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
 
   auto* people = command->add_option_group("Simulated", "Without --device");
   add_people_options(*people, options->people);
-  people->add_option("--push", simulated.push, "Push against the wall, N; above every F_B")
+  people->add_option("--push", options->hands.push, "Push against the wall, N; above every F_B")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
   add_clip_option(*people, options->people.clip);

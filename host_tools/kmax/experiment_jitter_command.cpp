@@ -2,9 +2,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "host_tools/experiment/jitter/jitter_device.hpp"
 #include "host_tools/experiment/jitter/jitter_report.hpp"
-#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
@@ -15,39 +13,27 @@ namespace kmax::cli {
 namespace {
 
 struct JitterOptions : StudyOptions {
-  experiment::JitterSettings simulated;
-  experiment::JitterDeviceSettings device;
-  PeopleOptions people;
+  JitterOptions() {
+    hands = experiment::jitter_hands();
+    limits = experiment::jitter_limits();
+  }
+  experiment::JitterSettings settings;
 };
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
                                  const Interruption& interruption) {
-  return simulate_force_pairs(context, interruption, options.simulated, options.people,
-                              experiment::study_jitter);
+  experiment::SimulatedHands hands = options.hands;
+  const auto people = people_of(options.people, hands.device);
+  return simulate_study(context, interruption, force_pairs_words,
+                        [&](const experiment::ProgressReport& tell) {
+                          return experiment::study_jitter(options.settings, hands, people, tell);
+                        });
 }
 
 experiment::JitterStudy measure(Context& context, const JitterOptions& options,
                                 const Interruption& interruption) {
-  experiment::JitterDeviceSettings settings = options.device;
-  settings.axis = context.axis();
-  settings.wall = options.simulated.wall;
-  settings.touches = options.simulated.touches;
-  device::Device device = context.connect();
-  const experiment::JitterDeviceResult result = make_touches(
-      context, interruption, device, "jitter", settings, options, experiment::run_jitter_on_device);
-  experiment::JitterStudy study;
-  study.wall = settings.wall;
-  study.origin = report::Origin::measured;
-  study.results = result.results;
-  study.verdict = experiment::judge_jitter(study.results);
-  study.circumstances = fmt::format(
-      "Measured on {}: {} per pair, wall of {:g} N/mm at {:g} Hz, force limit {:g} N, which took "
-      "something "
-      "away in up to {:.0f} % of a touch's samples; {} trace records lost.",
-      device.description(), experiment::touch_words(static_cast<std::size_t>(settings.touches)),
-      settings.wall.stiffness / 1000, settings.wall.haptic_rate, result.force_limit,
-      100 * result.limited_share, result.lost_records);
-  return study;
+  return measure_study(context, interruption, "jitter", options.settings, options, experiment::RigAxes::wall,
+                       [&](experiment::DeviceRig& rig) { return study_jitter(rig, options.settings); });
 }
 
 Json pairs_json(const std::vector<experiment::JitterResult>& results) {
@@ -117,32 +103,32 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
        "Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell."},
       Takes::device);
   auto options = std::make_shared<JitterOptions>();
-  experiment::JitterSettings& simulated = options->simulated;
+  experiment::JitterSettings& settings = options->settings;
+  experiment::SimulatedHands& hands = options->hands;
   command
-      ->add_option("--stiffness", simulated.wall.stiffness,
-                   "Stiffness of the wall, N/m; the paper gives none")
+      ->add_option("--stiffness", settings.wall.stiffness, "Stiffness of the wall, N/m; the paper gives none")
       ->check(finite_number() & CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  command->add_option("--rate", simulated.wall.haptic_rate, "Rate of the haptic loop, Hz")
+  command->add_option("--rate", settings.wall.haptic_rate, "Rate of the haptic loop, Hz")
       ->check(finite_number() & CLI::Range(100.0, 20000.0))
       ->capture_default_str();
-  command->add_option("--window", simulated.wall.window, "Time after the touch that is judged, s")
+  command->add_option("--window", settings.wall.window, "Time after the touch that is judged, s")
       ->check(finite_number() & CLI::Range(0.5, 60.0))
       ->capture_default_str();
-  command->add_option("--touches", simulated.touches, "Touches per person and pair of forces")
+  command->add_option("--touches", settings.touches, "Touches per person and pair of forces")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
   add_people_options(*people, options->people);
-  people->add_option("--push", simulated.push, "Push without the forces that the person answers to, N")
+  people->add_option("--push", hands.push, "Push without the forces that the person answers to, N")
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  people->add_option("--speed", simulated.approach_speed, "Speed of the approach, m/s")
+  people->add_option("--speed", hands.approach_speed, "Speed of the approach, m/s")
       ->check(finite_number() & CLI::Range(0.001, 5.0))
       ->capture_default_str();
-  people->add_option("--reaction", simulated.reaction, "Share of F_I that the person answers to, 0 to 1")
+  people->add_option("--reaction", hands.reaction, "Share of F_I that the person answers to, 0 to 1")
       ->check(finite_number() & CLI::Range(0.0, 1.0))
       ->capture_default_str();
   add_clip_option(*people, options->people.clip);

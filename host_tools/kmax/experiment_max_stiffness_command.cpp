@@ -6,7 +6,6 @@
 #include <chrono>
 #include <memory>
 
-#include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
@@ -61,13 +60,6 @@ double seconds_now() {
 namespace {
 using Options = std::vector<CLI::Option*>;
 
-std::string study_names() {
-  std::string names;
-  for (const experiment::StudyName& study : experiment::stiffness_studies)
-    names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", study.name, study.what);
-  return names;
-}
-
 Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
   auto* group = command.add_option_group("Simulated people", "Without --device");
   return {
@@ -86,14 +78,6 @@ Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
       group->add_flag(
           "--calibrate", options.calibrate,
           "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out"),
-      group
-          ->add_option(
-              "--study", options.studies,
-              fmt::format("What the numbers come from and how far they hold, as more sections: {} or "
-                          "all (a quarter of an hour)",
-                          study_names()))
-          ->delimiter(',')
-          ->type_name("LIST"),
       group->add_option("--jobs", options.jobs, "Searches at a time; all processors without it")
           ->check(CLI::Range(1, 4096)),
   };
@@ -149,7 +133,6 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
        "8).",
        "  kmax experiment max-stiffness                                  twelve simulated people, seconds\n"
        "  kmax experiment max-stiffness --clip both --out results        a page with tables and pictures\n"
-       "  kmax experiment max-stiffness --clip both --study causes       where the gain at 2 N comes from\n"
        "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results\n"
        "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume\n\n"
        "Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each "

@@ -2,8 +2,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "host_tools/experiment/report_words.hpp"
-#include "host_tools/experiment/resolution/resolution_device.hpp"
 #include "host_tools/experiment/resolution/resolution_report.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
@@ -15,11 +13,12 @@ namespace kmax::cli {
 namespace {
 
 struct ResolutionOptions : StudyOptions {
-  experiment::ResolutionSettings simulated;
-  experiment::ResolutionDeviceSettings device;
-  std::vector<double> speeds;
+  ResolutionOptions() { hands = experiment::resolution_hands(); }
+  experiment::ResolutionWall wall;
+  experiment::ResolutionHand weak = experiment::weak_hand;
+  std::vector<double> speeds, pushes = experiment::ResolutionSettings().pushes;
   int touches = 0;
-  std::string subjects, rounding = "nearest";
+  std::string rounding = "nearest";
 };
 
 control::Rounding rounding_of(const std::string& name) {
@@ -31,44 +30,33 @@ std::string percent_words(std::size_t done, std::size_t all) {
   return fmt::format("{:.0f} % done", 100.0 * static_cast<double>(done) / static_cast<double>(all));
 }
 
+/// `usual`: what holds where no option says otherwise.
+experiment::ResolutionSettings settings_of(const ResolutionOptions& options,
+                                           experiment::ResolutionSettings usual) {
+  usual.wall = options.wall;
+  usual.wall.rounding = rounding_of(options.rounding);
+  usual.pushes = options.pushes;
+  if (!options.speeds.empty()) usual.speeds = options.speeds;
+  if (options.touches > 0) usual.touches = options.touches;
+  return usual;
+}
+
 experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& options,
                                      const Interruption& interruption) {
-  experiment::ResolutionSettings settings = options.simulated;
-  settings.wall.rounding = rounding_of(options.rounding);
-  if (!options.speeds.empty()) settings.speeds = options.speeds;
-  if (options.touches > 0) settings.touches = options.touches;
+  const experiment::ResolutionSettings settings = settings_of(options, {});
   // Of a set the people only: the device is paper 2's.
   simulation::DeviceModel unused;
-  const std::vector<simulation::OperatorModel> people = people_of(options.subjects, unused);
+  const std::vector<simulation::OperatorModel> people = people_of(options.people.subjects, unused);
   return simulate_study(context, interruption, percent_words, [&](const experiment::ProgressReport& tell) {
-    return experiment::study_resolution(settings, people, tell);
+    return experiment::study_resolution(settings, options.weak, options.hands, people, tell);
   });
 }
 
 experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,
                                     const Interruption& interruption) {
-  experiment::ResolutionDeviceSettings settings = options.device;
-  settings.axis = context.axis();
-  settings.wall = options.simulated.wall;
-  settings.wall.rounding = rounding_of(options.rounding);
-  if (!options.speeds.empty()) settings.speeds = options.speeds;
-  if (options.touches > 0) settings.touches = options.touches;
-  device::Device device = context.connect();
-  const experiment::ResolutionDeviceResult result = make_touches(
-      context, interruption, device, "resolution", settings, options, experiment::run_resolution_on_device);
-  experiment::ResolutionStudy study;
-  study.wall = settings.wall;
-  study.origin = report::Origin::measured;
-  study.runs = {{{}, result.cells}};
-  std::size_t aborted = 0;
-  for (const bool one : result.aborted) aborted += one ? 1 : 0;
-  study.circumstances = fmt::format(
-      "Measured on {}: {}, {} of them aborted because the handle swung too far, wall of {:g} N/mm at "
-      "{:g} Hz, "
-      "force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
-      device.description(), experiment::touch_words(result.cells.size()), aborted,
-      settings.wall.stiffness / 1000, settings.wall.haptic_rate, result.force_limit, result.lost_records);
-  return study;
+  const experiment::ResolutionSettings settings = settings_of(options, experiment::resolution_on_device());
+  return measure_study(context, interruption, "resolution", settings, options, experiment::RigAxes::wall,
+                       [&](experiment::DeviceRig& rig) { return study_resolution(rig, settings); });
 }
 
 Json verdict_json(const experiment::ResolutionVerdict& verdict) {
@@ -140,18 +128,17 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
        "Exit code 3: one of the two did not come out, or was not tested."},
       Takes::device);
   auto options = std::make_shared<ResolutionOptions>();
-  experiment::ResolutionSettings& simulated = options->simulated;
-  command->add_option("--stiffness", simulated.wall.stiffness, "Stiffness of the wall, N/m")
+  command->add_option("--stiffness", options->wall.stiffness, "Stiffness of the wall, N/m")
       ->check(finite_number() & CLI::Range(1.0, 1e6))
       ->capture_default_str();
   command
-      ->add_option("--rate", simulated.wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none")
+      ->add_option("--rate", options->wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none")
       ->check(finite_number() & CLI::Range(100.0, 20000.0))
       ->capture_default_str();
-  command->add_option("--hold", simulated.wall.hold, "Time from the touch to the end of judging, s")
+  command->add_option("--hold", options->wall.hold, "Time from the touch to the end of judging, s")
       ->check(finite_number() & CLI::Range(1.0, 60.0))
       ->capture_default_str();
-  command->add_option("--threshold", simulated.wall.threshold, "Peak to peak above which a wall vibrates, m")
+  command->add_option("--threshold", options->wall.threshold, "Peak to peak above which a wall vibrates, m")
       ->check(finite_number() & CLI::Range(1e-9, 1.0))
       ->capture_default_str();
   command->add_option("--rounding", options->rounding, "How positions are re-sampled")
@@ -165,21 +152,22 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
   add_file_options(*command, options->files);
 
   auto* people = command->add_option_group("Simulated", "Without --device");
-  add_subjects_option(*people, options->subjects);
-  people->add_option("--grip", simulated.weak.grip, "Factor of the grip's stiffness and damping")
+  add_subjects_option(*people, options->people.subjects);
+  people->add_option("--grip", options->weak.grip, "Factor of the grip's stiffness and damping")
       ->check(finite_number() & CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  people->add_option("--delay", simulated.weak.delay, "From a command to its force, s")
+  people->add_option("--delay", options->weak.delay, "From a command to its force, s")
       ->check(finite_number() & CLI::Range(0.0, 0.1))
       ->capture_default_str();
-  people->add_option("--friction", simulated.device.friction, "Coulomb friction of the handle, N")
+  people->add_option("--friction", options->hands.device.friction, "Coulomb friction of the handle, N")
       ->check(finite_number() & CLI::Range(0.0, 10.0))
       ->capture_default_str();
-  people->add_option("--pushes", simulated.pushes, "Static pushes, N; a wall vibrates when it does with any")
+  people->add_option("--pushes", options->pushes, "Static pushes, N; a wall vibrates when it does with any")
       ->delimiter(',')
       ->check(finite_number() & CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  people->add_option("--clip", simulated.device.force_limit, "Largest force of the device, N; 0: no limit")
+  people
+      ->add_option("--clip", options->hands.device.force_limit, "Largest force of the device, N; 0: no limit")
       ->check(finite_number() & CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   add_study_action(*command, context, *people, options, resolution_study);

@@ -13,9 +13,10 @@
 
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/run_journal.hpp"
-#include "host_tools/experiment/watched_touch.hpp"
+#include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/experiment_commands.hpp"
@@ -25,11 +26,13 @@
 
 namespace kmax::cli {
 
-/// Options of every such command. Each derives its own, with the experiment's settings as `simulated` and
-/// `device`; the latter have force_limit, abort_amplitude and patience.
+/// Options of every such command. Each derives its own, with the experiment's settings.
 struct StudyOptions {
   ExperimentFiles files;
   bool no_prompt = false, resume = false;
+  experiment::SimulatedHands hands;
+  PeopleOptions people;
+  experiment::TouchLimits limits;
 };
 
 /// What is printed of a study.
@@ -78,8 +81,8 @@ void add_study_action(CLI::App& command, Context& context, CLI::App& people,
                       const std::shared_ptr<Options>& options, const StudyCommand<Study, Options>& study) {
   auto* device = command.add_option_group("Device", "With --device");
   add_axis_option(*device, context, "Axis that the wall is on");
-  add_safety_options(*device, options->device.force_limit, options->device.abort_amplitude);
-  add_touch_options(*device, options->no_prompt, options->device.patience);
+  add_safety_options(*device, options->limits.force_limit, options->limits.abort_amplitude);
+  add_touch_options(*device, options->no_prompt, options->limits.patience);
   add_resume_option(*device, options->resume);
   command.callback([&context, &people, device, options, study] {
     context.action = [&context, &people, device, options, study] {
@@ -111,29 +114,18 @@ auto simulate_study(Context& context, const Interruption& interruption,
 /// "3 of 16 pairs of forces".
 std::string force_pairs_words(std::size_t done, std::size_t all);
 
-/// simulate_study() of an experiment over the pairs of F_B and F_I, with these people and their device.
-template <typename Study, typename Settings>
-Study simulate_force_pairs(Context& context, const Interruption& interruption, Settings settings,
-                           const PeopleOptions& options,
-                           Study (*make)(const Settings& settings,
-                                         const std::vector<simulation::OperatorModel>& people,
-                                         const experiment::ProgressReport& tell)) {
-  const std::vector<simulation::OperatorModel> people = people_of(options, settings.device);
-  return simulate_study(context, interruption, force_pairs_words,
-                        [&](const experiment::ProgressReport& tell) { return make(settings, people, tell); });
-}
-
-/// The touches on a device, which `run` makes: kept in the journal `name` in --out, asked for at the terminal
-/// unless --no-prompt is given. Ctrl-C is an ExperimentInterrupted. Errors: those of open_touch_journal() and
-/// of `run`.
-template <typename Result, typename Settings>
-Result make_touches(Context& context, const Interruption& interruption, device::Device& device,
-                    const std::string& name, const Settings& settings, const StudyOptions& options,
-                    Result (*run)(device::Device& device, const Settings& settings,
-                                  calibration::Prompter* prompter, const experiment::Tell& tell,
-                                  experiment::RunJournal* journal, const experiment::Tell& notice)) {
+/// What `make` makes of the touches on the device in use, on --axis: kept in the journal `name` in --out,
+/// asked for at the terminal unless --no-prompt is given. Ctrl-C is an ExperimentInterrupted. Errors: those
+/// of open_touch_journal() and of `make`.
+template <typename Settings, typename Make>
+auto measure_study(Context& context, const Interruption& interruption, const std::string& name,
+                   const Settings& settings, const StudyOptions& options, experiment::RigAxes axes,
+                   const Make& make) {
+  experiment::TouchLimits limits = options.limits;
+  limits.axis = context.axis();
+  device::Device device = context.connect();
   const auto journal = open_touch_journal(context, options.files.folder, name,
-                                          journal_settings(device, settings), options.resume);
+                                          journal_settings(device, limits, settings), options.resume);
   const auto check_interruption = [&] {
     if (interruption.requested())
       throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on"
@@ -141,17 +133,17 @@ Result make_touches(Context& context, const Interruption& interruption, device::
   };
   TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   Progress progress(context.messages());
-  return run(
-      device, settings, options.no_prompt ? nullptr : &prompter,
-      [&](const std::string& text) {
-        check_interruption();
-        progress.show(text);
-      },
-      journal.get(),
-      [&](const std::string& text) {
-        progress.make_room();
-        context.note(text);
-      });
+  const experiment::Tell tell = [&](const std::string& text) {
+    check_interruption();
+    progress.show(text);
+  };
+  const experiment::Tell notice = [&](const std::string& text) {
+    progress.make_room();
+    context.note(text);
+  };
+  experiment::DeviceRig rig(device, limits,
+                            {options.no_prompt ? nullptr : &prompter, journal.get(), tell, notice}, axes);
+  return make(rig);
 }
 
 }  // namespace kmax::cli

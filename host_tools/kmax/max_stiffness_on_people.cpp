@@ -6,9 +6,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
-#include "host_tools/experiment/max_stiffness/max_stiffness_pictures.hpp"
-#include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
-#include "host_tools/experiment/max_stiffness/stiffness_studies.hpp"
+#include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/remaining_time.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
@@ -129,49 +127,6 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   return experiment::run_max_stiffness_study(set, conditions, run);
 }
 
-std::vector<std::string> chosen_studies(const MaxStiffnessOptions& options) {
-  std::vector<std::string> all;
-  for (const experiment::StudyName& study : experiment::stiffness_studies) all.emplace_back(study.name);
-  std::vector<std::string> chosen;
-  for (const std::string& name : options.studies) {
-    if (name == "all") return all;
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UsageError(fmt::format("--study {}: there is no such study; allowed are {} and all", name,
-                                   fmt::join(all, ", ")));
-    chosen.push_back(name);
-  }
-  return chosen;
-}
-
-/// The sections of the studies asked for.
-std::vector<report::Section> more_sections(Context& context, const MaxStiffnessOptions& options,
-                                           const std::vector<std::string>& names,
-                                           const std::vector<MaxStiffnessStudy>& studies,
-                                           const Interruption& interruption) {
-  std::vector<SubjectSet> sets;
-  for (const MaxStiffnessStudy& study : studies) sets.push_back(study.set);
-  std::vector<report::Section> sections;
-  if (names.empty()) return sections;
-  experiment::StiffnessRun run;
-  run.threads = options.jobs;
-  std::optional<RunJournal> journal;
-  if (!options.folder.empty()) {
-    RunJournal::Json settings = journal_settings(sets.front(), run);
-    settings["experiment"] = "studies of simulated people";
-    if (sets.size() > 1) settings["more_subjects"] = journal_settings(sets[1], run)["subjects"];
-    const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::anew;
-    journal.emplace(std::filesystem::path(options.folder) / "max_stiffness_studies.journal", settings, begin);
-    run.journal = &*journal;
-  }
-  for (const std::string& name : names) {
-    Progress progress(context.messages());
-    run.progress = reporter(progress, interruption, name, 0);
-    for (report::Section& section : experiment::run_stiffness_study(name, sets, run, options.folder))
-      sections.push_back(std::move(section));
-  }
-  return sections;
-}
-
 Json document(const std::vector<MaxStiffnessStudy>& studies) {
   Json conditions = Json::array();
   for (const MaxStiffnessStudy& study : studies) {
@@ -197,7 +152,6 @@ void print_section(std::ostream& out, const report::Section& section) {
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,
                             const Interruption& interruption) {
   const auto conditions = conditions_for(options.conditions);
-  const std::vector<std::string> named_studies = chosen_studies(options);
   if (options.calibrate && options.folder.empty())
     throw UsageError("--calibrate writes the subject set to a folder: name it with --out");
   if (!options.subjects.empty() && options.clip == "both")
@@ -215,8 +169,6 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
   }
   report::Page page{"Largest stable stiffness", {experiment::max_stiffness_section(studies)}};
   if (!calibrations.empty()) page.sections.push_back(experiment::calibration_section(calibrations));
-  for (report::Section& section : more_sections(context, options, named_studies, studies, interruption))
-    page.sections.push_back(std::move(section));
   if (!options.folder.empty()) {
     const std::filesystem::path folder = options.folder;
     page.sections.front().pictures.push_back(

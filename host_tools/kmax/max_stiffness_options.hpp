@@ -22,8 +22,7 @@ struct MaxStiffnessOptions {
   std::string clip;      ///< on, off, both; empty: on, or as the set that --subjects names has it
   std::optional<std::uint64_t> seed;
   bool calibrate = false;
-  std::vector<std::string> studies;  ///< names of experiment::stiffness_studies, or "all"
-  std::size_t jobs = 0;              ///< 0: all processors
+  std::size_t jobs = 0;  ///< 0: all processors
 
   // On a device.
   experiment::DeviceStiffnessSettings device;

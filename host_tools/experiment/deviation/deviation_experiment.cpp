@@ -3,28 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
 
-#include "control/haptic_loop.hpp"
+#include "host_tools/experiment/journal_fields.hpp"
 #include "host_tools/experiment/rank_correlation.hpp"
 #include "host_tools/experiment/setting_check.hpp"
-#include "host_tools/experiment/simulated_touch.hpp"
-#include "host_tools/simulation/coupled_handle.hpp"
-#include "host_tools/simulation/encoder_model.hpp"
 
 namespace kmax::experiment {
 
-DeviationMeasure measure_deviation(std::span<const DeviationSample> samples, std::span<const double> begins,
+DeviationMeasure measure_deviation(std::span<const RigSample> samples, std::span<const double> begins,
                                    double pulse_on) {
   DeviationMeasure measure;
   std::size_t counted_without = 0, counted_with = 0;
   for (std::size_t pulse = 0; pulse < begins.size(); ++pulse) {
     std::optional<double> origin;
     double largest = 0.0;
-    for (const DeviationSample& sample : samples) {
+    for (const RigSample& sample : samples) {
       if (sample.time < begins[pulse]) continue;
       if (sample.time >= begins[pulse] + pulse_on) break;
       if (!origin) origin = sample.tangential;
@@ -42,106 +36,73 @@ DeviationMeasure measure_deviation(std::span<const DeviationSample> samples, std
 }
 
 namespace {
-constexpr SettingCheck check("deviation");
+constexpr auto deviation_touch_fields = [](auto& touch, const auto& field) {
+  field("deviation_before_m", touch.measure.without);
+  field("deviation_m", touch.measure.with);
+  field("pulses", touch.measure.pulses);
+  field("contact_share", touch.contact_share);
+  field("limited_share", touch.limited_share);
+  field("aborted", touch.aborted);
+  field("lost_records", touch.lost_records);
+};
 
-void require(const DeviationSettings& settings, double background) {
-  const DeviationProtocol& protocol = settings.protocol;
-  check("stiffness", protocol.stiffness, 1.0, 1e6);
-  check("haptic rate", protocol.haptic_rate, 10.0, 1e6);
-  check("rest", protocol.rest, 0.0, 60.0);
-  check("pulse", protocol.pulse_on, 4.0 / protocol.haptic_rate, 60.0);
-  check("pause", protocol.pulse_off, 0.0, 60.0);
-  check("pulses", protocol.pulses, 1, 1000);
-  check("count length", settings.count_length, 1e-9, 1e-2);
-  if (!(settings.push > background))
-    throw std::invalid_argument(
-        fmt::format("deviation: a push of {} N loses the wall against F_B = {} N: push harder than every F_B",
-                    settings.push, background));
-}
-
-bool pulse_at(const DeviationProtocol& protocol, double time) {
-  for (int pulse = 0; pulse < 2 * protocol.pulses; ++pulse) {
-    const double begin = protocol.pulse_begin(pulse);
-    if (time >= begin && time < begin + protocol.pulse_on) return true;
-  }
-  return false;
+DeviationTouch measured_touch(const RigTouch& touch, const TouchPlan& plan, double pulse_on) {
+  std::vector<double> begins;
+  for (std::size_t change = 0; change < touch.change_times.size(); ++change)
+    if (plan.changes[change].of == ForceChange::Of::interference && plan.changes[change].force > 0.0)
+      begins.push_back(touch.change_times[change]);
+  return {measure_deviation(touch.samples, begins, pulse_on),
+          touch.contact_share,
+          touch.beyond_limit_share,
+          touch.limited_share,
+          touch.touched,
+          touch.aborted,
+          touch.lost_records};
 }
 }  // namespace
 
-DeviationTouch simulate_deviation(const DeviationSettings& settings, const simulation::OperatorModel& person,
-                                  double background, double interference,
-                                  std::vector<DeviationSample>* recording) {
-  require(settings, background);
+TouchPlan deviation_plan(const DeviationProtocol& protocol, const paper::DeviationCell& pair) {
+  using Of = ForceChange::Of;
+  TouchPlan plan;
+  plan.name = fmt::format("F_B = {:g} N, F_I = {:g} N", pair.background, pair.interference);
+  const std::string later = pair.background > 0.0 ? fmt::format(", and after {:g} s {:g} N away from it",
+                                                                protocol.onset(), pair.background)
+                                                  : "";
+  plan.request = fmt::format(
+      "{}: hold the handle outside the wall; after Enter press it firmly against the wall and keep it on the "
+      "spot for {:g} s (pulses of {:g} N act along the wall{})",
+      plan.name, protocol.duration() + 0.1, pair.interference, later);
+  plan.hold_time = protocol.duration();
+  for (int pulse = 0; pulse < 2 * protocol.pulses; ++pulse) {
+    if (pulse == protocol.pulses) plan.changes.push_back({protocol.onset(), Of::background, pair.background});
+    const double begin = protocol.pulse_begin(pulse);
+    plan.changes.push_back({begin, Of::interference, pair.interference});
+    plan.changes.push_back({begin + protocol.pulse_on, Of::interference, 0.0});
+  }
+  return plan;
+}
+
+void to_json(RunJournal::Json& json, const DeviationTouch& touch) {
+  write_fields(json, touch, deviation_touch_fields);
+}
+
+void from_json(const RunJournal::Json& json, DeviationTouch& touch) {
+  read_fields(json, touch, deviation_touch_fields);
+}
+
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const DeviationSettings& settings) {
   const DeviationProtocol& protocol = settings.protocol;
-  simulation::IntendedMotionConfig motion, still;
-  motion.start_position = 0.02;
-  motion.approach_speed = settings.approach_speed;
-  motion.push_force = settings.push;
-  motion.hold_time = protocol.duration() + 60.0;
-  still.start_position = 0.0;  // begin_motion() is never called: the person intends to stay there
-  simulation::CoupledHandle normal(settings.device, person, motion);
-  simulation::CoupledHandle tangential(settings.device, person, still);
-  normal.begin_motion();
-
-  control::HapticLoopConfig<float> config =
-      touched_wall(protocol.haptic_rate, settings.count_length, settings.device.force_limit);
-  config.wall.kind = control::WallKind::plain;
-  config.wall.stiffness = static_cast<float>(protocol.stiffness);
-  config.interference.mode = control::InterferenceMode::parallel;
-  const simulation::EncoderModel encoder(settings.count_length);
-  using Loop = control::HapticLoop<float>;
-  // By what acts inside: F_I in a pulse, F_B in the second half.
-  std::array<std::array<Loop::Coefficients, 2>, 2> coefficients;
-  for (const bool on : {false, true}) {
-    for (const bool second : {false, true}) {
-      config.interference.force = on ? static_cast<float>(interference) : 0.0F;
-      config.interference.background_force = second ? static_cast<float>(background) : 0.0F;
-      coefficients[on ? 1 : 0][second ? 1 : 0] =
-          Loop::prepare(config, encoder.extended_counts(motion.start_position));
-    }
-  }
-  Loop loop;
-
-  DeviationTouch result;
-  std::vector<DeviationSample> own;
-  std::vector<DeviationSample>& samples = recording != nullptr ? *recording : own;
-  samples.clear();
-  const double period = 1.0 / protocol.haptic_rate;
-  constexpr double patience = 30.0;  // s of approach
-  std::uint64_t waited = 0, since_touch = 0, inside = 0, beyond = 0;
-  while (static_cast<double>(waited) * period < patience) {
-    const double time = static_cast<double>(since_touch) * period;
-    if (result.touched && time >= protocol.duration()) break;
-    const bool on = result.touched && pulse_at(protocol, time);
-    const bool second = result.touched && time >= protocol.onset();
-    const Loop::Output& out =
-        loop.tick(coefficients[on ? 1 : 0][second ? 1 : 0], encoder.extended_counts(normal.position()), true);
-    const double felt = second && out.inside ? background : 0.0;
-    result.touched = result.touched || out.inside;
-    const auto force = static_cast<double>(out.force);
-    const auto along = static_cast<double>(out.tangential_force);
-    if (result.touched) {
-      samples.push_back(
-          {time, static_cast<double>(encoder.extended_counts(tangential.position())) * settings.count_length,
-           along});
-      inside += out.inside ? 1 : 0;
-      beyond +=
-          std::abs(force) > paper::touch_force_limit || std::abs(along) > paper::touch_force_limit ? 1 : 0;
-      ++since_touch;
-    } else {
-      ++waited;
-    }
-    normal.advance(force, felt, period);
-    tangential.advance(along, felt, period);
-  }
-  if (!result.touched) return result;
-  std::vector<double> begins;
-  for (int number = 0; number < 2 * protocol.pulses; ++number)
-    begins.push_back(protocol.pulse_begin(number) - 0.5 * period);
-  result.measure = measure_deviation(samples, begins, protocol.pulse_on);
-  result.contact_share = static_cast<double>(inside) / static_cast<double>(since_touch);
-  result.beyond_limit_share = static_cast<double>(beyond) / static_cast<double>(since_touch);
-  return result;
+  RunJournal::Json all = touch_settings("deviation", device, limits,
+                                        {{"other_axis", device_circumstances(device, 1 - limits.axis)},
+                                         {"stiffness_n_per_m", protocol.stiffness},
+                                         {"haptic_rate_hz", protocol.haptic_rate},
+                                         {"rest_s", protocol.rest},
+                                         {"pulse_on_s", protocol.pulse_on},
+                                         {"pulse_off_s", protocol.pulse_off},
+                                         {"pulses", protocol.pulses}});
+  all["wall_abort_amplitude_m"] = limits.wall_abort_amplitude;
+  return all;
 }
 
 DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const DeviationTouch> touches) {
@@ -164,19 +125,39 @@ DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const
   return result;
 }
 
-std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
-                                           const std::vector<simulation::OperatorModel>& people,
-                                           const ProgressReport& tell) {
-  check.require_somebody(people);
-  std::vector<DeviationResult> results;
-  for (const paper::DeviationCell& cell : paper::table_2) {
-    if (tell) tell(results.size(), paper::table_2.size());
+DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& tell) {
+  const DeviationProtocol& protocol = settings.protocol;
+  constexpr SettingCheck check("deviation");
+  check("rest", protocol.rest, 0.0, 60.0);
+  check("pulse", protocol.pulse_on, 4.0 / protocol.haptic_rate, 60.0);
+  check("pause", protocol.pulse_off, 0.0, 60.0);
+  check("pulses", protocol.pulses, 1, 1000);
+  DeviationRun run;
+  for (const paper::DeviationCell& pair : settings.pairs) {
+    if (tell) tell(run.results.size(), settings.pairs.size());
+    rig.set({protocol.stiffness, protocol.haptic_rate, control::InterferenceMode::parallel});
+    TouchPlan plan = deviation_plan(protocol, pair);
     std::vector<DeviationTouch> touches;
-    for (const simulation::OperatorModel& person : people)
-      touches.push_back(simulate_deviation(settings, person, cell.background, cell.interference));
-    results.push_back(mean_deviation(cell, touches));
+    std::size_t aborted = 0, without_contact = 0;
+    for (plan.person = 0; plan.person < rig.people(); ++plan.person) {
+      DeviationTouch touch = rig.touch<DeviationTouch>(
+          plan, [&](const RigTouch& made) { return measured_touch(made, plan, protocol.pulse_on); });
+      run.lost_records += touch.lost_records;
+      run.limited_share = std::max(run.limited_share, touch.limited_share);
+      aborted += touch.aborted ? 1 : 0;
+      if (!rig.simulated()) {
+        without_contact += touch.counts() ? 0 : 1;
+        touch.touched = !touch.aborted && touch.counts();
+      }
+      touches.push_back(touch);
+    }
+    run.results.push_back(mean_deviation(pair, touches));
+    DeviationResult& result = run.results.back();
+    result.aborted = aborted;
+    result.without_contact = without_contact;
+    if (result.touches == 0) result.contact_share = touches.front().contact_share;
   }
-  return results;
+  return run;
 }
 
 TestedClaim DeviationVerdict::claim_met() const {

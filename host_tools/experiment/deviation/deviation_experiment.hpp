@@ -6,14 +6,17 @@
 // Dev here: the largest distance along the surface from where the handle was when the pulse began, the mean
 // of the pulses. The length of the pulses is not in the paper; 0.5 s on, 0.5 s off.
 //
-// Simulated: the normal axis is a simulation::CoupledHandle against control::HapticLoop<float>, whose own
-// interference (mode parallel) gives both forces, F_I switched with the pulses and F_B on at t_0 of the touch
-// (the loop's own onset time begins anew at every contact, so a handle that leaves the wall for one sample
-// would lose F_B); the tangential axis is a second CoupledHandle of the same person, whose arm is activated
-// by the background force of the first one and who intends to stay where the handle is. That the hand is the
-// same in both directions is an assumption. The person presses harder than any F_B, so that contact is never
-// lost: a bouncing handle would be pushed along the surface for less time, and that would pass for a stiffer
-// arm.
+// Two axes: the wall's is the normal, the other one lies along the surface and takes the interference, which
+// the firmware passes from axis to axis; simulated_rig.hpp says how both are simulated. F_I is switched with
+// the pulses and F_B on at t_0 of the touch (the loop's own onset time begins again at every contact, so a
+// handle that leaves the wall for one sample would lose F_B). The person presses harder than any F_B, so that
+// contact is never lost: a bouncing handle would be pushed along the surface for less time, and that would
+// pass for a stiffer arm.
+//
+// On a device pulses are switched by the host, at the link's pace; when each was really switched is what its
+// deviation is measured from. A person simulated on one must push harder than F_B, since what the person adds
+// against F_B lags behind the onset, and hold for the whole touch: whoever lets go sooner swings out of the
+// wall, which ends the touch. The supplied scene paper1_deviation holds for 15 s.
 //
 // With activation_gain = 0 nothing in this model makes Dev depend on F_B: that case is computed beside every
 // other, and there the paper's trend must fail.
@@ -24,10 +27,10 @@
 #include <vector>
 
 #include "host_tools/experiment/background_trend.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
-#include "host_tools/simulation/device_model.hpp"
-#include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/experiment/simulated_rig.hpp"
 
 namespace kmax::experiment {
 
@@ -52,17 +55,22 @@ struct DeviationProtocol {
 
 struct DeviationSettings {
   DeviationProtocol protocol;
-  simulation::DeviceModel device{.force_limit = 0.0};
-  double count_length = paper::touch_resolution;  ///< m, both axes
-  double approach_speed = 0.2;                    ///< m/s
-  double push = 5.0;                              ///< N, static; above every F_B
+  std::vector<paper::DeviationCell> pairs{paper::table_2.begin(), paper::table_2.end()};
 };
 
-struct DeviationSample {
-  double time;        ///< s from the touch
-  double tangential;  ///< m along the surface, as the encoder shows it
-  double force;       ///< N along the surface
-};
+/// What holds the handle unless something else is said.
+inline SimulatedHands deviation_hands() {
+  SimulatedHands hands;
+  hands.push = 5.0;  // above every F_B
+  return hands;
+}
+/// Along the surface; the paper's deviation reaches 17 mm. Against the wall, a plain one that is unstable
+/// shows more than wall_abort_amplitude.
+inline TouchLimits deviation_limits() {
+  TouchLimits limits;
+  limits.abort_amplitude = 0.05;
+  return limits;
+}
 
 struct DeviationMeasure {
   double without = 0.0, with = 0.0;  ///< m, mean of the pulses in each half
@@ -70,20 +78,32 @@ struct DeviationMeasure {
 };
 
 /// `begins`: when each pulse began, s from the touch, the first half without F_B, the second with it.
-DeviationMeasure measure_deviation(std::span<const DeviationSample> samples, std::span<const double> begins,
+DeviationMeasure measure_deviation(std::span<const RigSample> samples, std::span<const double> begins,
                                    double pulse_on);
 
+/// A touch on a device with less contact is not averaged: without the wall there is no F_I.
+inline constexpr double least_contact = 0.95;
+
+/// One touch, as a journal keeps it.
 struct DeviationTouch {
   DeviationMeasure measure;
-  bool touched = false;
-  double contact_share = 0.0;       ///< of the samples from the touch on
-  double beyond_limit_share = 0.0;  ///< of them, with a force on either axis beyond the paper's 3.3 N
+  double contact_share = 0.0;  ///< of the samples from the touch on
+  double beyond_limit_share =
+      0.0;                     ///< simulated: of them, with a force on either axis beyond the paper's 3.3 N
+  double limited_share = 0.0;  ///< on a device
+  bool touched = true, aborted = false;
+  std::uint64_t lost_records = 0;
+  bool counts() const { return aborted || contact_share >= least_contact; }
 };
+void to_json(RunJournal::Json& json, const DeviationTouch& touch);
+void from_json(const RunJournal::Json& json, DeviationTouch& touch);  ///< throws what is wrong
 
-/// One touch. Throws std::invalid_argument.
-DeviationTouch simulate_deviation(const DeviationSettings& settings, const simulation::OperatorModel& person,
-                                  double background, double interference,
-                                  std::vector<DeviationSample>* recording = nullptr);
+/// Everything the touches on a device depend on, for a journal.
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const DeviationSettings& settings);
+
+/// The touch of one pair of forces.
+TouchPlan deviation_plan(const DeviationProtocol& protocol, const paper::DeviationCell& pair);
 
 /// The mean over people for one pair of forces.
 struct DeviationResult {
@@ -96,10 +116,14 @@ struct DeviationResult {
 };
 DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const DeviationTouch> touches);
 
-/// All pairs of Table II; `tell` as run_jitter().
-std::vector<DeviationResult> run_deviation(const DeviationSettings& settings,
-                                           const std::vector<simulation::OperatorModel>& people,
-                                           const ProgressReport& tell = {});
+struct DeviationRun {
+  std::vector<DeviationResult> results;
+  double limited_share = 0.0;  ///< on a device: the greatest
+  std::uint64_t lost_records = 0;
+};
+
+/// All pairs of forces; a touch that was aborted is counted, not averaged. `tell` and errors as run_jitter().
+DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& tell = {});
 
 struct DeviationVerdict {
   std::vector<BackgroundTrend> trends;  ///< m, one for each F_I that has a deviation in the paper

@@ -10,11 +10,11 @@
 
 namespace kmax::experiment {
 namespace {
-std::string mm(double metres) {
+std::string deviation_mm(double metres) {
   return fmt::format("{:.2f}", metres * 1e3);
 }
-std::string mm(const std::optional<double>& metres) {
-  return metres ? mm(*metres) : std::string("-");
+std::string deviation_mm(const std::optional<double>& metres) {
+  return metres ? deviation_mm(*metres) : std::string("-");
 }
 
 const DeviationResult* at(const std::vector<DeviationResult>& results, const paper::DeviationCell& cell) {
@@ -31,27 +31,65 @@ const DeviationFit* fit_named(const DeviationStudy& study, std::string_view name
 }
 }  // namespace
 
-DeviationStudy study_deviation(const DeviationSettings& settings,
+DeviationStudy study_deviation(const DeviationSettings& settings, const SimulatedHands& hands,
                                const std::vector<simulation::OperatorModel>& people,
                                const ProgressReport& tell) {
+  const DeviationProtocol& protocol = settings.protocol;
+  for (const paper::DeviationCell& pair : settings.pairs)
+    if (!(hands.push > pair.background))
+      throw std::invalid_argument(fmt::format(
+          "deviation: a push of {} N loses the wall against F_B = {} N: push harder than every F_B",
+          hands.push, pair.background));
+  SimulatedRig rig("deviation", people, hands);
   DeviationStudy study;
-  study.results = run_deviation(settings, people, part_of(tell, 0, 1, 2));
+  study.results = run_deviation(rig, settings, part_of(tell, 0, 1, 2)).results;
   study.verdict = judge_deviation(study.results);
   std::vector<simulation::OperatorModel> never_stiffer = people;
   for (simulation::OperatorModel& person : never_stiffer) person.activation_gain = 0.0;
-  study.without_stiffening = run_deviation(settings, never_stiffer, part_of(tell, 1, 1, 2));
+  SimulatedRig slack("deviation", never_stiffer, hands);
+  study.without_stiffening = run_deviation(slack, settings, part_of(tell, 1, 1, 2)).results;
   study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
   study.fits = fit_table_2();
-  simulate_deviation(settings, people.front(), 3.0, 5.0, &study.touch);
+  study.touch = rig.record(deviation_plan(protocol, *paper::deviation(3.0, 5.0))).samples;
+  std::erase_if(study.touch, [](const RigSample& sample) { return sample.time < 0.0; });
   double contact = 1.0;
   for (const DeviationResult& result : study.results) contact = std::min(contact, result.contact_share);
   study.circumstances = fmt::format(
       "Simulated: {}, wall of {:g} N/mm at {:g} Hz, push {:g} N, {} pulses of {:g} s without and {} with "
-      "F_B, {:g} "
-      "s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
-      people_words(people.size()), settings.protocol.stiffness / 1000, settings.protocol.haptic_rate,
-      settings.push, settings.protocol.pulses, settings.protocol.pulse_on, settings.protocol.pulses,
-      settings.protocol.rest, clipping_words(settings.device), 100 * contact);
+      "F_B, "
+      "{:g} s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
+      people_words(people.size()), protocol.stiffness / 1000, protocol.haptic_rate, hands.push,
+      protocol.pulses, protocol.pulse_on, protocol.pulses, protocol.rest, clipping_words(hands.device),
+      100 * contact);
+  return study;
+}
+
+DeviationStudy study_deviation(DeviceRig& rig, const DeviationSettings& settings) {
+  const DeviationProtocol& protocol = settings.protocol;
+  const DeviationRun run = run_deviation(rig, settings);
+  DeviationStudy study;
+  study.origin = report::Origin::measured;
+  study.results = run.results;
+  study.verdict = judge_deviation(study.results);
+  study.fits = fit_table_2();
+  const std::size_t axis = rig.limits().axis;
+  study.circumstances = fmt::format(
+      "Measured on {}: wall of {:g} N/mm at {:g} Hz on axis {}, pulses of {:g} s on axis {}, force limit "
+      "{:g} "
+      "N, which took something away in up to {:.0f} % of a touch's samples; {} trace records lost.",
+      rig.description(), protocol.stiffness / 1000, protocol.haptic_rate, axis, protocol.pulse_on, 1 - axis,
+      rig.force_limit(), 100 * run.limited_share, run.lost_records);
+  for (const DeviationResult& one : study.results) {
+    const std::string pair =
+        fmt::format("F_B = {:g} N, F_I = {:g} N: not counted", one.paper.background, one.paper.interference);
+    if (one.without_contact > 0)
+      rig.note(
+          fmt::format("{}, the wall was touched less than {:.0f} % of the time", pair, 100 * least_contact));
+    if (one.aborted > 0)
+      rig.note(fmt::format(
+          "{}, the handle swung too far or left the wall before the {:g} s of the touch were over", pair,
+          protocol.duration()));
+  }
   return study;
 }
 
@@ -67,13 +105,14 @@ report::Table deviation_table(const DeviationStudy& study) {
     table.columns.push_back("beyond 3.3 N (%)");
   }
   for (const DeviationResult& result : study.results) {
-    table.rows.push_back({fmt::format("{:g}", result.paper.background),
-                          fmt::format("{:g}", result.paper.interference), mm(result.paper.deviation),
-                          result.touches > 0 ? mm(result.deviation) : "-",
-                          result.touches > 0 ? mm(result.before) : "-", fmt::format("{}", result.aborted)});
+    table.rows.push_back(
+        {fmt::format("{:g}", result.paper.background), fmt::format("{:g}", result.paper.interference),
+         deviation_mm(result.paper.deviation), result.touches > 0 ? deviation_mm(result.deviation) : "-",
+         result.touches > 0 ? deviation_mm(result.before) : "-", fmt::format("{}", result.aborted)});
     if (!simulated) continue;
     const DeviationResult* other = at(study.without_stiffening, result.paper);
-    table.rows.back().push_back(other != nullptr && other->touches > 0 ? mm(other->deviation) : "-");
+    table.rows.back().push_back(other != nullptr && other->touches > 0 ? deviation_mm(other->deviation)
+                                                                       : "-");
     table.rows.back().push_back(fmt::format("{:.0f}", 100 * result.beyond_limit_share));
   }
   return table;
@@ -89,14 +128,15 @@ report::Table deviation_claims_table(const DeviationStudy& study) {
   };
   const auto rows = [&](const std::string& name, const std::vector<BackgroundTrend>& trends) {
     for (const BackgroundTrend& trend : trends)
-      table.rows.push_back({name, fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
-                            ratio(trend), rank_text(trend.rank), yes_no(trend.falls(), "not shown")});
+      table.rows.push_back({name, fmt::format("{:g}", trend.interference), deviation_mm(trend.without),
+                            deviation_mm(trend.with), ratio(trend), rank_text(trend.rank),
+                            yes_no(trend.falls(), "not shown")});
   };
   rows(std::string(report::to_string(study.origin)), study.verdict.trends);
   if (!study.without_stiffening.empty()) rows("activation_gain = 0", study.verdict_without_stiffening.trends);
   for (const BackgroundTrend& trend : printed_deviation_trends())
-    table.rows.push_back({"paper", fmt::format("{:g}", trend.interference), mm(trend.without), mm(trend.with),
-                          ratio(trend), "-", yes_no(trend.falls(), "not shown")});
+    table.rows.push_back({"paper", fmt::format("{:g}", trend.interference), deviation_mm(trend.without),
+                          deviation_mm(trend.with), ratio(trend), "-", yes_no(trend.falls(), "not shown")});
   return table;
 }
 
@@ -219,10 +259,10 @@ std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
   page.sections.push_back({"What the paper's table tells of the hand", {}, {deviation_fit_table(study)}, {}});
   if (!study.touch.empty()) {
     plot::Series along{"", {}, {}, true}, force{"", {}, {}, true};
-    for (const DeviationSample& sample : study.touch) {
+    for (const RigSample& sample : study.touch) {
       for (plot::Series* series : {&along, &force}) series->x.push_back(sample.time);
       along.y.push_back(sample.tangential * 1e3);
-      force.y.push_back(sample.force);
+      force.y.push_back(sample.tangential_force);
     }
     const plot::Figure touch{"F_I = 5 N in pulses, F_B = 3 N in the second half",
                              "time since the touch (s)",

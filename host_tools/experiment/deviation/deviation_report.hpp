@@ -7,6 +7,7 @@
 
 #include "host_tools/experiment/deviation/deviation_experiment.hpp"
 #include "host_tools/experiment/deviation/deviation_fit.hpp"
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
@@ -20,12 +21,16 @@ struct DeviationStudy {
   DeviationVerdict verdict_without_stiffening;
   std::vector<DeviationFit> fits;  ///< of the paper's table
   std::string circumstances;
-  std::vector<DeviationSample> touch;  ///< F_I = 5 N, F_B = 3 N, as Fig. 3 shows it; empty for a device
+  std::vector<RigSample> touch;  ///< F_I = 5 N, F_B = 3 N, as Fig. 3 shows it; empty for a device
 };
 
-DeviationStudy study_deviation(const DeviationSettings& settings,
+/// The simulated study. Throws std::invalid_argument for a push that loses the wall against an F_B.
+DeviationStudy study_deviation(const DeviationSettings& settings, const SimulatedHands& hands,
                                const std::vector<simulation::OperatorModel>& people,
                                const ProgressReport& tell = {});
+
+/// What somebody did on a device, who is told by the rig; it notes what was not counted.
+DeviationStudy study_deviation(DeviceRig& rig, const DeviationSettings& settings);
 
 report::Table deviation_table(const DeviationStudy& study);
 report::Table deviation_claims_table(const DeviationStudy& study);

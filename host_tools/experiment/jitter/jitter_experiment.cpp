@@ -1,22 +1,22 @@
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/experiment/journal_fields.hpp"
 #include "host_tools/experiment/rank_correlation.hpp"
 #include "host_tools/experiment/setting_check.hpp"
-#include "host_tools/experiment/simulated_touch.hpp"
-#include "host_tools/simulation/coupled_handle.hpp"
-#include "host_tools/simulation/encoder_model.hpp"
 
 namespace kmax::experiment {
 
-JitterMeasure measure_jitter(std::span<const JitterSample> samples, const JitterWall& wall) {
+JitterMeasure measure_jitter(std::span<const RigSample> samples, const JitterWall& wall) {
   JitterMeasure measure;
   double touch = 0.0, previous = 0.0, last_outside = 0.0;
   std::size_t judged = 0, beyond = 0;
   const double sample_time = 1.0 / wall.haptic_rate;
-  for (const JitterSample& sample : samples) {
+  for (const RigSample& sample : samples) {
     if (!measure.touched && sample.outside_distance <= 0.0) {
       measure.touched = true;
       touch = last_outside = sample.time;
@@ -38,71 +38,49 @@ JitterMeasure measure_jitter(std::span<const JitterSample> samples, const Jitter
 }
 
 namespace {
-constexpr SettingCheck check("jitter");
+constexpr auto jitter_touch_fields = [](auto& touch, const auto& field) {
+  field("touched", touch.measure.touched);
+  field("settled", touch.measure.settled);
+  field("jitter_m", touch.measure.amplitude);
+  field("adjustment_time_s", touch.measure.adjustment_time);
+  field("beyond_limit_share", touch.measure.beyond_limit_share);
+  field("aborted", touch.aborted);
+  field("limited_share", touch.limited_share);
+  field("lost_records", touch.lost_records);
+};
 
-void require(const JitterSettings& settings) {
-  check("stiffness", settings.wall.stiffness, 1.0, 1e6);
-  check("haptic rate", settings.wall.haptic_rate, 10.0, 1e6);
-  check("window", settings.wall.window, 0.01, 1000.0);
-  check("settled time", settings.wall.settled_time, 0.0, settings.wall.window);
-  check("count length", settings.count_length, 1e-9, 1e-2);
-  check("reaction", settings.reaction, 0.0, 1.0);
-  check("waiting time", settings.waiting_time, 0.0, 1000.0);
-  check("touches", settings.touches, 1, 1000);
+TouchPlan plan_of(const paper::JitterCell& pair, const JitterSettings& settings, int number) {
+  TouchPlan plan;
+  plan.name = fmt::format("F_B = {:g} N, F_I = {:g} N, touch {} of {}", pair.background, pair.interference,
+                          number + 1, settings.touches);
+  const std::string at_once =
+      pair.background > 0.0 ? fmt::format("{:g} N act at once, ", pair.background) : "";
+  plan.request = fmt::format(
+      "{}: hold the handle outside the wall; after Enter touch the wall and keep the handle there for {:g} s "
+      "({}inside {:g} N push it back)",
+      plan.name, settings.wall.window, at_once, pair.background + pair.interference);
+  plan.hold_time = settings.wall.window;
+  plan.phase = static_cast<double>(number) / settings.touches;
+  return plan;
 }
-
-constexpr double start = 0.02;  // m in front of the surface
 }  // namespace
 
-JitterMeasure simulate_jitter(const JitterSettings& settings, const simulation::OperatorModel& person,
-                              double background, double interference, double phase,
-                              std::vector<JitterSample>* recording) {
-  require(settings);
-  simulation::IntendedMotionConfig motion;
-  const double period = 1.0 / settings.wall.haptic_rate;
-  motion.start_position = start + phase * settings.approach_speed * period;
-  motion.approach_speed = settings.approach_speed;
-  motion.push_force = settings.push;
-  motion.hold_time = settings.wall.window + 60.0;
-  simulation::CoupledHandle handle(settings.device, person, motion);
+void to_json(RunJournal::Json& json, const JitterTouch& touch) {
+  write_fields(json, touch, jitter_touch_fields);
+}
 
-  control::HapticLoopConfig<float> config =
-      touched_wall(settings.wall.haptic_rate, settings.count_length, settings.device.force_limit);
-  config.wall.kind = control::WallKind::plain;
-  config.wall.stiffness = static_cast<float>(settings.wall.stiffness);
-  config.interference.mode = control::InterferenceMode::perpendicular;
-  config.interference.force = static_cast<float>(interference);
-  config.interference.background_force = static_cast<float>(background);
-  const simulation::EncoderModel encoder(settings.count_length);
-  using Loop = control::HapticLoop<float>;
-  const Loop::Coefficients coefficients =
-      Loop::prepare(config, encoder.extended_counts(motion.start_position));
-  Loop loop;
+void from_json(const RunJournal::Json& json, JitterTouch& touch) {
+  read_fields(json, touch, jitter_touch_fields);
+}
 
-  std::vector<JitterSample> own;
-  std::vector<JitterSample>& samples = recording != nullptr ? *recording : own;
-  samples.clear();
-  constexpr double patience = 30.0;  // s of approach
-  const double begin = settings.waiting_time;
-  bool moving = false;
-  double touch = -1.0;
-  for (std::uint64_t n = 0;; ++n) {
-    const double time = static_cast<double>(n) * period;
-    if (!moving && time >= begin) {
-      handle.begin_motion();
-      moving = true;
-    }
-    if (touch >= 0.0 ? time > touch + settings.wall.window : time > begin + patience) break;
-    const Loop::Output& out = loop.tick(coefficients, encoder.extended_counts(handle.position()), true);
-    if (moving && touch < 0.0 && out.inside) touch = time;
-    if (moving)
-      samples.push_back({time, static_cast<double>(out.outside_distance), static_cast<double>(out.force)});
-    const double felt = background + (out.inside ? settings.reaction * interference : 0.0);
-    handle.advance(static_cast<double>(out.force), felt, period);
-  }
-  if (touch >= 0.0)
-    for (JitterSample& sample : samples) sample.time -= touch;
-  return measure_jitter(samples, settings.wall);
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const JitterSettings& settings) {
+  return touch_settings("jitter", device, limits,
+                        {{"stiffness_n_per_m", settings.wall.stiffness},
+                         {"haptic_rate_hz", settings.wall.haptic_rate},
+                         {"window_s", settings.wall.window},
+                         {"settled_time_s", settings.wall.settled_time},
+                         {"touches", settings.touches}});
 }
 
 JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMeasure> touches) {
@@ -127,24 +105,44 @@ JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMe
   return result;
 }
 
-std::vector<JitterResult> run_jitter(const JitterSettings& settings,
-                                     const std::vector<simulation::OperatorModel>& people,
-                                     const ProgressReport& tell) {
-  check.require_somebody(people);
-  require(settings);
-  std::vector<JitterResult> results;
-  for (const paper::JitterCell& cell : paper::table_1) {
-    if (tell) tell(results.size(), paper::table_1.size());
-    std::vector<JitterMeasure> touches;
-    for (const simulation::OperatorModel& person : people) {
-      for (int touch = 0; touch < settings.touches; ++touch) {
-        const double phase = static_cast<double>(touch) / settings.touches;
-        touches.push_back(simulate_jitter(settings, person, cell.background, cell.interference, phase));
+JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& tell) {
+  const JitterWall& wall = settings.wall;
+  constexpr SettingCheck check("jitter");
+  check("window", wall.window, 0.01, 1000.0);
+  check("settled time", wall.settled_time, 0.0, wall.window);
+  check("touches", settings.touches, 1, 1000);
+  const auto measured = [&](const RigTouch& touch) {
+    return JitterTouch{touch.aborted ? JitterMeasure{} : measure_jitter(touch.samples, wall), touch.aborted,
+                       touch.limited_share, touch.lost_records};
+  };
+  JitterRun run;
+  for (const paper::JitterCell& pair : settings.pairs) {
+    if (tell) tell(run.results.size(), settings.pairs.size());
+    rig.set({wall.stiffness, wall.haptic_rate, control::InterferenceMode::perpendicular, pair.interference,
+             pair.background});
+    std::vector<JitterMeasure> measures;
+    std::size_t aborted = 0;
+    for (std::size_t person = 0; person < rig.people(); ++person) {
+      for (int number = 0; number < settings.touches; ++number) {
+        TouchPlan plan = plan_of(pair, settings, number);
+        plan.person = person;
+        const auto touch = rig.touch<JitterTouch>(plan, measured);
+        run.lost_records += touch.lost_records;
+        run.limited_share = std::max(run.limited_share, touch.limited_share);
+        if (touch.aborted) {
+          ++aborted;
+        } else if (touch.lost_records > 0) {
+          rig.note(fmt::format("{}: not counted, {} records of its trace were lost", plan.name,
+                               touch.lost_records));
+        } else {
+          measures.push_back(touch.measure);
+        }
       }
     }
-    results.push_back(mean_jitter(cell, touches));
+    run.results.push_back(mean_jitter(pair, measures));
+    run.results.back().aborted = aborted;
   }
-  return results;
+  return run;
 }
 
 TestedClaim JitterVerdict::amplitude_falls() const {

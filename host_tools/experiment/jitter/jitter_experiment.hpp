@@ -8,11 +8,11 @@
 //   AT    from the first touch to the last moment outside; only if the handle then stays inside (`settled`)
 // Both are 0 when the first touch already holds, as in the paper at F_I = 1 N.
 //
-// Simulated: control::HapticLoop<float>, the firmware's own code, on simulation::CoupledHandle. What the
-// person answers to with activation and push is F_B, and inside the wall `reaction` times F_I as well: a
-// person who never presses harder than before could not hold the wall against F_I > push, and the bouncing
-// would not end. That answer, the stiffness of the wall, the push and the speed are not in the paper: they
-// are settings.
+// A simulated person answers to F_B, and inside the wall `reaction` times to F_I as well (simulated_rig.hpp):
+// one who never presses harder than before could not hold the wall against F_I > push, and the bouncing would
+// not end. That answer, the stiffness of the wall, the push and the speed are not in the paper: they are
+// settings. On a device the person is asked, for each pair of forces, to touch the wall and to keep the
+// handle there.
 //
 // The forces exceed the 3.3 N of the paper's own device: the simulated one is not clipped, and the share of
 // samples beyond 3.3 N is reported.
@@ -22,12 +22,11 @@
 #include <string>
 #include <vector>
 
-#include "control/haptic_loop.hpp"
 #include "host_tools/experiment/background_trend.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
-#include "host_tools/simulation/device_model.hpp"
-#include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/experiment/simulated_rig.hpp"
 
 namespace kmax::experiment {
 
@@ -41,20 +40,22 @@ struct JitterWall {
 
 struct JitterSettings {
   JitterWall wall;
-  simulation::DeviceModel device{.force_limit = 0.0};
-  double count_length = paper::touch_resolution;  ///< m
-  double approach_speed = 0.2;                    ///< m/s
-  double push = 1.0;                              ///< N, static, without what the person answers to
-  double reaction = 1.0;                          ///< 0 to 1, the share of F_I that the person answers to
-  double waiting_time = 2.0;  ///< s under F_B before the approach: the arm needs 1.2 to 1.5 s (section 5)
-  int touches = 4;            ///< per person, started at different moments within a sample
+  int touches = 4;  ///< per person and pair of forces; simulated: begun at different moments within a sample
+  std::vector<paper::JitterCell> pairs{paper::table_1.begin(), paper::table_1.end()};
 };
 
-struct JitterSample {
-  double time;              ///< s
-  double outside_distance;  ///< m, as the encoder shows it; <= 0 inside
-  double force;             ///< N
-};
+/// What holds the handle unless something else is said: the arm needs 1.2 to 1.5 s under F_B (section 5).
+inline SimulatedHands jitter_hands() {
+  SimulatedHands hands;
+  hands.waiting_time = 2.0;
+  return hands;
+}
+/// The paper's jitter reaches 10 mm.
+inline TouchLimits jitter_limits() {
+  TouchLimits limits;
+  limits.abort_amplitude = 0.03;
+  return limits;
+}
 
 struct JitterMeasure {
   bool touched = false;
@@ -65,13 +66,23 @@ struct JitterMeasure {
 };
 
 /// Judges a recording in order of time, whatever device it is from. The first touch may be anywhere in it.
-JitterMeasure measure_jitter(std::span<const JitterSample> samples, const JitterWall& wall);
+JitterMeasure measure_jitter(std::span<const RigSample> samples, const JitterWall& wall);
 
-/// One touch. `phase` 0 to 1: when within a sample the handle meets the surface. Throws
-/// std::invalid_argument.
-JitterMeasure simulate_jitter(const JitterSettings& settings, const simulation::OperatorModel& person,
-                              double background, double interference, double phase = 0.0,
-                              std::vector<JitterSample>* recording = nullptr);
+/// One touch, as a journal keeps it.
+struct JitterTouch {
+  JitterMeasure measure;  ///< nothing if aborted
+  bool aborted = false;
+  double limited_share = 0.0;
+  std::uint64_t lost_records = 0;
+  /// A jitter that fell into a gap of the trace was never seen.
+  bool counts() const { return aborted || (measure.touched && lost_records == 0); }
+};
+void to_json(RunJournal::Json& json, const JitterTouch& touch);
+void from_json(const RunJournal::Json& json, JitterTouch& touch);  ///< throws what is wrong
+
+/// Everything the touches on a device depend on, for a journal.
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const JitterSettings& settings);
 
 /// The mean over people and touches for one pair of forces.
 struct JitterResult {
@@ -81,10 +92,16 @@ struct JitterResult {
 };
 JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMeasure> touches);
 
-/// All pairs of Table I. `tell` is called before each pair with how many are done, and may throw.
-std::vector<JitterResult> run_jitter(const JitterSettings& settings,
-                                     const std::vector<simulation::OperatorModel>& people,
-                                     const ProgressReport& tell = {});
+struct JitterRun {
+  std::vector<JitterResult> results;
+  double limited_share = 0.0;      ///< on a device: the greatest share of limited samples in a touch
+  std::uint64_t lost_records = 0;  ///< of touches that were aborted, or not counted for it
+};
+
+/// All pairs of forces. An aborted touch is counted, not averaged. One that lost records of its trace every
+/// time it was made is neither; the rig notes it. `tell` is called before each pair with how many are done,
+/// and may throw. Throws std::invalid_argument for settings out of range, and what the rig throws.
+JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& tell = {});
 
 struct JitterVerdict {
   std::vector<BackgroundTrend> amplitude, time;     ///< one for each F_I that has jitter in the paper

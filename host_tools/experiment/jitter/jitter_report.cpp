@@ -10,7 +10,7 @@
 
 namespace kmax::experiment {
 namespace {
-std::string mm(double metres) {
+std::string jitter_mm(double metres) {
   return fmt::format("{:.1f}", metres * 1e3);
 }
 std::string mm_fine(const std::optional<double>& metres) {
@@ -36,33 +36,55 @@ std::string time_text(const JitterResult& result) {
 }
 }  // namespace
 
-JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simulation::OperatorModel>& people,
-                         const ProgressReport& tell) {
-  const auto part = [&](std::size_t number) { return part_of(tell, number, 1, 3); };
+JitterStudy study_jitter(const JitterSettings& settings, const SimulatedHands& hands,
+                         const std::vector<simulation::OperatorModel>& people, const ProgressReport& tell) {
+  const auto run = [&](const SimulatedHands& holding, const std::vector<simulation::OperatorModel>& held_by,
+                       std::size_t number) {
+    SimulatedRig rig("jitter", held_by, holding);
+    return run_jitter(rig, settings, part_of(tell, number, 1, 3)).results;
+  };
   JitterStudy study;
   study.wall = settings.wall;
-  study.results = run_jitter(settings, people, part(0));
+  study.results = run(hands, people, 0);
   study.verdict = judge_jitter(study.results);
-  const auto vary = [&](std::string name, const JitterSettings& changed,
-                        const std::vector<simulation::OperatorModel>& held_by, std::size_t number) {
-    JitterVariation variation{std::move(name), run_jitter(changed, held_by, part(number)), {}};
-    variation.verdict = judge_jitter(variation.results);
-    study.variations.push_back(std::move(variation));
-  };
   std::vector<simulation::OperatorModel> never_stiffer = people;
   for (simulation::OperatorModel& person : never_stiffer) person.activation_gain = 0.0;
-  vary("hand does not stiffen (activation_gain = 0)", settings, never_stiffer, 1);
-  JitterSettings indifferent = settings;
+  SimulatedHands indifferent = hands;
   indifferent.reaction = 0.0;
-  vary("person answers to F_B only (reaction = 0)", indifferent, people, 2);
-  simulate_jitter(settings, people.front(), 0.0, 5.0, 0.0, &study.without);
-  simulate_jitter(settings, people.front(), 3.0, 5.0, 0.0, &study.with);
+  study.variations = {{"hand does not stiffen (activation_gain = 0)", run(hands, never_stiffer, 1), {}},
+                      {"person answers to F_B only (reaction = 0)", run(indifferent, people, 2), {}}};
+  for (JitterVariation& variation : study.variations) variation.verdict = judge_jitter(variation.results);
+  SimulatedRig rig("jitter", people, hands);
+  const auto record = [&](double background) {
+    rig.set({settings.wall.stiffness, settings.wall.haptic_rate, control::InterferenceMode::perpendicular,
+             5.0, background});
+    TouchPlan plan;
+    plan.hold_time = settings.wall.window;
+    return rig.record(plan).samples;
+  };
+  study.without = record(0.0);
+  study.with = record(3.0);
   study.circumstances = fmt::format(
-      "Simulated: {}, {} each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force "
-      "is {}.",
+      "Simulated: {}, {} each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force is {}.",
       people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)),
-      settings.wall.stiffness / 1000, settings.wall.haptic_rate, settings.push, settings.approach_speed,
-      clipping_words(settings.device));
+      settings.wall.stiffness / 1000, settings.wall.haptic_rate, hands.push, hands.approach_speed,
+      clipping_words(hands.device));
+  return study;
+}
+
+JitterStudy study_jitter(DeviceRig& rig, const JitterSettings& settings) {
+  const JitterRun run = run_jitter(rig, settings);
+  JitterStudy study;
+  study.wall = settings.wall;
+  study.origin = report::Origin::measured;
+  study.results = run.results;
+  study.verdict = judge_jitter(study.results);
+  study.circumstances = fmt::format(
+      "Measured on {}: {} per pair, wall of {:g} N/mm at {:g} Hz, force limit {:g} N, which took something "
+      "away in up to {:.0f} % of a touch's samples; {} trace records lost.",
+      rig.description(), touch_words(static_cast<std::size_t>(settings.touches)),
+      settings.wall.stiffness / 1000, settings.wall.haptic_rate, rig.force_limit(), 100 * run.limited_share,
+      run.lost_records);
   return study;
 }
 
@@ -76,7 +98,7 @@ report::Table jitter_table(const JitterStudy& study) {
   for (const JitterResult& result : study.results) {
     table.rows.push_back(
         {fmt::format("{:g}", result.paper.background), fmt::format("{:g}", result.paper.interference),
-         mm(result.paper.amplitude), amplitude_text(result), ms(result.paper.adjustment_time),
+         jitter_mm(result.paper.amplitude), amplitude_text(result), ms(result.paper.adjustment_time),
          time_text(result), fmt::format("{} of {}", result.unsettled, result.touches),
          fmt::format("{}", result.aborted), fmt::format("{:.0f}", 100 * result.beyond_limit_share)});
   }
@@ -123,7 +145,8 @@ report::Table jitter_variations_table(const JitterStudy& study) {
   for (const JitterVariation& variation : study.variations)
     row(variation.name, variation.results, variation.verdict);
   const auto first = paper::jitter(0, 7), last = paper::jitter(4, 7);
-  table.rows.push_back({"paper", "yes", "yes", "-", mm(first->amplitude) + " -> " + mm(last->amplitude),
+  table.rows.push_back({"paper", "yes", "yes", "-",
+                        jitter_mm(first->amplitude) + " -> " + jitter_mm(last->amplitude),
                         ms(first->adjustment_time) + " -> " + ms(last->adjustment_time)});
   return table;
 }
@@ -198,9 +221,9 @@ plot::Panel trend_panel(const JitterStudy& study, const std::string& label, doub
   return panel;
 }
 
-plot::Series trace(const std::string& label, const std::vector<JitterSample>& samples, bool force) {
+plot::Series trace(const std::string& label, const std::vector<RigSample>& samples, bool force) {
   plot::Series series{label, {}, {}, true};
-  for (const JitterSample& sample : samples) {
+  for (const RigSample& sample : samples) {
     if (sample.time < -0.1 || sample.time > 1.5) continue;
     series.x.push_back(sample.time);
     series.y.push_back(force ? sample.force : sample.outside_distance * 1e3);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -25,12 +26,16 @@ struct JitterStudy {
   std::vector<JitterVariation> variations;  ///< empty for a device
   std::string circumstances;                ///< who held what, in one or two sentences
   /// One touch at F_I = 5 N without and with F_B = 3 N, as Fig. 2 shows it; empty for a device.
-  std::vector<JitterSample> without, with;
+  std::vector<RigSample> without, with;
 };
 
 /// The simulated study: the table, and the table without stiffening and without an answer to F_I.
-JitterStudy study_jitter(const JitterSettings& settings, const std::vector<simulation::OperatorModel>& people,
+JitterStudy study_jitter(const JitterSettings& settings, const SimulatedHands& hands,
+                         const std::vector<simulation::OperatorModel>& people,
                          const ProgressReport& tell = {});
+
+/// What somebody did on a device, who is told by the rig.
+JitterStudy study_jitter(DeviceRig& rig, const JitterSettings& settings);
 
 report::Table jitter_table(const JitterStudy& study);         ///< every pair of forces
 report::Table jitter_claims_table(const JitterStudy& study);  ///< the paper's claims, one row each

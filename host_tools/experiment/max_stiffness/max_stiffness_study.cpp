@@ -5,11 +5,25 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/experiment/max_stiffness/max_stiffness_json.hpp"
+#include "host_tools/experiment/journal_fields.hpp"
 
 namespace kmax::experiment {
 
 namespace {
+
+// Of a search's result in the journal: reads back equal to the last bit.
+constexpr auto search_fields = [](auto& result, const auto& field) {
+  field("stiffness_n_per_m", result.stiffness);
+  field("beyond_last", result.beyond_last);
+  field("never_touched", result.never_touched);
+  field("ending_speed_m_per_s", result.ending_speed);
+  field("ending_push_n", result.ending_push);
+  field("ending_peak_to_peak_m", result.ending_peak_to_peak);
+  field("saturated_share", result.saturated_share);
+  field("touches", result.touches);
+  field("event_limit_hits", result.event_limit_hits);
+  field("simulated_s", result.simulated_time);
+};
 
 // A fit with another force limit is none: part of the gain is the limit's.
 report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condition) {
@@ -28,13 +42,21 @@ std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jo
       jobs.size(), run.threads,
       [&](std::size_t index) {
         const StiffnessJob& job = jobs[index];
+        MaxStiffness result;
         if (run.journal != nullptr) {
-          if (const RunJournal::Json* known = run.journal->find(job.name)) return max_stiffness_from(*known);
+          if (const RunJournal::Json* known = run.journal->find(job.name)) {
+            read_fields(*known, result, search_fields);
+            return result;
+          }
         }
         TouchSetup setup = job.setup;
         setup.integrator = run.integrator;
-        const MaxStiffness result = search_max_stiffness(setup, run.protocol, run.steps);
-        if (run.journal != nullptr) run.journal->add(job.name, json_of(result));
+        result = search_max_stiffness(setup, run.protocol, run.steps);
+        if (run.journal != nullptr) {
+          RunJournal::Json json;
+          write_fields(json, result, search_fields);
+          run.journal->add(job.name, json);
+        }
         return result;
       },
       run.progress);

@@ -60,42 +60,4 @@ TouchSetup touch_setup(const simulation::DeviceModel& device, const simulation::
   return setup;
 }
 
-void CauseCondition::apply(TouchSetup& setup) const {
-  constexpr double force = 2.0;  // N: the F_MC whose effect is taken apart
-  auto& wall = setup.wall;
-  wall.wall.kind = field ? control::WallKind::magnetic : control::WallKind::plain;
-  wall.wall.magnetic_coefficient = static_cast<float>(force);
-  wall.wall.magnetic_length = static_cast<float>(magnetic_length);
-  if (preload) {
-    wall.interference.mode = control::InterferenceMode::perpendicular;
-    wall.interference.background_force = static_cast<float>(force);
-    wall.interference.force = 0.0F;
-  }
-  if (!stiffens) setup.person.activation_gain = 0.0;
-  setup.person.grip_stiffness *= grip_factor;
-  setup.person.grip_damping *= grip_factor;
-  setup.person.arm_stiffness *= arm_factor;
-  setup.person.arm_damping *= arm_factor;
-}
-
-std::vector<CauseCondition> cause_conditions(double grown) {
-  constexpr double no_length = 1e-9;  // m
-  return {
-      {"plain wall", "none of them"},
-      {"field, hand unchanged", "the field in front of the wall and its preload", true},
-      {"preload, hand unchanged", "2 N everywhere, no slope in front of the wall", false, 1e-3, true},
-      {"2 N inside only, hand unchanged", "the force steps at the surface", true, no_length},
-      {"grip stiffer, no field", fmt::format("k1 and b1 times {:.3g}", grown), false, 1e-3, false, false,
-       grown},
-      {"arm stiffer, no field", fmt::format("k2 and b2 times {:.3g}", grown), false, 1e-3, false, false, 1.0,
-       grown},
-      {"grip and arm stiffer, no field", fmt::format("all four times {:.3g}", grown), false, 1e-3, false,
-       false, grown, grown},
-      {"preload, hand stiffens", "2 N everywhere, and the hand answers", false, 1e-3, true, true},
-      {"2 N inside only, hand stiffens", "the step at the surface, and the hand answers", true, no_length,
-       false, true},
-      {"field, hand stiffens", "all of them", true, 1e-3, false, true},
-  };
-}
-
 }  // namespace kmax::experiment

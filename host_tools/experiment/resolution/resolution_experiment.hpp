@@ -15,7 +15,12 @@
 // touch does. The push matters: a person who happens to press with a force that the coarse wall can make (a
 // multiple of K eta) holds still in the middle of a step.
 //
-// Simulated with simulated_touch.hpp. Beside it the paper's criterion, K max(eta, delta v T) <= F_h
+// On a device nobody keeps a speed that is asked for: the one of the recording counts. The position that a
+// device records is the re-sampled one. A handle that moves across the border between two steps of 0.4 mm
+// shows a whole step, more than the threshold, however little it moves: taken as vibration, since the person
+// feels the force jump by K eta.
+//
+// Beside it the paper's criterion, K max(eta, delta v T) <= F_h
 // (control/resolution_criterion.hpp), with delta = 1 and F_h = the push.
 
 #include <optional>
@@ -24,12 +29,11 @@
 #include <vector>
 
 #include "control/resampler.hpp"
+#include "host_tools/experiment/limited_touches.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
-#include "host_tools/experiment/simulated_touch.hpp"
+#include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
-#include "host_tools/simulation/device_model.hpp"
-#include "host_tools/simulation/operator_model.hpp"
 
 namespace kmax::experiment {
 
@@ -50,12 +54,28 @@ struct ResolutionSettings {
   ResolutionWall wall;
   std::vector<double> resolutions{0.0, 0.1e-3, 0.4e-3};                          ///< m; 0: the encoder's own
   std::vector<double> speeds{0.02, 0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3, 0.5};  ///< m/s
-  std::vector<double> pushes{0.3, 0.6, 1.0};                                     ///< N
-  int touches = 4;                                                               ///< for each push
-  simulation::DeviceModel device{.friction = 0.06, .force_limit = 0.0};          ///< the Desktop's friction
-  double count_length = paper::desktop_resolution;                               ///< m
-  ResolutionHand weak{0.25, 0.5e-3};
+  std::vector<double> pushes{0.3, 0.6, 1.0};                                     ///< N, of simulated people
+  int touches = 4;                                                               ///< for each speed and push
 };
+/// What is asked of a person on a device unless something else is said.
+inline ResolutionSettings resolution_on_device() {
+  ResolutionSettings settings;
+  settings.speeds = {0.05, 0.08, 0.15, 0.3};
+  settings.touches = 1;
+  return settings;
+}
+
+/// The Desktop's encoder and friction.
+inline SimulatedHands resolution_hands() {
+  SimulatedHands hands;
+  hands.device.friction = 0.06;
+  hands.count_length = paper::desktop_resolution;
+  return hands;
+}
+inline constexpr ResolutionHand weak_hand{0.25, 0.5e-3};
+/// These people and their device with a hand's grip and delay. Throws std::invalid_argument.
+SimulatedRig rig_with(const ResolutionHand& hand, std::vector<simulation::OperatorModel> people,
+                      SimulatedHands hands);
 
 struct ResolutionCell {
   double resolution = 0.0;  ///< m, asked for; 0: the encoder's own
@@ -74,19 +94,41 @@ struct ResolutionRun {
   std::vector<ResolutionCell> cells;
 };
 
-/// A touch as the experiment makes it; how fast, how hard and from where are the caller's (setup.motion).
-TouchSetup resolution_touch(const ResolutionSettings& settings, const ResolutionHand& hand,
-                            const simulation::OperatorModel& person, double resolution);
+/// One touch, as a journal keeps it.
+struct ResolutionTouch {
+  double speed = 0.0;  ///< m/s, measured on a device
+  bool unstable = false, without_contact = false, aborted = false;
+  double peak_to_peak = 0.0;  ///< m
+  std::uint64_t lost_records = 0;
+  bool counts() const { return !without_contact; }
+};
+void to_json(RunJournal::Json& json, const ResolutionTouch& touch);
+void from_json(const RunJournal::Json& json, ResolutionTouch& touch);  ///< throws what is wrong
 
-/// Throws std::invalid_argument.
-ResolutionCell simulate_resolution(const ResolutionSettings& settings, const ResolutionHand& hand,
-                                   const std::vector<simulation::OperatorModel>& people, double resolution,
-                                   double speed);
+/// Everything the touches on a device depend on, for a journal.
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const ResolutionSettings& settings);
 
-/// Full grip without delay, with delay, weak grip without delay, with delay: in this order.
-std::vector<ResolutionRun> run_resolution(const ResolutionSettings& settings,
-                                          const std::vector<simulation::OperatorModel>& people,
-                                          const ProgressReport& tell = {});
+/// One touch before anybody is asked for it.
+TouchPlan resolution_plan(const ResolutionWall& wall, double step, double speed, int number, int touches);
+RigWall rig_wall(const ResolutionWall& wall, double resolution);
+
+struct ResolutionTouches {
+  /// One for each resolution and speed; on a device one for each touch, with the speed that was measured.
+  std::vector<ResolutionCell> cells;
+  std::size_t aborted = 0;  ///< of the touches: taken as vibrating
+  std::uint64_t lost_records = 0;
+};
+/// Every resolution at every speed. `tell` and errors as run_jitter().
+ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings,
+                                 const ProgressReport& tell = {});
+
+/// Of simulated people: full grip without delay, with delay, weak grip without delay, with delay, in this
+/// order.
+std::vector<ResolutionRun> run_hands(const ResolutionSettings& settings, const ResolutionHand& weak,
+                                     const SimulatedHands& hands,
+                                     const std::vector<simulation::OperatorModel>& people,
+                                     const ProgressReport& tell = {});
 
 struct ResolutionVerdict {
   TestedClaim coarse_vibrates;     ///< 0.4 mm: at every speed
@@ -115,13 +157,11 @@ struct ResolutionVariation {
 /// Other grips, delays, friction and roundings: how much the claims hang on the numbers chosen. What the
 /// settings have already is left out.
 std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
+                                                 const ResolutionHand& weak, const SimulatedHands& hands,
                                                  const std::vector<simulation::OperatorModel>& people,
                                                  const ProgressReport& tell = {});
 
 /// The lowest speed from which on every higher one vibrates; nothing if the highest does not.
 std::optional<double> onset_speed(std::span<const ResolutionCell> cells, double resolution);
-
-/// m: the resampler's step for a resolution.
-double step_in_use(double resolution, double count_length);
 
 }  // namespace kmax::experiment

@@ -12,7 +12,7 @@
 
 namespace kmax::experiment {
 namespace {
-std::string mm(double metres) {
+std::string resolution_mm(double metres) {
   return fmt::format("{:.3g}", metres * 1e3);
 }
 
@@ -44,51 +44,62 @@ std::string onset_text(const ResolutionRun& run, double resolution) {
   return onset ? fmt::format("{:g}", *onset) : std::string("none");
 }
 
-void record(const ResolutionSettings& settings, const simulation::OperatorModel& person, double resolution,
-            std::vector<double>* times, std::vector<double>& positions) {
-  TouchSetup setup = resolution_touch(settings, settings.weak, person, resolution);
-  setup.motion.approach_speed = 0.05;
-  setup.motion.push_force = settings.pushes.front();
-  std::vector<TouchSample> samples;
-  simulate_touch(setup, &samples);
-  for (const TouchSample& sample : samples) {
-    if (times != nullptr) times->push_back(sample.time);
-    positions.push_back(sample.position);
-  }
-}
 }  // namespace
 
 std::string to_string(const ResolutionHand& hand) {
   return fmt::format("grip x {:g}, delay {:g} ms", hand.grip, hand.delay * 1e3);
 }
 
-ResolutionStudy study_resolution(const ResolutionSettings& settings,
+ResolutionStudy study_resolution(const ResolutionSettings& settings, const ResolutionHand& weak,
+                                 const SimulatedHands& hands,
                                  const std::vector<simulation::OperatorModel>& people,
                                  const ProgressReport& tell) {
   ResolutionStudy study;
   study.wall = settings.wall;
   study.pushes = settings.pushes;
   // The variations take about three times as long as the runs.
-  study.runs = run_resolution(settings, people, part_of(tell, 0, 1, 4));
-  study.variations = vary_resolution(settings, people, part_of(tell, 1, 3, 4));
-  record(settings, people.front(), 0.4e-3, &study.trace_time, study.trace_coarse);
-  record(settings, people.front(), 0.1e-3, nullptr, study.trace_fine);
-  const std::size_t samples =
-      std::min({study.trace_time.size(), study.trace_coarse.size(), study.trace_fine.size()});
-  study.trace_time.resize(samples);
-  study.trace_coarse.resize(samples);
-  study.trace_fine.resize(samples);
-  std::string pushes;
-  for (const double push : settings.pushes) pushes += fmt::format("{}{:g}", pushes.empty() ? "" : ", ", push);
+  const ProgressReport of_runs = part_of(tell, 0, 1, 4);
+  study.runs = run_hands(settings, weak, hands, people, of_runs);
+  study.variations = vary_resolution(settings, weak, hands, people, part_of(tell, 1, 3, 4));
+  SimulatedRig rig = rig_with(weak, people, hands);
+  const auto record = [&](double resolution) {
+    rig.set(rig_wall(settings.wall, resolution));
+    TouchPlan plan = resolution_plan(settings.wall, 0.0, 0.05, 0, 1);
+    plan.push = settings.pushes.front();
+    std::vector<TouchSample> samples;
+    simulate_touch(rig.setup_of(plan), &samples);
+    return samples;
+  };
+  const std::vector<TouchSample> coarse = record(0.4e-3), fine = record(0.1e-3);
+  for (std::size_t n = 0; n < std::min(coarse.size(), fine.size()); ++n) {
+    study.trace_time.push_back(coarse[n].time);
+    study.trace_coarse.push_back(coarse[n].position);
+    study.trace_fine.push_back(fine[n].position);
+  }
   study.circumstances = fmt::format(
-      "Simulated: {}, {} with each push of {} N, wall of {:g} N/mm at {:g} Hz, encoder of {} mm, friction "
-      "{:g} N. A wall "
-      "vibrates for a person when any touch does (more than {} mm peak to peak in every quarter of the last "
-      "second){}.",
-      people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)), pushes,
-      settings.wall.stiffness / 1000, settings.wall.haptic_rate, mm(settings.count_length),
-      settings.device.friction, mm(settings.wall.threshold),
+      "Simulated: {}, {} with each push of {:g} N, wall of {:g} N/mm at {:g} Hz, encoder of {} mm, friction "
+      "{:g} N. A wall vibrates for a person when any touch does (more than {} mm peak to peak in every "
+      "quarter "
+      "of the last second){}.",
+      people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)),
+      fmt::join(settings.pushes, ", "), settings.wall.stiffness / 1000, settings.wall.haptic_rate,
+      resolution_mm(hands.count_length), hands.device.friction, resolution_mm(settings.wall.threshold),
       people.size() == 1 ? "" : ", and is said to vibrate when it does for half of the people");
+  return study;
+}
+
+ResolutionStudy study_resolution(DeviceRig& rig, const ResolutionSettings& settings) {
+  ResolutionTouches run = run_resolution(rig, settings);
+  ResolutionStudy study;
+  study.wall = settings.wall;
+  study.origin = report::Origin::measured;
+  study.circumstances = fmt::format(
+      "Measured on {}: {}, {} of them aborted because the handle swung too far, wall of {:g} N/mm at {:g} "
+      "Hz, "
+      "force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
+      rig.description(), touch_words(run.cells.size()), run.aborted, settings.wall.stiffness / 1000,
+      settings.wall.haptic_rate, rig.force_limit(), run.lost_records);
+  study.runs = {{{}, std::move(run.cells)}};
   return study;
 }
 
@@ -100,8 +111,8 @@ report::Table resolution_table(const ResolutionStudy& study) {
   if (!study.pushes.empty()) table.columns.push_back("pushes that meet it");
   for (std::size_t i = 0; i < study.runs.back().cells.size(); ++i) {
     const ResolutionCell& cell = study.runs.back().cells[i];
-    table.rows.push_back({cell.resolution > 0 ? mm(cell.resolution) : "encoder", mm(cell.step),
-                          fmt::format("{:.3g}", cell.speed)});
+    table.rows.push_back({cell.resolution > 0 ? resolution_mm(cell.resolution) : "encoder",
+                          resolution_mm(cell.step), fmt::format("{:.3g}", cell.speed)});
     for (const ResolutionRun& run : study.runs) table.rows.back().push_back(cell_text(run.cells[i]));
     table.rows.back().push_back(fmt::format("{:.2f}", cell.force_step));
     if (study.pushes.empty()) continue;

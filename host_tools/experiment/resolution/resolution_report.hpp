@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/resolution/resolution_experiment.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -23,9 +24,14 @@ struct ResolutionStudy {
   ResolutionVerdict verdict() const { return judge_resolution(runs.back().cells); }
 };
 
-ResolutionStudy study_resolution(const ResolutionSettings& settings,
+/// The simulated study: every hand, and the weak one with one number changed.
+ResolutionStudy study_resolution(const ResolutionSettings& settings, const ResolutionHand& weak,
+                                 const SimulatedHands& hands,
                                  const std::vector<simulation::OperatorModel>& people,
                                  const ProgressReport& tell = {});
+
+/// What somebody did on a device, who is told by the rig.
+ResolutionStudy study_resolution(DeviceRig& rig, const ResolutionSettings& settings);
 
 std::string to_string(const ResolutionHand& hand);
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "host_tools/experiment/resolution/resolution_device.hpp"
+#include "host_tools/experiment/resolution/resolution_experiment.hpp"
 #include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
@@ -124,11 +124,11 @@ TEST_F(Limited, ATouchIsKeptUnderItsKey) {
   std::uint64_t made = 0;
   const auto touch = [&](const char* key) {
     const auto once = [&made] {
-      ResolutionDeviceTouch one;
+      ResolutionTouch one;
       one.lost_records = ++made;
       return one;
     };
-    return begin().touch<ResolutionDeviceTouch>(key, "wall", once).lost_records;
+    return begin().touch<ResolutionTouch>(key, "wall", once).lost_records;
   };
   EXPECT_EQ(touch("a"), 1u);
   EXPECT_EQ(touch("b"), 2u);
@@ -160,7 +160,7 @@ TEST_F(LimitedWithoutAPerson, NobodyIsWaitedForLongerThanThePatience) {
 }
 
 TEST(WatchWithin, HasEveryLimit) {
-  const TouchWatch watch = watch_within({1, 3.0, 0.02, 7.0}, "wall", 4.0);
+  const TouchWatch watch = watch_within({1, 3.0, 0.02, 7.0, 1e-3}, "wall", 4.0);
   EXPECT_EQ(watch.axis, 1u);
   EXPECT_EQ(watch.name, "wall");
   EXPECT_EQ(watch.hold_time, 4.0);

@@ -24,13 +24,13 @@ TEST(DeviationProtocol, PulsesFollowARestInEachHalf) {
 }
 
 TEST(MeasureDeviation, TakesEachPulseFromWhereItBegan) {
-  std::vector<DeviationSample> samples;
+  std::vector<RigSample> samples;
   for (int i = 0; i < 400; ++i) {
     const double time = 0.01 * i;
     double position = 0.005;  // an offset that must not count
     if (time >= 1.0 && time < 1.5) position += 0.010;
     if (time >= 3.0 && time < 3.5) position -= 0.004;
-    samples.push_back({time, position, 0.0});
+    samples.push_back({time, 0.0, 0.0, position, 0.0});
   }
   const DeviationMeasure measure = measure_deviation(samples, std::vector<double>{0.985, 2.985}, 0.5);
   EXPECT_NEAR(measure.without, 0.010, 1e-12);
@@ -39,7 +39,7 @@ TEST(MeasureDeviation, TakesEachPulseFromWhereItBegan) {
 }
 
 TEST(MeasureDeviation, PulsesThatWereNotRecordedAreNotCounted) {
-  const std::vector<DeviationSample> samples{{0.0, 0.0, 0.0}, {0.1, 0.002, 0.0}};
+  const std::vector<RigSample> samples{{}, {0.1, 0.0, 0.0, 0.002, 0.0}};
   const DeviationMeasure measure = measure_deviation(samples, std::vector<double>{0.0, 5.0}, 0.5);
   EXPECT_EQ(measure.pulses, 1u);
   EXPECT_DOUBLE_EQ(measure.without, 0.002);
@@ -51,7 +51,6 @@ std::vector<DeviationResult> as_printed() {
   std::vector<DeviationResult> results;
   for (const paper::DeviationCell& cell : paper::table_2) {
     DeviationTouch touch;
-    touch.touched = true;
     touch.measure.with = cell.deviation;
     touch.measure.pulses = 10;
     results.push_back(mean_deviation(cell, {&touch, 1}));
@@ -94,10 +93,19 @@ TEST(JudgeDeviation, WhatNobodyTouchedIsNotShownAndLeavesThePapersNumbersAlone) 
   EXPECT_EQ(all_fall(printed), true);
 }
 
-TEST(SimulateDeviation, FallsWithTheBackgroundForceAndContactIsKept) {
-  DeviationSettings settings;
-  settings.protocol = quick();
-  const std::vector<DeviationResult> results = run_deviation(settings, {simulation::OperatorModel{}});
+std::vector<DeviationResult> simulated(const simulation::OperatorModel& person) {
+  SimulatedRig rig("deviation", {person}, deviation_hands());
+  return run_deviation(rig, {quick()}).results;
+}
+
+RigTouch touch_of(const DeviationProtocol& protocol, double background, double interference) {
+  SimulatedRig rig("deviation", {simulation::OperatorModel{}}, deviation_hands());
+  rig.set({protocol.stiffness, protocol.haptic_rate, control::InterferenceMode::parallel});
+  return rig.record(deviation_plan(protocol, {background, interference, 0.0}));
+}
+
+TEST(SimulatedDeviation, FallsWithTheBackgroundForceAndContactIsKept) {
+  const std::vector<DeviationResult> results = simulated({});
   EXPECT_EQ(judge_deviation(results).claim_met(), true);
   for (const DeviationResult& result : results) {
     EXPECT_GT(result.contact_share, 0.99);
@@ -108,53 +116,42 @@ TEST(SimulateDeviation, FallsWithTheBackgroundForceAndContactIsKept) {
 }
 
 // The point of the experiment: it is the stiffening that makes the trend.
-TEST(SimulateDeviation, AHandThatDoesNotStiffenShowsNoTrend) {
-  DeviationSettings settings;
-  settings.protocol = quick();
+TEST(SimulatedDeviation, AHandThatDoesNotStiffenShowsNoTrend) {
   simulation::OperatorModel person;
   person.activation_gain = 0.0;
-  const DeviationVerdict verdict = judge_deviation(run_deviation(settings, {person}));
+  const DeviationVerdict verdict = judge_deviation(simulated(person));
   EXPECT_EQ(verdict.claim_met(), false);
   for (const BackgroundTrend& trend : verdict.trends)
     EXPECT_NEAR(trend.with.value() / trend.without.value(), 1.0, 0.01);
 }
 
 // A hand at rest gives way by F/k; k1 and k2 in series, less the friction.
-TEST(SimulateDeviation, ALongPulseMovesTheHandAsFarAsItsSpringsSay) {
-  DeviationSettings settings;
-  settings.protocol = quick();
-  settings.protocol.pulse_on = 3.0;
-  settings.protocol.pulse_off = 3.0;
-  const simulation::OperatorModel person;
-  const DeviationTouch touch = simulate_deviation(settings, person, 0.0, 3.0);
-  const double expected = 3.0 / simulation::series_stiffness(person);
-  EXPECT_NEAR(touch.measure.without, expected,
-              settings.device.friction / simulation::series_stiffness(person) + 1e-4);
+TEST(SimulatedDeviation, ALongPulseMovesTheHandAsFarAsItsSpringsSay) {
+  DeviationProtocol protocol = quick();
+  protocol.pulse_on = protocol.pulse_off = 3.0;
+  const RigTouch touch = touch_of(protocol, 0.0, 3.0);
+  const double stiffness = simulation::series_stiffness(simulation::OperatorModel{});
+  const std::vector<double> begins{protocol.pulse_begin(0) - 0.001, protocol.pulse_begin(2) - 0.001};
+  EXPECT_NEAR(measure_deviation(touch.samples, begins, protocol.pulse_on).without, 3.0 / stiffness,
+              deviation_hands().device.friction / stiffness + 1e-4);
 }
 
-TEST(SimulateDeviation, TheForceAlongTheSurfaceComesInPulses) {
-  DeviationSettings settings;
-  settings.protocol = quick();
-  std::vector<DeviationSample> samples;
-  simulate_deviation(settings, {}, 3.0, 5.0, &samples);
-  for (const DeviationSample& sample : samples) {
+TEST(SimulatedDeviation, TheForceAlongTheSurfaceComesInPulses) {
+  for (const RigSample& sample : touch_of(quick(), 3.0, 5.0).samples) {
     bool on = false;
     for (int pulse = 0; pulse < 4; ++pulse) {
-      const double begin = settings.protocol.pulse_begin(pulse);
-      on = on || (sample.time >= begin && sample.time < begin + 0.5);
+      const double since = sample.time - quick().pulse_begin(pulse);
+      on = on || (since >= -1e-9 && since < 0.5 - 1e-9);
     }
-    ASSERT_EQ(sample.force, on ? 5.0 : 0.0) << sample.time;
+    ASSERT_EQ(sample.tangential_force, on ? 5.0 : 0.0) << sample.time;
   }
 }
 
-TEST(SimulateDeviation, SettingsOutOfRangeAreRefused) {
+TEST(SimulatedDeviation, SettingsOutOfRangeAreRefused) {
+  SimulatedRig rig("deviation", {simulation::OperatorModel{}}, deviation_hands());
   DeviationSettings settings;
-  settings.push = 3.0;
-  EXPECT_THROW(simulate_deviation(settings, {}, 3.0, 5.0), std::invalid_argument);
-  settings = {};
   settings.protocol.pulse_on = std::nan("");
-  EXPECT_THROW(simulate_deviation(settings, {}, 0.0, 1.0), std::invalid_argument);
-  EXPECT_THROW(run_deviation({}, {}), std::invalid_argument);
+  EXPECT_THROW(run_deviation(rig, settings), std::invalid_argument);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 namespace kmax::experiment::deviation_report_test {
 namespace {
+using host_tools_test::thrown_message;
 
 DeviationSettings few() {
   DeviationSettings settings;
@@ -23,7 +24,8 @@ std::string all_words(const DeviationStudy& study) {
 }
 
 TEST(DeviationReport, SaysWhatHoldsAndWhatTheTableDoesNotTell) {
-  const DeviationStudy study = study_deviation(few(), std::vector<simulation::OperatorModel>(1));
+  const DeviationStudy study =
+      study_deviation(few(), deviation_hands(), std::vector<simulation::OperatorModel>(1));
   const std::string words = all_words(study);
   EXPECT_CONTAINS(words, "Here it falls at every F_I");
   EXPECT_CONTAINS(words, "With a hand that does not stiffen it does not fall");
@@ -39,7 +41,8 @@ TEST(DeviationReport, SaysWhatHoldsAndWhatTheTableDoesNotTell) {
 
 TEST(DeviationReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
-  const DeviationStudy study = study_deviation(few(), std::vector<simulation::OperatorModel>(1));
+  const DeviationStudy study =
+      study_deviation(few(), deviation_hands(), std::vector<simulation::OperatorModel>(1));
   const auto files = write_deviation(study, folder / "new", ".svg");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
@@ -84,7 +87,7 @@ TEST(DeviationReport, WithoutTheTouchWithoutABackgroundForceNothingIsShown) {
 }
 
 TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
-  const auto words_of = [](bool falls, bool falls_without) {
+  const auto words_when = [](bool falls, bool falls_without) {
     const auto results = [](bool fall) {
       std::vector<DeviationResult> cells;
       for (const paper::DeviationCell& cell : paper::table_2) {
@@ -104,19 +107,27 @@ TEST(DeviationReport, TheStiffeningIsTheCauseOnlyIfNothingElseIs) {
     return all_words(study);
   };
   const char* cause = "the stiffening and nothing else";
-  EXPECT_CONTAINS(words_of(true, false), cause);
+  EXPECT_CONTAINS(words_when(true, false), cause);
   for (const auto& [falls, without] :
        {std::pair{true, true}, std::pair{false, true}, std::pair{false, false}})
-    EXPECT_EQ(words_of(falls, without).find(cause), std::string::npos) << falls << without;
-  EXPECT_CONTAINS(words_of(true, true), "something else than the stiffening makes the trend");
-  EXPECT_CONTAINS(words_of(false, false), "no trend to explain");
+    EXPECT_EQ(words_when(falls, without).find(cause), std::string::npos) << falls << without;
+  EXPECT_CONTAINS(words_when(true, true), "something else than the stiffening makes the trend");
+  EXPECT_CONTAINS(words_when(false, false), "no trend to explain");
+}
+
+TEST(DeviationReport, APushThatLosesTheWallIsRefused) {
+  SimulatedHands hands = deviation_hands();
+  hands.push = 3.0;
+  EXPECT_CONTAINS(thrown_message<std::invalid_argument>(
+                      [&] { study_deviation({}, hands, std::vector<simulation::OperatorModel>(1)); }),
+                  "push harder than every F_B");
 }
 
 // People who do not stiffen are their own comparison.
 TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
   std::vector<simulation::OperatorModel> people(1);
   people[0].activation_gain = 0.0;
-  const std::string words = all_words(study_deviation(few(), people));
+  const std::string words = all_words(study_deviation(few(), deviation_hands(), people));
   EXPECT_EQ(words.find("nothing else"), std::string::npos) << words;
 }
 

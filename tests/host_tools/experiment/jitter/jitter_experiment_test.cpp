@@ -9,10 +9,10 @@
 namespace kmax::experiment::jitter_experiment_test {
 namespace {
 
-std::vector<JitterSample> course(const std::vector<double>& outside, double begin = 0.0) {
-  std::vector<JitterSample> samples;
+std::vector<RigSample> course(const std::vector<double>& outside, double begin = 0.0) {
+  std::vector<RigSample> samples;
   for (std::size_t i = 0; i < outside.size(); ++i)
-    samples.push_back({begin + 0.002 * static_cast<double>(i), outside[i], i % 2 == 0 ? 5.0 : 1.0});
+    samples.push_back({begin + 0.002 * static_cast<double>(i), outside[i], i % 2 == 0 ? 5.0 : 1.0, 0.0, 0.0});
   return samples;
 }
 
@@ -121,73 +121,83 @@ TEST(JudgeJitter, NoTouchAtAllIsNoClaim) {
   EXPECT_EQ(judge_jitter(results).claim_met(), std::nullopt);
 }
 
-TEST(SimulateJitter, TheWeakestForceThrowsNobodyOut) {
+const std::vector<simulation::OperatorModel> subject_1(1);
+
+JitterVerdict verdict_of(const std::vector<simulation::OperatorModel>& people) {
+  SimulatedRig rig("jitter", people, jitter_hands());
+  return judge_jitter(run_jitter(rig, {}).results);
+}
+
+/// One touch of a simulated person.
+RigTouch touch_of(double background, double interference, const SimulatedHands& hands = jitter_hands()) {
+  SimulatedRig rig("jitter", subject_1, hands);
+  rig.set({1000.0, 500.0, control::InterferenceMode::perpendicular, interference, background});
+  return rig.record({});
+}
+
+TEST(SimulatedJitter, TheWeakestForceThrowsNobodyOut) {
   for (const double background : {0.0, 1.0}) {
-    const JitterMeasure measure = simulate_jitter({}, {}, background, 1.0);
+    const JitterMeasure measure = measure_jitter(touch_of(background, 1.0).samples, {});
     EXPECT_TRUE(measure.touched);
     EXPECT_EQ(measure.amplitude, 0.0) << background;
     EXPECT_EQ(measure.adjustment_time, 0.0);
   }
 }
 
-TEST(SimulateJitter, BothFallWithTheBackgroundForce) {
-  const JitterVerdict verdict = judge_jitter(run_jitter({}, {simulation::OperatorModel{}}));
+TEST(SimulatedJitter, BothFallWithTheBackgroundForce) {
+  const JitterVerdict verdict = verdict_of(subject_1);
   EXPECT_EQ(verdict.amplitude_falls(), true);
   EXPECT_EQ(verdict.time_falls(), true);
 }
 
 // The point of the experiment: it is the stiffening that makes the trend.
-TEST(SimulateJitter, AHandThatDoesNotStiffenShowsNoTrend) {
+TEST(SimulatedJitter, AHandThatDoesNotStiffenShowsNoTrend) {
   simulation::OperatorModel person;
   person.activation_gain = 0.0;
-  const JitterVerdict verdict = judge_jitter(run_jitter({}, {person}));
+  const JitterVerdict verdict = verdict_of({person});
   EXPECT_EQ(verdict.amplitude_falls(), false);
   for (const BackgroundTrend& trend : verdict.amplitude)
     EXPECT_GT(trend.with.value(), 0.8 * trend.without.value());
 }
 
-TEST(SimulateJitter, APersonWhoNeverPressesHarderNeverSettles) {
-  JitterSettings settings;
-  settings.reaction = 0.0;
-  const JitterMeasure measure = simulate_jitter(settings, {}, 0.0, 7.0);
+TEST(SimulatedJitter, APersonWhoNeverPressesHarderNeverSettles) {
+  SimulatedHands indifferent = jitter_hands();
+  indifferent.reaction = 0.0;
+  const JitterMeasure measure = measure_jitter(touch_of(0.0, 7.0, indifferent).samples, {});
   EXPECT_TRUE(measure.touched);
   EXPECT_FALSE(measure.settled);
 }
 
-TEST(SimulateJitter, TheForceIsNotClippedUnlessAskedFor) {
-  std::vector<JitterSample> samples;
-  simulate_jitter({}, {}, 4.0, 7.0, 0.0, &samples);
-  const auto force = [](const JitterSample& sample) { return sample.force; };
-  const auto strongest = [&] {
+TEST(SimulatedJitter, TheForceIsNotClippedUnlessAskedFor) {
+  const auto strongest = [](const SimulatedHands& hands) {
     double most = 0.0;
-    for (const JitterSample& sample : samples) most = std::max(most, force(sample));
+    for (const RigSample& sample : touch_of(4.0, 7.0, hands).samples) most = std::max(most, sample.force);
     return most;
   };
-  EXPECT_GT(strongest(), 11.0);
-  JitterSettings clipped;
-  clipped.device.force_limit = 3.3;
-  simulate_jitter(clipped, {}, 4.0, 7.0, 0.0, &samples);
-  EXPECT_LE(strongest(), 3.3001);
+  SimulatedHands hands = jitter_hands();
+  EXPECT_GT(strongest(hands), 11.0);
+  hands.device.force_limit = 3.3;
+  EXPECT_LE(strongest(hands), 3.3001);
 }
 
-TEST(SimulateJitter, ABackgroundForceActsBeforeTheTouch) {
-  std::vector<JitterSample> samples;
-  simulate_jitter({}, {}, 3.0, 5.0, 0.0, &samples);
+TEST(SimulatedJitter, ABackgroundForceActsBeforeTheTouch) {
+  const std::vector<RigSample> samples = touch_of(3.0, 5.0).samples;
   ASSERT_LT(samples.front().time, 0.0);
   EXPECT_NEAR(samples.front().force, 3.0, 1e-6);
 }
 
-TEST(SimulateJitter, SettingsOutOfRangeAreRefused) {
+TEST(SimulatedJitter, SettingsOutOfRangeAreRefused) {
+  SimulatedHands hands = jitter_hands();
+  hands.reaction = 1.5;
+  EXPECT_THROW(SimulatedRig("jitter", subject_1, hands), std::invalid_argument);
+  EXPECT_THROW(SimulatedRig("jitter", {}, jitter_hands()), std::invalid_argument);
+  SimulatedRig rig("jitter", subject_1, jitter_hands());
   JitterSettings settings;
-  settings.reaction = 1.5;
-  EXPECT_THROW(simulate_jitter(settings, {}, 0, 1), std::invalid_argument);
-  settings = {};
   settings.wall.stiffness = std::nan("");
-  EXPECT_THROW(simulate_jitter(settings, {}, 0, 1), std::invalid_argument);
+  EXPECT_THROW(run_jitter(rig, settings), std::invalid_argument);
   settings = {};
   settings.touches = 0;
-  EXPECT_THROW(run_jitter(settings, {simulation::OperatorModel{}}), std::invalid_argument);
-  EXPECT_THROW(run_jitter({}, {}), std::invalid_argument);
+  EXPECT_THROW(run_jitter(rig, settings), std::invalid_argument);
 }
 
 TEST(PaperTables, HaveTheSamePairsOfForcesAndTimesOfWhole15Milliseconds) {

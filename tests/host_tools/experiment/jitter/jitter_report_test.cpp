@@ -23,7 +23,7 @@ std::string all_words(const JitterStudy& study) {
 }
 
 TEST(JitterReport, SaysWhatHoldsAndWhatIsNotReproduced) {
-  const JitterStudy study = study_jitter(few(), std::vector<simulation::OperatorModel>(1));
+  const JitterStudy study = study_jitter(few(), jitter_hands(), std::vector<simulation::OperatorModel>(1));
   const std::string words = all_words(study);
   EXPECT_CONTAINS(words, "Sizes are not reproduced");
   EXPECT_CONTAINS(words, "not clipped");
@@ -41,7 +41,7 @@ TEST(JitterReport, SaysWhatHoldsAndWhatIsNotReproduced) {
 
 TEST(JitterReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
-  const JitterStudy study = study_jitter(few(), std::vector<simulation::OperatorModel>(1));
+  const JitterStudy study = study_jitter(few(), jitter_hands(), std::vector<simulation::OperatorModel>(1));
   const auto files = write_jitter(study, folder / "new", ".svg");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
@@ -69,9 +69,9 @@ TEST(JitterReport, APageOfADeviceWithoutResults) {
 
 // A device that clips the force takes the trend away, and with it all that could be said of its cause.
 TEST(JitterReport, WhereNothingFallsThereIsNoTrendWhoseCauseTheStiffeningIs) {
-  JitterSettings settings = few();
-  settings.device.force_limit = 1.0;
-  const JitterStudy study = study_jitter(settings, std::vector<simulation::OperatorModel>(1));
+  SimulatedHands hands = jitter_hands();
+  hands.device.force_limit = 1.0;
+  const JitterStudy study = study_jitter(few(), hands, std::vector<simulation::OperatorModel>(1));
   const std::string words = all_words(study);
   EXPECT_CONTAINS(words, "Jit: does not fall");
   EXPECT_CONTAINS(words, "no trend to explain");

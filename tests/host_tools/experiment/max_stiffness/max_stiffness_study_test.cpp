@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host_tools/experiment/max_stiffness/max_stiffness_sections.hpp"
+#include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 

@@ -23,17 +23,5 @@ TEST(StiffnessCondition, AreThoseOfThePaper) {
   }
 }
 
-TEST(CauseCondition, NothingOfTheFieldIsLeftWhereItIsSwitchedOff) {
-  for (const CauseCondition& condition : cause_conditions(2.0)) {
-    TouchSetup setup;
-    condition.apply(setup);
-    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::magnetic, condition.field) << condition.name;
-    EXPECT_EQ(setup.person.activation_gain > 0.0, condition.stiffens) << condition.name;
-    EXPECT_EQ(setup.wall.interference.background_force > 0.0F, condition.preload) << condition.name;
-    EXPECT_EQ(setup.person.grip_stiffness,
-              simulation::OperatorModel{}.grip_stiffness * condition.grip_factor);
-  }
-}
-
 }  // namespace
 }  // namespace kmax::experiment::stiffness_condition_test

@@ -96,24 +96,34 @@ TEST(ResolutionCell, HalfThePeopleDecide) {
   EXPECT_TRUE(one.vibrates());
 }
 
-TEST(StepInUse, IsWholeCounts) {
-  EXPECT_DOUBLE_EQ(step_in_use(0.0, 0.023e-3), 0.023e-3);
-  EXPECT_DOUBLE_EQ(step_in_use(0.1e-3, 0.023e-3), 4 * 0.023e-3);
-  EXPECT_DOUBLE_EQ(step_in_use(0.4e-3, 0.023e-3), 17 * 0.023e-3);
-}
-
 const std::vector<simulation::OperatorModel> subject_1(1);
 
-// The null result: at no step and no speed.
-TEST(SimulateResolution, WithAFullGripAndNoDelayNothingVibrates) {
-  for (const double resolution : {0.0, 0.1e-3, 0.4e-3})
-    for (const double speed : {0.02, 0.1, 0.5})
-      EXPECT_EQ(simulate_resolution({}, {}, subject_1, resolution, speed).unstable, 0u)
-          << resolution << " " << speed;
+ResolutionSettings one_touch(double resolution, double speed) {
+  ResolutionSettings settings;
+  settings.resolutions = {resolution};
+  settings.speeds = {speed};
+  return settings;
 }
 
-TEST(SimulateResolution, WithAWeakGripAndADelayBothClaimsAppear) {
-  const auto runs = run_resolution({}, subject_1);
+TEST(SimulatedRig, StepsAreWholeCounts) {
+  SimulatedRig rig = rig_with({}, subject_1, resolution_hands());
+  for (const auto& [resolution, counts] : {std::pair(0.0, 1), {0.1e-3, 4}, {0.4e-3, 17}}) {
+    rig.set(rig_wall({}, resolution));
+    EXPECT_DOUBLE_EQ(rig.resolution_step(), counts * 0.023e-3);
+  }
+}
+
+// The null result: at no step and no speed.
+TEST(SimulatedResolution, WithAFullGripAndNoDelayNothingVibrates) {
+  SimulatedRig rig = rig_with({}, subject_1, resolution_hands());
+  ResolutionSettings settings;
+  settings.speeds = {0.02, 0.1, 0.5};
+  for (const ResolutionCell& cell : run_resolution(rig, settings).cells)
+    EXPECT_EQ(cell.unstable, 0u) << cell.resolution << " " << cell.speed;
+}
+
+TEST(SimulatedResolution, WithAWeakGripAndADelayBothClaimsAppear) {
+  const auto runs = run_hands({}, weak_hand, resolution_hands(), subject_1);
   ASSERT_EQ(runs.size(), 4u);
   EXPECT_EQ(judge_resolution(runs.back().cells).claim_met(), true);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(judge_resolution(runs[i].cells).claim_met(), false) << i;
@@ -121,37 +131,36 @@ TEST(SimulateResolution, WithAWeakGripAndADelayBothClaimsAppear) {
   EXPECT_EQ(judge_resolution(runs.back().cells).onset_from_resolution, false);
 }
 
-TEST(SimulateResolution, TheCriterionStandsBesideIt) {
-  const ResolutionSettings settings;
-  const ResolutionCell slow = simulate_resolution(settings, {}, subject_1, 0.4e-3, 0.02);
-  EXPECT_NEAR(slow.force_step, 1200 * 17 * 0.023e-3, 1e-9);
-  const ResolutionCell fast = simulate_resolution(settings, {}, subject_1, 0.1e-3, 0.5);
-  EXPECT_NEAR(fast.force_step, 1200 * 0.5e-3, 1e-9);
+TEST(SimulatedResolution, TheCriterionStandsBesideIt) {
+  SimulatedRig rig = rig_with({}, subject_1, resolution_hands());
+  EXPECT_NEAR(run_resolution(rig, one_touch(0.4e-3, 0.02)).cells.at(0).force_step, 1200 * 17 * 0.023e-3,
+              1e-9);
+  EXPECT_NEAR(run_resolution(rig, one_touch(0.1e-3, 0.5)).cells.at(0).force_step, 1200 * 0.5e-3, 1e-9);
 }
 
-TEST(SimulateResolution, SettingsOutOfRangeAreRefused) {
+TEST(SimulatedResolution, SettingsOutOfRangeAreRefused) {
+  EXPECT_THROW(rig_with({0.0, 0.0}, subject_1, resolution_hands()), std::invalid_argument);
+  EXPECT_THROW(rig_with({1.0, std::nan("")}, subject_1, resolution_hands()), std::invalid_argument);
+  EXPECT_THROW(rig_with({}, {}, resolution_hands()), std::invalid_argument);
+  SimulatedRig rig = rig_with({}, subject_1, resolution_hands());
   ResolutionSettings settings;
-  EXPECT_THROW(simulate_resolution(settings, {0.0, 0.0}, subject_1, 0, 0.1), std::invalid_argument);
-  EXPECT_THROW(simulate_resolution(settings, {1.0, std::nan("")}, subject_1, 0, 0.1), std::invalid_argument);
   settings.pushes.clear();
-  EXPECT_THROW(simulate_resolution(settings, {}, subject_1, 0, 0.1), std::invalid_argument);
-  EXPECT_THROW(run_resolution({}, {}), std::invalid_argument);
+  EXPECT_THROW(run_resolution(rig, settings), std::invalid_argument);
 }
 
 TEST(VaryResolution, EveryVariationDiffersFromTheSettings) {
-  ResolutionSettings settings;
-  settings.resolutions = {0.4e-3};
-  settings.speeds = {0.1};
+  ResolutionSettings settings = one_touch(0.4e-3, 0.1);
   settings.touches = 1;
+  ResolutionHand weak = weak_hand;
   const auto named = [&](const std::string& change) {
-    const auto variations = vary_resolution(settings, subject_1);
+    const auto variations = vary_resolution(settings, weak, resolution_hands(), subject_1);
     return std::count_if(variations.begin(), variations.end(),
                          [&](const ResolutionVariation& one) { return one.change == change; });
   };
-  EXPECT_EQ(vary_resolution(settings, subject_1).size(), 14u);
+  EXPECT_EQ(vary_resolution(settings, weak, resolution_hands(), subject_1).size(), 14u);
   EXPECT_EQ(named("grip x 0.25"), 0);
   EXPECT_EQ(named("grip x 0.3"), 1);
-  settings.weak = {0.3, 1e-3};
+  weak = {0.3, 1e-3};
   EXPECT_EQ(named("grip x 0.25"), 1);
   EXPECT_EQ(named("grip x 0.3"), 0);
   EXPECT_EQ(named("delay 1 ms"), 0);

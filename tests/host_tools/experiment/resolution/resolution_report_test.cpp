@@ -10,6 +10,10 @@
 namespace kmax::experiment::resolution_report_test {
 namespace {
 
+ResolutionStudy study_of(const ResolutionSettings& settings) {
+  return study_resolution(settings, weak_hand, resolution_hands(), std::vector<simulation::OperatorModel>(1));
+}
+
 ResolutionSettings few() {
   ResolutionSettings settings;
   settings.speeds = {0.05, 0.2};
@@ -24,7 +28,7 @@ std::string all_words(const ResolutionStudy& study) {
 }
 
 TEST(ResolutionReport, SaysWhatHoldsAndWhatDoesNot) {
-  const ResolutionStudy study = study_resolution(few(), std::vector<simulation::OperatorModel>(1));
+  const ResolutionStudy study = study_of(few());
   const std::string all = all_words(study);
   EXPECT_CONTAINS(all, "1 person, 1 touch with each push");
   EXPECT_EQ(all.find("Not tested"), std::string::npos) << all;
@@ -40,7 +44,7 @@ TEST(ResolutionReport, SaysWhatHoldsAndWhatDoesNot) {
 
 TEST(ResolutionReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
-  const ResolutionStudy study = study_resolution(few(), std::vector<simulation::OperatorModel>(1));
+  const ResolutionStudy study = study_of(few());
   const auto files = write_resolution(study, folder / "new", ".svg");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
@@ -70,7 +74,7 @@ TEST(ResolutionReport, WhatNoTouchTestedIsNeitherYesNorNo) {
     ResolutionSettings settings = few();
     settings.speeds = {speed};
     const bool slow = speed < paper::vibration_onset_speed;
-    const ResolutionStudy study = study_resolution(settings, std::vector<simulation::OperatorModel>(1));
+    const ResolutionStudy study = study_of(settings);
     const report::Table claims = resolution_claims_table(study), changed = resolution_variations_table(study);
     const std::size_t untested = slow ? 3 : 2, tested = slow ? 2 : 3;
     for (std::size_t run = 0; run < study.runs.size(); ++run) {

@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_tools/experiment/paper_numbers.hpp"
+#include "tests/studies/studies.hpp"
+
+namespace kmax::studies {
+namespace {
+
+constexpr std::string_view named_person = "subject 1";
+
+HeldWall hold(TouchSetup setup, const experiment::TouchProtocol& protocol) {
+  HeldWall held;
+  setup.threshold = protocol.threshold;
+  setup.matrices =
+      std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, experiment::study_gain_bits);
+  std::vector<experiment::TouchSample> whole;  // asked for, so that every touch goes on to its end
+  for (const double speed : protocol.approach_speeds) {
+    for (const double push : protocol.pushes) {
+      setup.motion.approach_speed = speed;
+      setup.motion.push_force = push;
+      whole.clear();
+      const experiment::TouchOutcome outcome = experiment::simulate_touch(setup, &whole);
+      ++held.touches;
+      held.unstable += outcome.unstable() ? 1 : 0;
+      held.worst = std::max(held.worst, outcome.peak_to_peak);
+    }
+  }
+  return held;
+}
+
+const experiment::paper::ContactVerdict* printed_verdict(const StiffnessCondition& condition) {
+  for (const auto& verdict : experiment::paper::contact_verdicts) {
+    if (verdict.adaptive == condition.adaptive &&
+        (condition.adaptive || verdict.magnetic_coefficient == condition.magnetic_coefficient))
+      return &verdict;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::size_t HeldWallResult::stable_people() const {
+  return static_cast<std::size_t>(
+      std::count_if(people.begin(), people.end(), std::mem_fn(&HeldWall::stable)));
+}
+
+double HeldWallResult::median_worst() const {
+  if (people.empty()) return 0.0;
+  std::vector<double> sorted;
+  for (const HeldWall& held : people) sorted.push_back(held.worst);
+  std::sort(sorted.begin(), sorted.end());
+  return 0.5 * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
+}
+
+std::vector<HeldWallResult> hold_walls(const SubjectSet& set, double stiffness, const StiffnessRun& run) {
+  simulation::OperatorModel named;
+  named.activation_gain = set.subjects.front().person.activation_gain;
+  std::vector<HeldWallResult> results;
+  std::vector<TouchSetup> setups;  // each condition's people, then the named one
+  for (const StiffnessCondition& condition : experiment::stiffness_conditions()) {
+    const auto* verdict = printed_verdict(condition);
+    if (verdict == nullptr) continue;
+    results.push_back({condition, std::string(verdict->figure), verdict->stable, {}, {}});
+    for (const experiment::Subject& subject : set.subjects)
+      setups.push_back(experiment::touch_setup(set.device, subject.person, condition));
+    setups.push_back(experiment::touch_setup(set.device, named, condition));
+  }
+  for (TouchSetup& setup : setups) {
+    setup.wall.wall.stiffness = static_cast<float>(stiffness);
+    setup.integrator = run.integrator;
+  }
+  const std::vector<HeldWall> held = experiment::collect_jobs<HeldWall>(
+      setups.size(), run.threads, [&](std::size_t index) { return hold(setups[index], run.protocol); },
+      run.progress);
+  auto next = held.begin();
+  for (HeldWallResult& result : results) {
+    const auto end = next + static_cast<std::ptrdiff_t>(set.subjects.size());
+    result.people.assign(next, end);
+    result.named = *end;
+    next = end + 1;
+  }
+  return results;
+}
+
+report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results) {
+  report::Table table{
+      fmt::format("Stable when none of {} touches is unstable; nothing was fitted to this",
+                  results.front().named.touches),
+      {"condition", "figure", "paper 1", fmt::format("{}, mm p-p", named_person), std::string(named_person),
+       "agrees", fmt::format("stable of {}", set.subjects.size()), "median worst, mm p-p", "ours is"},
+      {}};
+  for (const HeldWallResult& result : results) {
+    table.rows.push_back(
+        {result.condition.name, result.figure, result.paper_stable ? "stable" : "unstable",
+         fmt::format("{:.2f}", result.named.worst * 1e3), result.named.stable() ? "stable" : "unstable",
+         result.named.stable() == result.paper_stable ? "yes" : "no",
+         fmt::format("{}", result.stable_people()), fmt::format("{:.2f}", result.median_worst() * 1e3),
+         std::string(report::to_string(report::Origin::predicted))});
+  }
+  return {
+      fmt::format("A wall of 5.5 N/mm held (paper 1, Figs. 9 to 12; {})", experiment::clip_words(set.device)),
+      {},
+      {std::move(table)},
+      {}};
+}
+
+std::vector<report::Section> held_walls(const StudyInput& input) {
+  std::vector<report::Section> sections;
+  for (const SubjectSet& set : input.sets)
+    sections.push_back(
+        held_wall_section(set, hold_walls(set, experiment::paper::contact_stiffness, input.run)));
+  return sections;
+}
+
+}  // namespace kmax::studies

@@ -1,0 +1,69 @@
+// kmax-studies: makes docs/experiments/max_stiffness.md, the study of the largest stiffness (as `kmax
+// experiment max-stiffness`) and behind it the studies that are named.
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+#include "host_tools/experiment/remaining_time.hpp"
+#include "host_tools/report/page_files.hpp"
+#include "host_tools/report/terminal_text.hpp"
+#include "tests/studies/studies.hpp"
+
+namespace kmax::studies {
+namespace {
+
+report::Page make_page(const StudyInput& input, const std::vector<std::string>& names) {
+  std::vector<experiment::MaxStiffnessStudy> studies;
+  for (const SubjectSet& set : input.sets)
+    studies.push_back(
+        experiment::run_max_stiffness_study(set, experiment::stiffness_conditions(), input.run));
+  report::Page page{"Largest stable stiffness", {experiment::max_stiffness_section(studies)}};
+  if (!input.folder.empty())
+    page.sections.front().pictures.push_back(
+        experiment::draw_max_stiffness(studies, input.folder / "max_stiffness.svg"));
+  for (report::Section& section : run_studies(names, input)) page.sections.push_back(std::move(section));
+  return page;
+}
+
+int run(int count, char** arguments) {
+  std::string help = "Studies around the largest stable stiffness of simulated people.\n";
+  for (const Study& study : all_studies) help += fmt::format("  {:<13}{}\n", study.name, study.what);
+  CLI::App app(help + "  all          all of them: a quarter of an hour on two cores");
+  std::vector<std::string> names, sets{"clipped", "unclipped"};
+  StudyInput input;
+  app.add_option("STUDY", names, "Names of studies; none: the study of the largest stiffness alone");
+  app.add_option("--subjects", sets, "People and device: TOML files, 'clipped' or 'unclipped'")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--out", input.folder, "Folder for the page and its pictures")->type_name("DIR");
+  app.add_option("--jobs", input.run.threads, "Searches at a time; all processors without it");
+  input.run.threads = 0;
+  CLI11_PARSE(app, count, arguments);
+  for (const std::string& set : sets) input.sets.push_back(experiment::open_subject_set(set));
+  if (!input.folder.empty()) std::filesystem::create_directories(input.folder);
+  input.run.progress = [](std::size_t done, std::size_t all) {
+    fmt::print(stderr, "\r{}   ", experiment::progress_words(done, all, std::nullopt));
+  };
+  const report::Page page = make_page(input, names);
+  fmt::print(stderr, "\n");
+  for (const report::Section& section : page.sections) {
+    fmt::print("{}\n", section.heading);
+    for (const std::string& paragraph : section.paragraphs) fmt::print("{}\n", paragraph);
+    for (const report::Table& table : section.tables) fmt::print("\n{}", report::terminal_text(table));
+  }
+  if (!input.folder.empty()) report::write_page(page, input.folder, "max_stiffness");
+  return 0;
+}
+
+}  // namespace
+}  // namespace kmax::studies
+
+int main(int count, char** arguments) {
+  try {
+    return kmax::studies::run(count, arguments);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "kmax-studies: {}\n", error.what());
+    return 1;
+  }
+}

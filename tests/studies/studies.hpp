@@ -1,0 +1,235 @@
+#pragma once
+// One-off studies around the largest stable stiffness: what the numbers of docs/experiments/max_stiffness.md
+// come from and how far they can be trusted. The program kmax-studies (main.cpp) runs them; no product needs
+// them.
+//
+// Each has a file of its own. Its sweep over walls and people is data; its section has a table with the
+// paper's value beside ours where there is one, and words that follow the numbers.
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
+#include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
+#include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
+#include "host_tools/report/page.hpp"
+
+namespace kmax::studies {
+
+using experiment::CountedEnds;
+using experiment::StiffnessCondition;
+using experiment::StiffnessRun;
+using experiment::SubjectSet;
+using experiment::TouchSetup;
+
+struct StudyInput {
+  std::vector<SubjectSet> sets;  ///< calibrated, at least one
+  StiffnessRun run;
+  std::filesystem::path folder;  ///< of pictures; empty: none are drawn
+};
+
+struct Study {
+  std::string_view name, what;
+  std::vector<report::Section> (*run)(const StudyInput& input);
+};
+
+std::vector<report::Section> held_walls(const StudyInput& input);
+std::vector<report::Section> causes(const StudyInput& input);
+std::vector<report::Section> assumptions(const StudyInput& input);
+std::vector<report::Section> draws(const StudyInput& input);
+std::vector<report::Section> adaptive_gap(const StudyInput& input);
+std::vector<report::Section> loop_rates(const StudyInput& input);
+
+/// In the order of the page.
+inline constexpr std::array<Study, 6> all_studies{{
+    {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), predicted", held_walls},
+    {"causes", "the four causes of the gain at 2 N, one by one", causes},
+    {"assumptions", "threshold, pushes, approach speeds, device, integrator: what hangs on them",
+     assumptions},
+    {"draws", "25 other groups of people, each calibrated for itself; the first set is used", draws},
+    {"adaptive", "what would make the adaptive wall reach the paper's 8.02 N/mm", adaptive_gap},
+    {"rates",
+     "500 Hz to 20 kHz, two encoders, delays and velocity estimators; the first set's device is used",
+     loop_rates},
+}};
+
+/// The named ones, all of them for "all". Throws std::invalid_argument for an unknown name and for no people.
+std::vector<report::Section> run_studies(const std::vector<std::string>& names, const StudyInput& input);
+
+std::string n_per_mm(double stiffness);
+
+// --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
+
+/// The largest stable stiffness of one wall over the people of a set.
+struct PeopleMean {
+  double mean = 0.0;             ///< N/m
+  CountedEnds ends{};            ///< of the people
+  double saturated_share = 0.0;  ///< largest, simulated_touch.hpp
+};
+
+/// What makes a wall of the touch that everybody begins with.
+using WallChange = std::function<void(TouchSetup&)>;
+std::vector<PeopleMean> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
+                              const StiffnessRun& run);
+
+// --- Figs. 9 to 12 of paper 1: one stiffness held under every law (held_walls.cpp) -------------------------
+
+/// All touches of one person.
+struct HeldWall {
+  std::size_t touches = 0, unstable = 0;
+  double worst = 0.0;  ///< m peak to peak, in the touch that moved most
+  bool stable() const { return unstable == 0; }
+};
+
+struct HeldWallResult {
+  StiffnessCondition condition;
+  std::string figure;  ///< of paper 1
+  bool paper_stable = false;
+  std::vector<HeldWall> people;  ///< in the order of the set
+  HeldWall named;                ///< "subject 1": the person of the supplied scenes, with the set's gamma
+  std::size_t stable_people() const;
+  double median_worst() const;  ///< m
+};
+
+/// Nothing is fitted to it. The paper shows one person, about whom it says nothing.
+std::vector<HeldWallResult> hold_walls(const SubjectSet& set, double stiffness, const StiffnessRun& run);
+report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results);
+
+// --- Where the gain of F_MC = 2 N comes from (causes.cpp) --------------------------------------------------
+
+/// What is left of the four things that a field of F_MC = 2 N changes: the hand stiffens, the field reaches
+/// out in front of the wall, its force is there as a preload, and a force limit, which is the device's, is
+/// met sooner.
+struct CauseCondition {
+  std::string name;
+  std::string what;
+  bool field = false;             ///< paper 1, eqs. 5 and 6
+  double magnetic_length = 1e-3;  ///< m; nearly 0: the field's force inside the wall only
+  bool preload = false;           ///< F_MC everywhere instead of the field
+  bool stiffens = false;          ///< the hand, with what is commanded
+  double grip_factor = 1.0;       ///< of k1 and b1, from the beginning
+  double arm_factor = 1.0;        ///< of k2 and b2
+  void apply(TouchSetup& setup) const;
+};
+
+/// `grown`: 1 + gamma 2 N, what a hand grows by that has got used to 2 N.
+std::vector<CauseCondition> cause_conditions(double grown);
+/// The field alone, with the hand unchanged, by its length.
+std::vector<CauseCondition> fields_of(const std::vector<double>& lengths);
+
+/// What is looked for lies far below the 1 N/mm that other searches begin with: a field that no hand answers
+/// is unstable there already. N/m; the run's own first stiffness is not used.
+inline constexpr double cause_first_stiffness = 100.0;
+std::vector<PeopleMean> run_causes(const SubjectSet& set, const std::vector<CauseCondition>& conditions,
+                                   const StiffnessRun& run);
+
+inline const std::vector<double> field_lengths{0.25e-3, 0.5e-3, 1e-3, 2e-3, 5e-3};  ///< x_0, m
+struct CausesOfSet {
+  SubjectSet set;
+  std::vector<PeopleMean> causes;   ///< of cause_conditions()
+  std::vector<PeopleMean> lengths;  ///< of field_lengths
+};
+report::Section cause_section(const std::vector<CausesOfSet>& results);
+
+// --- What nobody knows (variations.cpp) --------------------------------------------------------------------
+
+/// The study with other people, touches, criterion, device or integrator: with the calibrated numbers left as
+/// they are, or with both fitted again to the same targets. What the two then predict differently is what the
+/// targets do not identify.
+struct Variation {
+  std::string name;
+  std::string group;  ///< what is varied
+  bool refit = false;
+  SubjectSet set;
+  experiment::TouchProtocol protocol;
+  simulation::IntegratorConfig integrator{};
+};
+/// All but the draws, from a calibrated set.
+std::vector<Variation> assumption_variations(const SubjectSet& set,
+                                             const experiment::TouchProtocol& protocol);
+/// Other people: the seeds 1 to `groups`, each fitted again.
+std::vector<Variation> draw_variations(const SubjectSet& set, const experiment::TouchProtocol& protocol,
+                                       std::size_t groups);
+
+struct VariationResult {
+  Variation variation;
+  double friction = 0.0, activation_gain = 0.0;  ///< N, 1/N
+  std::vector<PeopleMean> means;                 ///< in the order of stiffness_conditions()
+  /// Did a fit reach its two targets (operator_calibration.hpp)? One that did not says nothing about what the
+  /// targets leave open.
+  bool plain_met = true, magnetic_met = true;
+  bool met() const { return plain_met && magnetic_met; }
+};
+/// One job each: a variation is a long chain of small searches. Steps and threads are the run's.
+std::vector<VariationResult> run_variations(const std::vector<Variation>& variations,
+                                            const experiment::CalibrationSettings& calibration,
+                                            const StiffnessRun& run);
+/// With sentences on what holds in how many of the results; those whose fit missed count neither way.
+report::Section variation_section(const std::string& heading, const std::vector<VariationResult>& results);
+
+// --- What would make the adaptive wall reach the 8.02 N/mm of Fig. 8 (adaptive_gap.cpp) --------------------
+
+struct ApproachResult {
+  double approach_speed = 0.0;  ///< m/s, the only one of the touches
+  /// F_MC = 2 N constant; instant, latched, peak_hold; peak_hold whose hold is far longer than the touch.
+  std::array<PeopleMean, 5> walls{};
+  double coefficient_at_contact = 0.0;  ///< N, mean, of the last wall at its largest stiffness
+};
+std::vector<ApproachResult> run_approaches(const SubjectSet& set, const std::vector<double>& speeds,
+                                           const StiffnessRun& run);
+
+struct NeededCoefficient {
+  double coefficient = 0.0;     ///< N, constant
+  double mean = 0.0;            ///< N/m, what it gives: as near to the target as steps of the mean allow
+  double approach_speed = 0.0;  ///< m/s, at which eq. 7 commands that much
+};
+/// Searched between 0 and 4 N, all touches of the run's protocol.
+NeededCoefficient coefficient_for(const SubjectSet& set, double target, const StiffnessRun& run);
+
+report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<ApproachResult>& approaches,
+                                     const NeededCoefficient& needed);
+
+// --- Rate of the loop, encoder and velocity estimator (loop_rates.cpp) -------------------------------------
+
+/// What counts as unstable decides these numbers more than anything else.
+enum class RateMeasure : std::uint8_t {
+  moves,  ///< more than three counts peak to peak; a force that swings by many newtons a count passes
+  /// More than 1 N of force peak to peak. One count of a wall of 1 N / count length is 1 N: nothing can be
+  /// found above 18 N/mm with 0.055 mm and 182 N/mm with 5.5 um, whatever the rate.
+  feels
+};
+
+struct RateCase {
+  double rate = 500.0;          ///< Hz
+  double count_length = 55e-6;  ///< m
+  double wall_damping = 0.0;    ///< N s/m
+  control::VelocityEstimatorKind estimator = control::VelocityEstimatorKind::difference;
+  double delay_samples = 0.0;  ///< from the sample to its force
+  double delay = 0.0;          ///< s, added to it
+  RateMeasure measure = RateMeasure::moves;
+  std::string name() const;  ///< without rate and encoder
+};
+inline constexpr std::array study_rates{500.0, 1000.0, 2000.0, 5000.0, 10000.0, 20000.0};  ///< Hz
+/// Every rate with: no damping; a delay of one sample; a delay of 0.5 ms; damping of 2 N s/m with each
+/// estimator.
+std::vector<RateCase> rate_cases(double count_length, RateMeasure measure);
+
+struct RateResult {
+  RateCase setting;
+  experiment::MaxStiffness found;
+};
+/// The person of the supplied scenes; the force is not clipped, and the stiffness rises by 3 % a step, which
+/// is the resolution of the result. `device`: its force limit and delay are not used.
+std::vector<RateResult> run_rates(const std::vector<RateCase>& cases, const simulation::DeviceModel& device,
+                                  const StiffnessRun& run);
+/// A table for each encoder and measure.
+report::Section rate_section(const std::vector<RateResult>& results);
+/// Stiffness over the rate for one encoder and one measure. Throws plot::FigureError.
+report::Picture draw_rates(const std::vector<RateResult>& results, double count_length, RateMeasure measure,
+                           const std::filesystem::path& file);
+
+}  // namespace kmax::studies
