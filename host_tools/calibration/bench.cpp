@@ -10,7 +10,7 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/calibration/trip_diagnosis.hpp"
-#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/drive.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::calibration {

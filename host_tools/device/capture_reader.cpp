@@ -134,12 +134,7 @@ void CaptureReader::arm(const CaptureSettings& settings) {
   std::vector<CaptureChannel> channels;
   for (const std::string& name : settings.channels) channels.push_back(channel_of(name));
   const std::vector<Assignment> assignments = assignments_of(settings, channels);
-  // From the parameters, not from measured.count_length: that reading is rounded to float.
-  firmware::ParameterValues values;
-  for (const std::size_t entry :
-       {firmware::entry_of<"device.transmission">(), firmware::entry_of<"encoder.counts_per_turn">()})
-    values.set_raw(firmware::slot_of(entry, settings.axis), device_.read(Parameter(entry, settings.axis)));
-  count_length_ = firmware::count_length(values, settings.axis);
+  count_length_ = device_.count_length(settings.axis);
   channels_ = channels;
   settings_ = settings;
   device_.apply(assignments);
@@ -224,10 +219,10 @@ Captured CaptureReader::read(const Tell& tell) {
         fmt::format("{}: another program has taken the device's capture; try again", device_.description()));
   };
   if (before.channels != channels_.size() || before.taken > samples_of(settings_)) throw taken_away();
-  const std::size_t all = std::size_t{2} * before.taken * before.channels;
-  std::vector<std::uint16_t> registers;
+  const std::size_t all = std::size_t{before.taken} * before.channels;
+  std::vector<std::uint32_t> words;
   try {
-    registers = device_.link().read_input_window(firmware::capture_window, all, [&](std::size_t done) {
+    words = device_.link().read_capture(all, [&](std::size_t done) {
       tell_if_asked(tell,
                     {Phase::reading, static_cast<std::uint32_t>(done), static_cast<std::uint32_t>(all)});
     });
@@ -244,10 +239,9 @@ Captured CaptureReader::read(const Tell& tell) {
   captured.count_length = count_length_;
   for (const CaptureChannel channel : channels_)
     captured.columns.push_back({std::string(text_of(channel).name), std::string(text_of(channel).unit), {}});
-  for (std::size_t i = 0; i < registers.size(); i += 2) {
-    const std::size_t c = i / 2 % channels_.size();
-    const std::uint32_t word = (std::uint32_t{registers[i]} << 16) | registers[i + 1];
-    captured.columns[c].values.push_back(firmware::capture_value(channels_[c], word, count_length_));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::size_t c = i % channels_.size();
+    captured.columns[c].values.push_back(firmware::capture_value(channels_[c], words[i], count_length_));
   }
   return captured;
 }

@@ -50,7 +50,7 @@ struct Captured {
   const std::vector<double>& column(std::string_view name) const;
 };
 
-/// How far a capture is: `done` of `all` samples, or of all registers while they are being read.
+/// How far a capture is: `done` of `all` samples, or of all values while they are being read.
 struct CaptureProgress {
   enum class Phase : std::uint8_t { waiting, running, reading } phase;
   std::uint32_t done, all;

@@ -3,21 +3,14 @@
 
 #include <fmt/format.h>
 
+#include "firmware/haptic_configuration.hpp"
 #include "host_tools/base/errors.hpp"
-#include "host_tools/device/register_plan.hpp"
 
 namespace kmax::device {
 
 using link::RefusedError;
 
 namespace {
-std::uint32_t raw_from_words(firmware::Type type, std::span<const std::uint16_t> words) {
-  if (words.size() == 2) return (std::uint32_t{words[0]} << 16) | words[1];
-  if (type == firmware::Type::integer8)
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int16_t>(words[0])));
-  return words[0];
-}
-
 std::string version_text(std::uint32_t version) {
   return fmt::format("{}.{}.{}", version >> 16, (version >> 8) & 0xFFu, version & 0xFFu);
 }
@@ -48,18 +41,9 @@ void Device::check_dictionary() {
 }
 
 std::vector<std::uint32_t> Device::read(std::span<const Parameter> parameters) {
-  std::vector<std::uint32_t> values(parameters.size());
-  for (const RegisterRange& range : plan_registers(parameters, link::Link::read_count_max)) {
-    const auto words = range.table == Table::holding ? link_->read_holding(range.address, range.count)
-                                                     : link_->read_input(range.address, range.count);
-    for (const std::size_t member : range.members) {
-      const Parameter& parameter = parameters[member];
-      const auto own = std::span(words).subspan(static_cast<std::size_t>(parameter.address() - range.address),
-                                                parameter.words());
-      values[member] = raw_from_words(parameter.definition().type, own);
-    }
-  }
-  return values;
+  std::vector<std::size_t> slots;
+  for (const Parameter& parameter : parameters) slots.push_back(parameter.slot());
+  return link_->read(slots);
 }
 
 double Device::read_number(std::string_view name) {
@@ -67,14 +51,17 @@ double Device::read_number(std::string_view name) {
   return firmware::number_from_raw(parameter.definition().type, read(parameter));
 }
 
+double Device::count_length(std::size_t axis) {
+  firmware::ParameterValues values;
+  for (const Parameter& parameter :
+       {Parameter::of<"device.transmission">(axis), Parameter::of<"encoder.counts_per_turn">(axis)})
+    values.set_raw(parameter.slot(), read(parameter));
+  return firmware::count_length(values, axis);
+}
+
 void Device::write(const Parameter& parameter, std::uint32_t raw, bool idempotent) {
-  const std::uint16_t words[] = {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
-  const auto own = std::span(words).last(parameter.words());
-  if (idempotent) {
-    link_->write_holding_idempotent(parameter.address(), own);
-  } else {
-    link_->write_holding(parameter.address(), own);
-  }
+  const link::SlotValue value{parameter.slot(), raw};
+  link_->write({&value, 1}, idempotent ? link::Repeat::if_lost : link::Repeat::never);
 }
 
 RefusalReport Device::last_refusal() {

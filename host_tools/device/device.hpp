@@ -31,16 +31,20 @@ class Device {
  public:
   explicit Device(std::unique_ptr<link::Link> link, link::Notice notice = {});
 
-  /// In the order asked, in as few requests as the addresses allow (one per group of the dictionary).
-  /// Values of one group are read in one request and thus belong together.
+  /// In the order asked, in as few requests as the link allows. Over Modbus values of one group are read in
+  /// one request and thus belong together.
   std::vector<std::uint32_t> read(std::span<const Parameter> parameters);
   std::uint32_t read(const Parameter& parameter) { return read(std::span(&parameter, 1)).front(); }
 
   /// By name, as a number: choices give their number, 32-bit counters all their bits.
   double read_number(std::string_view name);
 
+  /// Handle travel per encoder count of an axis, m, from the parameters: the reading measured.count_length is
+  /// rounded to float.
+  double count_length(std::size_t axis);
+
   /// Writes one value by itself, at once: for commands. A refusal is a link::RefusedError. `idempotent`: as
-  /// Link::write_holding_idempotent().
+  /// link::Repeat::if_lost.
   void write(const Parameter& parameter, std::uint32_t raw, bool idempotent);
 
   /// Sets all values in one tick of the device or none of them, and reads them back.
@@ -75,7 +79,7 @@ class Device {
   void settle_lost_commit(std::span<const Assignment> assignments, const std::string& what);
   std::optional<Difference> first_difference(std::span<const Assignment> assignments);
   void verify(std::span<const Assignment> assignments);
-  void follow_line_settings(std::span<const Assignment> assignments);
+  void follow_serial_settings(std::span<const Assignment> assignments);
   [[noreturn]] void fail_refused(std::span<const Assignment> assignments, const RefusalReport& report);
 
   std::unique_ptr<link::Link> link_;

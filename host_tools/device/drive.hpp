@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/fault.hpp"
 #include "firmware/stability_guard.hpp"
 #include "host_tools/device/device.hpp"
 
@@ -31,6 +32,13 @@ struct DriveStatus {
   /// One or two sentences: what happened, the number that tripped it and its bound, what to check.
   std::string fault_words() const;
 };
+
+/// Fault::none also for an error code that this program does not know.
+inline firmware::Fault fault_of(const DriveStatus& status) {
+  const firmware::FaultText* text =
+      status.faulty() ? firmware::fault_by_error_code(status.error_code) : nullptr;
+  return text != nullptr ? text->fault : firmware::Fault::none;
+}
 
 /// The CiA 402 drive of one axis: force only while it is armed ("operation enabled").
 ///

@@ -10,7 +10,7 @@ namespace kmax::link {
 
 /// Something that one program at a time may talk to (a serial port, a node on a bus), and how programs that
 /// respect each other take turns: who comes second waits a moment, says so, and then gives up; who has it
-/// lends it while it has nothing to say.
+/// lets others have it while it has nothing to say.
 class ExclusiveUse {
  public:
   static constexpr std::chrono::milliseconds patience{2000};  ///< how long another kmax is waited for
@@ -21,7 +21,7 @@ class ExclusiveUse {
 
   /// Lets others have it for `duration` and takes it back: a program that keeps an axis armed must not keep
   /// out the one that stops it. Errors: LinkError if another program does not give it back.
-  void lend(std::chrono::microseconds duration) {
+  void yield(std::chrono::microseconds duration) {
     give_back();
     std::this_thread::sleep_for(duration);
     const auto start = Clock::now();

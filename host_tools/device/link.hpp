@@ -20,72 +20,68 @@ class LinkError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The device answered with a Modbus exception, or what stands for one on another link: it understood the
-/// request and did not carry it out.
+/// The device understood the request and did not carry it out; the message says what and why, in the terms of
+/// the link (RegisterRefused, SdoRefused).
 class RefusedError : public std::runtime_error {
  public:
-  RefusedError(std::uint8_t exception, std::uint8_t function, std::uint16_t address);
-  /// For a link that knows more than the exception.
-  RefusedError(std::uint8_t exception, std::uint8_t function, std::uint16_t address, const std::string& words)
-      : std::runtime_error(words), exception_(exception), function_(function), address_(address) {}
-
-  std::uint8_t exception() const { return exception_; }  ///< Modbus exception code, 1..
-  std::uint8_t function() const { return function_; }    ///< Modbus function of the request
-  std::uint16_t address() const { return address_; }     ///< first register of the request
-
- private:
-  std::uint8_t exception_;
-  std::uint8_t function_;
-  std::uint16_t address_;
+  using std::runtime_error::runtime_error;
 };
 
 /// Something the user should know while waiting, one line without a newline.
 using Notice = std::function<void(const std::string&)>;
 
-/// A conversation with one device in terms of Modbus registers, whatever carries it.
+/// A value of the device: a slot of the object dictionary (firmware::slot_of) and the 32 bits that are in it.
+struct SlotValue {
+  std::size_t slot;
+  std::uint32_t raw;
+};
+
+/// What is to happen when it is unknown whether a write arrived: a write that states a value does no harm
+/// when the device carries it out twice, one that asks for a step does.
+enum class Repeat : std::uint8_t { never, if_lost };
+
+/// A conversation with one device in slots of its object dictionary, whatever carries it.
 ///
-/// Every call is one request and its reply: when it returns, the device has answered. Errors: LinkError and
-/// RefusedError, nothing else. A link belongs to one thread.
+/// When a call returns, the device has answered. Errors: LinkError and RefusedError, nothing else. A link
+/// belongs to one thread.
 class Link {
  public:
-  static constexpr std::uint16_t read_count_max = 125;   ///< registers in one read request
-  static constexpr std::uint16_t write_count_max = 123;  ///< registers in one write request
+  /// Records of the trace that one request carries on every link.
+  static constexpr std::size_t trace_records_at_once = 15;
 
   Link() = default;
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
   virtual ~Link() = default;
 
-  /// Exactly `count` registers, 1..read_count_max.
-  virtual std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) = 0;
-  virtual std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) = 0;
+  /// The values of these slots, in the order asked. How many of them belong to one moment depends on the
+  /// link.
+  virtual std::vector<std::uint32_t> read(std::span<const std::size_t> slots) = 0;
 
-  /// How many of the registers asked for have been read; rises up to all of them. What it throws ends the
-  /// reading and comes through.
+  /// Writes the values in as few requests as the link allows, each of which is carried out whole or not at
+  /// all. `before_request` is called before each of them; what it throws ends the writing. With Repeat::never
+  /// nothing is sent twice: after a LinkError it is unknown whether the device carried the last request out.
+  virtual void write(std::span<const SlotValue> values, Repeat repeat,
+                     const std::function<void()>& before_request = {}) = 0;
+
+  /// `count` records of the trace's ring (firmware/trace.hpp) from place `first` on, as their 32-bit words.
+  /// Both are within the ring, and `count` is at most trace_records_at_once.
+  virtual std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) = 0;
+
+  /// How many of the words asked for have been read; rises up to all of them. What it throws ends the reading
+  /// and comes through.
   using Progress = std::function<void(std::size_t done)>;
 
-  /// Any number of input registers, in as many requests as that takes: the values may come from different
-  /// moments.
-  virtual std::vector<std::uint16_t> read_input_window(std::uint16_t address, std::size_t registers,
-                                                       const Progress& tell);
+  /// The first `count` 32-bit words of the completed capture (firmware/capture.hpp).
+  virtual std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) = 0;
 
-  /// 1..write_count_max registers; whole or not at all. Never sent twice: after a LinkError it is unknown
-  /// whether the device carried it out.
-  virtual void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) = 0;
-
-  /// The same for a write that does no harm when the device carries it out twice, because it states a value
-  /// rather than asks for a step. A link that can lose a message may repeat it.
-  virtual void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
-    write_holding(address, values);
-  }
-
-  /// Texts of the device identification (Modbus function 43/14) by their standard names in snake case:
+  /// Texts of the device's identification by the standard names of Modbus (function 43/14) in snake case:
   /// vendor_name, product_code, revision, product_name, model_name, ... Empty if the device offers none.
   virtual std::map<std::string, std::string> identify() { return {}; }
 
-  /// The device has just been told to use another unit or baud rate (what is not given stays): follow it.
-  virtual void follow_line_settings([[maybe_unused]] std::optional<std::uint8_t> unit,
-                                    [[maybe_unused]] std::optional<std::uint32_t> baud_rate) {}
+  /// The device has just been set to another unit or baud rate (what is not given stays): follow it.
+  virtual void follow_serial_settings([[maybe_unused]] std::optional<std::uint8_t> unit,
+                                      [[maybe_unused]] std::optional<std::uint32_t> baud_rate) {}
 
   /// The device's idea of passing time: the real clock, unless the device is simulated in this process.
   virtual std::chrono::microseconds now() const {
@@ -96,6 +92,29 @@ class Link {
 
   /// The address a user would type, for messages.
   virtual std::string description() const = 0;
+};
+
+/// Lets other programs use a link (Link::wait) for 25 ms every 500 ms while this one talks without a pause,
+/// since one that stops the device must not be kept out.
+class PeriodicYield {
+ public:
+  static constexpr std::chrono::milliseconds own_time{500};
+  /// Longer than from one attempt of a program that waits to the next (ExclusiveUse).
+  static constexpr std::chrono::milliseconds others_time{25};
+
+  /// `link` must outlive this.
+  explicit PeriodicYield(Link& link) : link_(link), last_(link.now()) {}
+
+  /// To be called between requests. Waits when it is time to. Errors: LinkError.
+  void yield_if_due() {
+    if (link_.now() - last_ < own_time) return;
+    link_.wait(others_time);
+    last_ = link_.now();
+  }
+
+ private:
+  Link& link_;
+  std::chrono::microseconds last_;
 };
 
 }  // namespace kmax::link

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/canopen/object_access.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::device {
@@ -26,19 +27,38 @@ class Parameter {
     return {firmware::entry_of<name>(), axis};
   }
 
+  /// The owner of a slot of the dictionary.
+  static constexpr Parameter at(std::size_t slot) {
+    const firmware::SlotOwner owner = firmware::owner_of(slot);
+    return {owner.entry, owner.axis};
+  }
+
   constexpr const firmware::Entry& definition() const { return firmware::entry_at(entry_); }
   constexpr std::size_t entry() const { return entry_; }
   constexpr std::size_t axis() const { return axis_; }
+  constexpr std::size_t slot() const { return firmware::slot_of(entry_, axis_); }
   constexpr bool belongs_to_axis() const { return definition().scope() == firmware::Scope::axis; }
   constexpr bool writable() const { return definition().access == firmware::Access::read_write; }
   constexpr Table table() const { return writable() ? Table::holding : Table::input; }
   constexpr std::uint16_t address() const { return firmware::modbus_address(entry_, axis_); }
   constexpr std::uint16_t words() const { return firmware::register_count(definition().type); }
+  constexpr std::size_t bytes() const { return firmware::bytes_of(definition().type); }
+  /// The slot's 32 bits from as many as its type has, which are the lowest of `bits`: signed ones keep their
+  /// sign.
+  constexpr std::uint32_t extended(std::uint32_t bits) const {
+    const std::size_t unused = 8 * (4 - bytes());
+    if (!firmware::is_signed(definition().type)) return bits << unused >> unused;
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(bits << unused) >> unused);
+  }
   constexpr std::uint32_t default_raw() const {
     return firmware::raw_from_number(definition().type, definition().default_value);
   }
   constexpr std::uint16_t index() const {
     return static_cast<std::uint16_t>(definition().index() + axis_ * firmware::axis_index_offset);
+  }
+
+  constexpr firmware::canopen::ObjectAddress object() const {
+    return {index(), definition().object_subindex()};
   }
 
   /// Axis 0 and the device without a prefix, other axes as axisN.NAME.

@@ -141,8 +141,9 @@ std::vector<Store::Change> Store::set_defaults() {
   } catch (const LinkError& error) {
     lost = error.what();  // the values themselves tell
   }
-  device_.link().follow_line_settings(static_cast<std::uint8_t>(Parameter::of<"modbus.unit">().default_raw()),
-                                      Parameter::of<"modbus.baud_rate">().default_raw());
+  device_.link().follow_serial_settings(
+      static_cast<std::uint8_t>(Parameter::of<"modbus.unit">().default_raw()),
+      Parameter::of<"modbus.baud_rate">().default_raw());
   std::vector<std::uint32_t> after;
   try {
     after = device_.read(parameters);

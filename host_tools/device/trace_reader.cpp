@@ -4,20 +4,14 @@
 #include <bit>
 
 #include "firmware/trace.hpp"
-#include "host_tools/device/count_length.hpp"
 
 namespace kmax::device {
 
 namespace {
-constexpr std::uint16_t records_per_request = link::Link::read_count_max / firmware::trace_words_per_record;
+constexpr std::size_t words_per_record = firmware::trace_words_per_record / 2;
 
 void set_interval(Device& device, std::uint16_t interval) {
   device.write(Parameter::of<"trace.interval">(), interval, true);
-}
-
-std::uint32_t field(const std::vector<std::uint16_t>& words, std::size_t record, std::size_t number) {
-  const std::size_t at = record * firmware::trace_words_per_record + 2 * number;
-  return (std::uint32_t{words[at]} << 16) | words[at + 1];
 }
 }  // namespace
 
@@ -28,7 +22,7 @@ TraceReader::TraceReader(Device& device, std::size_t axis, std::uint16_t interva
   const double rate = static_cast<double>(
       std::bit_cast<float>(device_.read(Parameter(firmware::entry_of<"haptic.rate">(), axis))));
   ticks_per_record_ = static_cast<std::uint32_t>(firmware::tick_rate_hz / rate + 0.5) * interval;
-  count_length_ = count_length(device_, axis);
+  count_length_ = device_.count_length(axis);
   set_interval(device_, interval);
 }
 
@@ -54,11 +48,9 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
     }
     const auto slot = static_cast<std::uint32_t>(next_ % firmware::trace_capacity);
     const auto until_wrap = static_cast<std::uint32_t>(firmware::trace_capacity) - slot;
-    const auto count = std::min({available - next_, until_wrap, std::uint32_t{records_per_request}});
-    const auto address =
-        static_cast<std::uint16_t>(firmware::trace_window + slot * firmware::trace_words_per_record);
-    const auto words = device_.link().read_input(
-        address, static_cast<std::uint16_t>(count * firmware::trace_words_per_record));
+    const auto count =
+        std::min({available - next_, until_wrap, std::uint32_t{link::Link::trace_records_at_once}});
+    const auto words = device_.link().read_trace(slot, count);
     // Records near the end of the ring may have been overwritten while they were read. Later the ticks tell
     // which record it is, but the first one must be what it is taken for.
     std::uint32_t overwritten = 0;
@@ -68,7 +60,7 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
         overwritten = std::min(count, age - static_cast<std::uint32_t>(firmware::trace_capacity));
     }
     for (std::uint32_t i = overwritten; i < count; ++i) {
-      const std::uint32_t tick = field(words, i, 0);
+      const std::uint32_t tick = words[i * words_per_record];
       if (!started_) {
         started_ = true;
         const std::uint32_t missed = next_ + i - began_;
@@ -82,10 +74,11 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
       if (gap == 0 || gap > 0x80000000u) continue;
       lost_ += gap / ticks_per_record_ - 1;
       last_tick_ = tick;
-      samples.push_back({static_cast<double>(tick - first_tick_) / firmware::tick_rate_hz,
-                         static_cast<double>(static_cast<std::int32_t>(field(words, i, 1))) * count_length_,
-                         static_cast<double>(std::bit_cast<float>(field(words, i, 2))),
-                         static_cast<double>(std::bit_cast<float>(field(words, i, 3)))});
+      samples.push_back(
+          {static_cast<double>(tick - first_tick_) / firmware::tick_rate_hz,
+           static_cast<double>(static_cast<std::int32_t>(words[i * words_per_record + 1])) * count_length_,
+           static_cast<double>(std::bit_cast<float>(words[i * words_per_record + 2])),
+           static_cast<double>(std::bit_cast<float>(words[i * words_per_record + 3]))});
     }
     next_ += count;
   }

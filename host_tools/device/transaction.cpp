@@ -7,7 +7,6 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/guard_words.hpp"
-#include "host_tools/device/register_plan.hpp"
 
 namespace kmax::device {
 
@@ -104,10 +103,11 @@ class Device::Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  void put_aside(std::uint16_t address, std::span<const std::uint16_t> words) {
-    check_silence();
-    last_write_ = device_.link_->now();
-    device_.link_->write_holding(address, words);
+  void put_aside(std::span<const link::SlotValue> values) {
+    device_.link_->write(values, link::Repeat::never, [this] {
+      check_silence();
+      last_write_ = device_.link_->now();
+    });
   }
 
   void apply() {
@@ -142,22 +142,13 @@ class Device::Transaction {
 };
 
 bool Device::transact(std::span<const Assignment> assignments, RefusalReport& report) {
-  std::vector<Parameter> parameters;
-  for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
+  std::vector<link::SlotValue> values;
+  for (const auto& [parameter, raw] : assignments) values.push_back({parameter.slot(), raw});
   std::optional<Transaction>
       transaction;  // outlives the handler, which asks why before the answer is cleared
   try {
     transaction.emplace(*this);
-    for (const RegisterRange& range : plan_registers(parameters, link::Link::write_count_max)) {
-      std::vector<std::uint16_t> words;
-      for (const std::size_t member : range.members) {
-        const Assignment& assignment = assignments[member];
-        if (assignment.parameter.words() == 2)
-          words.push_back(static_cast<std::uint16_t>(assignment.raw >> 16));
-        words.push_back(static_cast<std::uint16_t>(assignment.raw));
-      }
-      transaction->put_aside(range.address, words);
-    }
+    transaction->put_aside(values);
     transaction->apply();
     return true;
   } catch (const RefusedError&) {
@@ -186,14 +177,14 @@ void Device::apply(std::span<const Assignment> assignments) {
       if (attempt == commit_attempts) throw;
     }
   }
-  follow_line_settings(assignments);
+  follow_serial_settings(assignments);
   verify(assignments);
 }
 
 void Device::settle_lost_commit(std::span<const Assignment> assignments, const std::string& what) {
   std::optional<Difference> difference;
   try {
-    follow_line_settings(assignments);
+    follow_serial_settings(assignments);
     difference = first_difference(assignments);
   } catch (const std::exception&) {
     throw LinkError(fmt::format(
@@ -233,14 +224,14 @@ void Device::verify(std::span<const Assignment> assignments) {
                   value_with_unit(parameter, difference->found)));
 }
 
-void Device::follow_line_settings(std::span<const Assignment> assignments) {
+void Device::follow_serial_settings(std::span<const Assignment> assignments) {
   std::optional<std::uint8_t> unit;
   std::optional<std::uint32_t> baud_rate;
   for (const auto& [parameter, raw] : assignments) {
     if (parameter == Parameter::of<"modbus.unit">()) unit = static_cast<std::uint8_t>(raw);
     if (parameter == Parameter::of<"modbus.baud_rate">()) baud_rate = raw;
   }
-  if (unit || baud_rate) link_->follow_line_settings(unit, baud_rate);
+  if (unit || baud_rate) link_->follow_serial_settings(unit, baud_rate);
 }
 
 void Device::fail_refused(std::span<const Assignment> assignments, const RefusalReport& report) {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/drive.hpp"
 
 namespace kmax::experiment {
 

@@ -6,7 +6,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
-#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/drive.hpp"
 
 namespace kmax::experiment {
 

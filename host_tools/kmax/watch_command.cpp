@@ -13,7 +13,7 @@
 
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/regular_loan.hpp"
+#include "host_tools/device/link.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/watch_view.hpp"
 
@@ -97,7 +97,7 @@ int run_watch(Context& context, const WatchOptions& options) {
   device::Device device = context.connect();
   link::Link& link = device.link();
   Display display(context, device.description());
-  link::RegularLoan loan(link);
+  link::PeriodicYield yield(link);
   const microseconds interval(static_cast<std::int64_t>(1e6 / options.rate));
   const microseconds start = link.now();
   const auto real_start = std::chrono::steady_clock::now();
@@ -112,7 +112,7 @@ int run_watch(Context& context, const WatchOptions& options) {
     display.show(seconds, seconds > 0 ? static_cast<double>(readings) / seconds : 0, axes);
     if (options.seconds && seconds >= *options.seconds) break;
     // What is left of an interval may be too short for anybody to take the link.
-    loan.lend();
+    yield.yield_if_due();
     next = std::max(next + interval, link.now());
     // In pieces, so that Ctrl-C is not waited for.
     while (link.now() < next && !interruption.requested())

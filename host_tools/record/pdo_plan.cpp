@@ -9,7 +9,6 @@
 
 #include "firmware/canopen/object_places.hpp"
 #include "host_tools/base/errors.hpp"
-#include "host_tools/device/count_length.hpp"
 
 namespace kmax::record {
 
@@ -85,7 +84,7 @@ PdoPlan read_pdo_plan(device::Device& device, std::uint8_t node) {
   const std::uint32_t bit_rate = device.read(Parameter::of<"can.bit_rate_in_use">());
   plan.period_ticks = std::max(event_time, shortest_event_time(bit_rate)) * (firmware::tick_rate_hz / 1000);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
-    plan.count_lengths[axis] = device::count_length(device, axis);
+    plan.count_lengths[axis] = device.count_length(axis);
   plan.held_back = device.read(Parameter::of<"can.tpdo_held_back">());
   plan.node_state = static_cast<std::uint8_t>(device.read(Parameter::of<"can.node_state">()));
   plan.tick = device.read(Parameter::of<"info.tick">());

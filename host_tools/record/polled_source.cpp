@@ -8,10 +8,10 @@
 namespace kmax::record {
 
 PolledSource::PolledSource(device::Device& device, std::vector<std::size_t> axes)
-    : device_(device), axes_(std::move(axes)), loan_(device.link()) {}
+    : device_(device), axes_(std::move(axes)), yield_(device.link()) {}
 
 std::optional<Row> PolledSource::next(std::chrono::microseconds /*wait*/) {
-  loan_.lend();
+  yield_.yield_if_due();
   const std::vector<Measurement> measured = read_measurements(device_, axes_);
   const std::uint32_t tick = measured.front().tick;
   Row row;

@@ -8,7 +8,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/capture_reader.hpp"
-#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/drive.hpp"
 
 namespace kmax::selftest {
 

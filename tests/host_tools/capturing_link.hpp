@@ -13,7 +13,7 @@ namespace kmax::host_tools_test {
 
 /// A link to a device that consists of registers and the firmware's own capture. Its ticks pass with each
 /// request (5 ms) and in wait(); in tick t channel c has the word `word_of(t, c)`.
-class CapturingLink final : public link::Link {
+class CapturingLink final : public link::RegisterLink {
  public:
   using Exception = firmware::modbus::Exception;
 
@@ -141,7 +141,7 @@ class CapturingLink final : public link::Link {
     std::vector<std::uint16_t> words(count);
     const auto exception = execute(std::span<std::uint16_t>(words));
     if (exception != Exception::none)
-      throw link::RefusedError(static_cast<std::uint8_t>(exception), function, address);
+      throw link::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
     return words;
   }
 };

@@ -10,7 +10,7 @@
 #include "firmware/device_registers.hpp"
 #include "firmware/modbus/register_bank.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
-#include "host_tools/device/link.hpp"
+#include "host_tools/device/serial/register_link.hpp"
 
 namespace kmax::host_tools_test {
 
@@ -138,17 +138,17 @@ class FakeDevice {
 };
 
 /// A link that can lose messages, to a device that outlives it.
-class FakeLink final : public link::Link {
+class FakeLink final : public link::RegisterLink {
  public:
   enum class Loss { none, request, reply };
 
   explicit FakeLink(std::shared_ptr<FakeDevice> device) : device_(std::move(device)) {}
 
   std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return read(3, address, count, [&](auto out) { return device_->read_holding(address, out); });
+    return read_registers(3, address, count, [&](auto out) { return device_->read_holding(address, out); });
   }
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return read(4, address, count, [&](auto out) { return device_->read_input(address, out); });
+    return read_registers(4, address, count, [&](auto out) { return device_->read_input(address, out); });
   }
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
     exchange(16, address, [&] { return device_->write_holding(address, values); });
@@ -180,11 +180,11 @@ class FakeLink final : public link::Link {
     if (after_request) after_request(requests);
     if (lost) throw link::LinkError("reply lost");
     if (exception != firmware::modbus::Exception::none)
-      throw link::RefusedError(static_cast<std::uint8_t>(exception), function, address);
+      throw link::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
   }
   template <typename Execute>
-  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::uint16_t count,
-                                  Execute execute) {
+  std::vector<std::uint16_t> read_registers(std::uint8_t function, std::uint16_t address, std::uint16_t count,
+                                            Execute execute) {
     std::vector<std::uint16_t> words(count);
     exchange(function, address, [&] { return execute(std::span<std::uint16_t>(words)); });
     return words;

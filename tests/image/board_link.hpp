@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "firmware/modbus/crc.hpp"
-#include "host_tools/device/link.hpp"
+#include "host_tools/device/serial/register_link.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 
 namespace kmax::tests {
@@ -15,22 +15,15 @@ namespace kmax::tests {
 /// What host tools say to the image: Modbus RTU on the virtual board's serial line, in board time. A reading
 /// that gets lost (a tick is longer than a character at high rates) is asked for again, as the serial link
 /// does.
-class BoardLink final : public link::Link {
+class BoardLink final : public link::FrameLink {
  public:
-  explicit BoardLink(virtual_board::VirtualBoard& board) : board_(board) {}
+  explicit BoardLink(virtual_board::VirtualBoard& board) : FrameLink(1), board_(board) {}
 
   std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return read(3, address, count);
+    return again_if_lost([&] { return FrameLink::read_holding(address, count); });
   }
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return read(4, address, count);
-  }
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-    const auto count = static_cast<std::uint16_t>(values.size());
-    std::vector<std::uint8_t> request = begin(16, address, count);
-    request.push_back(static_cast<std::uint8_t>(2 * count));
-    for (const std::uint16_t value : values) push(request, value);
-    static_cast<void>(exchange(std::move(request), address, 8));
+    return again_if_lost([&] { return FrameLink::read_input(address, count); });
   }
   void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) override {
     again_if_lost([&] {
@@ -47,26 +40,6 @@ class BoardLink final : public link::Link {
   std::string description() const override { return "the virtual board"; }
 
  private:
-  static void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
-    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
-    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
-  }
-  static std::vector<std::uint8_t> begin(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
-    std::vector<std::uint8_t> request{1, function};
-    push(request, address);
-    push(request, count);
-    return request;
-  }
-
-  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
-    const auto reply =
-        again_if_lost([&] { return exchange(begin(function, address, count), address, 5U + 2U * count); });
-    std::vector<std::uint16_t> words;
-    for (std::size_t i = 0; i < count; ++i)
-      words.push_back(static_cast<std::uint16_t>(reply[3 + 2 * i] << 8 | reply[4 + 2 * i]));
-    return words;
-  }
-
   template <typename Exchange>
   static std::invoke_result_t<Exchange> again_if_lost(Exchange ask) {
     for (int attempt = 1; attempt < 3; ++attempt) {
@@ -78,12 +51,9 @@ class BoardLink final : public link::Link {
     return ask();
   }
 
-  std::vector<std::uint8_t> exchange(std::vector<std::uint8_t> request, std::uint16_t address,
-                                     std::size_t expected) {
-    const std::uint8_t function = request[1];
-    const std::uint16_t crc = firmware::modbus::crc_of(request);
-    request.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-    request.push_back(static_cast<std::uint8_t>(crc >> 8));
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> request) override {
+    // An answer to a write repeats the first registers and their number; one to a reading has the registers.
+    const std::size_t expected = request[1] == 16 ? 8 : 5U + 2U * request[5];
     static_cast<void>(board_.transmitted());
     board_.receive(request);
     std::vector<std::uint8_t> reply;
@@ -96,7 +66,6 @@ class BoardLink final : public link::Link {
       if (reply.size() < (refused ? 5U : expected)) continue;
       if (firmware::modbus::crc_of(reply) != 0) throw link::LinkError("the board's reply has a wrong CRC");
       board_.run_for(0.002);  // the silence between two frames is 1.75 ms
-      if (refused) throw link::RefusedError(reply[2], function, address);
       return reply;
     }
     throw link::LinkError("the board does not answer within 0.6 s");

@@ -5,43 +5,50 @@
 #include <algorithm>
 
 #include "firmware/axis_state_machine.hpp"
+#include "firmware/canopen/object_places.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
-#include "host_tools/device/can/register_objects.hpp"
+#include "host_tools/device/parameter.hpp"
 
 namespace kmax::link {
 
+using device::Parameter;
+using firmware::SpecialObject;
 using firmware::canopen::Abort;
 
 namespace {
-constexpr std::uint8_t read_holding_function = 3, read_input_function = 4, write_function = 16;
-constexpr std::uint8_t illegal_address = 2, illegal_value = 3;
-
-constexpr SdoClient::Object capture_object{0x5821, 1};
-constexpr std::uint16_t trace_index = 0x5820;
-constexpr std::uint16_t registers_per_trace_object = firmware::trace_object_bytes / 2;
-
-std::string name_of(const RegisterObject& value) {
-  return fmt::format("{}, {}", text_of(value.object), value.definition().name);
+constexpr std::uint16_t index_of(SpecialObject what) {
+  return std::find_if(firmware::special_objects.begin(), firmware::special_objects.end(),
+                      [what](const auto& row) { return row.what == what; })
+      ->index;
 }
 
-RefusedError refusal(const SdoAborted& aborted, std::uint8_t function, std::uint16_t address,
-                     const std::string& object, const std::string& more = {}) {
-  return {exception_of(aborted.code()), function, address,
-          fmt::format("the device refused to {} object {}: {} (SDO abort {:08X}){}",
-                      function == write_function ? "write" : "read", object,
-                      firmware::canopen::to_string(aborted.code()),
-                      static_cast<std::uint32_t>(aborted.code()), more)};
+constexpr std::size_t words_per_record = firmware::trace_words_per_record / 2;
+constexpr std::size_t records_per_object = firmware::trace_records_per_object;
+
+std::string name_of(const Parameter& parameter) {
+  return fmt::format("{}, {}", text_of(parameter.object()), parameter.definition().name);
 }
 
-/// 32-bit numbers, low byte first, as registers, high word first.
-std::vector<std::uint16_t> registers_of(std::span<const std::uint8_t> bytes) {
-  std::vector<std::uint16_t> registers;
-  registers.reserve(bytes.size() / 2);
-  for (std::size_t i = 0; i + 4 <= bytes.size(); i += 4) {
-    registers.push_back(static_cast<std::uint16_t>(bytes[i + 2] | bytes[i + 3] << 8));
-    registers.push_back(static_cast<std::uint16_t>(bytes[i] | bytes[i + 1] << 8));
-  }
-  return registers;
+SdoRefused refusal(const SdoAborted& aborted, const char* doing, const std::string& object,
+                   const std::string& more = {}) {
+  const std::string_view why = aborted.code() == Abort::local_control
+                                   ? "another link has a transaction open, or the data are in use"
+                                   : firmware::canopen::to_string(aborted.code());
+  return {aborted, fmt::format("the device refused to {} object {}: {} (SDO abort {:08X}){}", doing, object,
+                               why, static_cast<std::uint32_t>(aborted.code()), more)};
+}
+
+/// Low byte first.
+std::uint32_t number_from(std::span<const std::uint8_t> bytes) {
+  std::uint32_t number = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) number |= std::uint32_t{bytes[i]} << (8 * i);
+  return number;
+}
+
+SdoClient::Bytes bytes_of(std::uint32_t number, std::size_t count) {
+  SdoClient::Bytes bytes;
+  for (std::size_t i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
+  return bytes;
 }
 
 CanPortOptions options_for(std::uint8_t node) {
@@ -51,138 +58,117 @@ CanPortOptions options_for(std::uint8_t node) {
 }
 }  // namespace
 
-std::uint8_t exception_of(Abort code) {
-  switch (code) {
-    case Abort::unsupported_access:
-    case Abort::write_only:
-    case Abort::read_only:
-    case Abort::no_object:
-    case Abort::no_subindex:
-      return illegal_address;
-    case Abort::length:
-    case Abort::too_long:
-    case Abort::too_short:
-    case Abort::value_range:
-    case Abort::value_too_high:
-    case Abort::value_too_low:
-    case Abort::maximum_below_minimum:
-    case Abort::incompatible:
-    case Abort::incompatible_inside:
-    case Abort::not_mappable:
-    case Abort::pdo_length:
-      return illegal_value;
-    case Abort::local_control:
-      return 6;  // server device busy
-    default:
-      return 4;  // server device failure
-  }
-}
-
 CanLink::CanLink(const DeviceAddress& address, const Notice& notice, const SdoSettings& settings)
     : address_(address),
       port_(open_can_port(address.path, options_for(address.node))),
       lock_(address.path, address.node, notice),
       sdo_(*port_, address.node, settings) {}
 
-std::vector<std::uint16_t> CanLink::read_holding(std::uint16_t address, std::uint16_t count) {
-  return read(read_holding_function, address, count);
+std::vector<std::uint32_t> CanLink::read(std::span<const std::size_t> slots) {
+  std::vector<std::uint32_t> values;
+  for (const std::size_t slot : slots) values.push_back(read(slot));
+  return values;
 }
 
-std::vector<std::uint16_t> CanLink::read_input(std::uint16_t address, std::uint16_t count) {
-  if (firmware::Trace::contains(address)) return read_trace(address, count);
-  if (firmware::Capture::contains(address)) return read_input_window(address, count, {});
-  return read(read_input_function, address, count);
-}
-
-std::vector<std::uint16_t> CanLink::read(std::uint8_t function, std::uint16_t address, std::size_t count) {
-  const auto table = function == read_holding_function ? RegisterTable::holding : RegisterTable::input;
-  const auto values = objects_in(table, address, count);
-  if (!values) throw RefusedError(illegal_address, function, address);
+std::uint32_t CanLink::read(std::size_t slot) {
+  const Parameter parameter = Parameter::at(slot);
+  const firmware::Entry& definition = parameter.definition();
   keep_alive();
-  std::vector<std::uint16_t> registers;
-  for (const RegisterObject& value : *values) {
-    SdoClient::Bytes bytes;
-    try {
-      bytes = sdo_.upload(value.object);
-    } catch (const SdoAborted& aborted) {
-      throw refusal(aborted, function, value.address, name_of(value));
-    }
-    if (bytes.size() < value.bytes())
-      throw LinkError(
-          fmt::format("{}: node {} gave {} bytes for object {}, which has {}; check that this node is a Kmax "
-                      "controller of this program's release",
-                      address_.path, address_.node, bytes.size(), name_of(value), value.bytes()));
-    const auto words = registers_from_bytes(value, address_.node, bytes);
-    registers.insert(registers.end(), words.begin(), words.end());
+  SdoClient::Bytes bytes;
+  try {
+    bytes = sdo_.upload(parameter.object());
+  } catch (const SdoAborted& aborted) {
+    throw refusal(aborted, "read", name_of(parameter));
   }
-  return registers;
+  if (bytes.size() < parameter.bytes())
+    throw LinkError(
+        fmt::format("{}: node {} gave {} bytes for object {}, which has {}; check that this node is a Kmax "
+                    "controller of this program's release",
+                    address_.path, address_.node, bytes.size(), name_of(parameter), parameter.bytes()));
+  const std::uint32_t raw = parameter.extended(number_from(bytes));
+  if (!definition.node_relative) return raw;
+  // The object has the node ID added to it.
+  return firmware::canopen::stored_cob_id(raw, static_cast<std::uint32_t>(definition.default_value),
+                                          address_.node);
 }
 
-std::vector<std::uint16_t> CanLink::read_object(std::uint16_t address, SdoClient::Object object,
-                                                std::size_t bytes, const SdoClient::Tell& tell) {
+void CanLink::write(std::span<const SlotValue> values, Repeat repeat,
+                    const std::function<void()>& before_request) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Parameter parameter = Parameter::at(values[i].slot);
+    const std::string more =
+        i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, values.size());
+    if (before_request) before_request();
+    try {
+      sdo_.download(parameter.object(), bytes_of(values[i].raw, parameter.bytes()),
+                    repeat == Repeat::if_lost);
+      note_command(values[i]);
+    } catch (const SdoAborted& aborted) {
+      throw refusal(aborted, "write", name_of(parameter), more);
+    } catch (const LinkError& error) {
+      throw LinkError(error.what() + more);
+    }
+  }
+}
+
+std::vector<std::uint32_t> CanLink::read_words(SdoClient::Object object, std::size_t bytes,
+                                               const SdoClient::Tell& progress) {
   keep_alive();
   try {
-    return registers_of(sdo_.upload(object, bytes, tell));
+    const auto received = sdo_.upload(object, bytes, progress);
+    std::vector<std::uint32_t> words;
+    for (std::size_t i = 0; i + 4 <= received.size(); i += 4)
+      words.push_back(number_from(std::span(received).subspan(i, 4)));
+    return words;
   } catch (const SdoAborted& aborted) {
-    throw refusal(aborted, read_input_function, address, text_of(object));
+    throw refusal(aborted, "read", text_of(object));
   }
 }
 
-std::vector<std::uint16_t> CanLink::read_trace(std::uint16_t address, std::size_t count) {
-  std::vector<std::uint16_t> registers;
-  while (registers.size() < count) {
-    const auto at = static_cast<std::uint16_t>(address + registers.size());
-    if (!firmware::Trace::contains(at)) throw RefusedError(illegal_address, read_input_function, address);
-    const std::size_t offset = at - firmware::trace_window;
-    const SdoClient::Object object{trace_index,
-                                   static_cast<std::uint8_t>(offset / registers_per_trace_object + 1)};
-    const auto piece = read_object(at, object, firmware::trace_object_bytes);
-    const std::size_t skipped = offset % registers_per_trace_object;
-    if (piece.size() != registers_per_trace_object)
+std::vector<std::uint32_t> CanLink::read_trace(std::size_t first, std::size_t count) {
+  std::vector<std::uint32_t> words;
+  for (std::size_t at = first; at < first + count;) {
+    const SdoClient::Object object{index_of(SpecialObject::trace_records),
+                                   static_cast<std::uint8_t>(at / records_per_object + 1)};
+    const auto piece = read_words(object, firmware::trace_object_bytes);
+    if (4 * piece.size() != firmware::trace_object_bytes)
       throw LinkError(fmt::format("{}: object {} of node {} has {} bytes instead of {}", address_.path,
-                                  text_of(object), address_.node, 2 * piece.size(),
+                                  text_of(object), address_.node, 4 * piece.size(),
                                   firmware::trace_object_bytes));
-    const std::size_t taken = std::min(piece.size() - skipped, count - registers.size());
-    const auto first = piece.begin() + static_cast<std::ptrdiff_t>(skipped);
-    registers.insert(registers.end(), first, first + static_cast<std::ptrdiff_t>(taken));
+    const std::size_t skipped = at % records_per_object;
+    const std::size_t taken = std::min(records_per_object - skipped, first + count - at);
+    const auto begin = piece.begin() + static_cast<std::ptrdiff_t>(skipped * words_per_record);
+    words.insert(words.end(), begin, begin + static_cast<std::ptrdiff_t>(taken * words_per_record));
+    at += taken;
   }
-  return registers;
+  return words;
 }
 
-std::vector<std::uint16_t> CanLink::read_input_window(std::uint16_t address, std::size_t registers,
-                                                      const Progress& tell) {
-  if (registers == 0) return {};
-  if (!firmware::Capture::contains(address)) return Link::read_input_window(address, registers, tell);
-  const std::size_t offset = address - firmware::capture_window;
-  const std::size_t end = offset + registers;
-  if (end > 2 * firmware::capture_words) throw RefusedError(illegal_address, read_input_function, address);
-  std::size_t told = 0;
-  const auto tell_new = [&](std::size_t done) {
-    if (!tell || done <= told) return;
-    told = done;
-    tell(done);
+std::vector<std::uint32_t> CanLink::read_capture(std::size_t count, const Progress& progress) {
+  if (count == 0) return {};
+  std::size_t shown = 0;
+  const auto show = [&](std::size_t done) {
+    if (!progress || done <= shown) return;
+    shown = done;
+    progress(done);
   };
-  // The object is as long as the capture, so this is the window's part that was asked for, or less.
-  auto all = read_object(address, capture_object, 2 * end, [&](std::size_t bytes) {
-    const std::size_t done = bytes / 2 <= offset ? 0 : bytes / 2 - offset;
-    if (done < registers) tell_new(done);
-  });
-  if (all.size() < end)
+  // The object is as long as the capture.
+  auto words = read_words({index_of(SpecialObject::capture_samples), 1}, 4 * count,
+                          [&](std::size_t bytes) { show(std::min(bytes / 4, count - 1)); });
+  if (words.size() < count)
     throw LinkError(
-        fmt::format("{}: the capture of node {} has {} registers, {} were to be read; read its "
-                    "state again",
-                    address_.path, address_.node, all.size(), end));
-  tell_new(registers);
-  const auto first = all.begin() + static_cast<std::ptrdiff_t>(offset);
-  return {first, first + static_cast<std::ptrdiff_t>(registers)};
+        fmt::format("{}: the capture of node {} has {} words, {} were to be read; read its state again",
+                    address_.path, address_.node, words.size(), count));
+  show(count);
+  words.resize(count);
+  return words;
 }
 
-void CanLink::note_command(const SdoClient::Object& object, const SdoClient::Bytes& value) {
+void CanLink::note_command(const SlotValue& written) {
   last_write_ = Clock::now();
-  constexpr std::uint16_t controlword = firmware::entry_at(firmware::entry_of<"drive.controlword">()).index();
   for (std::size_t axis = 0; axis < commands_.size(); ++axis) {
-    if (object.index == controlword + axis * firmware::axis_index_offset)
-      commands_[axis] = (value.at(0) & firmware::controlword::enable_operation) != 0;
+    if (written.slot == Parameter::of<"drive.controlword">(axis).slot())
+      commands_[axis] = (written.raw & firmware::controlword::enable_operation) != 0;
   }
 }
 
@@ -190,45 +176,10 @@ void CanLink::keep_alive() {
   constexpr auto interval = std::chrono::milliseconds(100);
   const bool commands = std::find(commands_.begin(), commands_.end(), true) != commands_.end();
   if (!commands || Clock::now() - last_write_ < interval) return;
-  constexpr const firmware::Entry& entry = firmware::entry_at(firmware::entry_of<"link.sign_of_life">());
+  constexpr Parameter sign_of_life = Parameter::of<"link.sign_of_life">();
   ++signs_of_life_;
-  const std::uint8_t value[] = {static_cast<std::uint8_t>(signs_of_life_),
-                                static_cast<std::uint8_t>(signs_of_life_ >> 8)};
-  sdo_.download({entry.index(), entry.object_subindex()}, value, true);
+  sdo_.download(sign_of_life.object(), bytes_of(signs_of_life_, sign_of_life.bytes()), true);
   last_write_ = Clock::now();
-}
-
-void CanLink::write_holding(std::uint16_t address, std::span<const std::uint16_t> values) {
-  write(address, values, false);
-}
-
-void CanLink::write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
-  write(address, values, true);
-}
-
-void CanLink::write(std::uint16_t address, std::span<const std::uint16_t> values, bool idempotent) {
-  const auto targets = objects_in(RegisterTable::holding, address, values.size());
-  if (!targets) throw RefusedError(illegal_address, write_function, address);
-  std::vector<SdoClient::Bytes> bytes;
-  for (const RegisterObject& target : *targets) {
-    const auto own = values.subspan(static_cast<std::size_t>(target.address - address), target.words());
-    auto value = bytes_from_registers(target, own);
-    if (!value) throw RefusedError(illegal_value, write_function, target.address);
-    bytes.push_back(std::move(*value));
-  }
-  for (std::size_t i = 0; i < targets->size(); ++i) {
-    const RegisterObject& target = (*targets)[i];
-    const std::string more =
-        i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, targets->size());
-    try {
-      sdo_.download(target.object, bytes[i], idempotent);
-      note_command(target.object, bytes[i]);
-    } catch (const SdoAborted& aborted) {
-      throw refusal(aborted, write_function, target.address, name_of(target), more);
-    } catch (const LinkError& error) {
-      throw LinkError(error.what() + more);
-    }
-  }
 }
 
 std::map<std::string, std::string> CanLink::identify() {

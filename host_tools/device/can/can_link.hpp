@@ -10,50 +10,50 @@
 
 namespace kmax::link {
 
-/// A device on a CAN bus: its registers by SDO, each value one object of the same dictionary.
+/// The node ended a transfer with an SDO abort; the message names the object and says why.
+class SdoRefused : public RefusedError {
+ public:
+  SdoRefused(const SdoAborted& aborted, const std::string& message)
+      : RefusedError(message), code_(aborted.code()) {}
+  firmware::canopen::Abort code() const { return code_; }
+
+ private:
+  firmware::canopen::Abort code_;
+};
+
+/// A device on a CAN bus: each slot is one object of the same dictionary, read and written by SDO.
 ///
-/// Values that belong together on a serial line, because one request covers them, are read one after the
-/// other here: they may be some milliseconds apart. Writing several values at once is not whole or nothing
-/// either; an error says how many were written before it. Device::apply() makes it whole by a transaction.
-///
-/// The windows of the trace and of a capture are read in long pieces: 0x5820:k has 64 registers of the
-/// former, 0x5821:1 all of the latter.
+/// Values are read one after the other: they may be some milliseconds apart. Writing several of them is not
+/// whole or nothing either; an error says how many were written before it. Device::apply() makes it whole by
+/// a transaction.
 ///
 /// For the device only writing is a sign of life on CAN (link.timeout). From a controlword that enables an
 /// axis on, until one that does not, reading through this link therefore writes link.sign_of_life ten times a
 /// second.
 ///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
-///
-/// A refusal is a RefusedError whose exception() is the Modbus exception nearest to the SDO abort:
-///   2 no such object or sub-index, or not accessible in this way    3 a value or length that is not allowed
-///   4 not in the device's present state, or for a reason of its own 6 under control of somebody else
 class CanLink final : public Link {
  public:
   /// `address` is of kind can. Errors: LinkError.
   explicit CanLink(const DeviceAddress& address, const Notice& notice = {}, const SdoSettings& settings = {});
 
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override;
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override;
-  std::vector<std::uint16_t> read_input_window(std::uint16_t address, std::size_t registers,
-                                               const Progress& tell) override;
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override;
-  void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) override;
+  std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
+  void write(std::span<const SlotValue> values, Repeat repeat,
+             const std::function<void()>& before_request = {}) override;
+  std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
+  std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
   std::map<std::string, std::string> identify() override;
   std::string description() const override { return text_of(address_); }
-  void wait(std::chrono::microseconds duration) override { lock_.lend(duration); }
+  void wait(std::chrono::microseconds duration) override { lock_.yield(duration); }
 
   /// For objects that are not in the dictionary's tables.
   SdoClient& sdo() { return sdo_; }
 
  private:
-  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::size_t count);
-  std::vector<std::uint16_t> read_object(std::uint16_t address, SdoClient::Object object, std::size_t bytes,
-                                         const SdoClient::Tell& tell = {});
-  std::vector<std::uint16_t> read_trace(std::uint16_t address, std::size_t count);
-  void write(std::uint16_t address, std::span<const std::uint16_t> values, bool idempotent);
-
-  void note_command(const SdoClient::Object& object, const SdoClient::Bytes& value);
+  std::uint32_t read(std::size_t slot);
+  std::vector<std::uint32_t> read_words(SdoClient::Object object, std::size_t bytes,
+                                        const SdoClient::Tell& progress = {});
+  void note_command(const SlotValue& written);
   void keep_alive();
 
   using Clock = std::chrono::steady_clock;
@@ -65,8 +65,5 @@ class CanLink final : public Link {
   Clock::time_point last_write_{};
   std::uint16_t signs_of_life_ = 0;
 };
-
-/// The Modbus exception nearest to an SDO abort; see CanLink.
-std::uint8_t exception_of(firmware::canopen::Abort code);
 
 }  // namespace kmax::link

@@ -19,7 +19,7 @@
 #include <fstream>
 #include <thread>
 
-#include "host_tools/device/can/descriptor_wait.hpp"
+#include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/can/kernel_frame.hpp"
 #include "host_tools/device/link.hpp"
 

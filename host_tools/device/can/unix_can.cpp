@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "host_tools/device/can/descriptor_wait.hpp"
+#include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/can/kernel_frame.hpp"
 #include "host_tools/device/link.hpp"
 

@@ -16,15 +16,15 @@
 namespace kmax::link {
 
 namespace {
-[[noreturn]] void fail(const std::string& path, const std::string& words) {
+[[noreturn]] void fail_hub(const std::string& path, const std::string& words) {
   throw LinkError(fmt::format("{}: {}", path, words));
 }
 
-sockaddr_un address_of(const std::string& path) {
+sockaddr_un socket_address(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
-    fail(path, fmt::format("the path has {} characters; a socket's can have 1 to {}", path.size(),
+    fail_hub(path, fmt::format("the path has {} characters; a socket's can have 1 to {}", path.size(),
                            sizeof address.sun_path - 1));
   std::copy(path.begin(), path.end(), address.sun_path);
   return address;
@@ -61,12 +61,12 @@ unsigned long long inode_at(const std::string& path) {
 UnixCanHub::UnixCanHub(const std::string& path) : path_(path) {
   listen_at_path();
   events_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
-  if (!events_) fail(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
+  if (!events_) fail_hub(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
   watch(events_.number(), listener_.number());
 }
 
 void UnixCanHub::listen_at_path() {
-  const sockaddr_un address = address_of(path_);
+  const sockaddr_un address = socket_address(path_);
   listener_ = FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const auto bind_it = [&] {
     return bind(listener_.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
@@ -74,18 +74,18 @@ void UnixCanHub::listen_at_path() {
   if (!bind_it()) {
     if (errno == EADDRINUSE) {
       if (inode_at(path_) == 0)
-        fail(path_, "there is something here that is not a socket; give another path for the CAN bus");
+        fail_hub(path_, "there is something here that is not a socket; give another path for the CAN bus");
       if (is_served(address))
-        fail(path_, "another program serves a CAN bus here; end that one or give another path");
+        fail_hub(path_, "another program serves a CAN bus here; end that one or give another path");
       unlink(path_.c_str());
       errno = bind_it() ? 0 : errno;
     }
     if (errno != 0)
-      fail(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
+      fail_hub(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
   }
   inode_ = inode_at(path_);
   if (listen(listener_.number(), 64) != 0)
-    fail(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
+    fail_hub(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
 }
 
 UnixCanHub::~UnixCanHub() {

@@ -79,8 +79,8 @@ void SerialLink::connect() {
   modbus_flush(context_.get());
 }
 
-void SerialLink::follow_line_settings(std::optional<std::uint8_t> unit,
-                                      std::optional<std::uint32_t> baud_rate) {
+void SerialLink::follow_serial_settings(std::optional<std::uint8_t> unit,
+                                        std::optional<std::uint32_t> baud_rate) {
   address_.unit = unit.value_or(address_.unit);
   modbus_set_slave(context_.get(), address_.unit);
   if (!baud_rate || *baud_rate == address_.baud_rate) return;
@@ -120,57 +120,45 @@ void SerialLink::exchange(const Request& request, int attempts_allowed,
                           const std::function<int()>& transact) {
   int error = 0;
   for (int attempt = 0; attempt < attempts_allowed; ++attempt) {
-    if (line_suspect_) listen_until_silent();
+    if (answer_outstanding_) listen_until_silent();
     errno = 0;
     if (transact() == static_cast<int>(request.count)) {
       // The answer to an earlier attempt may still follow the one that was just taken.
-      line_suspect_ = attempt > 0;
+      answer_outstanding_ = attempt > 0;
       return;
     }
     error = errno;
     if (is_exception(error))
-      throw RefusedError(static_cast<std::uint8_t>(error - MODBUS_ENOBASE), request.function,
-                         request.address);
+      throw RegisterRefused(static_cast<std::uint8_t>(error - MODBUS_ENOBASE), request.function,
+                            request.address);
     if (is_vanished(error)) fail_vanished(error);
-    line_suspect_ = true;
+    answer_outstanding_ = true;
   }
   fail_unanswered(request, attempts_allowed, error);
 }
 
 void SerialLink::listen_until_silent() {
-  // A line that never falls silent (a device that chatters) must not hold the program for ever.
+  // One that never falls silent (a device that chatters) must not hold the program for ever.
   const auto deadline = Clock::now() + patience_;
   std::array<std::uint8_t, 256> discarded;
   pollfd port{modbus_get_socket(context_.get()), POLLIN, 0};
   while (Clock::now() < deadline && poll(&port, 1, static_cast<int>(silence.count())) > 0) {
-    if (read(port.fd, discarded.data(), discarded.size()) <= 0) fail_vanished(EIO);
+    if (::read(port.fd, discarded.data(), discarded.size()) <= 0) fail_vanished(EIO);
   }
-  line_suspect_ = false;
+  answer_outstanding_ = false;
 }
 
-std::map<std::string, std::string> SerialLink::identify() {
-  std::map<std::string, std::string> texts;
-  std::uint8_t object = 0;
-  // Every page brings the next object nearer to the end; the bound is for a device that lies.
-  for (int page_number = 0; page_number < 16; ++page_number) {
-    if (line_suspect_) listen_until_silent();
-    const std::array<std::uint8_t, 5> request{address_.unit, identification::function,
-                                              identification::mei_type, identification::stream_regular,
-                                              object};
-    if (modbus_send_raw_request(context_.get(), request.data(), static_cast<int>(request.size())) < 0) {
-      if (is_vanished(errno)) fail_vanished(errno);
-      return texts;
-    }
-    const auto page = identification::parse(receive_identification(), address_.unit);
-    if (!page) {
-      line_suspect_ = true;
-      return texts;
-    }
-    for (const auto& [id, text] : page->objects) texts[identification::name_of(id)] = text;
-    if (!page->next_object || *page->next_object <= object) return texts;
-    object = *page->next_object;
+std::optional<identification::Page> SerialLink::read_identification(std::uint8_t first) {
+  if (answer_outstanding_) listen_until_silent();
+  const std::array<std::uint8_t, 5> request{address_.unit, identification::function, identification::mei_type,
+                                            identification::stream_regular, first};
+  if (modbus_send_raw_request(context_.get(), request.data(), static_cast<int>(request.size())) < 0) {
+    if (is_vanished(errno)) fail_vanished(errno);
+    return std::nullopt;
   }
-  return texts;
+  auto page = identification::parse(receive_identification(), address_.unit);
+  if (!page) answer_outstanding_ = true;
+  return page;
 }
 
 std::vector<std::uint8_t> SerialLink::receive_identification() {
@@ -182,7 +170,7 @@ std::vector<std::uint8_t> SerialLink::receive_identification() {
     if (length != 0 && frame.size() >= length) return frame;
     if (poll(&port, 1, static_cast<int>(until(deadline).count())) <= 0) return frame;
     std::array<std::uint8_t, 256> bytes;
-    const auto count = read(port.fd, bytes.data(), bytes.size());
+    const auto count = ::read(port.fd, bytes.data(), bytes.size());
     if (count <= 0) fail_vanished(count == 0 ? ECONNRESET : errno);
     frame.insert(frame.end(), bytes.begin(), bytes.begin() + count);
     if (frame.size() > bytes.size()) return frame;  // longer than any frame

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "host_tools/device/device_address.hpp"
-#include "host_tools/device/link.hpp"
+#include "host_tools/device/serial/register_link.hpp"
 #include "host_tools/device/serial/serial_port_lock.hpp"
 
 struct _modbus;
@@ -18,12 +18,12 @@ namespace kmax::link {
 /// to stop the drive for instance. A request that gets no answer within 500 ms (`patience`), or an
 /// answer that is not one (bad CRC, other unit, other length), is sent again up to two times if it is a
 /// read or an idempotent write; other writes are sent once, since a lost answer does not tell whether the
-/// device acted. Before anything is sent after such a failure the line is listened to until it is silent: an
+/// device acted. Before anything is sent after such a failure the link listens until it is silent: an
 /// answer that comes late must not be taken for the next one, and a Modbus RTU answer does not say which
 /// request it belongs to.
 ///
 /// A port that vanishes (unplugged adapter, closed pseudo-terminal) ends in a LinkError at once.
-class SerialLink final : public Link {
+class SerialLink final : public RegisterLink {
  public:
   static constexpr std::chrono::milliseconds response_timeout{500};
   static constexpr int attempts = 3;
@@ -37,13 +37,13 @@ class SerialLink final : public Link {
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override;
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override;
   void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) override;
-  std::map<std::string, std::string> identify() override;
-  void follow_line_settings(std::optional<std::uint8_t> unit,
-                            std::optional<std::uint32_t> baud_rate) override;
+  void follow_serial_settings(std::optional<std::uint8_t> unit,
+                              std::optional<std::uint32_t> baud_rate) override;
   std::string description() const override { return text_of(address_); }
-  void wait(std::chrono::microseconds duration) override { lock_.lend(duration); }
+  void wait(std::chrono::microseconds duration) override { lock_.yield(duration); }
 
  private:
+  std::optional<identification::Page> read_identification(std::uint8_t first) override;
   struct Deleter {
     void operator()(_modbus* context) const;
   };
@@ -66,7 +66,7 @@ class SerialLink final : public Link {
   std::chrono::milliseconds patience_;
   SerialPortLock lock_;
   std::unique_ptr<_modbus, Deleter> context_;
-  bool line_suspect_ = false;  ///< an answer may still be on its way
+  bool answer_outstanding_ = false;  ///< an answer may still be on its way
 };
 
 }  // namespace kmax::link

@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds too_long{1100};  // link.timeout is 1 s
 
 /// The simulated board behind a link whose host can be held up before any message.
-class HeldUpLink final : public link::Link {
+class HeldUpLink final : public link::RegisterLink {
  public:
   explicit HeldUpLink(const simulation::Scene& scene) : link_(scene) {}
 
@@ -34,9 +34,9 @@ class HeldUpLink final : public link::Link {
     hold_up();
     link_.write_holding(address, values);
   }
-  void follow_line_settings(std::optional<std::uint8_t> unit,
-                            std::optional<std::uint32_t> baud_rate) override {
-    link_.follow_line_settings(unit, baud_rate);
+  void follow_serial_settings(std::optional<std::uint8_t> unit,
+                              std::optional<std::uint32_t> baud_rate) override {
+    link_.follow_serial_settings(unit, baud_rate);
   }
   std::string description() const override { return "sim"; }
   std::chrono::microseconds now() const override { return link_.now(); }

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/device/drive_fault.hpp"
+#include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/experiment/touch_journal.hpp"

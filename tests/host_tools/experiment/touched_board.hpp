@@ -17,7 +17,7 @@ namespace kmax::experiment {
 /// that can be cut and that tells of its requests.
 class TouchedBoard : public testing::Test {
  protected:
-  class CutLink final : public link::Link {
+  class CutLink final : public link::RegisterLink {
    public:
     explicit CutLink(const simulation::Scene& scene) : sim(scene) {}
     std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {

@@ -14,7 +14,7 @@ namespace kmax::cli::parameter_file_commands_test {
 namespace {
 
 /// A wire to a device that stays, whose address is what a serial port's would be. It can lose a write.
-class Wire final : public link::Link {
+class Wire final : public link::RegisterLink {
  public:
   Wire(std::shared_ptr<link::SimLink> device, int lost_write)
       : device_(std::move(device)), lost_(lost_write) {}
@@ -34,8 +34,8 @@ class Wire final : public link::Link {
     device_->write_holding(address, values);
   }
   std::map<std::string, std::string> identify() override { return device_->identify(); }
-  void follow_line_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
-    device_->follow_line_settings(unit, baud);
+  void follow_serial_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
+    device_->follow_serial_settings(unit, baud);
     if (unit) unit_ = *unit;
   }
   std::chrono::microseconds now() const override { return device_->now(); }

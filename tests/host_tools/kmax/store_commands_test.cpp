@@ -12,7 +12,7 @@ namespace {
 using firmware::DriveState;
 
 /// A wire to a device that stays; it can lose answers, and the device can lose words.
-class Wire final : public link::Link {
+class Wire final : public link::RegisterLink {
  public:
   enum class Loss { none, request, reply };
 
@@ -32,8 +32,8 @@ class Wire final : public link::Link {
     device_->wait(std::chrono::milliseconds(500));
     throw link::LinkError("no answer");
   }
-  void follow_line_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
-    device_->follow_line_settings(unit, baud);
+  void follow_serial_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
+    device_->follow_serial_settings(unit, baud);
   }
   std::chrono::microseconds now() const override { return device_->now(); }
   void wait(std::chrono::microseconds duration) override { device_->wait(duration); }

@@ -12,14 +12,14 @@
 
 #include "firmware/modbus/crc.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/link.hpp"
+#include "host_tools/device/serial/register_link.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::selftest {
 
 /// A link to the simulated board that looks at the true handle in every tick.
-class WatchedLink final : public link::Link {
+class WatchedLink final : public link::RegisterLink {
  public:
   WatchedLink(const simulation::Scene& scene, std::size_t axis) : board_(scene), axis_(axis) {
     start_ = position();
@@ -28,10 +28,10 @@ class WatchedLink final : public link::Link {
   }
 
   std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return read(3, address, count);
+    return read_registers(3, address, count);
   }
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return read(4, address, count);
+    return read_registers(4, address, count);
   }
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
     std::vector<std::uint16_t> words{address, static_cast<std::uint16_t>(values.size())};
@@ -94,12 +94,13 @@ class WatchedLink final : public link::Link {
       tick();
       const std::vector<std::uint8_t> reply = board_.board().transmitted();
       if (reply.size() <= 3) continue;
-      if (reply[1] != function) throw link::RefusedError(reply[2], function, address);
+      if (reply[1] != function) throw link::RegisterRefused(reply[2], function, address);
       return reply;
     }
     throw link::LinkError("no answer");
   }
-  std::vector<std::uint16_t> read(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
+  std::vector<std::uint16_t> read_registers(std::uint8_t function, std::uint16_t address,
+                                            std::uint16_t count) {
     const auto reply = exchange(start_of(function, {address, count}), address);
     std::vector<std::uint16_t> words;
     for (std::size_t i = 0; i < count; ++i)

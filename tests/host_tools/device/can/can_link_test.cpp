@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/object_dictionary/special_objects.hpp"
+#include "firmware/trace.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
 #include "tests/host_tools/device/can/can_device.hpp"
@@ -22,7 +24,7 @@ using host_tools_test::thrown_message;
 using Bytes = FakeSdoNode::Bytes;
 using Frames = FakeSdoNode::Frames;
 using Object = FakeSdoNode::Object;
-using Words = std::vector<std::uint16_t>;
+using Words = std::vector<std::uint32_t>;
 
 /// A device and a link to it, which opens when it is first used.
 struct Bench {
@@ -45,45 +47,57 @@ struct Bench {
   std::unique_ptr<CanLink> link_;
 };
 
-constexpr auto stiffness = Parameter::of<"wall.stiffness">().address();
+constexpr Parameter stiffness = Parameter::of<"wall.stiffness">(), damping = Parameter::of<"wall.damping">();
 
-TEST(CanLink, ReadsAndWritesRegisters) {
+std::uint32_t read(CanLink& link, const Parameter& parameter) {
+  const std::size_t slot = parameter.slot();
+  return link.read(std::span(&slot, 1)).front();
+}
+
+void write(CanLink& link, const std::vector<SlotValue>& values, Repeat repeat = Repeat::never) {
+  link.write(values, repeat);
+}
+
+TEST(CanLink, ReadsAndWritesSlots) {
   Bench bench;
   CanLink& link = bench.link();
-  EXPECT_EQ(link.read_holding(stiffness, 2), (Words{0x447A, 0}));
-  link.write_holding(stiffness, Words{0x4000, 0x0001});
-  EXPECT_EQ(link.read_holding(stiffness, 2), (Words{0x4000, 0x0001}));
-  link.write_holding_idempotent(stiffness, Words{0x4040, 0, 0x3F80, 0});
-  EXPECT_EQ(link.read_holding(stiffness, 4), (Words{0x4040, 0, 0x3F80, 0}));
-  const auto checksum = link.read_input(Parameter::of<"info.dictionary_checksum">().address(), 2);
-  EXPECT_EQ(std::uint32_t{checksum[0]} << 16 | checksum[1], firmware::dictionary_checksum);
-  EXPECT_EQ(link.read_holding(Parameter::of<"wall.side">().address(), 1), Words{1});
-  link.write_holding(Parameter::of<"wall.side">(1).address(), Words{0xFFFF});
-  EXPECT_EQ(link.read_holding(Parameter::of<"wall.side">(1).address(), 1), Words{0xFFFF});
-  EXPECT_EQ(link.read_holding(Parameter::of<"wall.side">(0).address(), 1), Words{1});
+  EXPECT_EQ(read(link, stiffness), 0x447A0000u);
+  write(link, {{stiffness.slot(), 0x40000001}});
+  EXPECT_EQ(read(link, stiffness), 0x40000001u);
+  write(link, {{stiffness.slot(), 0x40400000}, {damping.slot(), 0x3F800000}}, Repeat::if_lost);
+  const std::size_t both[] = {damping.slot(), stiffness.slot()};
+  EXPECT_EQ(link.read(both), (Words{0x3F800000, 0x40400000}));
+  EXPECT_EQ(read(link, Parameter::of<"info.dictionary_checksum">()), firmware::dictionary_checksum);
+  constexpr Parameter side = Parameter::of<"wall.side">(), other_side = Parameter::of<"wall.side">(1);
+  write(link, {{other_side.slot(), 0xFFFFFFFF}});
+  EXPECT_EQ(read(link, other_side), 0xFFFFFFFFu);
+  EXPECT_EQ(read(link, side), 1u);
   EXPECT_EQ(link.description(), "can:" + bench.can.node.path() + "?node=5");
 }
 
-// What the registers say over CAN is what they say over a serial line.
+// What is said over CAN is what is said over a serial link.
 TEST(CanLink, EveryValueOfTheDictionaryIsTheRegistersOwn) {
+  auto device = std::make_shared<host_tools_test::FakeDevice>();
+  host_tools_test::FakeLink serial(device);
   Bench bench;
-  std::vector<std::pair<Parameter, Words>> expected;
   for (const Parameter& parameter : device::all_parameters()) {
     if (parameter.definition().node_relative) continue;  // the object has the node ID added
-    Words words(parameter.words());
-    if (parameter.table() == device::Table::holding) {
-      bench.can.device.read_holding(parameter.address(), words);
-    } else {
-      bench.can.device.read_input(parameter.address(), words);
-    }
-    expected.emplace_back(parameter, words);
+    const std::size_t slot = parameter.slot();
+    EXPECT_EQ(read(bench.link(), parameter), serial.read(std::span(&slot, 1)).front()) << parameter.name();
   }
-  for (const auto& [parameter, words] : expected) {
-    const auto found = parameter.table() == device::Table::holding
-                           ? bench.link().read_holding(parameter.address(), parameter.words())
-                           : bench.link().read_input(parameter.address(), parameter.words());
-    EXPECT_EQ(found, words) << parameter.name();
-  }
+}
+
+TEST(CanLink, ACobIdIsReadAsItIsStored) {
+  constexpr Parameter cob_id = Parameter::of<"tpdo1.cob_id">();
+  const auto stored = static_cast<std::uint32_t>(cob_id.definition().default_value);
+  Bench bench;
+  bench.can.special = [&](Object object) -> std::variant<Bytes, Abort> {
+    if (!(object == cob_id.object())) return Abort::none;
+    const std::uint32_t sent = stored + 5;
+    return Bytes{static_cast<std::uint8_t>(sent), static_cast<std::uint8_t>(sent >> 8),
+                 static_cast<std::uint8_t>(sent >> 16), static_cast<std::uint8_t>(sent >> 24)};
+  };
+  EXPECT_EQ(read(bench.link(), cob_id), stored);
 }
 
 TEST(CanLink, ADeviceIsSetAsAWhole) {
@@ -106,11 +120,12 @@ TEST(CanLink, ADeviceIsSetAsAWhole) {
 
 // The answer to the message that applies the values is lost: reading back decides.
 TEST(CanLink, ALostCommitIsSettledByReading) {
+  constexpr Parameter control = Parameter::of<"transaction.control">();
   std::atomic<int> to_lose = 0;
   Bench bench(
       [&](int, const CanFrame& answer) {
         const bool of_transaction =
-            answer.data[0] == 0x60 && answer.data[1] == 0x10 && answer.data[2] == 0x30;
+            answer.data[0] == 0x60 && (answer.data[1] | answer.data[2] << 8) == control.index();
         if (of_transaction && ++to_lose == 2) return Frames{};
         return Frames{answer};
       },
@@ -122,76 +137,63 @@ TEST(CanLink, ALostCommitIsSettledByReading) {
   EXPECT_EQ(to_lose, 2) << "never sent twice";
 }
 
-TEST(CanLink, ARefusalHasTheExceptionAndTheWords) {
+TEST(CanLink, ARefusalHasTheAbortAndTheWords) {
   Bench bench;
-  const auto damping = Parameter::of<"wall.damping">().address();
   try {
-    bench.link().write_holding(damping, Words{0xBF80, 0});
+    write(bench.link(), {{damping.slot(), 0xBF800000}});
     FAIL();
-  } catch (const RefusedError& error) {
-    EXPECT_EQ(error.exception(), 3);
-    EXPECT_EQ(error.function(), 16);
-    EXPECT_EQ(error.address(), damping);
+  } catch (const SdoRefused& error) {
+    EXPECT_EQ(error.code(), Abort::value_range);
     EXPECT_CONTAINS(error.what(), "wall.damping");
     EXPECT_CONTAINS(error.what(), "the value is not allowed");
     EXPECT_CONTAINS(error.what(), "06090030");
   }
 }
 
-TEST(CanLink, RegistersOfNobodyAreRefusedAsTheDeviceWould) {
+TEST(CanLink, AnotherLinksTransactionIsSaidInWords) {
   Bench bench;
-  const auto exception_of_read = [&](std::uint16_t address, std::uint16_t count) {
-    try {
-      bench.link().read_holding(address, count);
-    } catch (const RefusedError& error) {
-      return int{error.exception()};
-    }
-    return 0;
-  };
-  EXPECT_EQ(exception_of_read(0x7000, 1), 2);
-  EXPECT_EQ(exception_of_read(stiffness, 3), 2);
-  EXPECT_EQ(exception_of_read(stiffness, 2), 0);
-  EXPECT_THROW(bench.link().write_holding(0x7000, Words{1}), RefusedError);
-  EXPECT_THROW(bench.link().write_holding(Parameter::of<"wall.law">().address(), Words{0x100}), RefusedError);
-  EXPECT_EQ(bench.can.node.commands().size(), 1u) << "only the one that can be asked";
-}
-
-TEST(CanLink, EachAbortHasItsException) {
-  EXPECT_EQ(exception_of(Abort::no_object), 2);
-  EXPECT_EQ(exception_of(Abort::no_subindex), 2);
-  EXPECT_EQ(exception_of(Abort::read_only), 2);
-  EXPECT_EQ(exception_of(Abort::value_range), 3);
-  EXPECT_EQ(exception_of(Abort::value_too_high), 3);
-  EXPECT_EQ(exception_of(Abort::value_too_low), 3);
-  EXPECT_EQ(exception_of(Abort::length), 3);
-  EXPECT_EQ(exception_of(Abort::device_state), 4);
-  EXPECT_EQ(exception_of(Abort::general), 4);
-  EXPECT_EQ(exception_of(Abort::local_control), 6);
-  EXPECT_EQ(exception_of(static_cast<Abort>(0x12345678)), 4);
+  bench.can.special = [](Object) -> std::variant<Bytes, Abort> { return Abort::local_control; };
+  EXPECT_CONTAINS(thrown_message<RefusedError>([&] { read(bench.link(), stiffness); }),
+                  "another link has a transaction open");
 }
 
 TEST(CanLink, AWriteThatFailsInTheMiddleSaysSo) {
+  constexpr Parameter coefficient = Parameter::of<"wall.magnetic_coefficient">();
+  const auto three = [&](std::uint32_t second) {
+    return std::vector<SlotValue>{
+        {stiffness.slot(), 0x40000000}, {damping.slot(), second}, {coefficient.slot(), 0x40000000}};
+  };
   Bench bench;
-  const Words three{0x4000, 0, 0xBF80, 0, 0x4000, 0};  // stiffness, damping below 0, magnetic coefficient
-  const auto message = thrown_message<RefusedError>([&] { bench.link().write_holding(stiffness, three); });
+  const auto message = thrown_message<RefusedError>([&] { write(bench.link(), three(0xBF800000)); });
   EXPECT_CONTAINS(message, "1 of 3 values had been written before");
-  EXPECT_EQ(bench.link().read_holding(stiffness, 2), (Words{0x4000, 0}));
+  EXPECT_EQ(read(bench.link(), stiffness), 0x40000000u);
 
   Bench silent([](int number, const CanFrame& answer) { return number >= 3 ? Frames{} : Frames{answer}; },
                quick_sdo());
-  EXPECT_CONTAINS(thrown_message<LinkError>([&] {
-                    silent.link().write_holding(stiffness, Words{0x4000, 0, 0x3F80, 0, 0x4000, 0});
-                  }),
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { write(silent.link(), three(0x3F800000)); }),
                   "2 of 3 values had been written before");
+}
+
+TEST(CanLink, WhatItsCallerThrowsBetweenRequestsEndsTheWriting) {
+  Bench bench;
+  int requests = 0;
+  const SlotValue values[] = {{stiffness.slot(), 0x40000000}, {damping.slot(), 0x40000000}};
+  EXPECT_THROW(bench.link().write(values, Repeat::never,
+                                  [&] {
+                                    if (++requests == 2) throw device::StoodStill("held up");
+                                  }),
+               device::StoodStill);
+  EXPECT_EQ(read(bench.link(), stiffness), 0x40000000u);
+  EXPECT_NE(read(bench.link(), damping), 0x40000000u);
 }
 
 TEST(CanLink, AnotherDevicesObjectIsNotTakenForAValue) {
   Bench bench;
   bench.can.special = [](Object object) -> std::variant<Bytes, Abort> {
-    if (object == Object{0x2000, 4}) return Bytes{1, 2};
+    if (object == stiffness.object()) return Bytes{1, 2};
     return Abort::none;
   };
-  const auto message = thrown_message<LinkError>([&] { bench.link().read_holding(stiffness, 2); });
+  const auto message = thrown_message<LinkError>([&] { read(bench.link(), stiffness); });
   EXPECT_CONTAINS(message, "2 bytes");
   EXPECT_CONTAINS(message, "wall.stiffness");
 }
@@ -205,93 +207,80 @@ TEST(CanLink, Identifies) {
             (std::map<std::string, std::string>{{"product_name", "Kmax"}, {"model_name", "fake board"}}));
 }
 
+constexpr std::uint16_t index_of(firmware::SpecialObject what) {
+  for (const auto& row : firmware::special_objects) {
+    if (row.what == what) return row.index;
+  }
+  return 0;
+}
+constexpr std::uint16_t trace_index = index_of(firmware::SpecialObject::trace_records);
+constexpr std::uint16_t capture_index = index_of(firmware::SpecialObject::capture_samples);
+
 /// Byte b of record object k.
-std::uint8_t trace_byte(unsigned k, unsigned b) {
+std::uint8_t trace_byte(std::size_t k, std::size_t b) {
   return static_cast<std::uint8_t>(k * 3 + b);
 }
 
-TEST(CanLink, TheTraceWindowIsMadeOfItsObjects) {
+TEST(CanLink, TheTraceIsMadeOfItsObjects) {
   Bench bench;
   bench.can.special = [](Object object) -> std::variant<Bytes, Abort> {
-    if (object.index != 0x5820) return Abort::none;
+    if (object.index != trace_index) return Abort::none;
     Bytes bytes;
     for (unsigned b = 0; b < 128; ++b) bytes.push_back(trace_byte(object.subindex, b));
     return bytes;
   };
   // All of it, in pieces that fit no object.
-  for (unsigned first = 0; first < 4096; first += 120) {
-    const unsigned count = std::min(120u, 4096 - first);
-    const auto words = bench.link().read_input(static_cast<std::uint16_t>(0x4000 + first),
-                                               static_cast<std::uint16_t>(count));
-    ASSERT_EQ(words.size(), count);
-    for (unsigned i = 0; i < count; ++i) {
-      const unsigned at = first + i, k = at / 64 + 1;
-      const unsigned b = (at % 64) / 2 * 4 + (at % 2 == 0 ? 2 : 0);  // high word first, from low byte first
-      ASSERT_EQ(words[i], trace_byte(k, b) | trace_byte(k, b + 1) << 8) << at;
+  for (std::size_t first = 0; first < firmware::trace_capacity; first += Link::trace_records_at_once) {
+    const std::size_t count = std::min(Link::trace_records_at_once, firmware::trace_capacity - first);
+    const auto words = bench.link().read_trace(first, count);
+    ASSERT_EQ(words.size(), 4 * count);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      const std::size_t at = 4 * first + i, k = at / 32 + 1, b = at % 32 * 4;
+      ASSERT_EQ(words[i], trace_byte(k, b) | trace_byte(k, b + 1) << 8 | trace_byte(k, b + 2) << 16 |
+                              std::uint32_t{trace_byte(k, b + 3)} << 24)
+          << at;
     }
   }
-  EXPECT_THROW(bench.link().read_input(0x4FFF, 2), RefusedError);
 }
 
-Words window_of(const Bytes& bytes) {
+Words words_of(const Bytes& bytes) {
   Words words;
-  for (std::size_t i = 0; i < bytes.size(); i += 4) {
-    words.push_back(static_cast<std::uint16_t>(bytes[i + 2] | bytes[i + 3] << 8));
-    words.push_back(static_cast<std::uint16_t>(bytes[i] | bytes[i + 1] << 8));
-  }
+  for (std::size_t i = 0; i < bytes.size(); i += 4)
+    words.push_back(bytes[i] | bytes[i + 1] << 8 | bytes[i + 2] << 16 | std::uint32_t{bytes[i + 3]} << 24);
   return words;
 }
 
 TEST(CanLink, ACaptureIsOneTransfer) {
   Bench bench;
   const Bytes all = host_tools_test::some_bytes(49152);
-  bench.can.by_index[0x5821] = all;
-  std::vector<std::size_t> told;
-  const auto words =
-      bench.link().read_input_window(0x5000, 24576, [&](std::size_t done) { told.push_back(done); });
-  EXPECT_EQ(words, window_of(all));
-  ASSERT_GT(told.size(), 10u);
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
-  EXPECT_TRUE(std::adjacent_find(told.begin(), told.end()) == told.end());
-  EXPECT_EQ(told.back(), 24576u);
+  bench.can.by_index[capture_index] = all;
+  std::vector<std::size_t> shown;
+  const auto words = bench.link().read_capture(12288, [&](std::size_t done) { shown.push_back(done); });
+  EXPECT_EQ(words, words_of(all));
+  ASSERT_GT(shown.size(), 10u);
+  EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end()));
+  EXPECT_TRUE(std::adjacent_find(shown.begin(), shown.end()) == shown.end());
+  EXPECT_EQ(shown.back(), 12288u);
   EXPECT_EQ(bench.can.node.count(0xA4), 1u) << "one initiation, with CRC";
 }
 
 TEST(CanLink, APartOfACapture) {
   Bench bench;
   const Bytes all = host_tools_test::some_bytes(4000);
-  bench.can.by_index[0x5821] = all;
-  const Words window = window_of(all);
-  EXPECT_EQ(bench.link().read_input(0x5000 + 501, 100), Words(window.begin() + 501, window.begin() + 601));
-  EXPECT_EQ(bench.link().read_input_window(0x5000, 2, {}), Words(window.begin(), window.begin() + 2));
-  EXPECT_EQ(bench.link().read_input_window(0x5000 + 1990, 10, {}), Words(window.end() - 10, window.end()));
-  EXPECT_TRUE(bench.link().read_input_window(0x5000, 0, {}).empty());
-  EXPECT_CONTAINS(thrown_message<LinkError>([&] { bench.link().read_input_window(0x5000, 2002, {}); }),
-                  "has 2000 registers, 2002 were to be read");
-  EXPECT_THROW(bench.link().read_input_window(0x5000, 24577, {}), RefusedError);
+  bench.can.by_index[capture_index] = all;
+  EXPECT_EQ(bench.link().read_capture(1, {}), Words{words_of(all).front()});
+  EXPECT_TRUE(bench.link().read_capture(0, {}).empty());
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { bench.link().read_capture(1001, {}); }),
+                  "has 1000 words, 1001 were to be read");
 }
 
 TEST(CanLink, ACaptureThatIsNotCompleteIsRefused) {
   Bench bench;
   bench.can.special = [](Object object) -> std::variant<Bytes, Abort> {
-    return object.index == 0x5821 ? Abort::device_state : Abort::none;
+    return object.index == capture_index ? Abort::device_state : Abort::none;
   };
-  try {
-    bench.link().read_input_window(0x5000, 100, {});
-    FAIL();
-  } catch (const RefusedError& error) {
-    EXPECT_EQ(error.exception(), 4);
-    EXPECT_CONTAINS(error.what(), "0x5821:01");
-  }
-}
-
-TEST(CanLink, AWindowOfValuesIsReadInRequests) {
-  Bench bench;
-  std::vector<std::size_t> told;
-  const auto address = Parameter::of<"info.vendor_id">().address();
-  EXPECT_EQ(
-      bench.link().read_input_window(address, 4, [&](std::size_t done) { told.push_back(done); }).size(), 4u);
-  EXPECT_EQ(told, std::vector<std::size_t>{4});
+  const auto message = thrown_message<SdoRefused>([&] { bench.link().read_capture(100, {}); });
+  EXPECT_CONTAINS(message, text_of(Object{capture_index, 1}));
 }
 
 TEST(CanLink, TwoLinksDoNotMixTheirTransfers) {
@@ -311,13 +300,13 @@ TEST(CanLink, WhoWaitsLetsAnotherIn) {
   std::thread other([&] {
     CanLink second(bench.address(), {}, patient_sdo());
     for (int i = 0; i < 20; ++i)
-      second.write_holding(stiffness, Words{0x4000, static_cast<std::uint16_t>(i)});
+      write(second, {{stiffness.slot(), 0x40000000u + static_cast<std::uint32_t>(i)}});
     done = true;
   });
   while (!done) first.wait(std::chrono::milliseconds(10));
   other.join();
   // Its answers have come here too, and are nobody's now.
-  EXPECT_EQ(first.read_holding(stiffness, 2), (Words{0x4000, 19}));
+  EXPECT_EQ(read(first, stiffness), 0x40000013u);
 }
 
 TEST(CanLink, ABusThatIsNotThereIsNamed) {

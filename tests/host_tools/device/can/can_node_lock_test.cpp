@@ -65,7 +65,7 @@ TEST(CanNodeLock, WhoWaitsLendsIt) {
     const CanNodeLock second(own_bus(), 5, {});
     had_it = true;
   });
-  while (!had_it) first.lend(20ms);
+  while (!had_it) first.yield(20ms);
   other.join();
   EXPECT_FALSE(CanNodeLock::try_to_take(own_bus(), 5)) << "and takes it back";
 }
@@ -80,7 +80,7 @@ TEST(CanNodeLock, WhoDoesNotGiveItBackIsTold) {
   std::string message;
   while (message.empty()) {
     try {
-      first.lend(20ms);
+      first.yield(20ms);
     } catch (const LinkError& error) {
       message = error.what();
     }

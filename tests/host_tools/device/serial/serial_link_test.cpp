@@ -58,7 +58,7 @@ TEST(SerialLink, AnExceptionIsARefusalAndNotRepeated) {
   try {
     link.read_holding(0x7000, 1);
     FAIL();
-  } catch (const RefusedError& error) {
+  } catch (const RegisterRefused& error) {
     EXPECT_EQ(error.exception(), 2);
     EXPECT_EQ(error.function(), 3);
     EXPECT_EQ(error.address(), 0x7000);
@@ -187,7 +187,7 @@ TEST(SerialLink, ALateAnswerIsNotTakenForTheNext) {
 TEST(SerialLink, FollowsTheDeviceToAnotherRate) {
   PtyDevice device;
   SerialLink link(address_of(device), {}, patient);
-  link.follow_line_settings(std::nullopt, 9600);
+  link.follow_serial_settings(std::nullopt, 9600);
   EXPECT_EQ(link.description(), "serial:" + device.path() + "?baud=9600");
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);
 }

@@ -17,7 +17,7 @@ using std::chrono::seconds;
 
 class SimLinkTest : public testing::Test {
  protected:
-  std::unique_ptr<Link> link = make_sim_link();
+  std::unique_ptr<SimLink> link = make_sim_link();
 
   /// Exception code, function and address of the refusal.
   template <typename Call>
@@ -25,7 +25,7 @@ class SimLinkTest : public testing::Test {
     try {
       call();
       ADD_FAILURE() << "not refused";
-    } catch (const RefusedError& error) {
+    } catch (const RegisterRefused& error) {
       EXPECT_EQ(error.exception(), exception);
       EXPECT_EQ(error.function(), function);
       EXPECT_EQ(error.address(), address);
@@ -47,7 +47,8 @@ TEST_F(SimLinkTest, WritesAreReadBackWordForWord) {
 }
 
 TEST_F(SimLinkTest, LongestReadHasAllItsRegisters) {
-  EXPECT_EQ(link->read_input(firmware::trace_window, Link::read_count_max).size(), Link::read_count_max);
+  EXPECT_EQ(link->read_input(firmware::trace_window, RegisterLink::read_count_max).size(),
+            RegisterLink::read_count_max);
 }
 
 TEST_F(SimLinkTest, RefusalsCarryTheException) {
@@ -74,18 +75,18 @@ TEST_F(SimLinkTest, IdentifiesItselfAsTheNativeBoard) {
 
 TEST_F(SimLinkTest, FollowsAnotherUnit) {
   link->write_holding(unit.address(), std::vector<std::uint16_t>{17});
-  link->follow_line_settings(17, std::nullopt);
+  link->follow_serial_settings(17, std::nullopt);
   EXPECT_EQ(link->read_holding(unit.address(), 1), std::vector<std::uint16_t>{17});
   EXPECT_EQ(link->identify().at("vendor_name"), "Kmax");
 }
 
 TEST_F(SimLinkTest, AWrongUnitIsAnsweredBySilence) {
-  link->follow_line_settings(9, std::nullopt);
+  link->follow_serial_settings(9, std::nullopt);
   const auto before = link->now();
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { link->read_holding(0, 1); }), "did not answer within 1 s");
   EXPECT_GE(link->now() - before, seconds(1));
   EXPECT_THROW(link->identify(), LinkError);
-  link->follow_line_settings(1, std::nullopt);
+  link->follow_serial_settings(1, std::nullopt);
   EXPECT_EQ(link->read_holding(unit.address(), 1), std::vector<std::uint16_t>{1});
 }
 
@@ -97,7 +98,7 @@ TEST_F(SimLinkTest, AnotherBaudRateChangesHowLongRequestsTake) {
   };
   const auto fast = duration();
   link->write_holding(baud.address(), std::vector<std::uint16_t>{0, 9600});
-  link->follow_line_settings(std::nullopt, 9600);
+  link->follow_serial_settings(std::nullopt, 9600);
   // 213 characters of 10 or 11 bits at 9600 baud.
   EXPECT_GT(duration(), milliseconds(220));
   EXPECT_LT(fast, milliseconds(40));
