@@ -5,6 +5,11 @@
 
 namespace kmax::cli {
 
+const BoardServices& board_services(const Context& context) {
+  static const BoardServices of_this_computer;
+  return context.board_services ? *context.board_services : of_this_computer;
+}
+
 void add_lines_option(CLI::App& command, std::string& file) {
   command
       .add_option("--lines", file,

@@ -24,9 +24,8 @@ struct BoardServices {
   std::filesystem::path usb_devices = flash::kernel_usb_devices;
 };
 
-/// lines, reset, bootloader
-void add_lines_commands(CLI::App& app, Context& context, const BoardServices& services);
-void add_flash_command(CLI::App& app, Context& context, const BoardServices& services);
+/// Those of the context, or else this computer's own.
+const BoardServices& board_services(const Context& context);
 
 /// Adds --lines.
 void add_lines_option(CLI::App& command, std::string& file);

@@ -35,6 +35,38 @@ struct CaptureOptions {
   double timeout = 30;
   std::string file;
   bool arm = false;
+
+  void declare(CLI::App& command) {
+    command
+        .add_option("--channels", settings.channels,
+                    fmt::format("One to four of {}", fmt::join(device::capture_channel_names(), ", ")))
+        ->delimiter(',')
+        ->type_name("NAME,...")
+        ->capture_default_str();
+    std::vector<std::string> triggers;
+    for (const auto& trigger : firmware::names::capture_trigger) triggers.emplace_back(trigger.name);
+    command
+        .add_option(
+            "--trigger", trigger,
+            "What starts it: now, contact with the wall, |force| or |velocity| above --level, a fault of the "
+            "axis, or the start of an excitation; default: now")
+        ->check(CLI::IsMember(triggers))
+        ->type_name("now|contact|force|velocity|fault|excitation")
+        ->option_text("TRIGGER");
+    command.add_option("--level", level, "Level of the triggers force (N) and velocity (m/s)")
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--pre-trigger", settings.pre_trigger, "Samples from before the trigger")
+        ->capture_default_str();
+    command.add_option("--samples", settings.samples, "Samples in all; 0: as many as fit")
+        ->capture_default_str();
+    command.add_option("--interval", settings.interval, "Ticks of 50 us from one sample to the next")
+        ->capture_default_str();
+    command.add_option("--timeout", timeout, "How long to wait for the trigger, s")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
+    command.add_option("--out", file, "CSV file to write")->type_name("FILE");
+    command.add_flag("--arm", arm, "Let the axis make force from the capture's start to its end");
+  }
 };
 
 class Interrupted : public std::runtime_error {
@@ -228,7 +260,7 @@ int run_capture(Context& context, const CaptureOptions& given) {
 }  // namespace
 
 void add_capture_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<CaptureOptions>(
       app, context,
       {"capture", "Records up to four channels of an axis at the full tick rate around an event.",
        "  kmax capture --channels position,force --trigger contact --pre-trigger 1000 --out contact.csv\n"
@@ -238,41 +270,8 @@ void add_capture_command(CLI::App& app, Context& context) {
        "of n\n"
        "ticks makes it n times as long. Without --out the table goes to standard output, with --json it is "
        "part of\n"
-       "the document. Times are the device's own and zero at the trigger. Ctrl-C stops the capture."});
-  auto options = std::make_shared<CaptureOptions>();
-  CaptureSettings& settings = options->settings;
-  command
-      ->add_option("--channels", settings.channels,
-                   fmt::format("One to four of {}", fmt::join(device::capture_channel_names(), ", ")))
-      ->delimiter(',')
-      ->type_name("NAME,...")
-      ->capture_default_str();
-  std::vector<std::string> triggers;
-  for (const auto& trigger : firmware::names::capture_trigger) triggers.emplace_back(trigger.name);
-  command
-      ->add_option(
-          "--trigger", options->trigger,
-          "What starts it: now, contact with the wall, |force| or |velocity| above --level, a fault of the "
-          "axis, or the start of an excitation; default: now")
-      ->check(CLI::IsMember(triggers))
-      ->type_name("now|contact|force|velocity|fault|excitation")
-      ->option_text("TRIGGER");
-  command->add_option("--level", options->level, "Level of the triggers force (N) and velocity (m/s)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--pre-trigger", settings.pre_trigger, "Samples from before the trigger")
-      ->capture_default_str();
-  command->add_option("--samples", settings.samples, "Samples in all; 0: as many as fit")
-      ->capture_default_str();
-  command->add_option("--interval", settings.interval, "Ticks of 50 us from one sample to the next")
-      ->capture_default_str();
-  command->add_option("--timeout", options->timeout, "How long to wait for the trigger, s")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--out", options->file, "CSV file to write")->type_name("FILE");
-  command->add_flag("--arm", options->arm, "Let the axis make force from the capture's start to its end");
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_capture(context, *options); };
-  });
+       "the document. Times are the device's own and zero at the trigger. Ctrl-C stops the capture."},
+      Takes::device_and_axis, run_capture);
 }
 
 }  // namespace kmax::cli

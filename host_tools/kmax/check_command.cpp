@@ -30,7 +30,30 @@ namespace {
 struct CheckOptions {
   std::vector<std::string> assignments, sides, explained;
   std::string hand = "none", picture, csv;
-  bool explain = false;
+  const CLI::Option* explain = nullptr;  ///< --explain, which may be given without a name
+
+  void declare(CLI::App& command) {
+    command.add_option("--set", assignments, "Parameter to judge in place of the device's; may be repeated")
+        ->type_name("NAME=VALUE")
+        ->take_all();
+    command
+        .add_option(
+            "--hand", hand,
+            "Who holds the handle: none (default), subject_1, or a TOML file with an [operator] table")
+        ->type_name("HAND");
+    command
+        .add_option("--map", sides,
+                    "Side of a map, twice: a parameter over a range, 60 points; :log for equal ratios")
+        ->type_name("NAME=FROM..TO[:log][,POINTS]")
+        ->take_all();
+    command.add_option("--picture", picture, "Map as .svg or .png")->type_name("FILE");
+    command.add_option("--csv", csv, "Map as a table: which criteria pass at every point")->type_name("FILE");
+    explain = command
+                  .add_option("--explain", explained,
+                              "Shows formula, assumptions and source of criteria, and does nothing else")
+                  ->type_name("[CRITERION]")
+                  ->expected(0, -1);
+  }
 };
 
 std::size_t slot_of(const Parameter& parameter) {
@@ -221,7 +244,7 @@ int explain(Context& context, const std::vector<std::string>& names) {
 }
 
 int run_check(Context& context, const CheckOptions& options) {
-  if (options.explain) {
+  if (options.explain->count() > 0) {
     if (!options.sides.empty()) throw UsageError("--explain and --map do not go together");
     return explain(context, options.explained);
   }
@@ -233,7 +256,7 @@ int run_check(Context& context, const CheckOptions& options) {
 }  // namespace
 
 void add_check_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<CheckOptions>(
       app, context,
       {"check", "Judges by stability criteria whether the wall of a parameter set will hold still.",
        "  kmax check                                 the device's parameters\n"
@@ -244,35 +267,8 @@ void add_check_command(CLI::App& app, Context& context) {
        "Sets nothing. 'pass' takes every criterion that applies; most walls in use are without a guarantee "
        "and\n"
        "still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.\n"
-       "See docs/stability_check.md. Exit code of a map: 0."});
-  auto options = std::make_shared<CheckOptions>();
-  command
-      ->add_option("--set", options->assignments,
-                   "Parameter to judge in place of the device's; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->take_all();
-  command
-      ->add_option("--hand", options->hand,
-                   "Who holds the handle: none (default), subject_1, or a TOML file with an [operator] table")
-      ->type_name("HAND");
-  command
-      ->add_option("--map", options->sides,
-                   "Side of a map, twice: a parameter over a range, 60 points; :log for equal ratios")
-      ->type_name("NAME=FROM..TO[:log][,POINTS]")
-      ->take_all();
-  command->add_option("--picture", options->picture, "Map as .svg or .png")->type_name("FILE");
-  command->add_option("--csv", options->csv, "Map as a table: which criteria pass at every point")
-      ->type_name("FILE");
-  auto* explained =
-      command
-          ->add_option("--explain", options->explained,
-                       "Shows formula, assumptions and source of criteria, and does nothing else")
-          ->type_name("[CRITERION]")
-          ->expected(0, -1);
-  command->callback([&context, options, explained] {
-    options->explain = explained->count() > 0;
-    context.action = [&context, options] { return run_check(context, *options); };
-  });
+       "See docs/stability_check.md. Exit code of a map: 0."},
+      Takes::device_and_axis, run_check);
 }
 
 }  // namespace kmax::cli

@@ -103,10 +103,7 @@ int run(std::vector<std::string> arguments, Context& context) {
   CLI::App app("Sets parameters of a Kmax haptic device, reads its state and lets it make force.", "kmax");
   app.set_version_flag("--version", "kmax " KMAX_VERSION);
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
-  app.add_option(
-         "--device", context.device_option,
-         "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
-      ->type_name("ADDRESS");
+  add_device_option(app, context);
   app.require_subcommand(1);
   app.footer(std::string("'kmax COMMAND --help' shows examples.\n\n") + exit_code_text);
   for (const AddCommand add : all_commands()) add(app, context);

@@ -9,14 +9,35 @@
 
 namespace kmax::cli {
 
+// Each is in the file of its name.
+void add_parameter_commands(CLI::App& app, Context& context);       // list, get, set
+void add_parameter_file_commands(CLI::App& app, Context& context);  // dump, load, diff
+void add_store_commands(CLI::App& app, Context& context);           // save, defaults
+void add_info_command(CLI::App& app, Context& context);
+void add_devices_command(CLI::App& app, Context& context);
+void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
+void add_watch_command(CLI::App& app, Context& context);
+void add_record_command(CLI::App& app, Context& context);
+void add_capture_command(CLI::App& app, Context& context);
+void add_calibrate_command(CLI::App& app, Context& context);
+void add_selftest_command(CLI::App& app, Context& context);
+void add_wall_command(CLI::App& app, Context& context);
+void add_check_command(CLI::App& app, Context& context);
+void add_simulate_command(CLI::App& app, Context& context);
+void add_experiment_command(CLI::App& app, Context& context);
+void add_plot_command(CLI::App& app, Context& context);
+void add_lines_commands(CLI::App& app, Context& context);  // lines, reset, bootloader
+void add_flash_command(CLI::App& app, Context& context);
+void add_serve_command(CLI::App& app, Context& context);
+void add_describe_command(CLI::App& app, Context& context);
+
 std::span<const AddCommand> all_commands() {
-  static constexpr AddCommand commands[] = {
+  static constexpr std::array commands = {
       &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_info_command,
       &add_devices_command,    &add_drive_commands,          &add_watch_command,      &add_record_command,
       &add_capture_command,    &add_calibrate_command,       &add_selftest_command,   &add_wall_command,
       &add_check_command,      &add_simulate_command,        &add_experiment_command, &add_plot_command,
-      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command,
-  };
+      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command};
   return commands;
 }
 
@@ -26,20 +47,30 @@ CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* he
       ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
 }
 
+void add_device_option(CLI::App& command, Context& context) {
+  command
+      .add_option(
+          "--device", context.device_option,
+          "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
+      ->type_name("ADDRESS");
+}
+
 CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes) {
   CLI::App* command = app.add_subcommand(text.name, text.summary);
   command->add_flag("--json", context.json, "One JSON document on standard output, in SI units");
-  if (takes != Takes::nothing)
-    command
-        ->add_option(
-            "--device", context.device_option,
-            "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
-        ->type_name("ADDRESS");
-  if (takes == Takes::device_and_axis)
+  if (takes == Takes::device || takes == Takes::device_and_axis) add_device_option(*command, context);
+  if (takes == Takes::axis || takes == Takes::device_and_axis)
     add_axis_option(*command, context, "Axis that names without a prefix are on");
   const std::string examples = *text.examples == '\0' ? "" : fmt::format("Examples:\n{}\n\n", text.examples);
   command->footer(examples + exit_code_text);
   return command;
+}
+
+void add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes,
+                 int (*run)(Context&)) {
+  add_command(app, context, text, takes)->callback([&context, run] {
+    context.action = [&context, run] { return run(context); };
+  });
 }
 
 }  // namespace kmax::cli

@@ -1,45 +1,29 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <memory>
 #include <span>
 
 #include "host_tools/kmax/context.hpp"
 
 namespace kmax::cli {
 
-// One function per file of commands. To add a command: write X_command.cpp with
+// To add a command, write X_command.cpp and name it twice in commands.cpp:
+//
+//   struct XOptions {
+//     bool fast = false;
+//     void declare(CLI::App& command) { command.add_flag("--fast", fast, "Does it fast"); }
+//   };
+//
+//   int run_x(Context& context, const XOptions& options) { ... }
 //
 //   void add_x_command(CLI::App& app, Context& context) {
-//     auto* command = add_command(app, context, {"x", "Does x.", "kmax x --fast    does it fast"});
-//     auto options = std::make_shared<XOptions>();
-//     command->add_option("--fast", options->fast, "...");
-//     command->callback([&context, options] { context.action = [&context, options] { return run_x(context,
-//     *options); }; });
+//     add_command<XOptions>(app, context, {"x", "Does x.", "  kmax x --fast"}, Takes::device, run_x);
 //   }
 //
-// declare it here, and name it in commands.cpp and in host_tools/CMakeLists.txt. run_x() returns an
-// ExitCode and reports errors by throwing: UsageError, device::ValueError and link::AddressError become exit
-// code 2, every other exception 1; the message is shown, with --json as {"error": "..."}.
-void add_parameter_commands(CLI::App& app, Context& context);  // list, get, set
-void add_store_commands(CLI::App& app, Context& context);      // save, defaults
-void add_info_command(CLI::App& app, Context& context);
-void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
-void add_capture_command(CLI::App& app, Context& context);
-void add_record_command(CLI::App& app, Context& context);
-void add_watch_command(CLI::App& app, Context& context);
-void add_devices_command(CLI::App& app, Context& context);
-void add_calibrate_command(CLI::App& app, Context& context);
-void add_selftest_command(CLI::App& app, Context& context);
-void add_wall_command(CLI::App& app, Context& context);
-void add_check_command(CLI::App& app, Context& context);
-void add_simulate_command(CLI::App& app, Context& context);
-void add_experiment_command(CLI::App& app, Context& context);
-void add_plot_command(CLI::App& app, Context& context);
-void add_serve_command(CLI::App& app, Context& context);
-void add_parameter_file_commands(CLI::App& app, Context& context);  ///< dump, load, diff
-void add_lines_commands(CLI::App& app, Context& context);           ///< lines, reset, bootloader
-void add_flash_command(CLI::App& app, Context& context);
-void add_describe_command(CLI::App& app, Context& context);
+// run_x() returns an ExitCode and reports errors by throwing: UsageError, device::ValueError and
+// link::AddressError become exit code 2, every other exception 1; the message is shown, with --json as
+// {"error": "..."}.
 
 /// All of them, in the order the help shows.
 using AddCommand = void (*)(CLI::App&, Context&);
@@ -53,13 +37,30 @@ struct CommandText {
 
 /// --axis alone, for a command whose group of options it belongs to.
 CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* help);
+/// --device.
+void add_device_option(CLI::App& command, Context& context);
 
 /// What a command takes besides its own arguments.
-enum class Takes { nothing, device, device_and_axis };
+enum class Takes { nothing, axis, device, device_and_axis };
 
 /// A subcommand with --json and, as `takes` says, --device and --axis; its help ends with the examples and
 /// the exit codes.
 CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text,
                       Takes takes = Takes::device_and_axis);
+
+/// One without arguments of its own.
+void add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes, int (*run)(Context&));
+
+/// One whose arguments `Options` declares; `run` gets what was given.
+template <typename Options>
+void add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes,
+                 int (*run)(Context&, const Options&)) {
+  CLI::App* command = add_command(app, context, text, takes);
+  const auto options = std::make_shared<Options>();
+  options->declare(*command);
+  command->callback([&context, options, run] {
+    context.action = [&context, options, run] { return run(context, *options); };
+  });
+}
 
 }  // namespace kmax::cli

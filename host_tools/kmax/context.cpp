@@ -8,6 +8,13 @@ std::string Context::device_address() const {
   return device_option.empty() ? link::default_device_address() : device_option;
 }
 
+std::vector<std::size_t> Context::axes() const {
+  if (axis_option) return {*axis_option};
+  std::vector<std::size_t> all;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) all.push_back(axis);
+  return all;
+}
+
 device::Device Context::connect() {
   const link::Notice notice = [this](const std::string& text) { note(text); };
   auto opened = opener_(device_address(), notice);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <ostream>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -17,6 +18,8 @@ namespace kmax::cli {
 
 /// Keys stay in the order they are added.
 using Json = nlohmann::ordered_json;
+
+struct BoardServices;
 
 /// Wrong usage that only a command itself can find. Becomes exit code 2.
 class UsageError : public std::invalid_argument {
@@ -48,6 +51,8 @@ class Context {
 
   /// --axis, 0 without it.
   std::size_t axis() const { return axis_option.value_or(0); }
+  /// --axis, or every axis: looking at and stopping one axis too many harms nobody.
+  std::vector<std::size_t> axes() const;
   /// The address in use.
   std::string device_address() const;
   bool simulated() const { return device_address() == "sim"; }
@@ -61,6 +66,8 @@ class Context {
   /// How a CAN bus is reached, besides the link to one device on it.
   std::function<std::unique_ptr<link::CanPort>(const std::string& bus, const link::CanPortOptions&)>
       open_bus = link::open_can_port;
+  /// How the board is reached besides its links (board_services.hpp); null: as this computer does.
+  std::shared_ptr<const BoardServices> board_services;
   std::function<int()> action;  ///< what the chosen command does; returns an exit code
 
  private:

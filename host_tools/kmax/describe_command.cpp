@@ -25,6 +25,14 @@ const std::vector<std::string> formats = {"markdown", "json", "modbus", "eds", "
 struct DescribeOptions {
   std::string format;
   std::optional<unsigned> node;
+
+  void declare(CLI::App& command) {
+    command.add_option("--format", format, "markdown (default), json, modbus, eds or dbc")
+        ->type_name("FORMAT");
+    command.add_option("--node", node, "Node ID of the messages in a dbc file; default: the factory's")
+        ->type_name("N")
+        ->check(CLI::Range(1, 127));
+  }
 };
 
 void describe_json(Context& context) {
@@ -146,7 +154,7 @@ int run_describe(Context& context, const DescribeOptions& options) {
 }  // namespace
 
 void add_describe_command(CLI::App& app, Context& context) {
-  auto* describe = add_command(
+  add_command<DescribeOptions>(
       app, context,
       {"describe", "Writes the object dictionary: every parameter, its range, object and register.",
        "  kmax describe --format markdown > parameters.md\n"
@@ -154,17 +162,7 @@ void add_describe_command(CLI::App& app, Context& context) {
        "  kmax describe --format json        {\"objects\": [...]}\n"
        "  kmax describe --format eds > kmax.eds             for CANopen masters and configuration tools\n"
        "  kmax describe --format dbc --node 5 > kmax.dbc    for programs that show a CAN bus by name"},
-      Takes::nothing);
-  auto options = std::make_shared<DescribeOptions>();
-  describe->add_option("--format", options->format, "markdown (default), json, modbus, eds or dbc")
-      ->type_name("FORMAT");
-  describe
-      ->add_option("--node", options->node, "Node ID of the messages in a dbc file; default: the factory's")
-      ->type_name("N")
-      ->check(CLI::Range(1, 127));
-  describe->callback([&context, options] {
-    context.action = [&context, options] { return run_describe(context, *options); };
-  });
+      Takes::nothing, run_describe);
 }
 
 }  // namespace kmax::cli

@@ -16,7 +16,17 @@ void append(std::vector<ReachableDevice>& all, const std::vector<ReachableDevice
   all.insert(all.end(), more.begin(), more.end());
 }
 
-int run_devices(Context& context, const std::vector<std::string>& buses) {
+struct DevicesOptions {
+  std::vector<std::string> buses;
+
+  void declare(CLI::App& command) {
+    command.add_option("--can", buses, "Look for nodes on this interface; more than once for several")
+        ->type_name("IFACE");
+  }
+};
+
+int run_devices(Context& context, const DevicesOptions& options) {
+  const std::vector<std::string>& buses = options.buses;
   if (std::find(buses.begin(), buses.end(), "") != buses.end())
     throw UsageError("--can: the name of a CAN interface is needed, as in --can can0");
   std::vector<ReachableDevice> devices{{"sim", "a simulated device in this program"}};
@@ -58,18 +68,13 @@ int run_devices(Context& context, const std::vector<std::string>& buses) {
 }  // namespace
 
 void add_devices_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<DevicesOptions>(
       app, context,
       {"devices", "Lists what can be reached: simulated, serial ports, CAN interfaces and the nodes on them.",
        "  kmax devices\n  kmax devices --can can0     with the nodes on can0\n\n"
        "The first column is what --device takes. Serial ports are listed, not opened. Nodes are asked for\n"
        "their identity over SDO, which takes a second for each bus."},
-      Takes::nothing);
-  auto buses = std::make_shared<std::vector<std::string>>();
-  command->add_option("--can", *buses, "Look for nodes on this interface; more than once for several")
-      ->type_name("IFACE");
-  command->callback(
-      [&context, buses] { context.action = [&context, buses] { return run_devices(context, *buses); }; });
+      Takes::nothing, run_devices);
 }
 
 }  // namespace kmax::cli

@@ -27,14 +27,6 @@ using firmware::Refusal;
 using std::chrono::milliseconds;
 
 namespace {
-/// --axis, or every axis: looking at and stopping one axis too many harms nobody.
-std::vector<std::size_t> chosen_axes(const Context& context) {
-  if (context.axis_option) return {*context.axis_option};
-  std::vector<std::size_t> axes;
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) axes.push_back(axis);
-  return axes;
-}
-
 Json fault_json(const DriveStatus& status) {
   if (!status.faulty()) return nullptr;
   const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
@@ -105,7 +97,7 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
 
 int run_state(Context& context) {
   Device device = context.connect();
-  return print_states(context, device, chosen_axes(context));
+  return print_states(context, device, context.axes());
 }
 
 /// Carries `act` out on every axis even if one fails; the first failure is then the command's.
@@ -113,7 +105,7 @@ template <typename Act>
 int run_on_axes(Context& context, Act act) {
   Device device = context.connect();
   std::exception_ptr first_error;
-  for (const std::size_t axis : chosen_axes(context)) {
+  for (const std::size_t axis : context.axes()) {
     try {
       act(Drive(device, axis));
     } catch (const std::exception& error) {
@@ -122,7 +114,7 @@ int run_on_axes(Context& context, Act act) {
     }
   }
   if (first_error) std::rethrow_exception(first_error);
-  return print_states(context, device, chosen_axes(context));
+  return print_states(context, device, context.axes());
 }
 
 /// Whatever went wrong, the force must not outlast the program that asked for it.
@@ -179,7 +171,18 @@ void note_a_warning(Context& context, Drive& drive) {
     context.note(fmt::format("armed with a warning: stability check: {}", words));
 }
 
-int run_arm(Context& context, bool holding) {
+struct ArmOptions {
+  bool holding = false;
+
+  void declare(CLI::App& command) {
+    auto holding = std::make_shared<bool>(false);
+    command.add_flag("--hold", holding,
+                     "Keep the link alive until Ctrl-C, then disarm; ends with code 1 on a fault");
+  }
+};
+
+int run_arm(Context& context, const ArmOptions& options) {
+  const bool holding = options.holding;
   const Interruption interruption;
   Device device = context.connect();
   Drive drive(device, context.axis());
@@ -203,6 +206,14 @@ int run_arm(Context& context, bool holding) {
   return done;
 }
 
+int run_disarm(Context& context) {
+  return run_on_axes(context, [](Drive drive) { drive.disarm(); });
+}
+
+int run_stop(Context& context) {
+  return run_on_axes(context, [](Drive drive) { drive.stop(); });
+}
+
 int run_clear(Context& context) {
   Device device = context.connect();
   Drive drive(device, context.axis());
@@ -212,44 +223,34 @@ int run_clear(Context& context) {
 }  // namespace
 
 void add_drive_commands(CLI::App& app, Context& context) {
-  auto* state = add_command(app, context,
-                            {"state", "Shows each axis' CiA 402 state and its fault in words.",
-                             "  kmax state\n  kmax state --axis 1 --json"});
-  state->callback([&context] { context.action = [&context] { return run_state(context); }; });
+  add_command(app, context,
+              {"state", "Shows each axis' CiA 402 state and its fault in words.",
+               "  kmax state\n  kmax state --axis 1 --json"},
+              Takes::device_and_axis, run_state);
 
-  auto* arm = add_command(
+  add_command<ArmOptions>(
       app, context,
       {"arm", "Lets an axis make force.",
        "  kmax arm --hold           until Ctrl-C\n  kmax arm --axis 1\n\n"
        "The device removes the force, with a fault, when the host has been silent for link.timeout.\n"
        "Refused while the handle is inside the wall, while a fault is present, and, with guard.mode=refuse,\n"
-       "when the stability check fails ('kmax check' explains it)."});
-  auto holding = std::make_shared<bool>(false);
-  arm->add_flag("--hold", *holding,
-                "Keep the link alive until Ctrl-C, then disarm; ends with code 1 on a fault");
-  arm->callback(
-      [&context, holding] { context.action = [&context, holding] { return run_arm(context, *holding); }; });
+       "when the stability check fails ('kmax check' explains it)."},
+      Takes::device_and_axis, run_arm);
 
-  auto* disarm =
-      add_command(app, context,
-                  {"disarm", "Takes the force away in order, on every axis unless --axis names one.",
-                   "  kmax disarm\n  kmax disarm --axis 1"});
-  disarm->callback([&context] {
-    context.action = [&context] { return run_on_axes(context, [](Drive drive) { drive.disarm(); }); };
-  });
+  add_command(app, context,
+              {"disarm", "Takes the force away in order, on every axis unless --axis names one.",
+               "  kmax disarm\n  kmax disarm --axis 1"},
+              Takes::device_and_axis, run_disarm);
 
-  auto* stop =
-      add_command(app, context,
-                  {"stop", "Quick stop: the force is gone at once, on every axis unless --axis names one.",
-                   "  kmax stop                 then 'kmax disarm' before arming again"});
-  stop->callback([&context] {
-    context.action = [&context] { return run_on_axes(context, [](Drive drive) { drive.stop(); }); };
-  });
+  add_command(app, context,
+              {"stop", "Quick stop: the force is gone at once, on every axis unless --axis names one.",
+               "  kmax stop                 then 'kmax disarm' before arming again"},
+              Takes::device_and_axis, run_stop);
 
-  auto* clear = add_command(app, context,
-                            {"clear", "Resets an axis' fault; says what remains if its cause does.",
-                             "  kmax clear\n  kmax clear --axis 1"});
-  clear->callback([&context] { context.action = [&context] { return run_clear(context); }; });
+  add_command(app, context,
+              {"clear", "Resets an axis' fault; says what remains if its cause does.",
+               "  kmax clear\n  kmax clear --axis 1"},
+              Takes::device_and_axis, run_clear);
 }
 
 }  // namespace kmax::cli

@@ -31,6 +31,39 @@ struct FlashOptions {
   unsigned speed_khz = 1000;
   double at_most = 300;
   bool dry_run = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("image", image, "Linked image (default: the one of the preset stm32f405)")
+        ->option_text("IMAGE.elf");
+    std::vector<std::string> methods = {"auto"};
+    for (const auto& facts : flash::all_methods) methods.emplace_back(facts.name);
+    command.add_option("--method", method, "Way to do it")
+        ->type_name("METHOD")
+        ->check(CLI::IsMember(methods))
+        ->capture_default_str();
+    command.add_flag("--dry-run", dry_run, "Show the command lines and do nothing");
+    command.add_option("--board", board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
+    add_lines_option(command, lines);
+    command
+        .add_option("--usb-serial", usb_serial,
+                    "Serial number of the ST-Link or of the board in DFU mode, if there are several")
+        ->type_name("TEXT")
+        ->check([](const std::string& text) {
+          // It becomes part of an OpenOCD command.
+          const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
+            return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+          });
+          return plain && !text.empty() ? std::string() : "allowed are letters and digits";
+        });
+    command.add_option("--speed", speed_khz, "Clock of the debug port in kHz")
+        ->type_name("KHZ")
+        ->check(CLI::Range(5, 4000))
+        ->capture_default_str();
+    command.add_option("--timeout", at_most, "A program that takes longer is ended, in s")
+        ->type_name("S")
+        ->check(CLI::Range(0.1, 3600.0))
+        ->capture_default_str();
+  }
 };
 
 std::filesystem::path chosen_image(const FlashOptions& options, const BoardProfile& board) {
@@ -209,7 +242,8 @@ int carry_out(Context& context, const BoardServices& services, const lines::Line
   return done;
 }
 
-int run_flash(Context& context, const BoardServices& services, const FlashOptions& options) try {
+int run_flash(Context& context, const FlashOptions& options) try {
+  const BoardServices& services = board_services(context);
   // CLI's ranges let a NaN pass.
   if (!std::isfinite(options.at_most))
     throw UsageError(fmt::format("--timeout: {} is not a number of seconds", options.at_most));
@@ -241,8 +275,8 @@ int run_flash(Context& context, const BoardServices& services, const FlashOption
 }
 }  // namespace
 
-void add_flash_command(CLI::App& app, Context& context, const BoardServices& given) {
-  auto* command = add_command(
+void add_flash_command(CLI::App& app, Context& context) {
+  add_command<FlashOptions>(
       app, context,
       {"flash", "Writes a firmware image into the board, keeps its parameters, and checks what is there.",
        "  kmax flash                                   the built image, the first way that is ready\n"
@@ -252,46 +286,7 @@ void add_flash_command(CLI::App& app, Context& context, const BoardServices& giv
        "ODrive v3: SWD on connector J2, or USB with the DIP switch on DFU; serial is not possible.\n"
        "Only the image's sectors are written. All is read back and compared, the parameter sectors, too.\n"
        "Refused while an axis of --device is armed. Afterwards 'kmax info' shows what runs."},
-      Takes::device);
-  const auto services = std::make_shared<BoardServices>(given);
-  const auto options = std::make_shared<FlashOptions>();
-  command->add_option("image", options->image, "Linked image (default: the one of the preset stm32f405)")
-      ->option_text("IMAGE.elf");
-  std::vector<std::string> methods = {"auto"};
-  for (const auto& facts : flash::all_methods) methods.emplace_back(facts.name);
-  command->add_option("--method", options->method, "Way to do it")
-      ->type_name("METHOD")
-      ->check(CLI::IsMember(methods))
-      ->capture_default_str();
-  command->add_flag("--dry-run", options->dry_run, "Show the command lines and do nothing");
-  command->add_option("--board", options->board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
-  add_lines_option(*command, options->lines);
-  command
-      ->add_option("--usb-serial", options->usb_serial,
-                   "Serial number of the ST-Link or of the board in DFU mode, if there are several")
-      ->type_name("TEXT")
-      ->check([](const std::string& text) {
-        // It becomes part of an OpenOCD command.
-        const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
-          return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
-        });
-        return plain && !text.empty() ? std::string() : "allowed are letters and digits";
-      });
-  command->add_option("--speed", options->speed_khz, "Clock of the debug port in kHz")
-      ->type_name("KHZ")
-      ->check(CLI::Range(5, 4000))
-      ->capture_default_str();
-  command->add_option("--timeout", options->at_most, "A program that takes longer is ended, in s")
-      ->type_name("S")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str();
-  command->callback([&context, services, options] {
-    context.action = [&context, services, options] { return run_flash(context, *services, *options); };
-  });
-}
-
-void add_flash_command(CLI::App& app, Context& context) {
-  add_flash_command(app, context, BoardServices{});
+      Takes::device, run_flash);
 }
 
 }  // namespace kmax::cli

@@ -114,14 +114,13 @@ int run_info(Context& context) {
 }  // namespace
 
 void add_info_command(CLI::App& app, Context& context) {
-  auto* info = add_command(app, context,
-                           {"info",
-                            "Shows what the device is, its firmware, board, clock, last reset and crash, "
-                            "kept parameters, uptime and "
-                            "link counters.",
-                            "  kmax info\n  kmax info --device 'serial:/dev/ttyUSB0?unit=2'"},
-                           Takes::device);
-  info->callback([&context] { context.action = [&context] { return run_info(context); }; });
+  add_command(app, context,
+              {"info",
+               "Shows what the device is, its firmware, board, clock, last reset and crash, "
+               "kept parameters, uptime and "
+               "link counters.",
+               "  kmax info\n  kmax info --device 'serial:/dev/ttyUSB0?unit=2'"},
+              Takes::device, run_info);
 }
 
 }  // namespace kmax::cli

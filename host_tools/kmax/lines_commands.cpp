@@ -24,6 +24,7 @@ struct LinesOptions {
   std::string file;
   std::vector<std::string> texts;
   double duration = 0;
+  std::string board;
 };
 
 constexpr milliseconds look_around{100};
@@ -62,9 +63,9 @@ void check_duration(const LinesOptions& options) {
     throw UsageError(fmt::format("--for: {} is not a number of seconds", options.duration));
 }
 
-int list_lines(Context& context, const BoardServices& services, const LinesConfig& config) {
+int list_lines(Context& context, const LinesOptions&, const LinesConfig& config) {
   require_some(config);
-  const auto gpio = services.open_gpio();
+  const auto gpio = board_services(context).open_gpio();
   Json document = Json::object();
   std::exception_ptr first_error;
   for (const auto& [role, settings] : config.lines) {
@@ -115,8 +116,7 @@ std::string seconds_text(std::chrono::nanoseconds time) {
   return fmt::format("{}.{:09}", time.count() / 1'000'000'000, time.count() % 1'000'000'000);
 }
 
-int watch_lines(Context& context, const BoardServices& services, const LinesOptions& options,
-                const LinesConfig& config) {
+int watch_lines(Context& context, const LinesOptions& options, const LinesConfig& config) {
   check_duration(options);
   std::vector<LineRole> roles;
   for (const std::string& name : options.texts) roles.push_back(role_of(name));
@@ -134,7 +134,7 @@ int watch_lines(Context& context, const BoardServices& services, const LinesOpti
   for (const LineRole role : roles) settings.push_back(config.required(role));
 
   const Interruption interruption;
-  const auto gpio = services.open_gpio();
+  const auto gpio = board_services(context).open_gpio();
   const auto watch = gpio->watch(settings);
   const auto over = until(options, interruption);
   Json start = Json::object(), edges = Json::array();
@@ -186,8 +186,7 @@ LineAssignment parsed(const std::string& text) {
       fmt::format("'{}': {} is set to {} or {}", text, facts.name, facts.active, facts.inactive));
 }
 
-int set_lines(Context& context, const BoardServices& services, const LinesOptions& options,
-              const LinesConfig& config) {
+int set_lines(Context& context, const LinesOptions& options, const LinesConfig& config) {
   check_duration(options);
   if (options.texts.empty()) throw UsageError("write NAME=STATE, as in 'kmax lines set emergency_stop=stop'");
   std::vector<LineAssignment> assignments;
@@ -199,7 +198,7 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
     assignments.push_back(one);
   }
   const Interruption interruption;
-  const auto gpio = services.open_gpio();
+  const auto gpio = board_services(context).open_gpio();
   HeldLines held(context, *gpio);
   Json document = Json::object();
   for (const auto& [role, active] : assignments) {
@@ -218,18 +217,18 @@ int set_lines(Context& context, const BoardServices& services, const LinesOption
       "holding {}; then the lines are let go and fall back to their pulls",
       options.duration > 0 ? fmt::format("for {} s", options.duration) : std::string("until Ctrl-C")));
   const auto over = until(options, interruption);
-  while (!over()) services.sleep(milliseconds(20));
+  while (!over()) board_services(context).sleep(milliseconds(20));
   held.end();
   if (context.json) context.print(document);
   return done;
 }
 
-int run_reset(Context& context, const BoardServices& services, const LinesConfig& config) {
+int run_reset(Context& context, const LinesOptions&, const LinesConfig& config) {
   config.required(LineRole::reset);
   // A reset that is torn would leave the board in it.
   const Interruption interruption;
-  const auto gpio = services.open_gpio();
-  lines::pulse_reset(*gpio, config, services.sleep);
+  const auto gpio = board_services(context).open_gpio();
+  lines::pulse_reset(*gpio, config, board_services(context).sleep);
   if (context.json) {
     context.print({{"reset", true}});
   } else {
@@ -238,18 +237,16 @@ int run_reset(Context& context, const BoardServices& services, const LinesConfig
   return done;
 }
 
-int run_bootloader(Context& context, const BoardServices& services, const std::string& board_option,
-                   const LinesConfig& config) {
-  const flash::BoardProfile& board = chosen_board(board_option, config);
+int run_bootloader(Context& context, const LinesOptions& options, const LinesConfig& config) {
+  const flash::BoardProfile& board = chosen_board(options.board, config);
   if (board.boot0_is_switch && config.find(LineRole::boot0) == nullptr)
     throw std::runtime_error(fmt::format(
-        "BOOT0 of {} is a switch that no line can move. To start the ROM bootloader: {}. To go back: "
-        "{}",
+        "BOOT0 of {} is a switch that no line can move. To start the ROM bootloader: {}. To go back: {}",
         board.title, board.to_bootloader, board.to_application));
   // Likewise.
   const Interruption interruption;
-  const auto gpio = services.open_gpio();
-  lines::enter_bootloader(*gpio, config, services.sleep);
+  const auto gpio = board_services(context).open_gpio();
+  lines::enter_bootloader(*gpio, config, board_services(context).sleep);
   if (context.json) {
     context.print({{"bootloader", true}});
   } else {
@@ -280,9 +277,17 @@ CLI::App* add_set(CLI::App& app, Context& context) {
 }
 }  // namespace
 
-void add_lines_commands(CLI::App& app, Context& context, const BoardServices& given) {
-  const auto services = std::make_shared<BoardServices>(given);
+void add_lines_commands(CLI::App& app, Context& context) {
   const auto options = std::make_shared<LinesOptions>();
+  const auto act = [&context, options](CLI::App& command, auto run) {
+    command.callback([&context, &command, options, run] {
+      if (!command.get_subcommands().empty()) return;
+      context.action = [&context, options, run] {
+        return with_lines(*options,
+                          [&](const LinesConfig& config) { return run(context, *options, config); });
+      };
+    });
+  };
   const auto add_duration = [options](CLI::App* command) {
     command->add_option("--for", options->duration, "Ends after so many seconds instead of at Ctrl-C")
         ->type_name("S")
@@ -295,12 +300,7 @@ void add_lines_commands(CLI::App& app, Context& context, const BoardServices& gi
                             "Nothing is changed: a line is looked at as it is."},
                            Takes::nothing);
   add_lines_option(*list, options->file);
-  list->callback([&context, services, options, list] {
-    if (!list->get_subcommands().empty()) return;
-    context.action = [&context, services, options] {
-      return with_lines(*options, [&](const auto& config) { return list_lines(context, *services, config); });
-    };
-  });
+  act(*list, list_lines);
 
   auto* watch = add_watch(*list, context);
   add_lines_option(*watch, options->file);
@@ -311,55 +311,31 @@ void add_lines_commands(CLI::App& app, Context& context, const BoardServices& gi
       ->type_name("NAME")
       ->allow_extra_args(false);
   add_duration(watch);
-  watch->callback([&context, services, options] {
-    context.action = [&context, services, options] {
-      return with_lines(
-          *options, [&](const auto& config) { return watch_lines(context, *services, *options, config); });
-    };
-  });
+  act(*watch, watch_lines);
 
   auto* set = add_set(*list, context);
   add_lines_option(*set, options->file);
   set->add_option("assignments", options->texts,
-                  "emergency_stop=stop|run, reset=reset|run, "
-                  "boot0=bootloader|application")
+                  "emergency_stop=stop|run, reset=reset|run, boot0=bootloader|application")
       ->option_text("NAME=STATE ...");
   add_duration(set);
-  set->callback([&context, services, options] {
-    context.action = [&context, services, options] {
-      return with_lines(*options,
-                        [&](const auto& config) { return set_lines(context, *services, *options, config); });
-    };
-  });
+  act(*set, set_lines);
 
   auto* reset =
       add_command(app, context, {"reset", "Resets the board's processor by its NRST line.", "  kmax reset"},
                   Takes::nothing);
   add_lines_option(*reset, options->file);
-  reset->callback([&context, services, options] {
-    context.action = [&context, services, options] {
-      return with_lines(*options, [&](const auto& config) { return run_reset(context, *services, config); });
-    };
-  });
+  act(*reset, run_reset);
 
   auto* bootloader =
       add_command(app, context,
                   {"bootloader", "Starts the ROM bootloader of the board's processor by BOOT0 and NRST.",
                    "  kmax bootloader\n\n'kmax flash' does this by itself where it needs it."},
                   Takes::nothing);
-  const auto board = std::make_shared<std::string>();
   add_lines_option(*bootloader, options->file);
-  bootloader->add_option("--board", *board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
-  bootloader->callback([&context, services, options, board] {
-    context.action = [&context, services, options, board] {
-      return with_lines(
-          *options, [&](const auto& config) { return run_bootloader(context, *services, *board, config); });
-    };
-  });
-}
-
-void add_lines_commands(CLI::App& app, Context& context) {
-  add_lines_commands(app, context, BoardServices{});
+  bootloader->add_option("--board", options->board, "Kind of board: " + flash::board_kinds())
+      ->type_name("KIND");
+  act(*bootloader, run_bootloader);
 }
 
 }  // namespace kmax::cli

@@ -22,6 +22,13 @@ namespace {
 struct ListOptions {
   std::string prefix;
   bool all_axes = false, changed_only = false, whole_texts = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("prefix", prefix, "Only names that begin with this")->option_text("PREFIX");
+    command.add_flag("--all", all_axes, "Every axis");
+    command.add_flag("--changed", changed_only, "Only values that are not the default");
+    command.add_flag("--long", whole_texts, "Whole help texts and choices, on lines of their own");
+  }
 };
 
 std::vector<Parameter> listed(const Context& context, const ListOptions& options) {
@@ -82,7 +89,16 @@ std::string shown_name(const std::string& given, const Parameter& parameter) {
   return given.starts_with("axis") ? given : parameter.name();
 }
 
-int run_get(Context& context, const std::vector<std::string>& names) {
+struct GetOptions {
+  std::vector<std::string> names;
+
+  void declare(CLI::App& command) {
+    command.add_option("names", names, "Names as 'kmax list' shows them")->option_text("NAME ...");
+  }
+};
+
+int run_get(Context& context, const GetOptions& options) {
+  const std::vector<std::string>& names = options.names;
   if (names.empty())
     throw UsageError("name a parameter, as in 'kmax get wall.stiffness'; 'kmax list' shows all of them");
   std::vector<Parameter> parameters;
@@ -126,7 +142,16 @@ void note_can_settings(Context& context, const std::vector<Assignment>& assignme
   }
 }
 
-int run_set(Context& context, const std::vector<std::string>& texts) {
+struct SetOptions {
+  std::vector<std::string> texts;
+
+  void declare(CLI::App& command) {
+    command.add_option("assignments", texts, "Names and what they are set to")->option_text("NAME=VALUE ...");
+  }
+};
+
+int run_set(Context& context, const SetOptions& options) {
+  const std::vector<std::string>& texts = options.texts;
   if (texts.empty())
     throw UsageError("write NAME=VALUE, as in 'kmax set wall.stiffness=3580'; 'kmax list' shows all names");
   const std::vector<Assignment> assignments = device::parse_assignments(texts, context.axis());
@@ -154,43 +179,30 @@ int run_set(Context& context, const std::vector<std::string>& texts) {
 }  // namespace
 
 void add_parameter_commands(CLI::App& app, Context& context) {
-  auto* list =
-      add_command(app, context,
-                  {"list", "Shows parameters and readings with value, unit, range, default and help.",
-                   "  kmax list                 axis 0 and the device; * marks what is not the default\n"
-                   "  kmax list wall.           the wall's parameters\n"
-                   "  kmax list axis1.wall      the same of axis 1\n"
-                   "  kmax list --long wall.    with the whole help texts"});
-  auto list_options = std::make_shared<ListOptions>();
-  list->add_option("prefix", list_options->prefix, "Only names that begin with this")->option_text("PREFIX");
-  list->add_flag("--all", list_options->all_axes, "Every axis");
-  list->add_flag("--changed", list_options->changed_only, "Only values that are not the default");
-  list->add_flag("--long", list_options->whole_texts, "Whole help texts and choices, on lines of their own");
-  list->callback([&context, list_options] {
-    context.action = [&context, list_options] { return run_list(context, *list_options); };
-  });
+  add_command<ListOptions>(
+      app, context,
+      {"list", "Shows parameters and readings with value, unit, range, default and help.",
+       "  kmax list                 axis 0 and the device; * marks what is not the default\n"
+       "  kmax list wall.           the wall's parameters\n"
+       "  kmax list axis1.wall      the same of axis 1\n"
+       "  kmax list --long wall.    with the whole help texts"},
+      Takes::device_and_axis, run_list);
 
-  auto* get = add_command(
+  add_command<GetOptions>(
       app, context,
       {"get", "Prints values by name.",
        "  kmax get wall.stiffness axis1.wall.stiffness\n"
-       "  kmax get measured.position --json    {\"measured.position\": {\"value\": ..., \"unit\": \"m\"}}"});
-  auto names = std::make_shared<std::vector<std::string>>();
-  get->add_option("names", *names, "Names as 'kmax list' shows them")->option_text("NAME ...");
-  get->callback(
-      [&context, names] { context.action = [&context, names] { return run_get(context, *names); }; });
+       "  kmax get measured.position --json    {\"measured.position\": {\"value\": ..., \"unit\": \"m\"}}"},
+      Takes::device_and_axis, run_get);
 
-  auto* set = add_command(
+  add_command<SetOptions>(
       app, context,
       {"set", "Sets values, all of them in the same instant or none, and reads them back.",
        "  kmax set wall.law=magnetic wall.stiffness=3.58N/mm wall.magnetic_length=1mm\n"
        "  kmax set axis1.wall.side=-1\n\n"
        "Numbers are SI; units such as N/mm, mm, mm/s, ms, kHz, g, mN are converted. Choices go by\n"
-       "name or number."});
-  auto texts = std::make_shared<std::vector<std::string>>();
-  set->add_option("assignments", *texts, "Names and what they are set to")->option_text("NAME=VALUE ...");
-  set->callback(
-      [&context, texts] { context.action = [&context, texts] { return run_set(context, *texts); }; });
+       "name or number."},
+      Takes::device_and_axis, run_set);
 }
 
 }  // namespace kmax::cli

@@ -22,9 +22,36 @@ using device::FileSetting;
 using device::Parameter;
 
 namespace {
+struct DumpOptions {
+  std::string file;
+
+  void declare(CLI::App& command) {
+    command.add_option("file", file, "File to write, replaced if it is there; - for standard output")
+        ->option_text("FILE")
+        ->required();
+  }
+};
+
+struct DiffOptions {
+  std::string file;
+
+  void declare(CLI::App& command) {
+    command.add_option("file", file, "File to read, as 'kmax dump' writes it")
+        ->option_text("FILE")
+        ->required();
+  }
+};
+
 struct LoadOptions {
   std::string file;
   bool dry_run = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("file", file, "File to read, as 'kmax dump' writes it")
+        ->option_text("FILE")
+        ->required();
+    command.add_flag("--dry-run", dry_run, "Check the file and show what would change, but set nothing");
+  }
 };
 
 /// A setting of a file and what the device has instead.
@@ -77,7 +104,8 @@ device::FileOrigin origin_of(Device& device) {
   return {names, fmt::format("{}.{}.{}", version >> 16, (version >> 8) & 0xFFu, version & 0xFFu)};
 }
 
-int run_dump(Context& context, const std::string& file) {
+int run_dump(Context& context, const DumpOptions& options) {
+  const std::string& file = options.file;
   const bool to_file = file != "-";
   if (to_file) check_writable(file);  // before a device is asked
   Device device = context.connect();
@@ -226,7 +254,8 @@ int run_load(Context& context, const LoadOptions& options) {
   return done;
 }
 
-int run_diff(Context& context, const std::string& file) {
+int run_diff(Context& context, const DiffOptions& options) {
+  const std::string& file = options.file;
   const auto settings = device::read_parameter_file(file);
   Device device = context.connect();
   const auto present = values_of(device);
@@ -275,28 +304,19 @@ int run_diff(Context& context, const std::string& file) {
                                               : fmt::format("{} parameters of the device are", not_in_file)));
   return code;
 }
-
-template <typename Run>
-void add_file_command(CLI::App& app, Context& context, const CommandText& text, const char* help, Run run) {
-  auto* command = add_command(app, context, text, Takes::device);
-  auto file = std::make_shared<std::string>();
-  command->add_option("file", *file, help)->option_text("FILE")->required();
-  command->callback(
-      [&context, file, run] { context.action = [&context, file, run] { return run(context, *file); }; });
-}
 }  // namespace
 
 void add_parameter_file_commands(CLI::App& app, Context& context) {
-  add_file_command(
+  add_command<DumpOptions>(
       app, context,
       {"dump", "Writes the device's parameters to a file (TOML), with units and choices.",
        "  kmax dump handle.toml\n"
        "  kmax dump -               on standard output\n\n"
        "All that 'kmax save' keeps, except CANopen's own settings, with the values that are in use\n"
        "now. The file has no date in it: equal parameters give an equal file."},
-      "File to write, replaced if it is there; - for standard output", run_dump);
+      Takes::device, run_dump);
 
-  auto* load = add_command(
+  add_command<LoadOptions>(
       app, context,
       {"load", "Sets the parameters of a file, all of them in the same instant or none, and reads them back.",
        "  kmax load handle.toml --dry-run    see what would change\n"
@@ -304,21 +324,14 @@ void add_parameter_file_commands(CLI::App& app, Context& context) {
        "Parameters that the file does not name stay as they are. One bad line refuses the whole file. A dry\n"
        "run finds all that is wrong with the values, but not what depends on the moment: some parameters\n"
        "cannot change while an axis is armed."},
-      Takes::device);
-  auto options = std::make_shared<LoadOptions>();
-  load->add_option("file", options->file, "File to read, as 'kmax dump' writes it")
-      ->option_text("FILE")
-      ->required();
-  load->add_flag("--dry-run", options->dry_run, "Check the file and show what would change, but set nothing");
-  load->callback(
-      [&context, options] { context.action = [&context, options] { return run_load(context, *options); }; });
+      Takes::device, run_load);
 
-  add_file_command(
+  add_command<DiffOptions>(
       app, context,
       {"diff", "Compares the parameters of a file with the device's.",
        "  kmax diff handle.toml && echo equal\n\n"
        "Exit code 3 if a value differs. Parameters that the file does not name are not compared."},
-      "File to read, as 'kmax dump' writes it", run_diff);
+      Takes::device, run_diff);
 }
 
 }  // namespace kmax::cli

@@ -16,6 +16,19 @@ struct PlotOptions {
   std::string table, picture, x;
   std::vector<std::string> y;
   bool together = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("table", table, "CSV file whose first line names the columns")
+        ->required()
+        ->option_text("FILE");
+    command.add_option("--x", x, "Column along the x axis (default: the first)")->type_name("COLUMN");
+    command.add_option("--y", y, "Column to draw; may be repeated (default: all others)")
+        ->type_name("COLUMN");
+    command.add_flag("--together", together, "All in one panel instead of one below the other");
+    command
+        .add_option("--out", picture, "Picture to write, .svg or .png (default: the table's name with .svg)")
+        ->type_name("PICTURE");
+  }
 };
 
 plot::Figure figure_of(const plot::CsvTable& table, const PlotOptions& options) {
@@ -55,27 +68,13 @@ int run_plot(Context& context, const PlotOptions& options) {
 }  // namespace
 
 void add_plot_command(CLI::App& app, Context& context) {
-  auto* command =
-      add_command(app, context,
-                  {"plot", "Draws the columns of a CSV file.",
-                   "  kmax plot run.csv                                  every column over the first\n"
-                   "  kmax plot run.csv --y force_n --out force.png\n"
-                   "  kmax plot run.csv --x position_m --y force_n"},
-                  Takes::nothing);
-  auto options = std::make_shared<PlotOptions>();
-  command->add_option("table", options->table, "CSV file whose first line names the columns")
-      ->required()
-      ->option_text("FILE");
-  command->add_option("--x", options->x, "Column along the x axis (default: the first)")->type_name("COLUMN");
-  command->add_option("--y", options->y, "Column to draw; may be repeated (default: all others)")
-      ->type_name("COLUMN");
-  command->add_flag("--together", options->together, "All in one panel instead of one below the other");
-  command
-      ->add_option("--out", options->picture,
-                   "Picture to write, .svg or .png (default: the table's name with .svg)")
-      ->type_name("PICTURE");
-  command->callback(
-      [&context, options] { context.action = [&context, options] { return run_plot(context, *options); }; });
+  add_command<PlotOptions>(
+      app, context,
+      {"plot", "Draws the columns of a CSV file.",
+       "  kmax plot run.csv                                  every column over the first\n"
+       "  kmax plot run.csv --y force_n --out force.png\n"
+       "  kmax plot run.csv --x position_m --y force_n"},
+      Takes::nothing, run_plot);
 }
 
 }  // namespace kmax::cli

@@ -29,6 +29,14 @@ struct RecordOptions {
   std::optional<double> seconds;
 
   bool to_standard_output() const { return file == "-"; }
+
+  void declare(CLI::App& command) {
+    command.add_option("file", file, "CSV file to write; -: standard output")
+        ->option_text("FILE|-")
+        ->required();
+    command.add_option("--for", seconds, "How long, s of the device's time; without it until Ctrl-C")
+        ->type_name("S");
+  }
 };
 
 /// A pipe that the reader closes is an error to report, not a reason to die with the device left operational.
@@ -48,13 +56,6 @@ struct Finished {
   std::string source;                        ///< in words
   std::optional<std::uint32_t> held_back{};  ///< by the device, of its PDOs
 };
-
-std::vector<std::size_t> recorded_axes(const Context& context) {
-  if (context.axis_option) return {*context.axis_option};
-  std::vector<std::size_t> axes;
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) axes.push_back(axis);
-  return axes;
-}
 
 std::string losses_text(const RecordingProgress& progress) {
   if (!progress.losses) return "";
@@ -78,7 +79,7 @@ void write_rows(Context& context, record::RowSource& source, const RecordOptions
     if (!file) throw cannot_write(options.file);
   }
   std::ostream& out = options.to_standard_output() ? context.out : file;
-  const record::RowCsv csv(recorded_axes(context), source.axes_apart());
+  const record::RowCsv csv(context.axes(), source.axes_apart());
   try {
     Progress line(context.messages());
     record::record(
@@ -98,7 +99,7 @@ void write_rows(Context& context, record::RowSource& source, const RecordOptions
 
 Finished record_polled(Context& context, const RecordOptions& options, const Interruption& interruption) {
   device::Device device = context.connect();
-  record::PolledSource source(device, recorded_axes(context));
+  record::PolledSource source(device, context.axes());
   Finished finished{.progress = {}, .source = fmt::format("{}, as fast as it answers", device.description())};
   write_rows(context, source, options, interruption, finished.progress);
   return finished;
@@ -148,7 +149,7 @@ Json finished_json(Context& context, const Finished& finished, const RecordOptio
   const RecordingProgress& progress = finished.progress;
   return {{"file", options.file},
           {"source", finished.source},
-          {"axes", recorded_axes(context)},
+          {"axes", context.axes()},
           {"rows", progress.rows},
           {"rows_lost", progress.losses ? Json(progress.losses->rows) : Json(nullptr)},
           {"gaps", progress.losses ? Json(progress.losses->gaps) : Json(nullptr)},
@@ -191,7 +192,7 @@ int run_record(Context& context, const RecordOptions& options) {
 }  // namespace
 
 void add_record_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<RecordOptions>(
       app, context,
       {"record", "Records position, velocity, force, current and flags as CSV for as long as you like.",
        "  kmax record run.csv --for 60 --device can:can0    1000 rows a second, from the device's PDOs\n"
@@ -202,16 +203,8 @@ void add_record_command(CLI::App& app, Context& context) {
        "the ticks. A node that is not operational is started and put back afterwards. Over other links "
        "values\n"
        "are read as fast as the link goes, one axis after the other: axis1_tick is when axis 1 was read.\n"
-       "Times are the device's own. 'kmax capture' records every tick of a short time instead."});
-  auto options = std::make_shared<RecordOptions>();
-  command->add_option("file", options->file, "CSV file to write; -: standard output")
-      ->option_text("FILE|-")
-      ->required();
-  command->add_option("--for", options->seconds, "How long, s of the device's time; without it until Ctrl-C")
-      ->type_name("S");
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_record(context, *options); };
-  });
+       "Times are the device's own. 'kmax capture' records every tick of a short time instead."},
+      Takes::device_and_axis, run_record);
 }
 
 }  // namespace kmax::cli

@@ -13,6 +13,24 @@ namespace kmax::cli {
 namespace {
 struct ServeOptions {
   std::string serial, can, scene, store;
+
+  void declare(CLI::App& command) {
+    command.add_option("--serial", serial, "Name under which the serial line (a pseudo-terminal) appears")
+        ->type_name("LINK");
+    command
+        .add_option("--can", can,
+                    "SocketCAN interface to be a CANopen node on; a name with a '/' is a bus that is "
+                    "served at that Unix domain socket")
+        ->type_name("IFACE");
+    command.add_option("--scene", scene, "TOML file or supplied scene (default: touch, factory parameters)")
+        ->type_name("SCENE");
+    command
+        .add_option("--store", store,
+                    "File that keeps what 'kmax save' saves (32 KiB, made if it is missing). Kept parameters "
+                    "replace the defaults, also those that fit the scene's hardware; the scene's own "
+                    "[parameters] replace the kept ones. Without it they last as long as this process")
+        ->type_name("FILE");
+  }
 };
 
 int run_serve(Context& context, const ServeOptions& options) {
@@ -63,7 +81,7 @@ int run_serve(Context& context, const ServeOptions& options) {
 }  // namespace
 
 void add_serve_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<ServeOptions>(
       app, context,
       {"serve",
        "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line or on a CAN bus.",
@@ -76,29 +94,7 @@ void add_serve_command(CLI::App& app, Context& context) {
        "  kmax serve --serial /tmp/kmax --store ~/kmax.store    what 'kmax save' keeps outlasts the "
        "process\n\n"
        "The person of the scene presses against the wall whenever axis 0 is armed."},
-      Takes::nothing);
-  auto options = std::make_shared<ServeOptions>();
-  command
-      ->add_option("--serial", options->serial,
-                   "Name under which the serial line (a pseudo-terminal) appears")
-      ->type_name("LINK");
-  command
-      ->add_option("--can", options->can,
-                   "SocketCAN interface to be a CANopen node on; a name with a '/' is a bus that is "
-                   "served at that Unix domain socket")
-      ->type_name("IFACE");
-  command
-      ->add_option("--scene", options->scene,
-                   "TOML file or supplied scene (default: touch, factory parameters)")
-      ->type_name("SCENE");
-  command
-      ->add_option("--store", options->store,
-                   "File that keeps what 'kmax save' saves (32 KiB, made if it is missing). Kept parameters "
-                   "replace the defaults, also those that fit the scene's hardware; the scene's own "
-                   "[parameters] replace the kept ones. Without it they last as long as this process")
-      ->type_name("FILE");
-  command->callback(
-      [&context, options] { context.action = [&context, options] { return run_serve(context, *options); }; });
+      Takes::nothing, run_serve);
 }
 
 }  // namespace kmax::cli

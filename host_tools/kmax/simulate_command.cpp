@@ -22,6 +22,16 @@ using simulated_board::RunSample;
 namespace {
 struct SimulateOptions {
   std::string scene, csv, picture;
+
+  void declare(CLI::App& command) {
+    std::string names;
+    for (const auto& scene : simulated_board::supplied_scenes()) names += fmt::format(" {}", scene.name);
+    command.add_option("scene", scene, "TOML file, or a supplied scene:" + names)
+        ->required()
+        ->option_text("SCENE");
+    command.add_option("--csv", csv, "Table of every haptic sample to write")->type_name("FILE");
+    command.add_option("--picture", picture, "Picture to draw, .svg or .png")->type_name("FILE");
+  }
 };
 
 /// What the table has of an axis; the time stands before.
@@ -191,9 +201,7 @@ int run_simulate(Context& context, const SimulateOptions& options) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app, Context& context) {
-  std::string names;
-  for (const auto& scene : simulated_board::supplied_scenes()) names += fmt::format(" {}", scene.name);
-  auto* command = add_command(
+  add_command<SimulateOptions>(
       app, context,
       {"simulate", "Runs one scene through the firmware on a simulated device.",
        "  kmax simulate touch\n"
@@ -201,16 +209,7 @@ void add_simulate_command(CLI::App& app, Context& context) {
        "A scene names its parts: device, structure, operator, motion, encoder, motor, parameters,\n"
        "measurement, integrator. Its axes are armed at time 0 and the person begins to move; everything\n"
        "goes through the firmware."},
-      Takes::nothing);
-  auto options = std::make_shared<SimulateOptions>();
-  command->add_option("scene", options->scene, "TOML file, or a supplied scene:" + names)
-      ->required()
-      ->option_text("SCENE");
-  command->add_option("--csv", options->csv, "Table of every haptic sample to write")->type_name("FILE");
-  command->add_option("--picture", options->picture, "Picture to draw, .svg or .png")->type_name("FILE");
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_simulate(context, *options); };
-  });
+      Takes::nothing, run_simulate);
 }
 
 }  // namespace kmax::cli

@@ -74,25 +74,23 @@ int run_defaults(Context& context) {
 }  // namespace
 
 void add_store_commands(CLI::App& app, Context& context) {
-  auto* save = add_command(
+  add_command(
       app, context,
       {"save", "Keeps all present parameters over a restart, and reads them back.",
        "  kmax set wall.stiffness=3.58N/mm && kmax save\n\n"
        "Appends a record to the device's memory; the one before stays until this one is whole, so a loss\n"
        "of power leaves the one or the other. Refused while an axis is armed, since the memory may hold the\n"
        "processor up for half a second; no axis can be armed meanwhile."},
-      Takes::device);
-  save->callback([&context] { context.action = [&context] { return run_save(context); }; });
+      Takes::device, run_save);
 
-  auto* defaults = add_command(
+  add_command(
       app, context,
       {"defaults", "Sets all parameters to their defaults; only 'kmax save' keeps that.",
        "  kmax defaults                  see what changes; a restart brings the kept parameters back\n"
        "  kmax defaults && kmax save     for good\n\n"
        "All means all: axes, motors, encoders, limits and the link itself (unit and baud rate). What is\n"
        "kept in the device's memory is not touched. Refused while an axis is armed."},
-      Takes::device);
-  defaults->callback([&context] { context.action = [&context] { return run_defaults(context); }; });
+      Takes::device, run_defaults);
 }
 
 }  // namespace kmax::cli

@@ -21,6 +21,19 @@ struct WallOptions {
   double velocity = 0;
   std::string input, output, picture;
   std::vector<std::string> assignments;
+
+  void declare(CLI::App& command) {
+    command.add_option("--position", position, "Position of the handle, m");
+    command.add_option("--velocity", velocity, "Its velocity, m/s (default 0)");
+    command.add_option("--csv", input, "Table with the columns position_m and velocity_m_per_s")
+        ->type_name("IN");
+    command.add_option("--out", output, "Table to write, with the column force_n")->type_name("OUT");
+    command.add_option("--picture", picture, "Draws the force-position curve of each law, .svg or .png")
+        ->type_name("FILE");
+    command.add_option("--set", assignments, "Parameter of the wall; may be repeated")
+        ->type_name("NAME=VALUE")
+        ->take_all();
+  }
 };
 
 firmware::ParameterValues values_of(const WallOptions& options, std::size_t axis) {
@@ -88,7 +101,7 @@ int run_wall(Context& context, const WallOptions& options) {
 }  // namespace
 
 void add_wall_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<WallOptions>(
       app, context,
       {"wall", "Evaluates the wall law as the firmware computes it, without a device.",
        "  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.0001\n"
@@ -98,24 +111,7 @@ void add_wall_command(CLI::App& app, Context& context) {
        "Positions in m and velocities in m/s along +x. Parameters not set have their defaults. Every point "
        "stands\n"
        "alone, as the first sample of a contact; force limit, sampling and encoder are left out."},
-      Takes::nothing);
-  auto options = std::make_shared<WallOptions>();
-  command->add_option("--axis", context.axis_option, "Axis that names without a prefix are on")
-      ->type_name("N")
-      ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
-  command->add_option("--position", options->position, "Position of the handle, m");
-  command->add_option("--velocity", options->velocity, "Its velocity, m/s (default 0)");
-  command->add_option("--csv", options->input, "Table with the columns position_m and velocity_m_per_s")
-      ->type_name("IN");
-  command->add_option("--out", options->output, "Table to write, with the column force_n")->type_name("OUT");
-  command
-      ->add_option("--picture", options->picture, "Draws the force-position curve of each law, .svg or .png")
-      ->type_name("FILE");
-  command->add_option("--set", options->assignments, "Parameter of the wall; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->take_all();
-  command->callback(
-      [&context, options] { context.action = [&context, options] { return run_wall(context, *options); }; });
+      Takes::axis, run_wall);
 }
 
 }  // namespace kmax::cli

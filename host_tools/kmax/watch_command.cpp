@@ -26,6 +26,13 @@ namespace {
 struct WatchOptions {
   std::optional<double> seconds;
   double rate = 10;
+
+  void declare(CLI::App& command) {
+    command.add_option("--for", seconds, "How long; without it until Ctrl-C")->type_name("S");
+    command.add_option("--rate", rate, "Readings a second, 0.1 .. 50")
+        ->type_name("HZ")
+        ->capture_default_str();
+  }
 };
 
 WatchedAxis read_axis(device::Device& device, std::size_t axis) {
@@ -81,13 +88,6 @@ class Display {
   double next_line_ = 0;
 };
 
-std::vector<std::size_t> watched_axes(const Context& context) {
-  if (context.axis_option) return {*context.axis_option};
-  std::vector<std::size_t> axes;
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) axes.push_back(axis);
-  return axes;
-}
-
 int run_watch(Context& context, const WatchOptions& options) {
   if (options.seconds && !(std::isfinite(*options.seconds) && *options.seconds >= 0))
     throw UsageError(fmt::format("--for: {} is not a number of seconds", *options.seconds));
@@ -106,7 +106,7 @@ int run_watch(Context& context, const WatchOptions& options) {
   double seconds = 0;
   for (microseconds next = start; !interruption.requested();) {
     axes.clear();
-    for (const std::size_t axis : watched_axes(context)) axes.push_back(read_axis(device, axis));
+    for (const std::size_t axis : context.axes()) axes.push_back(read_axis(device, axis));
     ++readings;
     seconds = std::chrono::duration<double>(link.now() - start).count();
     display.show(seconds, seconds > 0 ? static_cast<double>(readings) / seconds : 0, axes);
@@ -131,20 +131,14 @@ int run_watch(Context& context, const WatchOptions& options) {
 }  // namespace
 
 void add_watch_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<WatchOptions>(
       app, context,
       {"watch", "Shows state, position, velocity, force, current and faults of the axes as they change.",
        "  kmax watch                        until Ctrl-C\n"
        "  kmax watch --for 10 > watch.log   not on a terminal: a line a second\n"
        "  kmax watch --for 0 --json         one reading\n\n"
-       "With --json one document at the end: the last reading, and how many there were."});
-  auto options = std::make_shared<WatchOptions>();
-  command->add_option("--for", options->seconds, "How long; without it until Ctrl-C")->type_name("S");
-  command->add_option("--rate", options->rate, "Readings a second, 0.1 .. 50")
-      ->type_name("HZ")
-      ->capture_default_str();
-  command->callback(
-      [&context, options] { context.action = [&context, options] { return run_watch(context, *options); }; });
+       "With --json one document at the end: the last reading, and how many there were."},
+      Takes::device_and_axis, run_watch);
 }
 
 }  // namespace kmax::cli

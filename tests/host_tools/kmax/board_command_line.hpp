@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
-#include <CLI/CLI.hpp>
-
 #include <memory>
 #include <sstream>
 #include <string>
@@ -12,6 +10,7 @@
 
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/board_services.hpp"
+#include "host_tools/kmax/command_line.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"
@@ -20,8 +19,7 @@
 
 namespace kmax::cli {
 
-/// The commands for lines and flashing, with GPIO lines, tools, USB and a device that are not real. Errors
-/// become exit codes as command_line.cpp makes them.
+/// The command line with GPIO lines, tools, USB and a device that are not real.
 class BoardCommandLine : public testing::Test {
  protected:
   BoardCommandLine() {
@@ -45,10 +43,8 @@ class BoardCommandLine : public testing::Test {
                       if (!device) throw link::LinkError("nobody answers");
                       return std::make_unique<host_tools_test::FakeLink>(device);
                     });
-    CLI::App app("test", "kmax");
-    add_lines_commands(app, context, services);
-    add_flash_command(app, context, services);
-    const int code = outcome(app, context, std::move(arguments), messages);
+    context.board_services = std::make_shared<BoardServices>(services);
+    const int code = run(std::move(arguments), context);
     output = out.str();
     said = messages.str();
     return code;
@@ -74,26 +70,6 @@ class BoardCommandLine : public testing::Test {
   std::function<void()> at_sleep;
   std::shared_ptr<host_tools_test::FakeDevice> device;
   std::string image, lines_file, output, said;
-
- private:
-  static int outcome(CLI::App& app, Context& context, std::vector<std::string> arguments,
-                     std::ostringstream& messages) {
-    try {
-      std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-      app.parse(reversed);
-    } catch (const CLI::ParseError& error) {
-      return app.exit(error, messages, messages) == 0 ? done : wrong_usage;
-    }
-    try {
-      return context.action();
-    } catch (const UsageError& error) {
-      messages << error.what();
-      return wrong_usage;
-    } catch (const std::exception& error) {
-      messages << error.what();
-      return failed;
-    }
-  }
 };
 
 }  // namespace kmax::cli
