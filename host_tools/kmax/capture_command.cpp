@@ -44,7 +44,7 @@ struct CaptureOptions {
         ->type_name("NAME,...")
         ->capture_default_str();
     std::vector<std::string> triggers;
-    for (const auto& trigger : firmware::names::capture_trigger) triggers.emplace_back(trigger.name);
+    for (const auto& one : firmware::names::capture_trigger) triggers.emplace_back(one.name);
     command
         .add_option(
             "--trigger", trigger,

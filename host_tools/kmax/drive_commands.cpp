@@ -175,7 +175,6 @@ struct ArmOptions {
   bool holding = false;
 
   void declare(CLI::App& command) {
-    auto holding = std::make_shared<bool>(false);
     command.add_flag("--hold", holding,
                      "Keep the link alive until Ctrl-C, then disarm; ends with code 1 on a fault");
   }

@@ -25,7 +25,7 @@ struct SimulateOptions {
 
   void declare(CLI::App& command) {
     std::string names;
-    for (const auto& scene : simulated_board::supplied_scenes()) names += fmt::format(" {}", scene.name);
+    for (const auto& one : simulated_board::supplied_scenes()) names += fmt::format(" {}", one.name);
     command.add_option("scene", scene, "TOML file, or a supplied scene:" + names)
         ->required()
         ->option_text("SCENE");

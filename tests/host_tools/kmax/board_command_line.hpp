@@ -4,23 +4,21 @@
 #include <stdlib.h>
 
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/board_services.hpp"
-#include "host_tools/kmax/command_line.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 #include "tests/host_tools/lines/fake_gpio_lines.hpp"
-#include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli {
 
 /// The command line with GPIO lines, tools, USB and a device that are not real.
-class BoardCommandLine : public testing::Test {
+class BoardCommandLine : public CommandLineFixture {
  protected:
   BoardCommandLine() {
     unsetenv("KMAX_DEVICE");
@@ -36,23 +34,12 @@ class BoardCommandLine : public testing::Test {
   }
   ~BoardCommandLine() override { unsetenv("XDG_CONFIG_HOME"); }
 
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages,
-                    [this](const std::string&, const link::Notice&) -> std::unique_ptr<link::Link> {
-                      if (!device) throw link::LinkError("nobody answers");
-                      return std::make_unique<host_tools_test::FakeLink>(device);
-                    });
-    context.board_services = std::make_shared<BoardServices>(services);
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
+  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+    if (!device) throw link::LinkError("nobody answers");
+    return std::make_unique<host_tools_test::FakeLink>(device);
   }
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
+  void prepare(Context& context) override {
+    context.board_services = std::make_shared<BoardServices>(services);
   }
   void configure(const std::string& text) {
     lines_file = board.folder.write("lines.toml", text).string();
@@ -69,7 +56,7 @@ class BoardCommandLine : public testing::Test {
   BoardServices services;
   std::function<void()> at_sleep;
   std::shared_ptr<host_tools_test::FakeDevice> device;
-  std::string image, lines_file, output, said;
+  std::string image, lines_file;
 };
 
 }  // namespace kmax::cli

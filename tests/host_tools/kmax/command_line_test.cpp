@@ -8,7 +8,7 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "tests/host_tools/fake_device.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::command_line_test {
 namespace {
@@ -19,32 +19,19 @@ using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
 
 /// Runs commands in process on a device that outlives them.
-class CommandLine : public testing::Test {
+class CommandLine : public CommandLineFixture {
  protected:
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string& address, const link::Notice&) {
-      link::parse_device_address(address);
-      opened = address;
-      auto link = std::make_unique<FakeLink>(fake);
-      if (prepare) prepare(*link);
-      return link;
-    });
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
-  }
-
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
+  std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice&) override {
+    link::parse_device_address(address);
+    opened = address;
+    auto link = std::make_unique<FakeLink>(fake);
+    if (set_up) set_up(*link);
+    return link;
   }
 
   std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
-  std::function<void(FakeLink&)> prepare;
-  std::string output, said, opened;
+  std::function<void(FakeLink&)> set_up;
+  std::string opened;
 };
 
 TEST_F(CommandLine, GetIsTheContractedDocument) {
@@ -106,7 +93,7 @@ TEST_F(CommandLine, ExitCodesTellWhoseFaultItIs) {
   EXPECT_EQ(kmax({"list", "nonsense"}), wrong_usage);
   fake->obstacle[0] = Refusal::handle_inside_wall;
   EXPECT_EQ(kmax({"arm"}), failed);
-  prepare = [](FakeLink& link) {
+  set_up = [](FakeLink& link) {
     link.loss = FakeLink::Loss::request;
     link.first_lost = 1;
     link.last_lost = 1000;
@@ -286,7 +273,7 @@ TEST_F(CommandLine, AWrongTriggerIsSaidInPlainText) {
 }
 
 TEST_F(CommandLine, CtrlCWhileArmingDisarms) {
-  prepare = [&](FakeLink& link) {
+  set_up = [&](FakeLink& link) {
     link.after_request = [&](int) {
       if (fake->armed()) raise(SIGINT);
     };
@@ -303,7 +290,7 @@ TEST_F(CommandLine, CtrlCWhileArmingDisarms) {
 // `kmax stop` must find room between the readings, however fast they come.
 TEST_F(CommandLine, WatchLendsTheLinkAtAnyPace) {
   std::uint64_t longest = 0;
-  prepare = [&](FakeLink& link) {
+  set_up = [&](FakeLink& link) {
     link.before_request = [&, ended = std::uint64_t{0}](int) mutable {
       if (ended != 0) longest = std::max(longest, fake->now_us - ended);
       ended = fake->now_us + 5'000;
@@ -324,7 +311,7 @@ TEST_F(CommandLine, StopAndDisarmActOnEveryAxis) {
 TEST_F(CommandLine, HoldDisarmsOnCtrlC) {
   for (const int signal : {SIGINT, SIGTERM}) {
     int waits = 0;
-    prepare = [&](FakeLink& link) {
+    set_up = [&](FakeLink& link) {
       link.while_waiting = [&] {
         if (++waits == 3) raise(signal);
       };
@@ -338,13 +325,13 @@ TEST_F(CommandLine, HoldDisarmsOnCtrlC) {
 }
 
 TEST_F(CommandLine, HoldReportsAFaultAndNeverArmsAgain) {
-  prepare = [&](FakeLink& link) {
+  set_up = [&](FakeLink& link) {
     link.while_waiting = [&] { fake->trip(0, Fault::over_speed, 6.0f, 5.0f); };
   };
   EXPECT_EQ(kmax({"arm", "--hold", "--json"}), failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "faster than velocity.limit");
   EXPECT_FALSE(fake->armed());
-  prepare = {};
+  set_up = {};
   EXPECT_EQ(kmax({"state", "--json"}), done);
   EXPECT_EQ(document()["axes"][0]["fault"]["name"], "over_speed");
   EXPECT_EQ(document()["axes"][0]["fault"]["value"], 6);

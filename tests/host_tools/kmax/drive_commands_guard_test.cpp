@@ -1,18 +1,14 @@
 // What `kmax arm` and `kmax state` say of the stability guard, with the whole firmware behind them.
 #include <gtest/gtest.h>
 
-#include <sstream>
-
-#include "host_tools/kmax/command_line.hpp"
-#include "host_tools/kmax/context.hpp"
 #include "tests/host_tools/bench_link.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::drive_commands_guard_test {
 namespace {
 
 /// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.23 N s/m allow 4000 N/m.
-class GuardOnCommandLine : public testing::Test {
+class GuardOnCommandLine : public CommandLineFixture {
  protected:
   GuardOnCommandLine() {
     bench->set_up_plain_wall();
@@ -24,26 +20,13 @@ class GuardOnCommandLine : public testing::Test {
     bench->run_ms(5);
   }
 
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
-      return std::make_unique<host_tools_test::BenchLink>(bench);
-    });
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
-  }
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
+  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+    return std::make_unique<host_tools_test::BenchLink>(bench);
   }
   Json axis_0() { return document()["axes"][0]; }
   bool armed() const { return bench->application().any_armed(); }
 
   std::shared_ptr<board::Bench> bench = std::make_shared<board::Bench>();
-  std::string output, said;
 };
 
 TEST_F(GuardOnCommandLine, ARefusalToArmTellsTheNumbersAndWhatToDo) {

@@ -5,88 +5,19 @@
 #include <sstream>
 
 #include "host_tools/device/parameter_file.hpp"
-#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/kmax/command_line.hpp"
-#include "tests/host_tools/temporary_folder.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::parameter_file_commands_test {
 namespace {
 
-/// A wire to a device that stays, whose address is what a serial port's would be. It can lose a write.
-class Wire final : public link::RegisterLink {
- public:
-  Wire(std::shared_ptr<link::SimLink> device, int lost_write)
-      : device_(std::move(device)), lost_(lost_write) {}
-
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return device_->read_holding(address, count);
-  }
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return device_->read_input(address, count);
-  }
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-    ++writes_;
-    if (lost_ != 0 && writes_ >= lost_) {
-      device_->wait(std::chrono::milliseconds(500));
-      throw link::LinkError("no answer");
-    }
-    device_->write_holding(address, values);
-  }
-  std::map<std::string, std::string> identify() override { return device_->identify(); }
-  void follow_serial_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
-    device_->follow_serial_settings(unit, baud);
-    if (unit) unit_ = *unit;
-  }
-  std::chrono::microseconds now() const override { return device_->now(); }
-  void wait(std::chrono::microseconds duration) override { device_->wait(duration); }
-  std::string description() const override { return "wire?unit=" + std::to_string(unit_); }
-
- private:
-  std::shared_ptr<link::SimLink> device_;
-  int lost_, writes_ = 0;
-  int unit_ = device_->read_holding(device::Parameter::of<"modbus.unit">().address(), 1).front();
-};
-
-class ParameterFileCommands : public testing::Test {
+class ParameterFileCommands : public WiredCommandLine {
  protected:
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
-      ++connections;
-      return std::make_unique<Wire>(device, lost_write);
-    });
-    arguments.insert(arguments.end(), {"--device", "serial:/dev/wire"});
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
-  }
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
-  }
   std::string value(const std::string& name) {
     EXPECT_EQ(kmax({"get", name}), done) << said;
     return output.substr(name.size() + 3, output.size() - name.size() - 4);
   }
   std::string file(const std::string& text) { return folder.write("f.toml", text).string(); }
-  std::string in(const std::string& name) const { return (folder / name).string(); }
-  /// With --json it ends alike, with the message as a document.
-  void expect_error(std::vector<std::string> arguments, int code, const std::string& part) {
-    EXPECT_EQ(kmax(arguments), code) << said;
-    EXPECT_CONTAINS(said, part);
-    EXPECT_EQ(output, "");
-    arguments.push_back("--json");
-    EXPECT_EQ(kmax(arguments), code);
-    EXPECT_CONTAINS(document()["error"].get<std::string>(), part);
-  }
-
-  host_tools_test::TemporaryFolder folder;
-  std::shared_ptr<link::SimLink> device = std::make_shared<link::SimLink>(simulated_board::factory_scene());
-  int lost_write = 0, connections = 0;
-  std::string output, said;
 };
 
 const std::string all = std::to_string(device::file_parameters().size());
@@ -240,10 +171,11 @@ TEST_F(ParameterFileCommands, ALostLinkLeavesTheOldValues) {
   ASSERT_EQ(kmax({"dump", in("a.toml")}), done);
   ASSERT_EQ(kmax({"set", "wall.stiffness=111", "axis1.force.limit=1"}), done);
   for (const int first_lost : {1, 2, 9}) {
-    lost_write = first_lost;
+    first_lost_write = first_lost;
+    last_lost_write = 1'000;
     EXPECT_EQ(kmax({"load", in("a.toml")}), failed);
     EXPECT_CONTAINS(said, "nothing was changed");
-    lost_write = 0;
+    first_lost_write = last_lost_write = 0;
     device->wait(std::chrono::seconds(3));
     EXPECT_EQ(value("wall.stiffness"), "111 N/m");
     EXPECT_EQ(value("axis1.force.limit"), "1 N");

@@ -4,10 +4,8 @@
 #include <csignal>
 #include <sstream>
 
-#include "host_tools/kmax/command_line.hpp"
 #include "tests/host_tools/fake_device.hpp"
-#include "tests/host_tools/temporary_folder.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::record_command_test {
 namespace {
@@ -44,37 +42,29 @@ class FakePort final : public link::CanPort {
   FakeBus& bus_;
 };
 
-class RecordCommand : public testing::Test {
+class RecordCommand : public CommandLineFixture {
  protected:
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
-      auto made = std::make_unique<FakeLink>(fake);
-      made->before_request = [this](int) {
-        for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
-          fake->registers.values().set_whole<"measured.tick">(static_cast<std::uint32_t>(fake->now_us / 50),
-                                                              axis);
-      };
-      return made;
-    });
+  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+    auto made = std::make_unique<FakeLink>(fake);
+    made->before_request = [this](int) {
+      for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+        fake->registers.values().set_whole<"measured.tick">(static_cast<std::uint32_t>(fake->now_us / 50),
+                                                            axis);
+    };
+    return made;
+  }
+  void prepare(Context& context) override {
     context.open_bus = [this](const std::string& name, const link::CanPortOptions&) {
       opened = name;
       return std::make_unique<FakePort>(bus);
     };
     fake->registers.values().set_whole<"can.node_state">(127);
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
   }
-  Json document() { return Json::parse(output, nullptr, false); }
-  std::string in(const std::string& name) const { return (folder / name).string(); }
   static long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
 
-  host_tools_test::TemporaryFolder folder;
   std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
   FakeBus bus;
-  std::string output, said, opened;
+  std::string opened;
 };
 
 TEST_F(RecordCommand, OverCanItStartsTheNodeRecordsAndPutsItBack) {

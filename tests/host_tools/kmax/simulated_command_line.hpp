@@ -1,62 +1,16 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "host_tools/device/open_link.hpp"
-#include "host_tools/kmax/command_line.hpp"
-#include "host_tools/kmax/context.hpp"
-#include "tests/host_tools/temporary_folder.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli {
 
 /// The whole program in process, with the links that it really has.
-class SimulatedCommandLine : public testing::Test {
+class SimulatedCommandLine : public CommandLineFixture {
  protected:
-  int kmax(std::vector<std::string> arguments) {
-    return kmax(std::move(arguments), [](const std::string& address, const link::Notice& notice) {
-      return link::open_link(link::parse_device_address(address), notice);
-    });
+  std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) override {
+    return link::open_link(link::parse_device_address(address), notice);
   }
-  /// With what `open` gives, whatever the address.
-  template <typename Open>
-  int kmax(std::vector<std::string> arguments, const Open& open) {
-    std::ostringstream out, messages;
-    Context context(out, messages, open);
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
-  }
-
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
-  }
-  std::vector<std::string> keys() {
-    std::vector<std::string> found;
-    const Json all = document();
-    for (const auto& item : all.items()) found.push_back(item.key());
-    return found;
-  }
-  /// The same with --json must end alike, with the message as a document.
-  void expect_error(std::vector<std::string> arguments, int code, const std::string& part) {
-    EXPECT_EQ(kmax(arguments), code) << said;
-    EXPECT_CONTAINS(said, part);
-    EXPECT_EQ(output, "");
-    arguments.push_back("--json");
-    EXPECT_EQ(kmax(arguments), code);
-    EXPECT_CONTAINS(document()["error"].get<std::string>(), part);
-  }
-  std::string in(const std::string& name) const { return (folder / name).string(); }
-
-  host_tools_test::TemporaryFolder folder;
-  std::string output, said;
 };
 
 }  // namespace kmax::cli

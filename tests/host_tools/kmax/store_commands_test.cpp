@@ -3,72 +3,16 @@
 
 #include <sstream>
 
-#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/kmax/command_line.hpp"
-#include "tests/host_tools/thrown_message.hpp"
+#include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::store_commands_test {
 namespace {
 using firmware::DriveState;
 
-/// A wire to a device that stays; it can lose answers, and the device can lose words.
-class Wire final : public link::RegisterLink {
- public:
-  enum class Loss { none, request, reply };
-
-  explicit Wire(std::shared_ptr<link::SimLink> device, Loss loss, int lost_write)
-      : device_(std::move(device)), loss_(loss), lost_write_(lost_write) {}
-
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return device_->read_holding(address, count);
-  }
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return device_->read_input(address, count);
-  }
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-    const bool lost = ++writes_ == lost_write_;
-    if (!lost || loss_ == Loss::reply) device_->write_holding(address, values);
-    if (!lost) return;
-    device_->wait(std::chrono::milliseconds(500));
-    throw link::LinkError("no answer");
-  }
-  void follow_serial_settings(std::optional<std::uint8_t> unit, std::optional<std::uint32_t> baud) override {
-    device_->follow_serial_settings(unit, baud);
-  }
-  std::chrono::microseconds now() const override { return device_->now(); }
-  void wait(std::chrono::microseconds duration) override { device_->wait(duration); }
-  std::string description() const override { return "wire"; }
-
- private:
-  std::shared_ptr<link::SimLink> device_;
-  Loss loss_;
-  int lost_write_, writes_ = 0;
-};
-
-class StoreCommands : public testing::Test {
+class StoreCommands : public WiredCommandLine {
  protected:
-  int kmax(std::vector<std::string> arguments) {
-    std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
-      return std::make_unique<Wire>(device, loss, lost_write);
-    });
-    arguments.insert(arguments.end(), {"--device", "serial:/dev/wire"});
-    const int code = run(std::move(arguments), context);
-    output = out.str();
-    said = messages.str();
-    return code;
-  }
-  Json document() {
-    Json parsed = Json::parse(output, nullptr, false);
-    EXPECT_FALSE(parsed.is_discarded()) << output;
-    return parsed;
-  }
   firmware::Application& application() { return device->simulation().board().application(); }
-
-  std::shared_ptr<link::SimLink> device = std::make_shared<link::SimLink>(simulated_board::factory_scene());
-  Wire::Loss loss = Wire::Loss::none;
-  int lost_write = 0;
-  std::string output, said;
 };
 
 const std::string all = std::to_string(firmware::persistent_count);
@@ -150,24 +94,25 @@ TEST_F(StoreCommands, DefaultsOfTheLinkAreFollowed) {
 }
 
 TEST_F(StoreCommands, ALostRequestIsRepeatedAndALostAnswerIsNot) {
-  lost_write = 1;
-  loss = Wire::Loss::request;
+  first_lost_write = last_lost_write = 1;
+  loss = Loss::request;
   ASSERT_EQ(kmax({"save", "--json"}), done) << said;
   EXPECT_EQ(document()["record"], 1);
-  lost_write = 0;
+  first_lost_write = last_lost_write = 0;
   ASSERT_EQ(kmax({"set", "wall.stiffness=110"}), done);
-  lost_write = 1;
-  loss = Wire::Loss::reply;
+  first_lost_write = last_lost_write = 1;
+  loss = Loss::reply;
   ASSERT_EQ(kmax({"save", "--json"}), done) << said;
   EXPECT_EQ(document()["record"], 2);
-  lost_write = 0;
+  first_lost_write = last_lost_write = 0;
   ASSERT_EQ(kmax({"set", "wall.stiffness=111"}), done);
-  lost_write = 1;
+  first_lost_write = last_lost_write = 1;
   ASSERT_EQ(kmax({"defaults"}), done) << "the values show that it was carried out: " << said;
   EXPECT_CONTAINS(output, "wall.stiffness = 1000 N/m (was 111)");
-  loss = Wire::Loss::none;
+  first_lost_write = last_lost_write = 0;
   ASSERT_EQ(kmax({"set", "wall.stiffness=111"}), done);
-  loss = Wire::Loss::request;
+  first_lost_write = last_lost_write = 1;
+  loss = Loss::request;
   EXPECT_EQ(kmax({"defaults"}), failed);
   EXPECT_CONTAINS(said, "wall.stiffness is 111 N/m instead of its default");
 }
