@@ -6,7 +6,7 @@
 #include "drivers/drv8301_registers.hpp"
 #include "drivers/spi_chip.hpp"
 
-// DRV8301 gate driver over SPI: presence, configuration, status. DRV8301 data sheet, sections SPI
+// DRV8301 gate driver over SPI: presence and configuration. DRV8301 data sheet, sections SPI
 // communication and Register maps.
 //
 // Not here: EN_GATE and nFAULT, which belong to the board. The chip answers from 10 ms after EN_GATE has
@@ -14,19 +14,12 @@
 // is low.
 //
 // Every reply carries the address that was asked for, and every one is checked: a chip that is not powered, a
-// line that is stuck, a frame that slipped are named, never taken for data. Status 1 without faults looks
-// like a line that is stuck low except for its zeros in all the other places too, so it is believed only
-// together with the device number in status 2.
+// line that is stuck, a frame that slipped are named, never taken for data.
 //
 // Writes get lost: the vendor's firmware writes control 1 five times over. Here each is read back and
 // repeated, five times at most, and what does not stick is an error.
 //
-// A supply that fails for a moment resets the registers to the chip's defaults, with over-current set to
-// limiting, and nothing more to be seen than a short nFAULT: read_status() compares both control registers
-// too.
-//
-// Contexts: main loop. Cost: configure() 10 frames when nothing is lost, 50 at most; read_status() 5 frames:
-// 40 us at 2.6 MHz.
+// Contexts: main loop. Cost: configure() 10 frames when nothing is lost, 50 at most, of 8 us at 2.6 MHz.
 
 namespace kmax::drivers {
 
@@ -40,40 +33,6 @@ enum class Drv8301Result : std::uint8_t {
   wrong_device,        ///< it answers with another device number than 1
   control_1_not_kept,  ///< written five times, never read back as written
   control_2_not_kept,
-  configuration_lost,  ///< read_status(): the control registers are not what configure() left
-};
-
-constexpr const char* drv8301_result_text(Drv8301Result result) {
-  switch (result) {
-    case Drv8301Result::ok:
-      return "ok";
-    case Drv8301Result::bad_configuration:
-      return "over-current code above 31";
-    case Drv8301Result::bus_time_out:
-      return "a frame on the bus did not end";
-    case Drv8301Result::stuck_high:
-      return "the reply is all ones: no chip, no supply or EN_GATE low";
-    case Drv8301Result::stuck_low:
-      return "the reply is all zeros: line stuck low";
-    case Drv8301Result::wrong_address:
-      return "the reply names another register";
-    case Drv8301Result::wrong_device:
-      return "the device number is not that of a DRV8301";
-    case Drv8301Result::control_1_not_kept:
-      return "control register 1 does not keep what is written";
-    case Drv8301Result::control_2_not_kept:
-      return "control register 2 does not keep what is written";
-    case Drv8301Result::configuration_lost:
-      return "the control registers have lost their settings";
-  }
-  return "?";
-}
-
-struct Drv8301Status {
-  Drv8301Result result = Drv8301Result::ok;
-  Drv8301Faults faults{};  ///< means something unless result is an error of the bus or the reply
-
-  friend constexpr bool operator==(const Drv8301Status&, const Drv8301Status&) = default;
 };
 
 template <SpiChip Chip>
@@ -97,7 +56,6 @@ class Drv8301 {
     if (config.over_current_code >= drv8301::over_current_millivolts.size())
       return Drv8301Result::bad_configuration;
     config_ = config;
-    calibrating_ = false;
     Drv8301Result result = probe();
     for (unsigned attempt = 1; attempt < attempts && result != Drv8301Result::ok; ++attempt) result = probe();
     if (result != Drv8301Result::ok) return result;
@@ -113,39 +71,6 @@ class Drv8301 {
     return result;
   }
 
-  /// Shorts the inputs of both shunt amplifiers (true), or measures again.
-  Drv8301Result set_offset_calibration(bool active) {
-    calibrating_ = active;
-    return keep(Drv8301Register::control_2, control_2(), Drv8301Result::control_2_not_kept);
-  }
-
-  /// After configure(). Reading clears the flags in the chip, except FAULT, but not nFAULT: what is returned
-  /// here is not returned again.
-  Drv8301Status read_status() {
-    constexpr Drv8301Register order[] = {Drv8301Register::status_1, Drv8301Register::status_2,
-                                         Drv8301Register::control_1, Drv8301Register::control_2};
-    std::uint16_t data[4] = {};
-    // Each frame fetches the reply to the one before; the last asks again for what can be read without
-    // effect.
-    std::optional<std::uint16_t> word = exchange_selected(chip_, drv8301::read_word(order[0]));
-    Drv8301Result result = word ? Drv8301Result::ok : Drv8301Result::bus_time_out;
-    for (unsigned i = 0; i < 4; ++i) {
-      word = exchange_selected(chip_, drv8301::read_word(order[i < 3 ? i + 1 : i]));
-      const Reply reply = decode(order[i], word);
-      data[i] = reply.data;
-      if (result == Drv8301Result::ok) result = reply.result;
-    }
-    if (result != Drv8301Result::ok) return {result, {}};
-    if ((data[1] & drv8301::status_2_device_mask) != drv8301::device_id) {
-      return {data[1] == 0 && data[0] == 0 ? Drv8301Result::stuck_low : Drv8301Result::wrong_device, {}};
-    }
-    const bool kept = data[2] == control_1() && data[3] == control_2();
-    return {kept ? Drv8301Result::ok : Drv8301Result::configuration_lost, drv8301_faults(data[0], data[1])};
-  }
-
-  /// Writes that had to be repeated since the start.
-  std::uint32_t repeated_writes() const { return repeated_writes_; }
-
  private:
   struct Reply {
     Drv8301Result result = Drv8301Result::ok;
@@ -153,12 +78,12 @@ class Drv8301 {
   };
 
   std::uint16_t control_1() const { return drv8301_control_1(config_); }
-  std::uint16_t control_2() const { return drv8301_control_2(config_, calibrating_); }
+  std::uint16_t control_2() const { return drv8301_control_2(config_); }
 
   static Reply decode(Drv8301Register asked, std::optional<std::uint16_t> word) {
     if (!word) return {Drv8301Result::bus_time_out, 0};
     if (*word == 0xFFFF) return {Drv8301Result::stuck_high, 0};
-    if (*word == 0 && asked != Drv8301Register::status_1) return {Drv8301Result::stuck_low, 0};
+    if (*word == 0) return {Drv8301Result::stuck_low, 0};
     if (drv8301::address_of(*word) != static_cast<unsigned>(asked)) return {Drv8301Result::wrong_address, 0};
     return {Drv8301Result::ok, static_cast<std::uint16_t>(*word & drv8301::data_mask)};
   }
@@ -174,7 +99,6 @@ class Drv8301 {
   Drv8301Result keep(Drv8301Register address, std::uint16_t data, Drv8301Result not_kept) {
     Drv8301Result last = not_kept;
     for (unsigned attempt = 0; attempt < attempts; ++attempt) {
-      if (attempt != 0) ++repeated_writes_;
       if (!exchange_selected(chip_, drv8301::write_word(address, data))) return Drv8301Result::bus_time_out;
       const Reply reply = read(address);
       if (reply.result == Drv8301Result::bus_time_out) return reply.result;
@@ -186,8 +110,6 @@ class Drv8301 {
 
   Chip& chip_;
   Drv8301Config config_{};
-  bool calibrating_ = false;
-  std::uint32_t repeated_writes_ = 0;
 };
 
 }  // namespace kmax::drivers

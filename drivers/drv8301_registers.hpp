@@ -86,43 +86,6 @@ enum class Drv8301Fault : std::uint16_t {
   gate_supply_over_voltage = 1U << 11,  // GVDD_OV; only a full reset by EN_GATE takes it back
 };
 
-/// A set of faults.
-struct Drv8301Faults {
-  std::uint16_t bits = 0;
-
-  constexpr bool has(Drv8301Fault fault) const { return (bits & static_cast<std::uint16_t>(fault)) != 0; }
-  constexpr bool any() const { return bits != 0; }
-  friend constexpr bool operator==(const Drv8301Faults&, const Drv8301Faults&) = default;
-};
-
-constexpr Drv8301Faults drv8301_faults(std::uint16_t status_1, std::uint16_t status_2) {
-  const bool over_voltage = (status_2 & drv8301::status_2_gate_supply_over_voltage) != 0;
-  return {static_cast<std::uint16_t>(
-      (status_1 & drv8301::data_mask) |
-      (over_voltage ? static_cast<unsigned>(Drv8301Fault::gate_supply_over_voltage) : 0U))};
-}
-
-struct Drv8301FaultText {
-  Drv8301Fault fault;
-  const char* name;  ///< as in the data sheet
-  const char* text;
-};
-/// Worst first: the first of these that is set is the one to show when there is room for one.
-inline constexpr std::array<Drv8301FaultText, 12> drv8301_fault_texts{{
-    {Drv8301Fault::over_current_a_high, "FETHA_OC", "over-current in the high side of phase A"},
-    {Drv8301Fault::over_current_a_low, "FETLA_OC", "over-current in the low side of phase A"},
-    {Drv8301Fault::over_current_b_high, "FETHB_OC", "over-current in the high side of phase B"},
-    {Drv8301Fault::over_current_b_low, "FETLB_OC", "over-current in the low side of phase B"},
-    {Drv8301Fault::over_current_c_high, "FETHC_OC", "over-current in the high side of phase C"},
-    {Drv8301Fault::over_current_c_low, "FETLC_OC", "over-current in the low side of phase C"},
-    {Drv8301Fault::over_temperature, "OTSD", "gate driver too hot, shut down"},
-    {Drv8301Fault::gate_supply_over_voltage, "GVDD_OV", "gate supply above 16 V; needs a full reset"},
-    {Drv8301Fault::supply_under_voltage, "PVDD_UV", "motor supply too low for the gate driver"},
-    {Drv8301Fault::gate_supply_under_voltage, "GVDD_UV", "gate supply too low"},
-    {Drv8301Fault::over_temperature_warning, "OTW", "gate driver is getting too hot"},
-    {Drv8301Fault::fault, "FAULT", "gate driver has switched the gates off"},
-}};
-
 enum class Drv8301GateCurrent : std::uint8_t { a1_7, a0_7, a0_25 };
 
 /// What the chip does when a FET carries too much. `report_only` and `limit` do not pull nFAULT: without the
@@ -144,13 +107,10 @@ constexpr std::uint16_t drv8301_control_1(const Drv8301Config& config) {
       (config.three_inputs ? drv8301::three_inputs : 0U) |
       static_cast<unsigned>(config.gate_current) << drv8301::gate_current_position);
 }
-/// DC_CAL shorts the inputs of both shunt amplifiers: what they then give is their offset.
-constexpr std::uint16_t drv8301_control_2(const Drv8301Config& config, bool calibrate) {
-  return static_cast<std::uint16_t>(
-      static_cast<unsigned>(config.gain) << drv8301::gain_position |
-      (calibrate ? drv8301::calibrate_channel_1 | drv8301::calibrate_channel_2 : 0U));
+constexpr std::uint16_t drv8301_control_2(const Drv8301Config& config) {
+  return static_cast<std::uint16_t>(static_cast<unsigned>(config.gain) << drv8301::gain_position);
 }
 static_assert(drv8301_control_1({}) == 0x550);
-static_assert(drv8301_control_2({}, false) == 0x008);
+static_assert(drv8301_control_2({}) == 0x008);
 
 }  // namespace kmax::drivers

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -20,12 +19,6 @@
 //
 // Sending: `transmit` takes a view of bytes that must stay unchanged until `transmission_complete`, which
 // comes with TC: the last stop bit has left the pin, and not merely the data register (TXE).
-//
-// RS-485: given a driver-enable pin (anything with `write(bool)`, such as a GpioPin), the port switches the
-// line driver on in `transmit`, before the first start bit, and off in the interrupt of TC, so the line is
-// released within the latency of that interrupt. `transmit` does not wait for the transceiver; the interrupt
-// that follows gives it some 0.3 us, and the first edge is late by what is missing. A transceiver whose
-// receiver stays on hears itself. Without a pin all this costs neither memory nor an instruction.
 //
 // Contexts: `ISR_serve` in the USART interrupt; `transmit`, `transmitting` in one lower context. CR1 has two
 // writers, but never at once: `transmit` touches it only while nothing is being sent, `ISR_serve` only while
@@ -66,11 +59,6 @@ constexpr UsartDivisor usart_divisor(std::uint32_t kernel_clock_hz, std::uint32_
   return {value, error, usable};
 }
 
-/// A port that needs no driver-enable line: a point-to-point link.
-struct NoDriverEnable {
-  static constexpr void write(bool) {}
-};
-
 struct UsartEvent {
   bool received = false;
   std::uint8_t byte = 0;
@@ -78,14 +66,10 @@ struct UsartEvent {
   bool transmission_complete = false;
 };
 
-template <typename Registers = UsartRegisters, typename DriverEnable = NoDriverEnable>
+template <typename Registers = UsartRegisters>
 class Usart {
  public:
-  /// `driver_enable` high lets the transceiver drive the line; its pin is configured elsewhere, low at first.
-  constexpr Usart(Registers& registers, DriverEnable driver_enable)
-      : registers_(registers), driver_enable_(driver_enable) {}
-  explicit constexpr Usart(Registers& registers) requires std::same_as<DriverEnable, NoDriverEnable>
-      : registers_(registers) {}
+  explicit constexpr Usart(Registers& registers) : registers_(registers) {}
 
   /// Sets the line up and starts receiving; drops whatever was being sent. False, and nothing touched, when
   /// the baud rate cannot be had from this clock.
@@ -94,7 +78,6 @@ class Usart {
     if (!divisor.usable) return false;
 
     registers_.cr1 = 0;
-    driver_enable_.write(false);
     remaining_ = 0;
     transmitting_.store(false, std::memory_order_relaxed);
     registers_.brr = divisor.value;
@@ -115,8 +98,6 @@ class Usart {
     if (bytes.empty() || transmitting()) return false;
     next_ = bytes.data();
     remaining_ = bytes.size();
-    // Before `transmitting`: an interrupt pended by software sends the first byte as soon as it sees that.
-    driver_enable_.write(true);
     transmitting_.store(true, std::memory_order_release);
     usart_cr1::TransmitEmptyInterrupt::set(registers_.cr1);
     return true;
@@ -159,13 +140,11 @@ class Usart {
     }
     if ((status & usart_sr::TransmissionComplete::mask) == 0) return false;
     usart_cr1::TransmissionCompleteInterrupt::clear(registers_.cr1);
-    driver_enable_.write(false);
     transmitting_.store(false, std::memory_order_release);
     return true;
   }
 
   Registers& registers_;
-  [[no_unique_address]] DriverEnable driver_enable_;
   const std::uint8_t* next_ = nullptr;
   std::size_t remaining_ = 0;
   std::atomic<bool> transmitting_{false};

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <optional>
-
 #include "tests/drivers/fake_timer.hpp"
 
 namespace kmax::drivers::stm32f4::quadrature_timer_test {
@@ -46,61 +43,13 @@ TEST(QuadratureTimer, ThirtyTwoBitTimerUsesItsWholeRange) {
   EXPECT_EQ(encoder.count(), 0x8000'0000U);
 }
 
-TEST(QuadratureTimer, CaptureChannels) {
-  TimerRegisters timer{};
-  QuadratureTimer<> encoder{timer};
-  ASSERT_TRUE(encoder.configure({.input_filter = 15, .index_capture = IndexCapture{}}));
-  EXPECT_EQ(timer.ccmr[1], 0xF100U);
-  EXPECT_EQ(timer.ccer, 1U << 12);
-  ASSERT_TRUE(encoder.configure(
-      {.reversed = true, .index_capture = IndexCapture{.channel = 3, .falling_edge = true}}));
-  EXPECT_EQ(timer.ccmr[1], 0x0041U);
-  EXPECT_EQ(timer.ccer, 3U << 8 | 2U);
-}
-
 TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   FakeTimer timer;
   QuadratureTimer<FakeTimer> encoder{timer};
   EXPECT_FALSE(encoder.configure({.input_filter = 16}));
-  for (const int number : {0, 1, 2, 5}) {
-    const auto channel = static_cast<std::uint8_t>(number);
-    EXPECT_FALSE(encoder.configure({.index_capture = IndexCapture{.channel = channel}})) << number;
-  }
   EXPECT_TRUE(timer.cr1.writes.empty());
   EXPECT_TRUE(timer.ccer.writes.empty());
   EXPECT_TRUE(timer.smcr.writes.empty());
-}
-
-TEST(QuadratureTimer, SampledIndexIsHandedOutOnce) {
-  TimerRegisters timer{};
-  QuadratureTimer<> encoder{timer};
-  ASSERT_TRUE(encoder.configure({}));
-  EXPECT_EQ(encoder.take_index(), std::nullopt);
-  timer.cnt = 0;
-  encoder.ISR_sample_index();
-  timer.cnt = 5;
-  EXPECT_EQ(encoder.take_index(), 0) << "a count of 0 is an index too";
-  EXPECT_EQ(encoder.take_index(), std::nullopt);
-  encoder.ISR_sample_index();
-  timer.cnt = 6;
-  encoder.ISR_sample_index();
-  EXPECT_EQ(encoder.take_index(), 6) << "the later of two";
-  EXPECT_EQ(encoder.take_index(), std::nullopt);
-  encoder.ISR_sample_index();
-  ASSERT_TRUE(encoder.configure({}));
-  EXPECT_EQ(encoder.take_index(), std::nullopt) << "an index from before the start";
-}
-
-TEST(QuadratureTimer, CaptureIsReadOnlyWhenItsFlagIsUp) {
-  FakeTimer timer;
-  QuadratureTimer<FakeTimer> encoder{timer};
-  ASSERT_TRUE(encoder.configure({.index_capture = IndexCapture{}}));
-  timer.ccr[3].value = 777;
-  timer.sr.value = 1U << 3 | 1U << 12;  // another channel's, and a stale overcapture
-  EXPECT_EQ(encoder.take_index(), std::nullopt);
-  EXPECT_EQ(timer.ccr[3].reads, 0U) << "a read would clear the flag of an edge that comes in between";
-  timer.sr.value |= 1U << 4;
-  EXPECT_EQ(encoder.take_index(), 777);
 }
 
 // RM0090, TIMx_CCMR1, IC1F: sampling divider and number of samples.

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <optional>
 #include <vector>
 
 #include "control/count_extender.hpp"
@@ -14,7 +13,6 @@
 namespace kmax::virtual_board::quadrature_timer_on_model_test {
 namespace {
 
-using drivers::stm32f4::IndexCapture;
 using drivers::stm32f4::QuadratureTimer;
 using testing::RecordedInterrupts;
 using testing::TimerOnModel;
@@ -68,50 +66,10 @@ TEST(QuadratureTimerOnModel, ConfiguredAgainItStartsAtZero) {
   Bench bench;
   ASSERT_TRUE(bench.encoder.configure({}));
   bench.model.set_encoder_count(-300);
-  ASSERT_TRUE(bench.encoder.configure({.index_capture = IndexCapture{}}));
+  ASSERT_TRUE(bench.encoder.configure({}));
   EXPECT_EQ(bench.encoder.count(), 0);
   bench.model.set_encoder_count(-299);
   EXPECT_EQ(bench.encoder.count(), 1);
-}
-
-TEST(QuadratureTimerOnModel, HardwareCapturesTheIndex) {
-  Bench bench;
-  ASSERT_TRUE(bench.encoder.configure({.index_capture = IndexCapture{}}));
-  EXPECT_EQ(bench.encoder.take_index(), std::nullopt);
-  bench.model.set_encoder_count(500);
-  bench.model.capture_edge(4, true, bench.now);
-  bench.model.set_encoder_count(540);
-  EXPECT_EQ(bench.encoder.take_index(), 500);
-  EXPECT_EQ(bench.encoder.take_index(), std::nullopt) << "once for each edge";
-  bench.model.capture_edge(4, false, bench.now);
-  EXPECT_EQ(bench.encoder.take_index(), std::nullopt);
-  bench.model.capture_edge(4, true, bench.now);
-  bench.model.set_encoder_count(600);
-  bench.model.capture_edge(4, true, bench.now);
-  EXPECT_EQ(bench.encoder.take_index(), 600) << "two edges: the later";
-  EXPECT_EQ(bench.encoder.take_index(), std::nullopt) << "and no more after an overcapture";
-  bench.model.capture_edge(4, true, bench.now);
-  EXPECT_EQ(bench.encoder.take_index(), 600);
-}
-
-TEST(QuadratureTimerOnModel, FallingIndexOnChannel3) {
-  Bench bench;
-  ASSERT_TRUE(bench.encoder.configure({.index_capture = IndexCapture{.channel = 3, .falling_edge = true}}));
-  bench.model.capture_edge(4, false, bench.now);
-  bench.model.capture_edge(3, true, bench.now);
-  EXPECT_EQ(bench.encoder.take_index(), std::nullopt);
-  bench.model.set_encoder_count(-2);
-  bench.model.capture_edge(3, false, bench.now);
-  EXPECT_EQ(bench.encoder.take_index(), 65534);
-}
-
-TEST(QuadratureTimerOnModel, SamplingTakesThePresentCount) {
-  Bench bench;
-  ASSERT_TRUE(bench.encoder.configure({}));
-  bench.model.set_encoder_count(321);
-  bench.encoder.ISR_sample_index();
-  bench.model.set_encoder_count(400);
-  EXPECT_EQ(bench.encoder.take_index(), 321);
 }
 
 }  // namespace

@@ -27,12 +27,6 @@ struct UsartOnModel {
   TimedRegister sr, dr, brr, cr1, cr2, cr3;
 };
 
-struct DriverEnable {
-  std::vector<std::pair<bool, BoardTime>>* changes;
-  const BoardTime* now;
-  void write(bool level) { changes->emplace_back(level, *now); }
-};
-
 /// The port with a processor that takes its interrupt 2 us after it was raised.
 struct Port {
   BoardClocks clocks;
@@ -43,8 +37,7 @@ struct Port {
       {bus, model, offsetof(stm32::UsartRegisters, sr)},  {bus, model, offsetof(stm32::UsartRegisters, dr)},
       {bus, model, offsetof(stm32::UsartRegisters, brr)}, {bus, model, offsetof(stm32::UsartRegisters, cr1)},
       {bus, model, offsetof(stm32::UsartRegisters, cr2)}, {bus, model, offsetof(stm32::UsartRegisters, cr3)}};
-  std::vector<std::pair<bool, BoardTime>> driver_enable;
-  stm32::Usart<UsartOnModel, DriverEnable> usart{registers, DriverEnable{&driver_enable, &bus.now}};
+  stm32::Usart<UsartOnModel> usart{registers};
   std::vector<std::uint8_t> sent;
   std::vector<BoardTime> start_bits;
   BoardTime last_stop_bit = 0;
@@ -98,20 +91,6 @@ TEST(UsartOnModel, RoundTripOf256BytesInBothDirectionsAtOnce) {
   EXPECT_FALSE(port.lines.level(Interrupt::uart4));
   // 256 frames of 11 bits without a gap.
   EXPECT_EQ(port.last_stop_bit - port.start_bits.front(), 256 * 11 * bit_at_115200);
-}
-
-TEST(UsartOnModel, DriverEnableWrapsTheTransmission) {
-  Port port;
-  const std::array<std::uint8_t, 5> bytes{1, 2, 3, 4, 5};
-  port.run(50 * bit_at_115200);
-  ASSERT_TRUE(port.usart.transmit(bytes));
-  port.run(100 * bit_at_115200);
-  ASSERT_EQ(port.driver_enable.size(), 3U);
-  EXPECT_TRUE(port.driver_enable[1].first);
-  EXPECT_LE(port.driver_enable[1].second, port.start_bits.front());
-  EXPECT_FALSE(port.driver_enable[2].first);
-  EXPECT_GE(port.driver_enable[2].second, port.last_stop_bit);
-  EXPECT_LE(port.driver_enable[2].second - port.last_stop_bit, 3 * units_per_microsecond);
 }
 
 TEST(UsartOnModel, ErrorsOnTheLineReachTheirByte) {
