@@ -115,12 +115,12 @@ TEST_F(BusFaults, ABabblingNodeTakesTheWholeBus) {
 TEST_F(BusFaults, SegmentsAreLostAndRepeated) {
   std::vector<std::uint8_t> bytes(2000);
   for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(i * 7);
-  bench.sdo.download({0x3022, 1}, bytes, true);
+  bench.sdo.download({0x5822, 1}, bytes, true);
   // Destroyed frames are repeated by the controllers; nobody above notices.
   for (const std::uint64_t every : {1, 3, 7}) {
     bench.board->can_bus().destroy_frames_of(nullptr);
     bench.board->can_bus().destroy_frames(every, CanOutcome::crc_error);
-    EXPECT_EQ(bench.sdo.upload({0x3022, 1}, bytes.size()), bytes);
+    EXPECT_EQ(bench.sdo.upload({0x5822, 1}, bytes.size()), bytes);
   }
   expect_no_tick_missed();
 }

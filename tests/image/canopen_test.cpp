@@ -26,11 +26,11 @@ TEST(CanOpen, BootsUpAndAnswersTransfersOfEveryKind) {
   EXPECT_EQ(boot_up->frame.data[0], 0);
   EXPECT_EQ(bench.number(0x1000, 0), firmware::device_type_of_several_axes);
   for (const std::size_t size : {1, 7, 8, 889, 890, 2000}) {
-    bench.sdo.download({0x3022, 1}, pattern(size), true);
-    EXPECT_EQ(bench.sdo.upload({0x3022, 1}, size), pattern(size)) << size;
-    EXPECT_EQ(bench.sdo.upload({0x3022, 1}, 0), pattern(size)) << size << " segmented";
+    bench.sdo.download({0x5822, 1}, pattern(size), true);
+    EXPECT_EQ(bench.sdo.upload({0x5822, 1}, size), pattern(size)) << size;
+    EXPECT_EQ(bench.sdo.upload({0x5822, 1}, 0), pattern(size)) << size << " segmented";
   }
-  EXPECT_EQ(bench.number(0x3012, 10), 0U) << "a tick was missed";
+  EXPECT_EQ(bench.number(0x5812, 10), 0U) << "a tick was missed";
 }
 
 TEST(CanOpen, ArmedOverTheBusAnAxisMakesForceAndNmtStopTakesIt) {
@@ -122,7 +122,7 @@ TEST(CanOpen, PdosTellOfOneTickAndOfRegularOnes) {
     bench.board->run_for(0.005123);
   }
   // A reading, and one that takes long: it compares every parameter with what is kept.
-  for (const auto& object : {firmware::canopen::ObjectAddress{0x2012, 4}, {0x3017, 1}}) {
+  for (const auto& object : {firmware::canopen::ObjectAddress{0x2012, 4}, {0x5817, 1}}) {
     BusyClient client(*bench.board, object);
     for (int phase = 0; phase < 10; ++phase) {
       listen(0.1, "beside reads of " + std::to_string(object.index) + " at phase " + std::to_string(phase));

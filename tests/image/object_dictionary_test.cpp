@@ -71,7 +71,7 @@ std::string place(const DescribedObject& object) {
 
 /// Whether writing its own value to it does something, or is refused for more than the object itself.
 bool acts(const DescribedObject& object) {
-  static const std::set<std::uint16_t> indices{0x1003, 0x1010, 0x1011, 0x3010, 0x3016, 0x301A};
+  static const std::set<std::uint16_t> indices{0x1003, 0x1010, 0x1011, 0x5810, 0x5816, 0x581A};
   return indices.count(object.index) != 0;
 }
 
@@ -83,7 +83,7 @@ TEST_F(Dictionary, EveryObjectReadsAsTheEdsSays) {
       EXPECT_EQ(abort_of_reading(object.index, object.subindex), Abort::no_subindex) << place(object);
       continue;
     }
-    if (object.index == 0x3021 && object.subindex > 0) {
+    if (object.index == 0x5821 && object.subindex > 0) {
       EXPECT_EQ(abort_of_reading(object.index, object.subindex), Abort::device_state);
       continue;
     }
@@ -104,7 +104,7 @@ TEST_F(Dictionary, EveryObjectReadsAsTheEdsSays) {
 TEST_F(Dictionary, EveryObjectIsWrittenAsTheEdsSays) {
   std::size_t writable = 0, fixed = 0;
   for (const DescribedObject& object : description::described_objects()) {
-    if (acts(object) || (object.index == 0x3021 && object.subindex > 0)) continue;
+    if (acts(object) || (object.index == 0x5821 && object.subindex > 0)) continue;
     const auto bytes = read(object);
     const Abort abort =
         abort_of(object.index, object.subindex, bytes.empty() ? std::vector<std::uint8_t>{1} : bytes);
@@ -136,7 +136,7 @@ TEST_F(Dictionary, NothingIsThereThatTheEdsDoesNotName) {
 
 TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   // Toggle: the second segment again.
-  sdo.download({0x3022, 1}, std::vector<std::uint8_t>(30, 7), true);
+  sdo.download({0x5822, 1}, std::vector<std::uint8_t>(30, 7), true);
   answer_to({0x40, 0x22, 0x30, 1});
   answer_to({0x60});
   EXPECT_EQ(abort_in(answer_to({0x60})), Abort::toggle);
@@ -191,10 +191,10 @@ TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   EXPECT_EQ(abort_of(0x1005, 0, {0x80, 0, 0, 0x40}), Abort::value_range) << "it does not generate SYNC";
   EXPECT_EQ(abort_of(0x1800, 1, {0x81, 0x01, 0, 0x20}), Abort::value_range) << "29 bits";
   // A transaction that another host has open.
-  EXPECT_EQ(abort_of(0x3010, 1, {1, 0}), Abort::none);
-  EXPECT_EQ(abort_of(0x3010, 1, {1, 0}), Abort::local_control);
-  EXPECT_EQ(abort_of(0x3010, 1, {0, 0}), Abort::none);
-  EXPECT_EQ(abort_of(0x301A, 1, {1}), Abort::incompatible_inside) << "no channel is chosen";
+  EXPECT_EQ(abort_of(0x5810, 1, {1, 0}), Abort::none);
+  EXPECT_EQ(abort_of(0x5810, 1, {1, 0}), Abort::local_control);
+  EXPECT_EQ(abort_of(0x5810, 1, {0, 0}), Abort::none);
+  EXPECT_EQ(abort_of(0x581A, 1, {1}), Abort::incompatible_inside) << "no channel is chosen";
   // And after all that.
   EXPECT_EQ(number_in(sdo.upload({0x1000, 0})), firmware::device_type_of_several_axes);
 }

@@ -46,7 +46,7 @@ TEST(StoreText, TroublesHaveLinesOfTheirOwnAndNames) {
   status.migrated_dropped = 1;
   status.first_dropped = {0x2003'0905U};
   status.migrated_defaulted = 5;
-  status.first_defaulted = {0x2000'0405U, 0x2800'0405U, 0x3001'0105U};
+  status.first_defaulted = {0x2000'0405U, 0x2800'0405U, 0x5801'0105U};
   status.damaged_records = 1;
   status.write_errors = 2;
   status.state = StoreState::failed;

@@ -158,9 +158,9 @@ for (const size of [1, 7, 8, 889, 890, 2000]) {
     const kind = block ? 'block' : size > 4 ? 'segmented' : 'expedited';
     step(`SDO ${kind}, ${size} byte${size > 1 ? 's' : ''}`, async () => {
       const data = pattern(size, block ? size + 128 : size);
-      await write(0x3022, 1, data, block);
+      await write(0x5822, 1, data, block);
       for (const back of [block, !block]) {
-        const found = await read(0x3022, 1, back);
+        const found = await read(0x5822, 1, back);
         const differs = [...data].findIndex((byte, i) => found[i] !== byte);
         expect(found.equals(data), `${size} written, ${found.length} read ${back ? 'as a block' : 'in segments'}; ` +
                                    `the first that differs is ${differs}`);

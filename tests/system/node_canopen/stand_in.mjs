@@ -18,7 +18,7 @@ export function startStandIn(bus) {
   const position = value(0x6064, 'Position actual value', DataType.INTEGER32, -123456);
   const torque = value(0x6072, 'Max torque', DataType.UNSIGNED16, 1000);
   value(0x1017, 'Producer heartbeat time', DataType.UNSIGNED16, 0);
-  const scratch = eds.addEntry(0x3022, { parameterName: 'Scratch pad', objectType: ObjectType.RECORD });
+  const scratch = eds.addEntry(0x5822, { parameterName: 'Scratch pad', objectType: ObjectType.RECORD });
   scratch.addSubObject(1, { parameterName: 'Scratch pad', dataType: DataType.DOMAIN, accessType: 'rw' });
   const stays = { saveDefault: true }; // after a reset
   eds.addHeartbeatConsumer(125, 1000);
