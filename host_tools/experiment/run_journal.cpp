@@ -86,10 +86,10 @@ void RunJournal::read(const std::string& text, const Json& settings) {
     const Json line = Json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
                                   text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
     const auto wrong = [&] {
-      fail(fmt::format(
-          "line {} is not of a journal that this program has written; move the file away, or begin "
-          "without --resume",
-          number + 1));
+      fail(
+          fmt::format("line {} is not of a journal that this program has written; move the file away, or "
+                      "begin without --resume",
+                      number + 1));
     };
     if (number == 0) {
       const auto version = line.find("journal"), before = line.find("settings");
@@ -98,10 +98,10 @@ void RunJournal::read(const std::string& text, const Json& settings) {
         fail(fmt::format("the journal has format {}, this program's is {}; begin without --resume",
                          version->dump(), format_version));
       if (const std::string what = difference(*before, settings); !what.empty())
-        fail(fmt::format(
-            "the journal is of a run with other settings: {}; give the same as then to go on with "
-            "it, or begin without --resume",
-            what));
+        fail(
+            fmt::format("the journal is of a run with other settings: {}; give the same as then to go on "
+                        "with it, or begin without --resume",
+                        what));
     } else {
       const auto key = line.find("key"), value = line.find("value");
       const bool good = line.is_object() && key != line.end() && value != line.end() && key->is_string();

@@ -65,10 +65,9 @@ bool Standstill::cut_off(const std::exception& error, const std::string& touch) 
     return false;  // what ended the touch is what is to be told
   }
   if (notice_)
-    notice_(
-        fmt::format("{}: this touch is thrown away and made again, since this computer or the link stood "
-                    "still: {}",
-                    touch, why));
+    notice_(fmt::format(
+        "{}: this touch is thrown away and made again, since this computer or the link stood still: {}",
+        touch, why));
   return true;
 }
 

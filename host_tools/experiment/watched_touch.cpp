@@ -158,8 +158,7 @@ void require_sound(const TouchWatch& watch) {
   if (times && abort) return;
   throw std::invalid_argument(
       fmt::format("a touch held for {} s, waited for {} s, ended by {} m within {} s: all must be finite, "
-                  "the times above "
-                  "0, the amplitude 0 or above",
+                  "the times above 0, the amplitude 0 or above",
                   watch.hold_time, watch.contact_patience, watch.abort_amplitude, watch.abort_window));
 }
 

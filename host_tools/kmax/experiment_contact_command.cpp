@@ -48,10 +48,9 @@ experiment::ContactResult make_trial(device::Device& device, const experiment::C
                                      const experiment::TouchSession& session) {
   return experiment::repeated_touch<experiment::ContactResult>(session, condition.name, [&] {
     if (session.prompter != nullptr)
-      session.prompter->ask(
-          fmt::format("{}: take the handle out of the wall and be ready to press it against the wall for "
-                      "{:g} s",
-                      condition.name, settings.hold_time));
+      session.prompter->ask(fmt::format(
+          "{}: take the handle out of the wall and be ready to press it against the wall for {:g} s",
+          condition.name, settings.hold_time));
     return experiment::run_contact(device, condition, settings, session.tell);
   });
 }
@@ -149,8 +148,7 @@ void add_contact_experiment(CLI::App& experiment, Context& context) {
        "On a device you are told what to do: before each touch take the handle out of the wall and press "
        "Enter, then\n"
        "press against the wall until the time is over; a simulated person does so by itself. The axis is "
-       "disarmed after each trial and on Ctrl-C, and its parameters are put back "
-       "at the end.\n"
+       "disarmed after each trial and on Ctrl-C, and its parameters are put back at the end.\n"
        "A fast touch bounces by millimetres, which is no instability: approach at 0.2 m/s or so.\n"
        "Exit code 3: some condition did not come out as the paper says."});
   auto options = std::make_shared<ContactOptions>();

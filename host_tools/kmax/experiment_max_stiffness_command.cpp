@@ -68,10 +68,9 @@ Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
                        "People and device: a TOML file, 'clipped' or 'unclipped'; else as --clip says")
           ->type_name("FILE"),
       group
-          ->add_option(
-              "--clip", options.clip,
-              "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, "
-              "whose gamma was fitted to it; on, unless --subjects says otherwise")
+          ->add_option("--clip", options.clip,
+                       "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its "
+                       "own, whose gamma was fitted to it; on, unless --subjects says otherwise")
           ->check(CLI::IsMember({"on", "off", "both"})),
       group->add_option("--seed", options.seed,
                         "Draw other people with this seed; not fitted unless --calibrate"),
@@ -138,14 +137,11 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
        "Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each "
        "mode.\n"
        "Simulated people touch each stiffness at several speeds with several pushes. On a device you are "
-       "told what "
-       "to do:\n"
+       "told what to do:\n"
        "before each touch take the handle out of the wall and press Enter, then press against the wall until "
-       "the "
-       "time is\n"
+       "the time is\n"
        "over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on "
-       "Ctrl-C; "
-       "its\n"
+       "Ctrl-C; its\n"
        "parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from "
        "there.\n"
        "Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a "

@@ -113,11 +113,10 @@ report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<Ap
                                         needed.coefficient, n_per_mm(needed.mean));
   section.paragraphs.push_back(
       std::abs(needed.mean - printed) <= experiment::magnetic_tolerance
-          ? fmt::format(
-                "{}. Eq. 7 commands that much at an approach of {:.2f} m/s and falls back to 0.8 N at "
-                "rest: as the law is printed, {} N/mm needs touches that fast and a coefficient that "
-                "stays for the whole contact, which no mode but one with a very long hold has.",
-                given, needed.approach_speed, n_per_mm(printed))
+          ? fmt::format("{}. Eq. 7 commands that much at an approach of {:.2f} m/s and falls back to 0.8 N "
+                        "at rest: as the law is printed, {} N/mm needs touches that fast and a coefficient "
+                        "that stays for the whole contact, which no mode but one with a very long hold has.",
+                        given, needed.approach_speed, n_per_mm(printed))
           : fmt::format("{}, the nearest to {} N/mm that one between 0 and 4 N comes.", given,
                         n_per_mm(printed)));
   const ApproachResult& slowest = approaches.front();
@@ -128,15 +127,14 @@ report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<Ap
   section.paragraphs.push_back(
       slow_is_best
           ? fmt::format(
-                "The other way is to touch slowly only: at {:g} m/s alone the best mode reaches {} "
-                "N/mm, with a field of 0.8 N, because a slow touch hardly starts the oscillation. But "
-                "then the constant 2 N reaches {}, and the calibration no longer holds: the study "
-                "\"assumptions\" fits again to slow touches, in its rows on the approach speed.",
+                "The other way is to touch slowly only: at {:g} m/s alone the best mode reaches {} N/mm, "
+                "with a field of 0.8 N, because a slow touch hardly starts the oscillation. But then the "
+                "constant 2 N reaches {}, and the calibration no longer holds: the study \"assumptions\" "
+                "fits again to slow touches, in its rows on the approach speed.",
                 slowest.approach_speed, n_per_mm(best), n_per_mm(slowest.walls[0].mean))
-          : fmt::format(
-                "To touch slowly only is no way: at {:g} m/s alone the best mode reaches {} N/mm, and "
-                "no more than at a faster approach.",
-                slowest.approach_speed, n_per_mm(best)));
+          : fmt::format("To touch slowly only is no way: at {:g} m/s alone the best mode reaches {} N/mm, "
+                        "and no more than at a faster approach.",
+                        slowest.approach_speed, n_per_mm(best)));
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;
 }

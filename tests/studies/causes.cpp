@@ -81,9 +81,9 @@ report::Section cause_section(const std::vector<CausesOfSet>& results) {
   experiment::MarkedMeans marks;
   report::Section section{"The causes, one by one", {}, {}, {}};
   section.paragraphs.push_back(fmt::format(
-      "Adding a field of F_MC = 2 N changes four things: the hand stiffens, the field reaches out "
-      "in front of the wall, its force is a preload, and a force limit is met sooner. Each row "
-      "leaves only some of them; the columns are the force limit. The search begins at {:g} N/m.",
+      "Adding a field of F_MC = 2 N changes four things: the hand stiffens, the field reaches out in front "
+      "of the wall, its force is a preload, and a force limit is met sooner. Each row leaves only some of "
+      "them; the columns are the force limit. The search begins at {:g} N/m.",
       cause_first_stiffness));
   using Row = std::vector<std::string>;
   section.tables.push_back(cause_table(

@@ -95,9 +95,9 @@ std::vector<std::string> contact_words(const ContactSettings& settings, std::siz
   return {
       fmt::format("Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.",
                   settings.stiffness / 1000, settings.haptic_rate, settings.hold_time),
-      fmt::format("Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials "
-                  "counts.",
-                  settings.threshold * 1000, trials),
+      fmt::format(
+          "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.",
+          settings.threshold * 1000, trials),
       fmt::format("Velocity estimator: {}.", velocity_estimator)};
 }
 
@@ -136,8 +136,7 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
   if (origin != report::Origin::measured)
     section.paragraphs.emplace_back(
         "The device and the person are simulated. How much the person's hand stiffens was calibrated on "
-        "other "
-        "simulated hands at one of the paper's numbers: the verdicts are no proof of the method.");
+        "other simulated hands at one of the paper's numbers: the verdicts are no proof of the method.");
   return report::write_page({"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section}}, folder,
                             "contact");
 }

@@ -56,8 +56,7 @@ DeviationStudy study_deviation(const DeviationSettings& settings, const Simulate
   for (const DeviationResult& result : study.results) contact = std::min(contact, result.contact_share);
   study.circumstances = fmt::format(
       "Simulated: {}, wall of {:g} N/mm at {:g} Hz, push {:g} N, {} pulses of {:g} s without and {} with "
-      "F_B, "
-      "{:g} s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
+      "F_B, {:g} s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
       people_words(people.size()), protocol.stiffness / 1000, protocol.haptic_rate, hands.push,
       protocol.pulses, protocol.pulse_on, protocol.pulses, protocol.rest, clipping_words(hands.device),
       100 * contact);
@@ -75,8 +74,7 @@ DeviationStudy study_deviation(DeviceRig& rig, const DeviationSettings& settings
   const std::size_t axis = rig.limits().axis;
   study.circumstances = fmt::format(
       "Measured on {}: wall of {:g} N/mm at {:g} Hz on axis {}, pulses of {:g} s on axis {}, force limit "
-      "{:g} "
-      "N, which took something away in up to {:.0f} % of a touch's samples; {} trace records lost.",
+      "{:g} N, which took something away in up to {:.0f} % of a touch's samples; {} trace records lost.",
       rig.description(), protocol.stiffness / 1000, protocol.haptic_rate, axis, protocol.pulse_on, 1 - axis,
       rig.force_limit(), 100 * run.limited_share, run.lost_records);
   for (const DeviationResult& one : study.results) {
@@ -175,11 +173,10 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
       ++counted;
     }
     if (counted > 0)
-      words.push_back(
-          fmt::format("Sizes are not reproduced: {:.1f} times the paper's in the mean. The model's arm "
-                      "yields to a force as long as "
-                      "it lasts; the paper's people push back, and 1 N does not move them at all.",
-                      size / static_cast<double>(counted)));
+      words.push_back(fmt::format(
+          "Sizes are not reproduced: {:.1f} times the paper's in the mean. The model's arm yields to a force "
+          "as long as it lasts; the paper's people push back, and 1 N does not move them at all.",
+          size / static_cast<double>(counted)));
   }
   if (study.verdict.rank)
     words.push_back(fmt::format(
@@ -193,14 +190,12 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
   const DeviationFit* threshold = fit_named(study, fit_threshold.name);
   const DeviationFit* both = fit_named(study, fit_both.name);
   if (stiffening != nullptr && threshold != nullptr && both != nullptr)
-    words.push_back(
-        fmt::format("The paper's table hardly identifies a stiffness gain: a hand that stiffens by {:.2f} "
-                    "per N leaves {:.2f} mm, "
-                    "one that does not stiffen but resists {:.2f} N more for each N of F_B leaves {:.2f} mm, "
-                    "and with both allowed "
-                    "the gain is {:.2f} +- {:.2f}. Only the sign of the trend is firm.",
-                    stiffening->hand.stiffening, stiffening->rms * 1e3, threshold->hand.threshold_rise,
-                    threshold->rms * 1e3, both->hand.stiffening, both->error.stiffening));
+    words.push_back(fmt::format(
+        "The paper's table hardly identifies a stiffness gain: a hand that stiffens by {:.2f} per N leaves "
+        "{:.2f} mm, one that does not stiffen but resists {:.2f} N more for each N of F_B leaves {:.2f} mm, "
+        "and with both allowed the gain is {:.2f} +- {:.2f}. Only the sign of the trend is firm.",
+        stiffening->hand.stiffening, stiffening->rms * 1e3, threshold->hand.threshold_rise,
+        threshold->rms * 1e3, both->hand.stiffening, both->error.stiffening));
   return words;
 }
 

@@ -170,8 +170,8 @@ std::vector<std::string> jitter_words(const JitterStudy& study) {
   if (counted > 0)
     words.push_back(fmt::format(
         "Sizes are {}: Jit is {:.2f} times the paper's in the mean, AT {:.1f} times. {}The paper's "
-        "adjustment times "
-        "are whole multiples of 15 ms and do not fall steadily: only their trend can be compared.",
+        "adjustment times are whole multiples of 15 ms and do not fall steadily: only their trend can be "
+        "compared.",
         study.origin == report::Origin::measured ? "as measured" : "not reproduced",
         size / static_cast<double>(counted), time / static_cast<double>(counted),
         study.origin == report::Origin::measured
@@ -179,9 +179,8 @@ std::vector<std::string> jitter_words(const JitterStudy& study) {
             : "Its values come from people who answer at will; the model's time is that of its push lag. "));
   if (verdict.amplitude_rank || verdict.time_rank)
     words.push_back(fmt::format(
-        "Rank correlation with the paper over all pairs: Jit {}, AT {}. Most of it is the work of "
-        "F_I, which anything "
-        "that yields to a force would show; the trend with F_B is in the table of claims.",
+        "Rank correlation with the paper over all pairs: Jit {}, AT {}. Most of it is the work of F_I, which "
+        "anything that yields to a force would show; the trend with F_B is in the table of claims.",
         rank_text(verdict.amplitude_rank), rank_text(verdict.time_rank)));
   if (study.variations.size() == 2) {
     std::size_t unsettled = 0, touches = 0;
@@ -252,8 +251,7 @@ std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const 
   plot::write_figure(trends, files.back());
   section.pictures.push_back(
       {"Both numbers over F_B for each F_I, beside the paper's. A touch that never settled counts with its "
-       "whole "
-       "window.",
+       "whole window.",
        files.back()});
   page.sections.push_back(std::move(section));
   if (!study.variations.empty()) {

@@ -93,16 +93,15 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
                                                 const std::string& device) {
   const ContactSettings& touch = settings.touch;
   return {
+      fmt::format("Largest stable stiffness on {}, axis {}, at {:g} Hz: from {:g} N/mm ({:g} N/mm for "
+                  "adaptive walls) in steps of {:g} N/mm, {} at each, held for {:g} s.",
+                  device, touch.axis, touch.haptic_rate, settings.start / 1000,
+                  settings.start_adaptive / 1000, settings.step / 1000,
+                  settings.trials == 1 ? "one touch" : fmt::format("{} touches", settings.trials),
+                  touch.hold_time),
       fmt::format(
-          "Largest stable stiffness on {}, axis {}, at {:g} Hz: from {:g} N/mm ({:g} N/mm for adaptive "
-          "walls) in steps of {:g} N/mm, {} at each, held for {:g} s.",
-          device, touch.axis, touch.haptic_rate, settings.start / 1000, settings.start_adaptive / 1000,
-          settings.step / 1000,
-          settings.trials == 1 ? "one touch" : fmt::format("{} touches", settings.trials), touch.hold_time),
-      fmt::format(
-          "Unstable: more than {:g} mm peak to peak in every quarter of the last second, or more than "
-          "{:g} mm within 0.25 s, at which the host ended the touch. The force is limited to {:g} N or "
-          "less.",
+          "Unstable: more than {:g} mm peak to peak in every quarter of the last second, or more than {:g} "
+          "mm within 0.25 s, at which the host ended the touch. The force is limited to {:g} N or less.",
           touch.threshold * 1000, touch.abort_amplitude * 1000, touch.force_limit)};
 }
 

@@ -94,15 +94,13 @@ std::string MarkedMeans::cell(double mean, const CountedEnds& ends, std::size_t 
 std::vector<std::string> MarkedMeans::notes() const {
   std::vector<std::string> notes;
   if (!at_zero_.empty())
-    notes.push_back(
-        fmt::format("\"<\": people whose wall was unstable at the first stiffness of the search "
-                    "already count as 0: {}.",
-                    at_zero_));
+    notes.push_back(fmt::format(
+        "\"<\": people whose wall was unstable at the first stiffness of the search already count as 0: {}.",
+        at_zero_));
   if (!beyond_last_.empty())
-    notes.push_back(
-        fmt::format("\">\": people whose wall was stable up to the last stiffness of the search "
-                    "count with that: {}.",
-                    beyond_last_));
+    notes.push_back(fmt::format(
+        "\">\": people whose wall was stable up to the last stiffness of the search count with that: {}.",
+        beyond_last_));
   return notes;
 }
 
@@ -145,16 +143,13 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
   const MaxStiffnessStudy& first = studies.front();
   section.paragraphs.push_back(fmt::format(
       "{} simulated people, {} touches at every stiffness (approach speeds and pushes), in steps of {:g} "
-      "N/m. A "
-      "wall counts as unstable when the handle moves by more than {:g} mm in every quarter of the last "
-      "second of "
-      "a hold. {}",
+      "N/m. A wall counts as unstable when the handle moves by more than {:g} mm in every quarter of the "
+      "last second of a hold. {}",
       first.set.subjects.size(), first.protocol.touches(), first.steps.step, first.protocol.threshold * 1e3,
-      any_calibrated(studies)
-          ? "\"Calibrated\" means that friction and activation were fitted to this very number; everything "
-            "else is predicted, without another fit."
-          : "Everything is predicted: friction and activation are as the set has them, and were not fitted "
-            "for these people and this force limit."));
+      any_calibrated(studies) ? "\"Calibrated\" means that friction and activation were fitted to this very "
+                                "number; everything else is predicted, without another fit."
+                              : "Everything is predicted: friction and activation are as the set has them, "
+                                "and were not fitted for these people and this force limit."));
   for (const MaxStiffnessStudy& study : studies) {
     section.paragraphs.push_back(
         fmt::format("{}: gamma = {:.4g} /N, friction {:.4g} N; {} touches, {:.0f} s simulated.",
@@ -174,8 +169,7 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
     const double printed = paper::max_stiffness.back().stiffness;
     section.paragraphs.push_back(
         fmt::format("{}: the adaptive wall reaches {} N/mm in its best mode; the paper's is {}, ours {}. It "
-                    "is {} a constant 2 "
-                    "N ({}).",
+                    "is {} a constant 2 N ({}).",
                     clip_words(study.set.device), n_per_mm(most), n_per_mm(printed),
                     std::abs(most - printed) <= magnetic_tolerance ? "agrees"
                     : most < printed                               ? "does not reach it"
@@ -201,9 +195,8 @@ report::Section calibration_section(const std::vector<OperatorCalibration>& cali
   section.tables.push_back(std::move(table));
   section.paragraphs.push_back(
       "Two numbers can identify two. The friction of this table stands for everything that damps a plain "
-      "wall: "
-      "mass, viscous damping, friction and delay of the device trade against each other and against how hard "
-      "people press: other choices meet 3.58 N/mm too (docs/experiments/max_stiffness.md). gamma is "
+      "wall: mass, viscous damping, friction and delay of the device trade against each other and against "
+      "how hard people press: other choices meet 3.58 N/mm too (docs/experiments/max_stiffness.md). gamma is "
       "identifiable only together with the force limit: with the force clipped, part of the gain is the "
       "clip's.");
   return section;

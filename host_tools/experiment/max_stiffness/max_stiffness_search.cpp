@@ -14,10 +14,10 @@ void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
     throw std::invalid_argument("no touch: name at least one approach speed and one push force");
   if (!(steps.first > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 && steps.last >= steps.first &&
         steps.last <= 1e7))
-    throw std::invalid_argument(fmt::format(
-        "stiffness from {} N/m by {} N/m (or {} of it) to {} N/m: allowed are steps above 0 and an "
-        "end from the first one to 1e7 N/m",
-        steps.first, steps.step, steps.growth, steps.last));
+    throw std::invalid_argument(
+        fmt::format("stiffness from {} N/m by {} N/m (or {} of it) to {} N/m: allowed are steps above 0 and "
+                    "an end from the first one to 1e7 N/m",
+                    steps.first, steps.step, steps.growth, steps.last));
 }
 
 }  // namespace

@@ -78,8 +78,7 @@ TouchPlan resolution_plan(const ResolutionWall& wall, double step, double speed,
                           touches);
   plan.request = fmt::format(
       "{}: hold the handle outside the wall, lightly; after Enter touch the wall at about {:g} mm in a "
-      "second "
-      "and press on for {:g} s",
+      "second and press on for {:g} s",
       plan.name, speed * 1e3, wall.hold);
   plan.hold_time = wall.hold;
   plan.threshold = wall.threshold;

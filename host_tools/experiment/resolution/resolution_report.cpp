@@ -79,8 +79,7 @@ ResolutionStudy study_resolution(const ResolutionSettings& settings, const Resol
   study.circumstances = fmt::format(
       "Simulated: {}, {} with each push of {:g} N, wall of {:g} N/mm at {:g} Hz, encoder of {} mm, friction "
       "{:g} N. A wall vibrates for a person when any touch does (more than {} mm peak to peak in every "
-      "quarter "
-      "of the last second){}.",
+      "quarter of the last second){}.",
       people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)),
       fmt::join(settings.pushes, ", "), settings.wall.stiffness / 1000, settings.wall.haptic_rate,
       resolution_mm(hands.count_length), hands.device.friction, resolution_mm(settings.wall.threshold),
@@ -95,8 +94,7 @@ ResolutionStudy study_resolution(DeviceRig& rig, const ResolutionSettings& setti
   study.origin = report::Origin::measured;
   study.circumstances = fmt::format(
       "Measured on {}: {}, {} of them aborted because the handle swung too far, wall of {:g} N/mm at {:g} "
-      "Hz, "
-      "force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
+      "Hz, force limit {:g} N; {} trace records lost. Speeds are those measured at the touch.",
       rig.description(), touch_words(run.cells.size()), run.aborted, settings.wall.stiffness / 1000,
       settings.wall.haptic_rate, rig.force_limit(), run.lost_records);
   study.runs = {{{}, std::move(run.cells)}};
@@ -169,8 +167,7 @@ std::string narrowness_words(const ResolutionStudy& study) {
                     [](const ResolutionVariation& one) { return one.verdict.claim_met() == true; });
   return fmt::format(
       "How narrow that is: the weakest vibration of 0.4 mm has {:.2f} mm, with a threshold of {:.3g} mm, and "
-      "of "
-      "{} settings that differ in one number both claims appear in {}.",
+      "of {} settings that differ in one number both claims appear in {}.",
       least * 1e3, study.wall.threshold * 1e3, study.variations.size(), met);
 }
 }  // namespace
@@ -202,20 +199,19 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study) {
   if (const std::string places = untested_places(verdict); !places.empty())
     words.push_back(fmt::format("Not tested, for want of a touch there: {}.", places));
   if (verdict.onset_from_resolution)
-    words.push_back(*verdict.onset_from_resolution
-                        ? "At some speed 0.1 mm vibrates and the encoder's own step does not: there the step "
-                          "is the cause."
-                        : "Where 0.1 mm vibrates, the encoder's own step does so too: the onset with speed "
-                          "is not the work of the "
-                          "resolution here but of the loop itself (delay, sampling, a light grip), which a "
-                          "fast touch sets going. Only "
-                          "the vibration of 0.4 mm at low speed is that of a coarse step.");
-  words.push_back(fmt::format(
-      "The paper's criterion K max(eta, delta v T) <= F_h is quasi-static and not a condition of passivity. "
-      "It asks {:.2f} N "
-      "of a hand at 0.4 mm and {:.2f} N at 0.1 mm, and begins to depend on the speed at {:g} and {:g} m/s.",
-      study.wall.stiffness * 0.4e-3, study.wall.stiffness * 0.1e-3, 0.4e-3 * study.wall.haptic_rate,
-      0.1e-3 * study.wall.haptic_rate));
+    words.push_back(
+        *verdict.onset_from_resolution
+            ? "At some speed 0.1 mm vibrates and the encoder's own step does not: there the step is the "
+              "cause."
+            : "Where 0.1 mm vibrates, the encoder's own step does so too: the onset with speed is not the "
+              "work of the resolution here but of the loop itself (delay, sampling, a light grip), which a "
+              "fast touch sets going. Only the vibration of 0.4 mm at low speed is that of a coarse step.");
+  words.push_back(
+      fmt::format("The paper's criterion K max(eta, delta v T) <= F_h is quasi-static and not a condition of "
+                  "passivity. It asks {:.2f} N of a hand at 0.4 mm and {:.2f} N at 0.1 mm, and begins to "
+                  "depend on the speed at {:g} and {:g} m/s.",
+                  study.wall.stiffness * 0.4e-3, study.wall.stiffness * 0.1e-3,
+                  0.4e-3 * study.wall.haptic_rate, 0.1e-3 * study.wall.haptic_rate));
   return words;
 }
 
