@@ -6,7 +6,7 @@
 
 #include "host_tools/experiment/setting_check.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
-#include "host_tools/simulation/encoder_model.hpp"
+#include "host_tools/simulation/encoder_config.hpp"
 
 namespace kmax::experiment {
 namespace {

@@ -12,7 +12,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulated_board/scene_run.hpp"
-#include "host_tools/simulation/scene_parts.hpp"
+#include "host_tools/simulation/scene.hpp"
 
 namespace kmax::cli {
 

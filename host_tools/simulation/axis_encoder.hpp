@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "host_tools/simulation/encoder_model.hpp"
+#include "host_tools/simulation/encoder_config.hpp"
 #include "host_tools/simulation/quadrature_encoder.hpp"
 
 namespace kmax::simulation {

@@ -8,7 +8,8 @@
 // its grip. The spring of the last mass goes to the intended position u, and is 0 without a person. A part
 // that is not there is no mass of the chain.
 //
-// Every integrator of the simulation works on this description (coupled_handle.hpp, reference_integrators.hpp).
+// Every integrator of the simulation works on this description (coupled_handle.hpp,
+// reference_integrators.hpp).
 
 #include <array>
 #include <cstddef>
@@ -18,12 +19,12 @@ namespace kmax::simulation {
 inline constexpr std::size_t most_masses = 3;
 
 struct ChainDynamics {
-  std::size_t masses = 1;  // 1 to 3
+  std::size_t masses = 1;                       // 1 to 3
   std::array<double, most_masses> mass{};       // kg
   std::array<double, most_masses> stiffness{};  // N/m, [i] between mass i and i + 1, the last to u
   std::array<double, most_masses> damping{};    // N s/m, likewise
   double base_damping = 0.0;                    // N s/m, viscous, of mass 0 against the ground
-  double friction = 0.0;                        // N, Coulomb, of mass 0 against the ground; standing and moving
+  double friction = 0.0;  // N, Coulomb, of mass 0 against the ground; standing and moving
 };
 
 // `chain` with its springs and dampers from number `first` on times `gain`.

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host_tools/simulation/held_chain.hpp"
+#include "host_tools/simulation/propagator_table.hpp"
 #include "host_tools/simulation/reference_integrators.hpp"
 
 namespace kmax::simulation {

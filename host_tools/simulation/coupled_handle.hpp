@@ -6,7 +6,7 @@
 //
 // x handle, y hand, u intended position (intended_motion.hpp); k1, b1, k2, b2 already carry the activation g
 // (operator_model.hpp). A structure puts one more mass, the tip, between handle and hand
-// (structure_model.hpp); x is then the motor's side. Friction is Coulomb's with true stick: at x' = 0 the
+// (device_model.hpp); x is then the motor's side. Friction is Coulomb's with true stick: at x' = 0 the
 // handle stays while the other forces sum to no more than f_c. F is the commanded force, held between calls
 // (zero-order hold), clipped at the force limit and late by the device's delay (force_delay.hpp). A part that
 // is not named is no mass of the chain and costs nothing.

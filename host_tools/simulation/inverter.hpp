@@ -36,7 +36,6 @@
 
 #include "host_tools/simulation/brushed_dc_motor.hpp"
 #include "host_tools/simulation/model_field.hpp"
-#include "host_tools/simulation/motor_terminals.hpp"
 #include "host_tools/simulation/synchronous_motor.hpp"
 
 namespace kmax::simulation {

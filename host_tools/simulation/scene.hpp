@@ -10,7 +10,7 @@
 //                                   calibration; false: with the factory's
 //
 //   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
-//   [structure]                     structure_model.hpp: the handle behind a compliant structure
+//   [structure]                     device_model.hpp: the handle behind a compliant structure
 //   [operator]                      operator_model.hpp; in [axis1.operator] also same_person = true: the hand
 //                                   is that of axis 0's person, so that grip and arm answer to the background
 //                                   forces of both axes, which stand at right angles. Without [motion] the
@@ -131,5 +131,13 @@ Scene load_scene(const std::string& path, const ParameterCheck& check = {});
 
 // `source` stands for the file name in messages.
 Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check = {});
+
+// "exact", or a reference integrator with what it goes by: "rk4, 40 substeps per 2 ms".
+std::string to_string(const IntegratorConfig& integrator);
+
+// The parts of an axis that are there and so are integrated or computed, in the order from the actuator to
+// the person: "DC motor", "device", "delay of 0.5 ms", "structure", "hand and arm", "encoder noise", ... A
+// part that the scene does not name does not appear.
+std::vector<std::string> integrated_parts(const SceneAxis& axis);
 
 }  // namespace kmax::simulation

@@ -31,8 +31,8 @@
 
 #include <array>
 
+#include "host_tools/simulation/brushed_dc_motor.hpp"
 #include "host_tools/simulation/model_field.hpp"
-#include "host_tools/simulation/motor_terminals.hpp"
 
 namespace kmax::simulation {
 

@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <random>
 
-#include "host_tools/virtual_board/stm32f4/can_frame_bits.hpp"
+#include "host_tools/virtual_board/stm32f4/can_bus.hpp"
 #include "tests/image/can_bench.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/can/sdo_client.hpp"
-#include "host_tools/virtual_board/run/can_host_node.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests {

@@ -5,7 +5,7 @@
 //   name = "..."          description = "..."        seed = 1 (of the draw)
 //   [fitted]              optional: plain, magnetic (N/m), force_limit (N), see Fitted. Only a calibration
 //                         writes it; take it out of a file whose numbers you change
-//   [device] [structure]  device_model.hpp, structure_model.hpp
+//   [device] [structure]  device_model.hpp
 //   [[subject]]           name, and operator_model.hpp
 //
 // People are drawn independently and log-uniformly between the smallest and the largest value that Fu &

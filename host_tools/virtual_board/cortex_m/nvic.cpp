@@ -1,9 +1,10 @@
 #include "host_tools/virtual_board/cortex_m/nvic.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
 
+#include <array>
 #include <bit>
 #include <cstddef>
-#include <optional>
+
+#include "drivers/stm32f4/interrupts.hpp"
 
 namespace kmax::virtual_board {
 namespace {
@@ -11,41 +12,40 @@ namespace {
 using Registers = drivers::cortex_m::NvicRegisters;
 using drivers::stm32f4::interrupt_count;
 
-constexpr const char* name = "NVIC";
-
-/// Number of the first interrupt in the word at `offset` of the bit array that begins at `begin`; none
-/// outside.
-std::optional<unsigned> first_interrupt(std::uint32_t offset, std::size_t begin) {
-  if (offset < begin || offset >= begin + sizeof(Registers::iser)) return std::nullopt;
-  return static_cast<unsigned>(offset - begin) * 8;
-}
+constexpr const char* nvic_name = "NVIC";
 
 bool is_priority(std::uint32_t offset) {
   return offset >= offsetof(Registers, ipr);
 }
 
-template <typename Query>
-std::uint32_t gather(unsigned first, Query query) {
-  std::uint32_t word = 0;
-  for (unsigned bit = 0; bit < 32 && first + bit < interrupt_count; ++bit) {
-    if (query(exception_number::first_interrupt + first + bit)) word |= 1U << bit;
+/// An array of bits, one for each interrupt: what it shows, and what a 1 written to it does.
+struct BitArray {
+  std::size_t begin;
+  bool (ExceptionTable::*shows)(unsigned exception) const;
+  void (*sets)(ExceptionTable&, unsigned exception);  ///< none: read-only
+  bool existing_only;                                 ///< a 1 for an interrupt that does not exist is refused
+};
+constexpr std::array bit_arrays{
+    BitArray{offsetof(Registers, iser), &ExceptionTable::enabled,
+             [](ExceptionTable& table, unsigned exception) { table.set_enabled(exception, true); }, true},
+    BitArray{offsetof(Registers, icer), &ExceptionTable::enabled,
+             [](ExceptionTable& table, unsigned exception) { table.set_enabled(exception, false); }, false},
+    BitArray{offsetof(Registers, ispr), &ExceptionTable::pending,
+             [](ExceptionTable& table, unsigned exception) { table.pend(exception); }, true},
+    BitArray{offsetof(Registers, icpr), &ExceptionTable::pending,
+             [](ExceptionTable& table, unsigned exception) { table.clear_pending(exception); }, false},
+    BitArray{offsetof(Registers, iabr), &ExceptionTable::active, nullptr, false}};
+
+const BitArray& array_at(const Access& access) {
+  require_word(access, nvic_name);
+  for (const BitArray& array : bit_arrays) {
+    if (access.offset >= array.begin && access.offset < array.begin + sizeof(Registers::iser)) return array;
   }
-  return word;
+  refuse(access, nvic_name, "no register here");
 }
 
-template <typename Action>
-void for_each_bit(std::uint32_t word, unsigned first, Action action) {
-  for (; word != 0; word &= word - 1) {
-    const unsigned interrupt = first + static_cast<unsigned>(std::countr_zero(word));
-    if (interrupt < interrupt_count) action(exception_number::first_interrupt + interrupt);
-  }
-}
-
-void require_existing(const Access& access, std::uint32_t word, unsigned first) {
-  const unsigned highest = first + static_cast<unsigned>(std::bit_width(word));
-  if (word != 0 && highest > interrupt_count) {
-    refuse(access, name, "interrupt " + std::to_string(highest - 1) + " does not exist, 81 is the last one");
-  }
+[[noreturn]] void refuse_interrupt(const Access& access, const char* block, unsigned interrupt) {
+  refuse(access, block, "interrupt " + std::to_string(interrupt) + " does not exist, 81 is the last one");
 }
 
 }  // namespace
@@ -60,16 +60,13 @@ std::uint32_t Nvic::read(const Access& access) {
     }
     return value;
   }
-  require_word(access, name);
-  const auto enabled = [this](unsigned exception) { return exceptions_.enabled(exception); };
-  const auto pending = [this](unsigned exception) { return exceptions_.pending(exception); };
-  const auto active = [this](unsigned exception) { return exceptions_.active(exception); };
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, iser))) return gather(*first, enabled);
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, icer))) return gather(*first, enabled);
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, ispr))) return gather(*first, pending);
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, icpr))) return gather(*first, pending);
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, iabr))) return gather(*first, active);
-  refuse(access, name, "no register here");
+  const BitArray& array = array_at(access);
+  const auto first = static_cast<unsigned>(access.offset - array.begin) * 8;
+  std::uint32_t word = 0;
+  for (unsigned bit = 0; bit < 32 && first + bit < interrupt_count; ++bit) {
+    if ((exceptions_.*array.shows)(exception_number::first_interrupt + first + bit)) word |= 1U << bit;
+  }
+  return word;
 }
 
 void Nvic::write(const Access& access, std::uint32_t value) {
@@ -81,21 +78,15 @@ void Nvic::write(const Access& access, std::uint32_t value) {
     }
     return;
   }
-  require_word(access, name);
-  if (auto first = first_interrupt(access.offset, offsetof(Registers, iser))) {
-    require_existing(access, value, *first);
-    for_each_bit(value, *first, [this](unsigned exception) { exceptions_.set_enabled(exception, true); });
-  } else if (first = first_interrupt(access.offset, offsetof(Registers, icer)); first) {
-    for_each_bit(value, *first, [this](unsigned exception) { exceptions_.set_enabled(exception, false); });
-  } else if (first = first_interrupt(access.offset, offsetof(Registers, ispr)); first) {
-    require_existing(access, value, *first);
-    for_each_bit(value, *first, [this](unsigned exception) { exceptions_.pend(exception); });
-  } else if (first = first_interrupt(access.offset, offsetof(Registers, icpr)); first) {
-    for_each_bit(value, *first, [this](unsigned exception) { exceptions_.clear_pending(exception); });
-  } else if (first_interrupt(access.offset, offsetof(Registers, iabr))) {
-    refuse(access, name, "IABR is read-only");
-  } else {
-    refuse(access, name, "no register here");
+  const BitArray& array = array_at(access);
+  if (array.sets == nullptr) refuse(access, nvic_name, "IABR is read-only");
+  const auto first = static_cast<unsigned>(access.offset - array.begin) * 8;
+  const unsigned end = first + static_cast<unsigned>(std::bit_width(value));
+  if (array.existing_only && value != 0 && end > interrupt_count)
+    refuse_interrupt(access, nvic_name, end - 1);
+  for (; value != 0; value &= value - 1) {
+    const unsigned interrupt = first + static_cast<unsigned>(std::countr_zero(value));
+    if (interrupt < interrupt_count) array.sets(exceptions_, exception_number::first_interrupt + interrupt);
   }
 }
 
@@ -110,9 +101,7 @@ std::uint32_t SoftwareTrigger::read(const Access& access) {
 void SoftwareTrigger::write(const Access& access, std::uint32_t value) {
   require_word(access, "STIR");
   const std::uint32_t interrupt = drivers::cortex_m::nvic_stir::InterruptNumber::of(value);
-  if (interrupt >= interrupt_count) {
-    refuse(access, "STIR", "interrupt " + std::to_string(interrupt) + " does not exist, 81 is the last one");
-  }
+  if (interrupt >= interrupt_count) refuse_interrupt(access, "STIR", interrupt);
   exceptions_.pend(exception_number::first_interrupt + interrupt);
 }
 

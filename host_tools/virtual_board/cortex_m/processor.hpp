@@ -13,7 +13,6 @@
 #include "host_tools/virtual_board/cortex_m/core_engine.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_frame.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
 
 // The Cortex-M4F: instructions by Unicorn, exceptions, time and faults by us. PM0214, programming model.
 //
@@ -35,7 +34,7 @@
 // registers reach or leave the stack (with lazy preservation only when the handler uses the FPU).
 //
 // Not modelled: unprivileged code, WFE's event register (WFE does not wait), debugging, MPU violations (see
-// memory_protection.hpp), semihosting, bit-band aliases.
+// core_peripherals.hpp), semihosting, bit-band aliases.
 
 namespace kmax::virtual_board {
 

@@ -10,7 +10,6 @@ namespace {
 using namespace drivers::cortex_m;
 namespace number = exception_number;
 
-constexpr const char* name = "SCB";
 constexpr std::uint32_t shpr_begin = offsetof(ScbRegisters, shpr);
 constexpr std::uint32_t shpr_end = shpr_begin + sizeof(ScbRegisters::shpr);
 constexpr unsigned first_settable = 4;
@@ -57,6 +56,11 @@ std::uint32_t SystemControl::interrupt_control_state() const {
          flag(exceptions_.pending(number::non_maskable), scb_icsr::NonMaskablePending::mask);
 }
 
+std::uint32_t SystemControl::application_interrupt_state() const {
+  return scb_aircr::Key::bits(scb_aircr::key_read) |
+         scb_aircr::PriorityGroup::bits(exceptions_.priority_group());
+}
+
 std::uint32_t SystemControl::handler_control_state() const {
   return flag(exceptions_.active(number::memory_fault), scb_shcsr::MemoryFaultActive::mask) |
          flag(exceptions_.active(number::bus_fault), scb_shcsr::BusFaultActive::mask) |
@@ -78,92 +82,58 @@ std::uint32_t SystemControl::priorities(std::uint32_t offset, unsigned bytes) co
   return value;
 }
 
+const RegisterTable<SystemControl>& SystemControl::registers() {
+  using Model = SystemControl;
+  using Row = Register<Model>;
+  using Layout = ScbRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, cpuid), "CPUID", [](Model&, const Access&) { return cpuid; }},
+      {offsetof(Layout, icsr), "ICSR", Row::shows<&Model::interrupt_control_state>, any_bits,
+       Row::takes<&Model::write_interrupt_control>},
+      Row::word<&Model::vtor_>(offsetof(Layout, vtor), "VTOR", scb_vtor::TableOffset::mask),
+      {offsetof(Layout, aircr), "AIRCR", Row::shows<&Model::application_interrupt_state>,
+       scb_aircr::Key::mask | scb_aircr::PriorityGroup::mask | scb_aircr::SystemResetRequest::mask,
+       Row::takes<&Model::write_application_interrupt>},
+      Row::reserved(offsetof(Layout, scr), "SCR"),
+      {offsetof(Layout, ccr), "CCR", [](Model&, const Access&) { return ccr_reset; }, ccr_reset,
+       Row::takes<&Model::write_control>},
+      {offsetof(Layout, shcsr), "SHCSR", Row::shows<&Model::handler_control_state>, any_bits,
+       Row::takes<&Model::write_handler_control>},
+      {offsetof(Layout, cfsr), "CFSR", Row::shows<&Model::cfsr_>, any_bits,
+       Row::clears_by_ones<&Model::cfsr_>},
+      {offsetof(Layout, hfsr), "HFSR", Row::shows<&Model::hfsr_>, any_bits,
+       Row::clears_by_ones<&Model::hfsr_>},
+      Row::word<&Model::mmfar_>(offsetof(Layout, mmfar), "MMFAR", any_bits),
+      Row::word<&Model::bfar_>(offsetof(Layout, bfar), "BFAR", any_bits),
+      {offsetof(Layout, cpacr), "CPACR", Row::shows<&Model::cpacr_>, scb_cpacr::FpuAccess::mask,
+       Row::takes<&Model::write_coprocessor_access>}};
+  return table;
+}
+
 std::uint32_t SystemControl::read(const Access& access) {
-  if (access.offset >= shpr_begin && access.offset < shpr_end) return priorities(access.offset, access.bytes);
-  require_word(access, name);
-  switch (access.offset) {
-    case offsetof(ScbRegisters, cpuid):
-      return cpuid;
-    case offsetof(ScbRegisters, icsr):
-      return interrupt_control_state();
-    case offsetof(ScbRegisters, vtor):
-      return vtor_;
-    case offsetof(ScbRegisters, aircr):
-      return scb_aircr::Key::bits(scb_aircr::key_read) |
-             scb_aircr::PriorityGroup::bits(exceptions_.priority_group());
-    case offsetof(ScbRegisters, scr):
-      return 0;
-    case offsetof(ScbRegisters, ccr):
-      return ccr_reset;
-    case offsetof(ScbRegisters, shcsr):
-      return handler_control_state();
-    case offsetof(ScbRegisters, cfsr):
-      return cfsr_;
-    case offsetof(ScbRegisters, hfsr):
-      return hfsr_;
-    case offsetof(ScbRegisters, mmfar):
-      return mmfar_;
-    case offsetof(ScbRegisters, bfar):
-      return bfar_;
-    case offsetof(ScbRegisters, cpacr):
-      return cpacr_;
-    default:
-      refuse(access, name, "register not modelled");
-  }
+  const bool priority = access.offset >= shpr_begin && access.offset < shpr_end;
+  return priority ? priorities(access.offset, access.bytes) : RegisterBlock::read(access);
 }
 
 void SystemControl::write(const Access& access, std::uint32_t value) {
-  if (access.offset >= shpr_begin && access.offset < shpr_end) return write_priorities(access, value);
-  require_word(access, name);
-  switch (access.offset) {
-    case offsetof(ScbRegisters, icsr):
-      return write_interrupt_control(access, value);
-    case offsetof(ScbRegisters, vtor):
-      if ((value & ~scb_vtor::TableOffset::mask) != 0) {
-        refuse(access, name,
-               fmt::format("VTOR = 0x{:08X}: the vector table must be aligned to 512 bytes", value));
-      }
-      vtor_ = value;
-      return;
-    case offsetof(ScbRegisters, aircr):
-      return write_application_interrupt(access, value);
-    case offsetof(ScbRegisters, scr):
-      if (value != 0) refuse(access, name, fmt::format("SCR = 0x{:X}: only plain sleep is modelled", value));
-      return;
-    case offsetof(ScbRegisters, ccr):
-      if (value != ccr_reset) {
-        refuse(access, name, fmt::format("CCR = 0x{:X}: only its reset value 0x200 is modelled", value));
-      }
-      return;
-    case offsetof(ScbRegisters, shcsr):
-      return write_handler_control(access, value);
-    case offsetof(ScbRegisters, cfsr):
-      cfsr_ &= ~value;
-      return;
-    case offsetof(ScbRegisters, hfsr):
-      hfsr_ &= ~value;
-      return;
-    case offsetof(ScbRegisters, mmfar):
-      mmfar_ = value;
-      return;
-    case offsetof(ScbRegisters, bfar):
-      bfar_ = value;
-      return;
-    case offsetof(ScbRegisters, cpacr): {
-      const std::uint32_t fpu = scb_cpacr::FpuAccess::of(value);
-      if ((value & ~scb_cpacr::FpuAccess::mask) != 0 || (fpu != 0 && fpu != full_access)) {
-        refuse(access, name,
-               fmt::format("CPACR = 0x{:08X}: only no and full access to CP10 and CP11", value));
-      }
-      cpacr_ = value;
-      return;
-    }
-    default:
-      refuse(access, name, "register read-only or not modelled");
-  }
+  const bool priority = access.offset >= shpr_begin && access.offset < shpr_end;
+  return priority ? write_priorities(access, value) : RegisterBlock::write(access, value);
 }
 
-void SystemControl::write_interrupt_control(const Access& /*access*/, std::uint32_t value) {
+void SystemControl::write_control(const Access& access, std::uint32_t value) {
+  if (value != ccr_reset)
+    refuse(access, fmt::format("CCR = 0x{:X}: only its reset value 0x200 is modelled", value));
+}
+
+void SystemControl::write_coprocessor_access(const Access& access, std::uint32_t value) {
+  const std::uint32_t fpu = scb_cpacr::FpuAccess::of(value);
+  if (fpu != 0 && fpu != full_access) {
+    refuse(access, fmt::format("CPACR = 0x{:08X}: only no and full access to CP10 and CP11", value));
+  }
+  cpacr_ = value;
+}
+
+void SystemControl::write_interrupt_control(std::uint32_t value) {
   if (scb_icsr::NonMaskablePending::of(value) != 0) exceptions_.pend(number::non_maskable);
   if (scb_icsr::SupervisorPending::of(value) != 0) exceptions_.pend(number::pend_supervisor);
   if (scb_icsr::SupervisorPendingClear::of(value) != 0) exceptions_.clear_pending(number::pend_supervisor);
@@ -173,11 +143,8 @@ void SystemControl::write_interrupt_control(const Access& /*access*/, std::uint3
 
 void SystemControl::write_application_interrupt(const Access& access, std::uint32_t value) {
   if (scb_aircr::Key::of(value) != scb_aircr::key) {
-    refuse(access, name, fmt::format("AIRCR = 0x{:08X}: the key 0x05FA is missing", value));
+    refuse(access, fmt::format("AIRCR = 0x{:08X}: the key 0x05FA is missing", value));
   }
-  const std::uint32_t known =
-      scb_aircr::Key::mask | scb_aircr::PriorityGroup::mask | scb_aircr::SystemResetRequest::mask;
-  if ((value & ~known) != 0) refuse(access, name, fmt::format("AIRCR = 0x{:08X}: bit not modelled", value));
   exceptions_.set_priority_group(scb_aircr::PriorityGroup::of(value));
   if (scb_aircr::SystemResetRequest::of(value) == 0) return;
   reset_requested_ = true;
@@ -188,7 +155,7 @@ void SystemControl::write_handler_control(const Access& access, std::uint32_t va
   const std::uint32_t enables = scb_shcsr::MemoryFaultEnable::mask | scb_shcsr::BusFaultEnable::mask |
                                 scb_shcsr::UsageFaultEnable::mask;
   if ((value & ~enables) != (handler_control_state() & ~enables)) {
-    refuse(access, name, fmt::format("SHCSR = 0x{:X}: active and pending bits cannot be written", value));
+    refuse(access, fmt::format("SHCSR = 0x{:X}: active and pending bits cannot be written", value));
   }
   exceptions_.set_enabled(number::memory_fault, scb_shcsr::MemoryFaultEnable::of(value) != 0);
   exceptions_.set_enabled(number::bus_fault, scb_shcsr::BusFaultEnable::of(value) != 0);
@@ -202,7 +169,7 @@ void SystemControl::write_priorities(const Access& access, std::uint32_t value) 
     if (has_priority(exception)) {
       exceptions_.set_priority(exception, priority);
     } else if (priority != 0) {
-      refuse(access, name, fmt::format("exception {} has no priority", exception));
+      refuse(access, fmt::format("exception {} has no priority", exception));
     }
   }
 }

@@ -5,7 +5,7 @@
 
 #include "drivers/cortex_m/registers.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 // System control block, PM0214: the register face of the exception table for the system exceptions, the
 // vector table's place, the FPU's switch, the fault status and the reset request.
@@ -17,14 +17,16 @@
 
 namespace kmax::virtual_board {
 
-class SystemControl final : public Peripheral {
+class SystemControl final : public RegisterBlock<SystemControl> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::cortex_m::ScbRegisters);
   /// Cortex-M4 r0p1 (PM0214, CPUID).
   static constexpr std::uint32_t cpuid = 0x410F'C241;
 
-  explicit SystemControl(ExceptionTable& exceptions) : exceptions_(exceptions) {}
+  explicit SystemControl(ExceptionTable& exceptions)
+      : RegisterBlock("SCB", registers()), exceptions_(exceptions) {}
 
+  /// Besides words, bytes and half words of the priorities.
   std::uint32_t read(const Access& access) override;
   void write(const Access& access, std::uint32_t value) override;
   void reset(BoardTime now) override;
@@ -48,10 +50,14 @@ class SystemControl final : public Peripheral {
   void set_bus_fault_address(std::uint32_t address) { bfar_ = address; }
 
  private:
+  static const RegisterTable<SystemControl>& registers();
   std::uint32_t interrupt_control_state() const;
+  std::uint32_t application_interrupt_state() const;
   std::uint32_t handler_control_state() const;
   std::uint32_t priorities(std::uint32_t offset, unsigned bytes) const;
-  void write_interrupt_control(const Access& access, std::uint32_t value);
+  void write_interrupt_control(std::uint32_t value);
+  void write_control(const Access& access, std::uint32_t value);
+  void write_coprocessor_access(const Access& access, std::uint32_t value);
   void write_application_interrupt(const Access& access, std::uint32_t value);
   void write_handler_control(const Access& access, std::uint32_t value);
   void write_priorities(const Access& access, std::uint32_t value);

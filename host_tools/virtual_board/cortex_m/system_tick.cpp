@@ -7,7 +7,6 @@ namespace {
 
 using namespace drivers::cortex_m;
 
-constexpr const char* name = "SysTick";
 constexpr std::uint32_t ctrl_settings = system_tick_ctrl::Enable::mask |
                                         system_tick_ctrl::TickInterrupt::mask |
                                         system_tick_ctrl::ProcessorClock::mask;
@@ -53,61 +52,51 @@ void SystemTick::advance(BoardTime now) {
   }
 }
 
-std::uint32_t SystemTick::read(const Access& access) {
-  require_word(access, name);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(SystemTickRegisters, ctrl): {
-      const std::uint32_t value = ctrl_ | (count_flag_ ? system_tick_ctrl::CountFlag::mask : 0);
-      count_flag_ = false;
-      return value;
-    }
-    case offsetof(SystemTickRegisters, load):
-      return load_;
-    case offsetof(SystemTickRegisters, val):
-      return value_at(access.now);
-    case offsetof(SystemTickRegisters, calib):
-      return calibration;
-    default:
-      refuse(access, name, "no register here");
+const RegisterTable<SystemTick>& SystemTick::registers() {
+  using Model = SystemTick;
+  using Row = Register<Model>;
+  using Layout = SystemTickRegisters;
+  // COUNTFLAG is read-only; code that sets single bits writes it back.
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, ctrl), "CTRL", Row::shows<&Model::read_ctrl>,
+       ctrl_settings | system_tick_ctrl::CountFlag::mask, Row::takes<&Model::write_ctrl>},
+      {offsetof(Layout, load), "LOAD", Row::shows<&Model::load_>, system_tick_load::Reload::maximum,
+       Row::takes<&Model::write_load>},
+      {offsetof(Layout, val), "VAL", Row::shows<&Model::read_val>, any_bits, Row::takes<&Model::write_val>},
+      {offsetof(Layout, calib), "CALIB", [](Model&, const Access&) { return calibration; }}};
+  return table;
+}
+
+std::uint32_t SystemTick::read_ctrl() {
+  const std::uint32_t value = ctrl_ | (count_flag_ ? system_tick_ctrl::CountFlag::mask : 0);
+  count_flag_ = false;
+  return value;
+}
+
+void SystemTick::write_ctrl(const Access& access, std::uint32_t value) {
+  const bool was_enabled = enabled();
+  const std::uint32_t counter = value_at(access.now);
+  const std::uint32_t changed = ctrl_ ^ value;
+  ctrl_ = value & ctrl_settings;
+  if (!enabled()) {
+    stopped_value_ = counter;
+    zero_at_ = never;
+  } else if (!was_enabled || system_tick_ctrl::ProcessorClock::of(changed) != 0) {
+    start_from(counter, access.now);
   }
 }
 
-void SystemTick::write(const Access& access, std::uint32_t value) {
-  require_word(access, name);
-  advance(access.now);
-  const bool enabled = system_tick_ctrl::Enable::of(ctrl_) != 0;
-  switch (access.offset) {
-    case offsetof(SystemTickRegisters, ctrl): {
-      // COUNTFLAG is read-only; code that sets single bits writes it back.
-      if ((value & ~(ctrl_settings | system_tick_ctrl::CountFlag::mask)) != 0)
-        refuse(access, name, "CTRL: unknown bit");
-      const std::uint32_t counter = value_at(access.now);
-      const std::uint32_t changed = ctrl_ ^ value;
-      ctrl_ = value & ctrl_settings;
-      if (system_tick_ctrl::Enable::of(ctrl_) == 0) {
-        stopped_value_ = counter;
-        zero_at_ = never;
-      } else if (!enabled || system_tick_ctrl::ProcessorClock::of(changed) != 0) {
-        start_from(counter, access.now);
-      }
-      return;
-    }
-    case offsetof(SystemTickRegisters, load):
-      if (value > system_tick_load::Reload::maximum) refuse(access, name, "LOAD has 24 bits");
-      load_ = value;
-      if (enabled && zero_at_ == never) start_from(0, access.now);
-      return;
-    case offsetof(SystemTickRegisters, val):
-      count_flag_ = false;
-      if (enabled) {
-        start_from(0, access.now);
-      } else {
-        stopped_value_ = 0;
-      }
-      return;
-    default:
-      refuse(access, name, "CALIB is read-only");
+void SystemTick::write_load(const Access& access, std::uint32_t value) {
+  load_ = value;
+  if (enabled() && zero_at_ == never) start_from(0, access.now);
+}
+
+void SystemTick::write_val(const Access& access, std::uint32_t /*value*/) {
+  count_flag_ = false;
+  if (enabled()) {
+    start_from(0, access.now);
+  } else {
+    stopped_value_ = 0;
   }
 }
 

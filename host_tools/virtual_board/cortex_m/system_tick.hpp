@@ -1,9 +1,9 @@
 #pragma once
 
 #include "drivers/cortex_m/registers.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 // SysTick, PM0214 system timer: a 24-bit counter that runs down to 0 and starts again from LOAD.
 //
@@ -17,7 +17,7 @@
 
 namespace kmax::virtual_board {
 
-class SystemTick final : public Peripheral {
+class SystemTick final : public RegisterBlock<SystemTick> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::cortex_m::SystemTickRegisters);
   static constexpr std::uint32_t calibration =
@@ -25,15 +25,20 @@ class SystemTick final : public Peripheral {
       drivers::cortex_m::system_tick_calib::TenMilliseconds::bits(18750);
 
   SystemTick(const BoardClocks& clocks, ExceptionTable& exceptions)
-      : clocks_(clocks), exceptions_(exceptions) {}
+      : RegisterBlock("SysTick", registers()), clocks_(clocks), exceptions_(exceptions) {}
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override { return zero_at_; }
   void reset(BoardTime now) override;
 
  private:
+  static const RegisterTable<SystemTick>& registers();
+  std::uint32_t read_ctrl();
+  void write_ctrl(const Access& access, std::uint32_t value);
+  void write_load(const Access& access, std::uint32_t value);
+  std::uint32_t read_val(const Access& access) const { return value_at(access.now); }
+  void write_val(const Access& access, std::uint32_t value);
+  bool enabled() const { return drivers::cortex_m::system_tick_ctrl::Enable::of(ctrl_) != 0; }
   BoardTime tick_period() const;
   std::uint32_t value_at(BoardTime now) const;
   void start_from(std::uint32_t value, BoardTime now);

@@ -44,81 +44,72 @@ VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const Virtu
 }
 
 void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
-  flash_ = std::make_unique<FlashInterface>(clocks_, bus_.flash());
-  pwr_ = std::make_unique<PwrModel>(clocks_);
-  rcc_ = std::make_unique<RccModel>(clocks_, *flash_, *pwr_);
-  identity_ = std::make_unique<DeviceIdentity>(config.identity);
-  dbgmcu_ = std::make_unique<DbgmcuModel>();
-  dwt_ = std::make_unique<DwtModel>([this] { return processor_.cycles(); },
-                                    [this] { return core_.core_debug.trace_enabled(); });
-  iwdg_ = std::make_unique<IwdgModel>();
-  iwdg_->set_oscillator_hz(config.watchdog_oscillator_hz);
-  exti_ = std::make_unique<ExtiModel>(syscfg_, core_.nvic);
-  pwm_[0] = std::make_unique<AdvancedTimerModel>(AdvancedTimer::tim1, clocks_, core_.nvic);
-  pwm_[1] = std::make_unique<AdvancedTimerModel>(AdvancedTimer::tim8, clocks_, core_.nvic);
-  encoders_[0] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim3, clocks_, core_.nvic);
-  encoders_[1] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim4, clocks_, core_.nvic);
-  adc_ = std::make_unique<AdcModel>(clocks_, core_.nvic, [this](unsigned channel, BoardTime at) {
-    return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
-  });
-  usart2_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::usart2);
-  uart4_ = std::make_unique<UsartModel>(clocks_, core_.nvic, chip::Interrupt::uart4);
-  free_timers_[0] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim2, clocks_, core_.nvic);
-  free_timers_[1] = std::make_unique<GeneralTimerModel>(GeneralTimer::tim5, clocks_, core_.nvic);
-  can1_ = std::make_unique<CanController>(clocks_, core_.nvic, can_bus_);
-  spi3_ = std::make_unique<SpiModel>(clocks_);
-
-  const auto attach = [this](std::uint32_t base, std::uint32_t size, std::string name, Peripheral& block,
-                             std::size_t enable_register = 0, std::uint32_t enable_mask = 0) {
+  constexpr std::size_t always = 0;
+  constexpr std::size_t ahb1 = offsetof(chip::RccRegisters, ahb1enr);
+  constexpr std::size_t apb1 = offsetof(chip::RccRegisters, apb1enr);
+  constexpr std::size_t apb2 = offsetof(chip::RccRegisters, apb2enr);
+  // The loop asks those with events at every event. At one instant it serves them in the order of this list:
+  // an update event comes before the conversions that it starts.
+  const auto attach = [this](bool has_events, std::uint32_t base, std::uint32_t size, std::string name,
+                             Peripheral& block, std::size_t enable_register, std::uint32_t enable_mask) {
     std::function<bool()> clocked;
-    if (enable_mask != 0) {
+    if (enable_register != always) {
       clocked = [this, enable_register, enable_mask] {
-        return rcc_->clock_enabled(static_cast<std::uint32_t>(enable_register), enable_mask);
+        return rcc_.clock_enabled(static_cast<std::uint32_t>(enable_register), enable_mask);
       };
     }
     bus_.attach(base, size, std::move(name), block, std::move(clocked));
     peripherals_.push_back(&block);
+    if (has_events) events_.add(block);
   };
-  constexpr std::size_t ahb1 = offsetof(chip::RccRegisters, ahb1enr),
-                        apb1 = offsetof(chip::RccRegisters, apb1enr),
-                        apb2 = offsetof(chip::RccRegisters, apb2enr);
+  const auto other = [this](auto model) -> Peripheral& { return *others_.emplace_back(std::move(model)); };
+  const auto timer = [&](GeneralTimer unit) -> Peripheral& {
+    return other(std::make_unique<GeneralTimerModel>(unit, clocks_, core_.nvic));
+  };
+  constexpr bool with_events = true, without_events = false;
   constexpr std::uint32_t timer_size = sizeof(chip::TimerRegisters);
-  attach(chip::tim1_base, timer_size, "TIM1", *pwm_[0], apb2, chip::rcc_apb2enr::Timer1::mask);
-  attach(chip::tim8_base, timer_size, "TIM8", *pwm_[1], apb2, chip::rcc_apb2enr::Timer8::mask);
-  attach(chip::tim3_base, timer_size, "TIM3", *encoders_[0], apb1, chip::rcc_apb1enr::Timer3::mask);
-  attach(chip::tim4_base, timer_size, "TIM4", *encoders_[1], apb1, chip::rcc_apb1enr::Timer4::mask);
-  attach(chip::adc_base, 0x400, "ADC", *adc_, apb2,
-         chip::rcc_apb2enr::Adc1::mask | chip::rcc_apb2enr::Adc2::mask | chip::rcc_apb2enr::Adc3::mask);
-  attach(chip::usart2_base, UsartModel::size, "USART2", *usart2_, apb1, chip::rcc_apb1enr::Usart2::mask);
-  attach(chip::uart4_base, UsartModel::size, "UART4", *uart4_, apb1, chip::rcc_apb1enr::Uart4::mask);
-  attach(chip::tim2_base, timer_size, "TIM2", *free_timers_[0], apb1, chip::rcc_apb1enr::Timer2::mask);
-  attach(chip::tim5_base, timer_size, "TIM5", *free_timers_[1], apb1, chip::rcc_apb1enr::Timer5::mask);
-  attach(chip::can1_base, 0x400, "CAN1", *can1_, apb1, chip::rcc_apb1enr::Can1::mask);
-  attach(chip::spi3_base, sizeof(chip::SpiRegisters), "SPI3", *spi3_, apb1, chip::rcc_apb1enr::Spi3::mask);
+  constexpr std::uint32_t all_adcs =
+      chip::rcc_apb2enr::Adc1::mask | chip::rcc_apb2enr::Adc2::mask | chip::rcc_apb2enr::Adc3::mask;
+  attach(with_events, chip::tim1_base, timer_size, "TIM1", pwm_[0], apb2, chip::rcc_apb2enr::Timer1::mask);
+  attach(with_events, chip::tim8_base, timer_size, "TIM8", pwm_[1], apb2, chip::rcc_apb2enr::Timer8::mask);
+  attach(with_events, chip::adc_base, 0x400, "ADC", adc_, apb2, all_adcs);
+  attach(with_events, chip::usart2_base, UsartModel::size, "USART2", usart2_, apb1,
+         chip::rcc_apb1enr::Usart2::mask);
+  attach(with_events, chip::uart4_base, UsartModel::size, "UART4", uart4_, apb1,
+         chip::rcc_apb1enr::Uart4::mask);
+  attach(with_events, chip::spi3_base, sizeof(chip::SpiRegisters), "SPI3", spi3_, apb1,
+         chip::rcc_apb1enr::Spi3::mask);
+  attach(with_events, chip::rcc_base, RccModel::size, "RCC", rcc_, always, 0);
+  attach(with_events, chip::iwdg_base, IwdgModel::size, "IWDG", iwdg_, always, 0);
+  attach(with_events, chip::can1_base, 0x400, "CAN1", can1_, apb1, chip::rcc_apb1enr::Can1::mask);
+  attach(with_events, chip::tim3_base, timer_size, "TIM3", encoders_[0], apb1,
+         chip::rcc_apb1enr::Timer3::mask);
+  attach(with_events, chip::tim4_base, timer_size, "TIM4", encoders_[1], apb1,
+         chip::rcc_apb1enr::Timer4::mask);
+  attach(with_events, chip::tim2_base, timer_size, "TIM2", timer(GeneralTimer::tim2), apb1,
+         chip::rcc_apb1enr::Timer2::mask);
+  attach(with_events, chip::tim5_base, timer_size, "TIM5", timer(GeneralTimer::tim5), apb1,
+         chip::rcc_apb1enr::Timer5::mask);
   constexpr std::uint32_t port_clocks[] = {chip::rcc_ahb1enr::GpioA::mask, chip::rcc_ahb1enr::GpioB::mask,
                                            chip::rcc_ahb1enr::GpioC::mask, chip::rcc_ahb1enr::GpioD::mask};
   for (std::size_t i = 0; i < ports_.size(); ++i) {
-    const auto port = static_cast<GpioPort>(i);
-    ports_[i] = std::make_unique<GpioPortModel>(port);
-    attach(chip::gpio_base(port), 0x400, fmt::format("GPIO{}", "ABCD"[i]), *ports_[i], ahb1, port_clocks[i]);
+    attach(without_events, chip::gpio_base(static_cast<GpioPort>(i)), 0x400, fmt::format("GPIO{}", "ABCD"[i]),
+           ports_[i], ahb1, port_clocks[i]);
   }
-  attach(chip::syscfg_base, 0x400, "SYSCFG", syscfg_, apb2, chip::rcc_apb2enr::SystemConfiguration::mask);
-  attach(chip::exti_base, 0x400, "EXTI", *exti_);
-  attach(chip::rcc_base, RccModel::size, "RCC", *rcc_);
-  attach(chip::pwr_base, PwrModel::size, "PWR", *pwr_, apb1, chip::rcc_apb1enr::Power::mask);
-  attach(chip::flash_interface_base, FlashInterface::size, "FLASH", *flash_);
-  attach(chip::iwdg_base, IwdgModel::size, "IWDG", *iwdg_);
-  attach(chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU", *dbgmcu_);
-  attach(drivers::cortex_m::dwt_base, DwtModel::size, "DWT", *dwt_);
-  attach(DeviceIdentity::base, DeviceIdentity::size, "system memory", *identity_);
-  // Only those that do something by themselves: the loop asks each of them at every event. At one instant in
-  // this order: an update event comes before the conversions that it starts.
-  const std::array<Peripheral*, 13> with_events{
-      pwm_[0].get(),        pwm_[1].get(),      adc_.get(),         usart2_.get(),
-      uart4_.get(),         spi3_.get(),        rcc_.get(),         iwdg_.get(),
-      can1_.get(),          encoders_[0].get(), encoders_[1].get(), free_timers_[0].get(),
-      free_timers_[1].get()};
-  for (Peripheral* peripheral : with_events) events_.add(*peripheral);
+  attach(without_events, chip::syscfg_base, 0x400, "SYSCFG", syscfg_, apb2,
+         chip::rcc_apb2enr::SystemConfiguration::mask);
+  attach(without_events, chip::exti_base, 0x400, "EXTI", exti_, always, 0);
+  attach(without_events, chip::pwr_base, PwrModel::size, "PWR", pwr_, apb1, chip::rcc_apb1enr::Power::mask);
+  attach(without_events, chip::flash_interface_base, FlashInterface::size, "FLASH", flash_, always, 0);
+  attach(without_events, chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU",
+         other(std::make_unique<DbgmcuModel>()), always, 0);
+  attach(without_events, drivers::cortex_m::dwt_base, DwtModel::size, "DWT",
+         other(std::make_unique<DwtModel>([this] { return processor_.cycles(); },
+                                          [this] { return core_.core_debug.trace_enabled(); })),
+         always, 0);
+  attach(without_events, DeviceIdentity::base, DeviceIdentity::size, "system memory",
+         other(std::make_unique<DeviceIdentity>(config.identity)), always, 0);
+  iwdg_.set_oscillator_hz(config.watchdog_oscillator_hz);
   events_.add(core_.system_tick);
   events_.add(chip_events_);
   events_.add(flash_stall_);
@@ -126,34 +117,34 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
 
 void VirtualBoard::wire() {
   bus_.on_parameter_store([this](std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime now) {
-    flash_->store(address, bytes, value, now);
+    flash_.store(address, bytes, value, now);
   });
-  pwm_[0]->on_trigger_output([this](BoardTime now) {
-    pwm_[1]->trigger_input(now);
+  pwm_[0].on_trigger_output([this](BoardTime now) {
+    pwm_[1].trigger_input(now);
     look_at_world(now);
-    adc_->trigger_injected(now);
+    adc_.trigger_injected(now);
   });
   for (std::size_t axis = 0; axis < pwm_.size(); ++axis) {
-    pwm_[axis]->on_output_change([this, axis](BoardTime now) { show_bridge(axis, now); });
+    pwm_[axis].on_output_change([this, axis](BoardTime now) { show_bridge(axis, now); });
   }
-  rcc_->on_clock_failure([this](BoardTime now) {
-    for (auto& timer : pwm_) timer->clock_failure_break(now);
+  rcc_.on_clock_failure([this](BoardTime now) {
+    for (auto& timer : pwm_) timer.clock_failure_break(now);
   });
-  rcc_->on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
+  rcc_.on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
     if (level) core_.exceptions.pend(exception_number::non_maskable);
   });
-  iwdg_->on_started([this](BoardTime /*now*/) { rcc_->note_low_speed_oscillator_running(); });
-  iwdg_->on_reset([this](BoardTime /*now*/) {
+  iwdg_.on_started([this](BoardTime /*now*/) { rcc_.note_low_speed_oscillator_running(); });
+  iwdg_.on_reset([this](BoardTime /*now*/) {
     watchdog_fired_ = true;
     processor_.stop();
   });
-  usart2_->on_transmitted([this](std::uint8_t byte, BoardTime /*end*/) { transmitted_.push_back(byte); });
+  usart2_.on_transmitted([this](std::uint8_t byte, BoardTime /*end*/) { transmitted_.push_back(byte); });
   wire_chips();
   wire_pins();
 }
 
 void VirtualBoard::wire_chips() {
-  spi3_->on_frame([this](std::uint16_t word, BoardTime now) { return exchange(word, now); });
+  spi3_.on_frame([this](std::uint16_t word, BoardTime now) { return exchange(word, now); });
   for (Drv8301Chip& driver : gate_drivers_) {
     driver.on_fault_output([this](bool /*level*/, BoardTime now) {
       show_fault_line(now);
@@ -178,7 +169,7 @@ std::uint16_t VirtualBoard::exchange(std::uint16_t word, BoardTime now) {
 // Gate signals reach the FETs through a driver that is awake and without a latched fault.
 void VirtualBoard::show_bridge(std::size_t axis, BoardTime now) {
   if (world_ == nullptr) return;
-  std::array<PwmLegOutput, 3> legs = pwm_[axis]->outputs();
+  std::array<PwmLegOutput, 3> legs = pwm_[axis].outputs();
   if (!gate_drivers_[axis].drives_gates(now)) {
     for (PwmLegOutput& leg : legs) leg.enabled = false;
   }
@@ -194,13 +185,13 @@ void VirtualBoard::show_fault_line(BoardTime now) {
 void VirtualBoard::wire_pins() {
   for (std::size_t i = 0; i < ports_.size(); ++i) {
     const auto port_id = static_cast<GpioPort>(i);
-    ports_[i]->on_input_change([this, port_id](unsigned pin, bool level, BoardTime now) {
-      exti_->set_pin(port_id, pin, level, now);
+    ports_[i].on_input_change([this, port_id](unsigned pin, bool level, BoardTime now) {
+      exti_.set_pin(port_id, pin, level, now);
     });
   }
   for (std::size_t i = 0; i < ports_.size(); ++i) {
     const auto port_id = static_cast<GpioPort>(i);
-    ports_[i]->on_output_change([this, port_id](unsigned number, PinOutput output, BoardTime now) {
+    ports_[i].on_output_change([this, port_id](unsigned number, PinOutput output, BoardTime now) {
       const board::odrive_v3::PinLocation pin{port_id, static_cast<std::uint8_t>(number)};
       const bool high = output == PinOutput::high;
       if (pin == pins::gate_enable) {
@@ -234,7 +225,7 @@ void VirtualBoard::look_at_world(BoardTime now) {
   if (world_ == nullptr) return;
   for (std::size_t axis = 0; axis < encoders_.size(); ++axis) {
     const EncoderSignals signals = world_->encoder(axis, now);
-    encoders_[axis]->set_encoder_count(signals.edges);
+    encoders_[axis].set_encoder_count(signals.edges);
     const auto index = axis == 0 ? pins::encoder0_index : pins::encoder1_index;
     if (port(index.port).level(index.number) != signals.index)
       port(index.port).drive(index.number, signals.index ? PinDrive::high : PinDrive::low, now);
@@ -251,17 +242,17 @@ void VirtualBoard::look_at_world(BoardTime now) {
 void VirtualBoard::reset(ResetCause cause) {
   const BoardTime at = now();
   for (Peripheral* peripheral : peripherals_) peripheral->reset(at);
-  rcc_->note_reset(cause);
+  rcc_.note_reset(cause);
   processor_.reset(at);
   watchdog_fired_ = false;
   ++resets_;
 }
 
 void VirtualBoard::run_until(BoardTime time) {
-  while (now() < time && !flash_->power_is_cut()) {
+  while (now() < time && !flash_.power_is_cut()) {
     const RunEnd end = events_.run_until(time);
     if (flash_stall_.take()) {
-      stall_until(flash_->busy_until());
+      stall_until(flash_.busy_until());
       continue;
     }
     if (watchdog_fired_) {
@@ -270,7 +261,7 @@ void VirtualBoard::run_until(BoardTime time) {
       reset(ResetCause::software);
     } else if (end == RunEnd::fault) {
       // Cut in the middle of an erase or a store: nothing runs any more.
-      if (flash_->power_is_cut()) return;
+      if (flash_.power_is_cut()) return;
       fail();
     } else if (end == RunEnd::stopped) {
       return;
@@ -303,7 +294,7 @@ void VirtualBoard::run_for(double duration_s) {
 }
 
 void VirtualBoard::receive(std::span<const std::uint8_t> bytes) {
-  for (const std::uint8_t byte : bytes) usart2_->receive(byte, true, true, now());
+  for (const std::uint8_t byte : bytes) usart2_.receive(byte, true, true, now());
 }
 
 std::vector<std::uint8_t> VirtualBoard::transmitted() {
@@ -318,12 +309,11 @@ void VirtualBoard::open_emergency_stop(bool open) {
 }
 
 bool VirtualBoard::healthy() const {
-  return ports_[static_cast<std::size_t>(pins::healthy.port)]->level(pins::healthy.number);
+  return ports_[static_cast<std::size_t>(pins::healthy.port)].level(pins::healthy.number);
 }
 
 bool VirtualBoard::fault_line() const {
-  return ports_[static_cast<std::size_t>(pins::gate_driver_fault.port)]->level(
-      pins::gate_driver_fault.number);
+  return ports_[static_cast<std::size_t>(pins::gate_driver_fault.port)].level(pins::gate_driver_fault.number);
 }
 
 void VirtualBoard::hold_fault_line(bool low) {
@@ -336,7 +326,7 @@ void VirtualBoard::pull_reset() {
 }
 
 void VirtualBoard::cycle_power() {
-  flash_->power_up(now());
+  flash_.power_up(now());
   for (const auto memory : {bus_.sram(), bus_.ccm()}) {
     for (std::size_t i = 0; i < memory.size(); ++i) memory[i] = static_cast<std::uint8_t>(0xA5U ^ (i * 7U));
   }

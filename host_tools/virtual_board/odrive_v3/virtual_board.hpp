@@ -11,7 +11,6 @@
 
 #include "host_tools/base/elf_image.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
-#include "host_tools/virtual_board/cortex_m/dwt.hpp"
 #include "host_tools/virtual_board/cortex_m/processor.hpp"
 #include "host_tools/virtual_board/event_loop.hpp"
 #include "host_tools/virtual_board/odrive_v3/as5047p_chip.hpp"
@@ -21,14 +20,12 @@
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
 #include "host_tools/virtual_board/stm32f4/can_controller.hpp"
-#include "host_tools/virtual_board/stm32f4/dbgmcu.hpp"
 #include "host_tools/virtual_board/stm32f4/device_identity.hpp"
 #include "host_tools/virtual_board/stm32f4/exti_and_syscfg.hpp"
 #include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
 #include "host_tools/virtual_board/stm32f4/general_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
-#include "host_tools/virtual_board/stm32f4/pwr.hpp"
 #include "host_tools/virtual_board/stm32f4/rcc.hpp"
 #include "host_tools/virtual_board/stm32f4/spi.hpp"
 #include "host_tools/virtual_board/stm32f4/usart.hpp"
@@ -42,15 +39,19 @@ struct VirtualBoardConfig {
   std::uint32_t watchdog_oscillator_hz = 32'000;
 };
 
-/// The gate drivers' own events (they wake some time after EN_GATE) in the board's order of time. Not on the
-/// bus.
-class ChipEvents final : public Peripheral {
+/// Something with events of its own in the board's order of time that is not on the bus.
+class OffTheBus : public Peripheral {
+ public:
+  std::uint32_t read(const Access& access) override { refuse(access, "off the bus", "it has no registers"); }
+  void write(const Access& access, std::uint32_t /*value*/) override {
+    refuse(access, "off the bus", "it has no registers");
+  }
+};
+
+/// The gate drivers wake some time after EN_GATE.
+class ChipEvents final : public OffTheBus {
  public:
   explicit ChipEvents(std::array<Drv8301Chip, 2>& chips) : chips_(chips) {}
-  std::uint32_t read(const Access& access) override { refuse(access, "chips", "they have no registers"); }
-  void write(const Access& access, std::uint32_t /*value*/) override {
-    refuse(access, "chips", "they have no registers");
-  }
   void advance(BoardTime now) override {
     for (Drv8301Chip& chip : chips_) chip.advance(now);
   }
@@ -61,29 +62,23 @@ class ChipEvents final : public Peripheral {
   std::array<Drv8301Chip, 2>& chips_;
 };
 
-/// Stops the processor as soon as the flash has become busy, at the end of the block that did it. Not on the
-/// bus.
-class FlashStall final : public Peripheral {
+/// Stops the processor as soon as the flash has become busy, at the end of the block that did it.
+class FlashStall final : public OffTheBus {
  public:
-  FlashStall(const std::unique_ptr<FlashInterface>& flash, Processor& processor)
-      : flash_(flash), processor_(processor) {}
-  std::uint32_t read(const Access& access) override { refuse(access, "flash stall", "it has no registers"); }
-  void write(const Access& access, std::uint32_t /*value*/) override {
-    refuse(access, "flash stall", "it has no registers");
-  }
+  FlashStall(const FlashInterface& flash, Processor& processor) : flash_(flash), processor_(processor) {}
   void advance(BoardTime /*now*/) override {
-    served_ = flash_->busy_until();
+    served_ = flash_.busy_until();
     pending_ = true;
     processor_.stop();
   }
-  BoardTime next_event() const override { return flash_->busy_until() > served_ ? processor_.now() : never; }
-  void reset(BoardTime /*now*/) override { served_ = flash_->busy_until(); }
+  BoardTime next_event() const override { return flash_.busy_until() > served_ ? processor_.now() : never; }
+  void reset(BoardTime /*now*/) override { served_ = flash_.busy_until(); }
 
   /// The flash has become busy since the last call.
   bool take() { return std::exchange(pending_, false); }
 
  private:
-  const std::unique_ptr<FlashInterface>& flash_;
+  const FlashInterface& flash_;
   Processor& processor_;
   BoardTime served_ = 0;
   bool pending_ = false;
@@ -129,7 +124,7 @@ class VirtualBoard {
   /// Its level; low is a fault.
   bool fault_line() const;
 
-  bool bridge_armed(std::size_t axis) const { return pwm_[axis]->moe(); }
+  bool bridge_armed(std::size_t axis) const { return pwm_[axis].moe(); }
   std::uint64_t resets() const { return resets_; }
   /// What the processor is about to execute, in words.
   std::string where() const;
@@ -138,18 +133,18 @@ class VirtualBoard {
   Processor& processor() { return processor_; }
   Bus& bus() { return bus_; }
   CorePeripherals& core() { return core_; }
-  FlashInterface& flash() { return *flash_; }
-  RccModel& rcc() { return *rcc_; }
-  UsartModel& usart() { return *usart2_; }
+  FlashInterface& flash() { return flash_; }
+  RccModel& rcc() { return rcc_; }
+  UsartModel& usart() { return usart2_; }
   /// GPIO1 and GPIO2 of J3; the image of today does not use it.
-  UsartModel& uart4() { return *uart4_; }
+  UsartModel& uart4() { return uart4_; }
   CanBus& can_bus() { return can_bus_; }
-  const CanBusNode& can_node() const { return *can1_->node(); }
-  AdvancedTimerModel& pwm(std::size_t axis) { return *pwm_[axis]; }
-  GeneralTimerModel& encoder_timer(std::size_t axis) { return *encoders_[axis]; }
-  AdcModel& adc() { return *adc_; }
+  const CanBusNode& can_node() const { return *can1_.node(); }
+  AdvancedTimerModel& pwm(std::size_t axis) { return pwm_[axis]; }
+  GeneralTimerModel& encoder_timer(std::size_t axis) { return encoders_[axis]; }
+  AdcModel& adc() { return adc_; }
   Drv8301Chip& gate_driver(std::size_t axis) { return gate_drivers_[axis]; }
-  GpioPortModel& port(drivers::stm32f4::GpioPort port) { return *ports_[static_cast<std::size_t>(port)]; }
+  GpioPortModel& port(drivers::stm32f4::GpioPort port) { return ports_[static_cast<std::size_t>(port)]; }
 
  private:
   void attach_peripherals(const VirtualBoardConfig& config);
@@ -173,25 +168,28 @@ class VirtualBoard {
   Processor processor_;
   EventLoop events_;
 
-  std::unique_ptr<FlashInterface> flash_;
-  std::unique_ptr<PwrModel> pwr_;
-  std::unique_ptr<RccModel> rcc_;
-  std::unique_ptr<DeviceIdentity> identity_;
-  std::unique_ptr<DbgmcuModel> dbgmcu_;
-  std::unique_ptr<DwtModel> dwt_;
-  std::unique_ptr<IwdgModel> iwdg_;
-  std::array<std::unique_ptr<GpioPortModel>, 4> ports_;
+  FlashInterface flash_{clocks_, bus_.flash()};
+  PwrModel pwr_{clocks_};
+  RccModel rcc_{clocks_, flash_, pwr_};
+  IwdgModel iwdg_;
+  std::array<GpioPortModel, 4> ports_{
+      GpioPortModel{drivers::stm32f4::GpioPort::a}, GpioPortModel{drivers::stm32f4::GpioPort::b},
+      GpioPortModel{drivers::stm32f4::GpioPort::c}, GpioPortModel{drivers::stm32f4::GpioPort::d}};
   SyscfgModel syscfg_;
-  std::unique_ptr<ExtiModel> exti_;
-  std::array<std::unique_ptr<AdvancedTimerModel>, 2> pwm_;
-  std::array<std::unique_ptr<GeneralTimerModel>, 2> encoders_;
-  std::unique_ptr<AdcModel> adc_;
-  std::unique_ptr<UsartModel> usart2_;
-  std::unique_ptr<UsartModel> uart4_;
-  std::array<std::unique_ptr<GeneralTimerModel>, 2> free_timers_;  ///< TIM2 and TIM5
+  ExtiModel exti_{syscfg_, core_.nvic};
+  std::array<AdvancedTimerModel, 2> pwm_{AdvancedTimerModel{AdvancedTimer::tim1, clocks_, core_.nvic},
+                                         AdvancedTimerModel{AdvancedTimer::tim8, clocks_, core_.nvic}};
+  std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3, clocks_, core_.nvic},
+                                             GeneralTimerModel{GeneralTimer::tim4, clocks_, core_.nvic}};
+  AdcModel adc_{clocks_, core_.nvic, [this](unsigned channel, BoardTime at) {
+                  return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
+                }};
+  UsartModel usart2_{clocks_, core_.nvic, drivers::stm32f4::Interrupt::usart2};
+  UsartModel uart4_{clocks_, core_.nvic, drivers::stm32f4::Interrupt::uart4};
   CanBus can_bus_;
-  std::unique_ptr<CanController> can1_;
-  std::unique_ptr<SpiModel> spi3_;
+  CanController can1_{clocks_, core_.nvic, can_bus_};
+  SpiModel spi3_{clocks_};
+  std::vector<std::unique_ptr<Peripheral>> others_;  ///< on the bus, and of no concern to the board's wiring
   std::array<Drv8301Chip, 2> gate_drivers_;
   As5047pChip serial_encoder_{
       [this](BoardTime now) { return world_ != nullptr ? world_->serial_encoder(now).angle : 0; }};

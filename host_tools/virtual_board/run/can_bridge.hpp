@@ -4,7 +4,7 @@
 
 #include "host_tools/serve/can_connection.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
-#include "host_tools/virtual_board/run/can_host_node.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 
 namespace kmax::virtual_board {
 

@@ -3,9 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <string>
 
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -63,33 +64,55 @@ class AdcModel final : public Peripheral {
     bool held = false;
     std::uint32_t code = 0;
   };
-  struct Converter {
-    unsigned number = 0;
-    std::uint32_t sr = 0, cr1 = 0, cr2 = 0, smpr1 = 0, smpr2 = 0, sqr3 = 0, jsqr = 0, dr = 0;
-    std::array<std::uint32_t, 4> jdr{};
-    BoardTime on_since = never;
-    bool injected_running = false;
-    unsigned index = 0, count = 0;  // of the conversion under way, of the group
-    Conversion injected;
-    BoardTime group_ends_at = 0;
-    bool regular_waiting = false, regular_running = false;
-    Conversion regular;
+  class Converter {
+   public:
+    Converter(AdcModel& model, unsigned number) : model_(&model), number_(number) {}
+    static const RegisterTable<Converter>& registers();
+
+    const char* name() const;
+    bool busy() const { return injected_running || regular_running; }
+    bool interrupts() const;
+    void start_injected(BoardTime now);
+    /// Does the next thing that is due; false when there is none.
+    bool step(BoardTime now);
+    BoardTime next_event() const;
+
+    std::uint32_t sr = 0, cr2 = 0;
+    bool injected_running = false, regular_running = false;
     std::uint64_t ignored_triggers = 0, restarted_groups = 0;
+
+   private:
+    void write_cr2(const Access& access, std::uint32_t value);
+    void write_list(const Access& access, std::uint32_t value);
+    template <std::uint32_t Converter::*target>
+    void write_sampling(const Access& access, std::uint32_t value);
+    void write_sqr3(const Access& access, std::uint32_t value);
+    std::uint32_t read_data();
+    void require_ready(BoardTime now) const;
+    void start_regular(BoardTime now);
+    Conversion conversion(unsigned channel, BoardTime begin) const;
+    /// Channel of a place in the injected group.
+    unsigned listed_channel(unsigned place) const;
+    [[noreturn]] void refuse(const Access& access, const std::string& why) const {
+      virtual_board::refuse(access, name(), why);
+    }
+    [[noreturn]] void refuse_start(const std::string& why) const;
+
+    AdcModel* model_;
+    unsigned number_;
+    std::uint32_t cr1_ = 0, smpr1_ = 0, smpr2_ = 0, sqr3_ = 0, jsqr_ = 0, dr_ = 0;
+    std::array<std::uint32_t, 4> jdr_{};
+    BoardTime on_since_ = never;
+    unsigned index_ = 0, count_ = 0;  // of the conversion under way, of the group
+    Conversion injected_;
+    BoardTime group_ends_at_ = 0;
+    bool regular_waiting_ = false;
+    Conversion regular_;
   };
 
-  std::uint32_t read_common(const Access& access) const;
-  void write_common(const Access& access, std::uint32_t value);
-  void write_cr1(Converter& adc, const Access& access, std::uint32_t value);
-  void write_cr2(Converter& adc, const Access& access, std::uint32_t value);
-  void write_list(Converter& adc, const Access& access, std::uint32_t value);
-  void write_sampling(Converter& adc, const Access& access, std::uint32_t& target, std::uint32_t value,
-                      unsigned channels);
-
-  void require_ready(const Converter& adc, BoardTime now) const;
-  void start_injected(Converter& adc, BoardTime now);
-  void start_regular(Converter& adc, BoardTime now);
-  Conversion conversion(const Converter& adc, unsigned channel, BoardTime begin) const;
-  bool step(Converter& adc, BoardTime now);
+  static const RegisterTable<AdcModel>& common_registers();
+  std::uint32_t read_csr() const;
+  void write_ccr(const Access& access, std::uint32_t value);
   void hold(Conversion& conversion) const;
   void settle();
   BoardTime clock_period() const;
@@ -97,7 +120,7 @@ class AdcModel final : public Peripheral {
   const BoardClocks& clocks_;
   InterruptLines& interrupts_;
   Input volts_;
-  std::array<Converter, 3> converters_;
+  std::array<Converter, 3> converters_{Converter{*this, 1}, Converter{*this, 2}, Converter{*this, 3}};
   std::uint32_t ccr_ = 0;
   BoardTime next_event_ = never;
   bool interrupt_ = false;

@@ -24,7 +24,7 @@ constexpr std::uint32_t longest_count = 0xFFFF;
 
 AdvancedTimerModel::AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks,
                                        InterruptLines& interrupts)
-    : name_(unit == AdvancedTimer::tim1 ? "TIM1" : "TIM8"),
+    : RegisterBlock(unit == AdvancedTimer::tim1 ? "TIM1" : "TIM8", registers()),
       unit_(unit),
       clocks_(clocks),
       interrupts_(interrupts) {
@@ -114,7 +114,7 @@ bool AdvancedTimerModel::load_preloaded() {
   if (!waiting_) return false;
   psc_.active = psc_.preload;
   arr_.active = arr_.preload;
-  for (Compare& compare : ccr_) compare.active = compare.preload;
+  for (PreloadedWord& compare : ccr_) compare.active = compare.preload;
   waiting_ = false;
   return true;
 }
@@ -160,22 +160,22 @@ void AdvancedTimerModel::show_trigger_level(BoardTime now) {
 
 void AdvancedTimerModel::note_waiting() {
   waiting_ = psc_.preload != psc_.active || arr_.preload != arr_.active;
-  for (const Compare& compare : ccr_) waiting_ = waiting_ || compare.preload != compare.active;
+  for (const PreloadedWord& compare : ccr_) waiting_ = waiting_ || compare.preload != compare.active;
 }
 
-std::uint32_t AdvancedTimerModel::channel_mode(unsigned leg) const {
-  return timer_ccmr::CompareMode<1>::of(ccmr_[leg / 2] >> (timer_ccmr::bits_per_channel * (leg % 2)));
+std::uint32_t AdvancedTimerModel::output_mode(unsigned leg) const {
+  return timer_ccmr::CompareMode<1>::of(channel_mode(ccmr_, leg));
 }
 
 bool AdvancedTimerModel::preloaded(unsigned leg) const {
-  return timer_ccmr::ComparePreload<1>::of(ccmr_[leg / 2] >> (timer_ccmr::bits_per_channel * (leg % 2))) != 0;
+  return timer_ccmr::ComparePreload<1>::of(channel_mode(ccmr_, leg)) != 0;
 }
 
 /// Section PWM mode: mode 2 is active while counting up for CNT >= CCR, down for CNT > CCR, which is top -
 /// CCR ticks of either half period; mode 1 is its inverse. Stopped, the comparison stands still.
 PwmLegOutput AdvancedTimerModel::leg_output(unsigned leg) const {
   const std::uint32_t both = timer_ccer::Enable<1>::mask | timer_ccer::ComplementaryEnable<1>::mask;
-  if (!moe() || (ccer_ >> (timer_ccer::bits_per_channel * leg) & both) == 0) return {};
+  if (!moe() || (channel_switches(ccer_, leg) & both) == 0) return {};
   const std::uint32_t compare = ccr_[leg].active;
   double above = 0.0;
   if (counter_.running()) {
@@ -188,7 +188,7 @@ PwmLegOutput AdvancedTimerModel::leg_output(unsigned leg) const {
   const BoardTime dead_time_clock = clocks_.apb2_timer << timer_cr1::ClockDivision::of(cr1_);
   const auto code = static_cast<std::uint8_t>(timer_bdtr::DeadTime::of(bdtr_));
   return {.enabled = true,
-          .high_duty = channel_mode(leg) == timer_ccmr::pwm_mode_2 ? above : 1.0 - above,
+          .high_duty = output_mode(leg) == timer_ccmr::pwm_mode_2 ? above : 1.0 - above,
           .dead_time = seconds(dead_time_clock * drivers::stm32f4::dead_time_ticks(code))};
 }
 

@@ -5,9 +5,10 @@
 #include <functional>
 #include <string>
 
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 #include "host_tools/virtual_board/stm32f4/centre_aligned_counter.hpp"
+#include "host_tools/virtual_board/stm32f4/timer_channels.hpp"
 
 namespace kmax::virtual_board {
 
@@ -39,12 +40,10 @@ struct PwmLegOutput {
 /// The over- and underflow are events of the board only while somebody can see them: update interrupt,
 /// trigger output, a preloaded value that waits. At most two for each PWM period; otherwise they are made up
 /// for at the next access. Hence any write may bring next_event() forward.
-class AdvancedTimerModel final : public Peripheral {
+class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
  public:
   AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks, InterruptLines& interrupts);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
   void reset(BoardTime now) override;
@@ -67,27 +66,23 @@ class AdvancedTimerModel final : public Peripheral {
   bool moe() const;
 
  private:
-  struct Compare {
-    std::uint32_t preload = 0;
-    std::uint32_t active = 0;
-  };
-
-  // Register writes, advanced_timer_registers.cpp.
+  static const RegisterTable<AdvancedTimerModel>& registers();
+  std::uint32_t read_cr1() const;
   void write_cr1(const Access& access, std::uint32_t value);
   void write_cr2(const Access& access, std::uint32_t value);
   void write_smcr(const Access& access, std::uint32_t value);
   void write_egr(const Access& access, std::uint32_t value);
   void write_ccmr(const Access& access, unsigned index, std::uint32_t value);
   void write_ccer(const Access& access, std::uint32_t value);
+  std::uint32_t read_cnt(const Access& access) const { return counter_.count(access.now); }
   void write_cnt(const Access& access, std::uint32_t value);
   void write_arr(const Access& access, std::uint32_t value);
+  void write_psc(std::uint32_t value);
   void write_ccr(const Access& access, unsigned index, std::uint32_t value);
   void write_bdtr(const Access& access, std::uint32_t value);
-  void require_known(const Access& access, std::uint32_t value, std::uint32_t known, const char* name) const;
-  void require_16_bits(const Access& access, std::uint32_t value) const;
   void require_defined_outputs(const Access& access) const;
+  void after_write() override { update_interrupts(); }
 
-  // Counting and events, advanced_timer.cpp.
   bool centre_aligned() const;
   BoardTime tick() const { return clocks_.apb2_timer * (psc_.active + 1); }
   void start_counter(BoardTime now);
@@ -101,10 +96,9 @@ class AdvancedTimerModel final : public Peripheral {
   void refresh_outputs(BoardTime now);
   PwmLegOutput leg_output(unsigned leg) const;
   void update_interrupts();
-  std::uint32_t channel_mode(unsigned leg) const;
+  std::uint32_t output_mode(unsigned leg) const;
   bool preloaded(unsigned leg) const;
 
-  const char* name_;
   AdvancedTimer unit_;
   const BoardClocks& clocks_;
   InterruptLines& interrupts_;
@@ -115,8 +109,8 @@ class AdvancedTimerModel final : public Peripheral {
   std::uint32_t cr1_ = 0;  // without CEN and DIR, which the counter has
   std::uint32_t cr2_ = 0, smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0, rcr_ = 0, bdtr_ = 0;
   std::array<std::uint32_t, 2> ccmr_{};
-  Compare psc_, arr_;
-  std::array<Compare, 3> ccr_{};
+  PreloadedWord psc_, arr_;
+  std::array<PreloadedWord, 3> ccr_{};
   std::uint32_t repetitions_ = 0;
   bool lock_decided_ = false;
   bool waiting_ = false;  // a preloaded value differs from the active one

@@ -7,9 +7,24 @@
 
 #include "drivers/can_frame.hpp"
 #include "host_tools/virtual_board/board_time.hpp"
-#include "host_tools/virtual_board/stm32f4/can_frame_bits.hpp"
 
 namespace kmax::virtual_board {
+
+/// A frame as the bits that go over the bus, from start of frame to end of frame, stuff bits included: ISO
+/// 11898-1, sections on frame formats, bit stuffing and the CRC sequence. False is dominant.
+struct CanFrameBits {
+  std::vector<bool> bits;
+  unsigned arbitration_end = 0;  ///< bits that take part in the arbitration, stuff bits included
+  unsigned acknowledge_slot = 0;
+};
+
+CanFrameBits can_frame_bits(const drivers::CanFrame& frame);
+
+/// Recessive bits between two frames.
+inline constexpr unsigned can_intermission_bits = 3;
+
+/// CRC-15 with the polynomial 0x4599 over bits that are not stuffed.
+std::uint16_t can_crc(const std::vector<bool>& bits);
 
 /// How an attempt to send ended; the errors are numbered as bxCAN's LEC.
 enum class CanOutcome : std::uint8_t {
@@ -119,6 +134,41 @@ class CanBus {
   const CanBusNode* victim_ = nullptr;
   std::uint64_t frames_sent_ = 0, frames_destroyed_ = 0;
   BoardTime busy_time_ = 0;
+};
+
+/// Error counters of one node: ISO 11898-1, fault confinement. The additions of 8 for dominant bits after an
+/// error flag and the exception for stuff errors in the arbitration field are left out: no node here sends a
+/// longer flag than it should.
+class CanFaultConfinement {
+ public:
+  unsigned transmit_errors() const { return transmit_; }
+  unsigned receive_errors() const { return receive_; }
+  bool warning() const { return transmit_ >= 96 || receive_ >= 96; }
+  bool passive() const { return transmit_ > 127 || receive_ > 127; }
+  bool bus_off() const { return transmit_ > 255; }
+
+  void sent() { transmit_ -= transmit_ != 0 ? 1 : 0; }
+  void received() {
+    if (receive_ > 127) {
+      receive_ = 127;
+    } else if (receive_ != 0) {
+      --receive_;
+    }
+  }
+  /// `unacknowledged`: nobody has set the acknowledge bit; a node that is error passive does not count that,
+  /// so one alone on a bus never becomes bus-off.
+  void transmit_error(bool unacknowledged) {
+    if (unacknowledged && passive()) return;
+    transmit_ += 8;
+  }
+  void receive_error() {
+    if (receive_ < 255) ++receive_;
+  }
+  void reset() { transmit_ = receive_ = 0; }
+
+ private:
+  unsigned transmit_ = 0;
+  unsigned receive_ = 0;
 };
 
 /// Counts sequences of eleven recessive bits for a node that waits to join a bus.

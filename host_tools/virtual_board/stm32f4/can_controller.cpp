@@ -22,7 +22,7 @@ constexpr std::uint32_t beyond_length = 0xCCCC'CCCC;
 }  // namespace
 
 CanController::CanController(const BoardClocks& clocks, InterruptLines& interrupts, CanBus& bus)
-    : clocks_(clocks), interrupts_(interrupts), bus_(bus) {
+    : RegisterBlock("CAN1", registers()), clocks_(clocks), interrupts_(interrupts), bus_(bus) {
   bus_.attach(*this);
 }
 
@@ -103,12 +103,11 @@ void CanController::leave_initialization(const Access& access) {
 }
 
 void CanController::write_control(const Access& access, std::uint32_t value) {
-  constexpr const char* name = "CAN1";
   constexpr std::uint32_t modelled = can_mcr::InitializationRequest::mask | can_mcr::Sleep::mask |
                                      can_mcr::NoRetransmission::mask | can_mcr::MasterReset::mask |
                                      can_mcr::DebugFreeze::mask;
   if ((value & ~modelled) != 0) {
-    refuse(access, name, "MCR: TXFP, RFLM, AWUM, ABOM and TTCM are not modelled, other bits are reserved");
+    refuse(access, "MCR: TXFP, RFLM, AWUM, ABOM and TTCM are not modelled, other bits are reserved");
   }
   if (can_mcr::MasterReset::of(value) != 0) {
     mcr_ = can_mcr::reset_value;
@@ -121,10 +120,10 @@ void CanController::write_control(const Access& access, std::uint32_t value) {
   }
   const bool sleep = can_mcr::Sleep::of(value) != 0;
   const bool initialize = can_mcr::InitializationRequest::of(value) != 0;
-  if (sleep && initialize) refuse(access, name, "INRQ is set without clearing SLEEP (section Sleep mode)");
-  if (sleep && mode_ != Mode::sleep) refuse(access, name, "entering sleep mode is not modelled");
+  if (sleep && initialize) refuse(access, "INRQ is set without clearing SLEEP (section Sleep mode)");
+  if (sleep && mode_ != Mode::sleep) refuse(access, "entering sleep mode is not modelled");
   if (!sleep && !initialize && mode_ == Mode::sleep && !wants_initialization_) {
-    refuse(access, name, "sleep is left without going through initialization: BTR is not set");
+    refuse(access, "sleep is left without going through initialization: BTR is not set");
   }
   mcr_ = value;
   if (!initialize) {

@@ -6,10 +6,9 @@
 #include <optional>
 
 #include "drivers/stm32f4/registers/can.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
-#include "host_tools/virtual_board/stm32f4/can_fault_confinement.hpp"
 #include "host_tools/virtual_board/stm32f4/can_filters.hpp"
 
 namespace kmax::virtual_board {
@@ -32,7 +31,7 @@ namespace kmax::virtual_board {
 /// Refused: TXFP, RFLM, AWUM, ABOM, TTCM, sleep other than after reset, WKUIE, SLKIE, TGT, loop back without
 /// silent mode, BTR outside of initialization, writing back TSR or RFxR as read (it clears flags that nobody
 /// has looked at).
-class CanController final : public Peripheral, private CanBusNode {
+class CanController final : public RegisterBlock<CanController>, private CanBusNode {
  public:
   CanController(const BoardClocks& clocks, InterruptLines& interrupts, CanBus& bus);
   ~CanController() override { bus_.detach(*this); }
@@ -76,13 +75,20 @@ class CanController final : public Peripheral, private CanBusNode {
   void on_bus_busy(BoardTime now) override;
   void on_bus_idle(bool after_frame, BoardTime now) override;
 
+  static const RegisterTable<CanController>& registers();
+  std::uint32_t read_status() const;
   std::uint32_t status_of_mailboxes() const;
+  std::uint32_t fifo_status(unsigned fifo) const;
   std::uint32_t error_status() const;
   std::uint32_t read_mailbox(const Access& access) const;
   std::uint32_t read_fifo(const Access& access) const;
   void write_control(const Access& access, std::uint32_t value);
-  void write_mailbox_status(const Access& access, std::uint32_t value);
-  void write_fifo_status(const Access& access, Fifo& fifo, std::uint32_t value);
+  void write_status(std::uint32_t value);
+  void write_mailbox_status(std::uint32_t value);
+  void write_fifo_status(unsigned fifo, std::uint32_t value);
+  void write_errors(std::uint32_t value);
+  void write_bit_timing(const Access& access, std::uint32_t value);
+  void after_write() override { settle(); }
   void write_mailbox(const Access& access, std::uint32_t value);
   void leave_initialization(const Access& access);
 

@@ -9,7 +9,7 @@ namespace {
 
 using namespace drivers::stm32f4;
 
-constexpr const char* name = "CAN1";
+constexpr const char* can1 = "CAN1";
 constexpr std::uint32_t banks_mask = (1U << can1_filter_banks) - 1;
 constexpr std::uint32_t first_bank = offsetof(CanRegisters, bank);
 constexpr std::uint32_t bank_size = sizeof(CanFilterBankRegisters);
@@ -20,69 +20,66 @@ bool bit(std::uint32_t word, unsigned index) {
 
 }  // namespace
 
-std::uint32_t CanFilters::read(const Access& access) const {
-  switch (access.offset) {
-    case offsetof(CanRegisters, fmr):
-      return fmr_;
-    case offsetof(CanRegisters, fm1r):
-      return fm1r_;
-    case offsetof(CanRegisters, fs1r):
-      return fs1r_;
-    case offsetof(CanRegisters, ffa1r):
-      return ffa1r_;
-    case offsetof(CanRegisters, fa1r):
-      return fa1r_;
-    default:
-      break;
-  }
-  const std::uint32_t index = (access.offset - first_bank) / bank_size;
-  if (access.offset < first_bank || index >= banks_.size()) refuse(access, name, "no register of CAN1 here");
-  return access.offset % bank_size == offsetof(CanFilterBankRegisters, fr1) ? banks_[index].first
-                                                                            : banks_[index].second;
+const RegisterTable<CanFilters>& CanFilters::registers() {
+  using Model = CanFilters;
+  using Row = Register<Model>;
+  using Layout = CanRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, fmr), "FMR", Row::shows<&Model::fmr_>, any_bits, Row::takes<&Model::write_control>},
+      {offsetof(Layout, fm1r), "FM1R", Row::shows<&Model::fm1r_>, banks_mask,
+       Row::takes<&Model::write_setting<&Model::fm1r_>>},
+      {offsetof(Layout, fs1r), "FS1R", Row::shows<&Model::fs1r_>, banks_mask,
+       Row::takes<&Model::write_setting<&Model::fs1r_>>},
+      {offsetof(Layout, ffa1r), "FFA1R", Row::shows<&Model::ffa1r_>, banks_mask,
+       Row::takes<&Model::write_setting<&Model::ffa1r_>>},
+      {offsetof(Layout, fa1r), "FA1R", Row::shows<&Model::fa1r_>, banks_mask,
+       Row::takes<&Model::write_activation>}};
+  return table;
 }
 
-void CanFilters::write_setting(const Access& access, std::uint32_t& target, std::uint32_t value) {
-  if ((value & ~banks_mask) != 0)
-    refuse(access, name, fmt::format("0x{:X} touches banks that are not CAN1's", value));
-  if (can_fmr::FilterInitialization::of(fmr_) == 0) {
-    refuse(access, name,
-           "mode, scale and FIFO of filters are written with FINIT = 0 (section Register access protection)");
-  }
-  target = value;
+std::uint32_t* CanFilters::bank_word(const Access& access) {
+  const std::uint32_t index = (access.offset - first_bank) / bank_size;
+  if (access.offset < first_bank || index >= banks_.size()) return nullptr;
+  const bool first = access.offset % bank_size == offsetof(CanFilterBankRegisters, fr1);
+  return first ? &banks_[index].first : &banks_[index].second;
+}
+
+std::uint32_t CanFilters::read(const Access& access) {
+  if (const std::uint32_t* word = bank_word(access)) return *word;
+  return registers().read(*this, can1, access);
 }
 
 void CanFilters::write(const Access& access, std::uint32_t value) {
-  switch (access.offset) {
-    case offsetof(CanRegisters, fmr):
-      if ((value & ~can_fmr::FilterInitialization::mask) !=
-          (can_fmr::reset_value & ~can_fmr::FilterInitialization::mask)) {
-        refuse(access, name, fmt::format("FMR = 0x{:08X}: only FINIT may change", value));
-      }
-      fmr_ = value;
-      return;
-    case offsetof(CanRegisters, fm1r):
-      return write_setting(access, fm1r_, value);
-    case offsetof(CanRegisters, fs1r):
-      return write_setting(access, fs1r_, value);
-    case offsetof(CanRegisters, ffa1r):
-      return write_setting(access, ffa1r_, value);
-    case offsetof(CanRegisters, fa1r):
-      if ((value & ~banks_mask) != 0)
-        refuse(access, name, fmt::format("FA1R = 0x{:X}: banks of CAN2", value));
-      if ((value & ~fs1r_) != 0)
-        refuse(access, name, "a bank of 16-bit scale is activated; only 32 bits are modelled");
-      fa1r_ = value;
-      return;
-    default:
-      break;
-  }
+  std::uint32_t* const word = bank_word(access);
+  if (word == nullptr) return registers().write(*this, can1, access, value);
   const std::uint32_t index = (access.offset - first_bank) / bank_size;
-  if (access.offset < first_bank || index >= banks_.size()) refuse(access, name, "no register of CAN1 here");
   if (bit(fa1r_, index) && can_fmr::FilterInitialization::of(fmr_) == 0) {
-    refuse(access, name, fmt::format("filter bank {} is written while active and FINIT = 0", index));
+    refuse(access, can1, fmt::format("filter bank {} is written while active and FINIT = 0", index));
   }
-  const bool first = access.offset % bank_size == offsetof(CanFilterBankRegisters, fr1);
-  (first ? banks_[index].first : banks_[index].second) = value;
+  *word = value;
+}
+
+void CanFilters::write_control(const Access& access, std::uint32_t value) {
+  if ((value & ~can_fmr::FilterInitialization::mask) !=
+      (can_fmr::reset_value & ~can_fmr::FilterInitialization::mask)) {
+    refuse(access, can1, fmt::format("FMR = 0x{:08X}: only FINIT may change", value));
+  }
+  fmr_ = value;
+}
+
+template <std::uint32_t CanFilters::*setting>
+void CanFilters::write_setting(const Access& access, std::uint32_t value) {
+  if (can_fmr::FilterInitialization::of(fmr_) == 0) {
+    refuse(access, can1,
+           "mode, scale and FIFO of filters are written with FINIT = 0 (section Register access protection)");
+  }
+  this->*setting = value;
+}
+
+void CanFilters::write_activation(const Access& access, std::uint32_t value) {
+  if ((value & ~fs1r_) != 0)
+    refuse(access, can1, "a bank of 16-bit scale is activated; only 32 bits are modelled");
+  fa1r_ = value;
 }
 
 std::optional<CanFilters::Match> CanFilters::match(std::uint32_t identifier) const {

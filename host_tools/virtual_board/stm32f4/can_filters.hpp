@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "drivers/stm32f4/registers/can.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -21,7 +21,7 @@ class CanFilters {
     std::uint8_t index;  ///< FMI
   };
 
-  std::uint32_t read(const Access& access) const;
+  std::uint32_t read(const Access& access);
   void write(const Access& access, std::uint32_t value);
   void reset() { *this = CanFilters{}; }
 
@@ -32,7 +32,13 @@ class CanFilters {
   struct Bank {
     std::uint32_t first = 0, second = 0;
   };
-  void write_setting(const Access& access, std::uint32_t& target, std::uint32_t value);
+  static const RegisterTable<CanFilters>& registers();
+  void write_control(const Access& access, std::uint32_t value);
+  template <std::uint32_t CanFilters::*setting>
+  void write_setting(const Access& access, std::uint32_t value);
+  void write_activation(const Access& access, std::uint32_t value);
+  /// The word of a bank at the address; none when it is not one.
+  std::uint32_t* bank_word(const Access& access);
 
   std::uint32_t fmr_ = drivers::stm32f4::can_fmr::reset_value;
   std::uint32_t fm1r_ = 0, fs1r_ = 0, ffa1r_ = 0, fa1r_ = 0;

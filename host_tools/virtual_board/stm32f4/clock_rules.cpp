@@ -6,14 +6,14 @@
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 #include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
-#include "host_tools/virtual_board/stm32f4/pwr.hpp"
+#include "host_tools/virtual_board/stm32f4/rcc.hpp"
 
 namespace kmax::virtual_board {
 
 namespace {
 
-namespace cfgr_field = drivers::stm32f4::rcc_cfgr;
-namespace pll = drivers::stm32f4::rcc_pllcfgr;
+namespace rcc_cfgr = drivers::stm32f4::rcc_cfgr;
+namespace rcc_pllcfgr = drivers::stm32f4::rcc_pllcfgr;
 
 constexpr std::uint64_t mhz = 1'000'000;
 
@@ -38,38 +38,38 @@ void check_limit(const char* what, std::uint64_t hz, std::uint64_t maximum) {
 }
 
 std::uint64_t pll_source_hz(std::uint32_t pllcfgr) {
-  return pll::FromCrystal::of(pllcfgr) != 0 ? crystal_hz : internal_oscillator_hz;
+  return rcc_pllcfgr::FromCrystal::of(pllcfgr) != 0 ? crystal_hz : internal_oscillator_hz;
 }
 
 }  // namespace
 
 void check_pll(std::uint32_t pllcfgr) {
-  const std::uint32_t divider = pll::InputDivider::of(pllcfgr);
+  const std::uint32_t divider = rcc_pllcfgr::InputDivider::of(pllcfgr);
   if (divider < 2) refuse_clock("PLLCFGR: M = " + std::to_string(divider) + ", must be 2 to 63");
   const std::uint64_t input = pll_source_hz(pllcfgr) / divider;
   if (input < 950'000 || input > 2'100'000)
     refuse_clock("PLLCFGR: PLL input " + in_mhz(input) + ", must be 0.95 to 2.10 MHz");
-  const std::uint64_t vco = pll_source_hz(pllcfgr) * pll::Multiplier::of(pllcfgr) / divider;
+  const std::uint64_t vco = pll_source_hz(pllcfgr) * rcc_pllcfgr::Multiplier::of(pllcfgr) / divider;
   if (vco < 192 * mhz || vco > 432 * mhz)
     refuse_clock("PLLCFGR: VCO at " + in_mhz(vco) + ", must be 192 to 432 MHz");
-  const std::uint32_t usb_divider = pll::UsbDivider::of(pllcfgr);
+  const std::uint32_t usb_divider = rcc_pllcfgr::UsbDivider::of(pllcfgr);
   if (usb_divider < 2 || vco > 48 * mhz * usb_divider)
     refuse_clock("PLLCFGR: Q = " + std::to_string(usb_divider) + " is below 2 or gives more than 48 MHz");
 }
 
 std::uint64_t pll_output_hz(std::uint32_t pllcfgr) {
-  const std::uint64_t product = pll_source_hz(pllcfgr) * pll::Multiplier::of(pllcfgr);
-  const std::uint64_t divider =
-      std::uint64_t{2} * (pll::OutputDivider::of(pllcfgr) + 1) * std::max(pll::InputDivider::of(pllcfgr), 1U);
+  const std::uint64_t product = pll_source_hz(pllcfgr) * rcc_pllcfgr::Multiplier::of(pllcfgr);
+  const std::uint64_t divider = std::uint64_t{2} * (rcc_pllcfgr::OutputDivider::of(pllcfgr) + 1) *
+                                std::max(rcc_pllcfgr::InputDivider::of(pllcfgr), 1U);
   if (product % divider != 0) refuse_clock("PLL output is no whole number of hertz: not modelled");
   return product / divider;
 }
 
 BoardClocks board_clocks(std::uint64_t system_clock_hz, std::uint32_t cfgr,
                          const ClockConditions& conditions) {
-  const std::uint64_t divider = ahb_divider(cfgr_field::AhbPrescaler::of(cfgr));
-  const std::uint64_t divider1 = apb_divider(cfgr_field::Apb1Prescaler::of(cfgr));
-  const std::uint64_t divider2 = apb_divider(cfgr_field::Apb2Prescaler::of(cfgr));
+  const std::uint64_t divider = ahb_divider(rcc_cfgr::AhbPrescaler::of(cfgr));
+  const std::uint64_t divider1 = apb_divider(rcc_cfgr::Apb1Prescaler::of(cfgr));
+  const std::uint64_t divider2 = apb_divider(rcc_cfgr::Apb2Prescaler::of(cfgr));
   const std::uint64_t hclk = system_clock_hz / divider;
   check_limit("HCLK", hclk, 168 * mhz);
   check_limit("PCLK1", hclk / divider1, 42 * mhz);

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
 
 // The arithmetic of the clock tree and its limits: RM0090, chapter Reset and clock control for STM32F405xx
 // (RCC), section Clocks; STM32F405 data sheet, general operating conditions and main PLL characteristics. All

@@ -3,8 +3,9 @@
 #include <array>
 #include <cstdint>
 
+#include "drivers/stm32f4/registers/dbgmcu.hpp"
 #include "drivers/stm32f4/registers/system_memory.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -32,11 +33,29 @@ class DeviceIdentity final : public Peripheral {
 
   std::uint32_t read(const Access& access) override;
   void write(const Access& access, std::uint32_t value) override;
-  void reset(BoardTime now) override;
+  void reset(BoardTime /*now*/) override {}
 
  private:
   std::array<std::uint8_t, size> bytes_{};
   std::array<bool, size> known_{};
+};
+
+/// Debug support block: RM0090, chapter Debug support (DBG), section MCU debug component (DBGMCU). Identity
+/// and the freeze bits, which are kept but do nothing, since no debugger ever halts the virtual board. Bits
+/// of peripherals that the board does not have, and CR, are refused. System reset does not touch it.
+class DbgmcuModel final : public RegisterBlock<DbgmcuModel> {
+ public:
+  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::DbgmcuRegisters);
+  static constexpr std::uint32_t revision = 0x1007;  // revision 1 of the chip
+
+  DbgmcuModel() : RegisterBlock("DBGMCU", registers()) {}
+  void reset(BoardTime /*now*/) override {}
+
+ private:
+  static const RegisterTable<DbgmcuModel>& registers();
+
+  std::uint32_t apb1_fz_ = 0;
+  std::uint32_t apb2_fz_ = 0;
 };
 
 }  // namespace kmax::virtual_board

@@ -17,8 +17,6 @@ using drivers::stm32f4::Interrupt;
 using drivers::stm32f4::SyscfgRegisters;
 namespace syscfg_exticr = drivers::stm32f4::syscfg_exticr;
 
-constexpr const char* syscfg_name = "SYSCFG";
-constexpr const char* exti_name = "EXTI";
 constexpr std::uint32_t port_count = 4;
 constexpr std::uint32_t pin_lines = (1U << exti_pin_lines) - 1U;
 
@@ -41,31 +39,26 @@ constexpr std::array vectors{Vector{Interrupt::exti2, lines_of(Interrupt::exti2)
 constexpr std::uint32_t lines_with_vector =
     vectors[0].lines | vectors[1].lines | vectors[2].lines | vectors[3].lines;
 
-/// Index of the EXTICR at this offset; refuses all other registers.
-unsigned exticr_index(const Access& access) {
-  require_word(access, syscfg_name);
-  constexpr std::uint32_t first = offsetof(SyscfgRegisters, exticr);
-  if (access.offset < first || access.offset >= first + 16) {
-    refuse(access, syscfg_name, "only EXTICR1 to EXTICR4 are modelled");
-  }
-  return (access.offset - first) / 4;
-}
-
 }  // namespace
 
-std::uint32_t SyscfgModel::read(const Access& access) {
-  return exticr_[exticr_index(access)];
+const RegisterTable<SyscfgModel>& SyscfgModel::registers() {
+  using Model = SyscfgModel;
+  using Row = Register<Model>;
+  constexpr auto routing = []<unsigned index>() {
+    return Row{offsetof(SyscfgRegisters, exticr) + 4 * index, "EXTICR", Row::shows<&Model::exticr_, index>,
+               0xFFFF, Row::takes<&Model::write_exticr, index>};
+  };
+  static const RegisterTable<Model> table{routing.operator()<0>(), routing.operator()<1>(),
+                                          routing.operator()<2>(), routing.operator()<3>()};
+  return table;
 }
 
-void SyscfgModel::write(const Access& access, std::uint32_t value) {
-  const unsigned index = exticr_index(access);
-  if (value > 0xFFFFU) refuse(access, syscfg_name, "reserved bits of EXTICR are written 1");
+void SyscfgModel::write_exticr(const Access& access, unsigned index, std::uint32_t value) {
   for (unsigned line = 4 * index; line < 4 * index + 4; ++line) {
     const std::uint32_t port = value >> syscfg_exticr::position(line) & syscfg_exticr::port_mask;
     if (port >= port_count) {
-      refuse(access, syscfg_name,
-             "EXTI line " + std::to_string(line) + " is given port number " + std::to_string(port) +
-                 "; 0 (A) to 3 (D) are allowed");
+      refuse(access, "EXTI line " + std::to_string(line) + " is given port number " + std::to_string(port) +
+                         "; 0 (A) to 3 (D) are allowed");
     }
   }
   exticr_[index] = value;
@@ -82,83 +75,51 @@ unsigned SyscfgModel::port_of(unsigned line) const {
 }
 
 ExtiModel::ExtiModel(SyscfgModel& syscfg, InterruptLines& interrupts)
-    : syscfg_(syscfg), interrupts_(interrupts) {
-  syscfg_.on_routing_change([this](BoardTime now) { follow(now); });
+    : RegisterBlock("EXTI", registers()), syscfg_(syscfg), interrupts_(interrupts) {
+  syscfg_.on_routing_change([this](BoardTime) { follow(); });
 }
 
-std::uint32_t ExtiModel::read(const Access& access) {
-  require_word(access, exti_name);
-  switch (access.offset) {
-    case offsetof(ExtiRegisters, imr):
-      return imr_;
-    case offsetof(ExtiRegisters, emr):
-      return 0;
-    case offsetof(ExtiRegisters, rtsr):
-      return rtsr_;
-    case offsetof(ExtiRegisters, ftsr):
-      return ftsr_;
-    case offsetof(ExtiRegisters, swier):
-      return swier_;
-    case offsetof(ExtiRegisters, pr):
-      return pr_;
-    default:
-      refuse(access, exti_name, "no such register");
-  }
+const RegisterTable<ExtiModel>& ExtiModel::registers() {
+  using Model = ExtiModel;
+  using Row = Register<Model>;
+  using Layout = ExtiRegisters;
+  static const RegisterTable<Model> table{
+      Row::word<&Model::imr_>(offsetof(Layout, imr), "IMR", lines_with_vector),
+      Row::reserved(offsetof(Layout, emr), "EMR"),
+      Row::word<&Model::rtsr_>(offsetof(Layout, rtsr), "RTSR", pin_lines),
+      Row::word<&Model::ftsr_>(offsetof(Layout, ftsr), "FTSR", pin_lines),
+      {offsetof(Layout, swier), "SWIER", Row::shows<&Model::swier_>, pin_lines,
+       Row::takes<&Model::write_swier>},
+      {offsetof(Layout, pr), "PR", Row::shows<&Model::pr_>, pin_lines, Row::takes<&Model::write_pr>}};
+  return table;
 }
 
-void ExtiModel::write(const Access& access, std::uint32_t value) {
-  require_word(access, exti_name);
-  if ((value & ~pin_lines) != 0) refuse(access, exti_name, "lines above 15 are not modelled");
-  switch (access.offset) {
-    case offsetof(ExtiRegisters, imr):
-      if ((value & ~lines_with_vector) != 0) {
-        refuse(access, exti_name,
-               "IMR unmasks a line that has no vector here; lines 2, 4 and 5 to 15 have one");
-      }
-      imr_ = value;
-      break;
-    case offsetof(ExtiRegisters, emr):
-      if (value != 0) refuse(access, exti_name, "events (EMR) are not modelled");
-      break;
-    case offsetof(ExtiRegisters, rtsr):
-      rtsr_ = value;
-      break;
-    case offsetof(ExtiRegisters, ftsr):
-      ftsr_ = value;
-      break;
-    case offsetof(ExtiRegisters, swier): {
-      // Writing 1 to a bit that is 0 sets the pending bit; the bit falls when PR is cleared.
-      const std::uint32_t set = value & ~swier_;
-      if ((set & ~imr_) != 0) refuse(access, exti_name, "SWIER of a masked line: its effect is not defined");
-      swier_ |= set;
-      pr_ |= set;
-      break;
-    }
-    case offsetof(ExtiRegisters, pr):
-      pr_ &= ~value;
-      swier_ &= ~value;
-      break;
-    default:
-      refuse(access, exti_name, "no such register");
-  }
-  update_interrupts();
+/// Writing 1 to a bit that is 0 sets the pending bit; the bit falls when PR is cleared.
+void ExtiModel::write_swier(const Access& access, std::uint32_t value) {
+  const std::uint32_t set = value & ~swier_;
+  if ((set & ~imr_) != 0) refuse(access, "SWIER of a masked line: its effect is not defined");
+  swier_ |= set;
+  pr_ |= set;
 }
 
-void ExtiModel::reset(BoardTime now) {
+void ExtiModel::write_pr(std::uint32_t value) {
+  pr_ &= ~value;
+  swier_ &= ~value;
+}
+
+void ExtiModel::reset(BoardTime /*now*/) {
   imr_ = rtsr_ = ftsr_ = swier_ = pr_ = 0;
-  follow(now);
+  follow();
 }
 
-void ExtiModel::set_pin(drivers::stm32f4::GpioPort port, unsigned pin, bool level, BoardTime now) {
-  static_cast<void>(now);
+void ExtiModel::set_pin(drivers::stm32f4::GpioPort port, unsigned pin, bool level, BoardTime /*now*/) {
   std::uint32_t& pins = pins_.at(static_cast<unsigned>(port));
   pins = level ? pins | 1U << pin : pins & ~(1U << pin);
   follow_line(pin);
   update_interrupts();
 }
 
-void ExtiModel::follow(BoardTime now) {
-  static_cast<void>(now);
+void ExtiModel::follow() {
   for (unsigned line = 0; line < exti_pin_lines; ++line) follow_line(line);
   update_interrupts();
 }

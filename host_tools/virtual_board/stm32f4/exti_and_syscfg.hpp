@@ -6,16 +6,15 @@
 
 #include "drivers/stm32f4/registers/exti.hpp"
 #include "drivers/stm32f4/registers/gpio.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
 /// SYSCFG: RM0090, chapter System configuration controller. EXTICR1 to 4 with ports A to D, the ones that
 /// have pins here; MEMRMP, PMC and CMPCR are refused.
-class SyscfgModel final : public Peripheral {
+class SyscfgModel final : public RegisterBlock<SyscfgModel> {
  public:
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
+  SyscfgModel() : RegisterBlock("SYSCFG", registers()) {}
   void reset(BoardTime now) override;
 
   /// Index of the port (0 = A) whose pin feeds a line (0 to 15).
@@ -24,6 +23,9 @@ class SyscfgModel final : public Peripheral {
   void on_routing_change(std::function<void(BoardTime)> callback) { routing_change_ = std::move(callback); }
 
  private:
+  static const RegisterTable<SyscfgModel>& registers();
+  void write_exticr(const Access& access, unsigned index, std::uint32_t value);
+
   std::array<std::uint32_t, 4> exticr_{};
   std::function<void(BoardTime)> routing_change_;
 };
@@ -37,12 +39,10 @@ class SyscfgModel final : public Peripheral {
 ///
 /// Refused: unmasking a line that has no vector in this firmware (0, 1, 3, 16 and above), events (EMR), SWIER
 /// of a masked line (the manual defines it for unmasked ones only), bits above line 15.
-class ExtiModel final : public Peripheral {
+class ExtiModel final : public RegisterBlock<ExtiModel> {
  public:
   ExtiModel(SyscfgModel& syscfg, InterruptLines& interrupts);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void reset(BoardTime now) override;
 
   /// Level of a port's pin as the input buffer sees it. Wire GpioPortModel::on_input_change of each port
@@ -50,7 +50,11 @@ class ExtiModel final : public Peripheral {
   void set_pin(drivers::stm32f4::GpioPort port, unsigned pin, bool level, BoardTime now);
 
  private:
-  void follow(BoardTime now);
+  static const RegisterTable<ExtiModel>& registers();
+  void write_swier(const Access& access, std::uint32_t value);
+  void write_pr(std::uint32_t value);
+  void after_write() override { update_interrupts(); }
+  void follow();
   void follow_line(unsigned line);
   void update_interrupts();
 

@@ -9,18 +9,17 @@ namespace kmax::virtual_board {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
-namespace acr = stm32::flash_acr;
-namespace cr = stm32::flash_cr;
-namespace sr = stm32::flash_sr;
+namespace flash_acr = stm32::flash_acr;
+namespace flash_cr = stm32::flash_cr;
+namespace flash_sr = stm32::flash_sr;
 
-constexpr const char* block = "FLASH";
-
-constexpr std::uint32_t acr_bits = acr::Latency::mask | acr::Prefetch::mask | acr::InstructionCache::mask |
-                                   acr::DataCache::mask | acr::InstructionCacheReset::mask |
-                                   acr::DataCacheReset::mask;
-constexpr std::uint32_t cr_bits = cr::Program::mask | cr::SectorErase::mask | cr::Sector::mask |
-                                  cr::Parallelism::mask | cr::Start::mask | cr::Lock::mask;
-constexpr std::uint32_t sr_bits = sr::errors | sr::EndOfOperation::mask;
+constexpr std::uint32_t acr_bits = flash_acr::Latency::mask | flash_acr::Prefetch::mask |
+                                   flash_acr::InstructionCache::mask | flash_acr::DataCache::mask |
+                                   flash_acr::InstructionCacheReset::mask | flash_acr::DataCacheReset::mask;
+constexpr std::uint32_t cr_bits = flash_cr::Program::mask | flash_cr::SectorErase::mask |
+                                  flash_cr::Sector::mask | flash_cr::Parallelism::mask |
+                                  flash_cr::Start::mask | flash_cr::Lock::mask;
+constexpr std::uint32_t sr_bits = flash_sr::errors | flash_sr::EndOfOperation::mask;
 
 constexpr BoardTime store_duration = 16 * units_per_microsecond;
 
@@ -39,7 +38,7 @@ BoardTime erase_duration(unsigned sector) {
 }  // namespace
 
 FlashInterface::FlashInterface(const BoardClocks& clocks, std::span<std::uint8_t> image)
-    : clocks_(clocks), image_(image) {
+    : RegisterBlock("FLASH", registers()), clocks_(clocks), image_(image) {
   const std::uint32_t expected = stm32::flash_sector_offset(stm32::flash_sector_count);
   if (image.size() == expected) return;
   throw std::invalid_argument("flash image of " + std::to_string(image.size()) + " bytes; must be " +
@@ -47,7 +46,7 @@ FlashInterface::FlashInterface(const BoardClocks& clocks, std::span<std::uint8_t
 }
 
 std::uint32_t FlashInterface::wait_states() const {
-  return acr::Latency::of(acr_);
+  return flash_acr::Latency::of(acr_);
 }
 
 std::uint32_t FlashInterface::wait_states_needed(BoardTime core_period) {
@@ -71,7 +70,7 @@ void FlashInterface::reset(BoardTime now) {
   latest_.reset();
   acr_ = 0;
   sr_ = 0;
-  cr_ = cr::Lock::mask;
+  cr_ = flash_cr::Lock::mask;
   first_key_given_ = false;
   locked_up_ = false;
   // The caches come out of reset disabled and must be assumed to hold anything until they are reset.
@@ -85,56 +84,35 @@ void FlashInterface::power_up(BoardTime now) {
   reset(now);
 }
 
-std::uint32_t FlashInterface::read(const Access& access) {
-  require_word(access, block);
-  require_power();
-  switch (access.offset) {
-    case offsetof(stm32::FlashRegisters, acr):
-      return acr_;
-    case offsetof(stm32::FlashRegisters, sr):
-      return sr_ | sr::Busy::bits(access.now < busy_until_ ? 1 : 0);
-    case offsetof(stm32::FlashRegisters, cr):
-      return cr_;
-    case offsetof(stm32::FlashRegisters, keyr):
-    case offsetof(stm32::FlashRegisters, optkeyr):
-      refuse(access, block, "a key register cannot be read");
-    default:
-      refuse(access, block, "not modelled (option bytes)");
-  }
+const RegisterTable<FlashInterface>& FlashInterface::registers() {
+  using Model = FlashInterface;
+  using Row = Register<Model>;
+  using Layout = stm32::FlashRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, acr), "ACR", Row::shows<&Model::acr_>, acr_bits,
+       Row::takes<&Model::write_access_control>},
+      {offsetof(Layout, keyr), "KEYR", nullptr, any_bits, Row::takes<&Model::write_key>},
+      {offsetof(Layout, sr), "SR", Row::shows<&Model::read_status>, sr_bits,
+       Row::clears_by_ones<&Model::sr_>},
+      {offsetof(Layout, cr), "CR", Row::shows<&Model::cr_>, cr_bits, Row::takes<&Model::write_control>}};
+  return table;
 }
 
-void FlashInterface::write(const Access& access, std::uint32_t value) {
-  require_word(access, block);
-  require_power();
-  switch (access.offset) {
-    case offsetof(stm32::FlashRegisters, acr):
-      return write_access_control(access, value);
-    case offsetof(stm32::FlashRegisters, keyr):
-      return write_key(access, value);
-    case offsetof(stm32::FlashRegisters, sr):
-      if ((value & ~sr_bits) != 0) refuse(access, block, "SR: a bit that is not a flag was written 1");
-      sr_ &= ~value;
-      return;
-    case offsetof(stm32::FlashRegisters, cr):
-      return write_control(access, value);
-    default:
-      refuse(access, block, "not modelled (option bytes)");
-  }
+std::uint32_t FlashInterface::read_status(const Access& access) const {
+  return sr_ | flash_sr::Busy::bits(access.now < busy_until_ ? 1 : 0);
 }
 
 void FlashInterface::write_access_control(const Access& access, std::uint32_t value) {
-  if ((value & ~acr_bits) != 0) refuse(access, block, "ACR: reserved bit written 1");
   const std::uint32_t needed = wait_states_needed(clocks_.core);
-  if (acr::Latency::of(value) < needed) {
-    refuse(access, block,
-           "ACR: " + std::to_string(acr::Latency::of(value)) + " wait states, the present HCLK needs " +
-               std::to_string(needed));
+  if (flash_acr::Latency::of(value) < needed) {
+    refuse(access, "ACR: " + std::to_string(flash_acr::Latency::of(value)) +
+                       " wait states, the present HCLK needs " + std::to_string(needed));
   }
-  const bool resets_instructions = acr::InstructionCacheReset::of(value) != 0;
-  const bool resets_data = acr::DataCacheReset::of(value) != 0;
-  if ((resets_instructions && acr::InstructionCache::of(acr_ | value) != 0) ||
-      (resets_data && acr::DataCache::of(acr_ | value) != 0)) {
-    refuse(access, block, "ACR: a cache can be reset only while it is disabled");
+  const bool resets_instructions = flash_acr::InstructionCacheReset::of(value) != 0;
+  const bool resets_data = flash_acr::DataCacheReset::of(value) != 0;
+  if ((resets_instructions && flash_acr::InstructionCache::of(acr_ | value) != 0) ||
+      (resets_data && flash_acr::DataCache::of(acr_ | value) != 0)) {
+    refuse(access, "ACR: a cache can be reset only while it is disabled");
   }
   if (resets_data) data_cache_is_stale_ = false;
   acr_ = value;
@@ -142,50 +120,49 @@ void FlashInterface::write_access_control(const Access& access, std::uint32_t va
 
 void FlashInterface::write_key(const Access& access, std::uint32_t value) {
   if (locked_up_) return;
-  const bool locked = cr::Lock::of(cr_) != 0;
+  const bool locked = flash_cr::Lock::of(cr_) != 0;
   if (locked && !first_key_given_ && value == stm32::flash_key_1) {
     first_key_given_ = true;
     return;
   }
   if (locked && first_key_given_ && value == stm32::flash_key_2) {
     first_key_given_ = false;
-    cr_ &= ~cr::Lock::mask;
+    cr_ &= ~flash_cr::Lock::mask;
     return;
   }
   first_key_given_ = false;
   locked_up_ = true;
-  cr_ |= cr::Lock::mask;
-  refuse(access, block,
+  cr_ |= flash_cr::Lock::mask;
+  refuse(access,
          "KEYR: wrong key, or right key out of turn (bus error); CR is now locked until the next reset");
 }
 
 void FlashInterface::write_control(const Access& access, std::uint32_t value) {
-  if (access.now < busy_until_) refuse(access, block, "CR written while BSY is set: the bus would stall");
-  if ((value & ~cr_bits) != 0) refuse(access, block, "CR: MER, EOPIE, ERRIE or a reserved bit: not modelled");
-  if (cr::Lock::of(cr_) != 0) {
+  if (access.now < busy_until_) refuse(access, "CR written while BSY is set: the bus would stall");
+  if (flash_cr::Lock::of(cr_) != 0) {
     if (value == cr_) return;
-    refuse(access, block, "CR written while it is locked: ignored on silicon");
+    refuse(access, "CR written while it is locked: ignored on silicon");
   }
-  if (cr::Parallelism::of(value) == 3)
-    refuse(access, block, "CR: 64-bit parallelism needs Vpp, which the board does not have");
-  const bool start = cr::Start::of(value) != 0;
-  if (start && cr::Lock::of(value) != 0) refuse(access, block, "CR: STRT together with LOCK");
-  cr_ = value & ~cr::Start::mask;
+  if (flash_cr::Parallelism::of(value) == 3)
+    refuse(access, "CR: 64-bit parallelism needs Vpp, which the board does not have");
+  const bool start = flash_cr::Start::of(value) != 0;
+  if (start && flash_cr::Lock::of(value) != 0) refuse(access, "CR: STRT together with LOCK");
+  cr_ = value & ~flash_cr::Start::mask;
   if (start) start_erase(access);
 }
 
 void FlashInterface::start_erase(const Access& access) {
-  if (cr::SectorErase::of(cr_) == 0 || cr::Program::of(cr_) != 0)
-    refuse(access, block, "CR: STRT needs SER and no PG (RM0090: unpredictable)");
-  if (cr::Parallelism::of(cr_) != cr::by_word)
-    refuse(access, block, "CR: erase at other than x32: not modelled");
-  const std::uint32_t sector = cr::Sector::of(cr_);
+  if (flash_cr::SectorErase::of(cr_) == 0 || flash_cr::Program::of(cr_) != 0)
+    refuse(access, "CR: STRT needs SER and no PG (RM0090: unpredictable)");
+  if (flash_cr::Parallelism::of(cr_) != flash_cr::by_word)
+    refuse(access, "CR: erase at other than x32: not modelled");
+  const std::uint32_t sector = flash_cr::Sector::of(cr_);
   if (sector >= stm32::flash_sector_count)
-    refuse(access, block, "CR: sector " + std::to_string(sector) + " does not exist; 0 to 11 do");
-  if ((sr_ & sr::errors) != 0)
-    refuse(access, block, "erase started with error flags set in SR: clear them first");
+    refuse(access, "CR: sector " + std::to_string(sector) + " does not exist; 0 to 11 do");
+  if ((sr_ & flash_sr::errors) != 0)
+    refuse(access, "erase started with error flags set in SR: clear them first");
   if (write_protected_[sector]) {
-    sr_ |= sr::WriteProtected::mask;
+    sr_ |= flash_sr::WriteProtected::mask;
     return;
   }
   const std::uint32_t offset = stm32::flash_sector_offset(sector);
@@ -200,19 +177,20 @@ void FlashInterface::store(std::uint32_t address, unsigned bytes, std::uint32_t 
   require_power();
   const std::uint32_t offset = offset_of(address, bytes);
   const Access access{offset, bytes, now};
-  if (now < busy_until_) refuse(access, "flash memory", "store while BSY is set: the bus would stall");
-  if ((sr_ & sr::errors) != 0)
-    refuse(access, "flash memory", "store with error flags set in SR: clear them first");
-  if (cr::Program::of(cr_) == 0 || cr::SectorErase::of(cr_) != 0) {
-    sr_ |= sr::SequenceError::mask;
+  if (now < busy_until_)
+    virtual_board::refuse(access, "flash memory", "store while BSY is set: the bus would stall");
+  if ((sr_ & flash_sr::errors) != 0)
+    virtual_board::refuse(access, "flash memory", "store with error flags set in SR: clear them first");
+  if (flash_cr::Program::of(cr_) == 0 || flash_cr::SectorErase::of(cr_) != 0) {
+    sr_ |= flash_sr::SequenceError::mask;
     return;
   }
-  if (bytes != 1U << cr::Parallelism::of(cr_)) {
-    sr_ |= sr::ParallelismError::mask;
+  if (bytes != 1U << flash_cr::Parallelism::of(cr_)) {
+    sr_ |= flash_sr::ParallelismError::mask;
     return;
   }
   if (write_protected_[sector_at(offset)]) {
-    sr_ |= sr::WriteProtected::mask;
+    sr_ |= flash_sr::WriteProtected::mask;
     return;
   }
   begin(offset, bytes, now, store_duration);
@@ -224,9 +202,10 @@ void FlashInterface::store(std::uint32_t address, unsigned bytes, std::uint32_t 
 std::uint32_t FlashInterface::load(std::uint32_t address, unsigned bytes, BoardTime now) const {
   require_power();
   const std::uint32_t offset = offset_of(address, bytes);
-  if (data_cache_is_stale_ && acr::DataCache::of(acr_) != 0) {
-    refuse({offset, bytes, now}, "flash memory",
-           "load through a data cache that was not reset after an erase: it may give the old content");
+  if (data_cache_is_stale_ && flash_acr::DataCache::of(acr_) != 0) {
+    virtual_board::refuse(
+        {offset, bytes, now}, "flash memory",
+        "load through a data cache that was not reset after an erase: it may give the old content");
   }
   std::uint32_t value = 0;
   for (unsigned byte = 0; byte < bytes; ++byte)

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "drivers/stm32f4/registers/flash.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -37,7 +37,7 @@ class PowerCut : public std::runtime_error {
 /// than x32, writing CR while it is locked (silicon ignores it) or busy (silicon stalls the bus), too few
 /// wait states for HCLK, resetting a cache that is enabled, and starting an operation while error flags are
 /// set.
-class FlashInterface final : public Peripheral {
+class FlashInterface final : public RegisterBlock<FlashInterface> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::stm32f4::FlashRegisters);
 
@@ -45,8 +45,6 @@ class FlashInterface final : public Peripheral {
   /// size.
   FlashInterface(const BoardClocks& clocks, std::span<std::uint8_t> image);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void reset(BoardTime now) override;
 
   /// A store of the processor to main memory; may throw PowerCut.
@@ -75,6 +73,10 @@ class FlashInterface final : public Peripheral {
   std::uint64_t operations() const { return operations_; }
 
  private:
+  static const RegisterTable<FlashInterface>& registers();
+  void before_access(const Access& /*access*/) override { require_power(); }
+  std::uint32_t read_status(const Access& access) const;
+
   struct Operation {
     std::uint32_t offset;
     std::vector<std::uint8_t> before;

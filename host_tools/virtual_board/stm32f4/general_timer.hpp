@@ -4,8 +4,9 @@
 #include <cstdint>
 
 #include "drivers/stm32f4/interrupts.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
+#include "host_tools/virtual_board/stm32f4/timer_channels.hpp"
 
 namespace kmax::virtual_board {
 
@@ -24,12 +25,10 @@ enum class GeneralTimer : std::uint8_t { tim2, tim3, tim4, tim5 };
 /// other than 0, DMA, compare outputs, capture prescalers, changing SMS while counting.
 ///
 /// The wrap is an event of the board only while it can raise the update interrupt.
-class GeneralTimerModel final : public Peripheral {
+class GeneralTimerModel final : public RegisterBlock<GeneralTimerModel> {
  public:
   GeneralTimerModel(GeneralTimer unit, const BoardClocks& clocks, InterruptLines& interrupts);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
   void reset(BoardTime now) override;
@@ -44,22 +43,20 @@ class GeneralTimerModel final : public Peripheral {
   void clock_changed(BoardTime now);
 
  private:
-  struct Preloaded {
-    std::uint32_t preload = 0;
-    std::uint32_t active = 0;
-  };
-
-  // Register writes, general_timer_registers.cpp.
+  static const RegisterTable<GeneralTimerModel>& registers();
+  std::uint32_t read_cr1() const;
   void write_cr1(const Access& access, std::uint32_t value);
   void write_smcr(const Access& access, std::uint32_t value);
+  void write_egr(const Access& access, std::uint32_t value);
   void write_ccmr(const Access& access, unsigned index, std::uint32_t value);
   void write_ccer(const Access& access, std::uint32_t value);
+  std::uint32_t read_cnt(const Access& access) const { return count(access.now); }
+  void write_cnt(const Access& access, std::uint32_t value);
   void write_arr(const Access& access, std::uint32_t value);
   std::uint32_t read_capture(unsigned channel);
-  void require_known(const Access& access, std::uint32_t value, std::uint32_t known, const char* name) const;
   void require_encoder_inputs(const Access& access) const;
+  void after_write() override { update_interrupt(); }
 
-  // Counting, general_timer.cpp.
   bool encoder_mode() const;
   bool reversed() const;
   BoardTime tick() const { return clocks_.apb1_timer * (BoardTime{psc_.active} + 1); }
@@ -73,7 +70,6 @@ class GeneralTimerModel final : public Peripheral {
   void update_interrupt();
   bool captures(unsigned channel) const;
 
-  const char* name_;
   drivers::stm32f4::Interrupt interrupt_;
   std::uint32_t longest_;  // greatest count
   const BoardClocks& clocks_;
@@ -82,7 +78,7 @@ class GeneralTimerModel final : public Peripheral {
   std::uint32_t cr1_ = 0;  // without CEN and DIR
   std::uint32_t smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0;
   std::array<std::uint32_t, 2> ccmr_{};
-  Preloaded psc_, arr_;
+  PreloadedWord psc_, arr_;
   std::array<std::uint32_t, 4> captured_{};
   bool running_ = false;
   bool down_ = false;  // DIR

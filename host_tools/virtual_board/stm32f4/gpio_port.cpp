@@ -1,6 +1,7 @@
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 
 #include <cstddef>
+#include <string>
 #include <utility>
 
 namespace kmax::virtual_board {
@@ -23,7 +24,9 @@ std::uint32_t two_bits(std::uint32_t word, unsigned pin) {
 }  // namespace
 
 GpioPortModel::GpioPortModel(GpioPort port)
-    : port_(port), name_(std::string("GPIO") + static_cast<char>('A' + static_cast<int>(port))) {
+    : RegisterBlock(std::array{"GPIOA", "GPIOB", "GPIOC", "GPIOD"}.at(static_cast<std::size_t>(port)),
+                    registers()),
+      port_(port) {
   restore_reset_values();
   update(0);
 }
@@ -47,102 +50,58 @@ void GpioPortModel::reset(BoardTime now) {
   update(now);
 }
 
-std::uint32_t GpioPortModel::read(const Access& access) {
-  const std::uint32_t word = word_at(access);
-  if (access.bytes == 4) return word;
-  const std::uint32_t mask = access.bytes == 1 ? 0xFFU : 0xFFFFU;
-  return word >> (8 * (access.offset & 3U)) & mask;
+const RegisterTable<GpioPortModel>& GpioPortModel::registers() {
+  using Model = GpioPortModel;
+  using Row = Register<Model>;
+  static const RegisterTable<Model> table{
+      Row::word<&Model::moder_>(offsetof(Registers, moder), "MODER", any_bits),
+      Row::word<&Model::otyper_>(offsetof(Registers, otyper), "OTYPER", all_pins),
+      Row::word<&Model::ospeedr_>(offsetof(Registers, ospeedr), "OSPEEDR", any_bits),
+      {offsetof(Registers, pupdr), "PUPDR", Row::shows<&Model::pupdr_>, any_bits,
+       Row::takes<&Model::write_pulls>},
+      {offsetof(Registers, idr), "IDR", Row::shows<&Model::idr_>},
+      Row::word<&Model::odr_>(offsetof(Registers, odr), "ODR", all_pins),
+      {offsetof(Registers, bsrr), "BSRR", Row::zero, any_bits,
+       // Set wins over reset (section GPIO port bit set/reset register).
+       [](Model& port, const Access&, std::uint32_t value) {
+         port.odr_ = (port.odr_ & ~(value >> 16)) | (value & all_pins);
+       }},
+      Row::word<&Model::afr_, 0>(offsetof(Registers, afr), "AFRL", any_bits),
+      Row::word<&Model::afr_, 1>(offsetof(Registers, afr) + 4, "AFRH", any_bits)};
+  return table;
 }
 
-std::uint32_t GpioPortModel::word_at(const Access& access) const {
+// Bytes and half words of IDR, ODR and BSRR are parts of their words; the table refuses those of the others.
+std::uint32_t GpioPortModel::read(const Access& access) {
   const std::uint32_t offset = access.offset & ~3U;
-  switch (offset) {
-    case offsetof(Registers, idr):
-      return idr_;
-    case offsetof(Registers, odr):
-      return odr_;
-    case offsetof(Registers, bsrr):
-      return 0;
-    default:
-      break;
-  }
-  require_word(access, name_.c_str());
-  switch (offset) {
-    case offsetof(Registers, moder):
-      return moder_;
-    case offsetof(Registers, otyper):
-      return otyper_;
-    case offsetof(Registers, ospeedr):
-      return ospeedr_;
-    case offsetof(Registers, pupdr):
-      return pupdr_;
-    case offsetof(Registers, lckr):
-      refuse(access, name_.c_str(), "LCKR is not modelled");
-    case offsetof(Registers, afr):
-      return afr_[0];
-    case offsetof(Registers, afr) + 4:
-      return afr_[1];
-    default:
-      refuse(access, name_.c_str(), "no such register");
-  }
+  const bool parts = offset == offsetof(Registers, idr) || offset == offsetof(Registers, odr) ||
+                     offset == offsetof(Registers, bsrr);
+  if (!parts || access.bytes == 4) return RegisterBlock::read(access);
+  const std::uint32_t mask = access.bytes == 1 ? 0xFFU : 0xFFFFU;
+  return RegisterBlock::read({offset, 4, access.now}) >> (8 * (access.offset & 3U)) & mask;
 }
 
 void GpioPortModel::write(const Access& access, std::uint32_t value) {
-  const unsigned shift = 8 * (access.offset & 3U);
-  const std::uint32_t lanes = access.bytes == 4 ? 0xFFFF'FFFFU : ((1U << (8 * access.bytes)) - 1U) << shift;
-  const std::uint32_t shifted = value << shift & lanes;
-  switch (access.offset & ~3U) {
-    case offsetof(Registers, idr):
-      refuse(access, name_.c_str(), "IDR cannot be written");
-    case offsetof(Registers, odr): {
-      const std::uint32_t merged = (odr_ & ~lanes) | shifted;
-      if ((merged & ~all_pins) != 0) refuse(access, name_.c_str(), "reserved bits of ODR are written 1");
-      odr_ = merged;
-      break;
-    }
-    case offsetof(Registers, bsrr):
-      // Set wins over reset (section GPIO port bit set/reset register).
-      odr_ = (odr_ & ~(shifted >> 16)) | (shifted & all_pins);
-      break;
-    default:
-      require_word(access, name_.c_str());
-      write_word(access, value);
+  const std::uint32_t offset = access.offset & ~3U;
+  const bool parts = offset == offsetof(Registers, odr) || offset == offsetof(Registers, bsrr);
+  if (!parts || access.bytes == 4) {
+    RegisterBlock::write(access, value);
+  } else {
+    const unsigned shift = 8 * (access.offset & 3U);
+    const std::uint32_t lanes = ((1U << (8 * access.bytes)) - 1U) << shift;
+    const std::uint32_t kept = offset == offsetof(Registers, odr) ? odr_ & ~lanes : 0U;
+    RegisterBlock::write({offset, 4, access.now}, kept | (value << shift & lanes));
   }
   update(access.now);
 }
 
-void GpioPortModel::write_word(const Access& access, std::uint32_t value) {
-  switch (access.offset) {
-    case offsetof(Registers, moder):
-      moder_ = value;
-      break;
-    case offsetof(Registers, otyper):
-      if ((value & ~all_pins) != 0) refuse(access, name_.c_str(), "reserved bits of OTYPER are written 1");
-      otyper_ = value;
-      break;
-    case offsetof(Registers, ospeedr):
-      ospeedr_ = value;
-      break;
-    case offsetof(Registers, pupdr):
-      for (unsigned pin = 0; pin < pin_count; ++pin) {
-        if (two_bits(value, pin) == 3) {
-          refuse(access, name_.c_str(),
-                 "PUPDR of pin " + std::to_string(pin) + " is 3; 0, 1 (up) and 2 (down) exist");
-        }
-      }
-      pupdr_ = value;
-      break;
-    case offsetof(Registers, lckr):
-      refuse(access, name_.c_str(), "LCKR is not modelled");
-    case offsetof(Registers, afr):
-      afr_[0] = value;
-      break;
-    case offsetof(Registers, afr) + 4:
-      afr_[1] = value;
-      break;
-    default:
-      refuse(access, name_.c_str(), "no such register");
+void GpioPortModel::write_pulls(const Access& access, std::uint32_t value) {
+  for (unsigned pin = 0; pin < pin_count; ++pin) {
+    if (two_bits(value, pin) == 3) {
+      refuse(access, "PUPDR of pin " + std::to_string(pin) + " is 3; 0, 1 (up) and 2 (down) exist");
+    }
   }
+  pupdr_ = value;
 }
 
 void GpioPortModel::drive(unsigned pin, PinDrive drive, BoardTime now) {
@@ -238,7 +197,7 @@ void GpioPortModel::on_input_change(PinChange callback) {
 }
 
 std::string GpioPortModel::pin_name(unsigned pin) const {
-  return std::string("P") + name_.back() + std::to_string(pin);
+  return std::string("P") + block()[4] + std::to_string(pin);
 }
 
 }  // namespace kmax::virtual_board

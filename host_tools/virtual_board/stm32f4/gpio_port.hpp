@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drivers/stm32f4/gpio.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -33,7 +33,7 @@ enum class PinOutput : std::uint8_t { released, low, high };
 /// AHB clock). ODR, BSRR and IDR take byte, half-word and word accesses, the others words. Not modelled and
 /// refused: LCKR, a pull of both kinds (PUPDR 3), reserved bits. The port's clock in the RCC is not looked
 /// at.
-class GpioPortModel final : public Peripheral {
+class GpioPortModel final : public RegisterBlock<GpioPortModel> {
  public:
   using PinChange = std::function<void(unsigned pin, bool level, BoardTime now)>;
   using OutputChange = std::function<void(unsigned pin, PinOutput output, BoardTime now)>;
@@ -72,9 +72,9 @@ class GpioPortModel final : public Peripheral {
     bool floating;
   };
 
+  static const RegisterTable<GpioPortModel>& registers();
   void restore_reset_values();
-  std::uint32_t word_at(const Access& access) const;
-  void write_word(const Access& access, std::uint32_t value);
+  void write_pulls(const Access& access, std::uint32_t value);
   void update(BoardTime now);
   void report(BoardTime now);
   PinOutput output_of(unsigned pin) const;
@@ -83,7 +83,6 @@ class GpioPortModel final : public Peripheral {
   std::string pin_name(unsigned pin) const;
 
   drivers::stm32f4::GpioPort port_;
-  std::string name_;
   std::uint32_t moder_ = 0, otyper_ = 0, ospeedr_ = 0, pupdr_ = 0, odr_ = 0;
   std::array<std::uint32_t, 2> afr_{};
   std::array<PinDrive, 16> drives_{};

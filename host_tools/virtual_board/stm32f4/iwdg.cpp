@@ -9,7 +9,6 @@ namespace kmax::virtual_board {
 
 namespace {
 namespace stm32 = drivers::stm32f4;
-constexpr const char* block = "IWDG";
 constexpr std::uint64_t update_cycles = 5;
 }  // namespace
 
@@ -63,40 +62,28 @@ void IwdgModel::advance(BoardTime now) {
   }
 }
 
-std::uint32_t IwdgModel::read(const Access& access) {
-  require_word(access, block);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(stm32::IwdgRegisters, pr):
-      return pr_;
-    case offsetof(stm32::IwdgRegisters, rlr):
-      return rlr_;
-    case offsetof(stm32::IwdgRegisters, sr):
-      return stm32::iwdg_sr::PrescalerUpdating::bits(pr_effective_ != never ? 1 : 0) |
-             stm32::iwdg_sr::ReloadUpdating::bits(rlr_effective_ != never ? 1 : 0);
-    default:
-      refuse(access, block, "KR is write only; nothing lies behind SR");
-  }
+const RegisterTable<IwdgModel>& IwdgModel::registers() {
+  using Model = IwdgModel;
+  using Row = Register<Model>;
+  using Layout = stm32::IwdgRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, kr), "KR", nullptr, any_bits, Row::takes<&Model::write_key>},
+      {offsetof(Layout, pr), "PR", Row::shows<&Model::pr_>, stm32::iwdg_pr::Prescaler::maximum,
+       Row::takes<&Model::write_setting<&Model::pr_, &Model::pr_effective_>>},
+      {offsetof(Layout, rlr), "RLR", Row::shows<&Model::rlr_>, stm32::iwdg_rlr::Reload::maximum,
+       Row::takes<&Model::write_setting<&Model::rlr_, &Model::rlr_effective_>>},
+      {offsetof(Layout, sr), "SR", Row::shows<&Model::read_status>}};
+  return table;
 }
 
-void IwdgModel::write(const Access& access, std::uint32_t value) {
-  require_word(access, block);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(stm32::IwdgRegisters, kr):
-      return write_key(access, value);
-    case offsetof(stm32::IwdgRegisters, pr):
-      return write_setting(access, value, stm32::iwdg_pr::Prescaler::maximum, pr_, pr_effective_);
-    case offsetof(stm32::IwdgRegisters, rlr):
-      return write_setting(access, value, stm32::iwdg_rlr::Reload::maximum, rlr_, rlr_effective_);
-    default:
-      refuse(access, block, "SR is read only; nothing lies behind it");
-  }
+std::uint32_t IwdgModel::read_status() const {
+  return stm32::iwdg_sr::PrescalerUpdating::bits(pr_effective_ != never ? 1 : 0) |
+         stm32::iwdg_sr::ReloadUpdating::bits(rlr_effective_ != never ? 1 : 0);
 }
 
 void IwdgModel::write_key(const Access& access, std::uint32_t key) {
   if (key != stm32::iwdg_kr::start && key != stm32::iwdg_kr::reload && key != stm32::iwdg_kr::unlock)
-    refuse(access, block, "KR: key " + std::to_string(key) + " means nothing");
+    refuse(access, "KR: key " + std::to_string(key) + " means nothing");
   unlocked_ = key == stm32::iwdg_kr::unlock;
   const bool starts = key == stm32::iwdg_kr::start && !running_;
   if (starts) {
@@ -111,14 +98,12 @@ void IwdgModel::write_key(const Access& access, std::uint32_t key) {
   if (starts && on_started_) on_started_(access.now);
 }
 
-void IwdgModel::write_setting(const Access& access, std::uint32_t value, std::uint32_t maximum,
-                              std::uint32_t& setting, BoardTime& effective) {
-  if (!unlocked_) refuse(access, block, "PR and RLR need the unlock key 0x5555 first");
-  if (effective != never) refuse(access, block, "written again while PVU or RVU is set");
-  if (value > maximum)
-    refuse(access, block, "value " + std::to_string(value) + " is above " + std::to_string(maximum));
-  setting = value;
-  effective = running_ ? access.now + cycles(update_cycles) : 0;
+template <std::uint32_t IwdgModel::*setting, BoardTime IwdgModel::*effective>
+void IwdgModel::write_setting(const Access& access, std::uint32_t value) {
+  if (!unlocked_) refuse(access, "PR and RLR need the unlock key 0x5555 first");
+  if (this->*effective != never) refuse(access, "written again while PVU or RVU is set");
+  this->*setting = value;
+  this->*effective = running_ ? access.now + cycles(update_cycles) : 0;
 }
 
 void IwdgModel::reset(BoardTime) {

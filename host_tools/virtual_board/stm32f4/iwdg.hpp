@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "drivers/stm32f4/registers/iwdg.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -18,12 +18,12 @@ namespace kmax::virtual_board {
 ///
 /// Refused: PR and RLR without the unlock key (silicon ignores that) or while they are being updated, keys
 /// that mean nothing, reading KR.
-class IwdgModel final : public Peripheral {
+class IwdgModel final : public RegisterBlock<IwdgModel> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::stm32f4::IwdgRegisters);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
+  IwdgModel() : RegisterBlock("IWDG", registers()) {}
+
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
   /// Stops it, as every reset of the chip does.
@@ -46,9 +46,11 @@ class IwdgModel final : public Peripheral {
   BoardTime cycles(std::uint64_t count) const;
   std::uint64_t elapsed_cycles(BoardTime now) const;
   void take_prescaler_over(BoardTime now);
+  static const RegisterTable<IwdgModel>& registers();
+  std::uint32_t read_status() const;
   void write_key(const Access& access, std::uint32_t key);
-  void write_setting(const Access& access, std::uint32_t value, std::uint32_t maximum, std::uint32_t& setting,
-                     BoardTime& effective);
+  template <std::uint32_t IwdgModel::*setting, BoardTime IwdgModel::*effective>
+  void write_setting(const Access& access, std::uint32_t value);
 
   std::uint32_t oscillator_hz_ = drivers::stm32f4::lsi_typical_hz;
   std::function<void(BoardTime)> on_reset_;

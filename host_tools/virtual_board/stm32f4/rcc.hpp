@@ -4,14 +4,38 @@
 #include <functional>
 #include <utility>
 
+#include "drivers/stm32f4/registers/pwr.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/reset_cause.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 #include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
-#include "host_tools/virtual_board/stm32f4/pwr.hpp"
 
 namespace kmax::virtual_board {
+
+/// Power control: RM0090, chapter Power controller (PWR), section Voltage regulator. Only the voltage scale;
+/// low-power modes, the voltage detector and the backup domain are refused.
+///
+/// Sources disagree on VOS after reset. It is 0 (scale 2) here, the case in which a program that forgets it
+/// fails.
+class PwrModel final : public RegisterBlock<PwrModel> {
+ public:
+  static constexpr std::uint32_t size = sizeof(drivers::stm32f4::PwrRegisters);
+  /// Highest HCLK at scale 2 (STM32F405 data sheet, general operating conditions).
+  static constexpr std::uint64_t scale_2_maximum_hz = 144'000'000;
+
+  explicit PwrModel(const BoardClocks& clocks) : RegisterBlock("PWR", registers()), clocks_(clocks) {}
+  void reset(BoardTime /*now*/) override { cr_ = 0; }
+
+  bool voltage_scale_1() const { return drivers::stm32f4::pwr_cr::VoltageScale1::of(cr_) != 0; }
+
+ private:
+  static const RegisterTable<PwrModel>& registers();
+  void write_cr(const Access& access, std::uint32_t value);
+
+  const BoardClocks& clocks_;
+  std::uint32_t cr_ = 0;
+};
 
 /// Reset and clock control: RM0090, chapter Reset and clock control for STM32F405xx (RCC), sections Clocks,
 /// Clock security system, RCC registers. Crystal of 8 MHz. Writes BoardClocks whenever the core changes its
@@ -27,7 +51,7 @@ namespace kmax::virtual_board {
 /// allow; frequencies of which 336 MHz is no multiple, which BoardTime cannot express; clock outputs, I2S
 /// PLL, backup domain, LSION, ready interrupts, low-power enables; enable and reset bits of peripherals that
 /// the board does not have.
-class RccModel final : public Peripheral {
+class RccModel final : public RegisterBlock<RccModel> {
  public:
   static constexpr std::uint32_t size = 0x90;
   static constexpr BoardTime internal_start_time = 4 * units_per_microsecond;
@@ -37,8 +61,6 @@ class RccModel final : public Peripheral {
 
   RccModel(BoardClocks& clocks, const FlashInterface& flash, const PwrModel& power);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
   /// The reset flags stay: note_reset() sets them.
@@ -46,7 +68,7 @@ class RccModel final : public Peripheral {
 
   /// Whether all bits of `mask` are set in the enable register at `offset`, e.g. offsetof(RccRegisters,
   /// apb1enr).
-  bool clock_enabled(std::uint32_t offset, std::uint32_t mask) const;
+  bool clock_enabled(std::uint32_t offset, std::uint32_t mask);
   /// What the reset flags will say; call it with reset(). Also as after construction: power_on.
   void note_reset(drivers::stm32f4::ResetCause cause);
   /// The watchdog has started the low-speed oscillator.
@@ -75,14 +97,16 @@ class RccModel final : public Peripheral {
   bool core_clock_lost() const { return core_clock_lost_; }
 
  private:
-  std::uint32_t* storage(std::uint32_t offset);
+  static const RegisterTable<RccModel>& registers();
+  std::uint32_t read_control(const Access& access) const { return cr_ | ready_flags(access.now); }
   std::uint32_t ready_flags(BoardTime now) const;
   void write_control(const Access& access, std::uint32_t value);
   void write_pll(const Access& access, std::uint32_t value);
   void write_configuration(const Access& access, std::uint32_t value);
   void write_interrupts(const Access& access, std::uint32_t value);
-  void write_status(const Access& access, std::uint32_t value);
-  void write_enables(const Access& access, std::uint32_t value);
+  void write_status(std::uint32_t value);
+  std::uint32_t read_status() const;
+  template <std::uint32_t RccModel::*stored>
   void write_resets(const Access& access, std::uint32_t value);
   BoardTime ready_at(std::uint32_t source) const;
   /// The clocks that a CFGR would give with the core on `source`; throws RefusedAccess when they are not

@@ -14,9 +14,7 @@ using drivers::stm32f4::SpiRegisters;
 namespace spi_cr1 = drivers::stm32f4::spi_cr1;
 namespace spi_sr = drivers::stm32f4::spi_sr;
 
-constexpr const char* name = "SPI3";
 constexpr unsigned bits_per_frame = 16;
-constexpr std::uint32_t cr1_writable = 0xFFFF;
 /// What CR1 must be once SPE is set.
 constexpr std::uint32_t modelled_settings = spi_cr1::SecondEdge::mask | spi_cr1::Master::mask |
                                             spi_cr1::InternalSelect::mask | spi_cr1::SoftwareSelect::mask |
@@ -36,73 +34,57 @@ void SpiModel::reset(BoardTime /*now*/) {
   schedule();
 }
 
-std::uint32_t SpiModel::read(const Access& access) {
-  require_word(access, name);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(SpiRegisters, cr1):
-      return cr1_;
-    case offsetof(SpiRegisters, cr2):
-      return 0;
-    case offsetof(SpiRegisters, sr): {
-      const std::uint32_t value = (received_ ? spi_sr::ReceiveNotEmpty::mask : 0U) |
-                                  (buffer_full_ ? 0U : spi_sr::TransmitEmpty::mask) |
-                                  (overrun_ ? spi_sr::Overrun::mask : 0U) |
-                                  (shifting_ || buffer_full_ ? spi_sr::Busy::mask : 0U);
-      if (overrun_half_cleared_) overrun_ = overrun_half_cleared_ = false;
-      return value;
-    }
-    case offsetof(SpiRegisters, dr):
-      received_ = false;
-      overrun_half_cleared_ = overrun_;
-      return received_word_;
-    default:
-      refuse(access, name, "register not modelled");
-  }
+const RegisterTable<SpiModel>& SpiModel::registers() {
+  using Model = SpiModel;
+  using Row = Register<Model>;
+  using Layout = SpiRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, cr1), "CR1", Row::shows<&Model::cr1_>, 0xFFFF, Row::takes<&Model::write_cr1>},
+      Row::reserved(offsetof(Layout, cr2), "CR2"),
+      {offsetof(Layout, sr), "SR", Row::shows<&Model::read_status>},
+      {offsetof(Layout, dr), "DR", Row::shows<&Model::read_data>, 0xFFFF, Row::takes<&Model::write_data>}};
+  return table;
 }
 
-void SpiModel::write(const Access& access, std::uint32_t value) {
-  require_word(access, name);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(SpiRegisters, cr1):
-      write_cr1(access, value);
-      break;
-    case offsetof(SpiRegisters, cr2):
-      if (value != 0) refuse(access, name, "CR2: DMA, interrupts and SSOE are not modelled");
-      break;
-    case offsetof(SpiRegisters, dr):
-      if (value > 0xFFFF) refuse(access, name, fmt::format("DR = 0x{:X}: a frame has 16 bits", value));
-      if (spi_cr1::Enable::of(cr1_) == 0) refuse(access, name, "DR is written while SPE = 0");
-      if (buffer_full_) refuse(access, name, "DR is written while TXE = 0: the word before would be lost");
-      buffer_ = static_cast<std::uint16_t>(value);
-      buffer_full_ = true;
-      if (!shifting_) begin_frame(access.now + clocks_.apb1);
-      break;
-    default:
-      refuse(access, name, "register not modelled or not writable");
-  }
-  schedule();
+std::uint32_t SpiModel::read_status() {
+  const std::uint32_t value =
+      (received_ ? spi_sr::ReceiveNotEmpty::mask : 0U) | (buffer_full_ ? 0U : spi_sr::TransmitEmpty::mask) |
+      (overrun_ ? spi_sr::Overrun::mask : 0U) | (shifting_ || buffer_full_ ? spi_sr::Busy::mask : 0U);
+  if (overrun_half_cleared_) overrun_ = overrun_half_cleared_ = false;
+  return value;
+}
+
+std::uint32_t SpiModel::read_data() {
+  received_ = false;
+  overrun_half_cleared_ = overrun_;
+  return received_word_;
+}
+
+void SpiModel::write_data(const Access& access, std::uint32_t value) {
+  if (spi_cr1::Enable::of(cr1_) == 0) refuse(access, "DR is written while SPE = 0");
+  if (buffer_full_) refuse(access, "DR is written while TXE = 0: the word before would be lost");
+  buffer_ = static_cast<std::uint16_t>(value);
+  buffer_full_ = true;
+  if (!shifting_) begin_frame(access.now + clocks_.apb1);
 }
 
 void SpiModel::write_cr1(const Access& access, std::uint32_t value) {
-  if ((value & ~cr1_writable) != 0) refuse(access, name, "reserved bits of CR1 are written 1");
   const bool was_enabled = spi_cr1::Enable::of(cr1_) != 0;
   const bool enabled = spi_cr1::Enable::of(value) != 0;
   if (was_enabled && !enabled && (shifting_ || buffer_full_)) {
-    refuse(access, name,
-           "SPE is cleared while a frame is under way (section Disabling the SPI): wait for BSY = 0");
+    refuse(access, "SPE is cleared while a frame is under way (section Disabling the SPI): wait for BSY = 0");
   }
   if (enabled) {
     if ((value & ~free_settings) != modelled_settings) {
-      refuse(access, name,
-             fmt::format("CR1 = 0x{:04X}: only a 16-bit full-duplex master with CPOL 0, CPHA 1, MSB first, "
-                         "SSM and SSI is "
-                         "modelled",
-                         value));
+      refuse(
+          access,
+          fmt::format(
+              "CR1 = 0x{:04X}: only a 16-bit full-duplex master with CPOL 0, CPHA 1, MSB first, SSM and SSI "
+              "is modelled",
+              value));
     }
-    if (was_enabled && value != cr1_) refuse(access, name, "CR1 is changed while SPE = 1");
-    if (!was_enabled && !wire_) refuse(access, name, "the model's bus is not connected");
+    if (was_enabled && value != cr1_) refuse(access, "CR1 is changed while SPE = 1");
+    if (!was_enabled && !wire_) refuse(access, "the model's bus is not connected");
   }
   cr1_ = value;
 }

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -20,13 +20,13 @@ namespace kmax::virtual_board {
 /// Refused: all but 16 bits, MSB first, full duplex, master, CPOL 0 and CPHA 1, software NSS with SSI = 1;
 /// CRC, DMA, interrupts (RXNEIE, TXEIE, ERRIE), SSOE and I2S; writing DR while SPE = 0 or TXE = 0; clearing
 /// SPE while a frame is under way; changing the settings while SPE = 1. SR is read-only.
-class SpiModel final : public Peripheral {
+class SpiModel final : public RegisterBlock<SpiModel> {
  public:
   /// Given the word that went out, returns the one that came in. All chips whose select is low see it; the
   /// board ands their outputs, and reads the pull's level where nobody drives.
   using Wire = std::function<std::uint16_t(std::uint16_t mosi)>;
 
-  explicit SpiModel(const BoardClocks& clocks) : clocks_(clocks) {}
+  explicit SpiModel(const BoardClocks& clocks) : RegisterBlock("SPI3", registers()), clocks_(clocks) {}
   /// Called at the end of a frame, with its time; must be set before the first.
   void on_frame(std::function<std::uint16_t(std::uint16_t mosi, BoardTime now)> wire) {
     wire_ = std::move(wire);
@@ -35,8 +35,6 @@ class SpiModel final : public Peripheral {
     wire_ = [wire = std::move(wire)](std::uint16_t mosi, BoardTime) { return wire(mosi); };
   }
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override { return next_event_; }
   void reset(BoardTime now) override;
@@ -47,7 +45,12 @@ class SpiModel final : public Peripheral {
   std::uint64_t overruns() const { return overruns_; }
 
  private:
+  static const RegisterTable<SpiModel>& registers();
   void write_cr1(const Access& access, std::uint32_t value);
+  std::uint32_t read_status();
+  std::uint32_t read_data();
+  void write_data(const Access& access, std::uint32_t value);
+  void after_write() override { schedule(); }
   void begin_frame(BoardTime now);
   void schedule();
   BoardTime bit_time() const;

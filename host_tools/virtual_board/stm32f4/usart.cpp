@@ -11,38 +11,39 @@ namespace kmax::virtual_board {
 namespace {
 
 namespace stm32 = drivers::stm32f4;
-namespace sr = stm32::usart_sr;
-namespace cr1 = stm32::usart_cr1;
-namespace cr2 = stm32::usart_cr2;
-namespace cr3 = stm32::usart_cr3;
+namespace usart_sr = stm32::usart_sr;
+namespace usart_cr1 = stm32::usart_cr1;
+namespace usart_cr2 = stm32::usart_cr2;
 using stm32::UsartRegisters;
 
-constexpr std::uint32_t sr_reset_value = sr::TransmissionComplete::mask | sr::TransmitEmpty::mask;
-constexpr std::uint32_t cleared_by_data_read =
-    sr::ParityError::mask | sr::FramingError::mask | sr::Noise::mask | sr::Overrun::mask | sr::Idle::mask;
+constexpr std::uint32_t sr_reset_value = usart_sr::TransmissionComplete::mask | usart_sr::TransmitEmpty::mask;
+constexpr std::uint32_t cleared_by_data_read = usart_sr::ParityError::mask | usart_sr::FramingError::mask |
+                                               usart_sr::Noise::mask | usart_sr::Overrun::mask |
+                                               usart_sr::Idle::mask;
 constexpr std::uint32_t cr1_bits =
-    cr1::ReceiverEnable::mask | cr1::TransmitterEnable::mask | cr1::IdleInterrupt::mask |
-    cr1::ReceiveInterrupt::mask | cr1::TransmissionCompleteInterrupt::mask |
-    cr1::TransmitEmptyInterrupt::mask | cr1::ParityErrorInterrupt::mask | cr1::OddParity::mask |
-    cr1::ParityEnable::mask | cr1::NineBits::mask | cr1::Enable::mask;
+    usart_cr1::ReceiverEnable::mask | usart_cr1::TransmitterEnable::mask | usart_cr1::IdleInterrupt::mask |
+    usart_cr1::ReceiveInterrupt::mask | usart_cr1::TransmissionCompleteInterrupt::mask |
+    usart_cr1::TransmitEmptyInterrupt::mask | usart_cr1::ParityErrorInterrupt::mask |
+    usart_cr1::OddParity::mask | usart_cr1::ParityEnable::mask | usart_cr1::NineBits::mask |
+    usart_cr1::Enable::mask;
 constexpr std::uint32_t two_stop_bits = 2;
 constexpr std::uint32_t smallest_divisor = 16;
 
 }  // namespace
 
 UsartModel::UsartModel(const BoardClocks& clocks, InterruptLines& lines, stm32::Interrupt interrupt)
-    : clocks_(clocks),
+    : RegisterBlock(interrupt == stm32::Interrupt::uart4 ? "UART4" : "USART2", registers()),
+      clocks_(clocks),
       lines_(lines),
       interrupt_(interrupt),
-      block_(interrupt == stm32::Interrupt::uart4 ? "UART4" : "USART2"),
       sr_(sr_reset_value) {}
 
 bool UsartModel::receiver_on() const {
-  return cr1::Enable::of(cr1_) != 0 && cr1::ReceiverEnable::of(cr1_) != 0 && brr_ != 0;
+  return enabled() && usart_cr1::ReceiverEnable::of(cr1_) != 0 && brr_ != 0;
 }
 
 bool UsartModel::transmitter_on() const {
-  return cr1::Enable::of(cr1_) != 0 && cr1::TransmitterEnable::of(cr1_) != 0 && brr_ != 0;
+  return enabled() && usart_cr1::TransmitterEnable::of(cr1_) != 0 && brr_ != 0;
 }
 
 BoardTime UsartModel::bit_time() const {
@@ -50,8 +51,8 @@ BoardTime UsartModel::bit_time() const {
 }
 
 BoardTime UsartModel::frame_time() const {
-  const unsigned data_bits = cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
-  const unsigned stop_bits = cr2::StopBits::of(cr2_) == two_stop_bits ? 2 : 1;
+  const unsigned data_bits = usart_cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
+  const unsigned stop_bits = usart_cr2::StopBits::of(cr2_) == two_stop_bits ? 2 : 1;
   return bit_time() * (1 + data_bits + stop_bits);
 }
 
@@ -80,7 +81,7 @@ void UsartModel::advance(BoardTime now) {
       begin_reception(event);
     } else {
       idle_at_ = never;
-      sr_ |= sr::Idle::mask;
+      sr_ |= usart_sr::Idle::mask;
     }
     update_interrupt();
   }
@@ -92,7 +93,7 @@ void UsartModel::begin_reception(BoardTime now) {
   line_free_ = now + frame_time();
   if (!receiver_on()) return;
   idle_at_ = never;
-  const unsigned data_bits = cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
+  const unsigned data_bits = usart_cr1::NineBits::of(cr1_) != 0 ? 9 : 8;
   receiving_ = Reception{incoming, now + bit_time() * (2 * (1 + data_bits) + 1) / 2, line_free_};
 }
 
@@ -101,28 +102,29 @@ void UsartModel::end_reception() {
   receiving_.reset();
   if (!receiver_on()) return;
   idle_at_ = reception.end + frame_time();
-  if (sr::ReceiveNotEmpty::of(sr_) != 0) {
-    sr_ |= sr::Overrun::mask;
+  if (usart_sr::ReceiveNotEmpty::of(sr_) != 0) {
+    sr_ |= usart_sr::Overrun::mask;
     return;
   }
   const Incoming& incoming = reception.incoming;
   received_ = incoming.byte;
-  sr_ |= sr::ReceiveNotEmpty::mask;
-  if (cr1::ParityEnable::of(cr1_) != 0) {
+  sr_ |= usart_sr::ReceiveNotEmpty::mask;
+  if (usart_cr1::ParityEnable::of(cr1_) != 0) {
     const auto ones = static_cast<std::uint32_t>(std::popcount(incoming.byte));
-    const std::uint32_t parity = (ones + cr1::OddParity::of(cr1_) + (incoming.parity_ok ? 0U : 1U)) & 1U;
+    const std::uint32_t parity =
+        (ones + usart_cr1::OddParity::of(cr1_) + (incoming.parity_ok ? 0U : 1U)) & 1U;
     received_ |= parity << 8;
-    if (!incoming.parity_ok) sr_ |= sr::ParityError::mask;
+    if (!incoming.parity_ok) sr_ |= usart_sr::ParityError::mask;
   }
-  if (!incoming.framing_ok) sr_ |= sr::FramingError::mask;
-  if (incoming.noise) sr_ |= sr::Noise::mask;
+  if (!incoming.framing_ok) sr_ |= usart_sr::FramingError::mask;
+  if (incoming.noise) sr_ |= usart_sr::Noise::mask;
 }
 
 void UsartModel::load_shift_register(BoardTime now) {
   if (frame_end_ != never || !data_) return;
   shifting_ = data_;
   data_.reset();
-  sr_ |= sr::TransmitEmpty::mask;
+  sr_ |= usart_sr::TransmitEmpty::mask;
   frame_end_ = now + frame_time();
   if (on_transmitting_) on_transmitting_(true, now);
 }
@@ -134,7 +136,7 @@ void UsartModel::end_frame(BoardTime now) {
   load_shift_register(now);
   if (!sent) return;
   if (frame_end_ == never) {
-    sr_ |= sr::TransmissionComplete::mask;
+    sr_ |= usart_sr::TransmissionComplete::mask;
     if (on_transmitting_) on_transmitting_(false, now);
   }
   if (on_transmitted_) on_transmitted_(*sent, now);
@@ -149,96 +151,70 @@ void UsartModel::drop_transmission(BoardTime now) {
   if (was_shifting && on_transmitting_) on_transmitting_(false, now);
 }
 
-std::uint32_t UsartModel::read(const Access& access) {
-  require_word(access, block_);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(UsartRegisters, sr):
-      status_seen_ = sr_;
-      return sr_;
-    case offsetof(UsartRegisters, dr):
-      return read_data(access);
-    case offsetof(UsartRegisters, brr):
-      return brr_;
-    case offsetof(UsartRegisters, cr1):
-      return cr1_;
-    case offsetof(UsartRegisters, cr2):
-      return cr2_;
-    case offsetof(UsartRegisters, cr3):
-      return 0;
-    default:
-      refuse(access, block_, "not modelled (smartcard, IrDA)");
-  }
+const RegisterTable<UsartModel>& UsartModel::registers() {
+  using Model = UsartModel;
+  using Row = Register<Model>;
+  using Layout = UsartRegisters;
+  static const RegisterTable<Model> table{
+      {offsetof(Layout, sr), "SR", Row::shows<&Model::read_status>, any_bits,
+       Row::takes<&Model::write_status>},
+      {offsetof(Layout, dr), "DR", Row::shows<&Model::read_data>, 0xFF, Row::takes<&Model::write_data>},
+      {offsetof(Layout, brr), "BRR", Row::shows<&Model::brr_>, 0xFFFF, Row::takes<&Model::write_baud_rate>},
+      {offsetof(Layout, cr1), "CR1", Row::shows<&Model::cr1_>, cr1_bits, Row::takes<&Model::write_control_1>},
+      {offsetof(Layout, cr2), "CR2", Row::shows<&Model::cr2_>, usart_cr2::StopBits::bits(two_stop_bits),
+       Row::takes<&Model::write_control_2>},
+      Row::reserved(offsetof(Layout, cr3), "CR3")};
+  return table;
+}
+
+std::uint32_t UsartModel::read_status() {
+  return status_seen_ = sr_;
+}
+
+void UsartModel::write_status(std::uint32_t value) {
+  sr_ &= value | ~(usart_sr::ReceiveNotEmpty::mask | usart_sr::TransmissionComplete::mask);
 }
 
 std::uint32_t UsartModel::read_data(const Access& access) {
-  if (cr1::Enable::of(cr1_) == 0 && status_seen_ == 0) refuse(access, block_, "DR read while UE is 0");
+  if (!enabled() && status_seen_ == 0) refuse(access, "DR read while UE is 0");
   sr_ &= ~(status_seen_ & cleared_by_data_read);
-  sr_ &= ~sr::ReceiveNotEmpty::mask;
+  sr_ &= ~usart_sr::ReceiveNotEmpty::mask;
   status_seen_ = 0;
   update_interrupt();
   return received_;
 }
 
-void UsartModel::write(const Access& access, std::uint32_t value) {
-  require_word(access, block_);
-  advance(access.now);
-  switch (access.offset) {
-    case offsetof(UsartRegisters, sr):
-      sr_ &= value | ~(sr::ReceiveNotEmpty::mask | sr::TransmissionComplete::mask);
-      break;
-    case offsetof(UsartRegisters, dr):
-      write_data(access, value);
-      break;
-    case offsetof(UsartRegisters, brr):
-      if (cr1::Enable::of(cr1_) != 0) refuse(access, block_, "BRR changed while UE is 1");
-      if (value < smallest_divisor || value > 0xFFFF)
-        refuse(access, block_, "BRR = " + std::to_string(value) + ", must be 16 to 65535");
-      brr_ = value;
-      break;
-    case offsetof(UsartRegisters, cr1):
-      write_control_1(access, value);
-      break;
-    case offsetof(UsartRegisters, cr2):
-      if (value != 0 && value != cr2::StopBits::bits(two_stop_bits))
-        refuse(access, block_, "CR2: only one or two stop bits are modelled");
-      if (cr1::Enable::of(cr1_) != 0 && value != cr2_)
-        refuse(access, block_, "CR2: stop bits changed while UE is 1");
-      cr2_ = value;
-      break;
-    case offsetof(UsartRegisters, cr3):
-      if ((value & (cr3::ReceiveDma::mask | cr3::TransmitDma::mask)) != 0)
-        refuse(access, block_, "CR3: DMA (DMAR, DMAT) is not modelled");
-      if (value != 0) refuse(access, block_, "CR3: no bit of it is modelled");
-      break;
-    default:
-      refuse(access, block_, "not modelled (smartcard, IrDA)");
-  }
-  update_interrupt();
+void UsartModel::write_baud_rate(const Access& access, std::uint32_t value) {
+  if (enabled()) refuse(access, "BRR changed while UE is 1");
+  if (value < smallest_divisor) refuse(access, "BRR = " + std::to_string(value) + ", must be 16 to 65535");
+  brr_ = value;
+}
+
+void UsartModel::write_control_2(const Access& access, std::uint32_t value) {
+  if (enabled() && value != cr2_) refuse(access, "CR2: stop bits changed while UE is 1");
+  cr2_ = value;
 }
 
 void UsartModel::write_data(const Access& access, std::uint32_t value) {
-  if (!transmitter_on()) refuse(access, block_, "DR written while UE or TE is 0: the byte would be lost");
-  if (data_) refuse(access, block_, "DR written while TXE is 0: the byte before would be lost");
-  if (value > 0xFF) refuse(access, block_, "DR = " + std::to_string(value) + ", must be a byte");
+  if (!transmitter_on()) refuse(access, "DR written while UE or TE is 0: the byte would be lost");
+  if (data_) refuse(access, "DR written while TXE is 0: the byte before would be lost");
   // RM0090: the sequence of reading SR and writing DR clears TC (and PE).
-  sr_ &= ~(status_seen_ & (sr::TransmissionComplete::mask | sr::ParityError::mask));
+  sr_ &= ~(status_seen_ & (usart_sr::TransmissionComplete::mask | usart_sr::ParityError::mask));
   status_seen_ = 0;
   data_ = static_cast<std::uint8_t>(value);
-  sr_ &= ~sr::TransmitEmpty::mask;
+  sr_ &= ~usart_sr::TransmitEmpty::mask;
   load_shift_register(access.now);
 }
 
 void UsartModel::write_control_1(const Access& access, std::uint32_t value) {
-  if ((value & ~cr1_bits) != 0)
-    refuse(access, block_, "CR1: SBK, RWU, WAKE, OVER8 or a reserved bit: not modelled");
-  if ((cr1::NineBits::of(value) != 0) != (cr1::ParityEnable::of(value) != 0))
-    refuse(access, block_, "CR1: only eight data bits are modelled: M must equal PCE");
-  constexpr std::uint32_t format = cr1::NineBits::mask | cr1::ParityEnable::mask | cr1::OddParity::mask;
-  if (((value ^ cr1_) & format) != 0 && cr1::Enable::of(value & cr1_) != 0)
-    refuse(access, block_, "CR1: frame format changed while UE is 1");
-  if (cr1::Enable::of(value) != 0 && brr_ == 0)
-    refuse(access, block_, "CR1: enabled without a baud rate in BRR");
+  if ((usart_cr1::NineBits::of(value) != 0) != (usart_cr1::ParityEnable::of(value) != 0))
+    refuse(access, "CR1: only eight data bits are modelled: M must equal PCE");
+  constexpr std::uint32_t format =
+      usart_cr1::NineBits::mask | usart_cr1::ParityEnable::mask | usart_cr1::OddParity::mask;
+  if (((value ^ cr1_) & format) != 0 && usart_cr1::Enable::of(value & cr1_) != 0)
+    refuse(access, "CR1: frame format changed while UE is 1");
+  if (usart_cr1::Enable::of(value) != 0 && brr_ == 0)
+    refuse(access, "CR1: enabled without a baud rate in BRR");
   const bool transmitter_was_on = transmitter_on();
   cr1_ = value;
   if (transmitter_was_on && !transmitter_on()) drop_transmission(access.now);
@@ -253,12 +229,13 @@ void UsartModel::update_interrupt() {
   const auto asks = [this](std::uint32_t enable, std::uint32_t flags) {
     return (cr1_ & enable) != 0 && (sr_ & flags) != 0;
   };
-  const bool level = cr1::Enable::of(cr1_) != 0 &&
-                     (asks(cr1::ReceiveInterrupt::mask, sr::ReceiveNotEmpty::mask | sr::Overrun::mask) ||
-                      asks(cr1::TransmitEmptyInterrupt::mask, sr::TransmitEmpty::mask) ||
-                      asks(cr1::TransmissionCompleteInterrupt::mask, sr::TransmissionComplete::mask) ||
-                      asks(cr1::IdleInterrupt::mask, sr::Idle::mask) ||
-                      asks(cr1::ParityErrorInterrupt::mask, sr::ParityError::mask));
+  const bool level =
+      enabled() &&
+      (asks(usart_cr1::ReceiveInterrupt::mask, usart_sr::ReceiveNotEmpty::mask | usart_sr::Overrun::mask) ||
+       asks(usart_cr1::TransmitEmptyInterrupt::mask, usart_sr::TransmitEmpty::mask) ||
+       asks(usart_cr1::TransmissionCompleteInterrupt::mask, usart_sr::TransmissionComplete::mask) ||
+       asks(usart_cr1::IdleInterrupt::mask, usart_sr::Idle::mask) ||
+       asks(usart_cr1::ParityErrorInterrupt::mask, usart_sr::ParityError::mask));
   if (level == level_) return;
   level_ = level;
   lines_.set_level(interrupt_, level);

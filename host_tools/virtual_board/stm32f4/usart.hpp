@@ -8,8 +8,8 @@
 
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/usart.hpp"
-#include "host_tools/virtual_board/peripheral.hpp"
-#include "host_tools/virtual_board/stm32f4/board_clocks.hpp"
+#include "host_tools/virtual_board/board_time.hpp"
+#include "host_tools/virtual_board/register_block.hpp"
 
 namespace kmax::virtual_board {
 
@@ -31,15 +31,13 @@ namespace kmax::virtual_board {
 /// changed while enabled; writing DR while the transmitter is off or still full (the byte would be lost),
 /// reading DR while the port is off, except right after a read of SR, which is how a program drops old flags
 /// before it starts.
-class UsartModel final : public Peripheral {
+class UsartModel final : public RegisterBlock<UsartModel> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::stm32f4::UsartRegisters);
 
   /// `interrupt`: usart2 or uart4.
   UsartModel(const BoardClocks& clocks, InterruptLines& lines, drivers::stm32f4::Interrupt interrupt);
 
-  std::uint32_t read(const Access& access) override;
-  void write(const Access& access, std::uint32_t value) override;
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
   /// Bytes that are still to come from outside are kept.
@@ -80,6 +78,8 @@ class UsartModel final : public Peripheral {
     BoardTime end;
   };
 
+  static const RegisterTable<UsartModel>& registers();
+  bool enabled() const { return drivers::stm32f4::usart_cr1::Enable::of(cr1_) != 0; }
   bool receiver_on() const;
   bool transmitter_on() const;
   BoardTime bit_time() const;
@@ -89,15 +89,19 @@ class UsartModel final : public Peripheral {
   void end_frame(BoardTime now);
   void load_shift_register(BoardTime now);
   void drop_transmission(BoardTime now);
+  std::uint32_t read_status();
+  void write_status(std::uint32_t value);
+  void write_baud_rate(const Access& access, std::uint32_t value);
   void write_control_1(const Access& access, std::uint32_t value);
+  void write_control_2(const Access& access, std::uint32_t value);
   void write_data(const Access& access, std::uint32_t value);
   std::uint32_t read_data(const Access& access);
+  void after_write() override { update_interrupt(); }
   void update_interrupt();
 
   const BoardClocks& clocks_;
   InterruptLines& lines_;
   drivers::stm32f4::Interrupt interrupt_;
-  const char* block_;
   std::function<void(std::uint8_t, BoardTime)> on_transmitted_;
   std::function<void(bool, BoardTime)> on_transmitting_;
 

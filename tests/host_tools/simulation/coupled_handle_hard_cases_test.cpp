@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "host_tools/simulation/coupled_handle.hpp"
-#include "host_tools/simulation/held_chain.hpp"
+#include "host_tools/simulation/propagator_table.hpp"
 #include "tests/host_tools/simulation/precise_chain.hpp"
 
 namespace kmax::simulation::coupled_handle_hard_cases_test {

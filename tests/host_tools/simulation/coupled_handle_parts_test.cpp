@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "host_tools/simulation/coupled_handle.hpp"
-#include "tests/host_tools/simulation/energy_balance.hpp"
+#include "tests/host_tools/simulation/drawn_models.hpp"
 
 namespace kmax::simulation::coupled_handle_parts_test {
 namespace {

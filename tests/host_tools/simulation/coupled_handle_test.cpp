@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tests/host_tools/simulation/energy_balance.hpp"
+#include "tests/host_tools/simulation/drawn_models.hpp"
 
 namespace kmax::simulation::coupled_handle_test {
 namespace {

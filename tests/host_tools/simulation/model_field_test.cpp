@@ -8,6 +8,7 @@
 #include <string>
 
 #include "host_tools/simulation/device_model.hpp"
+#include "host_tools/simulation/integrator_config.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 
 namespace kmax::simulation::model_field_test {
@@ -51,6 +52,10 @@ TEST(ModelField, EveryNumberOfTheStructureHasARange) {
 TEST(ModelField, EveryNumberOfTheOperatorHasARange) {
   static_assert(sizeof(OperatorModel) == operator_fields.size() * sizeof(double));
   check_every_field(operator_fields);
+}
+
+TEST(ModelField, EveryNumberOfTheIntegratorHasARange) {
+  check_every_field(integrator_fields);
 }
 
 TEST(ModelField, MessageGivesValueAndRange) {

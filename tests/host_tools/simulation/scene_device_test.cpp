@@ -1,11 +1,11 @@
-// scene_device.hpp, through the scenes that it reads.
+// scene_axis.hpp, through the scenes that it reads.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
 #include "host_tools/simulation/scene.hpp"
-#include "tests/host_tools/simulation/scene_refusal.hpp"
+#include "tests/host_tools/simulation/scene_file.hpp"
 
 namespace kmax::simulation::scene_device_test {
 namespace {

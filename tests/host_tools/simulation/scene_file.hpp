@@ -18,4 +18,14 @@ inline Scene scene_file(const std::string& name) {
   return load_scene((scene_folder() / (name + ".toml")).string());
 }
 
+// The message of the SceneError that the text of a scene "bad.toml" provokes, or "accepted".
+inline std::string refusal(const std::string& text, const ParameterCheck& check = {}) {
+  try {
+    parse_scene(text, "bad.toml", check);
+    return "accepted";
+  } catch (const SceneError& error) {
+    return error.what();
+  }
+}
+
 }  // namespace kmax::simulation

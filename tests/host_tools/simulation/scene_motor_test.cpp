@@ -1,11 +1,11 @@
-// scene_motor.hpp, through the scenes that it reads.
+// scene_axis.hpp, through the scenes that it reads.
 #include <gtest/gtest.h>
 
 #include <string>
 
+#include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "tests/host_tools/simulation/scene_file.hpp"
-#include "tests/host_tools/simulation/scene_refusal.hpp"
 
 namespace kmax::simulation::scene_motor_test {
 namespace {
@@ -245,6 +245,17 @@ TEST(SceneMotor, TheSuppliedScenesAgreeWithTheirParameters) {
       EXPECT_EQ(axis.start.position, 0.0) << "a counter that is 0 at power-on is right";
     }
   }
+}
+
+TEST(Defect, NamesAndDefectsBelongTogether) {
+  for (std::size_t n = 0; n < defect_names.size(); ++n) {
+    EXPECT_EQ(static_cast<std::size_t>(defect_names[n].defect), n)
+        << "the table is in the enumeration's order";
+    EXPECT_EQ(name_of(defect_names[n].defect), defect_names[n].name);
+    EXPECT_EQ(defect_named(defect_names[n].name), defect_names[n].defect) << "a name stands twice";
+  }
+  EXPECT_EQ(defect_named("phase_d_open"), std::nullopt);
+  EXPECT_EQ(defect_named(""), std::nullopt);
 }
 
 }  // namespace

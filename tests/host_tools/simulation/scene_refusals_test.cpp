@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/host_tools/simulation/scene_file.hpp"
 #include "tests/host_tools/simulation/scene_keys.hpp"
-#include "tests/host_tools/simulation/scene_refusal.hpp"
 
 namespace kmax::simulation::scene_refusals_test {
 namespace {

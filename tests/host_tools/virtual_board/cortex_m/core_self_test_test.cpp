@@ -121,7 +121,7 @@ struct SelfTestBoard {
   EventLoop loop;
 };
 
-class CoreSelfTest : public testing::Test {
+class CoreSelfTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (image_path().empty() || !std::filesystem::exists(image_path())) {

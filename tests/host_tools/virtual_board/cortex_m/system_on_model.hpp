@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
-#include "host_tools/virtual_board/stm32f4/pwr.hpp"
 #include "host_tools/virtual_board/stm32f4/rcc.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timed_register.hpp"
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/stm32f4/interrupts.hpp"
-#include "host_tools/virtual_board/run/can_host_node.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
 namespace kmax::virtual_board::can_controller_test {

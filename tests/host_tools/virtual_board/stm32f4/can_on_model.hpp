@@ -10,8 +10,8 @@
 
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
-#include "host_tools/virtual_board/run/can_host_node.hpp"
 #include "host_tools/virtual_board/stm32f4/can_controller.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
 
 // The CAN driver on the model of the controller, with its interrupts served, and a bus with time.

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
-// RM0090, chapters Embedded Flash memory interface (one-time programmable bytes) and Device electronic
-// signature.
+#include <cstddef>
+
+// RM0090, chapters Embedded Flash memory interface (one-time programmable bytes), Device electronic signature
+// and Debug support (DBG), section MCU debug component (DBGMCU).
 
 namespace kmax::virtual_board::device_identity_test {
 namespace {
@@ -37,6 +39,28 @@ TEST(DeviceIdentity, HolesAndWritesAreRefused) {
   EXPECT_THROW(get(model, 0x1FFF'7A20, 4), RefusedAccess) << "only half of it is the flash size";
   EXPECT_THROW(get(model, 0x1FFF'7A24, 4), RefusedAccess);
   EXPECT_THROW(model.write({0, 4, 0}, 0), RefusedAccess);
+}
+
+using drivers::stm32f4::DbgmcuRegisters;
+
+TEST(Dbgmcu, IdentityAndFreezeBits) {
+  DbgmcuModel model;
+  EXPECT_EQ(model.read({0, 4, 0}) & 0xFFFU, 0x413U);
+  model.write({offsetof(DbgmcuRegisters, apb1_fz), 4, 0}, 1U << 12);
+  model.write({offsetof(DbgmcuRegisters, apb2_fz), 4, 0}, 3);
+  model.reset(0);
+  EXPECT_EQ(model.read({offsetof(DbgmcuRegisters, apb1_fz), 4, 0}), 1U << 12) << "power-on reset only";
+  EXPECT_EQ(model.read({offsetof(DbgmcuRegisters, apb2_fz), 4, 0}), 3U);
+}
+
+TEST(Dbgmcu, RefusesTheRest) {
+  DbgmcuModel model;
+  EXPECT_THROW(model.write({0, 4, 0}, 0), RefusedAccess) << "IDCODE";
+  EXPECT_THROW(model.write({4, 4, 0}, 1), RefusedAccess) << "DBG_SLEEP";
+  EXPECT_THROW(model.write({offsetof(DbgmcuRegisters, apb1_fz), 4, 0}, 1U << 11), RefusedAccess) << "WWDG";
+  EXPECT_THROW(model.write({offsetof(DbgmcuRegisters, apb2_fz), 4, 0}, 1U << 16), RefusedAccess) << "TIM9";
+  EXPECT_THROW(model.read({16, 4, 0}), RefusedAccess);
+  EXPECT_THROW(model.read({0, 2, 0}), RefusedAccess);
 }
 
 }  // namespace

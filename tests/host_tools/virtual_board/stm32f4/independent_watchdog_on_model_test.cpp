@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "host_tools/virtual_board/stm32f4/dbgmcu.hpp"
+#include "host_tools/virtual_board/stm32f4/device_identity.hpp"
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
 #include "tests/host_tools/virtual_board/stm32f4/timed_register.hpp"
 

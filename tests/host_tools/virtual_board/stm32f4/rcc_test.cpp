@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/virtual_board/cortex_m/system_on_model.hpp"
 
-// RM0090, chapter Reset and clock control for STM32F405xx (RCC).
+// RM0090, chapters Reset and clock control for STM32F405xx (RCC) and Power controller (PWR).
 
 namespace kmax::virtual_board::rcc_test {
 namespace {
@@ -246,6 +246,27 @@ TEST(RccClockSecurity, WithoutItTheCoreStops) {
   on_internal.start_crystal();
   on_internal.rcc.fail_crystal(on_internal.bus.now);
   EXPECT_FALSE(on_internal.rcc.core_clock_lost()) << "nothing depended on it";
+}
+
+TEST(Pwr, VoltageScaleMustBeChosen) {
+  BoardClocks clocks;
+  PwrModel model{clocks};
+  EXPECT_FALSE(model.voltage_scale_1());
+  model.write({0, 4, 0}, 1U << 14);
+  EXPECT_TRUE(model.voltage_scale_1());
+  EXPECT_EQ(model.read({0, 4, 0}), 1U << 14);
+  EXPECT_EQ(model.read({4, 4, 0}), 1U << 14) << "VOSRDY";
+  model.reset(0);
+  EXPECT_FALSE(model.voltage_scale_1());
+}
+
+TEST(Pwr, RefusesTheRest) {
+  BoardClocks clocks;
+  PwrModel model{clocks};
+  for (const unsigned bit : {0U, 1U, 4U, 8U, 15U})
+    EXPECT_THROW(model.write({0, 4, 0}, 1U << bit), RefusedAccess) << bit;
+  EXPECT_THROW(model.write({4, 4, 0}, 0), RefusedAccess);
+  EXPECT_THROW(model.read({8, 4, 0}), RefusedAccess);
 }
 
 }  // namespace

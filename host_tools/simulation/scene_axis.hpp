@@ -1,6 +1,7 @@
 #pragma once
-// Reads what a scene says about the mechanical parts of an axis beside the person: [device], [structure] and
-// the scene's [integrator]. All throw SceneError with the place in the file.
+// Reads what a scene says about the parts of an axis beside the person: [device] and [structure]; [encoder],
+// [motor], [inverter] and [current_sensor]; and what all axes share, [integrator] and [supply]. All throw
+// SceneError with the place in the file.
 
 #include <string>
 
@@ -19,5 +20,12 @@ void read_start(const SceneTables& tables, const toml::table& table, const std::
 void check_device(const SceneTables& tables, const toml::table& table, const std::string& prefix,
                   const SceneAxis& axis);
 void read_integrator_table(const SceneTables& tables, const toml::table& root, Scene& scene);
+
+// The motor is read before the encoder, which needs to know whether there is one.
+void read_encoder_table(const SceneTables& tables, const toml::table& table, const std::string& prefix,
+                        SceneAxis& axis);
+void read_motor_tables(const SceneTables& tables, const toml::table& table, const std::string& prefix,
+                       SceneAxis& axis);
+void read_supply_table(const SceneTables& tables, const toml::table& root, Scene& scene);
 
 }  // namespace kmax::simulation

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
-#include "host_tools/virtual_board/stm32f4/can_fault_confinement.hpp"
 
 namespace kmax::virtual_board {
 

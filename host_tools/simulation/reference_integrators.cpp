@@ -1,16 +1,139 @@
-#include <boost/numeric/odeint/algebra/array_algebra.hpp>
-#include <boost/numeric/odeint/stepper/generation.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
+#include "host_tools/simulation/reference_integrators.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include <boost/numeric/odeint/algebra/array_algebra.hpp>
+#include <boost/numeric/odeint/stepper/generation.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
+
 #include "host_tools/simulation/chain_equations.hpp"
-#include "host_tools/simulation/event_search.hpp"
-#include "host_tools/simulation/reference_integrators.hpp"
 
 namespace kmax::simulation {
+
+namespace {
+
+// The new velocity of mass 0. The friction opposes the motion; where it would turn the mass round, friction
+// holds it, or the rest of the step runs the other way.
+template <std::size_t masses>
+double next_velocity(const ChainEquations<masses>& equations,
+                     const typename ChainEquations<masses>::Vector& s, double force, double h) {
+  const double velocity = s[masses];
+  const double per_mass = equations.per_mass(0);
+  const double friction = equations.friction();
+  if (velocity == 0.0) {
+    if (equations.holds(s, force)) return 0.0;
+    return h * per_mass * (force - std::copysign(friction, force));
+  }
+  const double opposed = std::copysign(friction, velocity);
+  const double next = velocity + h * per_mass * (force - opposed);
+  if (next == 0.0 || std::signbit(next) == std::signbit(velocity)) return next;
+  if (equations.holds(s, force)) return 0.0;
+  const double left = h * (next / (next - velocity));  // after the instant of rest
+  return left * per_mass * (force + opposed);
+}
+
+template <std::size_t masses>
+void step(const ChainEquations<masses>& equations, typename ChainEquations<masses>::Vector& s, double t,
+          double h) {
+  const auto force = equations.forces(s, t);
+  s[masses] = next_velocity(equations, s, force[0], h);
+  for (std::size_t i = 1; i < masses; ++i) s[masses + i] += h * equations.per_mass(i) * force[i];
+  for (std::size_t i = 0; i < masses; ++i) s[i] += h * s[masses + i];
+}
+
+}  // namespace
+
+void integrate_semi_implicit_euler(const ChainDynamics& dynamics, ChainState& state, const ChainInput& input,
+                                   double duration, double longest_step) {
+  require_sound(dynamics, state, input, duration);
+  const long steps = equal_steps(duration, longest_step);
+  const double h = duration / static_cast<double>(steps);
+  with_equations(dynamics, input, [&](const auto& equations) {
+    auto s = equations.vector_of(state);
+    for (long n = 0; n < steps; ++n) step(equations, s, h * static_cast<double>(n), h);
+    equations.store(s, state);
+  });
+}
+
+namespace {
+
+template <std::size_t masses>
+class Rk4 {
+ public:
+  using Vector = typename ChainEquations<masses>::Vector;
+
+  explicit Rk4(const ChainEquations<masses>& equations) : equations_(equations) {}
+
+  // A step from t over h, divided where mass 0 comes to rest.
+  void advance(Vector& s, double t, double h) const {
+    for (int divisions = 0; divisions < most_divisions; ++divisions) {
+      const Contact contact = equations_.contact(s, t);
+      const Vector whole = next(s, t, h, contact);
+      if (contact == Contact::sticking || equations_.friction() == 0.0 || forward(whole, contact) >= 0.0) {
+        s = whole;
+        return;
+      }
+      const auto velocity = [&](double part) { return forward(next(s, t, part, contact), contact); };
+      const double low = forward(s, contact) > 0.0 ? 0.0 : moving_start(velocity, h);
+      if (low < 0.0) break;
+      const double rest = falling_zero_of(velocity, low, h);
+      s = next(s, t, rest, contact);
+      s[masses] = 0.0;
+      t += rest;
+      h -= rest;
+      if (!(h > 0.0)) return;
+    }
+    // It trembles: held for the rest of the step, which can only remove energy.
+    s[masses] = 0.0;
+    s = next(s, t, h, Contact::sticking);
+  }
+
+ private:
+  static constexpr int most_divisions = 16;
+
+  static double forward(const Vector& s, Contact contact) { return static_cast<double>(contact) * s[masses]; }
+
+  static Vector along(const Vector& s, const Vector& rate, double h) {
+    Vector moved;
+    for (std::size_t i = 0; i < s.size(); ++i) moved[i] = s[i] + h * rate[i];
+    return moved;
+  }
+
+  Vector next(const Vector& s, double t, double h, Contact contact) const {
+    const double half = 0.5 * h;
+    const Vector k1 = equations_.derivative(s, t, contact);
+    const Vector k2 = equations_.derivative(along(s, k1, half), t + half, contact);
+    const Vector k3 = equations_.derivative(along(s, k2, half), t + half, contact);
+    const Vector k4 = equations_.derivative(along(s, k3, h), t + h, contact);
+    Vector end;
+    for (std::size_t i = 0; i < s.size(); ++i)
+      end[i] = s[i] + h * (1.0 / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    return end;
+  }
+
+  const ChainEquations<masses>& equations_;
+};
+
+template <std::size_t masses>
+Rk4(const ChainEquations<masses>&) -> Rk4<masses>;
+
+}  // namespace
+
+void integrate_rk4(const ChainDynamics& dynamics, ChainState& state, const ChainInput& input, double duration,
+                   double longest_step) {
+  require_sound(dynamics, state, input, duration);
+  const long steps = equal_steps(duration, longest_step);
+  const double h = duration / static_cast<double>(steps);
+  with_equations(dynamics, input, [&](const auto& equations) {
+    const Rk4 method(equations);
+    auto s = equations.vector_of(state);
+    for (long n = 0; n < steps; ++n) method.advance(s, h * static_cast<double>(n), h);
+    equations.store(s, state);
+  });
+}
+
 namespace {
 
 namespace odeint = boost::numeric::odeint;
