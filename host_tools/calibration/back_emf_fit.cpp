@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <vector>
 
-#include "host_tools/calibration/least_squares.hpp"
+#include "host_tools/bench/least_squares.hpp"
 
 namespace kmax::calibration {
 namespace {
@@ -154,7 +155,7 @@ BackEmfFit fit_with(std::span<const BackEmfRecord> records, const BackEmfConfig&
     columns(n, offset) = 1.0;
     right[n] = w.volts - (config.synchronous ? config.pole_pairs * config.inductance_d * w.cross : 0.0);
   }
-  const LinearFit plain = solve_least_squares(columns, right);
+  const bench::LinearFit plain = bench::solve_least_squares(columns, right);
   // Rounding of the counts inflates the speed's square sum, and would make k too small by that share.
   const double share = rounding / (counts * counts);
   Eigen::MatrixXd normal = columns.transpose() * columns;
@@ -214,26 +215,19 @@ BackEmfFit fit_back_emf(std::span<const BackEmfRecord> records, const BackEmfCon
 }
 
 std::string_view to_string(BackEmfCause cause) {
-  switch (cause) {
-    case BackEmfCause::none:
-      return "";
-    case BackEmfCause::too_little_data:
-      return "back-EMF: too few samples, or channels of different length";
-    case BackEmfCause::not_finite:
-      return "back-EMF: a sample is not a number";
-    case BackEmfCause::no_motion:
-      return "back-EMF: the shaft hardly moves; more current, a longer half period, or free the handle";
-    case BackEmfCause::no_voltage:
-      return "back-EMF: the shaft turns and no voltage is induced; the encoder is not on this motor's shaft, "
-             "or a "
-             "phase is open";
-    case BackEmfCause::reversed:
-      return "back-EMF: the induced voltage has the wrong sign; encoder.direction is wrong, or two wires are "
-             "swapped";
-    case BackEmfCause::not_resolved:
-      return "back-EMF: the torque constant is not determined; more speed or more samples";
-  }
-  return "";
+  // In the order of the causes.
+  static constexpr std::string_view words[] = {
+      "",
+      "back-EMF: too few samples, or channels of different length",
+      "back-EMF: a sample is not a number",
+      "back-EMF: the shaft hardly moves; more current, a longer half period, or free the handle",
+      "back-EMF: the shaft turns and no voltage is induced; the encoder is not on this motor's shaft, or a "
+      "phase is open",
+      "back-EMF: the induced voltage has the wrong sign; encoder.direction is wrong, or two wires are "
+      "swapped",
+      "back-EMF: the torque constant is not determined; more speed or more samples"};
+  static_assert(std::size(words) == static_cast<std::size_t>(BackEmfCause::not_resolved) + 1);
+  return words[static_cast<std::size_t>(cause)];
 }
 
 }  // namespace kmax::calibration

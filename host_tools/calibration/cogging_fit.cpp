@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <vector>
 
-#include "host_tools/calibration/least_squares.hpp"
+#include "host_tools/bench/least_squares.hpp"
 
 namespace kmax::calibration {
 namespace {
@@ -128,7 +129,7 @@ struct Model {
   Eigen::Index cogging_column() const { return gravity_turns ? 4 : 2; }
 };
 
-LinearFit solve(const std::vector<Row>& rows, const Model& model) {
+bench::LinearFit solve(const std::vector<Row>& rows, const Model& model) {
   const auto count = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd columns(count, model.cogging_column() + 2 * model.harmonics);
   Eigen::VectorXd right(count);
@@ -148,10 +149,10 @@ LinearFit solve(const std::vector<Row>& rows, const Model& model) {
     }
     right[n] = weight * row.force;
   }
-  return solve_least_squares(columns, right);
+  return bench::solve_least_squares(columns, right);
 }
 
-double first_amplitude(const LinearFit& fit, const Model& model) {
+double first_amplitude(const bench::LinearFit& fit, const Model& model) {
   return std::hypot(fit.value[model.cogging_column()], fit.value[model.cogging_column() + 1]);
 }
 
@@ -193,7 +194,7 @@ Search find_periods(const std::vector<Row>& rows, const Model& base, double rang
     Model half = base;
     half.periods = search.periods / 2;
     half.harmonics = 2;
-    const LinearFit fit = solve(rows, half);
+    const bench::LinearFit fit = solve(rows, half);
     const double second =
         std::hypot(fit.value[half.cogging_column() + 2], fit.value[half.cogging_column() + 3]);
     if (least - fit.square_sum > improvement * variance &&
@@ -260,11 +261,11 @@ CoggingFit fit_cogging(std::span<const CoggingSweep> sweeps, const CoggingFitCon
     model.periods = search.periods;
     model.harmonics = 2;
   }
-  LinearFit solved = solve(rows, model);
+  bench::LinearFit solved = solve(rows, model);
   if (model.gravity_turns) {
     Model plain = model;
     plain.gravity_turns = false;
-    const LinearFit without = solve(rows, plain);
+    const bench::LinearFit without = solve(rows, plain);
     if (without.square_sum - solved.square_sum < improvement * solved.residual * solved.residual) {
       model = plain;
       solved = without;
@@ -313,27 +314,18 @@ CoggingFit fit_cogging(std::span<const CoggingSweep> sweeps, const CoggingFitCon
 }
 
 std::string_view to_string(CoggingCause cause) {
-  switch (cause) {
-    case CoggingCause::none:
-      return "";
-    case CoggingCause::too_little_data:
-      return "cogging: too few samples that move; sweep further or longer";
-    case CoggingCause::not_finite:
-      return "cogging: a sample is not a number";
-    case CoggingCause::no_motion:
-      return "cogging: the handle does not move; it is blocked, or friction is more than the force allowed";
-    case CoggingCause::one_direction:
-      return "cogging: sweeps in both directions are needed";
-    case CoggingCause::uneven_motion:
-      return "cogging: the shaft stands and jumps; raise excitation.stiffness above what the cogging has "
-             "itself";
-    case CoggingCause::range_too_short:
-      return "cogging: fewer than 2 of its periods were swept; sweep further (friction and gravity are "
-             "valid)";
-    case CoggingCause::periods_ambiguous:
-      return "cogging: another number of periods per turn fits as well; sweep further or slower";
-  }
-  return "";
+  // In the order of the causes.
+  static constexpr std::string_view words[] = {
+      "",
+      "cogging: too few samples that move; sweep further or longer",
+      "cogging: a sample is not a number",
+      "cogging: the handle does not move; it is blocked, or friction is more than the force allowed",
+      "cogging: sweeps in both directions are needed",
+      "cogging: the shaft stands and jumps; raise excitation.stiffness above what the cogging has itself",
+      "cogging: fewer than 2 of its periods were swept; sweep further (friction and gravity are valid)",
+      "cogging: another number of periods per turn fits as well; sweep further or slower"};
+  static_assert(std::size(words) == static_cast<std::size_t>(CoggingCause::periods_ambiguous) + 1);
+  return words[static_cast<std::size_t>(cause)];
 }
 
 }  // namespace kmax::calibration

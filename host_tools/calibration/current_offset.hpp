@@ -5,7 +5,6 @@
 #include <span>
 
 #include "host_tools/calibration/estimate.hpp"
-#include "host_tools/calibration/finding.hpp"
 
 namespace kmax::calibration {
 

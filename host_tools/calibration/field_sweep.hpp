@@ -2,9 +2,7 @@
 
 #include <string>
 
-#include "host_tools/calibration/bench.hpp"
-#include "host_tools/calibration/motor_knowledge.hpp"
-#include "host_tools/calibration/recording.hpp"
+#include "host_tools/calibration/step.hpp"
 
 namespace kmax::calibration {
 
@@ -25,10 +23,10 @@ class FieldSweep {
   void prepare();
   // One sweep: channels `electrical_angle`, `count` and `voltage_d`. Forwards and backwards must take turns,
   // forwards first.
-  Recording sweep(bool forwards);
+  Waveforms sweep(bool forwards);
 
   // Throws StepFailed if the encoder stands at the end of a pair of sweeps: encoder_dead, motor_blocked.
-  void require_living_encoder(const Recording& to, const Recording& fro);
+  void require_living_encoder(const Waveforms& to, const Waveforms& fro);
 
   // Back to the middle of the travel, after whole pairs of sweeps.
   void finish();
@@ -38,11 +36,11 @@ class FieldSweep {
  private:
   void align(double reach = 0.0);
   // Again from where it began, if the host was held up meanwhile.
-  Recording turn(double by, const std::vector<std::string>& channels, std::size_t samples);
-  Recording turn_once(double by, const std::vector<std::string>& channels, std::size_t samples);
+  Waveforms turn(double by, const std::vector<std::string>& channels, std::size_t samples);
+  Waveforms turn_once(double by, const std::vector<std::string>& channels, std::size_t samples);
   void go_back(double angle);
   double angle_by_count();
-  void diagnose_still(double counts, const Recording& to, const Recording& fro);
+  void diagnose_still(double counts, const Waveforms& to, const Waveforms& fro);
 
   Bench& bench_;
   const MotorKnowledge& known_;

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <numbers>
 #include <vector>
 
-#include "host_tools/calibration/least_squares.hpp"
+#include "host_tools/bench/excitation.hpp"
+#include "host_tools/bench/least_squares.hpp"
 
 namespace kmax::calibration {
 namespace {
@@ -79,7 +82,7 @@ Sweep cut(const FieldTurn& record, double settle) {
       columns(row, 1) = 1.0;
       right[row] = sweep.mean_count[n];
     }
-    sweep.slope = solve_least_squares(columns, right).value[0];
+    sweep.slope = bench::solve_least_squares(columns, right).value[0];
   } else if (whole == 1) {
     sweep.slope = (sweep.count.back() - sweep.count.front()) / (sweep.angle.back() - sweep.angle.front());
   }
@@ -104,18 +107,9 @@ std::vector<double> leads(const Sweep& sweep, double electrical_per_count) {
   return out;
 }
 
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
 double error_of_mean(const std::vector<double>& values) {
-  const double mean = mean_of(values);
-  double squares = 0.0;
-  for (const double v : values) squares += (v - mean) * (v - mean);
-  const auto count = static_cast<double>(values.size());
-  return count > 1.0 ? std::sqrt(squares / (count - 1.0) / count) : std::numeric_limits<double>::infinity();
+  if (values.size() < 2) return std::numeric_limits<double>::infinity();
+  return bench::deviation_of(values) / std::sqrt(static_cast<double>(values.size()));
 }
 
 double ripple_of(const Sweep& sweep, double electrical_per_count, double lead) {
@@ -186,7 +180,7 @@ FieldTurnFit fit_field_turn(const FieldTurn& forwards, const FieldTurn& backward
   const Sweep& up = there.sign > 0.0 ? there : back;
   const Sweep& down = there.sign > 0.0 ? back : there;
   const std::vector<double> up_leads = leads(up, per_count), down_leads = leads(down, per_count);
-  const double up_lead = mean_of(up_leads), down_lead = mean_of(down_leads);
+  const double up_lead = bench::mean_of(up_leads), down_lead = bench::mean_of(down_leads);
   // The two sweeps' angles may be unwrapped from different turns.
   const double lag = 0.5 * wrapped(up_lead - down_lead);
   const double error = 0.5 * std::hypot(error_of_mean(up_leads), error_of_mean(down_leads));
@@ -207,38 +201,25 @@ FieldTurnFit fit_field_turn(const FieldTurn& forwards, const FieldTurn& backward
 }
 
 std::string_view to_string(FieldTurnCause cause) {
-  switch (cause) {
-    case FieldTurnCause::none:
-      return "";
-    case FieldTurnCause::too_little_data:
-      return "field turn: less than one electrical turn each way; increase excitation.angle_span";
-    case FieldTurnCause::not_finite:
-      return "field turn: a sample is not a number";
-    case FieldTurnCause::field_still:
-      return "field turn: the commanded angle does not turn forwards and back; look at excitation.angle_rate";
-    case FieldTurnCause::motor_still:
-      return "field turn: the field turns and the encoder does not count; the motor is blocked, a phase is "
-             "open, or "
-             "the encoder is dead";
-    case FieldTurnCause::not_whole:
-      return "field turn: the number of pole pairs is not whole; encoder.counts_per_turn is wrong, or counts "
-             "are lost";
-    case FieldTurnCause::slipping:
-      return "field turn: the counts per electrical turn are not always the same; the rotor slips (more "
-             "current), "
-             "the encoder slips on the shaft, or counts are lost";
-    case FieldTurnCause::not_meeting:
-      return "field turn: the forward and the backward sweep do not meet; friction is too much for the "
-             "current, or "
-             "something slipped";
-    case FieldTurnCause::direction_differs:
-      return "field turn: the shaft did not follow the field's reversal; a phase is open, or the encoder's "
-             "lines are "
-             "mixed up";
-    case FieldTurnCause::pole_pairs_differ:
-      return "field turn: motor.pole_pairs is not what the motor has";
-  }
-  return "";
+  // In the order of the causes.
+  static constexpr std::string_view words[] = {
+      "",
+      "field turn: less than one electrical turn each way; increase excitation.angle_span",
+      "field turn: a sample is not a number",
+      "field turn: the commanded angle does not turn forwards and back; look at excitation.angle_rate",
+      "field turn: the field turns and the encoder does not count; the motor is blocked, a phase is open, or "
+      "the encoder is dead",
+      "field turn: the number of pole pairs is not whole; encoder.counts_per_turn is wrong, or counts are "
+      "lost",
+      "field turn: the counts per electrical turn are not always the same; the rotor slips (more current), "
+      "the encoder slips on the shaft, or counts are lost",
+      "field turn: the forward and the backward sweep do not meet; friction is too much for the current, or "
+      "something slipped",
+      "field turn: the shaft did not follow the field's reversal; a phase is open, or the encoder's lines "
+      "are mixed up",
+      "field turn: motor.pole_pairs is not what the motor has"};
+  static_assert(std::size(words) == static_cast<std::size_t>(FieldTurnCause::pole_pairs_differ) + 1);
+  return words[static_cast<std::size_t>(cause)];
 }
 
 }  // namespace kmax::calibration

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <vector>
 
-#include "host_tools/calibration/least_squares.hpp"
+#include "host_tools/bench/excitation.hpp"
+#include "host_tools/bench/least_squares.hpp"
 
 namespace kmax::calibration {
 namespace {
@@ -39,11 +41,6 @@ struct Bump {
   }
 };
 
-double span_of(std::span<const double> values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return *high - *low;
-}
-
 Finding<MotionCause> look_at(std::span<const MotionRecord> records, const MotionFitConfig& config,
                              double& stroke) {
   double force = 0.0;
@@ -55,8 +52,8 @@ Finding<MotionCause> look_at(std::span<const MotionRecord> records, const Motion
       if (!std::isfinite(r.force[k] + r.position[k]))
         return {MotionCause::not_finite, static_cast<double>(index), 0.0, "(index)"};
     }
-    force = std::max(force, span_of(r.force));
-    stroke = std::max(stroke, span_of(r.position));
+    force = std::max(force, bench::span_of(r.force));
+    stroke = std::max(stroke, bench::span_of(r.position));
   }
   if (index == 0) return {MotionCause::too_little_data, 0.0, static_cast<double>(fewest_bumps), "bumps"};
   if (!(force >= least_force)) return {MotionCause::no_force, force, least_force, "N"};
@@ -69,7 +66,7 @@ Finding<MotionCause> look_at(std::span<const MotionRecord> records, const Motion
 double half_wave(const MotionRecord& r) {
   double mean = 0.0;
   for (const double f : r.force) mean += f / static_cast<double>(r.force.size());
-  const double band = 0.1 * span_of(r.force);
+  const double band = 0.1 * bench::span_of(r.force);
   double side = 0.0;
   double crossings = 0.0;
   for (std::size_t k = 4; k + 4 < r.force.size(); ++k) {
@@ -168,8 +165,8 @@ void add_bumps(const MotionRecord& r, const MotionFitConfig& config, std::size_t
 }
 
 // Least squares of all records; `mass` of a fit before this one decides the bumps' widths, 0: none yet.
-LinearFit solve(std::span<const MotionRecord> records, const MotionFitConfig& config, double mass,
-                MotionFit& fit) {
+bench::LinearFit solve(std::span<const MotionRecord> records, const MotionFitConfig& config, double mass,
+                       MotionFit& fit) {
   Equations equations;
   double samples = 0.0;
   fit.sticking_share = 0.0;
@@ -193,13 +190,13 @@ LinearFit solve(std::span<const MotionRecord> records, const MotionFitConfig& co
       columns(n, j) = equations.rows[static_cast<std::size_t>(n)][static_cast<std::size_t>(j)];
     right[n] = equations.force[static_cast<std::size_t>(n)];
   }
-  LinearFit solved = solve_least_squares(columns, right);
+  bench::LinearFit solved = bench::solve_least_squares(columns, right);
   if (solved.value[1] < 0.0) {
     // Damping is not negative: what chance makes of it falls on the friction, with which it is easily
     // confused.
     columns.col(1).setZero();
     const double damping_error = solved.standard_error[1];
-    solved = solve_least_squares(columns, right);
+    solved = bench::solve_least_squares(columns, right);
     solved.standard_error[1] = damping_error;
   }
   return solved;
@@ -212,7 +209,7 @@ MotionFit fit_motion(std::span<const MotionRecord> records, const MotionFitConfi
   fit.finding = look_at(records, config, fit.stroke);
   if (!fit.finding.is_none()) return fit;
   // Bumps of half a wave first: a mass that rounding does not spoil, for the choice of shorter ones.
-  LinearFit solved = solve(records, config, 0.0, fit);
+  bench::LinearFit solved = solve(records, config, 0.0, fit);
   if (fit.bumps >= fewest_bumps) solved = solve(records, config, solved.value[0], fit);
   if (fit.bumps < fewest_bumps) {
     fit.finding = {MotionCause::too_little_data, static_cast<double>(fit.bumps),
@@ -239,26 +236,18 @@ MotionFit fit_motion(std::span<const MotionRecord> records, const MotionFitConfi
 }
 
 std::string_view to_string(MotionCause cause) {
-  switch (cause) {
-    case MotionCause::none:
-      return "";
-    case MotionCause::too_little_data:
-      return "motion: too little of the record moves; more force, or a longer capture";
-    case MotionCause::not_finite:
-      return "motion: a sample is not a number";
-    case MotionCause::no_force:
-      return "motion: there is no force; set excitation.alternation";
-    case MotionCause::no_motion:
-      return "motion: the handle does not move; it is blocked or sticks (more force), or the encoder is dead";
-    case MotionCause::reversed:
-      return "motion: the handle accelerates against the force; direction or commutation is wrong";
-    case MotionCause::negative_friction:
-      return "motion: friction comes out negative; the handle was held or pushed meanwhile: take the hand "
-             "off";
-    case MotionCause::not_resolved:
-      return "motion: the mass is not determined; more force, or a longer capture";
-  }
-  return "";
+  // In the order of the causes.
+  static constexpr std::string_view words[] = {
+      "",
+      "motion: too little of the record moves; more force, or a longer capture",
+      "motion: a sample is not a number",
+      "motion: there is no force; set excitation.alternation",
+      "motion: the handle does not move; it is blocked or sticks (more force), or the encoder is dead",
+      "motion: the handle accelerates against the force; direction or commutation is wrong",
+      "motion: friction comes out negative; the handle was held or pushed meanwhile: take the hand off",
+      "motion: the mass is not determined; more force, or a longer capture"};
+  static_assert(std::size(words) == static_cast<std::size_t>(MotionCause::not_resolved) + 1);
+  return words[static_cast<std::size_t>(cause)];
 }
 
 }  // namespace kmax::calibration

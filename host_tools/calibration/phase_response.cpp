@@ -3,48 +3,38 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 namespace kmax::calibration {
 
 namespace {
-struct Pattern {
-  const char* cause;  // empty: healthy
-  std::array<double, 4> currents;
-};
+using bench::Circuit;
 
-// B and C along 0, B and C along 90 degrees, in units of voltage / phase resistance.
-constexpr double half = 0.5, root = 0.8660254037844386, third = 0.75, shared = 0.4330127018922193;
-constexpr std::array patterns = {
-    Pattern{"", {-half, -half, root, -root}},
-    Pattern{"phase_a_open", {0, 0, root, -root}},
-    Pattern{"phase_b_open", {0, -third, 0, -shared}},
-    Pattern{"phase_c_open", {-third, 0, shared, 0}},
-    Pattern{"current_b_inverted", {half, -half, -root, -root}},
-    Pattern{"current_c_inverted", {-half, half, root, root}},
-    Pattern{"current_b_and_c_inverted", {half, half, -root, root}},
-    Pattern{"current_b_dead", {0, -half, 0, -root}},
-    Pattern{"current_c_dead", {-half, 0, root, 0}},
-};
-constexpr std::array brushed_patterns = {
-    Pattern{"", {1, -1, 0, 0}},
-    Pattern{"current_b_inverted", {-1, -1, 0, 0}},
-    Pattern{"current_c_inverted", {1, 1, 0, 0}},
-    Pattern{"current_b_and_c_inverted", {-1, 1, 0, 0}},
-    Pattern{"current_b_dead", {0, -1, 0, 0}},
-    Pattern{"current_c_dead", {1, 0, 0, 0}},
-};
-
-double cosine(const std::array<double, 4>& a, const std::array<double, 4>& b) {
-  double product = 0.0, of_a = 0.0, of_b = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    product += a[i] * b[i];
-    of_a += a[i] * a[i];
-    of_b += b[i] * b[i];
+std::string cause_of(Circuit circuit) {
+  switch (circuit) {
+    case Circuit::healthy:
+      return "";
+    case Circuit::open_a:
+      return "phase_a_open";
+    case Circuit::open_b:
+      return "phase_b_open";
+    case Circuit::open_c:
+      return "phase_c_open";
+    case Circuit::sense_b_inverted:
+      return "current_b_inverted";
+    case Circuit::sense_c_inverted:
+      return "current_c_inverted";
+    case Circuit::both_inverted:
+      return "current_b_and_c_inverted";
+    case Circuit::sense_b_dead:
+      return "current_b_dead";
+    case Circuit::sense_c_dead:
+      return "current_c_dead";
+    default:
+      return "phases_unbalanced";
   }
-  return of_a > 0.0 && of_b > 0.0 ? product / std::sqrt(of_a * of_b) : 0.0;
 }
 
 std::string advice_for(const std::string& cause) {
@@ -56,17 +46,17 @@ std::string advice_for(const std::string& cause) {
 }
 }  // namespace
 
-PhaseResponse phase_response(std::span<const double> voltage, std::span<const double> current_b,
-                             std::span<const double> current_c, int half_period, std::size_t from) {
+SensorAnswer phase_response(std::span<const double> voltage, std::span<const double> current_b,
+                            std::span<const double> current_c, int half_period, std::size_t from) {
   // The last quarter of a half wave: there a slow current, too, has the sign of its voltage.
   const auto settled = static_cast<std::size_t>(std::max(1, half_period * 3 / 4));
-  PhaseResponse sum_high, sum_low;
+  SensorAnswer sum_high, sum_low;
   std::size_t high = 0, low = 0, run = 0;
   for (std::size_t k = 1; k < voltage.size(); ++k) {
     const bool positive = voltage[k - 1] > 0.0;
     run = k >= 2 && positive == (voltage[k - 2] > 0.0) ? run + 1 : 1;
     if (run < settled || k < from) continue;
-    PhaseResponse& sum = positive ? sum_high : sum_low;
+    SensorAnswer& sum = positive ? sum_high : sum_low;
     sum.b += current_b[k];
     sum.c += current_c[k];
     ++(positive ? high : low);
@@ -76,31 +66,28 @@ PhaseResponse phase_response(std::span<const double> voltage, std::span<const do
   return {0.5 * (sum_high.b / h - sum_low.b / l), 0.5 * (sum_high.c / h - sum_low.c / l)};
 }
 
-double magnitude_of(const PhaseResponse& along_0, const PhaseResponse& along_90) {
+double magnitude_of(const SensorAnswer& along_0, const SensorAnswer& along_90) {
   return std::max({std::abs(along_0.b), std::abs(along_0.c), std::abs(along_90.b), std::abs(along_90.c)});
 }
 
-std::optional<Diagnosis> diagnose_phases(bool brushed, const PhaseResponse& along_0,
-                                         const PhaseResponse& along_90) {
-  const std::array<double, 4> seen = {along_0.b, along_0.c, brushed ? 0.0 : along_90.b,
-                                      brushed ? 0.0 : along_90.c};
-  const std::span<const Pattern> all = brushed ? std::span<const Pattern>(brushed_patterns) : patterns;
-  const Pattern* best = &all.front();
-  for (const Pattern& pattern : all) {
-    if (cosine(seen, pattern.currents) > cosine(seen, best->currents)) best = &pattern;
-  }
+std::optional<Diagnosis> diagnose_phases(bool brushed, const SensorAnswer& along_0,
+                                         const SensorAnswer& along_90) {
+  constexpr double directions[] = {0.0, 0.5 * std::numbers::pi};
+  const SensorAnswer seen[] = {along_0, along_90};
+  const bench::CircuitMatch match =
+      bench::match_circuit(brushed, directions, std::span(seen).first(brushed ? 1 : 2));
   const std::string numbers =
-      brushed
-          ? fmt::format("a voltage from B to C drives {:+.3f} A in B and {:+.3f} A in C", seen[0], seen[1])
-          : fmt::format(
-                "a voltage along phase A drives {:+.3f} A in B and {:+.3f} A in C, a quarter turn ahead "
-                "{:+.3f} A and {:+.3f} A",
-                seen[0], seen[1], seen[2], seen[3]);
-  constexpr double least_cosine = 0.9;
-  if (cosine(seen, best->currents) < least_cosine)
+      brushed ? fmt::format("a voltage from B to C drives {:+.3f} A in B and {:+.3f} A in C", along_0.b,
+                            along_0.c)
+              : fmt::format(
+                    "a voltage along phase A drives {:+.3f} A in B and {:+.3f} A in C, a quarter turn ahead "
+                    "{:+.3f} A and {:+.3f} A",
+                    along_0.b, along_0.c, along_90.b, along_90.c);
+  constexpr double least_cosine = 0.9;  // of the angle between what is seen and the pattern
+  if (!(match.residual <= 1.0 - least_cosine * least_cosine))
     return Diagnosis{"phases_unbalanced", numbers + ": no healthy motor and no single defect looks like this",
                      "check the motor's wires against each other and to ground"};
-  const std::string cause = best->cause;
+  const std::string cause = cause_of(match.circuit);
   if (cause.empty()) return std::nullopt;
   return Diagnosis{cause, numbers, advice_for(cause)};
 }

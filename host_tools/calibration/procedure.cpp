@@ -3,36 +3,121 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/calibration/compensation_step.hpp"
-#include "host_tools/calibration/current_offset_step.hpp"
-#include "host_tools/calibration/field_turn_step.hpp"
-#include "host_tools/calibration/hand_direction_step.hpp"
-#include "host_tools/calibration/index_search_step.hpp"
-#include "host_tools/calibration/motion_step.hpp"
-#include "host_tools/calibration/push_direction_step.hpp"
-#include "host_tools/calibration/torque_constant_step.hpp"
-#include "host_tools/calibration/trip_diagnosis.hpp"
-#include "host_tools/calibration/winding_step.hpp"
+#include "host_tools/calibration/step.hpp"
 #include "host_tools/device/store.hpp"
 
 namespace kmax::calibration {
 
-namespace {
+using firmware::Fault;
+using firmware::Refusal;
 
-void require_ready(device::Device& device, std::size_t axis) {
-  for (std::size_t i = 0; i < firmware::axis_count; ++i) {
-    const device::DriveStatus status = device::Drive(device, i).status();
-    if (status.armed()) throw device::DeviceError(fmt::format("axis {} is armed; 'kmax disarm' first", i));
-    if (i == axis && status.faulty())
-      throw device::DeviceError(
-          fmt::format("axis {} has a fault: {}; then 'kmax clear'", i, status.fault_words()));
+void Calibration::set_at_end(const std::vector<std::string>& texts) {
+  device::parse_assignments(texts, settings.axis);
+  results_at_end.insert(results_at_end.end(), texts.begin(), texts.end());
+}
+
+IdentifiedValue repeated_value(std::string name, std::span<const Estimate> repetitions, std::string unit,
+                               std::optional<double> previous) {
+  IdentifiedValue value{std::move(name), 0.0, 0.0, std::move(unit), previous};
+  std::vector<double> values;
+  double error = 0.0;
+  for (const Estimate& one : repetitions) {
+    values.push_back(one.value);
+    if (std::isfinite(one.standard_error)) error = std::max(error, one.standard_error);
+  }
+  value.value = bench::mean_of(values);
+  value.spread = std::max(bench::deviation_of(values), error);
+  return value;
+}
+
+void require_repeatable(const IdentifiedValue& value, double fine, const std::string& cause) {
+  constexpr double largest_scatter = 0.15;  // of the value
+  if (value.spread <= std::max(largest_scatter * std::abs(value.value), fine)) return;
+  throw StepFailed({cause,
+                    fmt::format("{}: {:.3g} {} scatters by {:.2g} {} from one measurement to the next",
+                                value.name, value.value, value.unit, value.spread, value.unit),
+                    "raise --current or --travel; nobody may hold the handle"});
+}
+
+void throw_encoder_dead(const std::string& evidence) {
+  throw StepFailed({"encoder_dead", evidence + ": the motor turns, the encoder does not",
+                    "check the encoder's cable, supply and mounting, and encoder.kind"});
+}
+
+void throw_motor_blocked(const std::string& evidence) {
+  throw StepFailed({"motor_blocked", evidence + ": the motor stands",
+                    "free the handle, move it away from its stops, or raise --current"});
+}
+
+Diagnosis diagnosis_of(const Trip& trip) {
+  const std::string words = "the axis tripped: " + trip.words;
+  switch (trip.fault) {
+    case Fault::under_voltage:
+      return {"supply_too_low", words, "use a supply that holds its voltage under load, or lower --current"};
+    case Fault::excitation_travel:
+      return {"travel_too_small", words, "allow more with --travel, or move the handle away from its stops"};
+    case Fault::encoder:
+      return {"encoder_dead", words, "check the encoder's cable and supply, and encoder.kind"};
+    case Fault::emergency_stop:
+      return {"emergency_stop", words, "release the emergency stop once it is clear why it was pressed"};
+    case Fault::power_stage:
+    case Fault::gate_driver:
+      return {std::string(firmware::text_of(trip.fault).name), words,
+              "check the supply and the gate driver, which needs it"};
+    case Fault::spin_out:
+      return {"motor_runs_away", words, "calibrate the encoder first: --steps encoder"};
+    default:
+      return {std::string(firmware::text_of(trip.fault).name), words, "see 'kmax state'"};
   }
 }
 
-MotorKnowledge knowledge_of(Bench& bench) {
+void require_no_trip(const Waveforms& seen) {
+  if (seen.trip) throw StepFailed(diagnosis_of(*seen.trip));
+}
+
+Diagnosis diagnosis_of(Refusal refusal, double supply, double supply_min, double supply_max) {
+  std::string words = fmt::format("the axis was not armed: {}", firmware::to_string(refusal));
+  switch (refusal) {
+    case Refusal::supply_out_of_range:
+      words =
+          fmt::format("the supply is {:.3g} V; supply.voltage_min is {:.3g} V, supply.voltage_max {:.3g} V",
+                      supply, supply_min, supply_max);
+      if (supply < supply_min)
+        return {"supply_too_low", words,
+                "use the supply that this device is made for, or lower supply.voltage_min"};
+      return {"supply_too_high", words,
+              "use the supply that this device is made for, or raise supply.voltage_max"};
+    case Refusal::encoder_invalid:
+      return {"encoder_dead", words, "check the encoder's cable and supply, and encoder.kind"};
+    case Refusal::current_sense_invalid:
+      return {"current_sensor", words, "check the shunts and the gate driver's amplifiers"};
+    case Refusal::emergency_stop:
+      return {"emergency_stop", words, "release the emergency stop once it is clear why it was pressed"};
+    case Refusal::power_stage_not_ready:
+      return {"power_stage", words + fmt::format(", and the supply is {:.3g} V", supply),
+              "check the supply, and the gate driver, which needs it to answer"};
+    case Refusal::gate_driver_fault:
+      return {"gate_driver", words, "look for a short between phases or to ground, and check the supply"};
+    default:
+      return {"not_armed", words, "see 'kmax state'"};
+  }
+}
+
+namespace {
+
+void require_ready(device::Device& device, std::size_t axis) {
+  bench::require_disarmed(device);
+  const device::DriveStatus status = device::Drive(device, axis).status();
+  if (status.faulty())
+    throw device::DeviceError(
+        fmt::format("axis {} has a fault: {}; then 'kmax clear'", axis, status.fault_words()));
+}
+
+MotorKnowledge knowledge_of(Bench& bench, const CalibrationSettings& settings) {
   MotorKnowledge known;
   known.supply = bench.number("supply.voltage");
   if (known.supply <= 0.0)
@@ -59,41 +144,95 @@ MotorKnowledge knowledge_of(Bench& bench) {
   known.mass_known = known.calibrated;
   known.searches_index = bench.number("encoder.index") != 0.0 && bench.number("encoder.start") == 0.0 &&
                          bench.number("encoder.kind") == 0.0;
-  known.current = std::min(bench.settings().current.value_or(0.5 * known.current_limit), known.current_limit);
+  known.current = std::min(settings.current.value_or(0.5 * known.current_limit), known.current_limit);
   return known;
 }
 
-bool blocked(const Step& step, const std::vector<StepReport>& before) {
-  const auto needed = step.needs();
+using Reports = std::vector<StepReport>;
+
+bool brushed(const Calibration& run) {
+  return run.known.brushed();
+}
+
+bool synchronous(const Calibration& run) {
+  return !run.known.brushed();
+}
+
+bool always(const Calibration&) {
+  return true;
+}
+
+// All steps in their order.
+const std::vector<Step>& calibration_steps() {
+  static const std::vector<Step> steps = {
+      {"current_offsets", StepSet::electrical, {}, always, check_current_sensors},
+      {"winding", StepSet::electrical, {"current_offsets"}, always, find_winding},
+      {"hand_direction",
+       StepSet::encoder,
+       {},
+       [](const Calibration& run) { return run.prompter != nullptr; },
+       find_direction_by_hand},
+      {"direction", StepSet::encoder, {"winding", "hand_direction"}, brushed, find_direction_by_pushes},
+      // Not with an encoder that knows its angle anyway, and not without an index line.
+      {"index_search",
+       StepSet::encoder,
+       {"winding", "hand_direction"},
+       [](const Calibration& run) { return synchronous(run) && run.known.searches_index; },
+       search_index},
+      {"field_turn",
+       StepSet::encoder,
+       {"winding", "hand_direction", "index_search"},
+       synchronous,
+       find_field_angle},
+      {"torque_constant",
+       StepSet::mechanical,
+       {"winding", "direction", "field_turn"},
+       always,
+       find_torque_constant},
+      {"motion", StepSet::mechanical, {"direction", "field_turn", "torque_constant"}, always, find_motion},
+      {"compensation_map",
+       StepSet::compensation,
+       {"direction", "field_turn", "torque_constant", "motion"},
+       always,
+       map_compensation}};
+  return steps;
+}
+
+bool blocked(const Step& step, const Reports& before) {
   return std::any_of(before.begin(), before.end(), [&](const StepReport& report) {
-    return !report.pass && std::find(needed.begin(), needed.end(), report.name) != needed.end();
+    return !report.pass && std::find(step.needs.begin(), step.needs.end(), report.name) != step.needs.end();
   });
 }
 
-StepReport run_step(Step& step, Bench& bench, MotorKnowledge& known) {
-  StepReport report;
-  const MotorKnowledge before = known;
+void run_step(const Step& step, Calibration& run) {
+  Bench& bench = run.bench;
+  const MotorKnowledge before = run.known;
+  std::optional<Diagnosis>& failure = run.report.failure;
   try {
     // Steps that can repeat a part of themselves do; this is for the rest.
     bench.repeat([&] {
-      known = before;
-      report = {};
-      report.name = step.name();
-      step.run(bench, known, report);
+      run.known = before;
+      run.report = {};
+      run.report.name = step.name;
+      step.run(run);
     });
-  } catch (const StepFailed& failure) {
-    report.failure = failure.diagnosis();
+  } catch (const StepFailed& failed) {
+    failure = failed.diagnosis();
+  } catch (const bench::AxisTripped& tripped) {
+    failure = diagnosis_of(tripped.trip());
+  } catch (const bench::ArmingRefused& refused) {
+    failure = diagnosis_of(refused.refusal(), bench.number("supply.voltage"),
+                           bench.number("supply.voltage_min"), bench.number("supply.voltage_max"));
   } catch (const device::ValueError& beyond) {
     // A result that no such device can have, or not a number.
-    report.failure = {report.name + "_not_resolved", beyond.what(),
-                      "raise --current or --travel; nobody may hold the handle"};
+    failure = {run.report.name + "_not_resolved", beyond.what(),
+               "raise --current or --travel; nobody may hold the handle"};
   }
   // The next step begins from rest, whatever this one left behind.
   bench.disarm();
   const std::optional<Trip> trip = bench.take_unseen_trip();
-  if (trip && !report.failure) report.failure = diagnosis_of(*trip);
-  report.pass = !report.failure;
-  return report;
+  if (trip && !failure) failure = diagnosis_of(*trip);
+  run.report.pass = !failure;
 }
 
 }  // namespace
@@ -102,100 +241,86 @@ bool CalibrationReport::pass() const {
   return std::all_of(steps.begin(), steps.end(), [](const StepReport& step) { return step.pass; });
 }
 
-std::vector<std::unique_ptr<Step>> calibration_steps() {
-  std::vector<std::unique_ptr<Step>> steps;
-  steps.push_back(std::make_unique<CurrentOffsetStep>());
-  steps.push_back(std::make_unique<WindingStep>());
-  steps.push_back(std::make_unique<HandDirectionStep>());
-  steps.push_back(std::make_unique<PushDirectionStep>());
-  steps.push_back(std::make_unique<IndexSearchStep>());
-  steps.push_back(std::make_unique<FieldTurnStep>());
-  steps.push_back(std::make_unique<TorqueConstantStep>());
-  steps.push_back(std::make_unique<MotionStep>());
-  steps.push_back(std::make_unique<CompensationStep>());
-  return steps;
-}
-
 namespace {
 
 // Disarms and puts everything back. "" if that was done, else what is left.
-std::string restore(std::optional<Bench>& bench, ParameterJournal& journal) {
+std::string restore(Bench& bench) {
   std::string trouble;
   try {
-    if (bench) bench->disarm();
+    bench.disarm();
   } catch (const std::exception& error) {
     trouble = fmt::format("the axis could not be disarmed ({}); ", error.what());
   }
   try {
-    journal.put_back();
+    bench.journal().put_back();
   } catch (const std::exception& error) {
     trouble += fmt::format("the parameters were not put back ({}); ", error.what());
     // Said here: no second attempt by the destructor.
-    journal.forget();
+    bench.journal().forget();
   }
   if (trouble.empty()) return "";
   return trouble + "not put back: switch the device off and on before 'kmax save'";
 }
 
-void run_steps(Bench& bench, const CalibrationSettings& settings,
-               const std::function<void(std::string_view)>& started, CalibrationReport& report) {
-  MotorKnowledge known = knowledge_of(bench);
+void run_steps(Calibration& run, const std::function<void(std::string_view)>& started,
+               CalibrationReport& report) {
+  run.bench.begin();
+  run.known = knowledge_of(run.bench, run.settings);
   // What is to be identified must not be corrected meanwhile.
-  bench.set_temporary({"compensation.dead_time=0", "compensation.limit=0"});
-  for (const auto& step : calibration_steps()) {
-    if (!settings.has(step->set()) || !step->applies(known)) continue;
-    if (step->name() == "hand_direction" && bench.prompter() == nullptr) continue;
-    if (bench.unusable() || blocked(*step, report.steps)) {
+  run.bench.set_temporary({"compensation.dead_time=0", "compensation.limit=0"});
+  for (const Step& step : calibration_steps()) {
+    if (!run.settings.has(step.set) || !step.applies(run)) continue;
+    if (run.bench.unusable() || blocked(step, report.steps)) {
       StepReport skipped;
-      skipped.name = step->name();
+      skipped.name = step.name;
       skipped.skipped = true;
       report.steps.push_back(skipped);
       continue;
     }
-    if (started) started(step->name());
-    report.steps.push_back(run_step(*step, bench, known));
+    if (started) started(step.name);
+    run_step(step, run);
+    report.steps.push_back(run.report);
   }
-  if (!report.pass() || settings.dry_run) return;
-  bench.apply_results_at_end();
-  if (settings.has(StepSet::electrical) && settings.has(StepSet::encoder) &&
-      settings.has(StepSet::mechanical))
-    bench.set_result({"motor.calibrated=yes"});
+  if (!report.pass() || run.settings.dry_run) return;
+  if (!run.results_at_end.empty()) run.bench.set_result(run.results_at_end);
+  if (run.settings.has(StepSet::electrical) && run.settings.has(StepSet::encoder) &&
+      run.settings.has(StepSet::mechanical))
+    run.bench.set_result({"motor.calibrated=yes"});
 }
 
 }  // namespace
 
-CalibrationReport calibrate(device::Device& device, const CalibrationSettings& settings, Prompter* prompter,
-                            const std::function<void(const std::string&)>& tell,
+CalibrationReport calibrate(device::Device& device, const CalibrationSettings& settings,
+                            bench::Prompter* prompter,
+                            const std::function<void(const std::string&)>& progress,
                             const std::function<void(std::string_view)>& started) {
   require_ready(device, settings.axis);
   CalibrationReport report;
-  // Outlives the bench, which disarms: parameters are put back on a disarmed axis.
-  ParameterJournal journal(device, settings.axis);
-  std::optional<Bench> bench;
+  Bench bench(device, settings.axis, settings.travel, progress);
   try {
-    bench.emplace(device, settings, journal, prompter, tell);
-    run_steps(*bench, settings, started, report);
-    bench->disarm();
+    Calibration run{bench, settings, prompter};
+    run_steps(run, started, report);
+    bench.disarm();
     if (!report.pass() || settings.dry_run) {
-      journal.put_back();
+      bench.journal().put_back();
       return report;
     }
     // Saved before the temporary ones are forgotten: a save that fails puts everything back.
-    journal.put_temporary_back();
+    bench.journal().put_temporary_back();
     if (settings.save) {
       device::Store(device).save();
       report.stored = true;
     }
-    journal.forget();
+    bench.journal().forget();
     report.kept = true;
     return report;
-  } catch (const CalibrationInterrupted& interruption) {
-    const std::string left = restore(bench, journal);
-    throw CalibrationInterrupted(
+  } catch (const bench::Interrupted& interruption) {
+    const std::string left = restore(bench);
+    throw bench::Interrupted(
         fmt::format("{}; {}", interruption.what(),
                     left.empty() ? "the axis has been disarmed and all parameters are as before" : left));
   } catch (const std::exception& error) {
-    const std::string left = restore(bench, journal);
+    const std::string left = restore(bench);
     if (left.empty()) throw;
     throw device::DeviceError(fmt::format("{}; {}", error.what(), left));
   }

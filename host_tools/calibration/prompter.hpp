@@ -1,17 +1,7 @@
 #pragma once
 
-#include <string>
+#include "host_tools/bench/prompter.hpp"
 
 namespace kmax::calibration {
-
-// Somebody who can be asked to do something with the handle.
-class Prompter {
- public:
-  virtual ~Prompter() = default;
-
-  // Asks, and returns while the hand moves or at once: the step watches the encoder itself. The axis has no
-  // force meanwhile.
-  virtual void ask(const std::string& what_to_do) = 0;
-};
-
+using bench::Prompter;
 }  // namespace kmax::calibration

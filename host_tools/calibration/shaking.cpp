@@ -4,17 +4,145 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
-#include "host_tools/calibration/centring.hpp"
-#include "host_tools/calibration/encoder_watch.hpp"
-#include "host_tools/calibration/step_report.hpp"
-#include "host_tools/calibration/trip_diagnosis.hpp"
+#include "host_tools/calibration/field_sweep.hpp"
 
 namespace kmax::calibration {
 
+bool InducedVoltage::sure(const MotorKnowledge& known, double current) const {
+  constexpr double share = 0.1;   // of the voltage that the resistance takes
+  constexpr double errors = 5.0;  // standard errors
+  return volts > std::max(share * known.resistance * std::abs(current), errors * error);
+}
+
+InducedVoltage induced_in_waves(const Waveforms& seen, const MotorKnowledge& known, std::size_t half_period,
+                                std::size_t first, std::size_t end) {
+  constexpr std::size_t fewest_samples = 10;
+  InducedVoltage none{0.0, std::numeric_limits<double>::infinity()};
+  const auto voltage = seen.of("voltage"), current = seen.of("current");
+  end = std::min(end, voltage.size());
+  if (half_period < fewest_samples) return none;
+  const auto mean_over = [&](std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t k = from; k < to; ++k) sum += voltage[k] - known.resistance * current[k];
+    return sum / static_cast<double>(to - from);
+  };
+  std::vector<double> rises;
+  for (std::size_t begin = first; begin + half_period <= end; begin += half_period) {
+    const double direction =
+        bench::mean_of(current.subspan(begin + 3 * half_period / 10, half_period * 6 / 10)) < 0.0 ? -1.0
+                                                                                                  : 1.0;
+    const double early = mean_over(begin + 3 * half_period / 10, begin + 6 * half_period / 10);
+    const double late = mean_over(begin + 7 * half_period / 10, begin + half_period);
+    // Their middles are four tenths of a half wave apart.
+    rises.push_back(direction * (late - early) / 0.4);
+  }
+  if (rises.size() < 2) return none;
+  // Of the samples, not of the rises: a synchronous motor under a dead encoder swings, and each wave differs.
+  double square = 0.0;
+  for (const double rise : rises) square += rise * rise;
+  std::vector<double> steps;
+  for (std::size_t k = first + 1; k < end; ++k)
+    if ((current[k] < 0.0) == (current[k - 1] < 0.0))
+      steps.push_back(voltage[k] - voltage[k - 1] - known.resistance * (current[k] - current[k - 1]));
+  const double noise = bench::deviation_of(steps) / std::numbers::sqrt2;
+  const double error = noise * std::sqrt(2.0 / (0.3 * static_cast<double>(half_period))) / 0.4;
+  return {std::sqrt(square / static_cast<double>(rises.size())),
+          error * (1.0 / std::sqrt(static_cast<double>(rises.size())) + 0.2)};
+}
+
+InducedVoltage induced_in_push(const Waveforms& seen, const MotorKnowledge& known) {
+  const auto voltage = seen.of("voltage"), current = seen.of("current");
+  const std::size_t length = voltage.size() / 3;
+  if (length < 2) return {0.0, std::numeric_limits<double>::infinity()};
+  const double direction = bench::mean_of(current.last(length)) < 0.0 ? -1.0 : 1.0;
+  const double lost =
+      (known.brushed() ? 2.0 : 4.0 / 3.0) * known.supply * known.pwm_frequency * known.dead_time;
+  std::vector<double> induced;
+  for (std::size_t k = voltage.size() - length; k < voltage.size(); ++k)
+    induced.push_back(direction * (voltage[k] - known.resistance * current[k]) - lost);
+  return {bench::mean_of(induced), bench::deviation_of(induced) / std::sqrt(static_cast<double>(length))};
+}
+
+bool stands(std::span<const double> count) {
+  return bench::span_of(count) < 2.0;
+}
+
+void throw_standing(Bench& bench, const MotorKnowledge& known, bool induced, const std::string& evidence) {
+  // A synchronous motor whose field stands still has come to rest in it. Dragged along by a field that turns
+  // it shows whether it can turn.
+  if (!induced && !known.brushed()) {
+    bench.disarm();
+    FieldSweep(bench, known).prepare();
+  }
+  if (induced) throw_encoder_dead(evidence);
+  throw_motor_blocked(evidence);
+}
+
+namespace {
+constexpr double near_enough = 0.15;   // of the travel, where there is nothing to do
+constexpr double arrived = 0.04;       // of the travel
+constexpr double first_piece = 0.04;   // s
+constexpr double longest_piece = 0.3;  // s
+constexpr int most_pieces = 200;
+constexpr std::size_t pull_samples = 60;
+// A handle that has coasted out of the travel must come back by more than is left of it.
+constexpr double return_margin = 0.002;  // m
+
+Waveforms pull(Bench& bench, const MotorKnowledge& known, double stroke, double duration, double reach) {
+  ExcitationPlan spring;
+  spring.kind = "position";
+  spring.stiffness = 500.0;
+  spring.damping = 5.0;
+  spring.speed = 0.05;
+  spring.stroke = stroke;
+  spring.duration = duration;
+  const int interval =
+      std::max(1, static_cast<int>(duration / known.tick / static_cast<double>(pull_samples)));
+  Waveforms seen =
+      bench.record(spring, {{"count", "voltage", "current"}, pull_samples, interval, 0.0}, reach);
+  require_no_trip(seen);
+  return seen;
+}
+}  // namespace
+
+void centre_handle(Bench& bench, const MotorKnowledge& known) {
+  // The device excites no torque before.
+  if (!known.brushed() && bench.number("measured.commutation_known") == 0.0)
+    throw StepFailed({"commutation_unknown", "the rotor's electrical angle is not known in this power cycle",
+                      "calibrate the encoder as well: --steps encoder,mechanical"});
+  double away = bench.displacement();
+  if (std::abs(away) < near_enough * bench.travel()) return;
+  bench.disarm();
+  const double reach = std::abs(away) + return_margin;
+  double duration = first_piece;
+  for (int piece = 0; piece < most_pieces; ++piece) {
+    away = bench.displacement();
+    if (std::abs(away) < arrived * bench.travel()) break;
+    const Waveforms seen = pull(bench, known, -away, duration, reach);
+    if (!stands(seen.of("count"))) {
+      duration = first_piece;
+      continue;
+    }
+    const bool induced = induced_in_push(seen, known).sure(known, known.current);
+    duration *= 1.4;
+    if (induced)
+      throw_standing(bench, known, true,
+                     fmt::format("pulled back by {:.1f} mm for {:.0f} ms the encoder counts nothing",
+                                 1000.0 * std::abs(away), 1000.0 * duration));
+    // Friction and cogging may hold it where the spring is no match for them; it is within the travel.
+    if (duration > longest_piece) break;
+  }
+  // A spring that goes nowhere takes the rest of the speed away.
+  pull(bench, known, 0.0, 0.1, reach);
+  bench.disarm();
+}
+
 namespace {
 constexpr int ramp_waves = 8;  // half periods
-constexpr int longest_half_period = 3000;
+constexpr int slowest_half_period = 3000;
 }  // namespace
 
 // In the middle of a half wave the handle turns back: there the wave ends, since nothing brakes it
@@ -32,13 +160,20 @@ ExcitationPlan Shaking::wave(std::size_t ticks) const {
 
 // Longer ones would take a free handle through all of the travel, by what this axis was found to weigh.
 int Shaking::longest() const {
-  if (!(known_.mass_known && known_.mass > 0.0 && known_.torque_constant > 0.0)) return longest_half_period;
+  if (!(known_.mass_known && known_.mass > 0.0 && known_.torque_constant > 0.0)) return slowest_half_period;
   // A square wave of force swings a free mass by force x T^2 / (4 mass), peak to peak.
   const double time = 2.0 * std::sqrt(bench_.travel() * known_.mass / (known_.force_per_ampere() * current_));
-  return static_cast<int>(std::clamp(time / known_.tick, 20.0, static_cast<double>(longest_half_period)));
+  return static_cast<int>(std::clamp(time / known_.tick, 20.0, static_cast<double>(slowest_half_period)));
 }
 
-void Shaking::require_living_encoder(const Recording& seen, int interval) const {
+std::string Shaking::evidence(const InducedVoltage& induced) const {
+  return fmt::format(
+      "{:.3g} A to and fro, for {:.1f} ms each, induce {:.3f} V +- {:.3f} V and move the count by less than "
+      "2",
+      current_, 1000.0 * half_period_ * known_.tick, induced.volts, induced.error);
+}
+
+void Shaking::require_living_encoder(const Waveforms& seen, int interval) const {
   if (seen.empty()) throw_standing(bench_, known_, false, "shaken, the encoder counts nothing");
   const auto half = static_cast<std::size_t>(half_period_ / interval);
   // The last one and a half waves: whatever went before, there the encoder stands.
@@ -49,14 +184,10 @@ void Shaking::require_living_encoder(const Recording& seen, int interval) const 
   std::size_t edge = seen.samples() - std::min(seen.samples() - 1, std::max(part, 4 * half));
   while (edge + 1 < seen.samples() && (current[edge] < 0.0) == (current[edge - 1] < 0.0)) ++edge;
   const InducedVoltage induced = induced_in_waves(seen, known_, half, edge, seen.samples());
-  throw_standing(
-      bench_, known_, induced.sure(known_, current_),
-      fmt::format("{:.3g} A to and fro, for {:.1f} ms each, induce {:.3f} V +- {:.3f} V and move the count "
-                  "by less than 2",
-                  current_, 1000.0 * half_period_ * known_.tick, induced.volts, induced.error));
+  throw_standing(bench_, known_, induced.sure(known_, current_), evidence(induced));
 }
 
-Recording Shaking::record_centred(const ExcitationPlan& excitation, const RecordPlan& plan) {
+Waveforms Shaking::record_centred(const ExcitationPlan& excitation, const CapturePlan& plan) {
   return bench_.repeat([&] {
     centre_handle(bench_, known_);
     return bench_.record_alone(excitation, plan);
@@ -66,11 +197,11 @@ Recording Shaking::record_centred(const ExcitationPlan& excitation, const Record
 void Shaking::prepare() {
   int blind = 0;
   for (int attempt = 0; attempt < 40; ++attempt) {
-    bench_.tell(fmt::format("shaking: {:.1f} ms half period", 1000.0 * half_period_ * known_.tick));
+    bench_.progress(fmt::format("shaking: {:.1f} ms half period", 1000.0 * half_period_ * known_.tick));
     const auto ticks = static_cast<std::size_t>((ramp_waves + 6) * half_period_);
     const int interval = static_cast<int>(std::max<std::size_t>(1, ticks / 280));
     // The wave drifts where friction, cogging or gravity want it.
-    const Recording seen = record_centred(
+    const Waveforms seen = record_centred(
         wave(5 * static_cast<std::size_t>(half_period_)),
         {{"count", "voltage", "current"}, ticks / static_cast<std::size_t>(interval), interval, 0.0});
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel &&
@@ -82,7 +213,7 @@ void Shaking::prepare() {
     require_no_trip(seen);
     const auto count = seen.of("count");
     const auto moving = count.last(count.size() * 4 / (ramp_waves + 6));
-    seen_ = span_of(moving) * known_.count_length();
+    seen_ = bench::span_of(moving) * known_.count_length();
     double largest_factor = 2.0;
     if (stands(moving)) {
       const auto half = static_cast<std::size_t>(half_period_ / interval);
@@ -90,12 +221,7 @@ void Shaking::prepare() {
       // A coarse encoder may not yet show what the voltage does: twice the stroke shows whether it is that.
       if (induced.sure(known_, current_)) {
         largest_factor = 1.4;
-        if (++blind == 2)
-          throw_standing(
-              bench_, known_, true,
-              fmt::format("{:.3g} A to and fro, for {:.1f} ms each, induce {:.3f} V +- {:.3f} V and "
-                          "move the count by less than 2",
-                          current_, 1000.0 * half_period_ * known_.tick, induced.volts, induced.error));
+        if (++blind == 2) throw_standing(bench_, known_, true, evidence(induced));
       }
     }
     if (seen_ >= 0.7 * stroke_ && seen_ <= 1.4 * stroke_) return;
@@ -111,7 +237,7 @@ void Shaking::prepare() {
                     "free the handle, or raise --current"});
 }
 
-Recording Shaking::record(const std::vector<std::string>& channels, std::size_t samples, int interval) {
+Waveforms Shaking::record(const std::vector<std::string>& channels, std::size_t samples, int interval) {
   const std::size_t ticks = samples * static_cast<std::size_t>(interval);
   constexpr int attempts = 5;
   for (int attempt = 1;; ++attempt) {
@@ -120,7 +246,7 @@ Recording Shaking::record(const std::vector<std::string>& channels, std::size_t 
     // A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by
     // the record.
     const double still = known_.brushed() ? 0.0 : std::max(0.1, 4.0 * half_period_ * known_.tick);
-    Recording seen = record_centred(plan, {channels, samples, interval, plan.ramp, still});
+    Waveforms seen = record_centred(plan, {channels, samples, interval, plan.ramp, still});
     // A long record may drift out of the travel: a shorter wave drifts less.
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel && attempt < attempts) {
       half_period_ = std::max(20, half_period_ * 4 / 5);

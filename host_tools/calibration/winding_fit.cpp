@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <vector>
 
-#include "host_tools/calibration/least_squares.hpp"
-#include "host_tools/calibration/winding_model.hpp"
+#include "host_tools/bench/excitation.hpp"
+#include "host_tools/bench/least_squares.hpp"
+#include "host_tools/bench/winding_model.hpp"
 
 namespace kmax::calibration {
 namespace {
@@ -34,11 +36,6 @@ struct Facts {
   double mean_current = 0.0;
   bool has_angles = true;
 };
-
-double span_of(std::span<const double> values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return *high - *low;
-}
 
 bool sizes_agree(const WindingRecord& record) {
   const std::size_t n = record.voltage.size();
@@ -68,7 +65,7 @@ Finding<WindingCause> look_at(std::span<const WindingRecord> records, const Wind
       facts.positive += record.current[k] > 2.0 * config.noise_hint ? 1 : 0;
       facts.negative += record.current[k] < -2.0 * config.noise_hint ? 1 : 0;
     }
-    facts.voltage_span = std::max(facts.voltage_span, span_of(record.voltage));
+    facts.voltage_span = std::max(facts.voltage_span, bench::span_of(record.voltage));
     facts.has_angles &= !record.shaft_angle.empty();
   }
   facts.samples = index;
@@ -140,12 +137,12 @@ Scan scan_at(double tau, std::span<const Prepared> records, const Terms& terms,
       const double share = std::clamp(record.current[k] / (3.0 * config.noise_hint), -1.0, 1.0);
       sign = whole * sign + (1.0 - whole) * share;
       moved = whole * moved + (1.0 - whole) * charge;
-      charge += config.tick * (record.current[k] - record.mean_current - charge / motion_decay);
+      charge += config.tick * (record.current[k] - record.mean_current - charge / bench::motion_decay);
       if (terms.speed) speed = whole * speed + (1.0 - whole) * record.speed[k];
       start *= whole;
     }
   }
-  const LinearFit fit = solve_least_squares(matrix, right);
+  const bench::LinearFit fit = bench::solve_least_squares(matrix, right);
   Scan scan;
   scan.square_sum = fit.square_sum;
   scan.tau = tau;
@@ -184,8 +181,8 @@ class Problem {
     if (knows_resistance_) ++rows_;
   }
 
-  WindingParameters parameters(const Eigen::VectorXd& x, std::size_t record) const {
-    WindingParameters p;
+  bench::WindingParameters parameters(const Eigen::VectorXd& x, std::size_t record) const {
+    bench::WindingParameters p;
     p.resistance = std::exp(std::clamp(x[0], -30.0, 30.0));
     p.inductance = std::exp(std::clamp(x[1], -40.0, 20.0));
     Eigen::Index n = 2;
@@ -207,8 +204,8 @@ class Problem {
     for (std::size_t r = 0; r < records_.size(); ++r) {
       const Prepared& record = records_[r];
       const std::span<double> current(simulated.data(), record.current.size());
-      simulate_winding(parameters(x, r), {record.voltage, record.speed, record.mean_current, config_.tick},
-                       current);
+      bench::simulate_winding(parameters(x, r),
+                              {record.voltage, record.speed, record.mean_current, config_.tick}, current);
       for (std::size_t k = 1; k < current.size(); ++k) out[row++] = current[k] - record.current[k];
     }
     if (knows_resistance_) {
@@ -229,8 +226,8 @@ class Problem {
 };
 
 struct Refined {
-  NonlinearFit solved;
-  WindingParameters parameters;
+  bench::NonlinearFit solved;
+  bench::WindingParameters parameters;
 };
 
 Refined refine(const Problem& problem, const Terms& terms, std::size_t records,
@@ -256,14 +253,14 @@ Refined refine(const Problem& problem, const Terms& terms, std::size_t records,
   }
   Refined refined;
   refined.solved =
-      minimise([&](const Eigen::VectorXd& at, Eigen::VectorXd& out) { problem.residuals(at, out); }, x, scale,
-               problem.rows());
+      bench::minimise([&](const Eigen::VectorXd& at, Eigen::VectorXd& out) { problem.residuals(at, out); }, x,
+                      scale, problem.rows());
   refined.parameters = problem.parameters(refined.solved.value, 0);
   return refined;
 }
 
 void report(const Refined& best, const Terms& terms, WindingFit& fit) {
-  const WindingParameters& p = best.parameters;
+  const bench::WindingParameters& p = best.parameters;
   const Eigen::VectorXd& error = best.solved.standard_error;
   fit.resistance = {p.resistance, p.resistance * error[0], "ohm"};
   fit.inductance = {p.inductance, p.inductance * error[1], "H"};
@@ -337,34 +334,22 @@ WindingFit fit_winding(std::span<const WindingRecord> records, const WindingFitC
 }
 
 std::string_view to_string(WindingCause cause) {
-  switch (cause) {
-    case WindingCause::none:
-      return "";
-    case WindingCause::too_little_data:
-      return "winding: too few samples, or channels of different length; capture more";
-    case WindingCause::not_finite:
-      return "winding: a sample is not a number";
-    case WindingCause::no_alternation:
-      return "winding: the voltage does not change; set excitation.alternation";
-    case WindingCause::supply_saturated:
-      return "winding: the voltage asked for is more than the supply can give; lower the voltage or raise "
-             "the "
-             "supply";
-    case WindingCause::no_current:
-      return "winding: no current follows the voltage; a phase is open, or the bridge is off";
-    case WindingCause::current_constant:
-      return "winding: a current is read that does not follow the voltage; the current sensor is faulty";
-    case WindingCause::current_inverted:
-      return "winding: the current goes against the voltage; a current sensor is inverted";
-    case WindingCause::not_resolved:
-      return "winding: the record does not determine R and L; more current, a longer half period or more "
-             "samples";
-    case WindingCause::bad_fit:
-      return "winding: the current does not behave as R and L in series; look at the capture (motion, "
-             "saturation, "
-             "a loose wire)";
-  }
-  return "";
+  // In the order of the causes.
+  static constexpr std::string_view words[] = {
+      "",
+      "winding: too few samples, or channels of different length; capture more",
+      "winding: a sample is not a number",
+      "winding: the voltage does not change; set excitation.alternation",
+      "winding: the voltage asked for is more than the supply can give; lower the voltage or raise the "
+      "supply",
+      "winding: no current follows the voltage; a phase is open, or the bridge is off",
+      "winding: a current is read that does not follow the voltage; the current sensor is faulty",
+      "winding: the current goes against the voltage; a current sensor is inverted",
+      "winding: the record does not determine R and L; more current, a longer half period or more samples",
+      "winding: the current does not behave as R and L in series; look at the capture (motion, saturation, a "
+      "loose wire)"};
+  static_assert(std::size(words) == static_cast<std::size_t>(WindingCause::bad_fit) + 1);
+  return words[static_cast<std::size_t>(cause)];
 }
 
 }  // namespace kmax::calibration

@@ -1,5 +1,4 @@
-#include "host_tools/calibration/winding_step.hpp"
-
+// Resistance and inductance of the winding, and whether all phases and both current sensors are there.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,8 +6,10 @@
 #include <numbers>
 
 #include "host_tools/calibration/applied_voltage.hpp"
-#include "host_tools/calibration/repeated_value.hpp"
-#include "host_tools/calibration/trip_diagnosis.hpp"
+#include "host_tools/calibration/phase_response.hpp"
+#include "host_tools/calibration/step.hpp"
+#include "host_tools/calibration/winding_excitation.hpp"
+#include "host_tools/calibration/winding_fit.hpp"
 
 namespace kmax::calibration {
 
@@ -20,7 +21,7 @@ constexpr double seen_current = 0.05;        // A, from which a response is more
 
 // The pulse that acted at each sample, without the rounding of the timer's ticks being a part of the model's
 // error.
-std::vector<double> applied_brushed(const Recording& recording) {
+std::vector<double> applied_brushed(const Waveforms& recording) {
   std::vector<double> applied;
   const auto asked = recording.of("voltage"), supply = recording.of("supply");
   for (std::size_t i = 0; i < asked.size(); ++i)
@@ -40,7 +41,7 @@ std::vector<double> applied_along(std::span<const double> along, double across, 
 }
 
 // What went before does not matter to these: a rotor falls in anew with the vector.
-Recording record(Bench& bench, const ExcitationPlan& excitation, const RecordPlan& plan) {
+Waveforms record(Bench& bench, const ExcitationPlan& excitation, const CapturePlan& plan) {
   return bench.repeat([&] { return bench.record_alone(excitation, plan); });
 }
 
@@ -51,12 +52,16 @@ WindingFit resolved(WindingFit fit) {
   return fit;
 }
 
+// V
+double dead_time_loss(const WindingFit& fit) {
+  return fit.dead_time_voltage.known() ? std::max(fit.dead_time_voltage.value, 0.0) : 0.0;
+}
+
 ExcitationPlan biased_wave(const WindingExcitation& planned, const WindingFit& rough,
                            const MotorKnowledge& known, double angle, bool across) {
-  const double loss = rough.dead_time_voltage.known() ? std::max(rough.dead_time_voltage.value, 0.0) : 0.0;
   ExcitationPlan wave;
   wave.kind = "voltage";
-  wave.bias = std::min(planned.bias + loss, 0.6 * known.largest_voltage());
+  wave.bias = std::min(planned.bias + dead_time_loss(rough), 0.6 * known.largest_voltage());
   wave.alternation = std::min(planned.alternation, 0.35 * known.largest_voltage());
   wave.half_period = planned.half_period;
   wave.across = across;
@@ -65,9 +70,12 @@ ExcitationPlan biased_wave(const WindingExcitation& planned, const WindingFit& r
   wave.duration = planned.settling + 1.0;
   return wave;
 }
-}  // namespace
+struct Response {
+  SensorAnswer phases;
+  Waveforms seen;
+};
 
-WindingStep::Response WindingStep::respond(Bench& bench, double voltage, double angle) {
+Response respond(Bench& bench, double voltage, double angle) {
   ExcitationPlan wave;
   wave.kind = "voltage";
   wave.alternation = voltage;
@@ -76,9 +84,9 @@ WindingStep::Response WindingStep::respond(Bench& bench, double voltage, double 
   wave.ramp = 0.004;
   wave.duration = 0.1;
   Response response;
-  response.recordings.push_back(
-      record(bench, wave, {{"current_b", "current_c", "voltage", "supply"}, 3 * settling_ticks, 1, 0.0}));
-  const Recording& seen = response.recordings.front();
+  response.seen =
+      record(bench, wave, {{"current_b", "current_c", "voltage", "supply"}, 3 * settling_ticks, 1, 0.0});
+  const Waveforms& seen = response.seen;
   if (!seen.empty())
     response.phases = phase_response(seen.of("voltage"), seen.of("current_b"), seen.of("current_c"),
                                      first_half_period, seen.trip ? 0 : settling_ticks);
@@ -86,23 +94,23 @@ WindingStep::Response WindingStep::respond(Bench& bench, double voltage, double 
 }
 
 // Finds the voltage that drives known.current, and judges phases and sensors as soon as any current is seen.
-void WindingStep::search(Bench& bench, MotorKnowledge& known) {
+void search(Bench& bench, MotorKnowledge& known) {
   double voltage = first_voltage;
   for (;;) {
-    bench.tell(fmt::format("winding: trying {:.2f} V", voltage));
+    bench.progress(fmt::format("winding: trying {:.2f} V", voltage));
     const Response first = respond(bench, voltage, 0.0);
     const Response second = known.brushed() ? first : respond(bench, voltage, quarter_turn);
     // Half a look shows no pattern; a brushed motor's one look is all there is.
     if (!known.brushed()) {
-      require_no_trip(first.recordings.front());
-      require_no_trip(second.recordings.front());
+      require_no_trip(first.seen);
+      require_no_trip(second.seen);
     }
-    const auto magnitude = magnitude_of(first.phases, known.brushed() ? PhaseResponse{} : second.phases);
+    const auto magnitude = magnitude_of(first.phases, known.brushed() ? SensorAnswer{} : second.phases);
     if (magnitude > std::max(seen_current, 0.1 * known.current)) {
       if (const auto diagnosis = diagnose_phases(known.brushed(), first.phases, second.phases))
         throw StepFailed(*diagnosis);
     }
-    require_no_trip(first.recordings.front());
+    require_no_trip(first.seen);
     if (magnitude >= 0.7 * known.current) break;
     const double most = known.largest_voltage();
     if (voltage >= most) {
@@ -129,24 +137,35 @@ void WindingStep::search(Bench& bench, MotorKnowledge& known) {
   known.search_voltage = voltage;
 }
 
+WindingFitConfig config_of(const MotorKnowledge& known) {
+  WindingFitConfig config;
+  config.tick = known.tick;
+  config.pwm_frequency = known.pwm_frequency;
+  config.switching_legs = known.brushed() ? 2.0 : 4.0 / 3.0;
+  return config;
+}
+
+// V that the dead time takes, as seconds of dead time.
+Estimate dead_time_of(const WindingFit& fit, const MotorKnowledge& known) {
+  const double volts = config_of(known).switching_legs * known.pwm_frequency * known.supply;
+  return {fit.dead_time_voltage.value / volts, fit.dead_time_voltage.standard_error / volts, "s"};
+}
+
 // Unbiased, so that the dead time shows; a vector stands along phase A.
-WindingFit WindingStep::rough_fit(Bench& bench, const MotorKnowledge& known) {
+WindingFit rough_fit(Bench& bench, const MotorKnowledge& known) {
   ExcitationPlan wave;
   wave.kind = "voltage";
   wave.alternation = known.search_voltage;
   wave.half_period = first_half_period;
   wave.ramp = 0.004;
   wave.duration = 0.2;
-  const Recording seen = record(bench, wave, {{"voltage", "current", "supply"}, 1000, 1, 0.0});
+  const Waveforms seen = record(bench, wave, {{"voltage", "current", "supply"}, 1000, 1, 0.0});
   require_no_trip(seen);
   const std::vector<double> applied = known.brushed()
                                           ? applied_brushed(seen)
                                           : applied_along(seen.of("voltage"), 0.0, 0.0, known.supply, false);
   const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
-  WindingFitConfig config;
-  config.tick = known.tick;
-  config.pwm_frequency = known.pwm_frequency;
-  config.switching_legs = known.brushed() ? 2.0 : 4.0 / 3.0;
+  WindingFitConfig config = config_of(known);
   config.motion = WindingMotion::free;
   WindingFit fit = fit_winding({&record, 1}, config);
   if (!fit.resistance.known() || !fit.inductance.known() || !(fit.resistance.value > 0.0))
@@ -154,70 +173,46 @@ WindingFit WindingStep::rough_fit(Bench& bench, const MotorKnowledge& known) {
   return fit;
 }
 
-void WindingStep::measure_brushed(Bench& bench, MotorKnowledge& known, const WindingFit& rough,
-                                  StepReport& report) {
-  WindingExcitation planned =
+WindingFit fit_brushed(Bench& bench, const MotorKnowledge& known, const WindingFit& rough) {
+  const WindingExcitation planned =
       brushed_excitation(rough.resistance.value, rough.inductance.value, known.current, known.tick);
-  const double loss = rough.dead_time_voltage.known() ? std::max(rough.dead_time_voltage.value, 0.0) : 0.0;
   ExcitationPlan wave;
   wave.kind = "voltage";
-  wave.alternation = std::min(planned.alternation + loss, known.largest_voltage());
+  wave.alternation = std::min(planned.alternation + dead_time_loss(rough), known.largest_voltage());
   wave.half_period = planned.half_period;
   wave.ramp = 0.02;
   wave.duration = 1.0;
-  std::vector<Estimate> resistance, inductance, dead_time;
-  for (int i = 0; i < bench.settings().repetitions; ++i) {
-    bench.tell(fmt::format("winding: measurement {} of {}", i + 1, bench.settings().repetitions));
-    const Recording seen = record(
-        bench, wave,
-        {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
-    require_no_trip(seen);
-    const std::vector<double> applied = applied_brushed(seen);
-    const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
-    WindingFitConfig config;
-    config.tick = known.tick;
-    config.pwm_frequency = known.pwm_frequency;
-    config.motion = WindingMotion::free;
-    const WindingFit fit = resolved(fit_winding({&record, 1}, config));
-    resistance.push_back(fit.resistance);
-    inductance.push_back(fit.inductance);
-    const double legs = config.switching_legs * known.pwm_frequency * known.supply;
-    if (fit.dead_time_voltage.known())
-      dead_time.push_back(
-          {fit.dead_time_voltage.value / legs, fit.dead_time_voltage.standard_error / legs, "s"});
-  }
-  report.values.push_back(repeated_value("motor.resistance", resistance, "ohm", known.resistance));
-  report.values.push_back(repeated_value("motor.inductance", inductance, "H", known.inductance));
-  if (!dead_time.empty())
-    report.values.push_back(repeated_value("compensation.dead_time", dead_time, "s", known.dead_time));
-}
-
-WindingFit WindingStep::fit_along(Bench& bench, const MotorKnowledge& known, const WindingFit& rough,
-                                  double angle) {
-  const WindingExcitation planned =
-      vector_excitation(rough.resistance.value, rough.inductance.value, known.current, known.tick);
-  const ExcitationPlan wave = biased_wave(planned, rough, known, angle, false);
-  const Recording seen = record(
+  const Waveforms seen = record(
       bench, wave,
       {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
   require_no_trip(seen);
-  const std::vector<double> applied =
-      applied_along(seen.of("voltage"), 0.0, angle, mean_of(seen.of("supply")), false);
+  const std::vector<double> applied = applied_brushed(seen);
   const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
-  WindingFitConfig config;
-  config.tick = known.tick;
-  config.pwm_frequency = known.pwm_frequency;
-  config.switching_legs = 4.0 / 3.0;
+  WindingFitConfig config = config_of(known);
+  config.motion = WindingMotion::free;
   return resolved(fit_winding({&record, 1}, config));
+}
+
+WindingFit fit_along(Bench& bench, const MotorKnowledge& known, const WindingFit& rough, double angle) {
+  const WindingExcitation planned =
+      vector_excitation(rough.resistance.value, rough.inductance.value, known.current, known.tick);
+  const Waveforms seen = record(
+      bench, biased_wave(planned, rough, known, angle, false),
+      {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
+  require_no_trip(seen);
+  const std::vector<double> applied =
+      applied_along(seen.of("voltage"), 0.0, angle, bench::mean_of(seen.of("supply")), false);
+  const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
+  return resolved(fit_winding({&record, 1}, config_of(known)));
 }
 
 // The rotor swings with a current across the field that holds it: fitted as a motion, from waves of two
 // lengths.
-WindingFit WindingStep::fit_across(Bench& bench, const MotorKnowledge& known, const WindingFit& rough,
-                                   double angle, const Estimate& resistance) {
+WindingFit fit_across(Bench& bench, const MotorKnowledge& known, const WindingFit& rough, double angle,
+                      const Estimate& resistance) {
   const WindingExcitation planned =
       across_excitation(rough.resistance.value, rough.inductance.value, known.current, known.tick);
-  std::vector<Recording> seen;
+  std::vector<Waveforms> seen;
   std::vector<std::vector<double>> applied;
   for (const int half_period : {planned.half_period, winding_slow_half_period(planned.half_period)}) {
     ExcitationPlan wave = biased_wave(planned, rough, known, angle, true);
@@ -229,51 +224,55 @@ WindingFit WindingStep::fit_across(Bench& bench, const MotorKnowledge& known, co
                            planned.settling}));
     require_no_trip(seen.back());
     applied.push_back(applied_along(seen.back().of("voltage_d"), wave.bias, angle,
-                                    mean_of(seen.back().of("supply")), true));
+                                    bench::mean_of(seen.back().of("supply")), true));
   }
   std::vector<WindingRecord> records;
   for (std::size_t i = 0; i < seen.size(); ++i)
     records.push_back({applied[i], seen[i].of("current_d"), seen[i].of("supply"), {}});
-  WindingFitConfig config;
-  config.tick = known.tick;
-  config.pwm_frequency = known.pwm_frequency;
-  config.switching_legs = 4.0 / 3.0;
+  WindingFitConfig config = config_of(known);
   config.fit_dead_time = false;
   config.motion = WindingMotion::free;
   config.known_resistance = resistance;
   return resolved(fit_winding(records, config));
 }
 
-void WindingStep::measure_vector(Bench& bench, MotorKnowledge& known, const WindingFit& rough,
-                                 StepReport& report) {
-  std::vector<Estimate> resistance, along, across;
-  for (int i = 0; i < bench.settings().repetitions; ++i) {
-    bench.tell(fmt::format("winding: measurement {} of {}", i + 1, bench.settings().repetitions));
+void measure(Calibration& run, const WindingFit& rough) {
+  Bench& bench = run.bench;
+  const MotorKnowledge& known = run.known;
+  std::vector<Estimate> resistance, inductance, across, dead_time;
+  for (int i = 0; i < run.settings.repetitions; ++i) {
+    bench.progress(fmt::format("winding: measurement {} of {}", i + 1, run.settings.repetitions));
     // Another phase carries the bias each time, and the rotor turns by a third of a turn at most.
     const double angle = std::numbers::pi / 3.0 * (i % 3 == 2 ? -1 : i % 3);
-    const WindingFit of_d = fit_along(bench, known, rough, angle);
-    resistance.push_back(of_d.resistance);
-    along.push_back(of_d.inductance);
-    across.push_back(fit_across(bench, known, rough, angle, of_d.resistance).inductance);
+    const WindingFit fit =
+        known.brushed() ? fit_brushed(bench, known, rough) : fit_along(bench, known, rough, angle);
+    resistance.push_back(fit.resistance);
+    inductance.push_back(fit.inductance);
+    if (!known.brushed())
+      across.push_back(fit_across(bench, known, rough, angle, fit.resistance).inductance);
+    else if (fit.dead_time_voltage.known())
+      dead_time.push_back(dead_time_of(fit, known));
   }
-  report.values.push_back(repeated_value("motor.resistance", resistance, "ohm", known.resistance));
-  report.values.push_back(repeated_value("motor.inductance", along, "H", known.inductance));
-  report.values.push_back(repeated_value("motor.inductance_q", across, "H", known.inductance_q));
-  // The dead time shows where the current changes its sign.
-  std::vector<Estimate> dead_time;
-  for (int i = 0; i < bench.settings().repetitions; ++i) {
-    const Estimate lost = rough_fit(bench, known).dead_time_voltage;
-    const double legs = 4.0 / 3.0 * known.pwm_frequency * known.supply;
-    if (lost.known()) dead_time.push_back({lost.value / legs, lost.standard_error / legs, "s"});
+  std::vector<IdentifiedValue>& values = run.report.values;
+  values.push_back(repeated_value("motor.resistance", resistance, "ohm", known.resistance));
+  values.push_back(repeated_value("motor.inductance", inductance, "H", known.inductance));
+  if (!known.brushed()) {
+    values.push_back(repeated_value("motor.inductance_q", across, "H", known.inductance_q));
+    // The dead time shows where the current changes its sign.
+    for (int i = 0; i < run.settings.repetitions; ++i) {
+      const WindingFit fit = rough_fit(bench, known);
+      if (fit.dead_time_voltage.known()) dead_time.push_back(dead_time_of(fit, known));
+    }
   }
   if (!dead_time.empty())
-    report.values.push_back(repeated_value("compensation.dead_time", dead_time, "s", known.dead_time));
+    values.push_back(repeated_value("compensation.dead_time", dead_time, "s", known.dead_time));
 }
 
-void WindingStep::finish(Bench& bench, MotorKnowledge& known, StepReport& report) {
+void finish(Calibration& run) {
+  MotorKnowledge& known = run.known;
   // A dead time that scatters by more than this is not made up for; nothing else depends on it.
   constexpr double fine_dead_time = 150e-9;  // s, 72 mV per leg at 24 V and 20 kHz
-  for (IdentifiedValue& value : report.values) {
+  for (IdentifiedValue& value : run.report.values) {
     if (value.name != "compensation.dead_time") {
       // A salient rotor that is held between its axes shows neither inductance well; the field's turn names
       // it.
@@ -286,7 +285,7 @@ void WindingStep::finish(Bench& bench, MotorKnowledge& known, StepReport& report
   std::vector<std::string> results;
   known.inductance_q = 0.0;
   known.dead_time = known.dead_time_error = 0.0;
-  for (IdentifiedValue& value : report.values) {
+  for (IdentifiedValue& value : run.report.values) {
     if (value.name == "motor.resistance") {
       known.resistance = value.value;
       known.resistance_error = std::max(value.spread, 1e-3 * value.value);
@@ -306,16 +305,17 @@ void WindingStep::finish(Bench& bench, MotorKnowledge& known, StepReport& report
   if (known.inductance_q <= 0.0) known.inductance_q = known.inductance;
   if (known.brushed()) results.push_back("motor.inductance_q=0");
   if (known.dead_time_error > 0.0)
-    bench.set_result_at_end(
-        {fmt::format("compensation.dead_time={:.9g}", known.dead_time),
-         fmt::format("compensation.dead_time_current={:.6g}",
-                     std::clamp(known.dead_time_band(), 0.02, 0.2 * known.current_limit))});
-  bench.set_result(results);
+    run.set_at_end({fmt::format("compensation.dead_time={:.9g}", known.dead_time),
+                    fmt::format("compensation.dead_time_current={:.6g}",
+                                std::clamp(known.dead_time_band(), 0.02, 0.2 * known.current_limit))});
+  run.bench.set_result(results);
 }
+}  // namespace
 
-void WindingStep::run(Bench& bench, MotorKnowledge& known, StepReport& report) {
-  search(bench, known);
-  const WindingFit rough = rough_fit(bench, known);
+void find_winding(Calibration& run) {
+  MotorKnowledge& known = run.known;
+  search(run.bench, known);
+  const WindingFit rough = rough_fit(run.bench, known);
   // What the supply can drive is measured with: less is less exact, and below 30 % of what was wanted not
   // exact enough.
   constexpr double least_share = 0.3;
@@ -327,12 +327,8 @@ void WindingStep::run(Bench& bench, MotorKnowledge& known, StepReport& report) {
                      known.supply, most, rough.resistance.value, known.current),
          "use a higher supply voltage, or lower current.limit or --current"});
   known.current = std::min(known.current, most);
-  if (known.brushed()) {
-    measure_brushed(bench, known, rough, report);
-  } else {
-    measure_vector(bench, known, rough, report);
-  }
-  finish(bench, known, report);
+  measure(run, rough);
+  finish(run);
 }
 
 }  // namespace kmax::calibration

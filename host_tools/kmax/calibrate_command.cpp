@@ -92,7 +92,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   choose_sets(settings, options.sets);
   device::Device device = context.connect();
   const auto check_interruption = [&] {
-    if (interruption.requested()) throw calibration::CalibrationInterrupted("interrupted");
+    if (interruption.requested()) throw bench::Interrupted("interrupted");
   };
   TerminalPrompter prompter(context, check_interruption, "--hand needs somebody at the terminal");
   CalibrationReport report;

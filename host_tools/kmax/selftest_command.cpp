@@ -9,6 +9,7 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/bench/prompter.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/selftest/selftest.hpp"
 
@@ -19,11 +20,6 @@ struct SelfTestOptions {
   bool hand = false;
   double patience = 20.0;
   int exchanges = 50;
-};
-
-class Interrupted : public std::runtime_error {
- public:
-  Interrupted() : std::runtime_error("interrupted") {}
 };
 
 Json check_json(const selftest::CheckResult& check) {
@@ -110,7 +106,7 @@ int run_selftest_command(Context& context, const SelfTestOptions& options) {
   {
     Progress progress(context.messages());
     report = selftest::run_selftest(device, settings, [&](const std::string& text) {
-      if (interruption.requested()) throw Interrupted();
+      if (interruption.requested()) throw bench::Interrupted("interrupted");
       progress.show(text);
     });
   }

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 
-#include "host_tools/calibration/step_report.hpp"
 
 namespace kmax::cli {
 
@@ -24,7 +23,7 @@ void TerminalPrompter::ask(const std::string& what_to_do) {
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     // A last line without its end is an answer too.
     if (got <= 0 && begun) return;
-    if (got <= 0) throw calibration::CalibrationInterrupted(fmt::format("nobody answered: {}", advice_));
+    if (got <= 0) throw bench::Interrupted(fmt::format("nobody answered: {}", advice_));
     if (byte == '\n') return;
     begun = true;
   }

@@ -3,20 +3,20 @@
 #include <functional>
 #include <string>
 
-#include "host_tools/calibration/prompter.hpp"
+#include "host_tools/bench/prompter.hpp"
 #include "host_tools/kmax/context.hpp"
 
 namespace kmax::cli {
 
 /// Asks whoever sits at the terminal, on the messages' stream, and waits for the Enter key on standard input.
-class TerminalPrompter final : public calibration::Prompter {
+class TerminalPrompter final : public bench::Prompter {
  public:
   /// `check` is called at least ten times a second while nobody answers, and may throw to give up. `advice`:
   /// what to do when nobody can.
   TerminalPrompter(Context& context, std::function<void()> check, std::string advice)
       : context_(context), check_(std::move(check)), advice_(std::move(advice)) {}
 
-  /// Throws calibration::CalibrationInterrupted when standard input ends or is closed: nobody is there to
+  /// Throws bench::Interrupted when standard input ends or is closed: nobody is there to
   /// answer.
   void ask(const std::string& what_to_do) override;
 

@@ -1,4 +1,5 @@
 #pragma once
+// What the self-test measures of an axis; the checks are functions of it alone.
 
 #include <optional>
 #include <string>
@@ -6,13 +7,92 @@
 
 #include "firmware/fault.hpp"
 #include "firmware/refusal.hpp"
-#include "host_tools/selftest/axis_facts.hpp"
-#include "host_tools/selftest/check_result.hpp"
-#include "host_tools/selftest/motion_evidence.hpp"
-#include "host_tools/selftest/phase_response.hpp"
-#include "host_tools/selftest/recording.hpp"
+#include "host_tools/bench/circuit.hpp"
+#include "host_tools/selftest/pulse.hpp"
 
 namespace kmax::selftest {
+
+using bench::Circuit;
+
+/// What the pulses along the phases say about the circuit.
+struct PhaseFinding {
+  bench::Circuit circuit = bench::Circuit::unclear;
+  double admittance = 0.0;         ///< of the winding, as a multiple of the one it was judged by
+  double judged_resistance = 0.0;  ///< ohm
+  double residual = 1.0;           ///< of the pattern that fits best: 0 exact, 1 not at all
+  /// Of the sensors to each pulse, as a multiple of the current along the pulse that the claimed winding
+  /// would carry.
+  std::vector<bench::SensorAnswer> answers{};
+};
+
+/// Finds the circuit by how the currents of B and C answer to voltages (host_tools/bench/circuit.hpp).
+///
+/// Synchronous motor: three pulses along 0, 120 and 240 degrees, the axes of the phases A, B, C. Each
+/// sensor's answer is compared with the current that the claimed winding (first-order, resistance and
+/// inductance) would carry under the voltage that was really given; that makes six numbers. DC motor: one
+/// pulse. A short between two phases that outweighs the winding has the pattern of the third phase open, and
+/// several times the claimed admittance.
+///
+/// The circuit with the smallest residual counts if it leaves less than 0.2 of the square unexplained and the
+/// next leaves twice as much. An answer below 5 % of the claimed current, or within three standard deviations
+/// of the noise, counts as none.
+PhaseFinding judge_phases(const std::vector<PulseResponse>& pulses, const AxisFacts& facts);
+
+/// How far the handle answers to current, m per A s^2 (the second integral of the current), seen in two
+/// ways that share nothing but the current: by the encoder, and by the voltage that the moving motor induces.
+struct MotionEvidence {
+  double by_encoder = 0.0, encoder_deviation = 0.0;
+  double by_back_emf = 0.0;
+  double free_handle = 0.0;  ///< of the claimed mass and torque constant without friction
+  /// V/(A s): voltage induced per impulse of current.
+  double back_emf = 0.0, back_emf_deviation = 0.0, free_back_emf = 0.0;
+  double largest_impulse = 0.0;   ///< A s
+  double largest_back_emf = 0.0;  ///< V, in the strongest swing
+  double largest_voltage = 0.0;   ///< V, of the pulses
+  /// m: largest excursion within one swing, as the encoder saw it and as the back-EMF has it.
+  double encoder_excursion = 0.0, back_emf_excursion = 0.0;
+  bool calibrated = false;
+  double counts = 0.0;  ///< the encoder's excursion in counts
+  /// rad, electrical angle of the rotor by which swing moved the handle which way; synchronous motors. None
+  /// if it did not move.
+  std::optional<double> rotor_angle;
+
+  /// Seen beyond doubt: five standard deviations and two counts.
+  bool encoder_moved() const;
+  /// Five standard deviations, a fiftieth of the voltage and, if the motor is calibrated, a sixth of what a
+  /// free handle would induce.
+  bool back_emf_moved() const;
+  /// Twice that could not have stayed unseen. Not known without calibration.
+  bool back_emf_would_show() const;
+  static constexpr double moving_share = 1.0 / 6.0;
+};
+
+/// In a swing the circuit obeys  L di/dt = v - R i - e S - d sign(i) - constant,  S the integral of i: a free
+/// handle's speed is proportional to S, so e, in V/(A s), is the back-EMF per impulse; k_t^2 / (m r^2) for a
+/// DC motor. d is what the bridge's dead time takes. A handle that is blocked has e = 0. For a synchronous
+/// motor whose rotor stands at an angle d from the direction it is sin^2 d times 2/3 of that (amplitude
+/// convention); two directions a right angle apart add up to 2/3. Only the motor's own current and voltage
+/// enter, so this tells a dead encoder from a handle that does not move. Fitted as i = (F v - e F S - d F
+/// sign(i))/R + constant, F the winding's lag, whose time constant is the one that leaves the smallest
+/// residual.
+///
+/// The encoder's answer is the coefficient of F S when its velocity, behind the same lag, is fitted to the
+/// same four. Whatever friction or a hand do to the motion, they do to both alike. A synchronous motor's two
+/// coefficients are G sin(direction - rotor angle).
+///
+/// by_back_emf is the handle's answer that makes e: e x r / k_t (x 3/2). Without calibration k_t is not
+/// known; then sqrt(e / m), which is the same for a handle without friction.
+///
+/// `swings`: one (DC), or two, along 0 and 90 degrees; or several such sets, which are averaged.
+std::optional<MotionEvidence> motion_evidence(const std::vector<PulseResponse>& swings,
+                                              const AxisFacts& facts);
+
+/// A fault that the axis had before the test, which a test cannot leave as it is.
+struct FaultAtStart {
+  firmware::Fault fault = firmware::Fault::none;  ///< none: one that this program does not know
+  std::string words;                              ///< with the number that tripped it
+  bool cleared = false;                           ///< else its cause remains
+};
 
 /// Exchanges with the device and what its counters made of them.
 struct LinkTrial {
@@ -44,10 +124,10 @@ struct Evidence {
   std::vector<double> supply;  ///< V, readings at rest
   double temperature = 0.0;    ///< degC, of the power stage; NaN: its sensor is broken
   ArmingTrial arming;
-  std::optional<Recording> rest;        ///< bridge off
-  std::vector<Recording> swings;        ///< along 0 and 90 degrees; a DC motor has one
-  std::optional<Recording> under_load;  ///< a pulse with the supply recorded
-  std::optional<PhaseResponse> response;
+  std::optional<PulseResponse> rest;        ///< bridge off
+  std::vector<PulseResponse> swings;        ///< along 0 and 90 degrees; a DC motor has one
+  std::optional<PulseResponse> under_load;  ///< a pulse with the supply recorded
+  std::optional<PhaseFinding> phases;
   std::optional<MotionEvidence> motion;
   firmware::Fault pulse_fault = firmware::Fault::none;  ///< the first that ended a pulse
   double pulse_fault_value = 0.0;
@@ -65,17 +145,6 @@ struct Evidence {
   static constexpr double most_displacement = 1e-3;  ///< m
 };
 
-// One check per file. A check says `not_judged` with the reason when what it needs could not be measured.
-CheckResult check_link(const Evidence& evidence);
-CheckResult check_supply(const Evidence& evidence);
-CheckResult check_emergency_stop(const Evidence& evidence);
-CheckResult check_gate_driver(const Evidence& evidence);
-CheckResult check_temperature(const Evidence& evidence);
-CheckResult check_handle(const Evidence& evidence);
-CheckResult check_current_sense(const Evidence& evidence);
-CheckResult check_phases(const Evidence& evidence);
-CheckResult check_encoder(const Evidence& evidence);
-
 /// Motion by the encoder over motion by the back-EMF, and what of it is allowed.
 struct EncoderScale {
   double ratio = 0.0, deviation = 0.0;
@@ -88,13 +157,7 @@ struct EncoderScale {
 };
 EncoderScale encoder_scale(const MotionEvidence& motion);
 
-/// In the order in which faults act on what follows.
-std::vector<CheckResult> run_checks(const Evidence& evidence);
-
 /// Why there are no pulses, to be said by the checks that need them; empty if there are.
 std::string reason_without_pulses(const Evidence& evidence);
-
-/// One sentence: the faulty part and what it explains, or that none was found.
-std::string conclusion(const Report& report);
 
 }  // namespace kmax::selftest

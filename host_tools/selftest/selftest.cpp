@@ -6,8 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/selftest/hand_checks.hpp"
-#include "host_tools/selftest/winding_estimate.hpp"
+#include "host_tools/selftest/probe.hpp"
 
 namespace kmax::selftest {
 
@@ -19,9 +18,10 @@ constexpr double weak_budget = 0.03e-3;     // m, likewise, of what is given bef
 constexpr double test_current_share = 0.4;  // of current.limit
 constexpr double strong_current_share = 0.8;
 
-class Prober {
+class PulseSequence {
  public:
-  Prober(Bench& bench, Evidence& evidence) : bench_(bench), evidence_(evidence), plan_(evidence.facts) {
+  PulseSequence(Probe& probe, Evidence& evidence)
+      : probe_(probe), evidence_(evidence), plan_(evidence.facts) {
     const MeanAndDeviation supply = mean_and_deviation(evidence.supply, 0, evidence.supply.size());
     supply_ = supply.mean;
   }
@@ -38,7 +38,7 @@ class Prober {
     }
     Pulse load = plan_pulse(plan_, test_current_share * limit, weak_budget, supply_);
     load.voltage = voltage_for(test_current_share * limit);
-    evidence_.under_load = bench_.give(load, Bench::Observe::supply);
+    evidence_.under_load = probe_.give(load, Probe::Observe::supply);
     note_trip(*evidence_.under_load);
   }
 
@@ -55,10 +55,10 @@ class Prober {
       pulse.voltage = sign * voltage;
       // Here the voltage between any two phases is at least half of the largest: one may be open.
       pulse.angle = std::numbers::pi / 6.0;
-      const double start = bench_.displacement();
-      const Recording recording = bench_.give(pulse);
-      note_trip(recording);
-      const WindingEstimate seen = estimate_winding(recording, facts.tick);
+      const double start = probe_.displacement();
+      const PulseResponse response = probe_.give(pulse);
+      note_trip(response);
+      const WindingEstimate seen = estimate_winding(response, facts.tick);
       last_voltage_ = voltage;
       const bool visible = seen.amplitude > 5.0 * seen.noise / std::sqrt(0.25 * pulse.duration);
       if (visible) {
@@ -71,11 +71,11 @@ class Prober {
         time_constant_ = seen.time_constant;
         plan_.inductance = plan_.resistance * std::max(seen.time_constant, 0.1 * facts.tick);
       }
-      if (recording.tripped()) return false;
-      learn_mobility(recording, pulse, seen.amplitude);
+      if (response.tripped()) return false;
+      learn_mobility(response, pulse, seen.amplitude);
       if (seen.amplitude >= 0.5 * wanted) return true;
       // Something moves although no current is seen: no more voltage into that.
-      if (!visible && std::abs(bench_.displacement() - start) > 10.0 * facts.count_length) return false;
+      if (!visible && std::abs(probe_.displacement() - start) > 10.0 * facts.count_length) return false;
       if (voltage >= highest) return visible;
       voltage = visible ? std::clamp(voltage_for(wanted), 1.2 * voltage, 2.0 * voltage) : 2.0 * voltage;
       sign = -sign;
@@ -95,14 +95,14 @@ class Prober {
     const AxisFacts& facts = evidence_.facts;
     Pulse pulse = plan_pulse(plan_, test_current_share * facts.current_limit, weak_budget, supply_);
     pulse.voltage = last_voltage_;
-    std::vector<Recording> pulses;
+    std::vector<PulseResponse> pulses;
     for (int phase = 0; phase < (facts.synchronous ? 3 : 1); ++phase) {
       pulse.angle = phase * 2.0 * std::numbers::pi / 3.0;
-      pulses.push_back(bench_.give(pulse));
+      pulses.push_back(probe_.give(pulse));
       note_trip(pulses.back());
     }
     evidence_.largest_pulse_voltage = last_voltage_;
-    evidence_.response = judge_phases(pulses, judged_winding());
+    evidence_.phases = judge_phases(pulses, judged_winding());
   }
 
   void swing(double current) {
@@ -115,10 +115,10 @@ class Prober {
     for (int set = 0; set < most_sets; ++set) {
       for (int direction = 0; direction < (facts.synchronous ? 2 : 1); ++direction) {
         pulse.angle = direction * 0.5 * std::numbers::pi;
-        const Recording recording = bench_.give(pulse);
-        note_trip(recording);
-        if (recording.tripped()) return;
-        evidence_.swings.push_back(recording);
+        const PulseResponse response = probe_.give(pulse);
+        note_trip(response);
+        if (response.tripped()) return;
+        evidence_.swings.push_back(response);
       }
       evidence_.motion = motion_evidence(evidence_.swings, facts);
       pulse.voltage = -pulse.voltage;
@@ -144,8 +144,8 @@ class Prober {
 
   /// A trip ends it, unless motion was seen before.
   bool worth_going_on() const {
-    return evidence_.pulse_fault == firmware::Fault::none && evidence_.response &&
-           evidence_.response->circuit == Circuit::healthy;
+    return evidence_.pulse_fault == firmware::Fault::none && evidence_.phases &&
+           evidence_.phases->circuit == Circuit::healthy;
   }
 
   bool moved() const {
@@ -153,23 +153,23 @@ class Prober {
   }
 
   /// A handle that is lighter, or a motor that is stronger than claimed, gets smaller pulses.
-  void learn_mobility(const Recording& recording, const Pulse& pulse, double current) {
+  void learn_mobility(const PulseResponse& response, const Pulse& pulse, double current) {
     double excursion = 0.0;
-    for (std::size_t k = recording.before; k < recording.position.size(); ++k)
-      excursion = std::max(excursion, std::abs(recording.position[k] - recording.position[recording.before]));
+    for (std::size_t k = response.before; k < response.position.size(); ++k)
+      excursion = std::max(excursion, std::abs(response.position[k] - response.position[response.before]));
     const double claimed = bound_on_displacement(plan_, pulse, current);
     // A few counts may be noise.
     if (excursion < 4.0 * plan_.count_length || !(claimed > 0.0) || excursion <= claimed) return;
     plan_.torque_constant *= excursion / claimed;
   }
 
-  void note_trip(const Recording& recording) {
-    if (!recording.tripped() || evidence_.pulse_fault != firmware::Fault::none) return;
-    evidence_.pulse_fault = recording.fault;
-    evidence_.pulse_fault_value = recording.fault_value;
+  void note_trip(const PulseResponse& response) {
+    if (!response.tripped() || evidence_.pulse_fault != firmware::Fault::none) return;
+    evidence_.pulse_fault = response.fault;
+    evidence_.pulse_fault_value = response.fault_value;
   }
 
-  Bench& bench_;
+  Probe& probe_;
   Evidence& evidence_;
   AxisFacts plan_;  ///< what pulses are planned with: corrected by what has been seen
   double supply_ = 0.0;
@@ -178,52 +178,54 @@ class Prober {
 };
 }  // namespace
 
-Evidence gather_evidence(Bench& bench, const SelfTestSettings& settings) {
+Evidence gather_evidence(Probe& probe, const SelfTestSettings& settings) {
+  bench::Bench& bench = probe.bench();
   Evidence evidence;
-  evidence.facts = read_facts(bench.device(), bench.axis());
-  evidence.link = bench.try_link(settings.link_exchanges);
-  evidence.fault_at_start = bench.clear_fault_at_start();
-  bench.tell("supply and temperature");
-  evidence.supply = bench.read_supply(20);
+  evidence.facts = read_facts(probe.device(), settings.axis);
+  evidence.link = probe.try_link(settings.link_exchanges);
+  evidence.fault_at_start = probe.clear_fault_at_start();
+  bench.progress("supply and temperature");
+  evidence.supply = probe.read_supply(20);
   evidence.temperature = bench.number("measured.temperature");
-  evidence.rest = bench.record_rest(400);
-  evidence.arming = bench.try_arming();
+  evidence.rest = probe.watch_at_rest(400);
+  evidence.arming = probe.try_arming();
   const bool left_alone = evidence.arming.fault == firmware::Fault::none;
   if (evidence.arming.armed && left_alone && evidence.measures_currents()) {
     try {
-      Prober(bench, evidence).run();
+      PulseSequence(probe, evidence).run();
     } catch (const HandleMoved&) {
       evidence.pulse_withheld = true;
     }
   }
-  bench.displacement();
-  evidence.largest_displacement = bench.largest_displacement();
+  probe.displacement();
+  evidence.largest_displacement = probe.largest_displacement();
   return evidence;
 }
 
 namespace {
-Report test(Bench& bench, const SelfTestSettings& settings, const Bench::Tell& tell) {
-  const Evidence evidence = gather_evidence(bench, settings);
+Report test(Probe& probe, const SelfTestSettings& settings, const Probe::Progress& progress) {
+  const Evidence evidence = gather_evidence(probe, settings);
   Report report{run_checks(evidence), evidence.largest_displacement, evidence.fault_at_start};
   if (settings.hand) {
-    const Bench::Tell& say = settings.say ? settings.say : tell;
-    report.checks.push_back(check_hand_motion(bench, *settings.hand, say));
-    report.checks.push_back(check_hand_stop(bench, *settings.hand, say));
+    const Probe::Progress& say = settings.say ? settings.say : progress;
+    report.checks.push_back(check_hand_motion(probe, *settings.hand, say));
+    report.checks.push_back(check_hand_stop(probe, *settings.hand, say));
   }
   return report;
 }
 }  // namespace
 
-Report run_selftest(device::Device& device, const SelfTestSettings& settings, const Bench::Tell& tell) {
-  Bench bench(device, settings.axis, tell);
+Report run_selftest(device::Device& device, const SelfTestSettings& settings,
+                    const Probe::Progress& progress) {
+  Probe probe(device, settings.axis, progress);
   Report report;
   try {
-    report = test(bench, settings, tell);
+    report = test(probe, settings, progress);
   } catch (const std::exception& error) {
-    throw SelfTestEnded(fmt::format("{}; {}", error.what(), bench.leave().words));
+    throw SelfTestEnded(fmt::format("{}; {}", error.what(), probe.restore().words));
   }
-  const Bench::Left left = bench.leave();
-  if (!left.in_order) throw SelfTestEnded(fmt::format("the test is done, but {}", left.words));
+  const Restored restored = probe.restore();
+  if (!restored.in_order) throw SelfTestEnded(fmt::format("the test is done, but {}", restored.words));
   return report;
 }
 

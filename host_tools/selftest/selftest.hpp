@@ -3,20 +3,32 @@
 #include <optional>
 #include <stdexcept>
 
-#include "host_tools/selftest/bench.hpp"
-#include "host_tools/selftest/evidence.hpp"
-#include "host_tools/selftest/hand_checks.hpp"
+#include "host_tools/selftest/checks.hpp"
+#include "host_tools/selftest/probe.hpp"
 
 namespace kmax::selftest {
+
+/// Checks in which the user takes part; `say` gets what to do. The bridge is off, or armed with zero volts.
+/// Each waits for at most `patience` seconds.
+struct HandSettings {
+  double patience = 20.0;
+  double travel = 5e-3;  ///< m that the handle must be moved
+};
+
+/// The handle is moved by hand: the encoder must count. Nothing is armed.
+CheckResult check_hand_motion(Probe& probe, const HandSettings& settings, const Probe::Progress& say);
+
+/// The emergency stop is pressed: the line must take an axis that is armed with zero volts out of operation.
+CheckResult check_hand_stop(Probe& probe, const HandSettings& settings, const Probe::Progress& say);
 
 struct SelfTestSettings {
   std::size_t axis = 0;
   int link_exchanges = 50;
   std::optional<HandSettings> hand{};  ///< the user takes part
-  Bench::Tell say{};                   ///< how the user is asked; without it, as everything else is told
+  Probe::Progress say{};               ///< how the user is asked; without it, like the progress
 };
 
-/// The test has ended before its end: why, and what has really become of the axis and its parameters.
+/// The test has ended before its end: why, and what has become of the axis and its parameters.
 class SelfTestEnded : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -44,11 +56,12 @@ class SelfTestEnded : public std::runtime_error {
 /// Leaves the axis disarmed and every parameter as it was; a fault that was there before is cleared, if it
 /// can be, and is in the report. Errors: DeviceError if an axis is armed, and DeviceError or link::LinkError
 /// if not even that can be read; nothing has been changed then. SelfTestEnded for everything that comes
-/// later: a lost link, an exception from `tell`, parameters that could not be put back. What `tell` throws
-/// that is no std::exception passes through, after the attempt to leave the device in order.
-Report run_selftest(device::Device& device, const SelfTestSettings& settings, const Bench::Tell& tell);
+/// later: a lost link, an exception from `progress`, parameters that could not be put back. What `progress`
+/// throws that is no std::exception passes through, after the attempt to leave the device in order.
+Report run_selftest(device::Device& device, const SelfTestSettings& settings,
+                    const Probe::Progress& progress);
 
-/// Steps 1 to 5, on a bench that stays usable.
-Evidence gather_evidence(Bench& bench, const SelfTestSettings& settings);
+/// Steps 1 to 5, with a probe that stays usable.
+Evidence gather_evidence(Probe& probe, const SelfTestSettings& settings);
 
 }  // namespace kmax::selftest

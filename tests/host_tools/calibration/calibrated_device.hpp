@@ -4,12 +4,15 @@
 
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "host_tools/calibration/procedure.hpp"
+#include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
@@ -31,6 +34,12 @@ inline std::vector<std::uint32_t> all_settings(device::Device& device) {
   return device.read(all);
 }
 
+/// How often a calibration reported its progress.
+struct CalibrationLength {
+  int whole = 0;
+  std::map<std::string, int> in_step;
+};
+
 /// A simulated board with one of the motor scenes, on a fast line, that can be calibrated.
 class CalibratedDevice {
  public:
@@ -47,11 +56,16 @@ class CalibratedDevice {
   simulation::SceneDrives& drives() { return link_->simulation().device().power().drives(); }
 
   calibration::CalibrationReport calibrate(const calibration::CalibrationSettings& settings = {},
-                                           calibration::Prompter* prompter = nullptr) {
-    return calibration::calibrate(device_, settings, prompter, [this](const std::string&) {
-      ++told;
-      if (interrupt_at != 0 && told == interrupt_at) throw calibration::CalibrationInterrupted("test");
-    });
+                                           bench::Prompter* prompter = nullptr) {
+    length = {};
+    return calibration::calibrate(
+        device_, settings, prompter,
+        [this](const std::string&) {
+          ++length.whole;
+          ++length.in_step[step];
+          if (on_progress) on_progress();
+        },
+        [this](std::string_view begun) { step = begun; });
   }
 
   std::vector<std::uint32_t> parameters() { return all_settings(device_); }
@@ -62,7 +76,9 @@ class CalibratedDevice {
   link::SimLink& link() { return *link_; }
   const simulation::SceneAxis& axis() const { return scene_.axes[0]; }
 
-  int told = 0, interrupt_at = 0;
+  std::function<void()> on_progress;  ///< whenever the calibration reports progress
+  CalibrationLength length;           ///< so far
+  std::string step;                   ///< that has begun last
 
  private:
   static simulation::Scene open(const std::string& name, std::uint64_t seed) {
@@ -75,6 +91,18 @@ class CalibratedDevice {
   link::SimLink* link_;
   device::Device device_;
 };
+
+/// Of the whole calibration of a scene, which is carried out once for all tests.
+inline const CalibrationLength& length_of(const std::string& scene) {
+  static std::map<std::string, CalibrationLength> known;
+  const auto [place, missing] = known.try_emplace(scene);
+  if (missing) {
+    CalibratedDevice device(scene);
+    device.calibrate();
+    place->second = device.length;
+  }
+  return place->second;
+}
 
 /// The first failure's cause, else the remarks' that say more than what every fresh device says, else "".
 inline std::string cause_of(const calibration::CalibrationReport& report) {

@@ -10,9 +10,9 @@ using simulation::Defect;
 struct Course {
   std::string cause;
   double farthest = 0.0;  // m from the beginning
-  int told = 0;
 };
 
+/// `planted_at`: counted in reports of progress; 0: from the beginning.
 Course course_of(const std::string& scene, const CalibrationSettings& settings, int planted_at) {
   CalibratedDevice device(scene);
   Course course;
@@ -20,10 +20,11 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
   const double start = handle.position();
   const auto look = [&] { course.farthest = std::max(course.farthest, std::abs(handle.position() - start)); };
   if (planted_at == 0) device.plant(Defect::encoder_stuck);
-  const auto report = calibration::calibrate(device.device(), settings, nullptr, [&](const std::string&) {
+  device.on_progress = [&] {
     look();
-    if (++course.told == planted_at) device.plant(Defect::encoder_stuck);
-  });
+    if (device.length.whole == planted_at) device.plant(Defect::encoder_stuck);
+  };
+  const auto report = device.calibrate(settings);
   // A handle that has been thrown still moves.
   for (int i = 0; i < 20; ++i) {
     device.link().wait(std::chrono::milliseconds(20));
@@ -45,7 +46,7 @@ TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
 
 TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
-  const int whole = course_of(GetParam(), settings, -1).told;
+  const int whole = length_of(GetParam()).whole;
   constexpr int points = 9;
   // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation.
   const double farthest = 4.0 * settings.travel;

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <limits>
 
-#include "host_tools/calibration/mechanical_excitation.hpp"
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
 namespace kmax::calibration::motion_fit_test {

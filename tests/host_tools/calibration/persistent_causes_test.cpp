@@ -1,7 +1,6 @@
 #include <functional>
 
 #include "tests/host_tools/calibration/calibrated_device.hpp"
-#include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::calibration_test::persistent_causes_test {
 namespace {
@@ -25,30 +24,25 @@ const Cause causes[] = {
 class Persistent : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Scenes, Persistent, testing::Values("dc_coreless_a", "gimbal_b"));
 
-// The fault cannot be cleared afterwards: a verdict all the same, and everything is put back.
+// In the middle of each step. The fault cannot be cleared afterwards: a verdict all the same, and everything
+// is put back.
 TEST_P(Persistent, ACauseThatStaysIsTheDiagnosisOfTheStepThatMeetsIt) {
-  CalibratedDevice whole(GetParam());
-  whole.calibrate();
-  constexpr int points = 6;
   for (const Cause& cause : causes) {
-    for (int point = 0; point < points; ++point) {
+    for (const auto& [step, length] : length_of(GetParam()).in_step) {
       CalibratedDevice device(GetParam());
       const auto before = device.parameters();
-      const int at = 1 + whole.told * point / points;
-      int told = 0;
+      device.on_progress = [&, middle = 1 + length / 2, name = step] {
+        if (device.step == name && device.length.in_step[name] == middle) cause.happens(device);
+      };
       calibration::CalibrationReport report;
-      ASSERT_NO_THROW(report = calibration::calibrate(device.device(), {}, nullptr,
-                                                      [&](const std::string&) {
-                                                        if (++told == at) cause.happens(device);
-                                                      }))
-          << cause.name << " at " << at;
-      // A quadrature encoder that falls silent late is not always told from a handle that is held.
+      ASSERT_NO_THROW(report = device.calibrate()) << cause.name << " in " << step;
+      // A quadrature encoder that falls silent late is not always distinguished from a handle that is held.
       const bool silent =
           std::string_view(cause.name) == "encoder_dead" && cause_of(report) == "motor_blocked";
-      EXPECT_TRUE(silent || cause_of(report) == cause.name) << cause_of(report) << " at " << at;
+      EXPECT_TRUE(silent || cause_of(report) == cause.name) << cause_of(report) << " in " << step;
       EXPECT_FALSE(report.stored);
       EXPECT_FALSE(device.armed());
-      EXPECT_EQ(device.parameters(), before) << cause.name << " at " << at;
+      EXPECT_EQ(device.parameters(), before) << cause.name << " in " << step;
     }
   }
 }
@@ -57,25 +51,17 @@ TEST_P(Persistent, ACauseThatStaysIsTheDiagnosisOfTheStepThatMeetsIt) {
 TEST(LinkTimeout, IsOnDuringTheProcedureAndAsBeforeAfterwards) {
   for (const double before : {0.0, 60.0, 0.5}) {
     CalibratedDevice device("dc_coreless_a");
-    device.device().apply(device::parse_assignments({"link.timeout=" + std::to_string(before)}));
+    device.set({"link.timeout=" + std::to_string(before)});
     double within = -1.0;
+    device.on_progress = [&] {
+      if (within < 0.0) within = device.device().read_number("link.timeout");
+    };
     calibration::CalibrationSettings settings;
     settings.sets = {true, false, false, false};
-    const auto report = calibration::calibrate(device.device(), settings, nullptr, [&](const std::string&) {
-      if (within < 0.0) within = device.device().read_number("link.timeout");
-    });
-    EXPECT_TRUE(report.pass());
+    EXPECT_TRUE(device.calibrate(settings).pass());
     EXPECT_EQ(within, before == 0.5 ? 0.5 : 1.0);
     EXPECT_EQ(device.device().read_number("link.timeout"), before);
   }
-}
-
-TEST(PutBack, AnInterruptionSaysSoWhenItIsDone) {
-  CalibratedDevice device("dc_coreless_a");
-  device.interrupt_at = 40;
-  EXPECT_CONTAINS(
-      host_tools_test::thrown_message<calibration::CalibrationInterrupted>([&] { device.calibrate(); }),
-      "all parameters are as before");
 }
 
 }  // namespace

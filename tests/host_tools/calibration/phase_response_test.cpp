@@ -10,8 +10,8 @@ namespace {
 
 /// B and C of a motor of 1 ohm at 1 V along 0 and along 90 degrees, phase resistances a, b, c; infinite:
 /// open.
-std::array<PhaseResponse, 2> responses(double a, double b, double c) {
-  std::array<PhaseResponse, 2> both;
+std::array<SensorAnswer, 2> responses(double a, double b, double c) {
+  std::array<SensorAnswer, 2> both;
   for (int i = 0; i < 2; ++i) {
     const double alpha = i == 0 ? 1.0 : 0.0, beta = i == 0 ? 0.0 : 1.0;
     const std::array<double, 3> volts = {alpha, -0.5 * alpha + std::sqrt(0.75) * beta,
@@ -28,7 +28,7 @@ std::array<PhaseResponse, 2> responses(double a, double b, double c) {
   return both;
 }
 
-std::string cause(const PhaseResponse& first, const PhaseResponse& second, bool brushed = false) {
+std::string cause(const SensorAnswer& first, const SensorAnswer& second, bool brushed = false) {
   const auto diagnosis = diagnose_phases(brushed, first, second);
   return diagnosis ? diagnosis->cause : "";
 }
@@ -82,7 +82,7 @@ TEST(DiagnosePhases, KnowsABrushedMotorsTwoSensors) {
 }
 
 // The sign of the current at the end of a half wave is the voltage's, for a quick and for a slow winding.
-TEST(PhaseResponse, HasTheVoltagesSignWhateverTheTimeConstant) {
+TEST(PhaseAnswer, HasTheVoltagesSignWhateverTheTimeConstant) {
   for (const double ticks : {0.2, 5.0, 40.0, 1000.0}) {
     const double keep = std::exp(-1.0 / ticks);
     std::vector<double> voltage, b, c;
@@ -93,15 +93,15 @@ TEST(PhaseResponse, HasTheVoltagesSignWhateverTheTimeConstant) {
       c.push_back(-current + 3.0);  // an offset is not a response
       current = keep * current + (1.0 - keep) * voltage.back();
     }
-    const PhaseResponse seen = phase_response(voltage, b, c, 20, 100);
+    const SensorAnswer seen = phase_response(voltage, b, c, 20, 100);
     EXPECT_GT(seen.b, 0.0) << ticks;
     EXPECT_NEAR(seen.c, -seen.b, 1e-9) << ticks;
   }
 }
 
-TEST(PhaseResponse, IsNothingWithoutAWave) {
+TEST(PhaseAnswer, IsNothingWithoutAWave) {
   const std::vector<double> steady(100, 1.0);
-  const PhaseResponse seen = phase_response(steady, steady, steady, 20, 0);
+  const SensorAnswer seen = phase_response(steady, steady, steady, 20, 0);
   EXPECT_EQ(seen.b, 0.0);
   EXPECT_EQ(seen.c, 0.0);
   EXPECT_EQ(phase_response({}, {}, {}, 20, 0).b, 0.0);

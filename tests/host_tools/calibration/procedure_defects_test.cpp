@@ -1,7 +1,6 @@
 #include <numbers>
 
 #include "tests/host_tools/calibration/calibrated_device.hpp"
-#include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::calibration_test::procedure_defects_test {
 namespace {
@@ -10,7 +9,7 @@ using calibration::CalibrationSettings;
 using simulation::Defect;
 
 /// A hand that pushes the simulated handle, as seen from outside, towards its positive end.
-class SimulatedHand final : public calibration::Prompter {
+class SimulatedHand final : public bench::Prompter {
  public:
   explicit SimulatedHand(CalibratedDevice& device) : device_(device) {}
   void ask(const std::string&) override {
@@ -119,17 +118,6 @@ TEST_P(InEveryScene, AnEncoderThatStandsUnderTheHandIsDead) {
   CalibrationSettings settings;
   settings.sets = {false, true, false, false};
   EXPECT_EQ(cause_of(device.calibrate(settings, &hand)), "encoder_dead");
-}
-
-// A share of the travel that is always lost looks like another torque constant; only what was found before
-// shows it.
-TEST_P(InEveryScene, LostTravelIsSeenAgainstTheCalibrationBefore) {
-  CalibratedDevice device(GetParam());
-  ASSERT_TRUE(device.calibrate().pass());
-  const auto before = device.parameters();
-  device.plant(Defect::encoder_slipping);
-  EXPECT_EQ(cause_of(device.calibrate()), "encoder_slipping");
-  EXPECT_EQ(device.parameters(), before);
 }
 
 TEST(PolePairs, WrongOnesAreNamedAndCorrectedOrRefused) {

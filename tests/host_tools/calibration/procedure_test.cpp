@@ -29,11 +29,14 @@ TEST(Procedure, SavesOnceWhenAllStepsPass) {
   EXPECT_FALSE(device.armed());
 }
 
-TEST(Procedure, KeepsInMemoryOnlyWhenToldNotToSave) {
-  CalibratedDevice device("dc_coreless_a");
+// The device takes its force away when the host falls silent: the procedure never does.
+TEST(Procedure, KeepsInMemoryOnlyWithoutSavingAndAShortLinkTimeoutAlive) {
+  CalibratedDevice device("gimbal_a");
+  device.set({"link.timeout=0.25"});
   CalibrationSettings settings;
   settings.save = false;
   const auto report = device.calibrate(settings);
+  EXPECT_TRUE(report.pass()) << cause_of(report);
   EXPECT_TRUE(report.kept);
   EXPECT_FALSE(report.stored);
   EXPECT_EQ(device.records(), 0u);
@@ -54,19 +57,19 @@ TEST(Procedure, ADryRunChangesNothing) {
   }
 }
 
-// Interrupted at points spread over the whole procedure, each step among them.
-TEST(Procedure, AnInterruptionAnywherePutsEverythingBackAndDisarms) {
+// In the middle of each step.
+TEST(Procedure, AnInterruptionAnywherePutsEverythingBackSaysSoAndDisarms) {
   for (const char* scene : {"dc_coreless_b", "gimbal_a"}) {
-    CalibratedDevice whole(scene);
-    whole.calibrate();
-    constexpr int points = 12;
-    for (int point = 0; point < points; ++point) {
+    for (const auto& [step, length] : length_of(scene).in_step) {
       CalibratedDevice device(scene);
       const auto before = device.parameters();
-      device.interrupt_at = 1 + whole.told * point / points;
-      EXPECT_THROW(device.calibrate(), calibration::CalibrationInterrupted);
+      device.on_progress = [&, middle = 1 + length / 2, name = step] {
+        if (device.step == name && device.length.in_step[name] == middle) throw bench::Interrupted("test");
+      };
+      EXPECT_CONTAINS(host_tools_test::thrown_message<bench::Interrupted>([&] { device.calibrate(); }),
+                      "all parameters are as before");
       EXPECT_FALSE(device.armed());
-      EXPECT_EQ(device.parameters(), before) << scene << " at " << device.interrupt_at;
+      EXPECT_EQ(device.parameters(), before) << scene << " in " << step;
       EXPECT_EQ(device.records(), 0u);
     }
   }
@@ -142,14 +145,6 @@ TEST(Procedure, AnArmedAxisIsLeftAlone) {
   device::Drive(device.device(), 0).arm();
   EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { device.calibrate(); }), "armed");
   EXPECT_TRUE(device.armed());
-}
-
-// The device takes its force away when the host falls silent: the procedure never does.
-TEST(Procedure, KeepsAShortLinkTimeoutAlive) {
-  CalibratedDevice device("gimbal_a");
-  device.set({"link.timeout=0.25"});
-  const auto report = device.calibrate();
-  EXPECT_TRUE(report.pass()) << cause_of(report);
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 
 namespace kmax::calibration::test {
 
-// Half period in s of a square-wave force (N) that swings a free mass (kg) by `swing` (m, peak to peak): from rest at one
-// end to the fastest in the middle.
+// Half period in s of a square-wave force (N) that swings a free mass (kg) by `swing` (m, peak to peak): from
+// rest at one end to the fastest in the middle.
 inline double swing_half_period(double swing, double force, double mass) {
   return 2.0 * std::sqrt(swing * mass / force);
 }

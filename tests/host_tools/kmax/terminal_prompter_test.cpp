@@ -6,7 +6,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "host_tools/calibration/step_report.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::terminal_prompter_test {
@@ -44,7 +43,7 @@ class Prompter : public testing::Test {
   }
   void ask() { prompter.ask("touch the wall"); }
   std::string refusal() {
-    return thrown_message<calibration::CalibrationInterrupted>([&] { ask(); });
+    return thrown_message<bench::Interrupted>([&] { ask(); });
   }
 
   std::ostringstream out, messages;

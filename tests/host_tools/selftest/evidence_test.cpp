@@ -1,4 +1,4 @@
-#include "host_tools/selftest/evidence.hpp"
+#include "host_tools/selftest/checks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,33 +1,35 @@
-#include "host_tools/selftest/phase_response.hpp"
+#include "host_tools/selftest/evidence.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/selftest/winding_model.hpp"
+#include "host_tools/bench/winding_model.hpp"
 
 namespace kmax::selftest::phase_response_test {
 namespace {
 
 /// Pulses whose sensors answer b and c times the winding's current.
-std::vector<Recording> answers(const AxisFacts& facts,
-                               const std::vector<std::pair<double, double>>& factors) {
-  std::vector<Recording> all;
+std::vector<PulseResponse> answers(const AxisFacts& facts,
+                                   const std::vector<std::pair<double, double>>& factors) {
+  std::vector<PulseResponse> all;
   for (const auto& [b, c] : factors) {
-    Recording recording;
-    recording.before = 20;
-    recording.pulse = {1.0, 20, 40, 0, 0.0};
-    recording.voltage.assign(20, 0.0);
-    for (int k = 0; k < 40; ++k) recording.voltage.push_back(k < 20 ? 1.0 : -1.0);
-    recording.voltage.insert(recording.voltage.end(), 20, 0.0);
-    const auto driven = lagged_voltage(recording.voltage, facts.inductance / facts.resistance, facts.tick);
+    const double direction = static_cast<double>(all.size()) * 2.0 * std::numbers::pi / 3.0;
+    PulseResponse response;
+    response.before = 20;
+    response.pulse = {1.0, 20, 40, 0, direction};
+    response.voltage.assign(20, 0.0);
+    for (int k = 0; k < 40; ++k) response.voltage.push_back(k < 20 ? 1.0 : -1.0);
+    response.voltage.insert(response.voltage.end(), 20, 0.0);
+    const auto driven =
+        bench::lagged_voltage(response.voltage, facts.inductance / facts.resistance, facts.tick);
     for (std::size_t k = 0; k < driven.size(); ++k) {
       const double noise = 0.01 * std::sin(12.9898 * static_cast<double>(k * k));
-      recording.current_b.push_back(0.05 + b * driven[k] / facts.resistance + noise);
-      recording.current_c.push_back(-0.03 + c * driven[k] / facts.resistance - noise);
+      response.current_b.push_back(0.05 + b * driven[k] / facts.resistance + noise);
+      response.current_c.push_back(-0.03 + c * driven[k] / facts.resistance - noise);
     }
-    all.push_back(recording);
+    all.push_back(response);
   }
   return all;
 }
@@ -56,7 +58,7 @@ std::vector<std::pair<double, double>> star(double a, double b, double c) {
   return factors;
 }
 
-TEST(PhaseResponse, AStarByKirchhoffsLaws) {
+TEST(JudgePhases, AStarByKirchhoffsLaws) {
   const AxisFacts facts = motor(true);
   EXPECT_EQ(judged(facts, star(1, 1, 1)), Circuit::healthy);
   EXPECT_EQ(judged(facts, star(1.2, 0.9, 1)), Circuit::healthy);
@@ -66,7 +68,7 @@ TEST(PhaseResponse, AStarByKirchhoffsLaws) {
   EXPECT_NEAR(judge_phases(answers(facts, star(0.5, 0.5, 0.5)), facts).admittance, 0.5, 0.02);
 }
 
-TEST(PhaseResponse, SensorsChangeTheirOwnNumbersAlone) {
+TEST(JudgePhases, SensorsChangeTheirOwnNumbersAlone) {
   const AxisFacts facts = motor(true);
   const auto changed = [](double of_b, double of_c) {
     auto factors = star(1, 1, 1);
@@ -84,7 +86,7 @@ TEST(PhaseResponse, SensorsChangeTheirOwnNumbersAlone) {
   EXPECT_EQ(judged(facts, changed(0, 0)), Circuit::nothing_flows);
 }
 
-TEST(PhaseResponse, AShortBetweenTwoPhasesOutweighsTheWinding) {
+TEST(JudgePhases, AShortBetweenTwoPhasesOutweighsTheWinding) {
   const AxisFacts facts = motor(true);
   EXPECT_EQ(judged(facts, star(30, 30, 1)), Circuit::short_ab);
   EXPECT_EQ(judged(facts, star(1, 30, 30)), Circuit::short_bc);
@@ -94,7 +96,7 @@ TEST(PhaseResponse, AShortBetweenTwoPhasesOutweighsTheWinding) {
   EXPECT_EQ(judged(motor(true, false), star(10, 10, 10)), Circuit::healthy);
 }
 
-TEST(PhaseResponse, ADcMotorIsOneCircuit) {
+TEST(JudgePhases, ADcMotorIsOneCircuit) {
   const AxisFacts facts = motor(false);
   EXPECT_EQ(judged(facts, {{1, -1}}), Circuit::healthy);
   EXPECT_EQ(judged(facts, {{0, 0}}), Circuit::nothing_flows);
@@ -105,7 +107,7 @@ TEST(PhaseResponse, ADcMotorIsOneCircuit) {
   EXPECT_EQ(judged(facts, {{8, -8}}), Circuit::short_circuit);
 }
 
-TEST(PhaseResponse, WhatFitsNothingIsUnclear) {
+TEST(JudgePhases, WhatFitsNothingIsUnclear) {
   EXPECT_EQ(judged(motor(false), {{1.0, -0.45}}), Circuit::unclear);
 }
 

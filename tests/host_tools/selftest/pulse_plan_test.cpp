@@ -1,4 +1,4 @@
-#include "host_tools/selftest/pulse_plan.hpp"
+#include "host_tools/selftest/pulse.hpp"
 
 #include <gtest/gtest.h>
 

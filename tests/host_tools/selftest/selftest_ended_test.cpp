@@ -55,15 +55,15 @@ TEST(SelfTestLeaves, AfterAPulledCableTheDeviceRemovesTheForceByItself) {
   for (const char* scene : {"dc_coreless_a", "gimbal_b"}) {
     TestedAxis tested(scene);
     ASSERT_EQ(tested.device->read_number("link.timeout"), 0.0);
-    Bench bench(*tested.device, 0, [](const std::string&) {});
-    ASSERT_TRUE(bench.arm_with_zero_volts());
+    Probe probe(*tested.device, 0, [](const std::string&) {});
+    ASSERT_TRUE(probe.arm_with_zero_volts());
     tested.link->wait(std::chrono::milliseconds(500));
     EXPECT_TRUE(force_is_possible(tested)) << scene;
     tested.link->wait(std::chrono::milliseconds(600));
     EXPECT_FALSE(force_is_possible(tested)) << scene;
     EXPECT_EQ(device::Drive(*tested.device, 0).status().error_code, 0x8130);
-    const Bench::Left left = bench.leave();
-    EXPECT_TRUE(left.in_order) << left.words;
+    const Restored restored = probe.restore();
+    EXPECT_TRUE(restored.in_order) << restored.words;
     EXPECT_FALSE(device::Drive(*tested.device, 0).status().faulty());
     EXPECT_EQ(tested.device->read_number("link.timeout"), 0.0);
   }
@@ -100,8 +100,8 @@ TEST(SelfTestLeaves, AFaultThatWasThereBeforeIsReportedAndCleared) {
   tested.link->wait(std::chrono::milliseconds(10));
   ASSERT_TRUE(drive.status().faulty());
   {
-    Bench bench(*tested.device, 0, [](const std::string&) {});
-    const auto before = bench.clear_fault_at_start();
+    Probe probe(*tested.device, 0, [](const std::string&) {});
+    const auto before = probe.clear_fault_at_start();
     ASSERT_TRUE(before.has_value());
     EXPECT_FALSE(before->cleared);
   }

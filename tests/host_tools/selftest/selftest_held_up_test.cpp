@@ -83,7 +83,7 @@ TEST(SelfTestHeldUp, AgainAndAgainTheTestCannotBeCarriedOut) {
     EXPECT_NE(text.find("3 times in a row the device heard nothing for 1 s and removed the force"),
               std::string::npos)
         << text;
-    EXPECT_EQ(times, Bench::most_silences) << words;
+    EXPECT_EQ(times, bench::most_silences) << words;
     tested.link->held_up = {};
     EXPECT_TRUE(tested.disarmed());
     EXPECT_EQ(tested.settings(), before);

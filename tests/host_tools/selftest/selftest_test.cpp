@@ -174,10 +174,10 @@ TEST(SelfTest, AnAxisWithItsForceOnIsLeftAlone) {
 
 TEST(SelfTest, LostMessagesAreTheLinksFault) {
   TestedAxis tested("dc_coreless_a");
-  Bench bench(*tested.device, 0, [](const std::string&) {});
+  Probe probe(*tested.device, 0, [](const std::string&) {});
   tested.link->lose_every(20);
   Evidence evidence;
-  evidence.link = bench.try_link(50);
+  evidence.link = probe.try_link(50);
   tested.link->lose_every(0);
   EXPECT_GE(evidence.link.lost, 2);
   EXPECT_EQ(check_link(evidence).verdict, Verdict::fail);

@@ -1,0 +1,343 @@
+#include "host_tools/bench/bench.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "host_tools/base/errors.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/value_text.hpp"
+
+namespace kmax::bench {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+namespace {
+constexpr double longest_timeout = 1.0;      // s, of link.timeout during the procedure
+constexpr double longest_excitation = 70.0;  // s, longer than any plan's
+// Of different lengths: a handle that is shaken in step with the looks would be found at rest at its turning
+// point each time.
+constexpr microseconds between_looks[] = {microseconds(20'000), microseconds(12'700), microseconds(7'300)};
+constexpr microseconds start_patience{2'000'000};
+
+bool starting(firmware::Refusal refusal) {
+  return refusal == firmware::Refusal::power_stage_not_ready || refusal == firmware::Refusal::store_busy;
+}
+
+microseconds of_seconds(double seconds) {
+  return microseconds(static_cast<std::int64_t>(std::llround(seconds * 1e6)));
+}
+}  // namespace
+
+void require_disarmed(device::Device& device) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (device::Drive(device, axis).status().armed())
+      throw device::DeviceError(fmt::format("axis {} is armed; 'kmax disarm' first", axis));
+  }
+}
+
+Bench::Bench(device::Device& device, std::size_t axis, double travel, Progress progress)
+    : device_(device),
+      drive_(device, axis),
+      journal_(device, axis),
+      progress_(std::move(progress)),
+      travel_(travel) {
+  home_ = number("measured.position");
+}
+
+void Bench::begin() {
+  if (begun_) return;
+  // Noted before any capture changes them.
+  journal_.note(std::vector<std::string>{"capture.axis", "capture.channel_1", "capture.channel_2",
+                                         "capture.channel_3", "capture.channel_4", "capture.interval",
+                                         "capture.samples", "capture.pre_trigger", "capture.trigger",
+                                         "capture.trigger_level"});
+  double timeout = number("link.timeout");
+  if (!(timeout > 0.0 && timeout <= longest_timeout)) {
+    timeout = longest_timeout;
+    journal_.set_temporary({fmt::format("link.timeout={}", timeout)});
+  }
+  timeout_ = timeout;
+  longest_silence_ = std::min(longest_silence_, timeout / 4.0);
+  run_ = static_cast<unsigned>(number("excitation.run"));
+  begun_ = true;
+}
+
+Bench::~Bench() {
+  try {
+    disarm();
+  } catch (const std::exception&) {
+    // The link is gone: link.timeout, which begin() has seen to, removes the force on the device.
+  }
+}
+
+double Bench::number(const std::string& name) {
+  const device::Parameter parameter = device::resolve(name, drive_.axis());
+  return firmware::number_from_raw(parameter.definition().type, device_.read(parameter));
+}
+
+void Bench::set_temporary(const std::vector<std::string>& texts) {
+  disarm();
+  journal_.set_temporary(texts);
+}
+
+void Bench::set_result(const std::vector<std::string>& texts) {
+  disarm();
+  journal_.set_result(texts);
+}
+
+double Bench::displacement() {
+  return number("measured.position") - home_;
+}
+
+void Bench::rehome(double displacement) {
+  home_ = number("measured.position") - displacement;
+}
+
+void Bench::wait(double seconds) {
+  const auto end = device_.link().now() + of_seconds(seconds);
+  for (;;) {
+    const auto left = end - device_.link().now();
+    if (left <= microseconds(0)) return;
+    device_.link().wait(
+        std::min<microseconds>(left, longest_still_ > 0.0 ? next_look() : of_seconds(longest_silence_)));
+    if (stands()) return;
+    // Both a sign of life for the device and a look whether there is still a reason to wait.
+    if (armed_ && drive_.status().faulty()) return;
+  }
+}
+
+std::optional<Trip> Bench::trip() {
+  const device::DriveStatus status = drive_.status();
+  if (status.armed()) return std::nullopt;
+  armed_ = false;
+  if (!status.faulty())
+    throw device::DeviceError(fmt::format("axis {}: somebody else has disarmed it: {}", drive_.axis(),
+                                          device::to_string(status.state())));
+  return cleared(status);
+}
+
+Trip Bench::cleared(const device::DriveStatus& status) {
+  Trip found{device::fault_of(status), status.fault_words(), false, static_cast<double>(status.fault_value)};
+  try {
+    drive_.clear();
+  } catch (const device::DeviceError&) {
+    found.remains = unusable_ = true;
+  }
+  return found;
+}
+
+std::optional<Trip> Bench::take_unseen_trip() {
+  return std::exchange(unseen_trip_, std::nullopt);
+}
+
+// A refusal because the power stage still starts or the store is busy is none for two seconds.
+void Bench::arm_when_ready() {
+  const auto end = device_.link().now() + start_patience;
+  for (;;) {
+    try {
+      drive_.arm();
+      return;
+    } catch (const device::DeviceError&) {
+      const device::DriveStatus status = drive_.status();
+      if (status.armed() || status.faulty() || !starting(status.refusal) || device_.link().now() >= end)
+        throw;
+    }
+    progress_("");
+    device_.link().wait(of_seconds(longest_silence_));
+  }
+}
+
+void Bench::arm(double reach) {
+  if (armed_) return;
+  if (const auto trip = take_unseen_trip()) throw AxisTripped(*trip);
+  begin();
+  // A tenth of a millimetre is left in any case: whoever is at the bound may still go back.
+  const double left = reach > 0.0 ? reach : std::max(travel_ - std::abs(displacement()), 1e-4);
+  // A voltage of zero, not 'off', which controls the current with gains that may not fit the motor yet.
+  std::vector<std::string> texts = ExcitationPlan{.kind = "voltage"}.assignments();
+  texts.push_back("drive.mode=excitation");
+  texts.push_back(fmt::format("excitation.travel={:.9g}", left));
+  journal_.set_temporary(texts);
+  try {
+    // Even an attempt that ends in an exception may have armed it.
+    armed_ = true;
+    arm_when_ready();
+  } catch (const device::DeviceError& error) {
+    const device::DriveStatus status = drive_.status();
+    armed_ = status.armed();
+    if (armed_) throw;
+    if (status.faulty()) {
+      const Trip found = cleared(status);
+      require_heard(found);
+      throw AxisTripped(found);
+    }
+    if (status.refusal == firmware::Refusal::none) throw;
+    unusable_ = true;
+    throw ArmingRefused(status.refusal, error.what());
+  }
+}
+
+void Bench::disarm() {
+  if (!armed_) return;
+  drive_.disarm();
+  armed_ = false;
+  const device::DriveStatus status = drive_.status();
+  if (!status.faulty()) return;
+  const Trip found = cleared(status);
+  const bool harmless =
+      found.fault == firmware::Fault::excitation_travel || found.fault == firmware::Fault::link_silent;
+  if (!harmless || found.remains) unseen_trip_ = found;
+}
+
+void Bench::begin_still_watch(double longest_still) {
+  longest_still_ = longest_still;
+  if (longest_still <= 0.0) return;
+  still_count_ = number("measured.count");
+  still_since_ = device_.link().now();
+}
+
+microseconds Bench::next_look() {
+  looks_ = (looks_ + 1) % std::size(between_looks);
+  return between_looks[looks_];
+}
+
+bool Bench::stands() {
+  constexpr double fewest_counts = 2.0, slowest = 0.002;  // m/s
+  if (longest_still_ <= 0.0 || !armed_) return false;
+  const double count = number("measured.count");
+  const auto now = device_.link().now();
+  if (std::abs(count - still_count_) >= fewest_counts || std::abs(number("measured.velocity")) > slowest) {
+    still_count_ = count;
+    still_since_ = now;
+  }
+  return now - still_since_ > of_seconds(longest_still_);
+}
+
+void Bench::wait_until_finished(double longest_still) {
+  begin_still_watch(longest_still);
+  const auto end = device_.link().now() + of_seconds(longest_excitation);
+  while (armed_ && number("measured.excitation_finished") == 0.0) {
+    progress_("");
+    if (const auto tripped = trip()) {
+      if (tripped->fault == firmware::Fault::link_silent) return;
+      throw AxisTripped(*tripped);
+    }
+    if (stands()) return disarm();
+    if (device_.link().now() >= end)
+      throw device::DeviceError(
+          fmt::format("axis {}: the excitation does not end; look at excitation.duration", drive_.axis()));
+    device_.link().wait(next_look());
+  }
+}
+
+void Bench::require_heard(const Trip& trip) const {
+  if (trip.fault == firmware::Fault::link_silent) throw HeldUp{timeout_};
+}
+
+// What could not be done for `error`: was it because the host was held up?
+void Bench::require_heard_after(const device::DeviceError& error) {
+  const device::DriveStatus status = drive_.status();
+  const bool silent = heard_nothing(status);
+  if (!silent && !(stood_still(error) && !status.faulty())) return;
+  drive_.disarm();
+  armed_ = false;
+  if (silent) cleared(status);
+  throw HeldUp{timeout_};
+}
+
+Waveforms Bench::record(const ExcitationPlan& excitation, const CapturePlan& plan, double reach) {
+  return record_heard(excitation, plan, reach, Afterwards::armed);
+}
+
+Waveforms Bench::record_alone(const ExcitationPlan& excitation, const CapturePlan& plan) {
+  return record_heard(excitation, plan, 0.0, Afterwards::any);
+}
+
+Waveforms Bench::record_heard(const ExcitationPlan& excitation, const CapturePlan& plan, double reach,
+                              Afterwards afterwards) {
+  try {
+    Waveforms seen = record_once(excitation, plan, reach, afterwards);
+    if (seen.trip) require_heard(*seen.trip);
+    return seen;
+  } catch (const device::DeviceError& error) {
+    // It could not be armed, or the excitation never came.
+    require_heard_after(error);
+    throw;
+  }
+}
+
+Waveforms Bench::record_once(const ExcitationPlan& excitation, const CapturePlan& plan, double reach,
+                             Afterwards afterwards) {
+  arm(reach);
+  begin_still_watch(plan.longest_still);
+  device::CaptureReader reader(device_);
+  const bool from_start = plan.delay <= 0.0;
+  if (from_start) begin_capture(reader, plan, firmware::CaptureTrigger::excitation);
+  // Until the samples from before have been taken.
+  if (plan.before > 0) device_.link().wait(milliseconds(5));
+  std::vector<std::string> texts = excitation.assignments();
+  run_ = (run_ + 1) % 65536;
+  texts.push_back(fmt::format("excitation.run={}", run_));
+  journal_.set_temporary(texts);
+  if (!from_start) {
+    wait(plan.delay);
+    begin_capture(reader, plan, firmware::CaptureTrigger::now);
+  }
+  return finish_capture(reader, afterwards);
+}
+
+Waveforms Bench::watch(const CapturePlan& plan) {
+  begin();
+  begin_still_watch(0.0);
+  device::CaptureReader reader(device_);
+  begin_capture(reader, plan, firmware::CaptureTrigger::now);
+  return finish_capture(reader, Afterwards::any);
+}
+
+void Bench::begin_capture(device::CaptureReader& reader, const CapturePlan& plan,
+                          firmware::CaptureTrigger trigger) {
+  reader.arm({.axis = drive_.axis(),
+              .channels = plan.channels,
+              .interval = static_cast<std::uint32_t>(plan.interval),
+              .samples = static_cast<std::uint32_t>(plan.samples),
+              .pre_trigger = static_cast<std::uint32_t>(plan.before),
+              .trigger = trigger});
+}
+
+Waveforms Bench::finish_capture(device::CaptureReader& reader, Afterwards afterwards) {
+  struct Ended {};
+  Waveforms seen;
+  try {
+    reader.wait(std::chrono::seconds(1), [&](const device::CaptureProgress&) {
+      progress_("");
+      if (armed_) seen.trip = trip();
+      seen.stood = stands();
+      if (seen.trip || seen.stood) throw Ended();
+    });
+  } catch (const Ended&) {
+    reader.stop();
+    if (seen.stood) disarm();
+  }
+  if (afterwards == Afterwards::any && !seen.trip && armed_) seen.trip = trip();
+  try {
+    const device::Captured captured = reader.read([&](const device::CaptureProgress&) { progress_(""); });
+    seen.interval = captured.interval / captured.tick_rate;
+    seen.before = captured.trigger_sample;
+    for (const device::CaptureColumn& column : captured.columns) seen.channels[column.name] = column.values;
+  } catch (const device::DeviceError&) {
+    // Stopped before it began.
+    if (!seen.trip && !seen.stood) throw;
+  }
+  if (seen.trip || !armed_) return seen;
+  seen.trip = trip();
+  if (afterwards == Afterwards::any && seen.trip && seen.trip->fault == firmware::Fault::link_silent)
+    seen.trip.reset();
+  return seen;
+}
+
+}  // namespace kmax::bench
