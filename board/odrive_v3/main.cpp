@@ -152,7 +152,7 @@ void poll_power(std::uint32_t now_us) {
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     healthy = healthy && application->fault(axis) == firmware::Fault::none;
   power->hardware().show_healthy(healthy);
-  if (power->drives().watchdog_gate().may_feed()) watchdog.feed();
+  if (power->drives().all_have_ticked()) watchdog.feed();
 }
 
 /// A reset by software: the bridges are off before it, and every pin is what it is at power-on.

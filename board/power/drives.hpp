@@ -15,7 +15,6 @@
 #include "drivers/supply_divider.hpp"
 #include "firmware/application.hpp"
 #include "firmware/double_buffer.hpp"
-#include "firmware/watchdog_gate.hpp"
 
 namespace kmax::board {
 
@@ -134,8 +133,9 @@ class Drives {
     if (inhibited) hardware_.set_brake(false);
   }
 
-  /// All axes have ticked since the last call that said so.
-  firmware::WatchdogGate& watchdog_gate() { return watchdog_gate_; }
+  /// Main loop: all axes have ticked since the last call that said so, and the watchdog may be fed. So the
+  /// reset comes when the main loop stands, and when any tick does.
+  bool all_have_ticked();
 
   /// Once a round of the application, when all axes have reported: the main loop need not look more often.
   bool main_loop_due() { return main_loop_due_.exchange(false, std::memory_order_relaxed); }
@@ -202,14 +202,13 @@ class Drives {
   std::array<Axis, firmware::axis_count> axes_{};
   drivers::CurrentSenseGain gain_ = drivers::CurrentSenseGain::x80;
   control::BrakeChopper brake_;
-  firmware::WatchdogGate watchdog_gate_;
   Settings settings_{};
   firmware::DoubleBuffer<Settings> double_buffer_{Settings{}};
   std::atomic<bool> calibrating_{false}, main_loop_due_{false}, brake_inhibited_{false};
   bool ISR_brake_on_ = false;
   std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
   std::array<std::atomic<std::uint32_t>, firmware::axis_count> axis_ticks_{};
-  std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{};
+  std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{}, axis_ticks_fed_{};
 };
 
 template <typename Hardware>
@@ -304,7 +303,6 @@ inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisO
     axis.arm_failed = !axis.driving;
     if (stage.condition() != firmware::Fault::none) bridge.disarm();
   }
-  watchdog_gate_.ISR_ticked(index);
   axis_ticks_[index].store(axis_ticks_[index].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if (index == first_axis()) {
     const Settings& settings = double_buffer_.ISR_current();
@@ -342,6 +340,17 @@ bool Drives<Hardware>::ISR_ticks_have_stopped() {
   if (ISR_silent_calls_ < 2) return false;
   ISR_disarm();
   main_loop_due_.store(true, std::memory_order_relaxed);
+  return true;
+}
+
+template <typename Hardware>
+bool Drives<Hardware>::all_have_ticked() {
+  std::array<std::uint32_t, firmware::axis_count> ticks{};
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    ticks[axis] = axis_ticks_[axis].load(std::memory_order_relaxed);
+    if (hardware_.has(axis) && ticks[axis] == axis_ticks_fed_[axis]) return false;
+  }
+  axis_ticks_fed_ = ticks;
   return true;
 }
 

@@ -83,19 +83,19 @@ TEST_F(MadeUpBoard, ParametersOfTheThirdAxisAreReachedOverBothBuses) {
 TEST_F(MadeUpBoard, TicksOfAllThreeAreCountedAndMissed) {
   auto& drives = bench.device.power.drives();
   bench.run_ticks(1);
-  EXPECT_TRUE(drives.watchdog_gate().may_feed());
-  EXPECT_FALSE(drives.watchdog_gate().may_feed()) << "nobody has ticked since";
+  EXPECT_TRUE(drives.all_have_ticked());
+  EXPECT_FALSE(drives.all_have_ticked()) << "nobody has ticked since";
   EXPECT_FALSE(drives.ISR_ticks_have_stopped());
   arm_all();
   EXPECT_FALSE(drives.ISR_ticks_have_stopped());
-  EXPECT_TRUE(drives.watchdog_gate().may_feed());
+  EXPECT_TRUE(drives.all_have_ticked());
   for (int silent = 0; silent < 2; ++silent) {
     for (const std::size_t axis : {0, 1}) bench.device.drive(axis, bench.device.last[axis]);
     EXPECT_EQ(drives.ISR_ticks_have_stopped(), silent == 1) << "the third alone stands still";
   }
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     EXPECT_FALSE(bench.device.power.hardware().bridge(axis).armed());
-  EXPECT_FALSE(drives.watchdog_gate().may_feed());
+  EXPECT_FALSE(drives.all_have_ticked());
 }
 
 // The ticks one after the other as a chip's interrupts come, without anything else of a board.
