@@ -201,17 +201,17 @@ std::vector<bool> unstuffed(const CanFrameBits& frame) {
   unsigned equal = 0;
   bool last = true, skip = false;
   for (unsigned i = 0; i + 1 < frame.acknowledge_slot; ++i) {
-    const bool bit = frame.bits[i];
+    const bool sent = frame.bits[i];
     if (skip) {
-      EXPECT_NE(bit, last) << "a stuff bit differs from the five before";
+      EXPECT_NE(sent, last) << "a stuff bit differs from the five before";
       skip = false;
       equal = 1;
-      last = bit;
+      last = sent;
       continue;
     }
-    plain.push_back(bit);
-    equal = bit == last ? equal + 1 : 1;
-    last = bit;
+    plain.push_back(sent);
+    equal = sent == last ? equal + 1 : 1;
+    last = sent;
     if (equal == 5) skip = true;
   }
   return plain;
