@@ -103,14 +103,14 @@ std::vector<std::uint16_t> SerialLink::read_input(std::uint16_t address, std::ui
 }
 
 void SerialLink::write_holding(std::uint16_t address, std::span<const std::uint16_t> values) {
-  write(address, values, 1);
+  write_words(address, values, 1);
 }
 
 void SerialLink::write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
-  write(address, values, attempts);
+  write_words(address, values, attempts);
 }
 
-void SerialLink::write(std::uint16_t address, std::span<const std::uint16_t> values, int attempts_allowed) {
+void SerialLink::write_words(std::uint16_t address, std::span<const std::uint16_t> values, int attempts_allowed) {
   exchange({16, address, values.size()}, attempts_allowed, [&] {
     return modbus_write_registers(context_.get(), address, static_cast<int>(values.size()), values.data());
   });

@@ -54,7 +54,7 @@ class SerialLink final : public RegisterLink {
   };
 
   void connect();
-  void write(std::uint16_t address, std::span<const std::uint16_t> values, int attempts_allowed);
+  void write_words(std::uint16_t address, std::span<const std::uint16_t> values, int attempts_allowed);
   /// `transact` returns what libmodbus returns and leaves errno.
   void exchange(const Request& request, int attempts_allowed, const std::function<int()>& transact);
   void listen_until_silent();
