@@ -55,10 +55,10 @@ void PdoRows::begin(std::size_t number) {
 
 std::optional<Row> PdoRows::close(const drivers::CanFrame& frame, nanoseconds time) {
   const bool complete = has_[0] && has_[1] && has_[2];
-  const bool first = !seen_time_;
+  const bool first_frame = !seen_time_;
   has_ = {};
   const std::uint64_t tick = unwrapped(word_at(frame, 6), time);
-  const bool follows = !first && periods(tick - seen_tick_) <= 1;
+  const bool follows = !first_frame && periods(tick - seen_tick_) <= 1;
   seen_tick_ = tick;
   seen_time_ = time;
   if (!complete || !follows) return std::nullopt;
