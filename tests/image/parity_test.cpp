@@ -225,7 +225,8 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
   expect_equal(companion);
   EXPECT_GT(companion.driven, 100'000u) << "the comparison must see forces";
   EXPECT_GT(companion.excited, 10'000u) << "and excitation";
-  EXPECT_GT(companion.commanded, 10'000u) << "and forces that the host asks for";
+  // Fewer: an eighth of the axes is in mode torque, and the random counts trip it within some hundred ticks.
+  EXPECT_GT(companion.commanded, 1'000u) << "and forces that the host asks for";
 }
 
 TEST(Parity, AContactIsBitIdentical) {
