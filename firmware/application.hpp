@@ -91,7 +91,7 @@ class Application {
 
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
   /// application.
-  explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {});
+  [[gnu::cold]] explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {});
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 
@@ -191,14 +191,15 @@ class Application {
   };
 
   bool settled(std::size_t axis) const;
-  Settings make_settings() const;
-  void offer_settings_if_changed();
+  // Rare: small code rather than fast code.
+  [[gnu::cold]] Settings make_settings() const;
+  [[gnu::cold]] void offer_settings_if_changed();
   void judge_if_changed();
-  void make_scales();
+  [[gnu::cold]] void make_scales();
   void act();
   void supervise(std::size_t axis);
   Refusal obstacle_to_arming(std::size_t axis) const;
-  void trip(std::size_t axis, Fault fault, float value, float bound);
+  [[gnu::cold]] void trip(std::size_t axis, Fault fault, float value, float bound);
   /// From the reports that the present poll began with: all that it tells is of one moment.
   void refresh_readings();
   /// Of the axis, or of the device, that this slot belongs to.
@@ -222,7 +223,7 @@ class Application {
   DriveMode mode(std::size_t axis) const { return registers_.values().choice<DriveMode, "drive.mode">(axis); }
   Circumstances circumstances_of(std::size_t axis) const;
   void configure_thermal();
-  void poll_temperatures();
+  [[gnu::cold]] void poll_temperatures();
   void start_communication(bool power_on);
   void poll_can();
   void act_on(const canopen::NodeEvents& events);
@@ -234,7 +235,7 @@ class Application {
   void finish_saves();
   void note_saving(const ParameterValues& values);
   std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
-  float bound_of(Fault fault, std::size_t axis) const;
+  [[gnu::cold]] float bound_of(Fault fault, std::size_t axis) const;
 
   BoardIdentity board_;
   DeviceRegisters registers_;

@@ -166,7 +166,7 @@ class Axis {
   [[gnu::noinline]] bool excite_or_release(const AxisSetting& setting, const Input& input,
                                            std::uint32_t state, std::int32_t moved);
   void find_trips(const AxisSetting& setting, const Input& input, Fault condition);
-  float excite(const AxisSetting& setting, const Input& input);
+  [[gnu::cold]] float excite(const AxisSetting& setting, const Input& input);
   [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
   static Fault condition_of(const AxisSetting& setting, const Input& input);
   bool drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved);

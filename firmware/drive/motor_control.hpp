@@ -117,7 +117,7 @@ class MotorControl {
 
   /// Instead of update(), in a tick in which an excited axis is driven. Gives the force asked for, N at the
   /// handle, as far as it is known: 0 for a voltage, and for a current in the stator's frame.
-  float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
+  [[gnu::cold]] float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
                std::uint32_t position, float velocity, Output& out);
 
  private:
@@ -138,7 +138,8 @@ class MotorControl {
                                      float velocity, bool steady, Output& out);
   control::PhaseCondition excite_dc(const Coefficients& c, const Measured& measured,
                                     const Excitation::Output& asked, float velocity, Output& out);
-  control::PhaseCondition excite_stator(const Coefficients& c, const Measured& measured,
+  // For identification only: small code rather than fast code.
+  [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(const Coefficients& c, const Measured& measured,
                                         const Excitation::Output& asked, std::uint32_t rotor_angle,
                                         float velocity, Output& out);
   static void take(const Dc::Output& made, Output& out);

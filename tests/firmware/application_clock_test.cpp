@@ -155,7 +155,7 @@ TEST(Clock, SilentHostWithoutSupervisionStaysArmedAcrossTheWrap) {
 TEST(Clock, ForgottenTransactionIsNotFoundAgainOneLapOfTheClockLater) {
   BareBoard board(0);
   const auto transaction = [&](std::uint8_t request) {
-    board.hear(modbus::adu(0, {6, 0x09, 0x00, 0, request}));
+    board.hear(modbus::adu(0, {6, 0x21, 0x00, 0, request}));
     board.application->poll(board.now);
   };
   transaction(1);
@@ -252,7 +252,7 @@ TEST(LatePoll, SettingsTakenByATickInTheMiddleOfAPollAreNotJudgedByTheReportBefo
                       static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
                       static_cast<std::uint8_t>(position[1])}));
   board.hear_command(0x0F);
-  board.hear(modbus::adu(0, {6, 0x08, 0x40, 0, 0}));     // a third request, whose end is seen only below
+  board.hear(modbus::adu(0, {6, 0x20, 0x40, 0, 0}));     // a third request, whose end is seen only below
   board.application->poll(board.now - 2000);             // the wall moves; the command waits for the tick
   board.tick();                                          // takes the settings
   (void)board.application->serial_reply_due(board.now);  // the third request, with the report from before

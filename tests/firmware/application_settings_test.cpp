@@ -268,8 +268,8 @@ TEST_F(Settings, UnitAndBaudRateChangeAfterTheReply) {
   EXPECT_EQ(bench.set("modbus.unit", 17), 0);  // answered as unit 1
   EXPECT_TRUE(bench.request({3, 0, 0, 0, 1}, 1).empty());
   EXPECT_FALSE(bench.request({3, 0, 0, 0, 1}, 17).empty());
-  const Bytes reply = bench.request({16, 0x08, 0x31, 0, 2, 4, 0, 0, 0x25, 0x80}, 17);  // 9600
-  EXPECT_EQ(reply, (Bytes{16, 0x08, 0x31, 0, 2}));
+  const Bytes reply = bench.request({16, 0x20, 0x31, 0, 2, 4, 0, 0, 0x25, 0x80}, 17);  // 9600
+  EXPECT_EQ(reply, (Bytes{16, 0x20, 0x31, 0, 2}));
   bench.run_ticks(1);
   EXPECT_EQ(bench.application().serial_settings().baud_rate, 9600u);
   const auto start = bench.board().now_us();

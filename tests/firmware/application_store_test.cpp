@@ -195,7 +195,7 @@ TEST_F(ApplicationStore, WithoutAMemoryItSaysSo) {
 
 TEST_F(ApplicationStore, DefaultsOfTheLinkItselfTakeEffectAfterTheReply) {
   ASSERT_EQ(bench->set("modbus.unit", 9), 0);
-  const auto reply = bench->request({16, 0x09, 0x10, 0, 1, 2, 0, 2}, 9);
+  const auto reply = bench->request({16, 0x21, 0x10, 0, 1, 2, 0, 2}, 9);
   EXPECT_EQ(Bench::exception_of(reply), 0);
   EXPECT_EQ(bench->get("modbus.unit"), 1);
 }

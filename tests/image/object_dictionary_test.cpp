@@ -137,29 +137,29 @@ TEST_F(Dictionary, NothingIsThereThatTheEdsDoesNotName) {
 TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   // Toggle: the second segment again.
   sdo.download({0x5822, 1}, std::vector<std::uint8_t>(30, 7), true);
-  answer_to({0x40, 0x22, 0x30, 1});
+  answer_to({0x40, 0x22, 0x58, 1});
   answer_to({0x60});
   EXPECT_EQ(abort_in(answer_to({0x60})), Abort::toggle);
   // Time-out: an initiated download that is not continued.
-  answer_to({0x21, 0x22, 0x30, 1, 20});
+  answer_to({0x21, 0x22, 0x58, 1, 20});
   board.run_for(1.1);
   std::optional<link::Received> late = port.receive(std::chrono::microseconds(1));
   ASSERT_TRUE(late);
   EXPECT_EQ(number_in(late->frame.data, 4), static_cast<std::uint32_t>(Abort::timeout));
   EXPECT_EQ(abort_in(answer_to({0xE0})), Abort::command);
-  EXPECT_EQ(abort_in(answer_to({0xA0, 0x22, 0x30, 1, 0})), Abort::block_size);
-  EXPECT_EQ(abort_in(answer_to({0xA0, 0x22, 0x30, 1, 128})), Abort::block_size);
+  EXPECT_EQ(abort_in(answer_to({0xA0, 0x22, 0x58, 1, 0})), Abort::block_size);
+  EXPECT_EQ(abort_in(answer_to({0xA0, 0x22, 0x58, 1, 128})), Abort::block_size);
   // Sequence: an acknowledgement of segments that were never sent.
-  answer_to({0xA4, 0x22, 0x30, 1, 4});
+  answer_to({0xA4, 0x22, 0x58, 1, 4});
   answer_to({0xA3});
   board.run_for(0.01);
   EXPECT_EQ(abort_in(answer_to({0xA2, 100, 4})), Abort::sequence);
   // Checksum.
-  EXPECT_EQ(answer_to({0xC6, 0x22, 0x30, 1, 7})[0], 0xA4);
+  EXPECT_EQ(answer_to({0xC6, 0x22, 0x58, 1, 7})[0], 0xA4);
   EXPECT_EQ(answer_to({0x81, 1, 2, 3, 4, 5, 6, 7})[0], 0xA2);
   EXPECT_EQ(abort_in(answer_to({0xC1, 0x12, 0x34})), Abort::crc);
   // Too long for the object, told in advance or found out; too short.
-  EXPECT_EQ(abort_in(answer_to({0x21, 0x22, 0x30, 1, 0x01, 0x08})), Abort::too_long);
+  EXPECT_EQ(abort_in(answer_to({0x21, 0x22, 0x58, 1, 0x01, 0x08})), Abort::too_long);
   EXPECT_EQ(abort_of(0x2000, 4, {1, 2, 3, 4, 5}), Abort::too_long);
   EXPECT_EQ(abort_of(0x2000, 4, {1, 2}), Abort::too_short);
   EXPECT_EQ(abort_of(0x1008, 0, {1}), Abort::read_only);

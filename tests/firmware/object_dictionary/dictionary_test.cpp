@@ -294,8 +294,8 @@ TEST(Dictionary, CommunicationSettingsAreKeptReadAndNeverWrittenThroughModbus) {
     EXPECT_EQ(entry.change, Change::any_time) << entry.name;
     EXPECT_GE(entry.index(), 0x1000) << entry.name;
     EXPECT_LT(entry.index(), 0x1C00) << entry.name;
-    EXPECT_GE(modbus_address(i, 0), 0x1000) << entry.name;
-    EXPECT_LT(modbus_address(i, 0), 0x1400) << entry.name;
+    EXPECT_GE(modbus_address(i, 0), 0x2800) << entry.name;
+    EXPECT_LT(modbus_address(i, 0), 0x2C00) << entry.name;
   }
   // SYNC, emergency, heartbeat, error behaviour; 4 nodes watched; 4 RPDOs of 2 + 9, 4 TPDOs of 4 + 9.
   EXPECT_EQ(count, 5 + 4 + 4 * 11 + 4 * 13);
