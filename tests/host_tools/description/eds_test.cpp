@@ -102,8 +102,8 @@ TEST_F(Eds, NumbersAreWrittenAsReadersExpect) {
   EXPECT_EQ(sections["6060"].at("DefaultValue"), "-1");
   EXPECT_EQ(sections["6060"].at("LowLimit"), "-2");
   EXPECT_EQ(sections["6064"].at("PDOMapping"), "1");
-  EXPECT_EQ(sections["3002sub1"].at("DefaultValue"), "1");
-  EXPECT_EQ(sections["3020sub40"].at("ObjectType"), "0x2");  // hexadecimal sub-index
+  EXPECT_EQ(sections["5802sub1"].at("DefaultValue"), "1");
+  EXPECT_EQ(sections["5820sub40"].at("ObjectType"), "0x2");  // hexadecimal sub-index
 }
 
 }  // namespace
