@@ -85,7 +85,7 @@ TEST(SdoBlockUpload, AnAbortAtTheStart) {
 TEST(SdoBlockUpload, AnAbortInMidBlock) {
   SdoBench bench([](int number, const CanFrame& answer) {
     if (number < 50) return Frames{answer};
-    return number == 50 ? Frames{frame_of(0x585, {0x80, 0x21, 0x30, 0x01, 0x22, 0, 0, 8})} : Frames{};
+    return number == 50 ? Frames{frame_of(0x585, {0x80, 0x21, 0x58, 0x01, 0x22, 0, 0, 8})} : Frames{};
   });
   bench.node.put(object, some_bytes(2000));
   EXPECT_CONTAINS(thrown_message<SdoAborted>([&] { bench.client().upload(object, 2000); }), "08000022");
