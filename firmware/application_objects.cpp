@@ -186,7 +186,7 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
       return Abort::none;
     }
     case SpecialObject::capture_samples:
-      if (!app_.tick_.capture().readable()) return Abort::device_state;  // begun anew in the middle
+      if (!app_.tick_.capture().readable()) return Abort::device_state;  // another capture has begun
       put_words(offset, out, [&](std::uint32_t word) { return app_.tick_.capture().value_at(word); });
       return Abort::none;
     case SpecialObject::scratch:

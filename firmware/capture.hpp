@@ -78,7 +78,7 @@ struct CaptureReadings {
 /// (trigger_sample), more after; the capture always ends with all `samples`, unless it is stopped.
 ///
 /// Contexts: arm(), stop() and reading in the main loop, ISR_... in the tick that may preempt it. The plan
-/// crosses through a DoubleBuffer, and takes effect in the axis' next tick: arming anew is safe at any time.
+/// crosses through a DoubleBuffer, and takes effect in the axis' next tick: arming again is safe at any time.
 /// Of what the tick writes, each value has this one writer, and the words are read only while the state is
 /// complete and no plan is on its way: the tick then writes none. Until then every word reads as 0 and
 /// readable() is false.
