@@ -8,6 +8,10 @@ by a hash of the command, of the program, of READS, of the environment variables
 installed here. A failure is not remembered, and a folder without passes, as a fresh clone has, remembers nothing.
 KMAX_TEST_ALL=1 runs the test in any case (scripts/test --all).
 
+Properties draw the same cases each time, so that a pass means the same tomorrow, and what failed fails again. KMAX_SOAK=1
+lets them draw others at each run, and remembers nothing; so does a test program that is started by itself.
+RC_PARAMS in the environment stays as it is.
+
 What the hash cannot see is the machine's load: a test that waits for real time and passed before is not asked again.
 """
 
@@ -17,6 +21,8 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+
+FIXED_SEED = "seed=20000"
 
 
 def files_below(path):
@@ -50,12 +56,15 @@ def main(arguments):
         return 2
     split = arguments.index("--")
     memory, reads, command = Path(arguments[0]), arguments[1:split], arguments[split + 1:]
+    soak = os.environ.get("KMAX_SOAK") == "1"
+    if not soak:
+        os.environ.setdefault("RC_PARAMS", FIXED_SEED)
     remembered = memory / key_of(command, reads)
-    if remembered.exists() and os.environ.get("KMAX_TEST_ALL") != "1":
+    if remembered.exists() and not soak and os.environ.get("KMAX_TEST_ALL") != "1":
         print(f"remembered: passed {remembered.read_text().strip()} with the same bytes")
         return 0
     code = subprocess.run(command, check=False).returncode
-    if code == 0:
+    if code == 0 and not soak:
         memory.mkdir(parents=True, exist_ok=True)
         remembered.write_text(time.strftime("%Y-%m-%d %H:%M\n"))
     return code
