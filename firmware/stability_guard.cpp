@@ -1,23 +1,14 @@
 // Compiled for size: it runs when parameters change, and flash is what it costs.
 #include "firmware/stability_guard.hpp"
 
-#include "control/current_loop_delay.hpp"
-#include "control/resampler.hpp"
 #include "firmware/drive/axis.hpp"
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/stability_case.hpp"
 
 namespace kmax::firmware {
 
 namespace {
 using control::Criterion;
 using control::CriterionResult;
-using control::WallKind;
-
-/// Whether the axis renders a wall at all.
-bool renders_a_wall(const ParameterValues& values, std::size_t axis) {
-  return values.choice<DriveMode, "drive.mode">(axis) == DriveMode::haptic &&
-         values.choice<WallKind, "wall.law">(axis) != WallKind::none;
-}
 
 /// Whether `a` is farther beyond its bound, or nearer to it, than `b` is to its own: value / bound compared
 /// without a division. Of two bounds that no value can keep, the greater value.
@@ -39,38 +30,10 @@ bool is_worse(const CriterionResult<float>& a, const CriterionResult<float>& b) 
 }
 }  // namespace
 
-float largest_magnetic_coefficient(const ParameterValues& values, std::size_t axis) {
-  const auto wall = wall_configuration<float>(values, axis);
-  if (wall.kind == WallKind::magnetic) return wall.magnetic_coefficient;
-  if (wall.kind != WallKind::adaptive) return 0.0f;
-  return control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most;
-}
-
-control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis) {
-  const double length = count_length(values, axis);
-  const double step =
-      control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), length);
-  control::StabilityCase<float> judged;
-  judged.stiffness = values.real<"wall.stiffness">(axis);
-  judged.wall_damping = values.real<"wall.damping">(axis);
-  judged.magnetic_coefficient = largest_magnetic_coefficient(values, axis);
-  judged.magnetic_length = values.real<"wall.magnetic_length">(axis);
-  judged.period = 1.0f / values.real<"haptic.rate">(axis);
-  judged.delay = values.real<"guard.delay">(axis) +
-                 control::current_loop_delay(values.real<"current.bandwidth">(axis), float{tick_rate_hz});
-  judged.quantum = static_cast<float>(step * length);
-  judged.mass = values.real<"device.mass">(axis);
-  judged.damping = values.real<"guard.damping">(axis);
-  judged.friction = values.real<"guard.friction">(axis);
-  judged.operator_force = values.real<"guard.operator_force">(axis);
-  judged.operator_speed = values.real<"guard.operator_speed">(axis);
-  judged.force_limit = values.real<"force.limit">(axis);
-  return judged;
-}
-
 GuardFinding guard_finding(const ParameterValues& values, std::size_t axis) {
   GuardFinding finding;
-  if (values.choice<GuardMode, "guard.mode">(axis) == GuardMode::off || !renders_a_wall(values, axis))
+  if (values.choice<GuardMode, "guard.mode">(axis) == GuardMode::off ||
+      values.choice<DriveMode, "drive.mode">(axis) != DriveMode::haptic)
     return finding;
   const auto judged = stability_case(values, axis);
   CriterionResult<float> worst;

@@ -58,18 +58,9 @@ inline constexpr auto guard_entries = std::to_array<std::uint8_t>({
     entry_of<"current.bandwidth">(),
 });
 
-/// The largest coefficient F_MC, N, that the present law can command, at whatever velocity and in whichever
-/// adaptive mode and relation: eq. 7 at V_max within the adaptive interval. 0 for the laws without a field.
-float largest_magnetic_coefficient(const ParameterValues& values, std::size_t axis);
-
-/// An axis' parameters as the criteria take them: b = guard.damping, f_c = guard.friction, T = 1 /
-/// haptic.rate, delay = guard.delay + that of the current loop (control/current_loop_delay.hpp), quantum =
-/// measured.resolution, F_h and v of guard.operator_*. Nobody holds the handle: the damping of a hand is not
-/// counted on.
-control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis);
-
-/// The stability check of one axis. Not judged where guard.mode is off, where drive.mode renders no wall, and
-/// for a law that makes no force. Value and bound are finite for every set of allowed parameters.
+/// The stability check of one axis' parameters (stability_case.hpp). Not judged where guard.mode is off,
+/// where drive.mode renders no wall, and for a law that makes no force. Value and bound are finite for every
+/// set of allowed parameters.
 ///
 /// Main loop: two divisions in double, a dozen in float. No failure.
 GuardFinding guard_finding(const ParameterValues& values, std::size_t axis);

@@ -2,60 +2,16 @@
 
 #include <array>
 
-#include "control/current_loop_delay.hpp"
-#include "control/resampler.hpp"
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/stability_case.hpp"
 #include "host_tools/base/numbers.hpp"
 
 namespace kmax::check {
 
-namespace {
-// As the user wrote it: 0.1, not the 0.100000001490116 of the float that is nearest to it.
-double real(float value) {
-  return device::shortest_double(value);
-}
-
-double largest_coefficient(const control::WallLawConfig<float>& wall) {
-  switch (wall.kind) {
-    case control::WallKind::magnetic:
-      return real(wall.magnetic_coefficient);
-    case control::WallKind::adaptive:
-      // The period only matters for the decay.
-      return real(control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most);
-    case control::WallKind::none:
-    case control::WallKind::plain:
-      break;
-  }
-  return 0.0;
-}
-}  // namespace
-
 control::StabilityCase<double> parameter_case(const firmware::ParameterValues& values, std::size_t axis,
                                               const control::Hand<double>& hand) {
-  const auto wall = firmware::wall_configuration<float>(values, axis);
-  const bool any_wall = wall.kind != control::WallKind::none;
-  const double count = firmware::count_length(values, axis);
-
-  control::StabilityCase<double> c{};
-  c.stiffness = any_wall ? real(wall.stiffness) : 0.0;
-  c.wall_damping = any_wall ? real(wall.damping) : 0.0;
-  c.magnetic_coefficient = largest_coefficient(wall);
-  c.magnetic_length = real(wall.magnetic_length);
-  c.period = 1.0 / real(values.real<"haptic.rate">(axis));
-  c.delay = real(values.real<"guard.delay">(axis)) +
-            control::current_loop_delay(real(values.real<"current.bandwidth">(axis)),
-                                        static_cast<double>(firmware::tick_rate_hz));
-  c.quantum =
-      count * control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), count);
-  c.mass = real(values.real<"device.mass">(axis));
-  c.damping = real(values.real<"guard.damping">(axis));
-  c.friction = real(values.real<"guard.friction">(axis));
-  c.operator_force = real(values.real<"guard.operator_force">(axis));
-  c.operator_speed = real(values.real<"guard.operator_speed">(axis));
-  c.detection_share = 1.0;
-  c.force_limit = real(values.real<"force.limit">(axis));
-  c.hand = hand;
-  return c;
+  auto judged = firmware::stability_case<double>(values, axis, device::shortest_double);
+  judged.hand = hand;
+  return judged;
 }
 
 const std::vector<device::Parameter>& case_parameters(std::size_t axis) {

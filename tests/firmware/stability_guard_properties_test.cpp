@@ -9,6 +9,7 @@
 #include "control/adaptive_coefficient.hpp"
 #include "firmware/haptic_configuration.hpp"
 #include "firmware/parameter_migration.hpp"
+#include "firmware/stability_case.hpp"
 #include "tests/firmware/guarded_parameters.hpp"
 
 namespace kmax::firmware::stability_guard_properties_test {
@@ -38,7 +39,7 @@ RC_GTEST_PROP(GuardField, LargestCoefficientIsNeverExceededAndIsReached, ()) {
   const float most_speed = set_real("wall.adaptive_velocity_max", 0.01, 5);
   const float least = set_real("wall.adaptive_force_min", 0, 3);
   set_real("wall.adaptive_force_max", static_cast<double>(least), 6);
-  const float largest = largest_magnetic_coefficient(values, 0);
+  const float largest = stability_case(values, 0).magnetic_coefficient;
   const auto config = wall_configuration<float>(values, 0).adaptive;
   const auto prepared = control::AdaptiveCoefficient<float>::prepare(config, 0.001f);
   control::AdaptiveCoefficient<float> coefficient;

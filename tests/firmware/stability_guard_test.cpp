@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "firmware/stability_case.hpp"
 #include "tests/firmware/guarded_parameters.hpp"
 
 namespace kmax::firmware::stability_guard_test {
@@ -58,35 +59,6 @@ TEST_F(Guard, JudgesNothingWhereNoWallIsRendered) {
   expect_pass();
   set("wall.damping", 6);
   expect_fail(bit(Criterion::colgate));
-}
-
-TEST_F(Guard, TakesEveryNumberFromTheParameterThatMeansIt) {
-  set("wall.damping", 0.5);
-  set("wall.law", 2);
-  set("wall.magnetic_coefficient", 1.25);
-  set("wall.magnetic_length", 0.002);
-  set("guard.delay", 0.001);
-  set("guard.operator_force", 3);
-  set("guard.operator_speed", 0.75);
-  set("position.resolution", 55e-6);
-  set("device.mass", 0.0625);
-  set("force.limit", 6.5);
-  const auto judged = stability_case(values, 0);
-  EXPECT_EQ(judged.stiffness, 1000.0f);
-  EXPECT_EQ(judged.wall_damping, 0.5f);
-  EXPECT_EQ(judged.magnetic_coefficient, 1.25f);
-  EXPECT_EQ(judged.magnetic_length, 0.002f);
-  EXPECT_EQ(judged.period, 0.0005f);
-  EXPECT_FLOAT_EQ(judged.delay, 0.0012825f) << "guard.delay, 1 / current.bandwidth and 0.65 ticks";
-  EXPECT_NEAR(judged.quantum, 60e-6f, 1e-11f) << "the step in use: six counts, not the 55 um asked for";
-  EXPECT_EQ(judged.mass, 0.0625f);
-  EXPECT_EQ(judged.damping, 5.325f);
-  EXPECT_EQ(judged.friction, 1.0f);
-  EXPECT_EQ(judged.operator_force, 3.0f);
-  EXPECT_EQ(judged.operator_speed, 0.75f);
-  EXPECT_EQ(judged.detection_share, 1.0f);
-  EXPECT_EQ(judged.force_limit, 6.5f);
-  EXPECT_EQ(judged.hand.hand_mass, 0.0f);
 }
 
 TEST_F(Guard, AxesAreJudgedEachByItsOwn) {
@@ -305,22 +277,6 @@ TEST_F(Guard, NamesTheOneFartherBeyondWhenNoValueCouldPass) {
   set("guard.friction", 0);
   expect_fail(bit(Criterion::abbott_okamura) | bit(Criterion::resolution));
   EXPECT_EQ(finding().criterion, Criterion::abbott_okamura) << "not the step of 10 mN over 1";
-}
-
-TEST_F(Guard, LargestCoefficientOfEachLaw) {
-  set("wall.magnetic_coefficient", 7);
-  const auto of_law = [&](double law) {
-    set("wall.law", law);
-    return largest_magnetic_coefficient(values, 0);
-  };
-  EXPECT_EQ(of_law(0), 0.0f);
-  EXPECT_EQ(of_law(1), 0.0f);
-  EXPECT_EQ(of_law(2), 7.0f);
-  EXPECT_EQ(of_law(3), 2.0f) << "the interval's upper end, below the 3.2 N of eq. 7";
-  set("wall.adaptive_force_max", 100);
-  EXPECT_FLOAT_EQ(of_law(3), 3.2f) << "eq. 7 at V_max";
-  set("wall.adaptive_force_min", 5);
-  EXPECT_EQ(of_law(3), 5.0f) << "the interval's lower end, above what eq. 7 gives";
 }
 
 }  // namespace

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+
+#include "control/current_loop_delay.hpp"
+#include "control/resampler.hpp"
+#include "control/stability_case.hpp"
+#include "firmware/haptic_configuration.hpp"
+
+namespace kmax::firmware {
+
+/// What the stability criteria judge, out of one axis' parameters; the guard before arming and `kmax check`
+/// go by the same.
+///
+///   K, B             wall.stiffness, wall.damping; 0 with wall.law none
+///   F_MC, x_0        the largest coefficient the law can command, at whatever velocity: none for plain;
+///                    wall.magnetic_coefficient for magnetic; for adaptive what eq. 7 gives at V_max within
+///                    its interval
+///   T                1 / haptic.rate
+///   T_d              guard.delay and that of the current loop (control/current_loop_delay.hpp)
+///   quantum          the step in use: whole encoder counts, as position.resolution is rounded
+///   m, b, f_c        device.mass, guard.damping, guard.friction
+///   F_h, v           guard.operator_force, guard.operator_speed
+///   force limit      force.limit
+///
+/// Nobody holds the handle: the damping of a hand is not counted on. Left out: the velocity that eq. 7 of the
+/// adaptive law feeds back (a damper on the way in, and with wall.adaptive_velocity = speed a negative one on
+/// the way out), the lag of the velocity estimator, the force slew limit, force compensation.
+///
+/// `number`: a float parameter as the criteria's Scalar. Outside the interrupt.
+template <typename Scalar, typename Number>
+control::StabilityCase<Scalar> stability_case(const ParameterValues& values, std::size_t axis,
+                                              Number number) {
+  control::StabilityCase<Scalar> judged;
+  const auto has_wall = [&](float largest_coefficient) {
+    judged.stiffness = number(values.real<"wall.stiffness">(axis));
+    judged.wall_damping = number(values.real<"wall.damping">(axis));
+    judged.magnetic_coefficient = number(largest_coefficient);
+  };
+  const auto wall = wall_configuration<float>(values, axis);
+  // All of them, and no default: a law that nobody has thought of here does not compile.
+  switch (wall.kind) {
+    case control::WallKind::none:
+      break;
+    case control::WallKind::plain:
+      has_wall(0.0f);
+      break;
+    case control::WallKind::magnetic:
+      has_wall(wall.magnetic_coefficient);
+      break;
+    case control::WallKind::adaptive:
+      // The period matters for the decay only.
+      has_wall(control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most);
+      break;
+  }
+  const double count = count_length(values, axis);
+  judged.magnetic_length = number(wall.magnetic_length);
+  judged.period = Scalar(1) / number(values.real<"haptic.rate">(axis));
+  judged.delay =
+      number(values.real<"guard.delay">(axis)) +
+      control::current_loop_delay(number(values.real<"current.bandwidth">(axis)), Scalar{tick_rate_hz});
+  judged.quantum = static_cast<Scalar>(
+      count * control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), count));
+  judged.mass = number(values.real<"device.mass">(axis));
+  judged.damping = number(values.real<"guard.damping">(axis));
+  judged.friction = number(values.real<"guard.friction">(axis));
+  judged.operator_force = number(values.real<"guard.operator_force">(axis));
+  judged.operator_speed = number(values.real<"guard.operator_speed">(axis));
+  judged.force_limit = number(values.real<"force.limit">(axis));
+  return judged;
+}
+
+/// In float, as the device judges it.
+inline control::StabilityCase<float> stability_case(const ParameterValues& values, std::size_t axis) {
+  return stability_case<float>(values, axis, [](float value) { return value; });
+}
+
+}  // namespace kmax::firmware
