@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "host_tools/virtual_board/cortex_m/access_locator.hpp"
+
 namespace kmax::virtual_board::block_table_test {
 namespace {
 
@@ -48,6 +50,25 @@ TEST(BlockTable, EndsAtACodeThatIsCutOff) {
   BlockTable table;
   EXPECT_EQ(table.add(address, std::span(code).first(4)).instructions, 2U);
   EXPECT_EQ(table.add(address + 100, {}).instructions, 0U);
+}
+
+TEST(AccessLocator, FindsTheInstructionByItsEffectiveAddress) {
+  BlockTable table;
+  const Block& block = table.add(address, code);
+  AccessLocator locator;
+  locator.begin_block(block);
+  const auto registers = [](unsigned) { return 0x4000'0000U; };
+  EXPECT_EQ(locator.locate(0x4000'0000, true, registers), &block.memory[0]);
+  EXPECT_EQ(locator.locate(0x4000'0000, true, registers), nullptr) << "there is no second store";
+  EXPECT_EQ(locator.locate(0x4000'0008, false, registers), &block.memory[1]);
+  EXPECT_EQ(locator.locate(0x4000'0000, false, registers), &block.memory[2]);
+  const auto changed = [](unsigned) { return 0x1234U; };
+  EXPECT_EQ(locator.locate(0x4000'0004, false, changed), &block.memory[2]) << "second word, base overwritten";
+  EXPECT_FALSE(locator.is_piece(4));
+  EXPECT_EQ(locator.locate(0x4000'0008, false, changed), nullptr);
+  locator.begin_block(block);
+  EXPECT_EQ(locator.locate(0x4000'0002, true, registers), &block.memory[0]);
+  EXPECT_TRUE(locator.is_piece(2));
 }
 
 }  // namespace

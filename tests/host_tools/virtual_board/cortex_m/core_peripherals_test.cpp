@@ -8,7 +8,9 @@
 #include <cstddef>
 
 #include "drivers/cortex_m/cycle_counter.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::core_peripherals_test {
 namespace {
@@ -37,53 +39,53 @@ TEST(CoreDebug, HasNoDebugger_Dhcsr) {
 
 using testing::RegisterOnModel;
 
-struct Core {
+struct DwtOnModel {
+  RegisterOnModel ctrl, cyccnt;
+};
+struct CycleCounting : testing::ModelBench {
+  CycleCounting() : ModelBench({&model}) {}
+  std::uint32_t count() { return static_cast<std::uint32_t>(dwt.cyccnt); }
+
   std::uint64_t cycles = 5'000'000'000;
   bool trace = true;
-  BoardTime now = 0;
   DwtModel model{[this] { return cycles; }, [this] { return trace; }};
-  RegisterOnModel ctrl{model, offsetof(DwtRegisters, ctrl), now};
-  RegisterOnModel cyccnt{model, offsetof(DwtRegisters, cyccnt), now};
-  std::uint32_t count() { return static_cast<std::uint32_t>(cyccnt); }
+  DwtOnModel dwt = block_on_model<DwtOnModel>(*this, model);
 };
 
 TEST(Dwt, CountsCoreCyclesWhileEnabledAndWraps) {
-  Core core;
-  EXPECT_EQ(static_cast<std::uint32_t>(core.ctrl), 0x4000'0000U);
+  CycleCounting core;
+  EXPECT_EQ(static_cast<std::uint32_t>(core.dwt.ctrl), 0x4000'0000U);
   core.cycles += 10;
   EXPECT_EQ(core.count(), 0U);
-  core.ctrl = 1;
+  core.dwt.ctrl = 1;
   core.cycles += 10;
   EXPECT_EQ(core.count(), 10U);
-  core.cyccnt = 0xFFFF'FFFE;
+  core.dwt.cyccnt = 0xFFFF'FFFE;
   core.cycles += 5;
   EXPECT_EQ(core.count(), 3U);
-  core.ctrl = 0;
+  core.dwt.ctrl = 0;
   core.cycles += 100;
   EXPECT_EQ(core.count(), 3U);
-  core.ctrl = 1;
+  core.dwt.ctrl = 1;
   core.cycles += 1;
   EXPECT_EQ(core.count(), 4U) << "goes on from where it stood";
 }
 
 TEST(Dwt, NeedsTraceAndRefusesTheRest) {
-  Core core;
-  EXPECT_THROW(core.ctrl = 1U << 12, RefusedAccess) << "PCSAMPLENA";
-  EXPECT_THROW(core.model.read({8, 4, 0}), RefusedAccess) << "CPICNT";
+  CycleCounting core;
+  EXPECT_THROW(core.dwt.ctrl = 1U << 12, RefusedAccess) << "PCSAMPLENA";
+  EXPECT_THROW(core.read(8), RefusedAccess) << "CPICNT";
   core.trace = false;
   EXPECT_THROW(core.count(), RefusedAccess);
-  EXPECT_THROW(core.ctrl = 1, RefusedAccess);
+  EXPECT_THROW(core.dwt.ctrl = 1, RefusedAccess);
 }
 
 TEST(Dwt, DriverMeasures) {
-  Core core;
-  struct {
-    RegisterOnModel ctrl, cyccnt;
-  } dwt{core.ctrl, core.cyccnt};
+  CycleCounting core;
   struct {
     std::uint32_t demcr = 0;
   } core_debug;
-  CycleCounter counter{dwt, core_debug};
+  CycleCounter counter{core.dwt, core_debug};
   ASSERT_TRUE(counter.start());
   const std::uint32_t start = counter.now();
   core.cycles += 8'400;
@@ -129,9 +131,8 @@ constexpr std::uint32_t rnr = offsetof(MpuRegisters, rnr);
 constexpr std::uint32_t rbar = offsetof(MpuRegisters, rbar);
 constexpr std::uint32_t rasr = offsetof(MpuRegisters, rasr);
 
-struct Unit {
-  std::uint32_t read(std::uint32_t offset) { return mpu.read({offset, 4, 0}); }
-  void write(std::uint32_t offset, std::uint32_t value) { mpu.write({offset, 4, 0}, value); }
+struct Unit : testing::ModelBench {
+  Unit() : ModelBench({&mpu}) {}
   MemoryProtection mpu;
 };
 
@@ -189,7 +190,69 @@ TEST(MemoryProtection, RefusesRegionsThatTheUnitCannotHave) {
   EXPECT_THROW(unit.write(rasr, attributes(5)), RefusedAccess) << "not aligned to 64 bytes";
   unit.write(rbar, 0);
   EXPECT_NO_THROW(unit.write(rasr, attributes(31))) << "all of the address space";
-  EXPECT_THROW(unit.mpu.read({0, 2, 0}), RefusedAccess);
+  EXPECT_THROW(unit.read(0, 2), RefusedAccess);
+}
+
+// drivers/cortex_m/system_tick.hpp and interrupt_controller.hpp on the models.
+struct NvicOnModel {
+  RegisterOnModel iser[32], icer[32], ispr[32], icpr[32], iabr[64], ipr[21];
+};
+struct ScbOnModel {
+  RegisterOnModel cpuid, icsr, vtor, aircr, scr, ccr, shpr[3];
+};
+struct SystemTickOnModel {
+  RegisterOnModel ctrl, load, val;
+};
+
+struct Core : testing::ModelBench {
+  Core() : ModelBench({&peripherals.system_tick}, 0) {
+    clocks.core = 2;
+    peripherals.reset(0);
+  }
+  Bus bus;
+  CorePeripherals peripherals{bus, clocks};
+  NvicOnModel nvic = block_on_model<NvicOnModel>(*this, peripherals.nvic);
+  ScbOnModel scb = block_on_model<ScbOnModel>(*this, peripherals.system_control);
+  SystemTickOnModel system_tick = block_on_model<SystemTickOnModel>(*this, peripherals.system_tick);
+};
+
+TEST(InterruptControllerOnModel, SetsPrioritiesEnablesAndPends) {
+  Core core;
+  InterruptController<NvicOnModel, ScbOnModel> controller(core.nvic, core.scb);
+  ExceptionTable& table = core.peripherals.exceptions;
+  controller.set_priority(drivers::stm32f4::Interrupt::adc, 1);
+  controller.set_priority(drivers::stm32f4::Interrupt::usart2, 9);
+  controller.set_priority(SystemException::system_tick, 14);
+  controller.enable(drivers::stm32f4::Interrupt::adc);
+  controller.enable(drivers::stm32f4::Interrupt::usart2);
+  EXPECT_EQ(table.priority(16 + 18), 0x10);
+  EXPECT_EQ(table.priority(16 + 38), 0x90);
+  EXPECT_EQ(table.priority(exception_number::system_tick), 0xE0);
+  controller.pend(drivers::stm32f4::Interrupt::usart2);
+  EXPECT_EQ(table.candidate(), 16U + 38);
+  controller.pend(drivers::stm32f4::Interrupt::adc);
+  EXPECT_EQ(table.candidate(), 16U + 18);
+  controller.clear_pending(drivers::stm32f4::Interrupt::adc);
+  controller.disable(drivers::stm32f4::Interrupt::usart2);
+  EXPECT_EQ(table.candidate(), 0U);
+}
+
+TEST(SystemTickOnModel, GivesMicroseconds) {
+  Core core;
+  drivers::cortex_m::SystemTick<SystemTickOnModel, ScbOnModel> driver(core.system_tick, core.scb);
+  ASSERT_TRUE(driver.start(168'000'000, 1000));
+  std::uint32_t served = 0;
+  for (std::uint32_t microsecond = 1; microsecond < 5000; ++microsecond) {
+    core.run(2 * 168);
+    ASSERT_EQ(driver.now_us(), microsecond) << "pending ticks included";
+    if (core.peripherals.exceptions.pending(exception_number::system_tick) && microsecond % 7 == 0) {
+      core.peripherals.exceptions.clear_pending(exception_number::system_tick);
+      driver.ISR_count();
+      ++served;
+      ASSERT_EQ(driver.now_us(), microsecond);
+    }
+  }
+  EXPECT_EQ(served, 4U);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 // PM0214, nested vectored interrupt controller.
 
 #include "host_tools/virtual_board/cortex_m/nvic.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstddef>
+
+#include "drivers/stm32f4/interrupts.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::nvic_test {
 namespace {
@@ -13,15 +15,8 @@ namespace {
 using drivers::cortex_m::NvicRegisters;
 using drivers::stm32f4::Interrupt;
 
-struct Controller {
-  Controller() { exceptions.reset(); }
-
-  std::uint32_t read(std::size_t offset, unsigned bytes = 4) {
-    return nvic.read({static_cast<std::uint32_t>(offset), bytes, 0});
-  }
-  void write(std::size_t offset, std::uint32_t value, unsigned bytes = 4) {
-    nvic.write({static_cast<std::uint32_t>(offset), bytes, 0}, value);
-  }
+struct Controller : testing::ModelBench {
+  Controller() : ModelBench({&nvic}) { exceptions.reset(); }
   static unsigned exception(unsigned interrupt) { return 16 + interrupt; }
 
   ExceptionTable exceptions;

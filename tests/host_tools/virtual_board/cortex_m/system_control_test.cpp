@@ -6,24 +6,19 @@
 
 #include <cstddef>
 
+#include "tests/host_tools/virtual_board/model_bench.hpp"
+
 namespace kmax::virtual_board::system_control_test {
 namespace {
 
 using namespace drivers::cortex_m;
 namespace number = exception_number;
 
-struct Block {
-  Block() {
+struct Block : testing::ModelBench {
+  Block() : ModelBench({&control}, 77) {
     exceptions.reset();
     control.reset(0);
   }
-  std::uint32_t read(std::size_t offset, unsigned bytes = 4) {
-    return control.read({static_cast<std::uint32_t>(offset), bytes, 0});
-  }
-  void write(std::size_t offset, std::uint32_t value, unsigned bytes = 4) {
-    control.write({static_cast<std::uint32_t>(offset), bytes, 77}, value);
-  }
-
   ExceptionTable exceptions;
   SystemControl control{exceptions};
 };

@@ -6,6 +6,8 @@
 
 #include <cstddef>
 
+#include "tests/host_tools/virtual_board/model_bench.hpp"
+
 namespace kmax::virtual_board::system_tick_test {
 namespace {
 
@@ -18,39 +20,25 @@ constexpr std::size_t load = offsetof(SystemTickRegisters, load);
 constexpr std::size_t val = offsetof(SystemTickRegisters, val);
 constexpr std::uint32_t running = 7;
 
-struct Timer {
-  Timer() {
+struct Timer : testing::ModelBench {
+  Timer() : ModelBench({&timer}) {
     exceptions.reset();
     clocks.core = cycle;
-  }
-  std::uint32_t read(std::size_t offset) { return timer.read({static_cast<std::uint32_t>(offset), 4, now}); }
-  void write(std::size_t offset, std::uint32_t value) {
-    timer.write({static_cast<std::uint32_t>(offset), 4, now}, value);
   }
   void start(std::uint32_t reload) {
     write(load, reload);
     write(val, 0);
     write(ctrl, running);
   }
-  /// Lets `cycles` core cycles pass as the event loop does.
-  void pass(BoardTime cycles) {
-    const BoardTime until = now + cycles * cycle;
-    while (timer.next_event() <= until) {
-      now = timer.next_event();
-      timer.advance(now);
-    }
-    now = until;
-  }
+  void pass(BoardTime cycles) { run(cycles * cycle); }
   bool take() {
     const bool pending = exceptions.pending(tick);
     exceptions.clear_pending(tick);
     return pending;
   }
 
-  BoardClocks clocks;
   ExceptionTable exceptions;
   SystemTick timer{clocks, exceptions};
-  BoardTime now = 1000;
 };
 
 TEST(SystemTickModel, CountsDownFromTheReloadValueAndTicksAtTheStepToZero) {
@@ -179,7 +167,7 @@ TEST(SystemTickModel, RefusesWhatDoesNotExist) {
   EXPECT_THROW(timer.write(offsetof(SystemTickRegisters, calib), 0), RefusedAccess);
   EXPECT_THROW(timer.write(load, 0x0100'0000), RefusedAccess);
   EXPECT_THROW(timer.write(ctrl, 8), RefusedAccess);
-  EXPECT_THROW(timer.timer.read({0, 1, 0}), RefusedAccess);
+  EXPECT_THROW(timer.read(0, 1), RefusedAccess);
 }
 
 }  // namespace

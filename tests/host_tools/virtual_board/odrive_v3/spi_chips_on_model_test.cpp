@@ -1,20 +1,64 @@
-// drivers/stm32f4/spi_master.hpp, drv8301.hpp and as5047p_angle.hpp on the models of bus and
-// chips.
+// drivers/stm32f4/spi_master.hpp, drv8301.hpp and as5047p_angle.hpp on the models of bus and chips.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include "drivers/as5047p_angle.hpp"
 #include "drivers/drv8301.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/spi_on_model.hpp"
+#include "drivers/stm32f4/spi_master.hpp"
+#include "host_tools/virtual_board/odrive_v3/as5047p_chip.hpp"
+#include "host_tools/virtual_board/odrive_v3/drv8301_chip.hpp"
+#include "host_tools/virtual_board/stm32f4/spi.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::spi_chips_on_model_test {
 namespace {
 
 using drivers::Drv8301Result;
-using testing::SelectedChip;
-using testing::SpiBench;
+using testing::RegisterOnModel;
 
 constexpr BoardTime us = units_per_microsecond;
+
+struct SpiOnModel {
+  RegisterOnModel cr1, cr2, sr, dr;
+};
+
+/// SPI3 with the chips that hang on it.
+struct SpiBench : testing::ModelBench {
+  SpiBench() : ModelBench({&model}) {
+    clocks.apb1 = units_per_period(42'000'000);
+    access_time = 12;  // a load or store on APB1 and the instructions around it: six core cycles
+    model.on_frame([this](std::uint16_t mosi, BoardTime at) { return wire(mosi, at); });
+  }
+  std::uint16_t wire(std::uint16_t mosi, BoardTime at) {
+    // Pulled up: who does not drive leaves ones, who drives pulls down.
+    std::uint16_t miso = 0xFFFF;
+    for (Drv8301Chip* chip : {&gate_driver_0, &gate_driver_1}) {
+      if (const auto reply = chip->exchange(mosi, at)) miso &= *reply;
+    }
+    if (const auto reply = encoder.exchange(mosi, at)) miso &= *reply;
+    return miso;
+  }
+
+  SpiModel model{clocks};
+  SpiOnModel registers = block_on_model<SpiOnModel>(*this, model);
+  drivers::stm32f4::SpiMaster<SpiOnModel> master{registers};
+  std::int64_t angle = 0;
+  Drv8301Chip gate_driver_0, gate_driver_1;
+  As5047pChip encoder{[this](BoardTime) { return angle; }};
+};
+
+/// drivers::SpiChip for one chip of the bench: `set_level(bool level)` moves its select pin.
+struct SelectedChip {
+  SpiBench& bench;
+  std::function<void(bool level)> set_level;
+
+  void select(bool active) {
+    EXPECT_FALSE(bench.model.busy()) << "the select moves while a frame is under way";
+    set_level(!active);
+  }
+  std::optional<std::uint16_t> exchange(std::uint16_t word) { return bench.master.exchange(word); }
+  void delay_us(std::uint32_t microseconds) { bench.run(microseconds * us); }
+};
 
 struct Board : SpiBench {
   Board() {

@@ -11,7 +11,7 @@
 
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::adc_test {
 namespace {
@@ -37,36 +37,22 @@ struct Asked {
   friend bool operator==(const Asked&, const Asked&) = default;
 };
 
-struct Board {
-  Board() {
+struct Board : testing::ModelBench {
+  Board() : ModelBench({&model}) {
     clocks.apb2 = units_per_period(84'000'000);
     set(0, ccr, 1U << 16);
   }
   std::uint32_t get(unsigned adc, std::uint32_t offset) {
-    return model.read({(adc == 0 ? 0 : 0x100 * (adc - 1)) + offset, 4, now});
+    return read((adc == 0 ? 0 : 0x100 * (adc - 1)) + offset);
   }
   void set(unsigned adc, std::uint32_t offset, std::uint32_t value) {
-    model.write({(adc == 0 ? 0 : 0x100 * (adc - 1)) + offset, 4, now}, value);
+    write((adc == 0 ? 0 : 0x100 * (adc - 1)) + offset, value);
   }
   void switch_on(unsigned adc, std::uint32_t bits = adon) {
     set(adc, cr2, bits);
     now += 3 * units_per_microsecond;
   }
-  /// As the board does it: every event at its time, in order.
-  unsigned run_until(BoardTime end) {
-    unsigned events = 0;
-    while (model.next_event() <= end) {
-      now = model.next_event();
-      model.advance(now);
-      ++events;
-    }
-    now = end;
-    return events;
-  }
 
-  BoardClocks clocks;
-  BoardTime now = 1000;
-  testing::RecordedInterrupts interrupts;
   std::vector<Asked> asked;
   AdcModel model{clocks, interrupts, [this](unsigned channel, BoardTime instant) {
                    asked.push_back({channel, instant});
@@ -101,7 +87,7 @@ TEST(AdcModel, InjectedSequenceRegister_ListEndsAtJsq4AndResultsStartAtJdr1) {
     board.set(1, cr1, scan);
     board.switch_on(1);
     board.set(1, cr2, adon | jswstart);
-    board.run_until(board.now + 1000 * cycle);
+    board.run(1000 * cycle);
     ASSERT_EQ(board.asked.size(), count);
     for (unsigned i = 0; i < 4; ++i) {
       EXPECT_EQ(board.get(1, jdr + 4 * i), i < count ? code_of_channel(channels[i]) : 0U)
@@ -140,10 +126,12 @@ TEST(AdcModel, ChannelwiseSamplingTime_SequenceAddsUpAndAsksEachAtItsInstant) {
   board.switch_on(1, triggered);
   const BoardTime begin = board.now;
   board.model.trigger_injected(begin);
-  EXPECT_EQ(board.run_until(begin + 160 * cycle - 1), 0U) << "a group of several is one event";
+  board.run_until(begin + 160 * cycle - 1);
+  EXPECT_EQ(board.events, 0U) << "a group of several is one event";
   EXPECT_EQ(board.get(1, jdr), code_of_channel(6)) << "looked at before the end: up to date";
   EXPECT_EQ(board.get(1, sr) & jeoc, 0U);
-  EXPECT_EQ(board.run_until(begin + 160 * cycle), 1U);
+  board.run_until(begin + 160 * cycle);
+  EXPECT_EQ(board.events, 1U);
   EXPECT_EQ(board.get(1, sr) & jeoc, jeoc);
   EXPECT_EQ(board.asked, (std::vector<Asked>{{6, begin + 28 * cycle},
                                              {15, begin + 68 * cycle},
@@ -161,9 +149,11 @@ TEST(AdcModel, ConversionOnExternalTrigger_AllThatListenStartTogether) {
   board.switch_on(1);  // deaf
   const BoardTime begin = board.now;
   board.model.trigger_injected(begin);
-  EXPECT_EQ(board.run_until(begin + 15 * cycle - 1), 1U) << "one event holds both";
+  board.run_until(begin + 15 * cycle - 1);
+  EXPECT_EQ(board.events, 1U) << "one event holds both";
   EXPECT_FALSE(board.interrupts.level(Interrupt::adc));
-  EXPECT_EQ(board.run_until(begin + 15 * cycle), 1U);
+  board.run_until(begin + 15 * cycle);
+  EXPECT_EQ(board.events, 2U);
   EXPECT_TRUE(board.interrupts.level(Interrupt::adc));
   EXPECT_EQ(board.asked, (std::vector<Asked>{{10, begin + 3 * cycle}, {11, begin + 3 * cycle}}));
   EXPECT_EQ(board.get(1, sr), 0U);
@@ -177,7 +167,7 @@ TEST(AdcModel, StatusRegister_WriteZeroClearsAndTheLevelFollows) {
   board.set(2, jsqr, 10U << 15);
   board.switch_on(2, triggered);
   board.model.trigger_injected(board.now);
-  board.run_until(board.now + 15 * cycle);
+  board.run(15 * cycle);
   board.set(2, sr, 0x3FU & ~jstrt);
   EXPECT_EQ(board.get(2, sr), jeoc);
   EXPECT_TRUE(board.interrupts.level(Interrupt::adc));
@@ -343,8 +333,8 @@ TEST(AdcModel, RefusesWhatIsNotModelled) {
   EXPECT_THROW(board.set(1, jsqr, 1U << 22), RefusedAccess);
   EXPECT_THROW(board.set(1, sr, 1U << 6), RefusedAccess);
   EXPECT_THROW(board.get(1, 0x50), RefusedAccess);
-  EXPECT_THROW(board.model.read({0x400, 4, board.now}), RefusedAccess);
-  EXPECT_THROW(board.model.read({sr, 2, board.now}), RefusedAccess);
+  EXPECT_THROW(board.read(0x400), RefusedAccess);
+  EXPECT_THROW(board.read(sr, 2), RefusedAccess);
   board.switch_on(1);
   board.set(1, cr2, adon | jswstart);
   EXPECT_THROW(board.set(1, smpr2, 1), RefusedAccess) << "a sampling time while it samples";
@@ -357,7 +347,7 @@ TEST(AdcModel, ResetStopsAndClears) {
   board.set(2, jsqr, 10U << 15);
   board.switch_on(2, triggered);
   board.model.trigger_injected(board.now);
-  board.run_until(board.now + 15 * cycle);
+  board.run(15 * cycle);
   board.model.trigger_injected(board.now);
   board.model.reset(board.now);
   EXPECT_FALSE(board.interrupts.level(Interrupt::adc));

@@ -2,19 +2,15 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <cstddef>
-
 #include "drivers/stm32f4/current_sampling.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::current_sampling_on_model_test {
 namespace {
 
 using drivers::stm32f4::adc_stride;
-using drivers::stm32f4::AdcCommonRegisters;
-using drivers::stm32f4::AdcRegisters;
 using drivers::stm32f4::CurrentSample;
 using drivers::stm32f4::Interrupt;
 using testing::RegisterOnModel;
@@ -22,24 +18,10 @@ using testing::RegisterOnModel;
 constexpr BoardTime period = 25 * units_per_microsecond;
 
 struct AdcOnModel {
-  AdcOnModel(Peripheral& model, std::uint32_t base, const BoardTime& now)
-      : sr{model, base + offsetof(AdcRegisters, sr), now},
-        cr1{model, base + offsetof(AdcRegisters, cr1), now},
-        cr2{model, base + offsetof(AdcRegisters, cr2), now},
-        smpr1{model, base + offsetof(AdcRegisters, smpr1), now},
-        smpr2{model, base + offsetof(AdcRegisters, smpr2), now},
-        jsqr{model, base + offsetof(AdcRegisters, jsqr), now},
-        jdr{{model, base + offsetof(AdcRegisters, jdr), now},
-            {model, base + offsetof(AdcRegisters, jdr) + 4, now},
-            {model, base + offsetof(AdcRegisters, jdr) + 8, now},
-            {model, base + offsetof(AdcRegisters, jdr) + 12, now}} {}
-  RegisterOnModel sr, cr1, cr2, smpr1, smpr2, jsqr;
-  RegisterOnModel jdr[4];
+  RegisterOnModel sr, cr1, cr2, smpr1, smpr2, jofr[4], htr, ltr, sqr[3], jsqr, jdr[4];
 };
 struct CommonOnModel {
-  CommonOnModel(Peripheral& model, const BoardTime& now)
-      : ccr{model, 3 * adc_stride + offsetof(AdcCommonRegisters, ccr), now} {}
-  RegisterOnModel ccr;
+  RegisterOnModel csr, ccr;
 };
 
 /// The codes that the world shows at a channel: what it is, and in which trigger period it was held.
@@ -47,8 +29,8 @@ std::uint32_t code_at(unsigned channel, BoardTime instant, BoardTime first_trigg
   return channel * 256 + static_cast<std::uint32_t>((instant - first_trigger) / period % 256);
 }
 
-struct Board {
-  Board() {
+struct Board : testing::ModelBench {
+  Board() : ModelBench({&model}) {
     clocks.apb2 = units_per_period(84'000'000);
     EXPECT_TRUE(sampling.configure(84'000'000));
     now += drivers::stm32f4::adc_stabilization_us * units_per_microsecond;
@@ -56,34 +38,24 @@ struct Board {
     first_trigger = now + period;
   }
 
-  /// Trigger number `n` (even: axis 0), and the time until the interrupt asks.
+  /// Trigger number `n` (even: axis 0).
   void trigger(unsigned n) {
     run_until(first_trigger + n * period);
     model.trigger_injected(now);
-  }
-  void run_until(BoardTime end) {
-    while (model.next_event() <= end) {
-      now = model.next_event();
-      model.advance(now);
-      ++events;
-    }
-    now = end;
   }
   std::uint32_t expected(unsigned channel, unsigned n) const {
     return code_at(channel, first_trigger + n * period, first_trigger);
   }
   static constexpr unsigned phase_b[] = {10, 13}, phase_c[] = {11, 12};
 
-  BoardClocks clocks;
-  BoardTime now = 1000;
   BoardTime first_trigger = 0;
-  unsigned events = 0;
-  testing::RecordedInterrupts interrupts;
   AdcModel model{clocks, interrupts, [this](unsigned channel, BoardTime instant) {
                    return code_at(channel, instant, first_trigger) * 3.3 / 4096;
                  }};
-  AdcOnModel adc1{model, 0, now}, adc2{model, adc_stride, now}, adc3{model, 2 * adc_stride, now};
-  CommonOnModel common{model, now};
+  AdcOnModel adc1 = block_on_model<AdcOnModel>(*this, model);
+  AdcOnModel adc2 = block_on_model<AdcOnModel>(*this, model, adc_stride);
+  AdcOnModel adc3 = block_on_model<AdcOnModel>(*this, model, 2 * adc_stride);
+  CommonOnModel common = block_on_model<CommonOnModel>(*this, model, 3 * adc_stride);
   drivers::stm32f4::CurrentSampling<AdcOnModel, CommonOnModel> sampling{adc1, adc2, adc3, common};
 };
 
@@ -97,11 +69,11 @@ TEST(CurrentSamplingOnModel, ThousandsOfTriggersNeverSwapTheAxes) {
   Board board;
   for (unsigned n = 0; n < 10'000; ++n) {
     board.trigger(n);
-    board.run_until(board.now + 15 * 16 - 1);
+    board.run(15 * 16 - 1);
     ASSERT_FALSE(board.interrupts.level(Interrupt::adc)) << n;
-    board.run_until(board.now + 1);
+    board.run(1);
     ASSERT_TRUE(board.interrupts.level(Interrupt::adc)) << "0.71 us after the trigger";
-    board.run_until(board.now + 168);  // entry of the handler
+    board.run(168);  // entry of the handler
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n));
     ASSERT_FALSE(board.interrupts.level(Interrupt::adc));
@@ -127,7 +99,7 @@ TEST(CurrentSamplingOnModel, InterruptThatIsLateButInTimeLosesNothing) {
   Board board;
   for (unsigned n = 0; n < 1000; ++n) {
     board.trigger(n);
-    board.run_until(board.now + (n % 3 == 0 ? 24 * units_per_microsecond : units_per_microsecond));
+    board.run((n % 3 == 0 ? 24 * units_per_microsecond : units_per_microsecond));
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n));
     ASSERT_LE(sample.slow_age, 1U);
@@ -141,12 +113,12 @@ TEST(CurrentSamplingOnModel, InterruptAfterTheNextTriggerIsCountedAndNothingWron
     Board board;
     for (unsigned n = 0; n < 4; ++n) {
       board.trigger(n);
-      board.run_until(board.now + units_per_microsecond);
+      board.run(units_per_microsecond);
       board.sampling.ISR_read(n % 2);
     }
     board.trigger(4);
     board.trigger(5);
-    board.run_until(board.now + late);
+    board.run(late);
     EXPECT_FALSE(board.sampling.ISR_read(1).valid) << late;
     EXPECT_GE(board.sampling.counters().overruns, 1U) << late;
     // Where the late handler ran into the conversion, that one ends now and asks again.
@@ -156,7 +128,7 @@ TEST(CurrentSamplingOnModel, InterruptAfterTheNextTriggerIsCountedAndNothingWron
     }
     for (unsigned n = 6; n < 12; ++n) {
       board.trigger(n);
-      board.run_until(board.now + units_per_microsecond);
+      board.run(units_per_microsecond);
       const CurrentSample sample = board.sampling.ISR_read(n % 2);
       ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n)) << late;
     }
@@ -172,7 +144,7 @@ RC_GTEST_PROP(CurrentSamplingOnModel, ValidMeansRight, ()) {
   int last = -1;
   for (unsigned n = 0; n < served.size(); ++n) {
     board.trigger(n);
-    board.run_until(board.now + units_per_microsecond);
+    board.run(units_per_microsecond);
     if (!served[n]) continue;
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     if (sample.valid) {
@@ -188,12 +160,12 @@ RC_GTEST_PROP(CurrentSamplingOnModel, ValidMeansRight, ()) {
 TEST(CurrentSamplingOnModel, StartedAtTheWrongPhaseHealsWithTheSecondSample) {
   Board board;
   board.trigger(1);  // axis 1 comes first, the list of axis 0 is in force
-  board.run_until(board.now + units_per_microsecond);
+  board.run(units_per_microsecond);
   EXPECT_FALSE(board.sampling.ISR_read(1).valid);
   EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
   EXPECT_EQ(board.sampling.counters().overruns, 0U);
   board.trigger(2);
-  board.run_until(board.now + units_per_microsecond);
+  board.run(units_per_microsecond);
   expect_sample_of(board, board.sampling.ISR_read(0), 2);
 }
 
@@ -201,11 +173,11 @@ TEST(CurrentSamplingOnModel, StopIsQuietAndStartComesBack) {
   Board board;
   board.sampling.stop();
   board.trigger(0);
-  board.run_until(board.now + 10 * units_per_microsecond);
+  board.run(10 * units_per_microsecond);
   EXPECT_FALSE(board.interrupts.level(Interrupt::adc));
   board.sampling.start(1);
   board.trigger(1);
-  board.run_until(board.now + units_per_microsecond);
+  board.run(units_per_microsecond);
   expect_sample_of(board, board.sampling.ISR_read(1), 1);
 }
 

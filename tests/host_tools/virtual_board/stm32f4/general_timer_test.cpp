@@ -1,5 +1,5 @@
-// Against RM0090, chapter General-purpose timers (TIM2 to TIM5); section titles stand with the tests.
-
+// Against RM0090, chapter General-purpose timers (TIM2 to TIM5); section titles stand with the tests. And the
+// encoders' driver on the models.
 #include "host_tools/virtual_board/stm32f4/general_timer.hpp"
 
 #include <gtest/gtest.h>
@@ -7,17 +7,17 @@
 
 #include <limits>
 #include <stdexcept>
-#include <string>
+#include <vector>
 
+#include "control/count_extender.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
+#include "drivers/stm32f4/quadrature_timer.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::general_timer_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
-using testing::RecordedInterrupts;
-using testing::run_until;
 using testing::TimerOnModel;
 
 constexpr std::uint32_t cen = 1U << 0, urs = 1U << 2, dir = 1U << 4, arpe = 1U << 7;
@@ -25,13 +25,10 @@ constexpr std::uint32_t cc1p = 1U << 1, cc2p = 1U << 5, cc4e = 1U << 12, cc4p = 
 constexpr std::uint32_t cc4if = 1U << 4, cc4of = 1U << 12;
 constexpr BoardTime tick = 4;  // 84 MHz
 
-struct Bench {
+struct Bench : testing::ModelBench {
   explicit Bench(GeneralTimer unit = GeneralTimer::tim3)
-      : model(unit, clocks, interrupts), timer(model, now) {}
-  static BoardClocks at_84_mhz() {
-    BoardClocks fast;
-    fast.apb1_timer = tick;
-    return fast;
+      : ModelBench({&model}, 500), model(unit, clocks, interrupts) {
+    clocks.apb1_timer = tick;
   }
   void encoder(std::uint32_t polarity = 0) {
     timer.ccmr[0] = 0x4141;
@@ -39,16 +36,12 @@ struct Bench {
     timer.smcr = 3;
     timer.cr1 = cen;
   }
-  void run(BoardTime duration) { run_until(now, now + duration, model); }
   std::uint32_t cnt() { return static_cast<std::uint32_t>(timer.cnt); }
   std::uint32_t sr() { return static_cast<std::uint32_t>(timer.sr); }
   bool down() { return (static_cast<std::uint32_t>(timer.cr1) & dir) != 0; }
 
-  BoardTime now = 500;
-  BoardClocks clocks = at_84_mhz();
-  RecordedInterrupts interrupts;
   GeneralTimerModel model;
-  TimerOnModel timer;
+  TimerOnModel timer = block_on_model<TimerOnModel>(*this, model);
 };
 
 // "Encoder interface mode": between 0 and ARR, both ways round.
@@ -310,8 +303,8 @@ TEST(GeneralTimerModel, RefusesWhatIsNotModelled) {
     b.timer.arr = 10;
     b.timer.cnt = 11;
   });
-  refused([](Bench& b) { b.model.read({0x24, 2, b.now}); });
-  refused([](Bench& b) { b.model.read({0x50, 4, b.now}); });  // OR
+  refused([](Bench& b) { b.read(0x24, 2); });
+  refused([](Bench& b) { b.read(0x50); });  // OR
 }
 
 TEST(GeneralTimerModel, ResetStopsAndForgets) {
@@ -327,6 +320,58 @@ TEST(GeneralTimerModel, ResetStopsAndForgets) {
   bench.run(1000);
   EXPECT_EQ(bench.cnt(), 0U);
   EXPECT_EQ(bench.model.next_event(), never);
+}
+
+// drivers/stm32f4/quadrature_timer.hpp on the models of TIM3 and TIM2.
+template <typename Counter = std::uint16_t>
+struct Encoder : Bench {
+  Encoder() : Bench(sizeof(Counter) == 2 ? GeneralTimer::tim3 : GeneralTimer::tim2) {}
+  drivers::stm32f4::QuadratureTimer<TimerOnModel, Counter> encoder{timer};
+};
+
+TEST(QuadratureTimerOnModel, WrapsBothWays) {
+  Encoder bench;
+  ASSERT_TRUE(bench.encoder.configure({}));
+  bench.model.set_encoder_count(-1);
+  EXPECT_EQ(bench.encoder.count(), 65535);
+  bench.model.set_encoder_count(0);
+  EXPECT_EQ(bench.encoder.count(), 0);
+  bench.model.set_encoder_count(65537);
+  EXPECT_EQ(bench.encoder.count(), 1);
+}
+
+TEST(QuadratureTimerOnModel, ThirtyTwoBits) {
+  Encoder<std::uint32_t> bench;
+  ASSERT_TRUE(bench.encoder.configure({}));
+  bench.model.set_encoder_count(-1);
+  EXPECT_EQ(bench.encoder.count(), 0xFFFF'FFFFU);
+  bench.model.set_encoder_count(70'000);
+  EXPECT_EQ(bench.encoder.count(), 70'000U);
+}
+
+RC_GTEST_PROP(QuadratureTimerOnModel, ExtendedCountFollowsAnyMotion, (bool reversed)) {
+  const auto steps = *rc::gen::container<std::vector<int>>(rc::gen::inRange(-32767, 32768));
+  Encoder bench;
+  RC_ASSERT(bench.encoder.configure({.reversed = reversed}));
+  control::CountExtender<std::uint16_t> extender;
+  extender.reset(bench.encoder.count());
+  std::int64_t position = 0;
+  for (const int step : steps) {
+    position += step;
+    bench.model.set_encoder_count(position);
+    RC_ASSERT(extender.update(bench.encoder.count()) == (reversed ? -position : position));
+  }
+}
+
+// The counter starts at 0 even when the last movement was backwards (UG would load ARR then).
+TEST(QuadratureTimerOnModel, ConfiguredAgainItStartsAtZero) {
+  Encoder bench;
+  ASSERT_TRUE(bench.encoder.configure({}));
+  bench.model.set_encoder_count(-300);
+  ASSERT_TRUE(bench.encoder.configure({}));
+  EXPECT_EQ(bench.encoder.count(), 0);
+  bench.model.set_encoder_count(-299);
+  EXPECT_EQ(bench.encoder.count(), 1);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "drivers/stm32f4/gpio.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/register_on_model.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::gpio_port_test {
 namespace {
@@ -21,14 +21,9 @@ constexpr std::uint32_t moder = offsetof(Registers, moder), otyper = offsetof(Re
                         pupdr = offsetof(Registers, pupdr), idr = offsetof(Registers, idr),
                         odr = offsetof(Registers, odr), bsrr = offsetof(Registers, bsrr);
 
-struct Port {
-  explicit Port(GpioPort which = GpioPort::c) : model(which) {}
+struct Port : testing::ModelBench {
+  explicit Port(GpioPort which = GpioPort::c) : ModelBench({&model}, 5), model(which) {}
   GpioPortModel model;
-
-  std::uint32_t get(std::uint32_t offset, unsigned bytes = 4) { return model.read({offset, bytes, 5}); }
-  void set(std::uint32_t offset, std::uint32_t value, unsigned bytes = 4) {
-    model.write({offset, bytes, 5}, value);
-  }
 };
 
 TEST(GpioPortModel, GpioRegisters_ResetValuesOfEachPort) {
@@ -40,19 +35,19 @@ TEST(GpioPortModel, GpioRegisters_ResetValuesOfEachPort) {
                          Row{GpioPort::c, 0, 0, 0}, Row{GpioPort::d, 0, 0, 0}}) {
     Port port{row.port};
     for (int round = 0; round < 2; ++round) {
-      EXPECT_EQ(port.get(moder), row.moder);
-      EXPECT_EQ(port.get(offsetof(Registers, ospeedr)), row.ospeedr);
-      EXPECT_EQ(port.get(pupdr), row.pupdr);
+      EXPECT_EQ(port.read(moder), row.moder);
+      EXPECT_EQ(port.read(offsetof(Registers, ospeedr)), row.ospeedr);
+      EXPECT_EQ(port.read(pupdr), row.pupdr);
       for (const std::size_t offset : {offsetof(Registers, otyper), offsetof(Registers, odr),
                                        offsetof(Registers, afr), offsetof(Registers, afr) + 4}) {
-        EXPECT_EQ(port.get(static_cast<std::uint32_t>(offset)), 0U) << offset;
+        EXPECT_EQ(port.read(static_cast<std::uint32_t>(offset)), 0U) << offset;
       }
-      port.set(moder, 0x5555'5555);
-      port.set(odr, 0xFFFF);
-      port.set(pupdr, 0);
-      port.set(offsetof(Registers, ospeedr), 0xFFFF'FFFF);
-      port.set(offsetof(Registers, afr) + 4, 0x1234'5678);
-      port.set(otyper, 0xF0F0);
+      port.write(moder, 0x5555'5555);
+      port.write(odr, 0xFFFF);
+      port.write(pupdr, 0);
+      port.write(offsetof(Registers, ospeedr), 0xFFFF'FFFF);
+      port.write(offsetof(Registers, afr) + 4, 0x1234'5678);
+      port.write(otyper, 0xF0F0);
       port.model.reset(9);
     }
   }
@@ -60,7 +55,7 @@ TEST(GpioPortModel, GpioRegisters_ResetValuesOfEachPort) {
 
 TEST(GpioPortModel, GpioRegisters_DebugPinsPullAsTheyComeOutOfReset) {
   Port port{GpioPort::a};
-  EXPECT_EQ(port.get(idr), 1U << 13 | 1U << 15) << "SWDIO and JTDI up, SWCLK down";
+  EXPECT_EQ(port.read(idr), 1U << 13 | 1U << 15) << "SWDIO and JTDI up, SWCLK down";
   EXPECT_EQ(port.model.mode(13), GpioMode::alternate);
   EXPECT_EQ(port.model.mode(0), GpioMode::input);
 }
@@ -69,63 +64,63 @@ TEST(GpioPortModel, InputConfiguration_FloatingInputIsDecidedByThePull) {
   Port port{GpioPort::d};
   EXPECT_TRUE(port.model.floats(2));
   EXPECT_FALSE(port.model.level(2));
-  port.set(pupdr, 1U << 4);
-  EXPECT_EQ(port.get(idr), 1U << 2) << "nFAULT open, pull-up";
+  port.write(pupdr, 1U << 4);
+  EXPECT_EQ(port.read(idr), 1U << 2) << "nFAULT open, pull-up";
   EXPECT_FALSE(port.model.floats(2));
   port.model.drive(2, PinDrive::low, 6);
-  EXPECT_EQ(port.get(idr), 0U);
+  EXPECT_EQ(port.read(idr), 0U);
   port.model.drive(2, PinDrive::floating, 7);
-  EXPECT_EQ(port.get(idr), 1U << 2);
-  port.set(pupdr, 2U << 4);
-  EXPECT_EQ(port.get(idr), 0U);
+  EXPECT_EQ(port.read(idr), 1U << 2);
+  port.write(pupdr, 2U << 4);
+  EXPECT_EQ(port.read(idr), 0U);
   EXPECT_FALSE(port.model.floats(2));
   port.model.drive(2, PinDrive::high, 8);
-  EXPECT_EQ(port.get(idr), 1U << 2);
+  EXPECT_EQ(port.read(idr), 1U << 2);
 }
 
 TEST(GpioPortModel, InputConfiguration_ResistorOnTheBoardBeatsThePullInside) {
   Port port;
-  port.set(pupdr, 2U);
+  port.write(pupdr, 2U);
   port.model.drive(0, PinDrive::pulled_up, 1);
   EXPECT_TRUE(port.model.level(0));
-  port.set(pupdr, 1U);
+  port.write(pupdr, 1U);
   port.model.drive(0, PinDrive::pulled_down, 1);
   EXPECT_FALSE(port.model.level(0));
-  port.set(odr, 1);
-  port.set(moder, 1);
+  port.write(odr, 1);
+  port.write(moder, 1);
   EXPECT_TRUE(port.model.level(0)) << "an output beats a resistor";
 }
 
 TEST(GpioPortModel, OutputConfiguration_PushPullAndOpenDrain) {
   Port port;
-  port.set(moder, 1U << 10);
+  port.write(moder, 1U << 10);
   EXPECT_EQ(port.model.output(5), PinOutput::low);
-  port.set(bsrr, 1U << 5);
+  port.write(bsrr, 1U << 5);
   EXPECT_EQ(port.model.output(5), PinOutput::high);
-  EXPECT_EQ(port.get(idr), 1U << 5) << "the input buffer stays on";
-  port.set(otyper, 1U << 5);
+  EXPECT_EQ(port.read(idr), 1U << 5) << "the input buffer stays on";
+  port.write(otyper, 1U << 5);
   EXPECT_EQ(port.model.output(5), PinOutput::released);
   EXPECT_TRUE(port.model.floats(5));
-  port.set(pupdr, 1U << 10);
+  port.write(pupdr, 1U << 10);
   EXPECT_TRUE(port.model.level(5));
   port.model.drive(5, PinDrive::low, 6);
   EXPECT_FALSE(port.model.level(5)) << "wired or";
-  port.set(bsrr, 1U << 21);
+  port.write(bsrr, 1U << 21);
   EXPECT_EQ(port.model.output(5), PinOutput::low);
 }
 
 TEST(GpioPortModel, OutputConfiguration_ShortCircuitIsRefused) {
   Port port;
   port.model.drive(5, PinDrive::high, 1);
-  EXPECT_THROW(port.set(moder, 1U << 10), RefusedAccess);
+  EXPECT_THROW(port.write(moder, 1U << 10), RefusedAccess);
   Port other;
-  other.set(moder, 1U << 10);
+  other.write(moder, 1U << 10);
   EXPECT_NO_THROW(other.model.drive(5, PinDrive::low, 1));
   EXPECT_THROW(other.model.drive(5, PinDrive::high, 1), RefusedAccess);
   Port drain;
-  drain.set(otyper, 1U << 5);
-  drain.set(odr, 1U << 5);
-  drain.set(moder, 1U << 10);
+  drain.write(otyper, 1U << 5);
+  drain.write(odr, 1U << 5);
+  drain.write(moder, 1U << 10);
   EXPECT_NO_THROW(drain.model.drive(5, PinDrive::low, 1)) << "an open drain that is off is no short circuit";
 }
 
@@ -133,14 +128,14 @@ TEST(GpioPortModel, AlternateFunctionConfiguration_PeripheralDrivesThePin) {
   Port port{GpioPort::b};
   port.model.drive_alternate(13, PinOutput::high, 1);
   EXPECT_EQ(port.model.output(13), PinOutput::released) << "still an input";
-  port.set(offsetof(Registers, afr) + 4, 1U << 20);
-  port.set(moder, 0x280U | 2U << 26);
+  port.write(offsetof(Registers, afr) + 4, 1U << 20);
+  port.write(moder, 0x280U | 2U << 26);
   EXPECT_EQ(port.model.output(13), PinOutput::high);
   EXPECT_EQ(port.model.alternate_function(13), 1U);
   EXPECT_EQ(port.model.alternate_function(12), 0U);
   port.model.drive_alternate(13, PinOutput::low, 2);
   EXPECT_FALSE(port.model.level(13));
-  port.set(odr, 1U << 13);
+  port.write(odr, 1U << 13);
   EXPECT_FALSE(port.model.level(13)) << "ODR has no say";
   port.model.reset(3);
   EXPECT_EQ(port.model.output(13), PinOutput::released);
@@ -149,49 +144,49 @@ TEST(GpioPortModel, AlternateFunctionConfiguration_PeripheralDrivesThePin) {
 TEST(GpioPortModel, AnalogConfiguration_ReadsZeroAndDoesNotPull) {
   Port port;
   port.model.drive(1, PinDrive::high, 1);
-  port.set(moder, 3U << 2);
-  EXPECT_EQ(port.get(idr), 0U);
+  port.write(moder, 3U << 2);
+  EXPECT_EQ(port.read(idr), 0U);
   port.model.drive(1, PinDrive::floating, 1);
-  port.set(pupdr, 1U << 2);
+  port.write(pupdr, 1U << 2);
   EXPECT_TRUE(port.model.floats(1));
-  port.set(moder, 0);
-  EXPECT_EQ(port.get(idr), 2U);
+  port.write(moder, 0);
+  EXPECT_EQ(port.read(idr), 2U);
 }
 
 TEST(GpioPortModel, BitSetResetRegister_SetWinsAndZeroLeavesAlone) {
   Port port;
-  port.set(odr, 0x00F0);
-  port.set(bsrr, 0x0030'0011U);
-  EXPECT_EQ(port.get(odr), 0x00D1U) << "pins 4 set and reset: set wins";
-  EXPECT_EQ(port.get(bsrr), 0U) << "write only";
+  port.write(odr, 0x00F0);
+  port.write(bsrr, 0x0030'0011U);
+  EXPECT_EQ(port.read(odr), 0x00D1U) << "pins 4 set and reset: set wins";
+  EXPECT_EQ(port.read(bsrr), 0U) << "write only";
 }
 
 TEST(GpioPortModel, GpioRegisters_ByteAndHalfWordAccess) {
   Port port;
-  port.set(moder, 0x5555'5555);
-  port.set(odr, 0xA5, 1);
-  port.set(odr + 1, 0x3C, 1);
-  EXPECT_EQ(port.get(odr), 0x3CA5U);
-  EXPECT_EQ(port.get(idr + 1, 1), 0x3CU);
-  EXPECT_EQ(port.get(idr, 2), 0x3CA5U);
-  port.set(bsrr + 2, 0x00FF, 2);
-  EXPECT_EQ(port.get(odr), 0x3C00U) << "the upper half resets";
-  port.set(bsrr + 1, 0x03, 1);
-  EXPECT_EQ(port.get(odr), 0x3F00U);
-  EXPECT_THROW(port.set(moder, 0, 2), RefusedAccess);
-  EXPECT_THROW(port.get(pupdr, 1), RefusedAccess);
+  port.write(moder, 0x5555'5555);
+  port.write(odr, 0xA5, 1);
+  port.write(odr + 1, 0x3C, 1);
+  EXPECT_EQ(port.read(odr), 0x3CA5U);
+  EXPECT_EQ(port.read(idr + 1, 1), 0x3CU);
+  EXPECT_EQ(port.read(idr, 2), 0x3CA5U);
+  port.write(bsrr + 2, 0x00FF, 2);
+  EXPECT_EQ(port.read(odr), 0x3C00U) << "the upper half resets";
+  port.write(bsrr + 1, 0x03, 1);
+  EXPECT_EQ(port.read(odr), 0x3F00U);
+  EXPECT_THROW(port.write(moder, 0, 2), RefusedAccess);
+  EXPECT_THROW(port.read(pupdr, 1), RefusedAccess);
 }
 
 TEST(GpioPortModel, RefusesWhatIsNotModelled) {
   Port port;
-  EXPECT_THROW(port.set(offsetof(Registers, lckr), 0x1'0001), RefusedAccess);
-  EXPECT_THROW(port.get(offsetof(Registers, lckr)), RefusedAccess);
-  EXPECT_THROW(port.set(idr, 0), RefusedAccess);
-  EXPECT_THROW(port.set(pupdr, 3U << 6), RefusedAccess);
-  EXPECT_THROW(port.set(odr, 0x1'0000), RefusedAccess);
-  EXPECT_THROW(port.set(otyper, 0x1'0000), RefusedAccess);
-  EXPECT_THROW(port.get(0x28), RefusedAccess);
-  EXPECT_THROW(port.set(0x28, 0), RefusedAccess);
+  EXPECT_THROW(port.write(offsetof(Registers, lckr), 0x1'0001), RefusedAccess);
+  EXPECT_THROW(port.read(offsetof(Registers, lckr)), RefusedAccess);
+  EXPECT_THROW(port.write(idr, 0), RefusedAccess);
+  EXPECT_THROW(port.write(pupdr, 3U << 6), RefusedAccess);
+  EXPECT_THROW(port.write(odr, 0x1'0000), RefusedAccess);
+  EXPECT_THROW(port.write(otyper, 0x1'0000), RefusedAccess);
+  EXPECT_THROW(port.read(0x28), RefusedAccess);
+  EXPECT_THROW(port.write(0x28, 0), RefusedAccess);
 }
 
 struct Change {
@@ -210,10 +205,10 @@ TEST(GpioPortModel, TellsChangesOnce) {
   port.model.on_input_change([&](unsigned pin, bool level, BoardTime now) {
     inputs.push_back({pin, level, now});
   });
-  port.set(bsrr, 1U << 3);
+  port.write(bsrr, 1U << 3);
   EXPECT_TRUE(outputs.empty()) << "not an output yet";
-  port.set(moder, 1U << 6);
-  port.set(bsrr, 1U << 3);
+  port.write(moder, 1U << 6);
+  port.write(bsrr, 1U << 3);
   port.model.drive(7, PinDrive::high, 11);
   port.model.drive(7, PinDrive::high, 12);
   port.model.drive(7, PinDrive::pulled_up, 13);
@@ -245,34 +240,24 @@ TEST(GpioPortModel, ListenerMayDriveBack) {
   });
   port.model.on_input_change(
       [&](unsigned pin, bool level, BoardTime) { seen = level ? seen | 1U << pin : seen & ~(1U << pin); });
-  port.set(moder, 1U << 4);
+  port.write(moder, 1U << 4);
   for (const std::uint32_t word : {1U << 2, 1U << 18, 1U << 2}) {
-    port.set(bsrr, word);
-    EXPECT_EQ(seen, port.get(idr));
+    port.write(bsrr, word);
+    EXPECT_EQ(seen, port.read(idr));
   }
   EXPECT_EQ(seen, 1U << 2 | 1U << 1);
 }
 
 // drivers/stm32f4/gpio.hpp against this model.
-struct PortRegisters {
-  PortRegisters(Peripheral& model, const BoardTime& now)
-      : moder{model, offsetof(Registers, moder), now},
-        otyper{model, offsetof(Registers, otyper), now},
-        ospeedr{model, offsetof(Registers, ospeedr), now},
-        pupdr{model, offsetof(Registers, pupdr), now},
-        idr{model, offsetof(Registers, idr), now},
-        bsrr{model, offsetof(Registers, bsrr), now},
-        afr{{model, offsetof(Registers, afr), now}, {model, offsetof(Registers, afr) + 4, now}} {}
-  testing::RegisterOnModel moder, otyper, ospeedr, pupdr, idr, bsrr;
-  testing::RegisterOnModel afr[2];
+struct PortOnModel {
+  testing::RegisterOnModel moder, otyper, ospeedr, pupdr, idr, odr, bsrr, lckr, afr[2];
 };
 
 TEST(GpioPortModel, DriverNeverShowsAWrongLevelOnTheWay) {
-  BoardTime now = 5;
-  GpioPortModel model{GpioPort::b};
-  PortRegisters registers{model, now};
+  Port port{GpioPort::b};
+  auto registers = testing::block_on_model<PortOnModel>(port, port.model);
   std::vector<PinOutput> seen;
-  model.on_output_change([&](unsigned, PinOutput output, BoardTime) { seen.push_back(output); });
+  port.model.on_output_change([&](unsigned, PinOutput output, BoardTime) { seen.push_back(output); });
   drivers::stm32f4::GpioPin pin{registers, 12};
   pin.configure({.mode = GpioMode::output, .initial_level = true});
   EXPECT_EQ(seen, std::vector{PinOutput::high});

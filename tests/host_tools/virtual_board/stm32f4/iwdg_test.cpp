@@ -1,10 +1,15 @@
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <cstddef>
 #include <optional>
 #include <stdexcept>
+
+#include "drivers/stm32f4/independent_watchdog.hpp"
+#include "host_tools/virtual_board/stm32f4/device_identity.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 // RM0090, chapter Independent watchdog (IWDG).
 
@@ -17,32 +22,24 @@ using stm32::IwdgRegisters;
 constexpr BoardTime lsi_cycle = units_per_second / 32'000;  // 10,500: exact
 constexpr std::uint32_t start = 0xCCCC, unlock = 0x5555, reload = 0xAAAA;
 
-struct Watchdog {
-  IwdgModel model;
-  BoardTime now = 777;
-  std::optional<BoardTime> fired;
-  Watchdog() {
+struct Watchdog : testing::ModelBench {
+  Watchdog() : ModelBench({&model}, 777) {
     model.on_reset([this](BoardTime at) { fired = at; });
   }
-  void put(std::size_t offset, std::uint32_t word) {
-    model.write({static_cast<std::uint32_t>(offset), 4, now}, word);
-  }
-  std::uint32_t get(std::size_t offset) { return model.read({static_cast<std::uint32_t>(offset), 4, now}); }
-  void key(std::uint32_t word) { put(offsetof(IwdgRegisters, kr), word); }
-  std::uint32_t status() { return get(offsetof(IwdgRegisters, sr)); }
-  void pass(BoardTime duration) {
-    now += duration;
-    model.advance(now);
-  }
+  void key(std::uint32_t word) { write(offsetof(IwdgRegisters, kr), word); }
+  std::uint32_t status() { return read(offsetof(IwdgRegisters, sr)); }
+
+  IwdgModel model;
+  std::optional<BoardTime> fired;
 };
 
 TEST(Iwdg, ResetValuesAndNothingHappensUnstarted) {
   Watchdog watchdog;
-  EXPECT_EQ(watchdog.get(offsetof(IwdgRegisters, pr)), 0U);
-  EXPECT_EQ(watchdog.get(offsetof(IwdgRegisters, rlr)), 0xFFFU);
+  EXPECT_EQ(watchdog.read(offsetof(IwdgRegisters, pr)), 0U);
+  EXPECT_EQ(watchdog.read(offsetof(IwdgRegisters, rlr)), 0xFFFU);
   EXPECT_EQ(watchdog.status(), 0U);
   EXPECT_EQ(watchdog.model.next_event(), never);
-  watchdog.pass(100 * units_per_second);
+  watchdog.run(100 * units_per_second);
   EXPECT_FALSE(watchdog.fired);
 }
 
@@ -53,9 +50,9 @@ TEST(Iwdg, FiresAtTheExactCycleAndNotBefore) {
   const BoardTime due = watchdog.now + 4096 * 4 * lsi_cycle;
   EXPECT_EQ(watchdog.model.next_event(), due);
   EXPECT_DOUBLE_EQ(seconds(due - watchdog.now), 0.512);
-  watchdog.pass(due - watchdog.now - 1);
+  watchdog.run(due - watchdog.now - 1);
   EXPECT_FALSE(watchdog.fired);
-  watchdog.pass(1);
+  watchdog.run(1);
   EXPECT_EQ(watchdog.fired, due);
   EXPECT_EQ(watchdog.model.next_event(), never) << "once";
 }
@@ -64,13 +61,13 @@ TEST(Iwdg, ReloadStartsThePeriodAnew) {
   Watchdog watchdog;
   watchdog.key(start);
   for (int feed = 0; feed < 10; ++feed) {
-    watchdog.pass(4095 * 4 * lsi_cycle);
+    watchdog.run(4095 * 4 * lsi_cycle);
     watchdog.key(reload);
   }
   EXPECT_FALSE(watchdog.fired);
   watchdog.key(start);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now + 4096 * 4 * lsi_cycle) << "starting twice is no feed";
-  watchdog.pass(1000);
+  watchdog.run(1000);
   watchdog.key(start);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now - 1000 + 4096 * 4 * lsi_cycle);
 }
@@ -78,30 +75,30 @@ TEST(Iwdg, ReloadStartsThePeriodAnew) {
 // Section Register access protection.
 TEST(Iwdg, SettingsNeedTheKeyAndAnyOtherKeyTakesItBack) {
   Watchdog watchdog;
-  EXPECT_THROW(watchdog.put(offsetof(IwdgRegisters, pr), 1), RefusedAccess);
+  EXPECT_THROW(watchdog.write(offsetof(IwdgRegisters, pr), 1), RefusedAccess);
   watchdog.key(unlock);
-  EXPECT_NO_THROW(watchdog.put(offsetof(IwdgRegisters, pr), 1));
+  EXPECT_NO_THROW(watchdog.write(offsetof(IwdgRegisters, pr), 1));
   watchdog.key(reload);
-  EXPECT_THROW(watchdog.put(offsetof(IwdgRegisters, rlr), 1), RefusedAccess);
+  EXPECT_THROW(watchdog.write(offsetof(IwdgRegisters, rlr), 1), RefusedAccess);
   EXPECT_THROW(watchdog.key(0x1234), RefusedAccess);
-  EXPECT_THROW(watchdog.get(offsetof(IwdgRegisters, kr)), RefusedAccess);
+  EXPECT_THROW(watchdog.read(offsetof(IwdgRegisters, kr)), RefusedAccess);
   watchdog.key(unlock);
-  EXPECT_THROW(watchdog.put(offsetof(IwdgRegisters, rlr), 0x1000), RefusedAccess);
+  EXPECT_THROW(watchdog.write(offsetof(IwdgRegisters, rlr), 0x1000), RefusedAccess);
 }
 
 // Section Status register (IWDG_SR).
 TEST(Iwdg, UpdateTakesFiveCyclesOfARunningOscillator) {
   Watchdog watchdog;
   watchdog.key(unlock);
-  watchdog.put(offsetof(IwdgRegisters, pr), 3);
-  watchdog.put(offsetof(IwdgRegisters, rlr), 99);
-  watchdog.pass(units_per_second);
+  watchdog.write(offsetof(IwdgRegisters, pr), 3);
+  watchdog.write(offsetof(IwdgRegisters, rlr), 99);
+  watchdog.run(units_per_second);
   EXPECT_EQ(watchdog.status(), 3U) << "not started, no oscillator";
-  EXPECT_THROW(watchdog.put(offsetof(IwdgRegisters, rlr), 98), RefusedAccess);
+  EXPECT_THROW(watchdog.write(offsetof(IwdgRegisters, rlr), 98), RefusedAccess);
   watchdog.key(start);
-  watchdog.pass(5 * lsi_cycle - 1);
+  watchdog.run(5 * lsi_cycle - 1);
   EXPECT_EQ(watchdog.status(), 3U);
-  watchdog.pass(1);
+  watchdog.run(1);
   EXPECT_EQ(watchdog.status(), 0U);
   watchdog.key(reload);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now + 100 * 32 * lsi_cycle);
@@ -111,19 +108,19 @@ TEST(Iwdg, ReloadDuringTheUpdateStillTakesTheOldValue) {
   Watchdog watchdog;
   watchdog.key(start);
   watchdog.key(unlock);
-  watchdog.put(offsetof(IwdgRegisters, rlr), 9);
+  watchdog.write(offsetof(IwdgRegisters, rlr), 9);
   watchdog.key(reload);
-  watchdog.pass(6 * lsi_cycle);
+  watchdog.run(6 * lsi_cycle);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now - 6 * lsi_cycle + 4096 * 4 * lsi_cycle);
 }
 
 TEST(Iwdg, NewPrescalerKeepsTheCount) {
   Watchdog watchdog;
   watchdog.key(start);
-  watchdog.pass(2000 * 4 * lsi_cycle);
+  watchdog.run(2000 * 4 * lsi_cycle);
   watchdog.key(unlock);
-  watchdog.put(offsetof(IwdgRegisters, pr), 6);
-  watchdog.pass(5 * lsi_cycle);
+  watchdog.write(offsetof(IwdgRegisters, pr), 6);
+  watchdog.run(5 * lsi_cycle);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now + (4096 - 2001) * 256 * lsi_cycle);
 }
 
@@ -143,14 +140,79 @@ TEST(Iwdg, OscillatorSpread) {
 TEST(Iwdg, AResetStopsIt) {
   Watchdog watchdog;
   watchdog.key(start);
-  watchdog.pass(4096 * 4 * lsi_cycle);
+  watchdog.run(4096 * 4 * lsi_cycle);
   ASSERT_TRUE(watchdog.fired);
   watchdog.model.reset(watchdog.now);
   EXPECT_FALSE(watchdog.model.running());
   EXPECT_EQ(watchdog.model.next_event(), never);
-  EXPECT_EQ(watchdog.get(offsetof(IwdgRegisters, rlr)), 0xFFFU);
+  EXPECT_EQ(watchdog.read(offsetof(IwdgRegisters, rlr)), 0xFFFU);
   watchdog.key(start);
   EXPECT_EQ(watchdog.model.fires_at(), watchdog.now + 4096 * 4 * lsi_cycle);
+}
+
+// drivers/stm32f4/independent_watchdog.hpp on the models.
+struct IwdgOnModel {
+  testing::RegisterOnModel kr, pr, rlr, sr;
+};
+struct DbgmcuOnModel {
+  testing::RegisterOnModel idcode, cr, apb1_fz;
+};
+
+struct Chip : Watchdog {
+  explicit Chip(std::uint32_t lsi_hz = 32'000) {
+    now = 0;
+    access_time = 20;
+    model.set_oscillator_hz(lsi_hz);
+  }
+  DbgmcuModel debug;
+  IwdgOnModel registers = block_on_model<IwdgOnModel>(*this, model);
+  DbgmcuOnModel debug_registers = block_on_model<DbgmcuOnModel>(*this, debug);
+  stm32::IndependentWatchdog<IwdgOnModel, DbgmcuOnModel> watchdog{registers, debug_registers};
+};
+
+TEST(IndependentWatchdogOnModel, FiresAtTheComputedTimeAndNotBefore) {
+  Chip chip;
+  ASSERT_TRUE(chip.watchdog.start(1000));
+  const BoardTime fed = chip.now - chip.access_time;
+  const BoardTime due = fed + (2938 + 1) * 16 * BoardTime{10'500};
+  chip.run(due - chip.now - 1);
+  EXPECT_FALSE(chip.fired);
+  chip.run(1);
+  EXPECT_EQ(chip.fired, due);
+}
+
+RC_GTEST_PROP(IndependentWatchdogOnModel, FedInTimeItNeverFiresAndUnfedItFiresInTime, ()) {
+  const auto hz = *rc::gen::inRange<std::uint32_t>(17'000, 47'001);
+  const auto period = *rc::gen::inRange<std::uint32_t>(1, 22'001);
+  const stm32::IndependentWatchdogTiming timing = stm32::independent_watchdog_timing(period);
+  Chip chip{hz};
+  RC_ASSERT(chip.watchdog.start(timing));
+  for (int feed = 0; feed < 4; ++feed) {
+    chip.run(timing.guaranteed_not_before_us * units_per_microsecond - chip.access_time);
+    RC_ASSERT(!chip.fired);
+    chip.watchdog.feed();
+  }
+  const BoardTime fed = chip.now - chip.access_time;
+  chip.run(timing.fires_at_latest_us * units_per_microsecond);
+  RC_ASSERT(chip.fired.has_value());
+  RC_ASSERT(*chip.fired - fed >= timing.guaranteed_not_before_us * units_per_microsecond);
+  RC_ASSERT(*chip.fired - fed <= timing.fires_at_latest_us * units_per_microsecond);
+}
+
+TEST(IndependentWatchdogOnModel, StartedAgainWithAnotherPeriod) {
+  Chip chip;
+  ASSERT_TRUE(chip.watchdog.start(10'000));
+  ASSERT_TRUE(chip.watchdog.start(100));
+  chip.run(150 * 1000 * units_per_microsecond);
+  EXPECT_TRUE(chip.fired) << "1176 x 4 cycles: 147 ms";
+}
+
+TEST(IndependentWatchdogOnModel, StartIsOverWithinAMillisecond) {
+  for (const std::uint32_t hz : {17'000U, 47'000U}) {
+    Chip chip{hz};
+    ASSERT_TRUE(chip.watchdog.start(22'000));
+    EXPECT_LT(seconds(chip.now), 1e-3);
+  }
 }
 
 }  // namespace

@@ -10,42 +10,34 @@
 #include <vector>
 
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
-#include "tests/host_tools/virtual_board/stm32f4/timer_on_model.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::phase_shifted_pwm_on_model_test {
 namespace {
 
 using drivers::stm32f4::ThreePhasePwm;
 using drivers::stm32f4::ThreePhasePwmConfig;
-using testing::RecordedInterrupts;
-using testing::run_until;
 using testing::TimerOnModel;
 
 constexpr BoardTime tick = 2;
 constexpr BoardTime half_period = 4200 * tick;
 
-struct Board {
-  explicit Board(const ThreePhasePwmConfig& config = {}) : pwm1(timer1, config), pwm8(timer8, config) {
+struct Board : testing::ModelBench {
+  explicit Board(const ThreePhasePwmConfig& config = {})
+      : ModelBench({&tim1, &tim8}, 12345), pwm1(timer1, config), pwm8(timer8, config) {
+    clocks.apb2_timer = tick;
     tim1.on_trigger_output([this](BoardTime at) {
       tim8.trigger_input(at);
       triggers.push_back(at);
     });
     tim1.on_output_change([this](BoardTime at) { changes.push_back(at); });
   }
-  static BoardClocks at_168_mhz() {
-    BoardClocks fast;
-    fast.apb2_timer = tick;
-    return fast;
-  }
   bool start() { return pwm1.configure() && pwm8.configure() && start_phase_shifted(pwm1, pwm8); }
-  unsigned run(BoardTime duration) { return run_until(now, now + duration, tim1, tim8); }
 
-  BoardTime now = 12345;
-  BoardClocks clocks = at_168_mhz();
-  RecordedInterrupts interrupts;
   AdvancedTimerModel tim1{AdvancedTimer::tim1, clocks, interrupts};
   AdvancedTimerModel tim8{AdvancedTimer::tim8, clocks, interrupts};
-  TimerOnModel timer1{tim1, now}, timer8{tim8, now};
+  TimerOnModel timer1 = block_on_model<TimerOnModel>(*this, tim1);
+  TimerOnModel timer8 = block_on_model<TimerOnModel>(*this, tim8);
   ThreePhasePwm<TimerOnModel> pwm1, pwm8;
   std::vector<BoardTime> triggers, changes;
 };
@@ -68,7 +60,7 @@ TEST(PhaseShiftedPwmOnModel, TriggersAlternateBetweenTheAxes) {
   const BoardTime started = board.now;
   ASSERT_EQ(board.triggers, std::vector<BoardTime>{started}) << "one at the start, none from the loading";
   for (unsigned n = 1; n <= 10; ++n) {
-    board.run(started + n * half_period - board.now);
+    board.run_until(started + n * half_period);
     ASSERT_EQ(board.triggers.size(), n + 1);
     EXPECT_EQ(board.triggers.back(), board.now);
     const bool axis1 = n % 2 == 1;
@@ -106,7 +98,7 @@ TEST(PhaseShiftedPwmOnModel, DutyBecomesActiveAtTheNextTurnOnly) {
   const BoardTime started = board.now;
   board.run(units_per_microsecond);
   ASSERT_TRUE(board.pwm1.ISR_set_duty({0.5F, 0.25F, 1.0F}));
-  board.run(started + half_period - 1 - board.now);
+  board.run_until(started + half_period - 1);
   EXPECT_EQ(board.tim1.outputs()[0].high_duty, 0.0);
   EXPECT_TRUE(board.changes.empty());
   board.run(1);
@@ -191,13 +183,13 @@ TEST(PhaseShiftedPwmOnModel, ThreeEventsForEachPeriod) {
   Board board;
   ASSERT_TRUE(board.start());
   ASSERT_TRUE(board.pwm1.arm() && board.pwm8.arm());
-  unsigned events = 0;
+  const unsigned before = board.events;
   for (unsigned n = 0; n < 200; ++n) {
     const float duty = 0.3F + 0.001F * static_cast<float>(n);
     ASSERT_TRUE((n % 2 == 0 ? board.pwm1 : board.pwm8).ISR_set_duty({duty, duty, duty}));
-    events += board.run(half_period);
+    board.run(half_period);
   }
-  EXPECT_EQ(events, 200U) << "TIM8's updates fall on those of TIM1";
+  EXPECT_EQ(board.events - before, 200U) << "TIM8's updates fall on those of TIM1";
 }
 
 }  // namespace

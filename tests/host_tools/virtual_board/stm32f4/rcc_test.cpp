@@ -5,7 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "tests/host_tools/virtual_board/cortex_m/system_on_model.hpp"
+#include "drivers/stm32f4/clock_tree.hpp"
+#include "tests/host_tools/virtual_board/stm32f4/system_on_model.hpp"
 
 // RM0090, chapters Reset and clock control for STM32F405xx (RCC) and Power controller (PWR).
 
@@ -18,15 +19,16 @@ namespace cfgr = stm32::rcc_cfgr;
 namespace pllcfgr = stm32::rcc_pllcfgr;
 using stm32::RccRegisters;
 using stm32::ResetCause;
+using testing::RegisterOnModel;
 
 constexpr std::uint32_t full_speed_buses = cfgr::Apb1Prescaler::bits(5) | cfgr::Apb2Prescaler::bits(4);
 constexpr std::uint32_t divider_4_from_crystal = 0x0740'2A04;  // M 4, N 168, P 2, Q 7
 
 struct Chip : testing::SystemOnModel {
-  std::uint32_t get(std::size_t offset) { return bus.read(rcc, static_cast<std::uint32_t>(offset)); }
-  void put(std::size_t offset, std::uint32_t word) {
-    bus.write(rcc, static_cast<std::uint32_t>(offset), word);
+  std::uint32_t get(std::size_t offset) {
+    return static_cast<std::uint32_t>(RegisterOnModel(*this, rcc, offset));
   }
+  void put(std::size_t offset, std::uint32_t word) { RegisterOnModel(*this, rcc, offset) = word; }
   void set(std::size_t offset, std::uint32_t bits) { put(offset, get(offset) | bits); }
 
   /// The message of the refusal, "" when the write is accepted.
@@ -38,24 +40,22 @@ struct Chip : testing::SystemOnModel {
     }
     return {};
   }
-  void wait_states(std::uint32_t count) { flash_registers.acr = count; }
-
   void start_crystal() {
     set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
-    bus.pass(RccModel::crystal_start_time);
+    run(RccModel::crystal_start_time);
   }
   void start_pll(std::uint32_t setting) {
     put(offsetof(RccRegisters, pllcfgr), setting);
     set(offsetof(RccRegisters, cr), cr::PllOn::mask);
-    bus.pass(RccModel::pll_lock_time);
+    run(RccModel::pll_lock_time);
   }
   void run_at_168_mhz() {
     power_registers.cr = stm32::pwr_cr::VoltageScale1::mask;
-    wait_states(5);
+    flash_registers.acr = 5;
     start_crystal();
     start_pll(divider_4_from_crystal);
     put(offsetof(RccRegisters, cfgr), full_speed_buses | cfgr::Switch::bits(cfgr::pll));
-    bus.pass(RccModel::switch_time);
+    run(RccModel::switch_time);
   }
   std::uint32_t source() { return cfgr::SwitchStatus::of(get(offsetof(RccRegisters, cfgr))); }
 };
@@ -69,16 +69,16 @@ TEST(RccRegisterMap, ResetValues) {
   EXPECT_EQ(chip.get(offsetof(RccRegisters, apb1enr)), 0U);
   EXPECT_EQ(chip.get(offsetof(RccRegisters, csr)), 0x0E00'0000U);
   EXPECT_THROW(chip.get(0x50), RefusedAccess) << "AHB1LPENR";
-  EXPECT_THROW(chip.rcc.read({0, 2, 0}), RefusedAccess);
+  EXPECT_THROW(chip.read(0, 2), RefusedAccess);
 }
 
 TEST(RccClocks, CrystalIsReadyNeitherEarlyNorLate) {
   Chip chip;
-  chip.bus.access_time = 0;
+  chip.access_time = 0;
   chip.set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
-  chip.bus.pass(RccModel::crystal_start_time - 1);
+  chip.run(RccModel::crystal_start_time - 1);
   EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
-  chip.bus.pass(1);
+  chip.run(1);
   EXPECT_NE(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
   chip.put(offsetof(RccRegisters, cr), 0x83);
   EXPECT_EQ(chip.get(offsetof(RccRegisters, cr)) & cr::CrystalReady::mask, 0U);
@@ -88,10 +88,10 @@ TEST(RccClocks, TheSwitchWaitsForItsSource) {
   Chip chip;
   chip.set(offsetof(RccRegisters, cr), cr::CrystalOn::mask);
   chip.put(offsetof(RccRegisters, cfgr), cfgr::Switch::bits(cfgr::crystal));
-  chip.bus.pass(RccModel::crystal_start_time / 2);
+  chip.run(RccModel::crystal_start_time / 2);
   EXPECT_EQ(chip.source(), cfgr::internal);
   EXPECT_EQ(chip.clocks.core, units_per_period(16'000'000));
-  chip.bus.pass(RccModel::crystal_start_time / 2);
+  chip.run(RccModel::crystal_start_time / 2);
   EXPECT_EQ(chip.source(), cfgr::crystal);
   EXPECT_EQ(chip.clocks.core, units_per_period(8'000'000));
 }
@@ -146,7 +146,7 @@ TEST(RccLimits, FullSpeedNeedsWaitStatesVoltageAndBusDividers) {
   const auto refusal_with = [](bool voltage, std::uint32_t wait_states, std::uint32_t buses) {
     Chip chip;
     if (voltage) chip.power_registers.cr = stm32::pwr_cr::VoltageScale1::mask;
-    chip.wait_states(wait_states);
+    chip.flash_registers.acr = wait_states;
     chip.start_crystal();
     chip.start_pll(divider_4_from_crystal);
     return chip.refusal(offsetof(RccRegisters, cfgr), buses | cfgr::Switch::bits(cfgr::pll));
@@ -166,7 +166,7 @@ TEST(RccLimits, WhatTheCoreRunsOnCannotBeStoppedNorItsConditionsWithdrawn) {
   const std::uint32_t control = chip.get(offsetof(RccRegisters, cr));
   EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::PllOn::mask), "");
   EXPECT_NE(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::CrystalOn::mask), "");
-  EXPECT_THROW(chip.wait_states(4), RefusedAccess);
+  EXPECT_THROW(chip.flash_registers.acr = 4, RefusedAccess);
   EXPECT_THROW(chip.power_registers.cr = 0, RefusedAccess);
   EXPECT_EQ(chip.refusal(offsetof(RccRegisters, cr), control & ~cr::InternalOn::mask), "");
   EXPECT_EQ(chip.clocks.core, units_per_period(168'000'000));
@@ -209,7 +209,7 @@ TEST(RccResetFlags, SurviveAResetAndAreRemovedByRmvf) {
   EXPECT_EQ(stm32::take_reset_cause(chip.rcc_registers), ResetCause::none);
   for (const ResetCause cause : {ResetCause::pin, ResetCause::software, ResetCause::independent_watchdog,
                                  ResetCause::window_watchdog, ResetCause::low_power, ResetCause::brown_out}) {
-    chip.rcc.reset(chip.bus.now);
+    chip.rcc.reset(chip.now);
     chip.rcc.note_reset(cause);
     EXPECT_EQ(stm32::take_reset_cause(chip.rcc_registers), cause);
   }
@@ -225,7 +225,7 @@ TEST(RccClockSecurity, CrystalFailureGivesNmiAndTheInternalOscillator) {
   chip.rcc.on_clock_failure([&](BoardTime) { ++breaks; });
   chip.run_at_168_mhz();
   chip.set(offsetof(RccRegisters, cr), cr::ClockSecurity::mask);
-  chip.rcc.fail_crystal(chip.bus.now);
+  chip.rcc.fail_crystal(chip.now);
   EXPECT_EQ(nmi, true);
   EXPECT_EQ(breaks, 1U);
   EXPECT_EQ(chip.source(), cfgr::internal);
@@ -240,11 +240,11 @@ TEST(RccClockSecurity, CrystalFailureGivesNmiAndTheInternalOscillator) {
 TEST(RccClockSecurity, WithoutItTheCoreStops) {
   Chip chip;
   chip.run_at_168_mhz();
-  chip.rcc.fail_crystal(chip.bus.now);
+  chip.rcc.fail_crystal(chip.now);
   EXPECT_TRUE(chip.rcc.core_clock_lost());
   Chip on_internal;
   on_internal.start_crystal();
-  on_internal.rcc.fail_crystal(on_internal.bus.now);
+  on_internal.rcc.fail_crystal(on_internal.now);
   EXPECT_FALSE(on_internal.rcc.core_clock_lost()) << "nothing depended on it";
 }
 
@@ -267,6 +267,71 @@ TEST(Pwr, RefusesTheRest) {
     EXPECT_THROW(model.write({0, 4, 0}, 1U << bit), RefusedAccess) << bit;
   EXPECT_THROW(model.write({4, 4, 0}, 0), RefusedAccess);
   EXPECT_THROW(model.read({8, 4, 0}), RefusedAccess);
+}
+
+// drivers/stm32f4/clock_tree.hpp on the models of RCC, PWR and FLASH.
+struct ClockTreeChip : testing::SystemOnModel {
+  stm32::ClockFrequencies start(stm32::ClockWaits waits = {}) {
+    return stm32::ClockTree<testing::RccOnModel, testing::PwrOnModel, testing::FlashOnModel>{
+        rcc_registers, power_registers, flash_registers, waits}
+        .start();
+  }
+  void expect_clocks(std::uint64_t core, std::uint64_t apb1, std::uint64_t apb2, std::uint64_t apb1_timer,
+                     std::uint64_t apb2_timer) const {
+    EXPECT_EQ(clocks.core, units_per_period(core));
+    EXPECT_EQ(clocks.apb1, units_per_period(apb1));
+    EXPECT_EQ(clocks.apb2, units_per_period(apb2));
+    EXPECT_EQ(clocks.apb1_timer, units_per_period(apb1_timer));
+    EXPECT_EQ(clocks.apb2_timer, units_per_period(apb2_timer));
+  }
+};
+
+TEST(ClockTreeOnModel, EndsAt168MHzFromTheCrystal) {
+  ClockTreeChip chip;
+  EXPECT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
+  chip.expect_clocks(168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000);
+  const double start_up = seconds(chip.now);
+  EXPECT_GT(start_up, 2.2e-3) << "crystal and PLL take that long";
+  EXPECT_LT(start_up, 2.3e-3);
+}
+
+TEST(ClockTreeOnModel, SurvivesARestartWithTheCoreOnThePll) {
+  ClockTreeChip chip;
+  ASSERT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
+  EXPECT_EQ(chip.start().source, stm32::ClockSource::crystal_pll)
+      << "as after a boot loader: no reset in between";
+  chip.expect_clocks(168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000);
+}
+
+TEST(ClockTreeOnModel, DeadCrystalGives168MHzFromTheInternalOscillator) {
+  ClockTreeChip chip;
+  chip.rcc.set_crystal_works(false);
+  EXPECT_EQ(chip.start().source, stm32::ClockSource::internal_pll);
+  chip.expect_clocks(168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000);
+}
+
+TEST(ClockTreeOnModel, DeadPllLeaves16MHz) {
+  ClockTreeChip chip;
+  chip.rcc.set_pll_locks(false);
+  EXPECT_EQ(chip.start().source, stm32::ClockSource::internal);
+  chip.expect_clocks(16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000);
+}
+
+TEST(ClockTreeOnModel, AWaitTooShortForTheCrystalIsSeen) {
+  ClockTreeChip chip;
+  // 20 units per access: 0.6 ms, the crystal takes 2.
+  EXPECT_EQ(chip.start({.crystal = 10'000, .pll = 20'000, .other = 1'000}).source,
+            stm32::ClockSource::internal_pll);
+}
+
+TEST(ClockTreeOnModel, ResetBringsTheInternalOscillatorBack) {
+  ClockTreeChip chip;
+  ASSERT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
+  chip.rcc.reset(chip.now);
+  chip.power.reset(chip.now);
+  chip.flash.reset(chip.now);
+  chip.expect_clocks(16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000);
+  EXPECT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
 }
 
 }  // namespace

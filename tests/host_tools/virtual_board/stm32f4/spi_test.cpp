@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "drivers/stm32f4/registers/spi.hpp"
+#include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::spi_test {
 namespace {
@@ -16,29 +16,16 @@ constexpr BoardTime bit = 16 * 8;           // at 42 MHz / 16
 constexpr BoardTime clock = 8;
 constexpr std::uint32_t txe = 2, rxne = 1, bsy = 0x80, ovr = 0x40;
 
-struct Bench {
-  Bench() {
+struct Bench : testing::ModelBench {
+  Bench() : ModelBench({&spi}, 777) {
     clocks.apb1 = units_per_period(42'000'000);
-    spi.on_frame([this](std::uint16_t mosi) {
+    spi.on_frame([this](std::uint16_t mosi, BoardTime /*at*/) {
       out.push_back(mosi);
       return static_cast<std::uint16_t>(~mosi);
     });
     write(cr1, settings);
     write(cr1, settings | 0x40);
   }
-  std::uint32_t read(std::uint32_t offset) { return spi.read({offset, 4, now}); }
-  void write(std::uint32_t offset, std::uint32_t value) { spi.write({offset, 4, now}, value); }
-  void run(BoardTime duration) {
-    const BoardTime end = now + duration;
-    for (BoardTime event = spi.next_event(); event <= end; event = spi.next_event()) {
-      ASSERT_GT(event, now - 1);
-      now = event;
-      spi.advance(now);
-    }
-    now = end;
-  }
-  BoardClocks clocks;
-  BoardTime now = 777;
   SpiModel spi{clocks};
   std::vector<std::uint16_t> out;
 };
@@ -136,8 +123,8 @@ TEST(SpiModel, RefusesWhatItDoesNotModel) {
   }
   refused([](Bench& bench) { bench.write(sr, 0); });
   refused([](Bench& bench) { bench.write(0x1C, 0); });
-  refused([](Bench& bench) { static_cast<void>(bench.read(0x10)); });
-  refused([](Bench& bench) { static_cast<void>(bench.spi.read({dr, 2, bench.now})); });
+  refused([](Bench& bench) { bench.read(0x10); });
+  refused([](Bench& bench) { bench.read(dr, 2); });
   refused([](Bench& bench) { bench.write(dr, 0x10000); });
   refused([](Bench& bench) { bench.write(cr1, (settings | 0x40) ^ 8); });
 }
