@@ -80,7 +80,6 @@ class FieldOrientedController {
     Scalar half_advance{};     ///< s, half of the time from the sample to the middle of the voltage
     Scalar half_turn_limit{};  ///< rad, half of the largest angle of advance
     DeadTimeCompensation<Scalar> dead_time{};
-    Verdict fault{false, true};  ///< here and not a constant: update() is three instructions shorter for it
   };
   struct Input {
     TurnFraction angle = 0;     ///< electrical, at the sample
@@ -155,7 +154,7 @@ class FieldOrientedController {
     }
     if (!(square <= std::numeric_limits<Scalar>::max())) {
       reset();
-      return without_voltage(c, current);
+      return without_voltage(current);
     }
     const Vector bounded = on_the_circle(c, share);
     const Scalar back = in.supply * static_cast<Scalar>(4.0 / 3.0);
@@ -180,7 +179,7 @@ class FieldOrientedController {
     // A controller would stumble over the measured values: they are a fault here too.
     if (!is_finite(square) || !is_finite(current.d) || !is_finite(current.q) ||
         !is_finite(in.electrical_speed)) {
-      return without_voltage(c, current);
+      return without_voltage(current);
     }
     if (square <= c.circle_square) {
       const Phases duty = modulated(c, in.electrical_speed, share, sine, cosine);
@@ -217,9 +216,18 @@ class FieldOrientedController {
     return {beta * sine - minus_alpha * cosine, beta * cosine + minus_alpha * sine};
   }
 
-  [[gnu::always_inline]] static Output without_voltage(const Coefficients& c, const Vector& current) {
+  /// The verdict of a fault, as something that the compiler cannot look through: as constants its members
+  /// would be merged with those of the other paths, and each tick of either motor would be two instructions
+  /// longer.
+  [[gnu::always_inline]] static Verdict fault() {
+    bool saturated = false, not_finite = true;
+    asm("" : "+r"(saturated), "+r"(not_finite));
+    return {saturated, not_finite};
+  }
+
+  [[gnu::always_inline]] static Output without_voltage(const Vector& current) {
     constexpr auto half = Scalar(0.5);
-    return {c.fault, half, half, half, current.d, current.q, Scalar(0), Scalar(0), {}, {}, {}};
+    return {fault(), half, half, half, current.d, current.q, Scalar(0), Scalar(0), {}, {}, {}};
   }
 
   // What lies beyond the circle onto it, the d axis first.
