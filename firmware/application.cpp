@@ -1,7 +1,7 @@
 // The main-loop side of the application.
 #include "firmware/application.hpp"
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware {
 

@@ -7,18 +7,18 @@
 
 #include "drivers/can_frame.hpp"
 #include "firmware/application_objects.hpp"
-#include "firmware/axis_state_machine.hpp"
 #include "firmware/can_port.hpp"
 #include "firmware/canopen/node.hpp"
-#include "firmware/commutation.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/device_registers.hpp"
 #include "firmware/drive/axes_tick.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
+#include "firmware/drive/commutation.hpp"
+#include "firmware/drive/thermal_supervisor.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
-#include "firmware/parameter_keeper.hpp"
+#include "firmware/parameters/parameter_keeper.hpp"
 #include "firmware/stability_guard.hpp"
-#include "firmware/thermal_supervisor.hpp"
 
 namespace kmax::firmware {
 
@@ -91,7 +91,8 @@ class Application {
 
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
   /// application.
-  [[gnu::cold]] explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {});
+  [[gnu::cold]] explicit Application(const BoardIdentity& board,
+                                     std::span<std::uint32_t> capture_memory = {});
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 

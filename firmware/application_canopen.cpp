@@ -1,6 +1,6 @@
 // What the application does for its CANopen node.
 #include "firmware/application.hpp"
-#include "firmware/cyclic_torque.hpp"
+#include "firmware/drive/cyclic_torque.hpp"
 
 namespace kmax::firmware {
 

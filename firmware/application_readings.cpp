@@ -1,9 +1,9 @@
 // What a host can read.
 #include "firmware/application.hpp"
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/profile_readings.hpp"
+#include "firmware/drive/statusword.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
-#include "firmware/profile_readings.hpp"
-#include "firmware/statusword.hpp"
 
 namespace kmax::firmware {
 

@@ -1,6 +1,6 @@
 #include "firmware/device_registers.hpp"
 
-#include "firmware/linked_parameters.hpp"
+#include "firmware/parameters/linked_parameters.hpp"
 #include "firmware/stability_guard.hpp"
 
 namespace kmax::firmware {

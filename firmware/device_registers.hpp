@@ -7,9 +7,9 @@
 #include <optional>
 #include <span>
 
-#include "firmware/armed_axes.hpp"
-#include "firmware/parameter_rules.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/drive/armed_axes.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

@@ -5,7 +5,7 @@
 #include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
 #include "control/stability_case.hpp"
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "control/closed_form_criteria.hpp"
-#include "firmware/armed_axes.hpp"
-#include "firmware/parameter_rules.hpp"
+#include "firmware/drive/armed_axes.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 
 namespace kmax::firmware {
 

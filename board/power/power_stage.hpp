@@ -4,7 +4,7 @@
 #include <concepts>
 #include <cstdint>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::board {

@@ -13,7 +13,7 @@
 #include "firmware/canopen/sdo_server.hpp"
 #include "firmware/canopen/sync.hpp"
 #include "firmware/canopen/tpdo.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware::canopen {
 

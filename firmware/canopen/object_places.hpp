@@ -9,7 +9,7 @@
 #include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/object_access.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware::canopen {
 

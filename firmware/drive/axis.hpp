@@ -7,8 +7,8 @@
 #include "control/haptic_loop.hpp"
 #include "control/motion_plausibility.hpp"
 #include "firmware/drive/excitation.hpp"
+#include "firmware/drive/fault.hpp"
 #include "firmware/drive/motor_control.hpp"
-#include "firmware/fault.hpp"
 
 namespace kmax::firmware {
 

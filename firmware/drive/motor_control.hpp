@@ -9,7 +9,7 @@
 #include "control/phase_watch.hpp"
 #include "control/sine_cosine.hpp"
 #include "firmware/drive/excitation.hpp"
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 
 namespace kmax::firmware {
 
@@ -118,7 +118,7 @@ class MotorControl {
   /// Instead of update(), in a tick in which an excited axis is driven. Gives the force asked for, N at the
   /// handle, as far as it is known: 0 for a voltage, and for a current in the stator's frame.
   [[gnu::cold]] float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
-               std::uint32_t position, float velocity, Output& out);
+                             std::uint32_t position, float velocity, Output& out);
 
  private:
   using FieldOriented = control::FieldOrientedController<float>;
@@ -139,9 +139,11 @@ class MotorControl {
   control::PhaseCondition excite_dc(const Coefficients& c, const Measured& measured,
                                     const Excitation::Output& asked, float velocity, Output& out);
   // For identification only: small code rather than fast code.
-  [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(const Coefficients& c, const Measured& measured,
-                                        const Excitation::Output& asked, std::uint32_t rotor_angle,
-                                        float velocity, Output& out);
+  [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(const Coefficients& c,
+                                                                     const Measured& measured,
+                                                                     const Excitation::Output& asked,
+                                                                     std::uint32_t rotor_angle,
+                                                                     float velocity, Output& out);
   static void take(const Dc::Output& made, Output& out);
   static void take(const FieldOriented::Output& made, Output& out);
   [[gnu::noinline, gnu::cold]] void tell(control::PhaseCondition condition, const Coefficients& c,

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/refusal.hpp"
+#include "firmware/parameters/refusal.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/bench/excitation.hpp"
 #include "host_tools/bench/held_up.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 
 namespace kmax::bench {
 

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "firmware/object_dictionary/device_entries.hpp"
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 
 namespace kmax::check {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "control/stability_criteria.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/device/parameter.hpp"
 
 namespace kmax::check {

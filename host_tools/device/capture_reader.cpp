@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "firmware/capture.hpp"
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/suggestion.hpp"
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware/refusal.hpp"
+#include "firmware/parameters/refusal.hpp"
 #include "host_tools/device/link.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"

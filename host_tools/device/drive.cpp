@@ -4,7 +4,7 @@
 
 #include <bit>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/guard_words.hpp"

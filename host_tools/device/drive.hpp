@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "firmware/axis_state_machine.hpp"
-#include "firmware/fault.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
+#include "firmware/drive/fault.hpp"
 #include "firmware/stability_guard.hpp"
 #include "host_tools/device/device.hpp"
 

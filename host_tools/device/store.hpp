@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/parameter_keeper.hpp"
+#include "firmware/parameters/parameter_keeper.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::device {

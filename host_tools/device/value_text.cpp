@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/suggestion.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/output_file.hpp"

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <thread>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/numbers.hpp"

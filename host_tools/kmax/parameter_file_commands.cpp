@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/output_file.hpp"
 #include "host_tools/base/print.hpp"

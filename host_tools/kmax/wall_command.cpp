@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/print.hpp"

@@ -6,7 +6,7 @@
 #include <array>
 #include <functional>
 
-#include "firmware/refusal.hpp"
+#include "firmware/parameters/refusal.hpp"
 #include "host_tools/base/numbers.hpp"
 
 namespace kmax::cli {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/fault.hpp"
-#include "firmware/refusal.hpp"
+#include "firmware/drive/fault.hpp"
+#include "firmware/parameters/refusal.hpp"
 #include "host_tools/bench/circuit.hpp"
 #include "host_tools/selftest/pulse.hpp"
 

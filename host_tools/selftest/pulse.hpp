@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::selftest {

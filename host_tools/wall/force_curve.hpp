@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::wall {
 

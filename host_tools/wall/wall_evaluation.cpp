@@ -1,6 +1,6 @@
 #include "host_tools/wall/wall_evaluation.hpp"
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::wall {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "control/wall_law.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::wall {
 

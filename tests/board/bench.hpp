@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "board/native/native_board.hpp"
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "tests/board/scripted_device.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 #include "tests/firmware/register_words.hpp"

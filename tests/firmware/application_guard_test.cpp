@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "control/stability_case.hpp"
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/stability_guard.hpp"
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"

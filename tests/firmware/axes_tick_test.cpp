@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware::axes_tick_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "firmware/device_registers.hpp"
-#include "firmware/persistent_parameters.hpp"
+#include "firmware/parameters/persistent_parameters.hpp"
 #include "tests/firmware/register_words.hpp"
 
 namespace kmax::firmware::device_registers_setpoints_test {

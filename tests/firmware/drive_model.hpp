@@ -1,7 +1,7 @@
 // The automaton of CiA 402-2 / IEC 61800-7-201 as its tables say it, apart from the code under test.
 #pragma once
 
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 
 namespace kmax::firmware {
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "firmware/parameter_store.hpp"
+#include "firmware/parameters/parameter_store.hpp"
 
 namespace kmax::firmware {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "control/adaptive_coefficient.hpp"
-#include "firmware/haptic_configuration.hpp"
-#include "firmware/parameter_migration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/parameters/parameter_migration.hpp"
 #include "firmware/stability_case.hpp"
 #include "tests/firmware/guarded_parameters.hpp"
 

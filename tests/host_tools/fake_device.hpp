@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/axis_state_machine.hpp"
 #include "firmware/device_registers.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/modbus/register_bank.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
 #include "host_tools/device/serial/register_link.hpp"

@@ -4,8 +4,8 @@
 
 #include <bit>
 
-#include "firmware/axis_state_machine.hpp"
 #include "firmware/can_port.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "tests/image/can_bench.hpp"
 
 namespace kmax::tests::can_faults_test {

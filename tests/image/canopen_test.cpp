@@ -1,7 +1,7 @@
 // CANopen on the flashed image, over a bus with its bits and their time.
 #include <gtest/gtest.h>
 
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/image/can_bench.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"

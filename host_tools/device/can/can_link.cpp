@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "firmware/axis_state_machine.hpp"
 #include "firmware/canopen/object_places.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/device/parameter.hpp"
 

@@ -4,10 +4,10 @@
 
 #include <stdexcept>
 
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/modbus/crc.hpp"
-#include "firmware/parameter_values.hpp"
-#include "firmware/refusal.hpp"
+#include "firmware/parameters/parameter_values.hpp"
+#include "firmware/parameters/refusal.hpp"
 
 namespace kmax::virtual_board {
 

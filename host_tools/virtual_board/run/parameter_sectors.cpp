@@ -6,8 +6,8 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "firmware/parameter_rules.hpp"
-#include "firmware/parameter_store.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
+#include "firmware/parameters/parameter_store.hpp"
 #include "host_tools/virtual_board/bus.hpp"
 
 namespace kmax::virtual_board {

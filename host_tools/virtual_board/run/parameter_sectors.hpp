@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 

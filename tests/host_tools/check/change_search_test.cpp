@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 
 namespace kmax::check::change_search_test {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/capturing_link.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <set>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 #include "firmware/trace.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "firmware/crc32.hpp"
-#include "firmware/flash_sectors.hpp"
+#include "firmware/parameters/flash_sectors.hpp"
 
 /// The parameter store's format in flash, in words of 32 bits:
 ///

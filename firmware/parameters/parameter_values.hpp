@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "firmware/object_dictionary/dictionary.hpp"
-#include "firmware/refusal.hpp"
-#include "firmware/slot_descriptors.hpp"
+#include "firmware/parameters/refusal.hpp"
+#include "firmware/parameters/slot_descriptors.hpp"
 
 namespace kmax::firmware {
 

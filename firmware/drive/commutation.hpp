@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

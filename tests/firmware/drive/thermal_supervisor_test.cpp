@@ -1,4 +1,4 @@
-#include "firmware/thermal_supervisor.hpp"
+#include "firmware/drive/thermal_supervisor.hpp"
 
 #include <gtest/gtest.h>
 

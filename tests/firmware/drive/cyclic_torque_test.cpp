@@ -1,4 +1,4 @@
-#include "firmware/cyclic_torque.hpp"
+#include "firmware/drive/cyclic_torque.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

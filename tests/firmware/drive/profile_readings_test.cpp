@@ -1,4 +1,4 @@
-#include "firmware/profile_readings.hpp"
+#include "firmware/drive/profile_readings.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware::profile_readings_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

@@ -4,7 +4,7 @@
 
 #include <rapidcheck.h>
 
-#include "firmware/parameter_store.hpp"
+#include "firmware/parameters/parameter_store.hpp"
 #include "tests/firmware/fake_flash.hpp"
 
 namespace kmax::firmware::parameter_store_power_cut_test {

@@ -7,9 +7,9 @@
 
 #include "control/finite.hpp"
 #include "firmware/drive/axis.hpp"
-#include "firmware/cyclic_torque.hpp"
-#include "firmware/linked_parameters.hpp"
+#include "firmware/drive/cyclic_torque.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
+#include "firmware/parameters/linked_parameters.hpp"
 
 namespace kmax::firmware {
 

@@ -1,5 +1,5 @@
 // Sets that another firmware has saved.
-#include "firmware/parameter_migration.hpp"
+#include "firmware/parameters/parameter_migration.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "firmware/fault.hpp"
+#include "firmware/drive/fault.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "firmware/fault.hpp"
-#include "firmware/refusal.hpp"
+#include "firmware/drive/fault.hpp"
+#include "firmware/parameters/refusal.hpp"
 
 namespace kmax::firmware {
 

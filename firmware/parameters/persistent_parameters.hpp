@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

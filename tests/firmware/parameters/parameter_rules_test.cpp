@@ -1,4 +1,4 @@
-#include "firmware/parameter_rules.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
 
 #include <gtest/gtest.h>
 

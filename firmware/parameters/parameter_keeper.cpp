@@ -1,4 +1,4 @@
-#include "firmware/parameter_keeper.hpp"
+#include "firmware/parameters/parameter_keeper.hpp"
 
 namespace kmax::firmware {
 

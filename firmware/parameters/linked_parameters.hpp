@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

@@ -1,4 +1,4 @@
-#include "firmware/slot_descriptors.hpp"
+#include "firmware/parameters/slot_descriptors.hpp"
 
 #include <gtest/gtest.h>
 

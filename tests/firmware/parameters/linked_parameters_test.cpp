@@ -1,4 +1,4 @@
-#include "firmware/linked_parameters.hpp"
+#include "firmware/parameters/linked_parameters.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "firmware/refusal.hpp"
+#include "firmware/parameters/refusal.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "firmware/haptic_configuration.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <optional>
 
-#include "firmware/flash_sectors.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
-#include "firmware/parameter_migration.hpp"
-#include "firmware/parameter_record.hpp"
-#include "firmware/persistent_parameters.hpp"
+#include "firmware/parameters/flash_sectors.hpp"
+#include "firmware/parameters/parameter_migration.hpp"
+#include "firmware/parameters/parameter_record.hpp"
+#include "firmware/parameters/persistent_parameters.hpp"
 
 namespace kmax::firmware {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "firmware/parameter_store.hpp"
+#include "firmware/parameters/parameter_store.hpp"
 
 namespace kmax::firmware {
 

@@ -5,8 +5,8 @@
 #include "control/motion_plausibility.hpp"
 #include "firmware/drive/excitation.hpp"
 #include "firmware/drive/motor_control.hpp"
-#include "firmware/parameter_values.hpp"
-#include "firmware/thermal_supervisor.hpp"
+#include "firmware/drive/thermal_supervisor.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

@@ -5,7 +5,7 @@
 
 #include "control/finite.hpp"
 #include "firmware/drive/axis.hpp"
-#include "firmware/parameter_values.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
 

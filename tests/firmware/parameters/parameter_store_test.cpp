@@ -1,4 +1,4 @@
-#include "firmware/parameter_store.hpp"
+#include "firmware/parameters/parameter_store.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/parameter_rules.hpp"
-#include "firmware/persistent_parameters.hpp"
+#include "firmware/parameters/parameter_rules.hpp"
+#include "firmware/parameters/persistent_parameters.hpp"
 
 namespace kmax::firmware {
 

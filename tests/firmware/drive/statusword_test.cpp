@@ -1,4 +1,4 @@
-#include "firmware/statusword.hpp"
+#include "firmware/drive/statusword.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/axis_state_machine.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
 
 namespace kmax::firmware {
 
