@@ -32,6 +32,9 @@ class PreciseChain {
     longest_step_ = 1.0 / std::max(fastest, 1.0);
   }
 
+  // Other springs and dampers of the same masses, from now on.
+  void change(const ChainDynamics& chain) { c_ = chain; }
+
   // A held force, u from `intended` with `rate`.
   void advance(const Real& force, const Real& intended, const Real& rate, const Real& duration) {
     const int steps = static_cast<int>(std::ceil(static_cast<double>(duration) / longest_step_));
@@ -41,7 +44,6 @@ class PreciseChain {
 
   const Real& position(std::size_t i) const { return x_[i]; }
   const Real& velocity(std::size_t i) const { return v_[i]; }
-  bool stuck() const { return stuck_; }
   int stops() const { return stops_; }
   int break_aways() const { return break_aways_; }
 
