@@ -35,7 +35,7 @@ modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
 Application::Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory)
     : board_(board),
       bank_(*this),
-      port_(bank_, port_configuration(registers_.values())),
+      port_(bank_, port_configuration(parameters_.values())),
       settings_(make_settings()),
       objects_(*this),
       node_(objects_,
@@ -60,7 +60,7 @@ ArmedAxes Application::armed_axes() const {
 
 Application::Settings Application::make_settings() const {
   Settings settings;
-  const ParameterValues& values = registers_.values();
+  const ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     settings[axis].encoder_offset = values.whole<"encoder.offset">(axis);
     settings[axis].encoder_direction = values.whole<"encoder.direction">(axis);
@@ -86,7 +86,7 @@ Application::Settings Application::make_settings() const {
 }
 
 void Application::make_scales() {
-  const ParameterValues& values = registers_.values();
+  const ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const double length = count_length(values, axis);
     const double step =
@@ -98,30 +98,30 @@ void Application::make_scales() {
 void Application::offer_settings_if_changed() {
   std::array<Circumstances, axis_count> now;
   for (std::size_t axis = 0; axis < axis_count; ++axis) now[axis] = circumstances_of(axis);
-  if (registers_.changes() == offered_changes_ && now == offered_) return;
+  if (parameters_.changes() == offered_changes_ && now == offered_) return;
   offered_ = now;
-  if (registers_.changes() != offered_changes_) {
+  if (parameters_.changes() != offered_changes_) {
     configure_thermal();
     make_scales();
   }
-  offered_changes_ = registers_.changes();
-  if (registers_.restarting_changes() != offered_restarts_) {
-    offered_restarts_ = registers_.restarting_changes();
+  offered_changes_ = parameters_.changes();
+  if (parameters_.restarting_changes() != offered_restarts_) {
+    offered_restarts_ = parameters_.restarting_changes();
     ++generation_;
   }
   settings_ = make_settings();
   tick_.offer(settings_);
-  port_.configure(port_configuration(registers_.values()));
-  tick_.trace_axis(static_cast<std::size_t>(registers_.values().whole<"trace.axis">()),
-                   static_cast<std::uint32_t>(registers_.values().whole<"trace.interval">()));
+  port_.configure(port_configuration(parameters_.values()));
+  tick_.trace_axis(static_cast<std::size_t>(parameters_.values().whole<"trace.axis">()),
+                   static_cast<std::uint32_t>(parameters_.values().whole<"trace.interval">()));
 }
 
 /// So that readings and arming never go by an older set, and nothing is worked out twice.
 void Application::judge_if_changed() {
-  if (registers_.changes() == judged_changes_) return;
-  judged_changes_ = registers_.changes();
+  if (parameters_.changes() == judged_changes_) return;
+  judged_changes_ = parameters_.changes();
   for (std::size_t axis = 0; axis < axis_count; ++axis)
-    guard_[axis] = guard_finding(registers_.values(), axis);
+    guard_[axis] = guard_finding(parameters_.values(), axis);
 }
 
 /// The tick works by the present settings, and knows of the axis' last disarming.
@@ -139,7 +139,7 @@ Application::Circumstances Application::circumstances_of(std::size_t axis) const
 
 void Application::configure_thermal() {
   for (std::size_t axis = 0; axis < axis_count; ++axis)
-    thermal_[axis].configure(thermal_configuration(registers_.values(), axis));
+    thermal_[axis].configure(thermal_configuration(parameters_.values(), axis));
 }
 
 void Application::poll_temperatures() {
@@ -149,7 +149,7 @@ void Application::poll_temperatures() {
 
 bool Application::commutation_known(std::size_t axis) const {
   return !readings_.has_power_stage ||
-         Commutation::known(registers_.values(), axis, report_[axis].referenced);
+         Commutation::known(parameters_.values(), axis, report_[axis].referenced);
 }
 
 void Application::take_reports() {
@@ -175,7 +175,7 @@ bool Application::round_has_begun() {
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
   if (restarting_) return Refusal::restarting;
-  if (commander_[axis] == Commander::can && node_.any_heartbeat_lost()) return Refusal::heartbeat_missing;
+  if (commander_[axis] == Link::can && node_.any_heartbeat_lost()) return Refusal::heartbeat_missing;
   if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
   if (thermal_[axis].power_stage_too_hot()) return Refusal::too_hot;
   if (thermal_[axis].motor_too_hot()) return Refusal::motor_too_hot;
@@ -184,7 +184,7 @@ Refusal Application::obstacle_to_arming(std::size_t axis) const {
   if (mode(axis) == DriveMode::excitation) return Refusal::none;
   if (!commutation_known(axis)) return Refusal::commutation_unknown;
   if (guard_[axis].verdict == GuardFinding::Verdict::fail &&
-      registers_.values().choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
+      parameters_.values().choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
     return Refusal::guard_refused;
   const auto& haptic = report_[axis].haptic;
   const bool makes_force = mode(axis) == DriveMode::haptic &&
@@ -202,7 +202,7 @@ void Application::trip(std::size_t axis, Fault fault, float value, float bound) 
   fault_bound_[axis] = bound;
   // Counts were lost, and with them the rotor's angle.
   if (fault == Fault::encoder || fault == Fault::spin_out)
-    commutation_[axis].forget(registers_.values(), axis);
+    commutation_[axis].forget(parameters_.values(), axis);
   const AxisReport& report = report_[axis];
   if (report.trip.fault == fault && report.fault == fault) {
     trip_record_[axis] = report.trip;
@@ -222,7 +222,7 @@ void Application::trip(std::size_t axis, Fault fault, float value, float bound) 
 }
 
 float Application::bound_of(Fault fault, std::size_t axis) const {
-  const ParameterValues& values = registers_.values();
+  const ParameterValues& values = parameters_.values();
   switch (fault) {
     case Fault::over_speed:
       return values.real<"velocity.limit">(axis);
@@ -246,7 +246,7 @@ float Application::bound_of(Fault fault, std::size_t axis) const {
 void Application::supervise(std::size_t axis) {
   AxisStateMachine& machine = machines_[axis];
   const AxisReport& report = report_[axis];
-  const ParameterValues& values = registers_.values();
+  const ParameterValues& values = parameters_.values();
 
   // Before the commands: a fault is reported even if the host disarms in the same moment.
   if (machine.armed()) {
@@ -272,11 +272,11 @@ void Application::supervise(std::size_t axis) {
     // Off the bus, or never on it again after a bit rate that failed.
     const bool off =
         can_.state == CanState::bus_off || can_.state == CanState::stopped || can_.state == CanState::absent;
-    if (commander_[axis] == Commander::can && off) trip(axis, Fault::bus_off, 0.0f, 0.0f);
+    if (commander_[axis] == Link::can && off) trip(axis, Fault::bus_off, 0.0f, 0.0f);
   }
 
   std::uint16_t word = 0;
-  if (registers_.fetch_controlword(axis, word)) {
+  if (parameters_.fetch_controlword(axis, word)) {
     // The latest command counts: one that still waits for the settings to arrive is superseded.
     pending_command_[axis] = word;
     command_pending_[axis] = true;
@@ -291,7 +291,7 @@ void Application::supervise(std::size_t axis) {
           (machine.fault() == Fault::motor_too_hot && thermal_[axis].motor_too_hot()) ||
           (machine.fault() == Fault::heartbeat_lost && node_.any_heartbeat_lost()) ||
           (machine.fault() != Fault::none && machine.fault() == report.condition);
-      const bool stays = registers_.values().whole<"profile.quick_stop_option">(axis) == 6;
+      const bool stays = parameters_.values().whole<"profile.quick_stop_option">(axis) == 6;
       machine.command(pending, obstacle_to_arming(axis), cause_remains, {.stay_in_quick_stop = stays});
       halted_[axis] = halted(pending);
     }
@@ -302,7 +302,7 @@ void Application::supervise(std::size_t axis) {
 
 void Application::act() {
   for (std::size_t axis = 0; axis < axis_count; ++axis)
-    commutation_[axis].follow(registers_.values(), axis, report_[axis].reference_generation);
+    commutation_[axis].follow(parameters_.values(), axis, report_[axis].reference_generation);
   offer_settings_if_changed();
   judge_if_changed();
   for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
@@ -321,7 +321,7 @@ void Application::poll(std::uint32_t now_us) {
     ++uptime_s_;
   }
   take_reports();
-  registers_.poll(now_us);
+  parameters_.poll(now_us);
   poll_temperatures();
 
   SerialByte received;
@@ -333,14 +333,9 @@ void Application::poll(std::uint32_t now_us) {
   finish_saves();
 }
 
-DeviceRegisters::WriteResult Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {
-  if (!descriptors[entry].writable) return {Refusal::read_only, register_address(entry, axis)};
-  if (const Refusal refusal = check_value(descriptors[entry], raw); refusal != Refusal::none)
-    return {refusal, register_address(entry, axis)};
-  std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)};
-  const auto needed = register_count(descriptors[entry].type);
-  const auto result =
-      registers_.write(register_address(entry, axis), std::span(words).last(needed), armed_axes(), now_us_);
+ParameterAccess::Result Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {
+  const SlotValue one{static_cast<std::uint16_t>(slot_of(entry, axis)), raw};
+  const auto result = parameters_.write({&one, 1}, Link::local, armed_axes(), now_us_);
   offer_settings_if_changed();
   return result;
 }

@@ -10,13 +10,13 @@
 #include "firmware/can_port.hpp"
 #include "firmware/canopen/node.hpp"
 #include "firmware/crash_record.hpp"
-#include "firmware/device_registers.hpp"
 #include "firmware/drive/axes_tick.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/commutation.hpp"
 #include "firmware/drive/thermal_supervisor.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
+#include "firmware/parameters/parameter_access.hpp"
 #include "firmware/parameters/parameter_keeper.hpp"
 #include "firmware/stability_guard.hpp"
 
@@ -135,16 +135,16 @@ class Application {
 
   /// Parameters a board or a scene starts with, before the first tick. Refused like a host's write, and
   /// then nothing changes.
-  DeviceRegisters::WriteResult preset(std::size_t entry, std::size_t axis, std::uint32_t raw);
+  ParameterAccess::Result preset(std::size_t entry, std::size_t axis, std::uint32_t raw);
 
   /// Gives the application the memory it keeps parameters in, and takes the newest set in it over; before the
   /// first tick, once. Parameters that the set lacks keep their present values. Without it nothing can be
   /// saved. `flash` refers to a memory that outlives the application.
   const LoadReport& attach_store(AnyFlashSectors flash);
 
-  const ParameterValues& values() const { return registers_.values(); }
+  const ParameterValues& values() const { return parameters_.values(); }
   /// Rises with every change of a parameter.
-  std::uint32_t parameter_changes() const { return registers_.changes(); }
+  std::uint32_t parameter_changes() const { return parameters_.changes(); }
   ArmedAxes armed_axes() const;
   bool any_armed() const { return armed_axes().any(); }
   /// A save is under way; its next step may stop the processor for half a second.
@@ -159,9 +159,6 @@ class Application {
 
  private:
   friend class ApplicationObjects;
-
-  /// Whose controlword an axis obeyed last.
-  enum class Commander : std::uint8_t { serial, can };
 
   /// The registers as the Modbus server sees them.
   class Bank {
@@ -211,17 +208,18 @@ class Application {
   bool saturated(std::size_t axis) const;
   void refresh_store_readings();
   void refresh_crash_readings();
-  DeviceRegisters::WriteResult write_registers(std::uint16_t address, std::span<const std::uint16_t> words,
-                                               Commander by);
-  DeviceRegisters::WriteResult command_store(std::uint16_t command);
+  ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
+  ParameterAccess::Result command_store(std::uint16_t command);
   /// The next start has all parameters at their defaults; the present ones stay.
-  DeviceRegisters::WriteResult save_defaults();
-  DeviceRegisters::WriteResult command_capture(std::uint16_t command);
+  ParameterAccess::Result save_defaults();
+  ParameterAccess::Result command_capture(std::uint16_t command);
   void refresh_capture_readings();
   void take_reports();
   bool round_has_begun();
   bool commutation_known(std::size_t axis) const;
-  DriveMode mode(std::size_t axis) const { return registers_.values().choice<DriveMode, "drive.mode">(axis); }
+  DriveMode mode(std::size_t axis) const {
+    return parameters_.values().choice<DriveMode, "drive.mode">(axis);
+  }
   Circumstances circumstances_of(std::size_t axis) const;
   void configure_thermal();
   [[gnu::cold]] void poll_temperatures();
@@ -239,7 +237,7 @@ class Application {
   [[gnu::cold]] float bound_of(Fault fault, std::size_t axis) const;
 
   BoardIdentity board_;
-  DeviceRegisters registers_;
+  ParameterAccess parameters_;
   Bank bank_;
   modbus::RtuPort<Bank> port_;
   std::array<AxisStateMachine, axis_count> machines_;
@@ -254,7 +252,7 @@ class Application {
   std::array<Circumstances, axis_count> offered_{};
   BoardReadings readings_;
   CanReadings can_;
-  std::array<Commander, axis_count> commander_{};
+  std::array<Link, axis_count> commander_{};  ///< whose controlword an axis obeyed last
   std::array<Fault, axis_count> told_fault_{};
   CanState told_can_state_ = CanState::absent;
   std::uint32_t told_overruns_ = 0, told_conflicts_ = 0, overrun_us_ = 0, conflict_us_ = 0;

@@ -41,7 +41,7 @@ constexpr std::uint32_t overrun_over_us = 1'000'000, conflict_over_us = 5'000'00
 
 /// At a start, and when a host resets the communication, which then has the settings of the last start again.
 void Application::start_communication(bool power_on) {
-  ParameterValues& values = registers_.values();
+  ParameterValues& values = parameters_.values();
   for (std::size_t i = 0; i < power_on_communication_.size(); ++i) {
     const std::size_t slot = first_communication_slot + i;
     if (power_on)
@@ -49,7 +49,7 @@ void Application::start_communication(bool power_on) {
     else
       values.set_raw(slot, power_on_communication_[i]);
   }
-  configured_communication_ = registers_.communication_changes();
+  configured_communication_ = parameters_.communication_changes();
   if (power_on) {
     node_.power_on(values, now_us_);
   } else {
@@ -61,10 +61,10 @@ void Application::poll_can() {
   // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
   for (int i = 0; i < frames_per_poll && can_queue_.pop(frame); ++i)
-    act_on(node_.receive(frame, registers_.values(), now_us_));
-  if (registers_.communication_changes() != configured_communication_) {
-    configured_communication_ = registers_.communication_changes();
-    node_.configure(registers_.values(), now_us_);
+    act_on(node_.receive(frame, parameters_.values(), now_us_));
+  if (parameters_.communication_changes() != configured_communication_) {
+    configured_communication_ = parameters_.communication_changes();
+    node_.configure(parameters_.values(), now_us_);
   }
   act_on(node_.poll(now_us_));
   if (round_has_begun()) node_.poll_pdos(round_clock_us_);
@@ -89,7 +89,7 @@ void Application::poll_can() {
 
 void Application::act_on(const canopen::NodeEvents& events) {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    if (!machines_[axis].armed() || commander_[axis] != Commander::can) continue;
+    if (!machines_[axis].armed() || commander_[axis] != Link::can) continue;
     if (events.heartbeat_lost) trip(axis, Fault::heartbeat_lost, 0.0f, 0.0f);
     // Nobody can change the target any more.
     if (events.pdos_ended && mode(axis) == DriveMode::torque) disarm(axis);
@@ -101,19 +101,22 @@ void Application::act_on(const canopen::NodeEvents& events) {
     identity_saving_ = save_identity();
     if (!identity_saving_) node_.lss().finish(canopen::LssStore::failed);
   }
-  if (events.start_node) node_.start(registers_.values(), now_us_);
-  if (events.reset_communication) start_communication(false);
+  if (events.start_node) node_.start(parameters_.values(), now_us_);
+  if (events.reset_communication) {
+    parameters_.drop(Link::can, now_us_);
+    start_communication(false);
+  }
   if (events.reset_node) restarting_ = true;
 }
 
 bool Application::save_identity() {
-  if (registers_.transaction_open() || any_armed()) return false;
+  if (parameters_.transaction_open() || any_armed()) return false;
   const auto set = [this](std::size_t entry, std::uint32_t raw) {
     return preset(entry, 0, raw).refusal == Refusal::none;
   };
   return set(entry_of<"node.id">(), node_.lss().pending_node_id()) &&
          set(entry_of<"can.bit_rate">(), node_.lss().pending_bit_rate()) &&
-         keeper_.save(registers_.values(), any_armed()) == Refusal::none;
+         keeper_.save(parameters_.values(), any_armed()) == Refusal::none;
 }
 
 /// The communication's part of a set that is being saved.
@@ -174,11 +177,11 @@ bool Application::next_can_frame(drivers::CanFrame& frame) {
 }
 
 std::optional<std::uint32_t> Application::last_heard_us(std::size_t axis) const {
-  return commander_[axis] == Commander::can ? node_.heard_us() : port_.last_valid_request_time();
+  return commander_[axis] == Link::can ? node_.heard_us() : port_.last_valid_request_time();
 }
 
 void Application::publish_torques() {
-  ParameterValues& values = registers_.values();
+  ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const bool armed = machines_[axis].armed();
     // A torque that was asked for while nothing could follow must not act later.
@@ -188,7 +191,7 @@ void Application::publish_torques() {
 }
 
 void Application::refresh_can_readings() {
-  ParameterValues& v = registers_.values();
+  ParameterValues& v = parameters_.values();
   v.set_whole<"can.state">(static_cast<std::uint32_t>(can_.state));
   v.set_whole<"can.node_state">(static_cast<std::uint32_t>(node_.state()));
   v.set_whole<"can.node_in_use">(node_.node_id());

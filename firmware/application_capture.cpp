@@ -3,15 +3,15 @@
 
 namespace kmax::firmware {
 
-DeviceRegisters::WriteResult Application::command_capture(std::uint16_t command) {
+ParameterAccess::Result Application::command_capture(std::uint16_t command) {
   const std::uint16_t address = register_address(entry_of<"capture.command">(), 0);
   if (command == static_cast<std::uint16_t>(CaptureCommand::stop)) {
     tick_.capture().stop();
-    return registers_.refuse(Refusal::none, address);
+    return parameters_.refuse(Refusal::none, address);
   }
   if (command != static_cast<std::uint16_t>(CaptureCommand::arm))
-    return registers_.refuse(Refusal::not_a_choice, address);
-  const ParameterValues& v = registers_.values();
+    return parameters_.refuse(Refusal::not_a_choice, address);
+  const ParameterValues& v = parameters_.values();
   CaptureConfig config;
   config.axis = static_cast<std::size_t>(v.whole<"capture.axis">());
   config.channels = {
@@ -22,13 +22,13 @@ DeviceRegisters::WriteResult Application::command_capture(std::uint16_t command)
   config.pre_trigger = static_cast<std::uint32_t>(v.whole<"capture.pre_trigger">());
   config.trigger = v.choice<CaptureTrigger, "capture.trigger">();
   config.level = v.real<"capture.trigger_level">();
-  if (tick_.capture().arm(config)) return registers_.refuse(Refusal::none, address);
+  if (tick_.capture().arm(config)) return parameters_.refuse(Refusal::none, address);
   const bool chosen = config.channels != CaptureConfig{}.channels;
-  return registers_.refuse(chosen ? Refusal::capture_missing : Refusal::capture_without_channels, address);
+  return parameters_.refuse(chosen ? Refusal::capture_missing : Refusal::capture_without_channels, address);
 }
 
 void Application::refresh_capture_readings() {
-  ParameterValues& v = registers_.values();
+  ParameterValues& v = parameters_.values();
   const CaptureReadings readings = tick_.capture().readings();
   v.set_whole<"capture.state">(static_cast<std::uint32_t>(readings.state));
   v.set_whole<"capture.taken">(readings.taken);

@@ -58,15 +58,6 @@ std::uint32_t little_endian(std::span<const std::uint8_t> in) {
   return raw;
 }
 
-/// A number of fewer bytes as the pattern that the dictionary keeps.
-std::uint32_t pattern_of(Type type, std::uint32_t raw) {
-  if (type == Type::integer8)
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int8_t>(raw)));
-  if (type == Type::integer16)
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int16_t>(raw)));
-  return raw;
-}
-
 void put_bytes(std::uint32_t value, std::uint32_t offset, std::span<std::uint8_t> out) {
   for (std::size_t i = 0; i < out.size(); ++i)
     out[i] = static_cast<std::uint8_t>(value >> (8 * ((offset + i) & 3U)));
@@ -235,7 +226,7 @@ Abort ApplicationObjects::write(ObjectAddress address, std::span<const std::uint
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
   if (special != nullptr) return write_special(*special, in);
   if (!slot) return Abort::read_only;
-  return write_slot(*slot, pattern_of(descriptors[owner_of(*slot).entry].type, little_endian(in)));
+  return write_slot(*slot, extended(descriptors[owner_of(*slot).entry].type, little_endian(in)));
 }
 
 Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
@@ -271,21 +262,16 @@ Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw) {
 }
 
 Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
-  const auto [entry, axis] = owner_of(slot);
-  const SlotDescriptor& descriptor = descriptors[entry];
+  const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
     const std::uint8_t node_id = app_.node_.node_id();
-    const Abort abort = canopen::check_communication(app_.registers_.values(), slot, raw, node_id);
+    const Abort abort = canopen::check_communication(app_.parameters_.values(), slot, raw, node_id);
     if (abort != Abort::none) return abort;
-    app_.registers_.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
+    app_.parameters_.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
     return Abort::none;
   }
-  const std::array<std::uint16_t, 2> words{static_cast<std::uint16_t>(raw >> 16),
-                                           static_cast<std::uint16_t>(raw)};
-  const auto result = app_.write_registers(register_address(entry, axis),
-                                           std::span(words).last(register_count(descriptor.type)),
-                                           Application::Commander::can);
-  return abort_for(result.refusal, descriptor, raw);
+  const SlotValue one{static_cast<std::uint16_t>(slot), raw};
+  return abort_for(app_.write({&one, 1}, Link::can).refusal, descriptor, raw);
 }
 
 void ApplicationObjects::refresh() {
@@ -293,13 +279,13 @@ void ApplicationObjects::refresh() {
 }
 
 std::uint32_t ApplicationObjects::value(std::size_t slot) const {
-  const std::uint32_t raw = app_.registers_.values().raw(slot);
+  const std::uint32_t raw = app_.parameters_.values().raw(slot);
   return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, app_.node_.node_id())
                                          : raw;
 }
 
 bool ApplicationObjects::take(std::size_t slot, std::uint32_t raw) {
-  return write_slot(slot, pattern_of(descriptors[owner_of(slot).entry].type, raw)) == Abort::none;
+  return write_slot(slot, raw) == Abort::none;
 }
 
 }  // namespace kmax::firmware

@@ -35,7 +35,7 @@ std::uint32_t Application::flags_of(std::size_t axis) const {
 
 void Application::refresh_axis_readings(std::size_t axis) {
   judge_if_changed();
-  ParameterValues& v = registers_.values();
+  ParameterValues& v = parameters_.values();
   const AxisReport& report = report_[axis];
   const auto& haptic = report.haptic;
   const GuardFinding& guard = guard_[axis];
@@ -105,7 +105,7 @@ void Application::refresh_axis_readings(std::size_t axis) {
 }
 
 void Application::refresh_device_readings() {
-  ParameterValues& v = registers_.values();
+  ParameterValues& v = parameters_.values();
   publish_telemetry(v, {flags_of(0), flags_of(1)}, report_[0].tick);
   v.set_whole<"info.vendor_id">(vendor_id);
   v.set_whole<"info.product_code">(product_code);
@@ -135,8 +135,8 @@ void Application::refresh_device_readings() {
   refresh_crash_readings();
   refresh_capture_readings();
   refresh_can_readings();
-  v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(registers_.last_refusal().refusal));
-  v.set_whole<"refusal.register">(registers_.last_refusal().address);
+  v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(parameters_.last_refusal().refusal));
+  v.set_whole<"refusal.register">(parameters_.last_refusal().address);
   v.set_whole<"trace.next">(tick_.trace().next());
 }
 

@@ -1,40 +1,18 @@
 // What a host can read and write: the bank behind the Modbus server.
 #include "firmware/application.hpp"
+#include "firmware/modbus/parameter_registers.hpp"
 
 namespace kmax::firmware {
 
 using modbus::Exception;
 
-namespace {
-Exception exception_for(Refusal refusal) {
-  switch (refusal) {
-    case Refusal::none:
-      return Exception::none;
-    case Refusal::unknown_register:
-    case Refusal::read_only:
-    case Refusal::value_cut_in_two:
-      return Exception::illegal_data_address;
-    case Refusal::while_armed:
-    case Refusal::no_transaction:
-    case Refusal::store_missing:
-    case Refusal::capture_missing:
-      return Exception::server_device_failure;
-    case Refusal::transaction_open:
-    case Refusal::store_busy:
-      return Exception::server_device_busy;
-    default:
-      return Exception::illegal_data_value;
-  }
-}
-}  // namespace
-
 bool Application::Bank::has_holding(std::uint16_t address, std::uint16_t count) const {
-  return app_.registers_.readable(true, address, count);
+  return modbus::readable(true, address, count);
 }
 
 Exception Application::Bank::read_holding(std::uint16_t address, std::span<std::uint16_t> out) {
-  if (!app_.registers_.readable(true, address, out.size())) return Exception::illegal_data_address;
-  app_.registers_.read(true, address, out);
+  if (!modbus::readable(true, address, out.size())) return Exception::illegal_data_address;
+  modbus::read_registers(app_.parameters_, true, address, out);
   return Exception::none;
 }
 
@@ -52,37 +30,35 @@ Exception Application::Bank::read_input(std::uint16_t address, std::span<std::ui
       out[i] = app_.tick_.capture().word_at(static_cast<std::uint16_t>(address + i));
     return Exception::none;
   }
-  if (!app_.registers_.readable(false, address, out.size())) return Exception::illegal_data_address;
+  if (!modbus::readable(false, address, out.size())) return Exception::illegal_data_address;
   app_.refresh_readings();
-  app_.registers_.read(false, address, out);
+  modbus::read_registers(app_.parameters_, false, address, out);
   return Exception::none;
 }
 
 Exception Application::Bank::write_holding(std::uint16_t address, std::span<const std::uint16_t> in) {
-  return exception_for(app_.write_registers(address, in, Commander::serial).refusal);
+  const modbus::WantedValues wanted = modbus::wanted_values(address, in);
+  if (wanted.refusal != Refusal::none) {
+    app_.parameters_.refuse(wanted.refusal, wanted.address);
+    return modbus::exception_for(wanted.refusal);
+  }
+  return modbus::exception_for(app_.write(wanted.values(), Link::serial).refusal);
 }
 
-DeviceRegisters::WriteResult Application::write_registers(std::uint16_t address,
-                                                          std::span<const std::uint16_t> in, Commander by) {
-  const auto is_single = [&](std::size_t entry, std::size_t axis) {
-    return in.size() == 1 && address == register_address(entry, axis);
-  };
-  DeviceRegisters::WriteResult result;
-  if (is_single(entry_of<"store.command">(), 0)) {
-    result = command_store(in[0]);
-  } else if (is_single(entry_of<"capture.command">(), 0)) {
-    result = command_capture(in[0]);
-  } else {
-    result = registers_.write(address, in, armed_axes(), now_us_);
-    for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      if (is_single(entry_of<"drive.controlword">(), axis)) commander_[axis] = by;
-    }
+ParameterAccess::Result Application::write(std::span<const SlotValue> wanted, Link by) {
+  const std::size_t entry = owner_of(wanted[0].slot).entry;
+  if (entry == entry_of<"store.command">()) return command_store(static_cast<std::uint16_t>(wanted[0].raw));
+  if (entry == entry_of<"capture.command">())
+    return command_capture(static_cast<std::uint16_t>(wanted[0].raw));
+  const auto result = parameters_.write(wanted, by, armed_axes(), now_us_);
+  for (const SlotValue& one : wanted) {
+    const auto [of, axis] = owner_of(one.slot);
+    if (of == entry_of<"drive.controlword">()) commander_[axis] = by;
   }
-  // At once: a poll that comes late finds several requests, and each must act as if it had come alone.
-  // Settings that came over CAN, where one value is one message and thousands may come in a second, are made
-  // once per poll for all, or before the next controlword.
-  const bool commands = registers_.controlword_waits();
-  if (by == Commander::serial || commands)
+  // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come
+  // alone, by the settings that came before it. Else settings act at the end of the poll, whichever link they
+  // came over: thousands may come in a second.
+  if (parameters_.controlword_waits())
     act();
   else
     publish_torques();

@@ -24,7 +24,6 @@ static_assert(slot_count < dummy_slot);
 struct MappedObject {
   std::uint16_t slot = dummy_slot;
   std::uint8_t bits = 0;
-  bool is_signed = false;
   friend constexpr bool operator==(const MappedObject&, const MappedObject&) = default;
 };
 
@@ -52,7 +51,7 @@ constexpr Abort find_mapped(PdoKind kind, std::uint32_t raw, MappedObject& objec
   if (address.index >= 1 && address.index <= dummy_bits.size()) {
     if (address.subindex != 0) return Abort::no_subindex;
     if (kind != PdoKind::receive || bits != dummy_bits[address.index - 1U]) return Abort::not_mappable;
-    object = {dummy_slot, bits, false};
+    object = {dummy_slot, bits};
     return Abort::none;
   }
   const auto slot = slot_at(address);
@@ -63,11 +62,10 @@ constexpr Abort find_mapped(PdoKind kind, std::uint32_t raw, MappedObject& objec
     return address.subindex == 0 || special_at(address) != nullptr ? Abort::not_mappable : Abort::no_subindex;
   }
   const std::size_t entry = owner_of(*slot).entry;
-  const Type type = descriptors[entry].type;
   if (!(kind == PdoKind::transmit ? tpdo_mappable(entry) : rpdo_mappable(entry)) ||
-      bits != 8 * bytes_of(type))
+      bits != 8 * bytes_of(descriptors[entry].type))
     return Abort::not_mappable;
-  object = {static_cast<std::uint16_t>(*slot), bits, is_signed(type)};
+  object = {static_cast<std::uint16_t>(*slot), bits};
   return Abort::none;
 }
 

@@ -131,13 +131,11 @@ class Rpdos {
     for (std::size_t i = 0; i < data.size(); ++i) bits |= std::uint64_t{data[i]} << (8 * i);
     for (std::size_t i = 0; i < mapping.count; ++i) {
       const MappedObject& object = mapping.objects[i];
-      const unsigned unused = 32U - object.bits;
-      std::uint32_t raw = static_cast<std::uint32_t>(bits) << unused >> unused;
-      if (object.is_signed)
-        raw = static_cast<std::uint32_t>(
-            static_cast<std::int32_t>(static_cast<std::uint32_t>(bits) << unused) >> unused);
+      const auto lowest = static_cast<std::uint32_t>(bits);
       bits >>= object.bits;
-      if (object.slot != dummy_slot && !write(std::size_t{object.slot}, raw)) ++counters_.refused;
+      if (object.slot == dummy_slot) continue;
+      const Type type = descriptors[owner_of(object.slot).entry].type;
+      if (!write(std::size_t{object.slot}, extended(type, lowest))) ++counters_.refused;
     }
   }
 

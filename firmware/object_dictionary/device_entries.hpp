@@ -94,8 +94,8 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
 
     whole("transaction.control", group::transaction, 1, Type::unsigned16, "", 0, 2, 0,
           "1 begins a transaction: writes are checked and kept aside; 2 applies them all in one tick; 0 "
-          "drops them. "
-          "A transaction that sees no write for 2 s is dropped.")
+          "drops them. It belongs to the link that began it: what another link sets meanwhile is refused. A "
+          "transaction that sees no write for 2 s is dropped.")
         .volatile_value(),
 
     reading("info.vendor_id", group::info, 1, Type::unsigned32, "", "CiA vendor ID; 0: none assigned.")

@@ -130,6 +130,13 @@ constexpr bool is_signed(Type type) {
   return type == Type::integer8 || type == Type::integer16 || type == Type::integer32;
 }
 
+/// A value's 32-bit pattern from as many bits as its type has, the lowest of `bits`: signed ones keep their sign.
+constexpr std::uint32_t extended(Type type, std::uint32_t bits) {
+  const int unused = 8 * (4 - bytes_of(type));
+  if (!is_signed(type)) return bits << unused >> unused;
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(bits << unused) >> unused);
+}
+
 /// A value as its 32-bit pattern, as it is stored and sent. The number must fit the type.
 constexpr std::uint32_t raw_from_number(Type type, double number) {
   switch (type) {

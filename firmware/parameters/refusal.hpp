@@ -60,7 +60,10 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::rate_does_not_divide, "haptic.rate must divide the tick rate of 20000 Hz without a remainder"},
     {Refusal::adaptive_interval_empty, "wall.adaptive_force_min must not exceed wall.adaptive_force_max"},
     {Refusal::supply_interval_empty, "supply.voltage_min must be below supply.voltage_max"},
-    {Refusal::transaction_open, "another transaction is open; it is dropped after 2 s without a write"},
+    {Refusal::transaction_open,
+     "a transaction is open, of another link or program; try again when it has ended, at the latest 2 s "
+     "after "
+     "its last write"},
     {Refusal::no_transaction,
      "no transaction is open (one that was left open has been dropped; write 0 to transaction.control, or "
      "wait 30 s)"},

@@ -46,9 +46,7 @@ class Parameter {
   /// The slot's 32 bits from as many as its type has, which are the lowest of `bits`: signed ones keep their
   /// sign.
   constexpr std::uint32_t extended(std::uint32_t bits) const {
-    const std::size_t unused = 8 * (4 - bytes());
-    if (!firmware::is_signed(definition().type)) return bits << unused >> unused;
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(bits << unused) >> unused);
+    return firmware::extended(definition().type, bits);
   }
   constexpr std::uint32_t default_raw() const {
     return firmware::raw_from_number(definition().type, definition().default_value);

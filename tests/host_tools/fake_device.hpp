@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "firmware/device_registers.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/modbus/register_bank.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
 #include "host_tools/device/serial/register_link.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
 namespace kmax::host_tools_test {
 
@@ -52,7 +52,7 @@ class FakeDevice {
   }
 
   bool has_holding(std::uint16_t address, std::uint16_t count) const {
-    return registers.readable(true, address, count);
+    return firmware::modbus::readable(true, address, count);
   }
   std::string_view identification(std::uint8_t object) const {
     if (object == 0) return "Kmax";
@@ -92,7 +92,7 @@ class FakeDevice {
     return raw;
   }
 
-  firmware::DeviceRegisters registers;
+  firmware::RegisterAccess registers;
   std::array<firmware::AxisStateMachine, firmware::axis_count> machines;
   std::array<firmware::Refusal, firmware::axis_count> obstacle{};
   std::array<bool, firmware::axis_count> cause_remains{};
@@ -117,7 +117,7 @@ class FakeDevice {
   }
 
   Exception read(bool holding, std::uint16_t address, std::span<std::uint16_t> out) {
-    if (!registers.readable(holding, address, out.size())) return Exception::illegal_data_address;
+    if (!firmware::modbus::readable(holding, address, out.size())) return Exception::illegal_data_address;
     registers.read(holding, address, out);
     return Exception::none;
   }

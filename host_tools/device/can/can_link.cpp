@@ -31,9 +31,10 @@ std::string name_of(const Parameter& parameter) {
 
 SdoRefused refusal(const SdoAborted& aborted, const char* doing, const std::string& object,
                    const std::string& more = {}) {
-  const std::string_view why = aborted.code() == Abort::local_control
-                                   ? "another link has a transaction open, or the data are in use"
-                                   : firmware::canopen::to_string(aborted.code());
+  const std::string_view why =
+      aborted.code() == Abort::local_control
+          ? "another link has a transaction open, or the data are in use; try again in 2 s"
+          : firmware::canopen::to_string(aborted.code());
   return {aborted, fmt::format("the device refused to {} object {}: {} (SDO abort {:08X}){}", doing, object,
                                why, static_cast<std::uint32_t>(aborted.code()), more)};
 }

@@ -31,7 +31,7 @@ const char* words_of_exception(std::uint8_t exception) {
     case 5:
       return "it needs more time";
     case 6:
-      return "it is busy, or another link has a transaction open";
+      return "it is busy, or another link has a transaction open; try again in 2 s";
     default:
       return "for a reason this program does not know";
   }

@@ -18,13 +18,13 @@ Abort find(PdoKind kind, std::uint16_t index, std::uint8_t subindex, unsigned bi
 TEST(PdoMapping, FindsAValueOfEachAxisAndItsLength) {
   MappedObject object;
   ASSERT_EQ(find_mapped(receive, mapping_of(0x6071, 0, 16), object), Abort::none);
-  EXPECT_EQ(object, (MappedObject{static_cast<std::uint16_t>(slot_of(entry_of<"profile.target_torque">(), 0)),
-                                  16, true}));
+  EXPECT_EQ(object,
+            (MappedObject{static_cast<std::uint16_t>(slot_of(entry_of<"profile.target_torque">(), 0)), 16}));
   ASSERT_EQ(find_mapped(receive, mapping_of(0x6871, 0, 16), object), Abort::none);
   EXPECT_EQ(object.slot, slot_of(entry_of<"profile.target_torque">(), 1));
   ASSERT_EQ(find_mapped(transmit, mapping_of(0x2812, 3, 32), object), Abort::none);
-  EXPECT_EQ(object, (MappedObject{static_cast<std::uint16_t>(slot_of(entry_of<"measured.velocity">(), 1)), 32,
-                                  false}));
+  EXPECT_EQ(object,
+            (MappedObject{static_cast<std::uint16_t>(slot_of(entry_of<"measured.velocity">(), 1)), 32}));
 }
 
 TEST(PdoMapping, EveryMappableValueFitsWithItsOwnLengthOnly) {

@@ -166,7 +166,7 @@ TEST(Device, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
     connection.fake->write_holding(Parameter::of<"wall.damping">().address(), words);
   };
   EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.stiffness=50"})); }),
-                  "another transaction");
+                  "a transaction is open");
 }
 
 TEST(Device, AnotherWriterIsFoundOut) {

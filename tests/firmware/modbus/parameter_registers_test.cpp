@@ -4,17 +4,17 @@
 #include <array>
 #include <vector>
 
-#include "firmware/device_registers.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
-namespace kmax::firmware::device_registers_places_test {
+namespace kmax::firmware::modbus::parameter_registers_test {
 namespace {
 
-TEST(DeviceRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
+TEST(ParameterRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
   struct Word {
     bool there = false;
     std::uint16_t value = 0;
   };
-  DeviceRegisters registers;
+  RegisterAccess registers;
   std::array<std::vector<Word>, 2> tables{std::vector<Word>(0x10000), std::vector<Word>(0x10000)};
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
@@ -31,14 +31,14 @@ TEST(DeviceRegisters, EveryAddressHoldsTheWordThatTheDictionarySays) {
     for (std::size_t address = 0; address < 0x10000; ++address) {
       const Word& word = tables[holding][address];
       const auto at = static_cast<std::uint16_t>(address);
-      ASSERT_EQ(registers.readable(holding, at, 1), word.there) << holding << " " << address;
+      ASSERT_EQ(readable(holding, at, 1), word.there) << holding << " " << address;
       std::array<std::uint16_t, 1> read{};
       if (word.there) registers.read(holding, at, read);
       ASSERT_EQ(read[0], word.value) << holding << " " << address;
     }
   }
-  EXPECT_FALSE(registers.readable(true, 0x10000, 1));
+  EXPECT_FALSE(readable(true, 0x10000, 1));
 }
 
 }  // namespace
-}  // namespace kmax::firmware::device_registers_places_test
+}  // namespace kmax::firmware::modbus::parameter_registers_test

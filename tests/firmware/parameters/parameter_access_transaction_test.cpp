@@ -1,44 +1,22 @@
-// The transactions of DeviceRegisters; single writes are in device_registers_test.cpp.
+// The transactions of ParameterAccess; single writes are in parameter_access_test.cpp.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <vector>
 
-#include "firmware/device_registers.hpp"
-#include "tests/firmware/register_words.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
-namespace kmax::firmware::device_registers_transaction_test {
+namespace kmax::firmware::parameter_access_transaction_test {
 namespace {
 
-class Transaction : public testing::Test {
- protected:
-  Refusal control(std::uint16_t request, bool armed = false) {
-    return registers.write(address_of("transaction.control"), Words{request}, armed, now).refusal;
-  }
-  Refusal set(std::string_view name, double number, bool armed = false) {
-    return registers.write(address_of(name), words_for(name, number), armed, now).refusal;
-  }
-  double get(std::string_view name) {
-    Words words(register_count(entry_at(entry_named(name)).type));
-    registers.read(true, address_of(name), words);
-    return number_in(name, words);
-  }
-  std::vector<std::uint32_t> bits() {
-    std::vector<std::uint32_t> all;
-    for (std::size_t slot = 0; slot < slot_count; ++slot) all.push_back(registers.values().raw(slot));
-    return all;
-  }
-
-  DeviceRegisters registers;
-  std::uint32_t now = 1000;
-};
+using Transaction = NamedParameters;
 
 TEST_F(Transaction, NothingShowsBeforeTheCommitAndAllOfItAfter) {
   EXPECT_EQ(control(1), Refusal::none);
-  const auto before = bits();
+  const auto before = registers.bits();
   EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
   EXPECT_EQ(set("wall.position", 0.25), Refusal::none);
-  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(registers.bits(), before);
   EXPECT_EQ(registers.changes(), 0u);
   EXPECT_EQ(control(2), Refusal::none);
   EXPECT_EQ(get("wall.stiffness"), 5000);
@@ -62,14 +40,14 @@ TEST_F(Transaction, ASetThatBreaksARuleIsDroppedWhole) {
   EXPECT_EQ(control(1), Refusal::none);
   EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
   EXPECT_EQ(set("haptic.rate", 300), Refusal::none);
-  const auto before = bits();
+  const auto before = registers.bits();
   EXPECT_EQ(control(2), Refusal::rate_does_not_divide);
   EXPECT_EQ(registers.last_refusal().address, address_of("haptic.rate"));
-  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(registers.bits(), before);
   EXPECT_FALSE(registers.transaction_open());
   EXPECT_EQ(control(1), Refusal::none);
   EXPECT_EQ(control(2), Refusal::none);
-  EXPECT_EQ(bits(), before) << "nothing of the dropped set comes back";
+  EXPECT_EQ(registers.bits(), before) << "nothing of the dropped set comes back";
 }
 
 TEST_F(Transaction, ARefusedValueLeavesWhatWasStagedAndTheTransaction) {
@@ -83,7 +61,7 @@ TEST_F(Transaction, ARefusedValueLeavesWhatWasStagedAndTheTransaction) {
 }
 
 TEST_F(Transaction, EndsWithoutEffectWhenDroppedAndASecondBeginIsRefused) {
-  const auto before = bits();
+  const auto before = registers.bits();
   EXPECT_EQ(control(0), Refusal::none) << "nothing to drop is no error";
   EXPECT_EQ(control(2), Refusal::no_transaction);
   EXPECT_EQ(control(3), Refusal::out_of_range);
@@ -94,7 +72,7 @@ TEST_F(Transaction, EndsWithoutEffectWhenDroppedAndASecondBeginIsRefused) {
   EXPECT_TRUE(registers.transaction_open());
   EXPECT_EQ(control(0), Refusal::none);
   EXPECT_EQ(control(2), Refusal::no_transaction);
-  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(registers.bits(), before);
 }
 
 TEST_F(Transaction, TwoSecondsWithoutAWriteDropItAlsoAcrossTheClocksWrap) {
@@ -135,10 +113,10 @@ TEST_F(Transaction, ArmedBetweenStagingAndCommitIsRefusedWhole) {
   EXPECT_EQ(control(1), Refusal::none);
   EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
   EXPECT_EQ(set("wall.position", 0.25), Refusal::none);
-  const auto before = bits();
+  const auto before = registers.bits();
   EXPECT_EQ(control(2, true), Refusal::while_armed);
   EXPECT_EQ(registers.last_refusal().address, address_of("wall.position"));
-  EXPECT_EQ(bits(), before);
+  EXPECT_EQ(registers.bits(), before);
   EXPECT_EQ(control(2, false), Refusal::no_transaction) << "dropped, not kept for later";
 }
 
@@ -217,4 +195,4 @@ TEST_F(Transaction, ChangesOnlyWhatWasWrittenInIt) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::device_registers_transaction_test
+}  // namespace kmax::firmware::parameter_access_transaction_test

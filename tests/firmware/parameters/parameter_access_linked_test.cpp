@@ -1,4 +1,4 @@
-// Parameters that are one thing in two standards' numbers, as DeviceRegisters keeps them together; which
+// Parameters that are one thing in two standards' numbers, as ParameterAccess keeps them together; which
 // those are is in linked_parameters_test.cpp.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -7,11 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/device_registers.hpp"
 #include "firmware/parameters/persistent_parameters.hpp"
-#include "tests/firmware/register_words.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
-namespace kmax::firmware::device_registers_linked_test {
+namespace kmax::firmware::parameter_access_linked_test {
 namespace {
 
 struct Pair {
@@ -21,19 +20,8 @@ struct Pair {
 const std::vector<Pair> pairs = {{"drive.mode", "profile.operation_mode", {{0, -1}, {1, -2}, {2, 10}}},
                                  {"encoder.direction", "profile.polarity", {{1, 0}, {-1, 0xC0}}}};
 
-class LinkedRegisters : public testing::Test {
+class LinkedRegisters : public NamedParameters {
  protected:
-  Refusal set(std::string_view name, double number, std::size_t axis = 0, bool armed = false) {
-    return registers.write(address_of(name, axis), words_for(name, number), armed, now).refusal;
-  }
-  Refusal control(std::uint16_t request, bool armed = false) {
-    return registers.write(address_of("transaction.control"), Words{request}, armed, now).refusal;
-  }
-  double get(std::string_view name, std::size_t axis = 0) {
-    Words words(register_count(entry_at(entry_named(name)).type));
-    registers.read(true, address_of(name, axis), words);
-    return number_in(name, words);
-  }
   ParameterValues with(std::initializer_list<std::pair<std::string_view, int>> numbers,
                        std::size_t axis = 0) {
     ParameterValues values = registers.values();
@@ -41,9 +29,6 @@ class LinkedRegisters : public testing::Test {
       values.set_raw(slot_of(entry_named(name), axis), static_cast<std::uint32_t>(number));
     return values;
   }
-
-  DeviceRegisters registers;
-  std::uint32_t now = 1000;
 };
 
 TEST_F(LinkedRegisters, WritingEitherSetsBothAndIsOneChange) {
@@ -53,7 +38,7 @@ TEST_F(LinkedRegisters, WritingEitherSetsBothAndIsOneChange) {
         for (const auto& [own, standard] : pair.values) {
           const auto changes = registers.changes(), restarts = registers.restarting_changes();
           const bool changed = get(pair.own, axis) != own;
-          ASSERT_EQ(by_standard ? set(pair.standard, standard, axis) : set(pair.own, own, axis),
+          ASSERT_EQ(by_standard ? set(pair.standard, standard, false, axis) : set(pair.own, own, false, axis),
                     Refusal::none);
           EXPECT_EQ(get(pair.own, axis), own);
           EXPECT_EQ(get(pair.standard, axis), standard);
@@ -72,9 +57,9 @@ TEST_F(LinkedRegisters, WhatIsNoChoiceOrNotAllowedWhileArmedChangesNeither) {
     EXPECT_EQ(set("profile.operation_mode", wrong), Refusal::not_a_choice) << wrong;
   for (const double wrong : {1, 0x40, 0x80, 0xC1, 0xFF})
     EXPECT_EQ(set("profile.polarity", wrong), Refusal::not_a_choice) << wrong;
-  EXPECT_EQ(set("profile.operation_mode", 10, 0, true), Refusal::while_armed);
-  EXPECT_EQ(set("profile.polarity", 0xC0, 0, true), Refusal::while_armed);
-  EXPECT_EQ(set("profile.operation_mode", -1, 0, true), Refusal::none) << "what it is already";
+  EXPECT_EQ(set("profile.operation_mode", 10, true), Refusal::while_armed);
+  EXPECT_EQ(set("profile.polarity", 0xC0, true), Refusal::while_armed);
+  EXPECT_EQ(set("profile.operation_mode", -1, true), Refusal::none) << "what it is already";
   EXPECT_EQ(get("drive.mode"), 0);
   EXPECT_EQ(get("profile.operation_mode"), -1);
   EXPECT_EQ(get("encoder.direction"), 1);
@@ -149,8 +134,8 @@ TEST_F(LinkedRegisters, OfASetTheOneThatDiffersFromNowWinsAndElseThePersistentOn
 }
 
 TEST_F(LinkedRegisters, AgreeAfterTheDefaults) {
-  ASSERT_EQ(set("profile.polarity", 0xC0, 1), Refusal::none);
-  ASSERT_EQ(set("profile.operation_mode", 10, 1), Refusal::none);
+  ASSERT_EQ(set("profile.polarity", 0xC0, false, 1), Refusal::none);
+  ASSERT_EQ(set("profile.operation_mode", 10, false, 1), Refusal::none);
   ParameterValues wanted = registers.values();
   set_defaults(wanted);
   ASSERT_EQ(registers.set_all(wanted, false).refusal, Refusal::none);
@@ -161,7 +146,7 @@ TEST_F(LinkedRegisters, AgreeAfterTheDefaults) {
 }
 
 RC_GTEST_PROP(LinkedParametersOfRegisters, AlwaysAgreeWhateverIsDone, ()) {
-  DeviceRegisters registers;
+  RegisterAccess registers;
   const auto steps = *rc::gen::inRange(1, 60);
   std::uint32_t now = 0;
   for (int step = 0; step < steps; ++step) {
@@ -204,4 +189,4 @@ RC_GTEST_PROP(LinkedParametersOfRegisters, AlwaysAgreeWhateverIsDone, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::device_registers_linked_test
+}  // namespace kmax::firmware::parameter_access_linked_test

@@ -1,36 +1,18 @@
-// Setpoints and CANopen's own settings in DeviceRegisters: what is taken at once and is no part of a set.
+// Setpoints and CANopen's own settings in ParameterAccess: what is taken at once and is no part of a set.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <string_view>
 #include <vector>
 
-#include "firmware/device_registers.hpp"
 #include "firmware/parameters/persistent_parameters.hpp"
-#include "tests/firmware/register_words.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
-namespace kmax::firmware::device_registers_setpoints_test {
+namespace kmax::firmware::parameter_access_setpoints_test {
 namespace {
 
-class Registers : public testing::Test {
- protected:
-  Refusal write(std::string_view name, Words words, bool armed = false, std::size_t axis = 0) {
-    return registers.write(address_of(name, axis), words, armed, now).refusal;
-  }
-  Refusal control(std::uint16_t request) { return write("transaction.control", {request}); }
-  double get(std::string_view name, std::size_t axis = 0) {
-    const Entry& entry = entry_at(entry_named(name));
-    Words words(register_count(entry.type));
-    registers.read(entry.access == Access::read_write, address_of(name, axis), words);
-    return number_in(name, words);
-  }
-  static std::size_t slot(std::string_view name) { return slot_of(entry_named(name), 0); }
-
-  DeviceRegisters registers;
-  std::uint32_t now = 1000;
-};
-using Setpoints = Registers;
-using Communication = Registers;
+using Setpoints = NamedParameters;
+using Communication = NamedParameters;
 
 TEST_F(Setpoints, EveryPatternOfTheTargetIsANumberWithItsSign) {
   for (unsigned word = 0; word <= 0xFFFF; ++word) {
@@ -161,7 +143,7 @@ TEST_F(Communication, SettingsAreSetOneByOneWithinTheirRangeAndCountedApart) {
     }
     // Any link reads it, among the readings.
     Words words(register_count(e.type));
-    ASSERT_TRUE(registers.readable(false, modbus_address(i, 0), words.size())) << e.name;
+    ASSERT_TRUE(modbus::readable(false, modbus_address(i, 0), words.size())) << e.name;
     registers.read(false, modbus_address(i, 0), words);
     EXPECT_EQ(words, words_of_raw(e.type, value)) << e.name;
   }
@@ -215,7 +197,8 @@ TEST_F(Communication, OfASetIsTakenWithItAndCountedOnce) {
 TEST_F(Communication, SetDuringATransactionStaysAtItsCommit) {
   ASSERT_EQ(control(1), Refusal::none);
   ASSERT_EQ(write("wall.stiffness", words_for("wall.stiffness", 5000)), Refusal::none);
-  ASSERT_EQ(registers.write_communication(slot("canopen.heartbeat_time"), 100).refusal, Refusal::none);
+  ASSERT_EQ(registers.write_communication(slot_of(entry_of<"canopen.heartbeat_time">(), 0), 100).refusal,
+            Refusal::none);
   ASSERT_EQ(control(2), Refusal::none);
   EXPECT_EQ(get("canopen.heartbeat_time"), 100);
   EXPECT_EQ(get("wall.stiffness"), 5000);
@@ -223,4 +206,4 @@ TEST_F(Communication, SetDuringATransactionStaysAtItsCommit) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::device_registers_setpoints_test
+}  // namespace kmax::firmware::parameter_access_setpoints_test

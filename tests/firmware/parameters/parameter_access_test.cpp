@@ -1,4 +1,4 @@
-#include "firmware/device_registers.hpp"
+#include "firmware/parameters/parameter_access.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -9,17 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "tests/firmware/register_words.hpp"
+#include "tests/firmware/parameters/register_access.hpp"
 
-namespace kmax::firmware::device_registers_test {
+namespace kmax::firmware::parameter_access_test {
 namespace {
-
-// All parameters' bits, for "nothing has changed".
-std::vector<std::uint32_t> bits_of(const DeviceRegisters& registers) {
-  std::vector<std::uint32_t> all;
-  for (std::size_t slot = 0; slot < slot_count; ++slot) all.push_back(registers.values().raw(slot));
-  return all;
-}
 
 // What is set together with a parameter.
 std::string_view partner_of(std::string_view name) {
@@ -37,13 +30,13 @@ bool is_setpoint(std::string_view name) {
 }
 
 struct Written {
-  DeviceRegisters registers;
-  DeviceRegisters::WriteResult write(std::uint16_t address, Words words, bool armed = false,
-                                     std::uint32_t now = 0) {
+  RegisterAccess registers;
+  ParameterAccess::Result write(std::uint16_t address, Words words, bool armed = false,
+                                std::uint32_t now = 0) {
     return registers.write(address, words, armed, now);
   }
-  DeviceRegisters::WriteResult write(std::string_view name, double number, std::size_t axis = 0,
-                                     bool armed = false) {
+  ParameterAccess::Result write(std::string_view name, double number, std::size_t axis = 0,
+                                bool armed = false) {
     return write(address_of(name, axis), words_for(name, number), armed);
   }
   Words read(bool holding, std::uint16_t address, std::size_t count) {
@@ -53,7 +46,7 @@ struct Written {
   }
 };
 
-TEST(DeviceRegisters, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxis) {
+TEST(ParameterAccess, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxis) {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
@@ -66,14 +59,14 @@ TEST(DeviceRegisters, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxi
           check_value(descriptors[entry], raw_from_number(e.type, number)) != Refusal::none)
         continue;
       Written w;
-      const auto before = bits_of(w.registers);
+      const auto before = w.registers.bits();
       const Words words = words_for(e.name, number);
       const auto result = w.write(modbus_address(entry, axis), words);
       if (e.name == "wall.adaptive_force_min" || e.name == "wall.adaptive_force_max" ||
           e.name == "supply.voltage_min" || e.name == "supply.voltage_max" ||
           e.name == "compensation.limit") {
         if (result.refusal != Refusal::none) {  // a rule between two parameters
-          EXPECT_EQ(bits_of(w.registers), before);
+          EXPECT_EQ(w.registers.bits(), before);
           continue;
         }
       }
@@ -81,15 +74,15 @@ TEST(DeviceRegisters, EveryParameterCanBeWrittenToItsBoundsAndReadBackOnEveryAxi
       EXPECT_EQ(w.read(true, modbus_address(entry, axis), words.size()), words) << e.name;
       auto expected = before;
       expected[slot] = raw_from_number(e.type, number);
-      // The same thing in another standard's numbers; which ones, device_registers_linked_test.cpp says.
+      // The same thing in another standard's numbers; which ones, parameter_access_linked_test.cpp says.
       if (const std::string_view other = partner_of(e.name); !other.empty())
-        expected[slot_of(entry_named(other), axis)] = bits_of(w.registers)[slot_of(entry_named(other), axis)];
-      EXPECT_EQ(bits_of(w.registers), expected) << e.name << ": nothing else may change";
+        expected[slot_of(entry_named(other), axis)] = w.registers.bits()[slot_of(entry_named(other), axis)];
+      EXPECT_EQ(w.registers.bits(), expected) << e.name << ": nothing else may change";
     }
   }
 }
 
-TEST(DeviceRegisters, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNothing) {
+TEST(ParameterAccess, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNothing) {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
@@ -115,13 +108,13 @@ TEST(DeviceRegisters, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNo
     }
     for (const auto& [words, reason] : wrong) {
       Written w;
-      const auto before = bits_of(w.registers);
+      const auto before = w.registers.bits();
       const auto result = w.write(modbus_address(entry, axis), words);
       EXPECT_EQ(result.refusal, reason) << e.name;
       EXPECT_EQ(result.address, modbus_address(entry, axis)) << e.name;
       EXPECT_EQ(w.registers.last_refusal().refusal, reason);
       EXPECT_EQ(w.registers.last_refusal().address, modbus_address(entry, axis));
-      EXPECT_EQ(bits_of(w.registers), before) << e.name;
+      EXPECT_EQ(w.registers.bits(), before) << e.name;
       EXPECT_EQ(w.registers.changes(), 0u);
       EXPECT_EQ(w.write("force.limit", 1.0).refusal, Refusal::none);
       EXPECT_EQ(w.registers.last_refusal().refusal, Refusal::none) << "a later write that is taken clears it";
@@ -129,7 +122,7 @@ TEST(DeviceRegisters, WhatIsOutOfRangeIsRefusedWithReasonAndRegisterAndChangesNo
   }
 }
 
-TEST(DeviceRegisters, Signed8BitValuesComeSignExtendedOrAsABareByte) {
+TEST(ParameterAccess, Signed8BitValuesComeSignExtendedOrAsABareByte) {
   const std::uint16_t side = address_of("wall.side");
   for (const unsigned form : {0xFFFFu, 0x00FFu}) {
     Written w;
@@ -145,7 +138,7 @@ TEST(DeviceRegisters, Signed8BitValuesComeSignExtendedOrAsABareByte) {
   }
 }
 
-TEST(DeviceRegisters, HalfOfATwoRegisterValueIsRefusedWhereverTheRangeCutsIt) {
+TEST(ParameterAccess, HalfOfATwoRegisterValueIsRefusedWhereverTheRangeCutsIt) {
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const auto [entry, axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
@@ -158,14 +151,14 @@ TEST(DeviceRegisters, HalfOfATwoRegisterValueIsRefusedWhereverTheRangeCutsIt) {
     EXPECT_EQ(result.refusal, Refusal::value_cut_in_two) << e.name;
     EXPECT_EQ(result.address, first + 1);
     // As long as a value, but begun in the middle of one.
-    const auto before = bits_of(w.registers);
+    const auto before = w.registers.bits();
     EXPECT_EQ(w.write(static_cast<std::uint16_t>(first + 1), words).refusal, Refusal::value_cut_in_two)
         << e.name;
-    EXPECT_EQ(bits_of(w.registers), before) << e.name;
+    EXPECT_EQ(w.registers.bits(), before) << e.name;
   }
 }
 
-TEST(DeviceRegisters, ARangeIsWrittenWholeOrNotAtAllWhicheverValueIsWrong) {
+TEST(ParameterAccess, ARangeIsWrittenWholeOrNotAtAllWhicheverValueIsWrong) {
   // The whole wall record, with one wrong value at each place in turn.
   Words good;
   std::vector<std::size_t> starts;
@@ -188,26 +181,26 @@ TEST(DeviceRegisters, ARangeIsWrittenWholeOrNotAtAllWhicheverValueIsWrong) {
       Words bad = good;
       bad[starts[i]] = 0x7FC0;  // a NaN, or far out of any choice
       Written w;
-      const auto before = bits_of(w.registers);
+      const auto before = w.registers.bits();
       const auto result = w.write(base, bad);
       EXPECT_NE(result.refusal, Refusal::none);
       EXPECT_EQ(result.address, base + starts[i]);
-      EXPECT_EQ(bits_of(w.registers), before) << entry_at(entries[i]).name;
+      EXPECT_EQ(w.registers.bits(), before) << entry_at(entries[i]).name;
     }
     Written cut;
-    const auto before = bits_of(cut.registers);
+    const auto before = cut.registers.bits();
     EXPECT_EQ(cut.write(base, Words(good.begin(), good.end() - 1)).refusal, Refusal::value_cut_in_two);
     Words longer = good;
     longer.push_back(0);
     EXPECT_EQ(cut.write(base, longer).refusal, Refusal::unknown_register);
     EXPECT_EQ(cut.registers.last_refusal().address, base + good.size());
-    EXPECT_EQ(bits_of(cut.registers), before);
+    EXPECT_EQ(cut.registers.bits(), before);
   }
 }
 
-TEST(DeviceRegisters, GapsEndsAndReadOnlyPlacesAreNotWritable) {
+TEST(ParameterAccess, GapsEndsAndReadOnlyPlacesAreNotWritable) {
   Written w;
-  const auto before = bits_of(w.registers);
+  const auto before = w.registers.bits();
   for (const unsigned address : {0x003Fu, 0x0201u, 0x07FFu, 0x0FFFu, 0x4000u, 0xFFFFu})
     EXPECT_EQ(w.write(static_cast<std::uint16_t>(address), {0}).refusal, Refusal::unknown_register)
         << address;
@@ -223,10 +216,10 @@ TEST(DeviceRegisters, GapsEndsAndReadOnlyPlacesAreNotWritable) {
   EXPECT_FALSE(w.registers.transaction_open());
   std::uint16_t word = 0;
   EXPECT_FALSE(w.registers.fetch_controlword(0, word));
-  EXPECT_EQ(bits_of(w.registers), before);
+  EXPECT_EQ(w.registers.bits(), before);
 }
 
-TEST(DeviceRegisters, ReadableIsExactlyTheRegistersThereAre) {
+TEST(ParameterAccess, ReadableIsExactlyTheRegistersThereAre) {
   Written w;
   for (const bool holding : {true, false}) {
     std::vector<bool> there(0x10000, false);
@@ -241,14 +234,14 @@ TEST(DeviceRegisters, ReadableIsExactlyTheRegistersThereAre) {
       for (const std::size_t count : {1u, 2u, 3u, 27u, 125u}) {
         if (address + count > 0x10000) break;
         for (std::uint32_t a = address; a < address + count; ++a) expected = expected && there[a];
-        ASSERT_EQ(w.registers.readable(holding, address, count), expected) << address << " " << count;
+        ASSERT_EQ(modbus::readable(holding, address, count), expected) << address << " " << count;
       }
     }
-    EXPECT_FALSE(w.registers.readable(holding, 0xFFFF, 2));
+    EXPECT_FALSE(modbus::readable(holding, 0xFFFF, 2));
   }
 }
 
-TEST(DeviceRegisters, ReadingMayStartAndEndWithinAValue) {
+TEST(ParameterAccess, ReadingMayStartAndEndWithinAValue) {
   Written w;
   ASSERT_EQ(w.write("wall.position", 0.1).refusal, Refusal::none);
   const Words position = words_for("wall.position", 0.1);
@@ -257,7 +250,7 @@ TEST(DeviceRegisters, ReadingMayStartAndEndWithinAValue) {
   EXPECT_EQ(w.read(true, static_cast<std::uint16_t>(first - 1), 2), (Words{1, position[0]}));
 }
 
-TEST(DeviceRegisters, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
+TEST(ParameterAccess, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& e = entry_at(i);
     if (e.access != Access::read_write || e.name == "transaction.control" || e.name == "drive.controlword" ||
@@ -287,7 +280,7 @@ TEST(DeviceRegisters, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
   }
 }
 
-TEST(DeviceRegisters, StoreCommandsAreForTheApplicationAndNeverAValue) {
+TEST(ParameterAccess, StoreCommandsAreForTheApplicationAndNeverAValue) {
   for (const bool in_transaction : {false, true}) {
     Written w;
     if (in_transaction) {
@@ -304,7 +297,7 @@ TEST(DeviceRegisters, StoreCommandsAreForTheApplicationAndNeverAValue) {
   }
 }
 
-TEST(DeviceRegisters, ControlwordsAreFetchedOncePerAxisAndAreNoParameterChange) {
+TEST(ParameterAccess, ControlwordsAreFetchedOncePerAxisAndAreNoParameterChange) {
   Written w;
   EXPECT_EQ(w.write(address_of("drive.controlword", 1), {0xABCD}, true).refusal, Refusal::none);
   std::uint16_t word = 0;
@@ -318,8 +311,8 @@ TEST(DeviceRegisters, ControlwordsAreFetchedOncePerAxisAndAreNoParameterChange) 
   EXPECT_EQ(w.registers.changes(), 0u);
 }
 
-RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWriteChangesNothing, ()) {
-  DeviceRegisters registers;
+RC_GTEST_PROP(ParameterAccess, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWriteChangesNothing, ()) {
+  RegisterAccess registers;
   std::uint32_t now = *rc::gen::arbitrary<std::uint32_t>();
   const auto steps = *rc::gen::inRange(1, 60);
   for (int step = 0; step < steps; ++step) {
@@ -346,11 +339,11 @@ RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
                                              e.type == Type::integer32 ? 2147483647.0 : 4294967295.0));
       }
     }
-    const auto before = bits_of(registers);
+    const auto before = registers.bits();
     const auto changes = registers.changes();
     const auto result = registers.write(address, words, armed, now);
     RC_ASSERT(registers.last_refusal().refusal == result.refusal);
-    const auto after = bits_of(registers);
+    const auto after = registers.bits();
     if (result.refusal != Refusal::none) RC_ASSERT(after == before);
     RC_ASSERT(check_rules(registers.values()).refusal == Refusal::none);
     for (std::size_t s = 0; s < slot_count; ++s) {
@@ -368,4 +361,4 @@ RC_GTEST_PROP(DeviceRegisters, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
 }
 
 }  // namespace
-}  // namespace kmax::firmware::device_registers_test
+}  // namespace kmax::firmware::parameter_access_test
