@@ -169,7 +169,8 @@ class Axis {
   [[gnu::cold]] float excite(const AxisSetting& setting, const Input& input);
   [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
   static Fault condition_of(const AxisSetting& setting, const Input& input);
-  bool drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved);
+  [[gnu::always_inline]] inline bool drive(const AxisSetting& setting, const Input& input,
+                                           std::uint32_t position, std::int32_t moved);
 
   control::CountExtender<std::uint32_t> extender_;
   control::HapticLoop<float> loop_;

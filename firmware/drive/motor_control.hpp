@@ -130,14 +130,21 @@ class MotorControl {
     return {-(measured.current_b + measured.current_c), measured.current_b, measured.current_c};
   }
 
+  /// Who follows a force or drives the motor: the tick, in whose one function all is inline, or
+  /// identification, whose kinds share the current controller's code.
+  enum class By : std::uint8_t { tick, identification };
+  template <By by>
   void follow_force(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
                     float velocity, Output& out);
   control::PhaseCondition drive_dc(const Coefficients& c, const Measured& measured, float velocity,
                                    bool steady, Output& out);
+  template <By by>
   control::PhaseCondition drive_pmsm(const Coefficients& c, const Measured& measured, std::uint32_t angle,
                                      float velocity, bool steady, Output& out);
   control::PhaseCondition excite_dc(const Coefficients& c, const Measured& measured,
                                     const Excitation::Output& asked, float velocity, Output& out);
+  [[gnu::cold, gnu::noinline]] FieldOriented::Output identify_pmsm(const Coefficients& c,
+                                                                   const FieldOriented::Input& in);
   // For identification only: small code rather than fast code.
   [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(const Coefficients& c,
                                                                      const Measured& measured,
@@ -172,9 +179,10 @@ inline void MotorControl::update(const Coefficients& c, const Measured& measured
       out.current = 0.5f * (measured.current_b - measured.current_c);
     return;
   }
-  follow_force(c, measured, force, position, velocity, out);
+  follow_force<By::tick>(c, measured, force, position, velocity, out);
 }
 
+template <MotorControl::By by>
 inline void MotorControl::follow_force(const Coefficients& c, const Measured& measured, float force,
                                        std::uint32_t position, float velocity, Output& out) {
   const auto wanted = control::MotorTransmission<float>::update(c.transmission, force);
@@ -188,7 +196,7 @@ inline void MotorControl::follow_force(const Coefficients& c, const Measured& me
   const auto condition =
       c.kind == MotorKind::dc
           ? drive_dc(c, measured, velocity, true, out)
-          : drive_pmsm(c, measured, position * c.angle_per_count + c.angle_offset, velocity, true, out);
+          : drive_pmsm<by>(c, measured, position * c.angle_per_count + c.angle_offset, velocity, true, out);
   if (condition != control::PhaseCondition::good) [[unlikely]]
     tell(condition, c, measured, out);
 }
@@ -205,6 +213,7 @@ inline control::PhaseCondition MotorControl::drive_dc(const Coefficients& c, con
                        control::magnitude(velocity) < c.slow_velocity);
 }
 
+template <MotorControl::By by>
 inline control::PhaseCondition MotorControl::drive_pmsm(const Coefficients& c, const Measured& measured,
                                                         std::uint32_t angle, float velocity, bool steady,
                                                         Output& out) {
@@ -215,7 +224,7 @@ inline control::PhaseCondition MotorControl::drive_pmsm(const Coefficients& c, c
   in.electrical_speed = velocity * c.electrical_speed_per_velocity;
   in.reference_q = out.current_reference;
   in.supply = measured.supply_voltage;
-  const auto made = pmsm_.update(c.pmsm, in);
+  const auto made = by == By::tick ? pmsm_.update(c.pmsm, in) : identify_pmsm(c, in);
   take(made, out);
   out.current = made.current_q;
   out.current_d = made.current_d;

@@ -35,7 +35,7 @@ bool bound(float limit, float& along, float& across) {
   out.excitation_finished = asked.finished;
   out.current_d = out.voltage_d = 0.0f;
   if (asked.kind == ExcitationKind::position) {
-    follow_force(c, measured, asked.force, position, velocity, out);
+    follow_force<By::identification>(c, measured, asked.force, position, velocity, out);
     return Transmission::force(c.transmission, out.current_reference);
   }
   const bool by_voltage = asked.kind == ExcitationKind::voltage;
@@ -52,9 +52,10 @@ bool bound(float limit, float& along, float& across) {
     return force;
   }
   const std::uint32_t rotor_angle = position * c.angle_per_count + c.angle_offset;
-  const auto condition = c.kind == MotorKind::dc ? excite_dc(c, measured, asked, velocity, out)
-                         : of_rotor ? drive_pmsm(c, measured, rotor_angle, velocity, !asked.alternating, out)
-                                    : excite_stator(c, measured, asked, rotor_angle, velocity, out);
+  const auto condition =
+      c.kind == MotorKind::dc ? excite_dc(c, measured, asked, velocity, out)
+      : of_rotor ? drive_pmsm<By::identification>(c, measured, rotor_angle, velocity, !asked.alternating, out)
+                 : excite_stator(c, measured, asked, rotor_angle, velocity, out);
   if (condition != control::PhaseCondition::good) tell(condition, c, measured, out);
   return force;
 }
@@ -69,6 +70,11 @@ control::PhaseCondition MotorControl::excite_dc(const Coefficients& c, const Mea
   take(Dc::voltage(c.dc, asked.along, measured.supply_voltage), out);
   settle(c, out.current, out.current * out.current, out);
   return watch_.update(c.watch, of_dc(measured), {}, false);
+}
+
+MotorControl::FieldOriented::Output MotorControl::identify_pmsm(const Coefficients& c,
+                                                                const FieldOriented::Input& in) {
+  return pmsm_.update(c.pmsm, in);
 }
 
 control::PhaseCondition MotorControl::excite_stator(const Coefficients& c, const Measured& measured,
@@ -87,7 +93,7 @@ control::PhaseCondition MotorControl::excite_stator(const Coefficients& c, const
     if (bound(c.transmission.current_limit, in.reference_d, in.reference_q)) out.saturated = true;
   }
   const auto made =
-      by_voltage ? FieldOriented::voltage(c.pmsm, in, asked.along, asked.across) : pmsm_.update(c.pmsm, in);
+      by_voltage ? FieldOriented::voltage(c.pmsm, in, asked.along, asked.across) : identify_pmsm(c, in);
   take(made, out);
   out.current = made.current_d;
   out.current_d = made.current_q;
