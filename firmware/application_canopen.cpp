@@ -184,8 +184,11 @@ void Application::publish_torques() {
   ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const bool armed = machines_[axis].armed();
-    // A torque that was asked for while nothing could follow must not act later.
-    if (!armed) values.set_whole<"profile.target_torque">(0, axis);
+    // What was asked for while nothing could follow must not act later.
+    if (!armed) {
+      values.set_whole<"profile.target_torque">(0, axis);
+      values.set_real<"profile.target_force">(0.0f, axis);
+    }
     tick_.command_force(axis, commanded_force(values, axis, armed, halted_[axis]));
   }
 }

@@ -9,8 +9,8 @@
 
 namespace kmax::firmware {
 
-// Mode torque, CiA 402's cyclic synchronous torque: what a host asks for in thousandths of the rated torque,
-// as a force at the handle. Main loop.
+// Mode torque, CiA 402's cyclic synchronous torque: what a host asks for in thousandths of the rated torque
+// and in newtons, as a force at the handle. Main loop.
 
 /// profile.rated_current, mA: current.limit to the nearest whole one; at least 1.
 constexpr std::uint32_t rated_current(const ParameterValues& values, std::size_t axis) {
@@ -26,10 +26,16 @@ constexpr std::uint32_t rated_torque(const ParameterValues& values, std::size_t 
   return whole < 1 ? 1 : whole;
 }
 
-/// N at the handle that mode torque asks for now: profile.target_torque, within +-profile.max_torque, as
-/// thousandths of the rated torque that a host reads; torque = force x device.transmission. 0 unless `armed`
-/// in mode torque and not `halted`. Always finite. force.limit, force.slew_limit and the motor's current
-/// limit are for the tick to keep, as for any other force.
+/// N at the handle that mode torque asks for now, the sum of two commands, so that neither depends on which
+/// was written last:
+///
+///   profile.target_torque  within +-profile.max_torque, as thousandths of the rated torque that a host
+///   reads;
+///                          torque = force x device.transmission
+///   profile.target_force   as it is
+///
+/// 0 unless `armed` in mode torque and not `halted`. Always finite. force.limit, force.slew_limit and the
+/// motor's current limit are for the tick to keep, as for any other force.
 constexpr float commanded_force(const ParameterValues& values, std::size_t axis, bool armed, bool halted) {
   if (!armed || halted || values.choice<DriveMode, "drive.mode">(axis) != DriveMode::torque) return 0.0f;
   const std::int32_t bound = values.whole<"profile.max_torque">(axis);
@@ -38,7 +44,7 @@ constexpr float commanded_force(const ParameterValues& values, std::size_t axis,
   if (thousandths < -bound) thousandths = -bound;
   const float rated = 1e-3f * static_cast<float>(rated_torque(values, axis));  // N m
   const float torque = 1e-3f * static_cast<float>(thousandths) * rated;
-  return torque / values.real<"device.transmission">(axis);
+  return torque / values.real<"device.transmission">(axis) + values.real<"profile.target_force">(axis);
 }
 
 }  // namespace kmax::firmware

@@ -322,9 +322,11 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only()
         .volatile_value()
         .at_standard_index(0x6060),
-    whole("profile.target_torque", group::profile, 2, integer16, "1/1000", -32768, 32767, 0,
-          "Torque asked for in mode torque, in thousandths of profile.rated_torque, along +x; within "
-          "profile.max_torque and force.limit. 0 whenever the axis is not armed.")
+    whole(
+        "profile.target_torque", group::profile, 2, integer16, "1/1000", -32768, 32767, 0,
+        "Torque asked for in mode torque, in thousandths of profile.rated_torque, along +x, within "
+        "profile.max_torque; profile.target_force is added to it, and force.limit bounds the sum. 0 whenever "
+        "the axis is not armed.")
         .volatile_value()
         .at_standard_index(0x6071),
     whole("profile.max_torque", group::profile, 3, unsigned16, "1/1000", 0, 32767, 1000,
@@ -350,6 +352,11 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
                 "armed."),
     stop_option("profile.fault_option", 9, names::disable_drive, 0, 0x605E,
                 "0: a fault removes the force at once."),
+    real("profile.target_force", group::profile, 10, "N", -1000, 1000, 0,
+         "Force asked for in mode torque at the handle, along +x; added to what profile.target_torque makes "
+         "there, "
+         "and force.limit bounds the sum. 0 whenever the axis is not armed.")
+        .volatile_value(),
 });
 
 }  // namespace kmax::firmware

@@ -13,7 +13,8 @@ constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 /// No part of a set of parameters: they act when they are written.
 constexpr bool acts_at_once(std::size_t slot) {
   constexpr std::array entries{controlword_entry, entry_of<"profile.target_torque">(),
-                               entry_of<"profile.max_torque">(), entry_of<"link.sign_of_life">()};
+                               entry_of<"profile.max_torque">(), entry_of<"profile.target_force">(),
+                               entry_of<"link.sign_of_life">()};
   static_assert(std::none_of(entries.begin(), entries.end(), [](std::size_t entry) {
     return descriptors[entry].disarmed_only || !descriptors[entry].writable;
   }));

@@ -41,7 +41,7 @@ struct SlotValue {
 /// without its owner's doing, that link can set nothing for 30 s, or until it writes transaction.control,
 /// lest a message that was held up takes effect by itself; the other links can at once.
 ///
-/// Commands (drive.controlword), setpoints (profile.target_torque, profile.max_torque) and
+/// Commands (drive.controlword), setpoints (profile.target_torque, .max_torque, .target_force) and
 /// link.sign_of_life are no settings and so no part of a transaction: they act when they are written, in
 /// anybody's transaction too, and are no change of parameters. So are CANopen's own settings
 /// (Access::communication), which only CANopen writes, one by one, with write_communication().

@@ -1,6 +1,8 @@
 // The application on a CAN bus: who commands, and what takes the force away.
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/board/canopen_host.hpp"
 
@@ -39,6 +41,38 @@ TEST_F(OnCan, TorqueModeMakesWhatPdosAskForAndNothingWhenDisarmed) {
   EXPECT_EQ(bench.force(), 0.0);
   rpdo(15, 0);
   EXPECT_EQ(bench.force(), 0.0) << "armed again, and nothing asked for";
+}
+
+TEST_F(OnCan, TorqueModeMakesTheNewtonsThatAPdoAsksFor) {
+  EXPECT_EQ(write(0x1400, 1, 0x80000201, 4), 0U);
+  EXPECT_EQ(write(0x1600, 0, 0, 1), 0U);
+  EXPECT_EQ(write(0x1600, 1, 0x60400010, 4), 0U);
+  EXPECT_EQ(write(0x1600, 2, 0x20170A20, 4), 0U);
+  EXPECT_EQ(write(0x1600, 0, 2, 1), 0U);
+  EXPECT_EQ(write(0x1400, 1, 0x201, 4), 0U);
+  nmt(1);
+  EXPECT_EQ(write(0x6060, 0, 10, 1), 0U);
+  const auto ask = [this](std::uint8_t controlword, float newtons, double ms) {
+    const auto bits = std::bit_cast<std::uint32_t>(newtons);
+    send({.identifier = 0x201,
+          .length = 6,
+          .data = {controlword, 0, static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
+                   static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 24)}},
+         ms);
+  };
+  ask(6, 1.5f, 2.0);
+  EXPECT_EQ(read(0x2017, 10), 0U) << "a target is not kept for later";
+  ask(7, 0.0f, 2.0);
+  ask(15, 0.0f, 2.0);
+  ASSERT_TRUE(armed());
+  ask(15, 1.5f, 300.0);
+  EXPECT_NEAR(bench.force(), 1.5, 1e-3);
+  ask(15, -1.5f, 5.0);
+  EXPECT_NEAR(bench.force(), -1.5, 1e-3);
+  ask(15, 100.0f, 20.0);
+  EXPECT_NEAR(bench.force(), 3.3, 1e-3) << "force.limit";
+  ask(6, 1.5f, 5.0);
+  EXPECT_EQ(bench.force(), 0.0);
 }
 
 // The one who commands has gone; a second program reads on.

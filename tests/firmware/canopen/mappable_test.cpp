@@ -21,8 +21,9 @@ TEST(Mappable, SentPdosHoldEveryValueButTheSettingsOfCanopen) {
 }
 
 TEST(Mappable, ReceivedPdosSetWhatAnAxisTakesAtAnyTime) {
-  for (const std::string_view name : {"drive.controlword", "profile.target_torque", "profile.operation_mode",
-                                      "profile.max_torque", "wall.stiffness", "force.limit"})
+  for (const std::string_view name :
+       {"drive.controlword", "profile.target_torque", "profile.operation_mode", "profile.max_torque",
+        "profile.target_force", "wall.stiffness", "force.limit"})
     EXPECT_TRUE(rpdo_mappable(named_entry(name))) << name;
   for (const std::string_view name :
        {"drive.mode", "wall.law", "encoder.offset", "excitation.run", "excitation.bias", "measured.position",

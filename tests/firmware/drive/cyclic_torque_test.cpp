@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware/drive/haptic_configuration.hpp"
+
 namespace kmax::firmware::cyclic_torque_test {
 namespace {
 
@@ -54,6 +56,17 @@ TEST(CyclicTorque, ForceIsTheTorqueOverTheTransmissionAlongX) {
   EXPECT_NEAR(share_of(values), 2.5, 5e-6);
 }
 
+TEST(CyclicTorque, NewtonsAtTheHandleAreAddedToTheTorquesForce) {
+  ParameterValues values = in_mode_torque(0);
+  values.set_real<"profile.target_force">(-2.5f);
+  EXPECT_EQ(share_of(values), -2.5f);
+  EXPECT_EQ(share_of(values, 1), 0.0f) << "the other axis has its own";
+  values.set_whole<"profile.target_torque">(1000);
+  EXPECT_NEAR(share_of(values), 2.5, 5e-6);
+  values.set_whole<"profile.max_torque">(0);
+  EXPECT_EQ(share_of(values), -2.5f) << "which bounds the torque";
+}
+
 // What a host computes from the two objects it reads, and not from the parameters behind them.
 TEST(CyclicTorque, CountsInTheRatedTorqueThatAHostReads) {
   ParameterValues values = in_mode_torque(1000);
@@ -85,6 +98,7 @@ TEST(CyclicTorque, NothingUnlessArmedInModeTorqueAndNotHalted) {
       for (const bool is_halted : {false, true}) {
         ParameterValues values = in_mode_torque(1000);
         values.set_whole<"drive.mode">(static_cast<std::uint32_t>(mode));
+        values.set_real<"profile.target_force">(1.0f);
         const bool acts = mode == DriveMode::torque && armed && !is_halted;
         EXPECT_EQ(commanded_force(values, 0, armed, is_halted) != 0.0f, acts)
             << static_cast<int>(mode) << armed << is_halted;
@@ -110,10 +124,44 @@ RC_GTEST_PROP(CyclicTorque, IsFiniteAndAsExactAsFloatForAllParameters, ()) {
   RC_ASSERT(std::abs(std::max(1.0, 1e3 * product) - rated) <= 0.5 + 1e-6 * rated);
   const int bound = values.whole<"profile.max_torque">();
   const int target = std::clamp(values.whole<"profile.target_torque">(), -bound, bound);
-  const double wanted = 1e-6 * target * rated / double(values.real<"device.transmission">());
+  const double by_torque = 1e-6 * target * rated / double(values.real<"device.transmission">());
+  const auto newtons = static_cast<float>(*rc::gen::inRange(-1000, 1001));
+  values.set_real<"profile.target_force">(newtons);
   const float force = share_of(values);
   RC_ASSERT(std::isfinite(force));
-  RC_ASSERT(std::abs(double(force) - wanted) <= 1e-6 * std::abs(wanted));
+  RC_ASSERT(std::abs(double(force) - (by_torque + double(newtons))) <=
+            1e-6 * (std::abs(by_torque) + std::abs(double(newtons))));
+}
+
+// The newtons arrive as current, by way of transmission and torque constant and within force.limit.
+RC_GTEST_PROP(CyclicTorque, NewtonsArriveAsTheCurrentThatMakesThem, ()) {
+  const auto in = [](double low, double high) {
+    return static_cast<float>(low * std::pow(high / low, *rc::gen::inRange(0, 1001) / 1000.0));
+  };
+  ParameterValues values = in_mode_torque(0);
+  values.set_real<"profile.target_force">(*rc::gen::element(-1.0f, 1.0f) * in(1e-3, 100));
+  values.set_real<"force.limit">(in(1e-2, 50));
+  values.set_real<"force.slew_limit">(1e9f);
+  values.set_real<"force.ramp_time">(0.0f);
+  values.set_real<"current.limit">(120.0f);
+  values.set_real<"motor.torque_constant">(in(1e-2, 1));
+  values.set_real<"device.transmission">(in(1e-3, 1e-1));
+  AxisSetting setting;
+  setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, 0), 0);
+  setting.motor = MotorControl::prepare(motor_configuration(values, 0));
+  setting.mode = DriveMode::torque;
+  Axis axis;
+  const Axis::Input input{.count = 0, .count_valid = true, .condition = Fault::none, .motor = {}};
+  const Axis::Output* output = nullptr;
+  for (std::uint32_t tick = 1; tick <= 100; ++tick)
+    output = &axis.ISR_tick(setting, input, true, {0.0f, share_of(values)}, tick);
+  const double limit = double(values.real<"force.limit">());
+  const double force = std::clamp(double(values.real<"profile.target_force">()), -limit, limit);
+  const double per_newton =
+      double(values.real<"device.transmission">()) / double(values.real<"motor.torque_constant">());
+  const double current = std::clamp(force * per_newton, -120.0, 120.0);
+  RC_ASSERT(output->enabled);
+  RC_ASSERT(std::abs(double(output->motor.current_reference) - current) <= 1e-5 * std::abs(current));
 }
 
 }  // namespace

@@ -190,6 +190,7 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"profile.polarity", 0x0283, 0x0683},
       {"profile.quick_stop_option", 0x0284, 0x0684},
       {"profile.fault_option", 0x0288, 0x0688},
+      {"profile.target_force", 0x0289, 0x0689},
       {"profile.operation_mode_display", 0x00C0, 0x04C0},
       {"profile.velocity", 0x00C1, 0x04C1},
       {"profile.torque", 0x00C7, 0x04C7},

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -50,6 +51,22 @@ TEST_F(Setpoints, AreTakenAtOnceAndAreNoChangeOfParameters) {
   }
   EXPECT_EQ(registers.changes(), 0u);
   EXPECT_EQ(registers.restarting_changes(), 0u);
+}
+
+TEST_F(Setpoints, OneOfTwoRegistersIsTakenWholeOrNotAtAll) {
+  for (const bool armed : {false, true}) {
+    const double newtons = armed ? -2.5 : 1.25;
+    EXPECT_EQ(write("profile.target_force", words_for("profile.target_force", newtons), armed),
+              Refusal::none);
+    EXPECT_EQ(get("profile.target_force"), newtons);
+  }
+  EXPECT_EQ(registers.changes(), 0u);
+  EXPECT_EQ(write("profile.target_force", {0x3F80}), Refusal::value_cut_in_two);
+  EXPECT_EQ(write("profile.target_force", words_for("profile.target_force", 1001)), Refusal::out_of_range);
+  EXPECT_EQ(write("profile.target_force", words_of_float(std::nanf(""))), Refusal::not_finite);
+  const auto second = static_cast<std::uint16_t>(address_of("profile.target_force") + 1);
+  EXPECT_EQ(registers.write(second, Words{0}, false, now).refusal, Refusal::value_cut_in_two);
+  EXPECT_EQ(get("profile.target_force"), -2.5);
 }
 
 TEST_F(Setpoints, OutOfRangeIsRefusedAndOfTwoNeitherIsTaken) {

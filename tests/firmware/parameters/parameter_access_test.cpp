@@ -26,7 +26,7 @@ std::string_view partner_of(std::string_view name) {
 }
 
 bool is_setpoint(std::string_view name) {
-  return name == "profile.target_torque" || name == "profile.max_torque";
+  return name == "profile.target_torque" || name == "profile.max_torque" || name == "profile.target_force";
 }
 
 struct Written {
