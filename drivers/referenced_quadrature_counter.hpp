@@ -55,10 +55,8 @@ class ReferencedQuadratureCounter {
   /// moment, asked only where there is one.
   template <std::predicate Line>
   constexpr Reading ISR_read(Counter counter, Line&& index_line, bool driving) {
-    using Signed = std::make_signed_t<Counter>;
-    const auto step = static_cast<Signed>(static_cast<Counter>(counter - counter_));
+    count_ = ISR_peek(counter);
     counter_ = counter;
-    count_ += static_cast<std::uint32_t>(static_cast<std::int32_t>(step));
     bool valid = true;
     if (config_.has_index) {
       valid = index_.ISR_plausible(count_, index_line());
@@ -66,6 +64,13 @@ class ReferencedQuadratureCounter {
         refer_to_index();
     }
     return {count_, valid, referenced_, reference_generation_};
+  }
+
+  /// The count that ISR_read() would give; nothing changes.
+  constexpr std::uint32_t ISR_peek(Counter counter) const {
+    using Signed = std::make_signed_t<Counter>;
+    const auto step = static_cast<Signed>(static_cast<Counter>(counter - counter_));
+    return count_ + static_cast<std::uint32_t>(static_cast<std::int32_t>(step));
   }
 
  private:

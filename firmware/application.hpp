@@ -87,6 +87,7 @@ class Application {
  public:
   /// The main loop's rhythm.
   static constexpr std::uint32_t round_ticks = AxesTick<axis_count>::round_ticks;
+  static constexpr bool needs_all_positions = AxesTick<axis_count>::needs_all_positions;
   static constexpr std::uint32_t round_interval_us = round_ticks * 1'000'000 / tick_rate_hz;
 
   /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the

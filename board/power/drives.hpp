@@ -87,11 +87,19 @@ class Drives {
   const Hardware& hardware() const { return hardware_; }
 
   /// The whole tick of an axis. The condition is asked twice, so it comes as the object that has it.
-  template <typename Stage>
-  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, firmware::Application& application,
+  ///
+  /// `Application`: firmware::Application, or any AxesTick. Where its law needs all positions, the counters
+  /// of all axes are read in each slot.
+  template <typename Application, typename Stage>
+  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, Application& application,
                                               const Stage& stage) {
     const firmware::AxisInput input = ISR_measure(axis, stage);
-    ISR_drive(axis, application.ISR_tick(axis, input), input.motor.supply_voltage, stage);
+    if constexpr (Application::needs_all_positions) {
+      const auto inputs = ISR_beside_others(axis, input);
+      ISR_drive(axis, application.ISR_tick(axis, inputs), input.motor.supply_voltage, stage);
+    } else {
+      ISR_drive(axis, application.ISR_tick(axis, input), input.motor.supply_voltage, stage);
+    }
     if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
       main_loop_due_.store(true, std::memory_order_relaxed);
   }
@@ -174,7 +182,9 @@ class Drives {
     Counter counter{};
     std::uint32_t encoder_generation = 0;  ///< of the settings that have been taken over
     bool driving = false, arm_failed = false;
+    Count count{};  ///< of its last tick; kept where a law needs all positions
   };
+  using Inputs = std::array<firmware::AxisInput, firmware::axis_count>;
 
   /// The axis whose tick begins a round: it takes settings over and looks after the brake.
   constexpr std::size_t first_axis() const {
@@ -183,6 +193,7 @@ class Drives {
     return axis;
   }
 
+  Inputs ISR_beside_others(std::size_t axis, const firmware::AxisInput& input);
   [[gnu::always_inline]] inline Count ISR_read_count(std::size_t axis, const Settings& settings,
                                                      bool driving);
   void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
@@ -265,6 +276,30 @@ inline typename Drives<Hardware>::Count Drives<Hardware>::ISR_read_count(std::si
   }
   const auto index_line = [this, axis] { return hardware_.ISR_index_line(axis); };
   return axes_[axis].counter.ISR_read(hardware_.ISR_counter(axis), index_line, driving);
+}
+
+/// The input of the axis whose slot it is, and where the others' counters stand in it. What is valid and what
+/// it is referred to is as their own last ticks found; so is the angle of an AS5047P, whose frame takes
+/// longer.
+template <typename Hardware>
+typename Drives<Hardware>::Inputs Drives<Hardware>::ISR_beside_others(std::size_t axis,
+                                                                      const firmware::AxisInput& input) {
+  axes_[axis].count = {.count = input.count,
+                       .valid = input.count_valid,
+                       .referenced = input.referenced,
+                       .reference_generation = input.reference_generation};
+  Inputs inputs{};
+  for (std::size_t other = 0; other < firmware::axis_count; ++other) {
+    if (!hardware_.has(other)) continue;
+    const Axis& of = axes_[other];
+    const EncoderRole role = double_buffer_.ISR_current().role[other];
+    const bool on_lines = role == EncoderRole::lines || role == EncoderRole::lines_beside_chip;
+    inputs[other].count = on_lines ? of.counter.ISR_peek(hardware_.ISR_counter(other)) : of.count.count;
+    inputs[other].count_valid = of.count.valid;
+    inputs[other].reference_generation = of.count.reference_generation;
+  }
+  inputs[axis] = input;
+  return inputs;
 }
 
 template <typename Hardware>

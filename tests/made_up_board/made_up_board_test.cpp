@@ -124,6 +124,41 @@ TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
   }
 }
 
+/// Makes no force, and keeps what it was shown.
+struct Onlooker {
+  static constexpr bool needs_all_positions = true;
+  using Positions = firmware::AxesPositions<firmware::axis_count>;
+  float ISR_force(std::size_t, const Positions& at) {
+    *seen = at;
+    return 0.0f;
+  }
+  void ISR_rendered(std::size_t, const control::HapticLoop<float>::Output&, bool) {}
+  Positions* seen;
+};
+
+TEST(MadeUpTicks, InTheSlotOfEachAxisALawSeesAllCountersAsTheyAreThen) {
+  struct Stage {
+    Fault condition() const { return Fault::none; }
+  };
+  Onlooker::Positions seen;
+  Drives<MadeUpHardware> drives{MadeUpHardware::supply_ratio};
+  drives.apply({});
+  auto& counters = drives.hardware().counters;
+  firmware::AxesTick<firmware::axis_count, Onlooker> axes{{}, {}, {&seen}};
+  const auto tick = [&](std::size_t axis) { drives.ISR_tick(axis, axes, Stage{}); };
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) tick(axis);
+  // More than half a timer's range in all, and a different way in every slot.
+  for (int slot = 0; slot < 300; ++slot) {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      counters[axis] = static_cast<std::uint16_t>(counters[axis] + 100 * (axis + 1));
+    tick(static_cast<std::size_t>(slot) % firmware::axis_count);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      EXPECT_TRUE(seen.valid[axis]);
+      EXPECT_EQ(seen.position[axis], 100 * (static_cast<int>(axis) + 1) * (slot + 1)) << axis;
+    }
+  }
+}
+
 /// Drives under a stage whose condition changes with each look.
 class Arming : public testing::Test {
  protected:
