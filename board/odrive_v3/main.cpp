@@ -15,10 +15,10 @@
 #include "board/odrive_v3/serial_line.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "board/stm32f405/crash_record.hpp"
-#include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
 #include "drivers/stm32f4/external_interrupt.hpp"
 #include "drivers/stm32f4/flash_sectors.hpp"
@@ -36,6 +36,7 @@ namespace kmax::board {
 
 namespace {
 
+namespace cortex = drivers::cortex_m;
 namespace stm32 = drivers::stm32f4;
 using namespace odrive_v3;
 
@@ -47,12 +48,13 @@ constexpr std::uint32_t clock_rate_hz = 1'000;
 constexpr std::uint32_t watchdog_ms = 1'000;
 static_assert(watchdog_ms > stm32::longest_erase_ms);
 
-drivers::cortex_m::InterruptController interrupts{drivers::cortex_m::nvic(), drivers::cortex_m::scb()};
-drivers::cortex_m::SystemTick system_tick{drivers::cortex_m::system_tick(), drivers::cortex_m::scb()};
+cortex::InterruptController interrupts{cortex::nvic(), cortex::scb()};
+cortex::SystemTick system_tick{cortex::system_tick(), cortex::scb()};
 stm32::ExternalInterrupts line_interrupts{stm32::exti(), stm32::syscfg()};
 stm32::IndependentWatchdog watchdog{stm32::iwdg(), stm32::dbgmcu()};
 
 using ParameterFlash = stm32::FlashSectors<>;
+static_assert(firmware::ParameterStore<ParameterFlash>::length <= ParameterFlash::words_per_sector);
 std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_sector(std::size_t index) {
   return std::span<volatile std::uint32_t, ParameterFlash::words_per_sector>{
       kmax_parameters_begin + index * ParameterFlash::words_per_sector, ParameterFlash::words_per_sector};
@@ -97,8 +99,8 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.core_clock_hz = clocks.core_hz;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
-  if (identity.reset_cause == firmware::ResetCause::power_on) fault_record.magic = 0;
-  identity.crash = crash_record_of(fault_record);
+  if (identity.reset_cause == firmware::ResetCause::power_on) cortex::fault_record.magic = 0;
+  identity.crash = crash_record_of(cortex::fault_record);
   return identity;
 }
 
@@ -128,8 +130,7 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
   apply(line_pins);
   apply(bus_pins);
   // The chips' delays count cycles.
-  static_cast<void>(
-      drivers::cortex_m::CycleCounter{drivers::cortex_m::dwt(), drivers::cortex_m::core_debug()}.start());
+  static_cast<void>(cortex::CycleCounter{cortex::dwt(), cortex::core_debug()}.start());
   if (!chip_bus.configure({})) return false;
   if (!power->hardware().configure(clocks.apb2_hz)) return false;
   const std::uint32_t converters_on_us = system_tick.now_us();
@@ -157,8 +158,8 @@ void poll_power(std::uint32_t now_us) {
 
 /// A reset by software: the bridges are off before it, and every pin is what it is at power-on.
 [[noreturn]] void restart() {
-  enter_safe_state();
-  reset_core();
+  cortex::enter_safe_state();
+  cortex::reset_core();
 }
 
 [[noreturn]] void run() {
@@ -167,9 +168,9 @@ void poll_power(std::uint32_t now_us) {
   application.emplace(identity(clocks), capture_memory);
   application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
-  interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, priority::clock);
+  interrupts.set_priority(cortex::SystemException::system_tick, priority::clock);
   // Each core clock of the clock tree is a whole number of MHz and of periods.
-  if (!system_tick.start(clocks.core_hz, clock_rate_hz)) stop_on_unexpected_interrupt();
+  if (!system_tick.start(clocks.core_hz, clock_rate_hz)) cortex::stop_on_unexpected_interrupt();
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
   apply(serial_pins);
   serial.emplace(interrupts, clocks.apb1_hz);
@@ -182,7 +183,7 @@ void poll_power(std::uint32_t now_us) {
   // say that they have no encoder.
   if (clocks.source != stm32::ClockSource::unresponsive && clocks.core_hz == description.core_clock_hz) {
     power.emplace(supply_divider_ratio(voltage_variant()), chip_bus);
-    if (!start_power(clocks) || !watchdog.start(watchdog_ms)) stop_on_unexpected_interrupt();
+    if (!start_power(clocks) || !watchdog.start(watchdog_ms)) cortex::stop_on_unexpected_interrupt();
   }
   for (;;) {
     const bool due = !power_runs || power->drives().main_loop_due() || serial->news() || can_line->news();
@@ -201,13 +202,16 @@ void poll_power(std::uint32_t now_us) {
       if (power_runs) poll_power(now);
     }
     // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
-    drivers::cortex_m::wait_for_interrupt();
+    cortex::wait_for_interrupt();
   }
 }
 
 }  // namespace
 
-void enter_safe_state() {
+}  // namespace kmax::board
+
+void kmax::drivers::cortex_m::enter_safe_state() {
+  using namespace kmax::board;
   // MOE first: one store for each bridge, if its timer has a clock.
   constexpr std::uint32_t bridges = stm32::rcc_apb2enr::Timer1::mask | stm32::rcc_apb2enr::Timer8::mask;
   if ((static_cast<std::uint32_t>(stm32::rcc().apb2enr) & bridges) == bridges) {
@@ -217,8 +221,6 @@ void enter_safe_state() {
   // The pins' latches first, then the direction, in case the pins were not set up yet.
   switch_power_stage_off();
 }
-
-}  // namespace kmax::board
 
 void ISR_adc() {
   using namespace kmax::board;

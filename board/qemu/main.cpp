@@ -5,9 +5,9 @@
 
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
-#include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
 
 namespace kmax::board {
@@ -28,7 +28,7 @@ std::optional<odrive_v3::SerialLine> serial;
                                               .core_clock_hz = clocks.core_hz,
                                               .clock_source = static_cast<std::uint8_t>(clocks.source)});
   interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, odrive_v3::priority::clock);
-  if (!system_tick.start(clocks.core_hz, 1'000)) stop_on_unexpected_interrupt();
+  if (!system_tick.start(clocks.core_hz, 1'000)) drivers::cortex_m::stop_on_unexpected_interrupt();
   serial.emplace(interrupts, clocks.apb1_hz);
   serial->start(*application);
   for (;;) {
@@ -37,16 +37,16 @@ std::optional<odrive_v3::SerialLine> serial;
     serial->poll(*application, now);
     // QEMU's USART never asks for the interrupt when it has sent.
     if (serial->transmitting()) interrupts.pend(drivers::stm32f4::Interrupt::usart2);
-    if (application->restart_wanted()) reset_core();
+    if (application->restart_wanted()) drivers::cortex_m::reset_core();
     drivers::cortex_m::wait_for_interrupt();
   }
 }
 
 }  // namespace
 
-void enter_safe_state() {}
-
 }  // namespace kmax::board
+
+void kmax::drivers::cortex_m::enter_safe_state() {}
 
 void ISR_system_tick() {
   using namespace kmax;

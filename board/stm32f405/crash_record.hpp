@@ -1,14 +1,15 @@
 #pragma once
 
-#include "board/stm32f405/fault_handler.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 #include "firmware/crash_record.hpp"
 
 namespace kmax::board {
 
 /// What the fault handler left in RAM, as the application tells it. Empty after power-on.
-inline firmware::CrashRecord crash_record_of(const FaultRecord& kept) {
+inline firmware::CrashRecord crash_record_of(const drivers::cortex_m::FaultRecord& kept) {
   firmware::CrashRecord crash;
-  if (kept.magic != FaultRecord::valid_magic) return crash;
+  using drivers::cortex_m::FaultCause;
+  if (kept.magic != drivers::cortex_m::FaultRecord::valid_magic) return crash;
   crash.count = kept.count;
   crash.cause = kept.cause == FaultCause::unexpected_interrupt ? firmware::CrashCause::unexpected_interrupt
                                                                : firmware::CrashCause::fault;

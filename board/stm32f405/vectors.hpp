@@ -1,13 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
-#include "drivers/cortex_m/registers.hpp"
+#include "drivers/cortex_m/vectors.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 
-// The vector table of the STM32F405 and the names of its handlers. Vector table in RM0090; exceptions in
-// PM0214.
+// The vector table of the STM32F405 and the names of its interrupts' handlers: RM0090, vector table.
 //
 // A program handles an interrupt by defining the function of that name. All the others end in
 // `stop_on_unexpected_interrupt`, the faults in the fault handler. Include this header where a handler is
@@ -16,22 +14,13 @@
 
 namespace kmax::board {
 
-using InterruptHandler = void (*)();
-
-/// 98 words: the initial stack pointer, 15 system exceptions (1 to 15), 82 interrupts (16 to 97).
-struct VectorTable {
-  const void* initial_stack_pointer;
-  InterruptHandler exception[15 + drivers::stm32f4::interrupt_count];
-
-  /// By exception number: 1 is reset, 15 is SysTick, 16 + n is interrupt n.
-  constexpr InterruptHandler at(std::size_t exception_number) const {
-    return exception[exception_number - 1];
-  }
-  constexpr InterruptHandler at(drivers::stm32f4::Interrupt interrupt) const {
+struct VectorTable : drivers::cortex_m::VectorTable<drivers::stm32f4::interrupt_count> {
+  using drivers::cortex_m::VectorTable<drivers::stm32f4::interrupt_count>::at;
+  constexpr drivers::cortex_m::InterruptHandler at(drivers::stm32f4::Interrupt interrupt) const {
     return at(16 + static_cast<std::size_t>(interrupt));
   }
 };
-static_assert(sizeof(VectorTable) == 98 * sizeof(InterruptHandler));
+static_assert(sizeof(VectorTable) == 98 * sizeof(drivers::cortex_m::InterruptHandler));
 
 extern const VectorTable vector_table;
 
@@ -126,13 +115,6 @@ extern const VectorTable vector_table;
 // clang-format on
 
 extern "C" {
-[[noreturn]] void ISR_reset();
-void ISR_non_maskable();
-void ISR_hard_fault();
-void ISR_supervisor_call();
-void ISR_debug_monitor();
-void ISR_pend_supervisor();
-void ISR_system_tick();
 #define KMAX_DECLARE(name) void ISR_##name();
 #define KMAX_NOTHING()
 KMAX_STM32F405_INTERRUPTS(KMAX_DECLARE, KMAX_NOTHING)

@@ -53,8 +53,6 @@ EXCEPTIONS = {
     "host_tools_order": {"device -> device/sim"},
     "using_namespace": {
         "board/odrive_v3/main.cpp",
-        "board/stm32f405/fault_handler.cpp",
-        "board/stm32f405/startup.cpp",
         "firmware/object_dictionary/axis_groups.hpp",
         "host_tools/device/drive.cpp",
         "host_tools/virtual_board/cortex_m/core_peripherals.cpp",

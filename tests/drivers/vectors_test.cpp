@@ -9,8 +9,8 @@
 #include <stdexcept>
 
 #include "board/odrive_v3/pins.hpp"
-#include "board/stm32f405/fault_handler.hpp"
 #include "board/stm32f405/unique_id.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 
 extern "C" {
@@ -24,13 +24,13 @@ void ISR_system_tick() {}
 void ISR_usart2() {}
 void ISR_fpu() {}
 
-namespace kmax::board {
+namespace kmax::drivers::cortex_m {
 
 void stop_on_unexpected_interrupt() {
   throw std::runtime_error("unexpected interrupt");
 }
 
-}  // namespace kmax::board
+}  // namespace kmax::drivers::cortex_m
 
 namespace kmax::board::vectors_test {
 namespace {

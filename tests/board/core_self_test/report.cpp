@@ -1,6 +1,6 @@
 #include "tests/board/core_self_test/report.hpp"
 
-#include "board/stm32f405/fault_handler.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/registers.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/usart.hpp"
@@ -71,7 +71,7 @@ void end_report() {
 
 }  // namespace kmax::core_self_test
 
-void kmax::board::enter_safe_state() {
+void kmax::drivers::cortex_m::enter_safe_state() {
   using namespace kmax::core_self_test;
   send("fault ");
   send_hexadecimal(drivers::cortex_m::scb().cfsr);

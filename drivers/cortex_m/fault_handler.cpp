@@ -1,16 +1,14 @@
-#include "board/stm32f405/fault_handler.hpp"
+#include "drivers/cortex_m/fault_handler.hpp"
 
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/registers.hpp"
-
-using namespace kmax::drivers::cortex_m;
 
 extern "C" {
 extern std::uint32_t kmax_stack_bottom[];
 extern std::uint32_t kmax_stack_top[];
 }
 
-namespace kmax::board {
+namespace kmax::drivers::cortex_m {
 
 [[gnu::section(".noinit")]] FaultRecord fault_record;
 
@@ -45,12 +43,12 @@ namespace {
   reset_core();
 }
 
-}  // namespace kmax::board
+}  // namespace kmax::drivers::cortex_m
 
 /// Called by the naked handler below with the stacked frame's address and EXC_RETURN.
 extern "C" [[noreturn, gnu::used, gnu::section(".boot.fault")]] void kmax_record_fault(
     const std::uint32_t* frame, std::uint32_t exception_return) {
-  using namespace kmax::board;
+  using namespace kmax::drivers::cortex_m;
   enter_safe_state();
   begin_record(FaultCause::fault);
   fault_record.exception_return = exception_return;

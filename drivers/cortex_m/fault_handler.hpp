@@ -9,7 +9,7 @@
 // written, the core is reset. After the reset the application reads `fault_record`; it is valid when `magic`
 // is right.
 
-namespace kmax::board {
+namespace kmax::drivers::cortex_m {
 
 enum class FaultCause : std::uint32_t {
   fault = 1,                 // HardFault and the configurable faults
@@ -46,4 +46,4 @@ void enter_safe_state();
 /// For a handler of an interrupt that should never come. Does not return.
 [[noreturn]] void stop_on_unexpected_interrupt();
 
-}  // namespace kmax::board
+}  // namespace kmax::drivers::cortex_m

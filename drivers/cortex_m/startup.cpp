@@ -2,15 +2,14 @@
 
 #include <cstdint>
 
-#include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/registers.hpp"
-
-using namespace kmax::drivers::cortex_m;
+#include "drivers/cortex_m/vectors.hpp"
 
 int main();
 
 extern "C" {
+extern const std::uint32_t kmax_vectors[];
 extern std::uint32_t kmax_data_begin[];
 extern std::uint32_t kmax_data_end[];
 extern const std::uint32_t kmax_data_image[];
@@ -20,6 +19,8 @@ using Constructor = void (*)();
 extern const Constructor kmax_constructors_begin[];
 extern const Constructor kmax_constructors_end[];
 }
+
+namespace kmax::drivers::cortex_m {
 
 namespace {
 
@@ -33,7 +34,7 @@ namespace {
        ++constructor) {
     (*constructor)();
   }
-  main();
+  ::main();
   for (;;) wait_for_interrupt();
 }
 
@@ -44,7 +45,9 @@ extern "C" [[noreturn, gnu::section(".boot.reset")]] void ISR_reset() {
   data_synchronization_barrier();
   instruction_synchronization_barrier();
   // A boot loader leaves its own table behind.
-  scb().vtor = reinterpret_cast<std::uintptr_t>(&kmax::board::vector_table);
+  scb().vtor = reinterpret_cast<std::uintptr_t>(kmax_vectors);
   data_synchronization_barrier();
   start();
 }
+
+}  // namespace kmax::drivers::cortex_m
