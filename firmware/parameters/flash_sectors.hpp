@@ -6,7 +6,7 @@
 
 namespace kmax::firmware {
 
-/// Two sectors of flash memory that belong to the parameter store.
+/// Two sectors of flash memory that belong to the parameter store, equal in size.
 ///
 /// Words of 32 bits; an erased word reads 0xFFFFFFFF; programming clears bits and never sets one; only
 /// erasing a whole sector sets them again. erase() and program() return whether the memory says it worked;
@@ -16,7 +16,7 @@ template <typename Candidate>
 concept FlashSectors = requires(Candidate& flash, const Candidate& constant, std::size_t sector,
                                 std::size_t word, std::uint32_t value) {
   requires Candidate::sector_count == 2;
-  requires Candidate::words_per_sector == 4096;
+  { constant.words_per_sector } -> std::convertible_to<std::size_t>;
   { constant.read(sector, word) } -> std::same_as<std::uint32_t>;
   { flash.erase(sector) } -> std::same_as<bool>;
   { flash.program(sector, word, value) } -> std::same_as<bool>;
@@ -28,7 +28,7 @@ concept FlashSectors = requires(Candidate& flash, const Candidate& constant, std
 class AnyFlashSectors {
  public:
   static constexpr std::size_t sector_count = 2;
-  static constexpr std::size_t words_per_sector = 4096;
+  std::size_t words_per_sector = 0;  ///< of the memory that it refers to
 
   AnyFlashSectors() = default;
 
@@ -36,6 +36,7 @@ class AnyFlashSectors {
   static AnyFlashSectors of(Flash& flash) {
     AnyFlashSectors any;
     any.flash_ = &flash;
+    any.words_per_sector = Flash::words_per_sector;
     any.read_ = [](const void* self, std::size_t sector, std::size_t word) {
       return static_cast<const Flash*>(self)->read(sector, word);
     };

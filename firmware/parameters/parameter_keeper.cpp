@@ -53,7 +53,7 @@ void ParameterKeeper::publish(ParameterValues& v) const {
     unsaved += v.raw(persistent_slots[i]) != kept_[i] ? 1U : 0U;
   v.set_whole<"store.unsaved_parameters">(unsaved);
   v.set_whole<"store.free_saves">(
-      flash_.present() ? static_cast<std::uint32_t>(decltype(store_)::free_saves(survey_)) : 0U);
+      flash_.present() ? static_cast<std::uint32_t>(store_.free_saves(survey_)) : 0U);
   v.set_whole<"store.erases">(survey_.erases);
   v.set_whole<"store.write_errors">(store_.write_errors());
   v.set_whole<"store.damaged_records">(survey_.damaged);

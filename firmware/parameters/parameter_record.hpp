@@ -30,8 +30,6 @@ inline constexpr std::uint32_t erased = 0xFFFF'FFFF;
 inline constexpr std::size_t alignment = 16;
 
 inline constexpr std::size_t header_words = 5;
-inline constexpr std::size_t sector_words = AnyFlashSectors::words_per_sector;
-inline constexpr std::size_t count_max = (sector_words - header_words - 2) / 2;
 
 constexpr std::size_t length_of(std::size_t count) {
   return header_words + 2 * count + 2;
@@ -67,12 +65,12 @@ struct Found {
 /// What stands at a word of a sector. Reads the record once, and never beyond the sector's end.
 template <FlashSectors Flash>
 Found examine(const Flash& flash, std::size_t sector, std::size_t word) {
-  if (word + length_of(0) > sector_words || flash.read(sector, word) != magic) return {};
+  if (word + length_of(0) > flash.words_per_sector || flash.read(sector, word) != magic) return {};
   Found found{Condition::damaged, {}};
   found.header = {flash.read(sector, word + 1), flash.read(sector, word + 2), flash.read(sector, word + 3),
                   flash.read(sector, word + 4)};
   const std::uint32_t count = found.header.count;
-  if (count > count_max || word + length_of(count) > sector_words) return found;
+  if (count > flash.words_per_sector || word + length_of(count) > flash.words_per_sector) return found;
   Crc32 crc;
   const std::size_t covered = length_of(count) - 2;
   for (std::size_t i = 0; i < covered; ++i) crc.add(flash.read(sector, word + i));

@@ -42,7 +42,7 @@ enum class SaveProgress : std::uint8_t { busy, done, failed };
 /// counts. Every word is read back when it has been programmed, the whole record once more at the end. A
 /// sector is erased only when the other holds the newest valid record, or when there is none; so the last
 /// good set is never at stake, whatever fails. The sector is changed only when it is full: with n parameters
-/// it takes 4096 / (7 + 2n, rounded up to 16) saves per erase, and 10,000 erases of each sector (DS8626,
+/// it takes its words / (7 + 2n, rounded up to 16) saves per erase, and 10,000 erases of each sector (DS8626,
 /// flash endurance) last for 20,000 times as many.
 ///
 /// A word that does not read back as it was written makes the save begin again at the next place, in the end
@@ -50,7 +50,7 @@ enum class SaveProgress : std::uint8_t { busy, done, failed };
 ///
 /// begin(), then step() until it is not busy; each step is one word (16 us, at most 100 us), one erase
 /// (0.25 s, at most 0.5 s, in which a processor that runs from the same flash stands still), or one reading
-/// through. begin() and load() read both sectors through: 8192 words plus a CRC over the records in them.
+/// through. begin() and load() read both sectors through, plus a CRC over the records in them.
 /// Main loop only.
 template <FlashSectors Flash>
 class ParameterStore {
@@ -141,21 +141,20 @@ class ParameterStore {
   std::uint32_t write_errors() const { return write_errors_; }
 
   /// How many sets of the present size fit before a sector must be erased.
-  static std::size_t free_saves(const StoreSurvey& found) {
+  std::size_t free_saves(const StoreSurvey& found) const {
     const std::size_t from = found.free_from[found.newest ? found.newest->sector : 0];
-    const std::size_t left = from < Flash::words_per_sector ? Flash::words_per_sector - from : 0;
+    const std::size_t left = from < flash_.words_per_sector ? flash_.words_per_sector - from : 0;
     // The last of them needs no room for rounding up.
     return (left + record::aligned_up(length) - length) / record::aligned_up(length);
   }
 
   static constexpr std::size_t length = record::length_of(persistent_count);
-  static_assert(length <= Flash::words_per_sector);
 
  private:
   enum class Phase : std::uint8_t { idle, erase, write, verify };
 
   std::size_t end_of_used(std::size_t sector) const {
-    std::size_t end = Flash::words_per_sector;
+    std::size_t end = flash_.words_per_sector;
     while (end != 0 && flash_.read(sector, end - 1) == record::erased) --end;
     return end;
   }
@@ -170,7 +169,7 @@ class ParameterStore {
     base_ = record::aligned_up(word);
     next_ = 0;
     crc_ = {};
-    if (base_ + length <= Flash::words_per_sector) {
+    if (base_ + length <= flash_.words_per_sector) {
       phase_ = Phase::write;
     } else {
       leave_sector();

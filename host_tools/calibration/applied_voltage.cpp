@@ -6,19 +6,19 @@
 namespace kmax::calibration {
 namespace {
 
-double rounded(double duty, double steps) {
-  return std::floor(std::clamp(duty, 0.0, 1.0) * steps + 0.5) / steps;
+double rounded(double duty) {
+  return std::floor(std::clamp(duty, 0.0, 1.0) * timer_steps + 0.5) / timer_steps;
 }
 
 }  // namespace
 
-double applied_brushed_voltage(double asked, double supply, double steps) {
+double applied_brushed_voltage(double asked, double supply) {
   if (!(supply > 0.0)) return 0.0;
   const double share = 0.5 * asked / supply;
-  return (rounded(0.5 + share, steps) - rounded(0.5 - share, steps)) * supply;
+  return (rounded(0.5 + share) - rounded(0.5 - share)) * supply;
 }
 
-VoltageVector applied_vector(const VoltageVector& asked, double angle, double supply, double steps) {
+VoltageVector applied_vector(const VoltageVector& asked, double angle, double supply) {
   if (!(supply > 0.0)) return {};
   const double half_root_three = 0.5 * std::sqrt(3.0);
   const double cosine = std::cos(angle), sine = std::sin(angle);
@@ -27,9 +27,9 @@ VoltageVector applied_vector(const VoltageVector& asked, double angle, double su
   const double b = half_root_three * beta - 0.5 * alpha;
   const double c = -half_root_three * beta - 0.5 * alpha;
   const double centre = 0.5 - 0.5 * (std::max({alpha, b, c}) + std::min({alpha, b, c}));
-  const double duty_a = rounded(centre + alpha, steps);
-  const double duty_b = rounded(centre + b, steps);
-  const double duty_c = rounded(centre + c, steps);
+  const double duty_a = rounded(centre + alpha);
+  const double duty_b = rounded(centre + b);
+  const double duty_c = rounded(centre + c);
   const double given_alpha = supply * (2.0 * duty_a - duty_b - duty_c) / 3.0;
   const double given_beta = supply * (duty_b - duty_c) / std::sqrt(3.0);
   return {given_alpha * cosine + given_beta * sine, given_beta * cosine - given_alpha * sine};

@@ -1,8 +1,11 @@
 #pragma once
+
+#include "board/odrive_v3/description.hpp"
+
 // The voltage that the bridge gave for the voltage that was asked for: the PWM rounds each leg's duty to a
-// whole number of timer ticks (4200 to half a period), which is 5.7 mV at 24 V; for a motor of 0.05 ohm that
-// is 0.1 A. Rounding follows the controllers' own arithmetic (dc_current_controller.hpp: legs at 1/2 +- v / 2
-// V; field_oriented_controller.hpp: min-max). Dead time is not in it.
+// whole number of the board's timer steps, which is 5.7 mV at 24 V; for a motor of 0.05 ohm that is 0.1 A.
+// Rounding follows the controllers' own arithmetic (dc_current_controller.hpp: legs at 1/2 +- v / 2 V;
+// field_oriented_controller.hpp: min-max). Dead time is not in it.
 
 namespace kmax::calibration {
 
@@ -11,10 +14,13 @@ struct VoltageVector {
   double q = 0.0;  // V a quarter turn ahead
 };
 
-// V between B and C. `steps`: timer ticks to half a period.
-double applied_brushed_voltage(double asked, double supply, double steps = 4200.0);
+// Of the one board that there is.
+inline constexpr double timer_steps = board::odrive_v3::description.half_period_ticks;
+
+// V between B and C.
+double applied_brushed_voltage(double asked, double supply);
 
 // In the frame at `angle` (rad, electrical) in which it was asked for.
-VoltageVector applied_vector(const VoltageVector& asked, double angle, double supply, double steps = 4200.0);
+VoltageVector applied_vector(const VoltageVector& asked, double angle, double supply);
 
 }  // namespace kmax::calibration

@@ -13,6 +13,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "board/odrive_v3/description.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
@@ -297,7 +298,8 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   add("whole tick, axis 1 (PMSM)", totals[1]);
 
   const auto worst = [&sums](const char* step) { return static_cast<double>(sums[step].worst); };
-  const double tick_cycles = 168e6 / 20e3;
+  constexpr const board::BoardDescription& of_board = board::odrive_v3::description;
+  const double tick_cycles = of_board.core_clock_hz / of_board.pwm_hz();
   report.lines = {
       {"adaptive wall", worst("adaptive wall"), 90, "instructions", ""},
       {"position, FOAW (window 16) and re-sampling",
@@ -307,7 +309,8 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
        "lean reference 138, moteus core 202 and whole 420, ODrive 3.x 453, VESC 531, SimpleFOC 807"},
       {"both axes, adaptive wall every tick",
        100.0 * static_cast<double>(totals[0].worst_cycles + totals[1].worst_cycles) / tick_cycles, 25,
-       "% of 168 MHz", "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
+       fmt::format("% of {:.0f} MHz", of_board.core_clock_hz * 1e-6),
+       "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
   };
   return report;
 }

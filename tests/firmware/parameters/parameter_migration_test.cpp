@@ -186,11 +186,12 @@ TEST(ParameterMigration, RulesBetweenParametersHoldAfterwards) {
 }
 
 TEST(ParameterMigration, TheLargestSetThatFitsASector) {
+  constexpr std::size_t count_max = (FakeFlash::words_per_sector - record::length_of(0)) / 2;
   std::vector<Pair> pairs = pairs_of(some_values(1));
-  for (std::uint32_t i = 0; pairs.size() < record::count_max; ++i) pairs.push_back({0x4000'0000U + i, i});
+  for (std::uint32_t i = 0; pairs.size() < count_max; ++i) pairs.push_back({0x4000'0000U + i, i});
   const Taken taken = take(pairs);
   EXPECT_EQ(persistent_part(taken.values), persistent_part(some_values(1)));
-  EXPECT_EQ(taken.report.migration.dropped, record::count_max - persistent_count);
+  EXPECT_EQ(taken.report.migration.dropped, count_max - persistent_count);
 }
 
 TEST(ParameterMigration, TheNextSaveIsThisFirmwaresOwn) {

@@ -23,7 +23,7 @@ TEST(ParameterStore, AnErasedMemoryHoldsNothing) {
   EXPECT_FALSE(found.newest);
   EXPECT_EQ(found.damaged, 0);
   EXPECT_EQ(found.next_sequence, 1u);
-  EXPECT_EQ(Store::free_saves(found), saves_per_sector);
+  EXPECT_EQ(store.free_saves(found), saves_per_sector);
 }
 
 TEST(ParameterStore, WhatIsSavedIsLoaded) {
@@ -69,7 +69,7 @@ TEST(ParameterStore, ASectorIsErasedOnlyWhenTheOtherIsFullAndIsCounted) {
     EXPECT_NE(newest->sector, sector);
   };
   for (std::uint32_t k = 1; k <= 5 * saves_per_sector; ++k) {
-    const bool full = Store::free_saves(store.survey()) == 0;
+    const bool full = store.free_saves(store.survey()) == 0;
     ASSERT_EQ(save(store, some_values(k)), SaveProgress::done);
     erases += full ? 1 : 0;
     ASSERT_EQ(flash.erases, erases) << k;

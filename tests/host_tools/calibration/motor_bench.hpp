@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/calibration/applied_voltage.hpp"
 #include "host_tools/simulation/motor_drive.hpp"
 
 namespace kmax::calibration::test {
 
 inline constexpr double tick = 50e-6;
 inline constexpr double two_pi = 2.0 * std::numbers::pi;
-inline constexpr double timer_steps = 4200.0;
 inline constexpr double leg_resistance = 2e-3;
 
 struct BenchMotor {
