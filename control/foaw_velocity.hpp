@@ -107,7 +107,7 @@ class FoawVelocity {
     window_ = 1;
   }
 
-  // What estimate() is told by push().
+  // What push() leaves for estimate().
   struct Pushed {
     const std::uint32_t* positions = nullptr;  // the newest one; older ones behind it
     std::uint32_t interval = 0;                // the newest one less the second newest

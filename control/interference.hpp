@@ -25,7 +25,7 @@ struct InterferenceConfig {
 ///
 /// Eq. 4 writes one sum for forces that act in different directions. Read here: the interference is
 /// tangential (that is what "parallel" says), the background force normal, as in eq. 2 and Fig. 1(b).
-/// Time runs in whole samples from the moment of contact and starts anew at each contact.
+/// Time runs in whole samples from the moment of contact and starts again at each contact.
 /// Cost: about 15 instructions.
 template <typename Scalar>
 class Interference {

@@ -12,8 +12,8 @@ namespace kmax::control {
 // seconds.
 //
 // bandwidth in Hz, > 0 (0 or less freezes the output); the -3 dB point is at `bandwidth` as long as it is far
-// below the sampling rate. Other units as in difference_velocity.hpp. Cost: at most 41
-// Cortex-M4 instructions.
+// below the sampling rate. Other units as in difference_velocity.hpp. Cost: at most 41 Cortex-M4
+// instructions.
 template <typename Scalar>
 class LowPassVelocity {
  public:

@@ -51,7 +51,7 @@ struct MotionPlausibilityConfig {
 ///
 /// `force` is what really acts (from the measured torque-making current, or at least after every limit): a
 /// force that is only asked for would be missed as energy. Where the axis is not driven call follow()
-/// instead, and reset() when the counts are referred anew.
+/// instead, and reset() when the counts get another origin.
 ///
 /// A NaN trips. Cost, executed on a Cortex-M4F: 47 instructions.
 template <typename Scalar>

@@ -130,15 +130,15 @@ class VelocityEstimator {
 
   // Another kind or another step: true if this sample is only a new origin.
   [[gnu::noinline, gnu::cold]] bool changed(const Coefficients& coefficients, std::int64_t count) {
-    const bool resampled_anew = key_ != no_key && ((coefficients.key ^ key_) & step_bits) != 0;
+    const bool step_changed = key_ != no_key && ((coefficients.key ^ key_) & step_bits) != 0;
     key_ = coefficients.key;
-    if (resampled_anew) {
+    if (step_changed) {
       foaw_.reset(coefficients.foaw, count, velocity_);
       last_ = count;
     }
     low_pass_.reset(last_, velocity_);
     tracking_.reset(coefficients.tracking, last_, velocity_);
-    return resampled_anew;
+    return step_changed;
   }
 
   FoawVelocity<Scalar> foaw_;

@@ -88,7 +88,7 @@ class As5047pAngle {
  public:
   explicit constexpr As5047pAngle(const As5047pAngleConfig& config = {}) : config_(config) {}
 
-  /// Starts anew: the count is invalid until three frames agree. It goes on from where it was if the turns
+  /// Starts again: the count is invalid until three frames agree. It goes on from where it was if the turns
   /// can be known (above), else it begins within one turn. Counters go on.
   constexpr void restart() {
     fault_ = As5047pFault::starting;

@@ -76,8 +76,8 @@ class QuadratureIndexWatch {
   // Both before the index is known only, and kept out of the tick's one function, of which there is a copy
   // for each axis: inlined they are 1 KiB of the image.
 
-  /// The counts at which the line is high. Counts here are from where it rose: the
-  /// last low look, or the first look of all.
+  /// The counts at which the line is high. Counts here are from where it rose: the last low look, or
+  /// the first look of all.
   [[gnu::noinline, gnu::cold]] constexpr void extend(std::uint32_t count) {
     if (!high_) {
       from_low_ = low_seen_;

@@ -72,10 +72,9 @@ struct BoardReadings {
 /// all and counts the ticks. Half a tick apart or one right after the other makes no difference.
 ///
 /// Contexts. The tick is the highest; the serial interrupt may be preempted by it; the main loop by both.
-/// What crosses: settings, enables and torques main -> tick (DoubleBuffer, atomics), reports and the trace
-/// tick
-/// -> main (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN frames -> main
-/// (InterruptQueue). Nothing else is shared.
+/// What crosses: settings, enables and forces from the main loop to the tick (DoubleBuffer, atomics), reports
+/// and the trace back (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN
+/// frames to the main loop (InterruptQueue). Nothing else is shared.
 ///
 /// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines. Whoever wrote
 /// an axis' controlword last commands it: that link's silence, bus-off or NMT stop takes the force away.

@@ -61,18 +61,18 @@ class CanLine {
 
   void ISR_serve_transmit() {
     can_.ISR_serve_transmit();
-    news_.store(true, std::memory_order_relaxed);
+    poll_due_.store(true, std::memory_order_relaxed);
   }
   void ISR_receive(unsigned fifo, firmware::Application& application) {
     can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) {
       application.ISR_can_frame(frame);
-      news_.store(true, std::memory_order_relaxed);
+      poll_due_.store(true, std::memory_order_relaxed);
     });
   }
   void ISR_serve_status() { static_cast<void>(can_.ISR_serve_status()); }
 
   /// An interrupt has left something for the main loop since the last call.
-  bool news() { return news_.exchange(false, std::memory_order_relaxed); }
+  bool poll_due() { return poll_due_.exchange(false, std::memory_order_relaxed); }
 
  private:
   struct PendTransmit {
@@ -151,7 +151,7 @@ class CanLine {
   firmware::CanReadings readings_{};
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
   bool configured_ = false, absent_ = false;
-  std::atomic<bool> news_{false};
+  std::atomic<bool> poll_due_{false};
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -186,7 +186,8 @@ void poll_power(std::uint32_t now_us) {
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) cortex::stop_on_unexpected_interrupt();
   }
   for (;;) {
-    const bool due = !power_runs || power->drives().main_loop_due() || serial->news() || can_line->news();
+    const bool due =
+        !power_runs || power->drives().main_loop_due() || serial->poll_due() || can_line->poll_due();
     if (due) {
       const std::uint32_t now = system_tick.now_us();
       if (power_runs) {

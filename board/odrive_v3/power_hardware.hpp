@@ -30,7 +30,7 @@ class PowerHardware {
         sampling_(drivers::stm32f4::adc(1), drivers::stm32f4::adc(2), drivers::stm32f4::adc(3),
                   drivers::stm32f4::adc_common()) {}
 
-  /// Timers and converters, outputs off. False: the hardware does not do what it is told.
+  /// Timers and converters, outputs off. False: the hardware does not do what it is set to.
   [[nodiscard]] bool configure(std::uint32_t apb2_hz) {
     return bridge0_.configure() && bridge1_.configure() && encoder0_.configure({}) &&
            encoder1_.configure({}) && sampling_.configure(apb2_hz);

@@ -56,14 +56,14 @@ class SerialLine {
       reply_sent_us_ = now;
       reply_sent_.store(true);
     }
-    news_.store(true, std::memory_order_relaxed);
+    poll_due_.store(true, std::memory_order_relaxed);
   }
 
   /// A reply is under way.
   bool transmitting() const { return usart_.transmitting(); }
 
   /// The interrupt has left something for the main loop since the last call.
-  bool news() { return news_.exchange(false, std::memory_order_relaxed); }
+  bool poll_due() { return poll_due_.exchange(false, std::memory_order_relaxed); }
 
  private:
   bool configure() {
@@ -80,7 +80,7 @@ class SerialLine {
   drivers::stm32f4::Usart<> usart_{drivers::stm32f4::usart2()};
   firmware::SerialSettings settings_{};
   std::atomic<std::uint32_t> reply_sent_us_{0};  ///< written before the flag
-  std::atomic<bool> reply_sent_{false}, news_{false};
+  std::atomic<bool> reply_sent_{false}, poll_due_{false};
 };
 
 }  // namespace kmax::board::odrive_v3

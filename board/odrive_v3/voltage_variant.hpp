@@ -15,7 +15,7 @@ namespace kmax::board::odrive_v3 {
 enum class VoltageVariant : std::uint8_t { v24, v56 };
 
 /// Reads the maker's record (its layout: registers/system_memory.hpp). Nothing for a blank, damaged or
-/// unknown record: the caller then takes what the build was told. (The maker's firmware reads the first
+/// unknown record: the caller then takes what the build says. (The maker's firmware reads the first
 /// record only, its tools skip void ones.) `byte_at(i)`: byte i of the area.
 template <typename ByteAt>
 constexpr std::optional<VoltageVariant> voltage_variant_from_otp(ByteAt byte_at) {

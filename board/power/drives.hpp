@@ -48,7 +48,7 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   /// The AS5047P, of which a board has one (SerialEncoder).
   { hardware.serial_encoder().ISR_take().count } -> std::convertible_to<std::uint32_t>;
   {hardware.serial_encoder().ISR_begin()};
-  {hardware.serial_encoder().restart_anew()};
+  {hardware.serial_encoder().restart_without_turns()};
 
   /// The high side of the brake's half-bridge. Any context.
   {hardware.set_brake(level)};
@@ -423,7 +423,7 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
   }
   settings.brake = control::BrakeChopper::prepare({.on_voltage = values.real<"supply.brake_voltage">()});
   settings.has_brake = settings.brake.on_voltage > 0.0f;
-  if (chip_moves) hardware_.serial_encoder().restart_anew();
+  if (chip_moves) hardware_.serial_encoder().restart_without_turns();
   settings_ = settings;
   double_buffer_.offer(settings_);
   gain_ = drivers::gain_for_current(largest_current);

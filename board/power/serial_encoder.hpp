@@ -37,8 +37,8 @@ class SerialEncoder {
   /// can be known.
   void restart() { restart_.store(true, std::memory_order_relaxed); }
   /// Main loop: as restart(), for another axis or after a time in which nobody took frames.
-  void restart_anew() {
-    anew_.store(true, std::memory_order_relaxed);
+  void restart_without_turns() {
+    forget_turns_.store(true, std::memory_order_relaxed);
     restart();
   }
 
@@ -52,7 +52,7 @@ class SerialEncoder {
 
   drivers::As5047pSample ISR_take() {
     if (restart_.exchange(false, std::memory_order_relaxed)) {
-      if (anew_.exchange(false, std::memory_order_relaxed)) angle_.forget_turns();
+      if (forget_turns_.exchange(false, std::memory_order_relaxed)) angle_.forget_turns();
       return ISR_start_again();
     }
     if (!under_way_) return angle_.ISR_missed();
@@ -82,7 +82,7 @@ class SerialEncoder {
   Select select_;
   drivers::As5047pAngle angle_;
   bool under_way_ = false, bus_was_taken_ = false;
-  std::atomic<bool> restart_{false}, anew_{false};
+  std::atomic<bool> restart_{false}, forget_turns_{false};
 };
 
 }  // namespace kmax::board

@@ -5,7 +5,7 @@
 
 namespace kmax::board {
 
-/// What the fault handler left in RAM, as the application tells it. Empty after power-on.
+/// What the fault handler left in RAM, as the application reports it. Empty after power-on.
 inline firmware::CrashRecord crash_record_of(const drivers::cortex_m::FaultRecord& kept) {
   firmware::CrashRecord crash;
   using drivers::cortex_m::FaultCause;

@@ -26,8 +26,7 @@ extern const VectorTable vector_table;
 
 }  // namespace kmax::board
 
-/// Interrupts 0 to 81 in their order: HANDLER(name) for ISR_name, RESERVED() for a number that does not
-/// exist.
+/// Interrupts 0 to 81 in their order: HANDLER(name) for ISR_name, RESERVED() for a number without one.
 // clang-format off
 #define KMAX_STM32F405_INTERRUPTS(HANDLER, RESERVED) \
   HANDLER(window_watchdog) \

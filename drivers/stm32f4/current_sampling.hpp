@@ -39,9 +39,9 @@
 //   missing_phase_c   ADC2 was done, ADC3 not.
 //   spurious          called without a finished conversion; nothing was touched.
 // A lost interrupt counts as overrun and mismatch. A mismatch alone means that caller and trigger disagree on
-// the phase.
-// One gap remains: a trigger in the few cycles between the caller's look at the timer and the clearing of the
-// flags. A caller that finds the timer's direction unchanged after ISR_read knows that there was none.
+// the phase. One gap remains: a trigger in the few cycles between the caller's look at the timer and the
+// clearing of the flags. A caller that finds the timer's direction unchanged after ISR_read knows that there
+// was none.
 //
 // Order: `configure` (timers' trigger still off or not), wait adc_stabilization_us, `start`. The converters'
 // clocks, the pins (analog mode) and the NVIC are the composition root's.

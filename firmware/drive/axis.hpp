@@ -51,7 +51,8 @@ struct TripRecord {
   Fault fault = Fault::none;
 };
 
-/// What the tick of one axis tells the main loop. To fill it is part of the tick: it costs 60 instructions.
+/// What the tick of one axis reports to the main loop. To fill it is part of the tick: it costs 60
+/// instructions.
 struct AxisReport {
   control::HapticLoop<float>::Output haptic{};
   MotorControl::Report motor{};

@@ -15,7 +15,7 @@ namespace kmax::firmware {
 /// starts; and what a host has found out in this power cycle (motor.commutation_known = yes).
 ///
 /// What the host has found out is forgotten when one of the parameters that it was found with changes, when
-/// the counts are referred anew, and after a fault that says that counts were lost: encoder and spin_out.
+/// the counts get another origin, and after a fault that says that counts were lost: encoder and spin_out.
 /// It is tied to the parameters that are set when motor.commutation_known becomes yes.
 class Commutation {
  public:

@@ -50,8 +50,7 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
      "check encoder.counts_per_turn and device.transmission, the encoder's cable, and velocity.limit"},
     {Fault::encoder, 0x7305, "encoder", "", "the encoder gave no valid count",
      "check the encoder's cable and supply, and encoder.kind; then switch the device off and on: its "
-     "position is "
-     "lost"},
+     "position is lost"},
     {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
      "check the cable and the host program; link.timeout = 0 turns this off"},
     {Fault::main_loop, 0x6100, "main_loop", "", "the firmware's main loop stood still for more than 0.1 s",
@@ -83,8 +82,7 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::spin_out, 0xFF04, "spin_out", "J",
      "the handle gained energy that neither the motor nor a hand can have given it: the motor runs away",
      "the encoder slipped, or encoder.direction or motor.electrical_offset is wrong: run 'kmax calibrate'; "
-     "or a "
-     "hand pushed harder than device.hand_force"},
+     "or a hand pushed harder than device.hand_force"},
     {Fault::motor_too_hot, 0x4210, "motor_too_hot", "degC",
      "the winding was hotter than temperature.motor_limit",
      "let it cool down; lower current.limit, or correct the motor's thermal values under temperature.*"},

@@ -57,7 +57,7 @@ inline constexpr float current_square_time = 0.01f;  // s
 /// Excitation (excitation.hpp) takes the force's place for identification. Its kinds voltage and current, and
 /// `off`, which is a current of zero, hold for a synchronous motor in the excitation's own frame: nothing
 /// needs to be known about rotor or encoder. References stay within the current limit, `along` first.
-/// The phases are watched as ever for over-current and for what leaks. An open phase is told where the
+/// The phases are watched as ever for over-current and for what leaks. An open phase is reported where the
 /// current is steered by references that it can follow: with a voltage nobody knows yet what current should
 /// flow, and a square wave may be faster than the loop; there it is for the identification to find.
 class MotorControl {
@@ -87,7 +87,7 @@ class MotorControl {
   /// tick later). The frame is the rotor's; with the excitation's kinds voltage and current its own, where
   /// `current` and `voltage` are along and `_d` across.
   ///
-  /// The part that the main loop is told, in whole words so that it is copied fast.
+  /// The part that the main loop gets, in whole words so that it is copied fast.
   struct Report {
     float current_reference = 0.0f;    ///< A, torque-making (along)
     float current = 0.0f;              ///< A, measured, torque-making (along)
@@ -111,7 +111,7 @@ class MotorControl {
   static Coefficients prepare(const MotorControlConfig& config);
 
   /// `force`: N at the handle. `position`: counts, low 32 bits, direction and offset applied. `velocity`: m/s
-  /// of the handle. Not driving: no reference, controllers wound back, the measured current still told.
+  /// of the handle. Not driving: no reference, controllers wound back, the measured current still reported.
   void update(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
               float velocity, bool driving, Output& out);
 
@@ -153,8 +153,8 @@ class MotorControl {
                                                                      float velocity, Output& out);
   static void take(const Dc::Output& made, Output& out);
   static void take(const FieldOriented::Output& made, Output& out);
-  [[gnu::noinline, gnu::cold]] void tell(control::PhaseCondition condition, const Coefficients& c,
-                                         const Measured& measured, Output& out);
+  [[gnu::noinline, gnu::cold]] void report_fault(control::PhaseCondition condition, const Coefficients& c,
+                                                 const Measured& measured, Output& out);
   void settle(const Coefficients& c, float torque_current, float square, Output& out);
 
   control::DcCurrentController<float> dc_;
@@ -198,7 +198,7 @@ inline void MotorControl::follow_force(const Coefficients& c, const Measured& me
           ? drive_dc(c, measured, velocity, true, out)
           : drive_pmsm<by>(c, measured, position * c.angle_per_count + c.angle_offset, velocity, true, out);
   if (condition != control::PhaseCondition::good) [[unlikely]]
-    tell(condition, c, measured, out);
+    report_fault(condition, c, measured, out);
 }
 
 /// `steady`: the reference is one that the current can follow.

@@ -1,4 +1,4 @@
-// The rare parts of the motor's tick: excitation, and what a fault has to tell. The usual one is inline in
+// The rare parts of the motor's tick: excitation, and what is reported of a fault. The usual one is inline in
 // the header.
 #include "firmware/drive/motor_control.hpp"
 
@@ -56,7 +56,7 @@ bool bound(float limit, float& along, float& across) {
       c.kind == MotorKind::dc ? excite_dc(c, measured, asked, velocity, out)
       : of_rotor ? drive_pmsm<By::identification>(c, measured, rotor_angle, velocity, !asked.alternating, out)
                  : excite_stator(c, measured, asked, rotor_angle, velocity, out);
-  if (condition != control::PhaseCondition::good) tell(condition, c, measured, out);
+  if (condition != control::PhaseCondition::good) report_fault(condition, c, measured, out);
   return force;
 }
 
@@ -110,8 +110,8 @@ control::PhaseCondition MotorControl::excite_stator(const Coefficients& c, const
                                                    steady && control::magnitude(velocity) < c.slow_velocity);
 }
 
-void MotorControl::tell(control::PhaseCondition condition, const Coefficients& c, const Measured& measured,
-                        Output& out) {
+void MotorControl::report_fault(control::PhaseCondition condition, const Coefficients& c,
+                                const Measured& measured, Output& out) {
   const Phases phases = c.kind == MotorKind::dc ? of_dc(measured) : of_pmsm(measured);
   const float of_a = control::magnitude(phases.a), of_b = control::magnitude(phases.b);
   const float of_c = control::magnitude(phases.c);

@@ -35,8 +35,7 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
         .at_standard_index(0x6064),
     reading("measured.flags", group::measured, 9, unsigned16, "",
             "Bit 0 inside the wall, 1 force limited, 2 slew limited, 3 soft start, 4 armed, 5 motor "
-            "saturated: less force "
-            "than asked for."),
+            "saturated: less force than asked for."),
     reading("measured.count_length", group::measured, 10, float32, "m", "Handle travel per encoder count."),
     reading("measured.resolution", group::measured, 11, float32, "m", "Position step that is really in use."),
     reading("measured.limited_samples", group::measured, 12, unsigned32, "samples",
@@ -99,10 +98,9 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
     reading("telemetry.current", group::telemetry, 1, integer16, "mA",
             "measured.current, for a PDO; beyond +-32.767 A it stays there."),
 
-    named_reading(
-        "guard.verdict", group::guard_status, 1, names::guard_verdict,
-        "Stability check of the present parameters. Not judged: guard.mode is off, or nothing renders "
-        "a wall."),
+    named_reading("guard.verdict", group::guard_status, 1, names::guard_verdict,
+                  "Stability check of the present parameters. Not judged: guard.mode is off, or nothing "
+                  "renders a wall."),
     reading("guard.failed", group::guard_status, 2, unsigned16, "",
             "Criteria that fail: bit n stands for number n of guard.criterion."),
     named_reading("guard.criterion", group::guard_status, 3, names::guard_criterion,

@@ -21,8 +21,7 @@ constexpr Entry stop_option(std::string_view name, std::uint8_t subindex, std::s
 inline constexpr std::array axis_settings = std::to_array<Entry>({
     choice("wall.law", group::wall, 1, names::wall_law, 1,
            "Wall law: no force, plain spring (paper 1 eq. 3), magnetic field of constant coefficient (eqs. "
-           "5-6), "
-           "or of a coefficient that follows the velocity (eqs. 5-7).")
+           "5-6), or of a coefficient that follows the velocity (eqs. 5-7).")
         .disarmed_only(),
     real("wall.position", group::wall, 2, "m", -1000, 1000, 0, "Where the wall's surface is.")
         .disarmed_only(),
@@ -55,8 +54,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
 
     choice("interference.mode", group::interference, 1, names::interference_mode, 0,
            "Disturbance of paper 1 section 2: none, along the wall's normal (eq. 2), or along its surface "
-           "(eq. 4; "
-           "the interference force goes to the other axis).")
+           "(eq. 4; the interference force goes to the other axis).")
         .disarmed_only(),
     real("interference.force", group::interference, 2, "N", -100, 100, 0,
          "Interference force F_I while inside."),
@@ -65,10 +63,9 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     real("interference.onset_time", group::interference, 4, "s", 0, 3600, 0,
          "Time t_0 after contact at which F_B sets in; parallel mode only."),
 
-    real(
-        "position.resolution", group::position, 1, "m", 0, 1, 0,
-        "Step to which the position is re-quantized (paper 2); 0 keeps the encoder's own. Rounded to a whole "
-        "number of encoder counts, see measured.resolution.")
+    real("position.resolution", group::position, 1, "m", 0, 1, 0,
+         "Step to which the position is re-quantized (paper 2); 0 keeps the encoder's own. Rounded to a "
+         "whole number of encoder counts, see measured.resolution.")
         .disarmed_only(),
     choice("position.rounding", group::position, 2, names::rounding, 0,
            "How a position between two steps is rounded; hysteresis holds the old step until it is a whole "
@@ -77,8 +74,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
 
     choice("velocity.estimator", group::velocity, 1, names::velocity_estimator, 2,
            "Velocity estimator: finite difference, low-passed difference, first-order adaptive windowing "
-           "with the "
-           "best fit or the end fit, or a tracking loop.")
+           "with the best fit or the end fit, or a tracking loop.")
         .disarmed_only(),
     whole("velocity.window", group::velocity, 2, unsigned8, "samples", 1, 16, 16,
           "Widest window of foaw and foaw_end_fit.")
@@ -109,30 +105,28 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
     real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
          "Viscous damping b at the handle that the stability check may count on."),
-    real("guard.friction", group::guard, 3, "N", 0, 100, 0,
-         "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does "
-         "not "
-         "subtract what compensation.limit allows to be taken away; compensation.limit must be below it."),
+    real(
+        "guard.friction", group::guard, 3, "N", 0, 100, 0,
+        "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does "
+        "not subtract what compensation.limit allows to be taken away; compensation.limit must be below it."),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
          "Force F_h of the operator in paper 2's resolution criteria; 0: not known, they are not judged."),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
          "Speed v of the operator in paper 2's resolution criteria; 0: not known."),
     real("guard.delay", group::guard, 6, "s", 0, 1, 0,
          "Delay from a command to its force at the handle, beyond the current loop's own (1 / "
-         "current.bandwidth "
-         "and 0.65 ticks)."),
+         "current.bandwidth and 0.65 ticks)."),
 
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,
          "Handle travel per radian of the motor shaft.")
         .disarmed_only(),
     real("device.mass", group::device, 2, "kg", 1e-4, 100, 0.045,
-         "Mass felt at the handle, the rotor's inertia included. Used by the spin-out watch and "
-         "by the eigenvalues of 'kmax check'.")
+         "Mass felt at the handle, the rotor's inertia included. Used by the spin-out watch and by the "
+         "eigenvalues of 'kmax check'.")
         .disarmed_only(),
     real("device.hand_force", group::device, 3, "N", 0, 1000, 5,
          "Largest force of a hand: a handle that gains more energy than the motor and such a hand can have "
-         "given it "
-         "has spun out (encoder slipped, wrong commutation) and trips. 0 turns the watch off.")
+         "given it has spun out (encoder slipped, wrong commutation) and trips. 0 turns the watch off.")
         .disarmed_only(),
 
     choice("motor.kind", group::motor, 1, names::motor_kind, 0,
@@ -156,13 +150,11 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
     choice("motor.calibrated", group::motor, 8, names::no_or_yes, 0,
            "Whether the values of motor and encoder have been identified; 'kmax calibrate' says yes. A "
-           "synchronous "
-           "motor is not armed otherwise, but after a calibration in this power cycle.")
+           "synchronous motor is not armed otherwise, but after a calibration in this power cycle.")
         .disarmed_only(),
     choice("motor.commutation_known", group::motor, 9, names::no_or_yes, 0,
            "Whether 'kmax calibrate' has found the rotor's electrical angle in this power cycle. Forgotten "
-           "when the "
-           "counts or their meaning change; see measured.commutation_known.")
+           "when the counts or their meaning change; see measured.commutation_known.")
         .disarmed_only()
         .volatile_value(),
 
@@ -187,15 +179,12 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
     choice("encoder.index", group::encoder, 5, names::encoder_index, 0,
            "Index line of a quadrature encoder. When it is first passed after a start, counts are referred "
-           "to it: the "
-           "index is at a whole number of turns. From then on a cable that comes off is found at once, since "
-           "all "
-           "lines read high away from the index.")
+           "to it: the index is at a whole number of turns. From then on a cable that comes off is found at "
+           "once, since all lines read high away from the index.")
         .disarmed_only(),
     choice("encoder.start", group::encoder, 6, names::encoder_start, 0,
            "Where the handle is when the device starts: anywhere, or always in the same rest, so that counts "
-           "from "
-           "there mean the same after every start.")
+           "from there mean the same after every start.")
         .disarmed_only(),
 
     real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100,
@@ -216,10 +205,9 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     real("temperature.case_resistance", group::temperature, 8, "K/W", 0.01, 1000, 8,
          "Thermal resistance from case to ambient."),
 
-    whole(
-        "drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
-        "CiA 402 controlword: 6 shutdown, 7 switch on, 15 enable operation, 2 quick stop, 0 disable voltage, "
-        "128 fault reset (rising edge).")
+    whole("drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
+          "CiA 402 controlword: 6 shutdown, 7 switch on, 15 enable operation, 2 quick stop, 0 disable "
+          "voltage, 128 fault reset (rising edge).")
         .volatile_value()
         .at_standard_index(0x6040),
     choice(
@@ -231,9 +219,8 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
 
     choice("excitation.kind", group::excitation, 1, names::excitation_kind, 0,
            "What is excited: a voltage or a current vector in the stator's frame, a torque-making current in "
-           "the "
-           "rotor's frame, or the handle's position through a spring and damper. A DC motor has magnitudes "
-           "only.")
+           "the rotor's frame, or the handle's position through a spring and damper. A DC motor has "
+           "magnitudes only.")
         .volatile_value(),
     whole("excitation.run", group::excitation, 2, unsigned16, "", 0, 65535, 0,
           "A number other than the one at arming starts the excitation, another one starts it anew.")
@@ -284,8 +271,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
     real("compensation.limit", group::compensation, 3, "N", 0, 100, 0,
          "Bound on friction, cogging and gravity compensation together; 0: off. Must be below "
-         "guard.friction, so "
-         "that a handle at rest cannot be moved by it.")
+         "guard.friction, so that a handle at rest cannot be moved by it.")
         .disarmed_only(),
     real("compensation.friction", group::compensation, 4, "N", 0, 100, 0,
          "Coulomb friction that is made up for.")
@@ -322,11 +308,10 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only()
         .volatile_value()
         .at_standard_index(0x6060),
-    whole(
-        "profile.target_torque", group::profile, 2, integer16, "1/1000", -32768, 32767, 0,
-        "Torque asked for in mode torque, in thousandths of profile.rated_torque, along +x, within "
-        "profile.max_torque; profile.target_force is added to it, and force.limit bounds the sum. 0 whenever "
-        "the axis is not armed.")
+    whole("profile.target_torque", group::profile, 2, integer16, "1/1000", -32768, 32767, 0,
+          "Torque asked for in mode torque, in thousandths of profile.rated_torque, along +x, within "
+          "profile.max_torque; profile.target_force is added to it, and force.limit bounds the sum. 0 "
+          "whenever the axis is not armed.")
         .volatile_value()
         .at_standard_index(0x6071),
     whole("profile.max_torque", group::profile, 3, unsigned16, "1/1000", 0, 32767, 1000,
@@ -348,14 +333,12 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
                 "0: disabling the operation removes the force at once."),
     stop_option("profile.halt_option", 8, names::halt_option, 1, 0x605D,
                 "1: controlword bit 8 in mode torque; the torque goes to zero within force.slew_limit, the "
-                "axis stays "
-                "armed."),
+                "axis stays armed."),
     stop_option("profile.fault_option", 9, names::disable_drive, 0, 0x605E,
                 "0: a fault removes the force at once."),
     real("profile.target_force", group::profile, 10, "N", -1000, 1000, 0,
          "Force asked for in mode torque at the handle, along +x; added to what profile.target_torque makes "
-         "there, "
-         "and force.limit bounds the sum. 0 whenever the axis is not armed.")
+         "there, and force.limit bounds the sum. 0 whenever the axis is not armed.")
         .volatile_value(),
 });
 

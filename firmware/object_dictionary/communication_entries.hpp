@@ -83,11 +83,10 @@ constexpr Entry pdo_entry(std::size_t pdo, std::size_t value) {
                                       : canopen::cob_id::rpdo[number] | canopen::cob_id::invalid,
                     "Identifier; bit 31: this PDO does not exist.");
     case 1:
-      return communication(
-          name, group(false), 2, Type::unsigned8, "", 255, 255,
-          sent ? "0: at a SYNC if something has changed; 1 to 240: at every nth SYNC; 254, 255: by "
-                 "the event time, or at a change if that is 0."
-               : "0 to 240: taken over at the next SYNC; 254, 255: at once.");
+      return communication(name, group(false), 2, Type::unsigned8, "", 255, 255,
+                           sent ? "0: at a SYNC if something has changed; 1 to 240: at every nth SYNC; 254, "
+                                  "255: by the event time, or at a change if that is 0."
+                                : "0 to 240: taken over at the next SYNC; 254, 255: at once.");
     case 2:
       return communication(name, group(false), 3, Type::unsigned16, "100 us", 65535, 0,
                            "Least time between two of them.");
@@ -122,8 +121,8 @@ inline constexpr std::array node_entries = std::to_array<Entry>({
         .at_standard_index(0x1017),
     communication(
         "canopen.error_behaviour", group::communication, 5, Type::unsigned8, "", 2, 0,
-        "NMT state after bus-off or the loss of a watched heartbeat: 0 pre-operational (from operational), "
-        "1 as it was, 2 stopped. An axis that was armed over CAN loses its force in any case.")
+        "NMT state after bus-off or the loss of a watched heartbeat: 0 pre-operational (from operational), 1 "
+        "as it was, 2 stopped. An axis that was armed over CAN loses its force in any case.")
         .at_standard_index(0x1029, 1),
 
     communication("heartbeat_consumer.node_1", group::heartbeat_consumer, 1, Type::unsigned32, "", 8388607, 0,

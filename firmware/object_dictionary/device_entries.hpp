@@ -70,9 +70,8 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
 
     real("link.timeout", group::link, 1, "s", 0, 60, 1,
          "Host silence after which an armed axis loses its force with a fault; 0 turns it off. On the serial "
-         "line "
-         "any request is a sign of life; on CAN only what commands: a value written, a PDO taken, a watched "
-         "heartbeat."),
+         "line any request is a sign of life; on CAN only what commands: a value written, a PDO taken, a "
+         "watched heartbeat."),
     whole("link.sign_of_life", group::link, 2, Type::unsigned16, "", 0, 65535, 0,
           "Written by a host that commands over CAN and has nothing else to write; the number means nothing.")
         .volatile_value(),

@@ -73,8 +73,7 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
      ObjectAccessKind::read_write, 1, "Writing 'save' (0x65766173) saves; reads 1: on command."},
     {SpecialObject::restore_defaults, "Restore all default parameters", 0x1011, 1, 1, ObjectType::unsigned32,
      ObjectAccessKind::read_write, 1,
-     "Writing 'load' (0x64616F6C): all parameters are at their defaults after the "
-     "next reset; reads 1."},
+     "Writing 'load' (0x64616F6C): all parameters are at their defaults after the next reset; reads 1."},
     {SpecialObject::trace_records, "Trace records", 0x5820, 1, trace_objects, ObjectType::domain,
      ObjectAccessKind::read_only, 0, "Eight records each of tick, count, force, magnetic coefficient."},
     {SpecialObject::capture_samples, "Capture samples", 0x5821, 1, 1, ObjectType::domain,

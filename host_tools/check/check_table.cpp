@@ -124,8 +124,7 @@ std::string conclusion(const Judgement& judgement) {
   else if (!exact.pass)
     text += held ? "The linear loop is unstable with this hand: expect vibration, unless friction stops it. "
                  : "The linear loop is unstable with nobody at the handle: expect vibration there, unless "
-                   "friction "
-                   "stops it; a hand may hold it still (--hand). ";
+                   "friction stops it; a hand may hold it still (--hand). ";
   else if (!guaranteed && exact.applies)
     text += "Nothing is guaranteed, and the linear loop is stable: try it, with a low force.limit first. ";
   else if (!guaranteed)

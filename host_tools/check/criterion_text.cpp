@@ -12,32 +12,26 @@ namespace {
 constexpr std::array<CriterionText, control::criterion_count> texts{{
     {Criterion::colgate, Worth::guarantee, "N/m", "K", "<", "(b - |B|) / (T/2 + T_d)",
      "A rigid device of mass m and damping b, a spring and damper wall whose damper uses the difference of "
-     "two "
-     "positions, a zero-order hold. The hand may be anything passive; friction, quantization and the hand's "
-     "own "
-     "damping are not counted on, so most walls in use fail it and are still. A damper by low_pass is "
-     "covered too, by foaw "
-     "or tracking not. The delay is added to half a "
-     "period to first order; a b that is only measured at low speed may be smaller at the rate of the loop.",
+     "two positions, a zero-order hold. The hand may be anything passive; friction, quantization and the "
+     "hand's own damping are not counted on, so most walls in use fail it and are still. A damper by "
+     "low_pass is covered too, by foaw or tracking not. The delay is added to half a period to first order; "
+     "a b that is only measured at low speed may be smaller at the rate of the loop.",
      "",
      "J. E. Colgate and G. G. Schenkel, Passivity of a class of sampled-data systems: application to haptic "
      "interfaces, J. Robotic Systems 14(1), 1997."},
     {Criterion::gil, Worth::heuristic, "N/m", "K", "<", "(b + B) / (T/2 + T_d)",
      "An estimate, in closed form, of where the linear loop with nobody at the handle turns unstable: close "
-     "while "
-     "(b + B)(T + T_d)/m is well below 1, and off to either side beyond. sampled_eigenvalues is exact, and "
-     "has "
-     "the hand. Friction and quantization are left out.",
+     "while (b + B)(T + T_d)/m is well below 1, and off to either side beyond. sampled_eigenvalues is exact, "
+     "and has the hand. Friction and quantization are left out.",
      "",
      "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche and G. Hirzinger, Stability boundary for haptic "
-     "rendering: "
-     "influence of damping and delay, J. Computing and Information Science in Engineering 9(1), 2009."},
+     "rendering: influence of damping and delay, J. Computing and Information Science in Engineering 9(1), "
+     "2009."},
     {Criterion::sampled_eigenvalues, Worth::necessary, "N/m", "K", "<",
      "the smallest K at which an eigenvalue of the sampled loop leaves the unit circle",
      "Exact for the linear model: m, b, the hand of --hand, zero-order hold, wall damper by difference, "
-     "delay. "
-     "Without friction, quantization, the wall's one-sidedness and the field. Friction may hold "
-     "still what it calls unstable; a hand that grips otherwise moves the limit, often several times.",
+     "delay. Without friction, quantization, the wall's one-sidedness and the field. Friction may hold still "
+     "what it calls unstable; a hand that grips otherwise moves the limit, often several times.",
      "a device.mass and a delay of at most 8 periods",
      "K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, chapter on sampling of continuous-time "
      "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012."},
@@ -53,19 +47,16 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
     {Criterion::diolaiti, Worth::heuristic, "m/s", "v, the operator's speed", "<",
      "f_c / (K (T/2 + T_d) - b)",
      "Where viscous damping is too small for the spring (K (T/2 + T_d) > b), Coulomb friction still stops "
-     "what moves "
-     "slower than the escape speed; 0 when friction is too small for the quantum (f_c < K quantum / 2). From "
-     "the energies of one period, with nobody holding it: the regions are the source's, with T + 2 T_d for "
-     "T; the escape speed is derived from the same balance.",
+     "what moves slower than the escape speed; 0 when friction is too small for the quantum (f_c < K quantum "
+     "/ 2). From the energies of one period, with nobody holding it: the regions are the source's, with T + "
+     "2 T_d for T; the escape speed is derived from the same balance.",
      "guard.operator_speed",
      "N. Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, Stability of haptic rendering: "
-     "discretization, "
-     "quantization, time delay, and Coulomb effects, IEEE Trans. Robotics 22(2), 2006."},
+     "discretization, quantization, time delay, and Coulomb effects, IEEE Trans. Robotics 22(2), 2006."},
     {Criterion::resolution, Worth::heuristic, "N", "K max(quantum, v T)", "<=", "F_h, the operator's force",
      "Quasi-static: the step of force that one quantum, or the depth reached before the wall is noticed, "
-     "makes "
-     "must not exceed what the operator holds against. The wall counts as noticed one whole period late, the "
-     "worst case. It says nothing of dynamics and is no passivity condition.",
+     "makes must not exceed what the operator holds against. The wall counts as noticed one whole period "
+     "late, the worst case. It says nothing of dynamics and is no passivity condition.",
      "guard.operator_force", "Paper 2, on position resolution and stability, eqs. 2 to 7."},
     {Criterion::resolution_speed, Worth::heuristic, "m/s", "v, the operator's speed", "<=", "F_h / (K T)",
      "The same estimate solved for the speed: an upper bound, for an approach noticed one whole period late.",
@@ -74,8 +65,8 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "min((b - |B|) / (T/2 + T_d), 2 (f_c / quantum - |B| / T))",
      "The magnetic field is steepest at the surface; there it is a spring of 2 F_MC / x_0, to which colgate "
      "applies as to the wall's own, and what the quantum makes of it friction must hold. It is often stiffer "
-     "than the wall. F_MC is the largest that the law can "
-     "command; that the adaptive law changes it with the velocity is not counted.",
+     "than the wall. F_MC is the largest that the law can command; that the adaptive law changes it with the "
+     "velocity is not counted.",
      "a wall.law with a field above 0",
      "Colgate and Schenkel 1997, Abbott and Okamura 2005, with the slope of eq. 5 of paper 1, on impedance "
      "tuning."},

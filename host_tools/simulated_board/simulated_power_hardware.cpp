@@ -24,7 +24,7 @@ SimulatedSerialEncoder::Sample SimulatedSerialEncoder::ISR_take() {
   return sample_;
 }
 
-void SimulatedSerialEncoder::restart_anew() {
+void SimulatedSerialEncoder::restart_without_turns() {
   if (started_) ++sample_.reference_generation;
   started_ = false;
 }

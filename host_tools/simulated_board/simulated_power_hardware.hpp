@@ -27,7 +27,7 @@ class SimulatedSerialEncoder {
   bool under_way() const { return false; }
   void ISR_abandon() {}
   void restart() {}
-  void restart_anew();
+  void restart_without_turns();
 
  private:
   const simulation::SceneDrives& drives_;

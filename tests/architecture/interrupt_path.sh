@@ -64,7 +64,7 @@ failed=0
 check "control/haptic_loop.hpp" "$work/haptic_loop.cpp" || failed=1
 check "firmware/drive/motor_control_tick.cpp" "$source_dir/firmware/drive/motor_control_tick.cpp" || failed=1
 # Those of motor_control_tick.cpp, which has just been looked at.
-motor='^_ZNK?4kmax8firmware12MotorControl(6excite|4tell)E'
+motor='^_ZNK?4kmax8firmware12MotorControl(6excite|12report_fault)E'
 allowed="$allowed|$motor"
 check "firmware/drive/axis.cpp" "$source_dir/firmware/drive/axis.cpp" || failed=1
 # Those of axis.cpp, likewise.

@@ -87,7 +87,7 @@ TEST(SerialEncoder, ARestartOfAnEncoderThatIsReadKeepsTheTurns) {
 TEST(SerialEncoder, AfterATimeInWhichNobodyReadTheTurnsAreUnknown) {
   Board board;
   board.start_at_twenty_thousand();
-  board.encoder.restart_anew();
+  board.encoder.restart_without_turns();
   const auto sample = board.ticks(10, 20'000);
   EXPECT_TRUE(sample.valid);
   EXPECT_EQ(sample.count, 3616U);

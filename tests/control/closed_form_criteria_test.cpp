@@ -92,8 +92,8 @@ TEST(ClosedFormCriteria, AreTheFormulasOfTheTable) {
   expect_the_formulas(c);
 }
 
-// 2 N over 0.2 mm, counts of 0.055 mm, hardly any friction, a damper of 20 N s/m in the
-// device. It buzzes, and Colgate's bound of 40,000 N/m does not see it.
+// 2 N over 0.2 mm, counts of 0.055 mm, hardly any friction, a damper of 20 N s/m in the device. It
+// buzzes, and Colgate's bound of 40,000 N/m does not see it.
 TEST(ClosedFormCriteria, AFieldThatStepsBeyondTheFrictionFails) {
   StabilityCase<double> c;
   c.stiffness = 100.0;

@@ -73,7 +73,7 @@ class MadeUpHardware {
     void ISR_abandon() {}
     bool under_way() const { return false; }
     void restart() {}
-    void restart_anew() {}
+    void restart_without_turns() {}
   };
 
   static constexpr bool has(std::size_t) { return true; }
