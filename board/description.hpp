@@ -13,6 +13,7 @@ struct BoardDescription {
   std::uint16_t half_period_ticks;    ///< steps from no duty to all of it
   std::uint16_t dead_time_ticks;      ///< between the two switches of a leg
   std::uint16_t minimum_low_ticks;    ///< for which a low side must stay on, so that its shunt can be read
+  float modulation_limit;             ///< of the supply, for the current controllers; below largest_duty()
   double supply_ratio;                ///< of the supply to the voltage at the converter's pin
   double gate_driver_supply_minimum;  ///< V; below it the gate drivers report a fault
 
@@ -21,6 +22,10 @@ struct BoardDescription {
   /// The greatest duty of a leg, 0 to 1.
   constexpr double largest_duty() const {
     return static_cast<double>(half_period_ticks - minimum_low_ticks) / half_period_ticks;
+  }
+  /// Else what the current controllers ask for would be cut off, and they would not know.
+  constexpr bool modulation_fits() const {
+    return 0.5 + 0.5 * static_cast<double>(modulation_limit) <= largest_duty() + 1e-6;
   }
 };
 

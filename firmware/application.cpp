@@ -69,8 +69,9 @@ Application::Settings Application::make_settings() const {
     const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
     settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
     const Circumstances now = offered_[axis];
-    settings[axis].motor =
-        MotorControl::prepare(motor_configuration(values, axis, now.winding_temperature, now.current_share));
+    auto motor = motor_configuration(values, axis, now.winding_temperature, now.current_share);
+    motor.modulation_limit = board_.modulation_limit;
+    settings[axis].motor = MotorControl::prepare(motor);
     settings[axis].compensation =
         control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
     settings[axis].plausibility = control::MotionPlausibility<float>::prepare(

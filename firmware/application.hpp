@@ -30,6 +30,8 @@ struct BoardIdentity {
   std::uint8_t clock_source = 0;  ///< as info.clock_source says
   ResetCause reset_cause = ResetCause::unknown;
   CrashRecord crash{};  ///< what is left of the run before
+  /// Of the supply, that the current controllers may use: what the board's bridge can give.
+  float modulation_limit = MotorControlConfig{}.modulation_limit;
 };
 
 inline constexpr std::uint32_t firmware_version = 0x000100;  ///< 0.1.0

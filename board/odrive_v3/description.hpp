@@ -2,7 +2,6 @@
 
 #include "board/description.hpp"
 #include "drivers/stm32f4/three_phase_pwm.hpp"
-#include "firmware/drive/motor_control.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::board::odrive_v3 {
@@ -17,13 +16,12 @@ inline constexpr BoardDescription description{
     .half_period_ticks = pwm_config.half_period_ticks,
     .dead_time_ticks = drivers::stm32f4::dead_time_ticks(pwm_config.dead_time_code),
     .minimum_low_ticks = pwm_config.minimum_low_ticks,
+    .modulation_limit = 0.88f,  // leaves the low sides on for 6 % of the period
     .supply_ratio = 11.0,
     // DRV8301 data sheet, PVDD under-voltage.
     .gate_driver_supply_minimum = 5.9,
 };
 static_assert(description.pwm_hz() == firmware::tick_rate_hz);
-static_assert(0.5 + 0.5 * static_cast<double>(firmware::MotorControlConfig{}.modulation_limit) <=
-                  description.largest_duty() + 1e-6,
-              "what the current controllers ask for would be cut off, and they would not know");
+static_assert(description.modulation_fits());
 
 }  // namespace kmax::board::odrive_v3

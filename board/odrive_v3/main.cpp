@@ -97,6 +97,7 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.board_name = "odrive_v3";
   identity.serial_number = serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
+  identity.modulation_limit = description.modulation_limit;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
   if (identity.reset_cause == firmware::ResetCause::power_on) cortex::fault_record.magic = 0;

@@ -28,11 +28,10 @@ struct MotorControlConfig {
   std::int32_t pole_pairs = 7;
   float electrical_offset = 0.0f;  ///< rad, electrical angle at position zero
   std::uint32_t counts_per_turn = 8192;
-  float current_limit = 5.0f;  ///< A
-  float current_share = 1.0f;  ///< 0 .. 1 of current_limit that may be asked for: thermal derating
-  float bandwidth = 3000.0f;   ///< rad/s
-  /// Of the supply: leaves the low sides on for 6 % of the period, to be sampled.
-  float modulation_limit = 0.88f;
+  float current_limit = 5.0f;      ///< A
+  float current_share = 1.0f;      ///< 0 .. 1 of current_limit that may be asked for: thermal derating
+  float bandwidth = 3000.0f;       ///< rad/s
+  float modulation_limit = 0.88f;  ///< of the supply; a fact of the board
   float dead_time = 0.0f;          ///< s of the bridge that is made up for; 0: not
   float dead_time_current = 0.1f;  ///< A, within it that goes smoothly through zero
   float tick_rate = 20000.0f;      ///< Hz, also of the PWM
