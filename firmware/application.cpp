@@ -174,7 +174,7 @@ bool Application::round_has_begun() {
 }
 
 Refusal Application::obstacle_to_arming(std::size_t axis) const {
-  if (keeper_.busy()) return Refusal::store_busy;  // an erase stops the tick
+  if (store_busy()) return Refusal::store_busy;  // an erase stops the tick
   if (restarting_) return Refusal::restarting;
   if (commander_[axis] == Link::can && node_.any_heartbeat_lost()) return Refusal::heartbeat_missing;
   if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
@@ -330,8 +330,16 @@ void Application::poll(std::uint32_t now_us) {
   port_.poll(now_us);
   poll_can();
   act();
-  keeper_.poll();
+  store_.poll();
   finish_saves();
+}
+
+const LoadReport& Application::attach_store(AnyFlashSectors flash) {
+  const LoadReport& loaded = store_.attach(flash);
+  offer_settings_if_changed();
+  start_communication(true);
+  refresh_readings();
+  return loaded;
 }
 
 ParameterAccess::Result Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {

@@ -9,15 +9,17 @@
 #include "firmware/application_objects.hpp"
 #include "firmware/can_port.hpp"
 #include "firmware/canopen/node.hpp"
+#include "firmware/capture_commands.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/drive/axes_tick.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/commutation.hpp"
+#include "firmware/drive/emergency_reports.hpp"
 #include "firmware/drive/thermal_supervisor.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameters/parameter_access.hpp"
-#include "firmware/parameters/parameter_keeper.hpp"
+#include "firmware/parameters/store_commands.hpp"
 #include "firmware/stability_guard.hpp"
 
 namespace kmax::firmware {
@@ -150,7 +152,7 @@ class Application {
   ArmedAxes armed_axes() const;
   bool any_armed() const { return armed_axes().any(); }
   /// A save is under way; its next step may stop the processor for half a second.
-  bool store_busy() const { return keeper_.busy(); }
+  bool store_busy() const { return store_.keeper().busy(); }
   DriveState state(std::size_t axis) const { return machines_[axis].state(); }
   Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
   Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
@@ -208,14 +210,8 @@ class Application {
   void refresh_device_readings();
   std::uint32_t flags_of(std::size_t axis) const;
   bool saturated(std::size_t axis) const;
-  void refresh_store_readings();
   void refresh_crash_readings();
   ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
-  ParameterAccess::Result command_store(std::uint16_t command);
-  /// The next start has all parameters at their defaults; the present ones stay.
-  ParameterAccess::Result save_defaults();
-  ParameterAccess::Result command_capture(std::uint16_t command);
-  void refresh_capture_readings();
   void take_reports();
   bool round_has_begun();
   bool commutation_known(std::size_t axis) const;
@@ -228,13 +224,12 @@ class Application {
   void start_communication(bool power_on);
   void poll_can();
   void act_on(const canopen::NodeEvents& events);
-  void tell_emergencies();
+  void report_emergencies();
   void refresh_can_readings();
   void publish_torques();
   void disarm(std::size_t axis);
   bool save_identity();
   void finish_saves();
-  void note_saving(const ParameterValues& values);
   std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
   [[gnu::cold]] float bound_of(Fault fault, std::size_t axis) const;
 
@@ -255,13 +250,8 @@ class Application {
   BoardReadings readings_;
   CanReadings can_;
   std::array<Link, axis_count> commander_{};  ///< whose controlword an axis obeyed last
-  std::array<Fault, axis_count> told_fault_{};
-  CanState told_can_state_ = CanState::absent;
-  std::uint32_t told_overruns_ = 0, told_conflicts_ = 0, overrun_us_ = 0, conflict_us_ = 0;
-  std::optional<std::uint32_t> heard_on_can_us_;
-  /// CANopen's own settings as the last start brought them: what a reset of the communication brings back.
-  std::array<std::uint32_t, communication_entries.size()> power_on_communication_{};
-  std::optional<std::array<std::uint32_t, communication_entries.size()>> saving_communication_;
+  EmergencyReports emergencies_;
+  bool was_bus_off_ = false;
   bool identity_saving_ = false;
   std::uint32_t configured_communication_ = 0;
   std::array<bool, axis_count> halted_{};
@@ -272,7 +262,7 @@ class Application {
   };
   std::array<Scale, axis_count> scale_{};
   bool restart_wanted_ = false, restarting_ = false;
-  ParameterKeeper keeper_;
+  StoreCommands store_{parameters_};
   // Before settings_, which is made from them.
   std::array<AxisReport, axis_count> report_;  ///< main loop's copies
   std::array<GuardFinding, axis_count> guard_{};

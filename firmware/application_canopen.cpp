@@ -6,48 +6,17 @@ namespace kmax::firmware {
 
 namespace {
 
-constexpr std::size_t first_communication_slot = slot_count - communication_entries.size();
-
-/// Bits of object 0x1001 by the group of error codes (CiA 301, table of emergency error codes).
-std::uint8_t register_bits_of(std::uint16_t code) {
-  namespace bits = canopen::error_register;
-  switch (code >> 12) {
-    case 0x2:
-      return bits::current;
-    case 0x3:
-      return bits::voltage;
-    case 0x4:
-      return bits::temperature;
-    case 0x8:
-      return code == 0x8480 ? bits::device_profile : bits::communication;
-    case 0xF:
-      return bits::manufacturer;
-    default:
-      return bits::device_profile;
-  }
-}
-
-std::array<std::uint8_t, 5> bytes_of(std::uint8_t source, float value) {
-  const auto word = std::bit_cast<std::uint32_t>(value);
-  return {source, static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8),
-          static_cast<std::uint8_t>(word >> 16), static_cast<std::uint8_t>(word >> 24)};
-}
-
 constexpr int frames_per_poll = 16;
-/// What lies behind us for so long is over.
-constexpr std::uint32_t overrun_over_us = 1'000'000, conflict_over_us = 5'000'000;
 
 }  // namespace
 
 /// At a start, and when a host resets the communication, which then has the settings of the last start again.
 void Application::start_communication(bool power_on) {
   ParameterValues& values = parameters_.values();
-  for (std::size_t i = 0; i < power_on_communication_.size(); ++i) {
-    const std::size_t slot = first_communication_slot + i;
-    if (power_on)
-      power_on_communication_[i] = values.raw(slot);
-    else
-      values.set_raw(slot, power_on_communication_[i]);
+  if (power_on) {
+    store_.power_on_communication().take(values);
+  } else {
+    store_.power_on_communication().put_back(values);
   }
   configured_communication_ = parameters_.communication_changes();
   if (power_on) {
@@ -68,23 +37,11 @@ void Application::poll_can() {
   }
   act_on(node_.poll(now_us_));
   if (round_has_begun()) node_.poll_pdos(round_clock_us_);
-  if (can_.state != told_can_state_) {
-    if (can_.state == CanState::bus_off) act_on(node_.bus_off());
-    canopen::Emergency& emergency = node_.emergency();
-    const bool passive = can_.state == CanState::error_passive;
-    if (passive)
-      emergency.raise({0x8120, canopen::error_register::communication, {canopen::bus_source}});
-    else
-      emergency.clear(0x8120, canopen::bus_source);
-    // It can be told only when it is over.
-    if (told_can_state_ == CanState::bus_off)
-      emergency.raise({0x8140, canopen::error_register::communication, {canopen::bus_source}});
-    told_can_state_ = can_.state;
-  } else if (can_.state == CanState::active) {
-    node_.emergency().clear(0x8140, canopen::bus_source);
-  }
-  tell_emergencies();
-  restart_wanted_ = restarting_ && !any_armed() && !keeper_.busy();
+  const bool bus_off = can_.state == CanState::bus_off;
+  if (bus_off && !was_bus_off_) act_on(node_.bus_off());
+  was_bus_off_ = bus_off;
+  report_emergencies();
+  restart_wanted_ = restarting_ && !any_armed() && !store_busy();
 }
 
 void Application::act_on(const canopen::NodeEvents& events) {
@@ -116,24 +73,15 @@ bool Application::save_identity() {
   };
   return set(entry_of<"node.id">(), node_.lss().pending_node_id()) &&
          set(entry_of<"can.bit_rate">(), node_.lss().pending_bit_rate()) &&
-         keeper_.save(parameters_.values(), any_armed()) == Refusal::none;
+         store_.save(any_armed()).refusal == Refusal::none;
 }
 
-/// The communication's part of a set that is being saved.
-void Application::note_saving(const ParameterValues& values) {
-  saving_communication_.emplace();
-  for (std::size_t i = 0; i < saving_communication_->size(); ++i)
-    (*saving_communication_)[i] = values.raw(first_communication_slot + i);
-}
-
-/// After the keeper's step: what waits for the end of a save.
+/// After the store's step: what waits for the end of a save.
 void Application::finish_saves() {
-  if (keeper_.busy()) return;
-  const bool saved = keeper_.state() == StoreState::saved;
-  if (identity_saving_) node_.lss().finish(saved ? canopen::LssStore::stored : canopen::LssStore::failed);
+  if (!identity_saving_ || store_busy()) return;
+  const bool saved = store_.keeper().state() == StoreState::saved;
+  node_.lss().finish(saved ? canopen::LssStore::stored : canopen::LssStore::failed);
   identity_saving_ = false;
-  if (saving_communication_ && saved) power_on_communication_ = *saving_communication_;
-  saving_communication_.reset();
 }
 
 /// At once, and without a controlword.
@@ -143,33 +91,13 @@ void Application::disarm(std::size_t axis) {
   tick_.enable(axis, machines_[axis].armed());
 }
 
-/// Every fault of an axis, when it comes and when it goes.
-void Application::tell_emergencies() {
-  canopen::Emergency& emergency = node_.emergency();
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const Fault fault = machines_[axis].fault();
-    if (fault == told_fault_[axis]) continue;
-    const auto source = static_cast<std::uint8_t>(axis);
-    if (told_fault_[axis] != Fault::none) emergency.clear(error_code_of(told_fault_[axis]), source);
-    told_fault_[axis] = fault;
-    if (fault == Fault::none) continue;
-    const std::uint16_t code = error_code_of(fault);
-    emergency.raise({code, register_bits_of(code), bytes_of(source, fault_value_[axis])});
-  }
-  if (node_.identity_conflicts() != told_conflicts_) {
-    told_conflicts_ = node_.identity_conflicts();
-    conflict_us_ = now_us_;
-    emergency.raise({0x8100, canopen::error_register::communication, {canopen::bus_source}});
-  } else if (now_us_ - conflict_us_ > conflict_over_us) {
-    emergency.clear(0x8100, canopen::bus_source);
-  }
-  if (can_.overruns + can_queue_.overflows() != told_overruns_) {
-    told_overruns_ = can_.overruns + can_queue_.overflows();
-    overrun_us_ = now_us_;
-    emergency.raise({0x8110, canopen::error_register::communication, {canopen::bus_source}});
-  } else if (now_us_ - overrun_us_ > overrun_over_us) {
-    emergency.clear(0x8110, canopen::bus_source);
-  }
+void Application::report_emergencies() {
+  EmergencyCauses now{.fault_values = fault_value_,
+                      .can_state = can_.state,
+                      .identity_conflicts = node_.identity_conflicts(),
+                      .frames_lost = can_.overruns + can_queue_.overflows()};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) now.faults[axis] = machines_[axis].fault();
+  emergencies_.poll(now, node_.emergency(), now_us_);
 }
 
 bool Application::next_can_frame(drivers::CanFrame& frame) {

@@ -238,10 +238,10 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
       return Abort::none;
     case SpecialObject::store_parameters:
       if (little_endian(in) != signature_save) return Abort::not_transferred;
-      return abort_for(app_.command_store(static_cast<std::uint16_t>(StoreCommand::save)).refusal, {}, 0);
+      return abort_for(app_.store_.save(app_.any_armed()).refusal, {}, 0);
     case SpecialObject::restore_defaults:
       if (little_endian(in) != signature_load) return Abort::not_transferred;
-      return abort_for(app_.save_defaults().refusal, {}, 0);
+      return abort_for(app_.store_.save_defaults(app_.any_armed()).refusal, {}, 0);
     case SpecialObject::scratch:
       canopen::copy_bytes(in, scratch_);
       scratch_size_ = static_cast<std::uint32_t>(in.size());

@@ -10,7 +10,7 @@ namespace kmax::firmware {
 void Application::refresh_readings() {
   for (std::size_t axis = 0; axis < axis_count; ++axis) refresh_axis_readings(axis);
   refresh_device_readings();
-  refresh_store_readings();
+  store_.keeper().publish(parameters_.values());
 }
 
 void Application::refresh_reading(std::size_t slot) {
@@ -18,7 +18,7 @@ void Application::refresh_reading(std::size_t slot) {
   if (descriptors[entry].per_axis) return refresh_axis_readings(axis);
   // Apart, since it compares every parameter with what is kept.
   if (entry >= entry_of<"store.state">() && entry <= entry_of<"store.defaulted_3">())
-    return refresh_store_readings();
+    return store_.keeper().publish(parameters_.values());
   refresh_device_readings();
 }
 
@@ -104,6 +104,20 @@ void Application::refresh_axis_readings(std::size_t axis) {
   v.set_real<"guard.bound">(guard.bound, axis);
 }
 
+void Application::refresh_crash_readings() {
+  ParameterValues& v = parameters_.values();
+  v.set_whole<"info.reset_cause">(static_cast<std::uint32_t>(board_.reset_cause));
+  const CrashRecord& crash = board_.crash;
+  v.set_whole<"info.crash_count">(crash.count);
+  v.set_whole<"info.crash_cause">(static_cast<std::uint32_t>(crash.cause));
+  v.set_whole<"info.crash_exception">(crash.exception_number);
+  v.set_whole<"info.crash_program_counter">(crash.program_counter);
+  v.set_whole<"info.crash_link_register">(crash.link_register);
+  v.set_whole<"info.crash_status">(crash.status);
+  v.set_whole<"info.crash_hard_fault_status">(crash.hard_fault_status);
+  v.set_whole<"info.crash_address">(crash.address);
+}
+
 void Application::refresh_device_readings() {
   ParameterValues& v = parameters_.values();
   publish_telemetry(v, {flags_of(0), flags_of(1)}, report_[0].tick);
@@ -133,7 +147,7 @@ void Application::refresh_device_readings() {
   v.set_real<"supply.voltage">(readings_.supply_voltage);
 
   refresh_crash_readings();
-  refresh_capture_readings();
+  publish_capture(v, tick_.capture().readings());
   refresh_can_readings();
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(parameters_.last_refusal().refusal));
   v.set_whole<"refusal.register">(parameters_.last_refusal().address);

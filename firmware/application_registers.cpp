@@ -47,9 +47,9 @@ Exception Application::Bank::write_holding(std::uint16_t address, std::span<cons
 
 ParameterAccess::Result Application::write(std::span<const SlotValue> wanted, Link by) {
   const std::size_t entry = owner_of(wanted[0].slot).entry;
-  if (entry == entry_of<"store.command">()) return command_store(static_cast<std::uint16_t>(wanted[0].raw));
+  if (entry == entry_of<"store.command">()) return store_.command(wanted[0].raw, any_armed());
   if (entry == entry_of<"capture.command">())
-    return command_capture(static_cast<std::uint16_t>(wanted[0].raw));
+    return command_capture(wanted[0].raw, parameters_, tick_.capture());
   const auto result = parameters_.write(wanted, by, armed_axes(), now_us_);
   for (const SlotValue& one : wanted) {
     const auto [of, axis] = owner_of(one.slot);

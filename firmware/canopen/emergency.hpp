@@ -11,6 +11,10 @@
 
 namespace kmax::firmware::canopen {
 
+/// First manufacturer byte of emergencies about the bus and, plus the node ID, about other nodes; axes are 0,
+/// 1, ...
+inline constexpr std::uint8_t bus_source = 0x7F, watched_source = 0x80;
+
 /// Errors that can be present at the same time.
 inline constexpr std::size_t present_error_count = 16;
 /// Messages that can wait for the inhibit time or for the bus.
@@ -92,18 +96,7 @@ class Emergency {
 
   /// An error appeared. To call it again while the error lasts changes nothing. False: refused, there are too
   /// many; it can be raised again later.
-  bool raise(const EmergencyError& error) {
-    if (find(error.code, error.manufacturer[0]) != present_) return true;
-    if (error.code == 0 || present_ == present_error_count) {
-      ++counters_.refused;
-      return false;
-    }
-    errors_[present_++] = error;
-    ++counters_.raised;
-    remember(error);
-    announce();
-    return true;
-  }
+  bool raise(const EmergencyError& error);
 
   /// An error has gone; nothing happens if it was not there.
   void clear(std::uint16_t code, std::uint8_t source = 0) {

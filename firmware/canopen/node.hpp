@@ -17,10 +17,6 @@
 
 namespace kmax::firmware::canopen {
 
-/// First manufacturer byte of emergencies about the bus and, plus the node ID, about other nodes; axes are 0
-/// and 1.
-inline constexpr std::uint8_t bus_source = 0x7F, watched_source = 0x80;
-
 /// What the owner of a node has to do; several at a time.
 struct NodeEvents {
   bool remove_force = false;         ///< NMT stop or a reset: no axis may be driven

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 
 #include "firmware/object_dictionary/dictionary.hpp"
@@ -15,7 +14,11 @@ struct ArmedAxes {
   /// All or none.
   constexpr ArmedAxes(bool all) { axis.fill(all); }  // NOLINT(google-explicit-constructor)
 
-  constexpr bool any() const { return std::find(axis.begin(), axis.end(), true) != axis.end(); }
+  constexpr bool any() const {
+    bool some = false;
+    for (const bool one : axis) some = some || one;
+    return some;
+  }
 };
 
 }  // namespace kmax::firmware

@@ -1,5 +1,7 @@
 #include "firmware/parameters/parameter_access.hpp"
 
+#include <algorithm>
+
 #include "firmware/parameters/linked_parameters.hpp"
 #include "firmware/stability_guard.hpp"
 

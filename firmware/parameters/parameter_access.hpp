@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -96,7 +95,9 @@ class ParameterAccess {
   Result last_refusal() const { return last_; }
 
   bool controlword_waits() const {
-    return std::find(commanded_.begin(), commanded_.end(), true) != commanded_.end();
+    bool some = false;
+    for (const bool one : commanded_) some = some || one;
+    return some;
   }
   /// Controlwords written since they were last fetched, per axis.
   bool fetch_controlword(std::size_t axis, std::uint16_t& word) {

@@ -1,17 +1,18 @@
-// What the application's main loop does with the capture: commands and readings.
-#include "firmware/application.hpp"
+#include "firmware/capture_commands.hpp"
 
 namespace kmax::firmware {
 
-ParameterAccess::Result Application::command_capture(std::uint16_t command) {
-  const std::uint16_t address = register_address(entry_of<"capture.command">(), 0);
-  if (command == static_cast<std::uint16_t>(CaptureCommand::stop)) {
-    tick_.capture().stop();
-    return parameters_.refuse(Refusal::none, address);
+ParameterAccess::Result command_capture(std::uint32_t command, ParameterAccess& parameters,
+                                        Capture& capture) {
+  const auto refuse = [&parameters](Refusal refusal) {
+    return parameters.refuse_slot(refusal, slot_of(entry_of<"capture.command">(), 0));
+  };
+  if (command == static_cast<std::uint32_t>(CaptureCommand::stop)) {
+    capture.stop();
+    return refuse(Refusal::none);
   }
-  if (command != static_cast<std::uint16_t>(CaptureCommand::arm))
-    return parameters_.refuse(Refusal::not_a_choice, address);
-  const ParameterValues& v = parameters_.values();
+  if (command != static_cast<std::uint32_t>(CaptureCommand::arm)) return refuse(Refusal::not_a_choice);
+  const ParameterValues& v = parameters.values();
   CaptureConfig config;
   config.axis = static_cast<std::size_t>(v.whole<"capture.axis">());
   config.channels = {
@@ -22,14 +23,12 @@ ParameterAccess::Result Application::command_capture(std::uint16_t command) {
   config.pre_trigger = static_cast<std::uint32_t>(v.whole<"capture.pre_trigger">());
   config.trigger = v.choice<CaptureTrigger, "capture.trigger">();
   config.level = v.real<"capture.trigger_level">();
-  if (tick_.capture().arm(config)) return parameters_.refuse(Refusal::none, address);
+  if (capture.arm(config)) return refuse(Refusal::none);
   const bool chosen = config.channels != CaptureConfig{}.channels;
-  return parameters_.refuse(chosen ? Refusal::capture_missing : Refusal::capture_without_channels, address);
+  return refuse(chosen ? Refusal::capture_missing : Refusal::capture_without_channels);
 }
 
-void Application::refresh_capture_readings() {
-  ParameterValues& v = parameters_.values();
-  const CaptureReadings readings = tick_.capture().readings();
+void publish_capture(ParameterValues& v, const CaptureReadings& readings) {
   v.set_whole<"capture.state">(static_cast<std::uint32_t>(readings.state));
   v.set_whole<"capture.taken">(readings.taken);
   v.set_whole<"capture.trigger_sample">(readings.trigger_sample);
