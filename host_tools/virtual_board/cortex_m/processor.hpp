@@ -116,7 +116,6 @@ class Processor {
   /// s0 to s31.
   float fp_register(unsigned number) const;
   void set_core_register(unsigned number, std::uint32_t value);
-  void set_program_counter(std::uint32_t address) { pc_ = address & ~1U; }
   ExceptionMasks masks() const;
 
  private:

@@ -23,8 +23,7 @@ std::optional<std::uint16_t> As5047pChip::exchange(std::uint16_t mosi, BoardTime
   if (!selected_ || !fitted_) return std::nullopt;
   ++frames_in_select_;
   const auto out = static_cast<std::uint16_t>(reply_ ^ std::exchange(disturbance_, std::uint16_t{0}));
-  reply_ =
-      answer(static_cast<std::uint16_t>(mosi ^ std::exchange(command_disturbance_, std::uint16_t{0})), now);
+  reply_ = answer(mosi, now);
   return out;
 }
 
@@ -51,9 +50,9 @@ std::uint16_t As5047pChip::answer(std::uint16_t command, BoardTime now) {
       return with_flags(found);
     }
     case As5047pRegister::diagnostics:
-      return with_flags(diagnostics_);
+      return with_flags(drivers::as5047p::ready | 0x80);
     case As5047pRegister::magnitude:
-      return with_flags(magnitude_);
+      return with_flags(0x1000);
     case As5047pRegister::uncompensated_angle:
     case As5047pRegister::angle:
       return with_flags(static_cast<std::uint16_t>(angle_(now) & as5047p::data_mask));

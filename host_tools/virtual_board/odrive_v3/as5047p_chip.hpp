@@ -31,13 +31,8 @@ class As5047pChip {
   std::optional<std::uint16_t> exchange(std::uint16_t mosi, BoardTime now);
 
   void set_fitted(bool fitted) { fitted_ = fitted; }
-  /// Default: a chip that has started, with a field in range.
-  void set_diagnostics(std::uint16_t diaagc) { diagnostics_ = diaagc; }
-  void set_magnitude(std::uint16_t magnitude) { magnitude_ = magnitude; }
   /// Flips these bits of the next reply: a disturbed line.
   void disturb_next_reply(std::uint16_t bits) { disturbance_ = bits; }
-  /// The next commands are seen with these bits flipped.
-  void disturb_next_command(std::uint16_t bits) { command_disturbance_ = bits; }
 
  private:
   std::uint16_t answer(std::uint16_t command, BoardTime now);
@@ -49,10 +44,7 @@ class As5047pChip {
   unsigned frames_in_select_ = 0;
   std::uint16_t reply_ = 0;
   std::uint16_t errors_ = 0;
-  std::uint16_t diagnostics_ = drivers::as5047p::ready | 0x80;
-  std::uint16_t magnitude_ = 0x1000;
   std::uint16_t disturbance_ = 0;
-  std::uint16_t command_disturbance_ = 0;
 };
 
 }  // namespace kmax::virtual_board

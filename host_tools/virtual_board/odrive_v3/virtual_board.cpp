@@ -63,9 +63,6 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
     if (has_events) events_.add(block);
   };
   const auto other = [this](auto model) -> Peripheral& { return *others_.emplace_back(std::move(model)); };
-  const auto timer = [&](GeneralTimer unit) -> Peripheral& {
-    return other(std::make_unique<GeneralTimerModel>(unit, clocks_, core_.nvic));
-  };
   constexpr bool with_events = true, without_events = false;
   constexpr std::uint32_t timer_size = sizeof(chip::TimerRegisters);
   constexpr std::uint32_t all_adcs =
@@ -82,14 +79,10 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(with_events, chip::rcc_base, RccModel::size, "RCC", rcc_, always, 0);
   attach(with_events, chip::iwdg_base, IwdgModel::size, "IWDG", iwdg_, always, 0);
   attach(with_events, chip::can1_base, 0x400, "CAN1", can1_, apb1, chip::rcc_apb1enr::Can1::mask);
-  attach(with_events, chip::tim3_base, timer_size, "TIM3", encoders_[0], apb1,
+  attach(without_events, chip::tim3_base, timer_size, "TIM3", encoders_[0], apb1,
          chip::rcc_apb1enr::Timer3::mask);
-  attach(with_events, chip::tim4_base, timer_size, "TIM4", encoders_[1], apb1,
+  attach(without_events, chip::tim4_base, timer_size, "TIM4", encoders_[1], apb1,
          chip::rcc_apb1enr::Timer4::mask);
-  attach(with_events, chip::tim2_base, timer_size, "TIM2", timer(GeneralTimer::tim2), apb1,
-         chip::rcc_apb1enr::Timer2::mask);
-  attach(with_events, chip::tim5_base, timer_size, "TIM5", timer(GeneralTimer::tim5), apb1,
-         chip::rcc_apb1enr::Timer5::mask);
   constexpr std::uint32_t port_clocks[] = {chip::rcc_ahb1enr::GpioA::mask, chip::rcc_ahb1enr::GpioB::mask,
                                            chip::rcc_ahb1enr::GpioC::mask, chip::rcc_ahb1enr::GpioD::mask};
   for (std::size_t i = 0; i < ports_.size(); ++i) {

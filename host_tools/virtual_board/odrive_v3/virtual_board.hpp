@@ -177,10 +177,10 @@ class VirtualBoard {
       GpioPortModel{drivers::stm32f4::GpioPort::c}, GpioPortModel{drivers::stm32f4::GpioPort::d}};
   SyscfgModel syscfg_;
   ExtiModel exti_{syscfg_, core_.nvic};
-  std::array<AdvancedTimerModel, 2> pwm_{AdvancedTimerModel{AdvancedTimer::tim1, clocks_, core_.nvic},
-                                         AdvancedTimerModel{AdvancedTimer::tim8, clocks_, core_.nvic}};
-  std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3, clocks_, core_.nvic},
-                                             GeneralTimerModel{GeneralTimer::tim4, clocks_, core_.nvic}};
+  std::array<AdvancedTimerModel, 2> pwm_{AdvancedTimerModel{AdvancedTimer::tim1, clocks_},
+                                         AdvancedTimerModel{AdvancedTimer::tim8, clocks_}};
+  std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3},
+                                             GeneralTimerModel{GeneralTimer::tim4}};
   AdcModel adc_{clocks_, core_.nvic, [this](unsigned channel, BoardTime at) {
                   return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
                 }};

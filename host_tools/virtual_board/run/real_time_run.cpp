@@ -4,7 +4,7 @@
 #include <chrono>
 #include <optional>
 
-#include "host_tools/virtual_board/run/can_bridge.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 
 namespace kmax::virtual_board {
 
@@ -18,6 +18,36 @@ constexpr auto rest = std::chrono::microseconds(300);
 BoardTime board_time(double duration_s) {
   return static_cast<BoardTime>(duration_s * static_cast<double>(units_per_second));
 }
+
+/// The board's CAN bus, with its bits and their time, as one node among others on a bus of the host's.
+///
+/// Frames cross in both directions as soon as exchange() is called; on the board's side they then take their
+/// time. The node has the board's bit rate: an interface whose bit rate does not match is for real hardware
+/// to find. It never sends error frames of its own.
+class CanBridge {
+ public:
+  CanBridge(VirtualBoard& board, serve::CanConnection& connection)
+      : board_(board), connection_(connection), node_(board.can_bus(), 1'000'000) {
+    node_.on_frame([this](const drivers::CanFrame& frame, BoardTime) { connection_.send(frame); });
+  }
+  CanBridge(const CanBridge&) = delete;
+  CanBridge& operator=(const CanBridge&) = delete;
+
+  /// Hands over what has come since the last call.
+  void exchange() {
+    constexpr std::size_t most_waiting = 64;
+    if (const BoardTime bit_time = board_.can_node().bit_time(); bit_time != 0)
+      node_.set_bit_time(bit_time, board_.now());
+    // What the bus cannot take waits with the host, whose own queue is bounded.
+    if (node_.waiting() >= most_waiting) return;
+    for (const drivers::CanFrame& frame : connection_.received()) node_.send(frame, board_.now());
+  }
+
+ private:
+  VirtualBoard& board_;
+  serve::CanConnection& connection_;
+  CanHostNode node_;
+};
 
 }  // namespace
 

@@ -17,7 +17,6 @@ namespace adc_ccr = drivers::stm32f4::adc_ccr;
 namespace adc_cr1 = drivers::stm32f4::adc_cr1;
 namespace adc_cr2 = drivers::stm32f4::adc_cr2;
 namespace adc_jsqr = drivers::stm32f4::adc_jsqr;
-namespace adc_sqr3 = drivers::stm32f4::adc_sqr3;
 namespace adc_sr = drivers::stm32f4::adc_sr;
 using drivers::stm32f4::adc_conversion_cycles;
 using drivers::stm32f4::adc_maximum_clock_hz;
@@ -36,8 +35,7 @@ constexpr std::uint32_t common_offset = 3 * adc_stride;
 constexpr std::uint32_t cr1_modelled = adc_cr1::InjectedEndInterrupt::mask | adc_cr1::Scan::mask;
 constexpr std::uint32_t cr2_stored =
     adc_cr2::On::mask | adc_cr2::InjectedTrigger::mask | adc_cr2::InjectedTriggerEdge::mask;
-constexpr std::uint32_t cr2_modelled =
-    cr2_stored | adc_cr2::StartInjected::mask | adc_cr2::StartRegular::mask;
+constexpr std::uint32_t cr2_modelled = cr2_stored | adc_cr2::StartInjected::mask;
 
 }  // namespace
 
@@ -63,15 +61,13 @@ const RegisterTable<AdcModel::Converter>& AdcModel::Converter::registers() {
       {offsetof(Layout, smpr2), "SMPR2", Row::shows<&Model::smpr2_>, ten_times,
        Row::takes<&Model::write_sampling<&Model::smpr2_>>},
       Row::reserved(offsetof(Layout, sqr1), "SQR1"),
-      {offsetof(Layout, sqr3), "SQR3", Row::shows<&Model::sqr3_>, adc_sqr3::First::maximum,
-       Row::takes<&Model::write_sqr3>},
+      Row::reserved(offsetof(Layout, sqr3), "SQR3"),
       {offsetof(Layout, jsqr), "JSQR", Row::shows<&Model::jsqr_>,
        adc_jsqr::LastIndex::mask | adc_jsqr::Channels::mask, Row::takes<&Model::write_list>},
       {offsetof(Layout, jdr[0]), "JDR1", Row::shows<&Model::jdr_, 0>},
       {offsetof(Layout, jdr[1]), "JDR2", Row::shows<&Model::jdr_, 1>},
       {offsetof(Layout, jdr[2]), "JDR3", Row::shows<&Model::jdr_, 2>},
-      {offsetof(Layout, jdr[3]), "JDR4", Row::shows<&Model::jdr_, 3>},
-      {offsetof(Layout, dr), "DR", Row::shows<&Model::read_data>}};
+      {offsetof(Layout, jdr[3]), "JDR4", Row::shows<&Model::jdr_, 3>}};
   return table;
 }
 
@@ -113,7 +109,7 @@ std::uint32_t AdcModel::read_csr() const {
 
 /// Each converter on its own, no internal channels.
 void AdcModel::write_ccr(const Access& access, std::uint32_t value) {
-  if (std::ranges::any_of(converters_, &Converter::busy))
+  if (std::ranges::any_of(converters_, &Converter::running))
     refuse(access, common_name, "ADCPRE is written while a conversion runs");
   ccr_ = value;
 }
@@ -128,10 +124,9 @@ void AdcModel::Converter::write_cr2(const Access& access, std::uint32_t value) {
   if (!on) {
     // Power-down stops what runs (section ADC on-off control).
     on_since_ = never;
-    injected_running = regular_running = regular_waiting_ = false;
+    running = false;
   }
   cr2 = value & cr2_stored;
-  if ((value & adc_cr2::StartRegular::mask) != 0) start_regular(access.now);
   if ((value & adc_cr2::StartInjected::mask) != 0) start_injected(access.now);
 }
 
@@ -145,26 +140,16 @@ void AdcModel::Converter::write_list(const Access& access, std::uint32_t value) 
     }
   }
   jsqr_ = value;
-  if (!injected_running) return;
+  if (!running) return;
   ++restarted_groups;
-  injected_running = false;
+  running = false;
   start_injected(access.now);
 }
 
 template <std::uint32_t AdcModel::Converter::*target>
 void AdcModel::Converter::write_sampling(const Access& access, std::uint32_t value) {
-  if (busy()) refuse(access, "a sampling time is written while a conversion runs");
+  if (running) refuse(access, "a sampling time is written while a conversion runs");
   this->*target = value;
-}
-
-void AdcModel::Converter::write_sqr3(const Access& access, std::uint32_t value) {
-  if (regular_running) refuse(access, "SQR3 is written while a regular conversion runs");
-  sqr3_ = value;
-}
-
-std::uint32_t AdcModel::Converter::read_data() {
-  sr &= ~adc_sr::RegularEnd::mask;
-  return dr_;
 }
 
 const char* AdcModel::Converter::name() const {
@@ -204,7 +189,7 @@ AdcModel::Conversion AdcModel::Converter::conversion(unsigned channel, BoardTime
 }
 
 void AdcModel::Converter::start_injected(BoardTime now) {
-  if (injected_running) {
+  if (running) {
     ++ignored_triggers;
     return;
   }
@@ -214,8 +199,7 @@ void AdcModel::Converter::start_injected(BoardTime now) {
     refuse_start("an injected group of " + std::to_string(count_) + " is started with SCAN = 0; set SCAN");
   }
   // The reset value of JSQR names channel 0, which each converter reaches.
-  if (std::exchange(regular_running, false)) regular_waiting_ = true;
-  injected_running = true;
+  running = true;
   index_ = 0;
   sr |= adc_sr::InjectedStarted::mask;
   group_ends_at_ = now;
@@ -225,46 +209,20 @@ void AdcModel::Converter::start_injected(BoardTime now) {
   }
 }
 
-void AdcModel::Converter::start_regular(BoardTime now) {
-  require_ready(now);
-  if (!adc_reaches(number_, sqr3_)) {
-    refuse_start("SQR3 names channel " + std::to_string(sqr3_) +
-                 ", which this converter does not reach on this package");
-  }
-  if (regular_running) refuse_start("SWSTART while a regular conversion runs");
-  if (injected_running) {
-    regular_waiting_ = true;
-    return;
-  }
-  regular_waiting_ = false;
-  regular_running = true;
-  sr |= adc_sr::RegularStarted::mask;
-  regular_ = conversion(sqr3_, now);
-}
-
 bool AdcModel::Converter::step(BoardTime now) {
-  if (!busy()) return false;
-  Conversion& current = injected_running ? injected_ : regular_;
-  if (!current.held) {
-    if (current.held_at > now) return false;
-    model_->hold(current);
+  if (!running) return false;
+  if (!injected_.held) {
+    if (injected_.held_at > now) return false;
+    model_->hold(injected_);
   }
-  if (current.ends_at > now) return false;
-  const BoardTime ended = current.ends_at;
-  if (!injected_running) {
-    dr_ = current.code;
-    sr |= adc_sr::RegularEnd::mask;
-    regular_running = false;
-    return true;
-  }
-  jdr_[index_] = current.code;
+  if (injected_.ends_at > now) return false;
+  jdr_[index_] = injected_.code;
   if (++index_ < count_) {
-    injected_ = conversion(listed_channel(index_), ended);
+    injected_ = conversion(listed_channel(index_), injected_.ends_at);
     return true;
   }
-  injected_running = false;
+  running = false;
   sr |= adc_sr::InjectedEnd::mask;
-  if (regular_waiting_) start_regular(ended);
   return true;
 }
 
@@ -273,13 +231,10 @@ bool AdcModel::Converter::interrupts() const {
 }
 
 BoardTime AdcModel::Converter::next_event() const {
-  if (injected_running) {
-    // A clock that became slower in between moves the end of the group behind what was reckoned.
-    const bool to_hold = count_ == 1 && !injected_.held;
-    return to_hold ? injected_.held_at : std::max(group_ends_at_, injected_.ends_at);
-  }
-  if (regular_running) return regular_.held ? regular_.ends_at : regular_.held_at;
-  return never;
+  if (!running) return never;
+  // A clock that became slower in between moves the end of the group behind what was reckoned.
+  const bool to_hold = count_ == 1 && !injected_.held;
+  return to_hold ? injected_.held_at : std::max(group_ends_at_, injected_.ends_at);
 }
 
 BoardTime AdcModel::clock_period() const {
@@ -302,7 +257,7 @@ void AdcModel::hold(Conversion& conversion) const {
 void AdcModel::advance(BoardTime now) {
   bool any = false;
   for (Converter& adc : converters_) {
-    if (!adc.busy()) continue;
+    if (!adc.running) continue;
     any = true;
     while (adc.step(now)) {
     }

@@ -14,14 +14,12 @@ namespace kmax::virtual_board {
 /// Analog-to-digital converter, sections Injected channel management, Channel-wise programmable sampling
 /// time, Conversion on external trigger, ADC registers.
 ///
-/// Injected groups of 1 to 4 conversions, started by TIM1's TRGO (rising edge) or JSWSTART; single regular
-/// conversions by SWSTART. A conversion takes its sampling time plus 12 ADC clocks; the input is held at the
-/// end of the sampling time. An injected start aborts a regular conversion, which begins anew afterwards; a
-/// regular start waits for the injected group. Writing JSQR while the injected group runs throws its work
-/// away and begins the new list at once (section Channel selection). Starts begin at once: the latency of up
-/// to 3 ADC clocks (data sheet) is not modelled.
+/// Injected groups of 1 to 4 conversions, started by TIM1's TRGO (rising edge) or JSWSTART. A conversion
+/// takes its sampling time plus 12 ADC clocks; the input is held at the end of the sampling time. Writing
+/// JSQR while the group runs throws its work away and begins the new list at once (section Channel
+/// selection). Starts begin at once: the latency of up to 3 ADC clocks (data sheet) is not modelled.
 ///
-/// Refused: all bits and registers beyond those (regular sequences, continuous and discontinuous mode,
+/// Refused: all bits and registers beyond those (regular conversions, continuous and discontinuous mode,
 /// watchdog, DMA, offsets, left alignment, lower resolution, multi-ADC modes, EOCIE, internal channels, other
 /// triggers and edges); an ADC clock above 36 MHz; a start while the converter is off or less than 3 us after
 /// ADON; a list of several without SCAN; a channel that the converter cannot reach; changing a sampling time
@@ -70,7 +68,6 @@ class AdcModel final : public Peripheral {
     static const RegisterTable<Converter>& registers();
 
     const char* name() const;
-    bool busy() const { return injected_running || regular_running; }
     bool interrupts() const;
     void start_injected(BoardTime now);
     /// Does the next thing that is due; false when there is none.
@@ -78,7 +75,7 @@ class AdcModel final : public Peripheral {
     BoardTime next_event() const;
 
     std::uint32_t sr = 0, cr2 = 0;
-    bool injected_running = false, regular_running = false;
+    bool running = false;  ///< the injected group
     std::uint64_t ignored_triggers = 0, restarted_groups = 0;
 
    private:
@@ -86,10 +83,7 @@ class AdcModel final : public Peripheral {
     void write_list(const Access& access, std::uint32_t value);
     template <std::uint32_t Converter::*target>
     void write_sampling(const Access& access, std::uint32_t value);
-    void write_sqr3(const Access& access, std::uint32_t value);
-    std::uint32_t read_data();
     void require_ready(BoardTime now) const;
-    void start_regular(BoardTime now);
     Conversion conversion(unsigned channel, BoardTime begin) const;
     /// Channel of a place in the injected group.
     unsigned listed_channel(unsigned place) const;
@@ -100,14 +94,12 @@ class AdcModel final : public Peripheral {
 
     AdcModel* model_;
     unsigned number_;
-    std::uint32_t cr1_ = 0, smpr1_ = 0, smpr2_ = 0, sqr3_ = 0, jsqr_ = 0, dr_ = 0;
+    std::uint32_t cr1_ = 0, smpr1_ = 0, smpr2_ = 0, jsqr_ = 0;
     std::array<std::uint32_t, 4> jdr_{};
     BoardTime on_since_ = never;
     unsigned index_ = 0, count_ = 0;  // of the conversion under way, of the group
     Conversion injected_;
     BoardTime group_ends_at_ = 0;
-    bool regular_waiting_ = false;
-    Conversion regular_;
   };
 
   static const RegisterTable<AdcModel>& common_registers();

@@ -1,20 +1,17 @@
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 
 #include "drivers/stm32f4/dead_time.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/timer.hpp"
 
 namespace kmax::virtual_board {
 
 namespace {
 
-using drivers::stm32f4::Interrupt;
 namespace timer_bdtr = drivers::stm32f4::timer_bdtr;
 namespace timer_ccer = drivers::stm32f4::timer_ccer;
 namespace timer_ccmr = drivers::stm32f4::timer_ccmr;
 namespace timer_cr1 = drivers::stm32f4::timer_cr1;
 namespace timer_cr2 = drivers::stm32f4::timer_cr2;
-namespace timer_dier = drivers::stm32f4::timer_dier;
 namespace timer_smcr = drivers::stm32f4::timer_smcr;
 namespace timer_sr = drivers::stm32f4::timer_sr;
 
@@ -22,42 +19,35 @@ constexpr std::uint32_t longest_count = 0xFFFF;
 
 }  // namespace
 
-AdvancedTimerModel::AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks,
-                                       InterruptLines& interrupts)
+AdvancedTimerModel::AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks)
     : RegisterBlock(unit == AdvancedTimer::tim1 ? "TIM1" : "TIM8", registers()),
       unit_(unit),
-      clocks_(clocks),
-      interrupts_(interrupts) {
+      clocks_(clocks) {
   reset(0);
 }
 
 void AdvancedTimerModel::reset(BoardTime now) {
   counter_ = {};
-  cr1_ = cr2_ = smcr_ = dier_ = sr_ = ccer_ = rcr_ = bdtr_ = 0;
+  cr1_ = cr2_ = smcr_ = sr_ = ccer_ = bdtr_ = 0;
   ccmr_ = {};
-  psc_ = {};
   arr_ = {longest_count, longest_count};
   ccr_ = {};
-  repetitions_ = 0;
   lock_decided_ = waiting_ = trigger_level_ = false;
-  update_interrupts();
   refresh_outputs(now);
 }
 
 void AdvancedTimerModel::advance(BoardTime now) {
   while (counter_.next_turn() <= now) {
     pass_turn();
-    // Between turns that nobody sees only the repetition counter could tell one period from the next.
-    if (next_event() == never && rcr_ == 0 && repetitions_ == 0) counter_.skip_whole_periods(now);
+    // Nothing tells one period from the next where nobody sees the turns.
+    if (next_event() == never) counter_.skip_whole_periods(now);
   }
   counter_.change_tick(now, tick());
 }
 
 BoardTime AdvancedTimerModel::next_event() const {
   const bool triggers = timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_update && trigger_output_;
-  const bool interrupts = timer_dier::UpdateInterrupt::of(dier_) != 0 && timer_sr::Update::of(sr_) == 0;
-  const bool arms = timer_bdtr::AutomaticOutputEnable::of(bdtr_) != 0 && !moe();
-  return triggers || interrupts || arms || waiting_ ? counter_.next_turn() : never;
+  return triggers || waiting_ ? counter_.next_turn() : never;
 }
 
 void AdvancedTimerModel::clock_changed(BoardTime now) {
@@ -78,41 +68,24 @@ void AdvancedTimerModel::start_counter(BoardTime now) {
   refresh_outputs(now);
 }
 
-/// Over- or underflow. The repetition counter is reloaded by the update event alone, so RCR = 1 written
-/// before the start (repetition counter still 0) gives update events at overflows, as section Repetition
-/// counter says.
+/// Over- or underflow.
 void AdvancedTimerModel::pass_turn() {
   const BoardTime now = counter_.next_turn();
-  const bool update = repetitions_ == 0;
-  bool changed = false;
-  if (update) {
-    changed = load_preloaded();
-  } else {
-    --repetitions_;
-  }
+  const bool changed = load_preloaded();
   counter_.turn(tick(), arr_.active);
-  if (update) update_event(now, true, changed);
+  update_event(now, true, changed);
 }
 
 /// What follows from an update event once the registers are loaded.
 void AdvancedTimerModel::update_event(BoardTime now, bool flagged, bool changed) {
-  if (flagged) {
-    sr_ |= timer_sr::Update::mask;
-    update_interrupts();
-  }
-  if (timer_bdtr::AutomaticOutputEnable::of(bdtr_) != 0 && !moe()) {
-    bdtr_ |= timer_bdtr::MainOutputEnable::mask;
-    changed = true;
-  }
+  if (flagged) sr_ |= timer_sr::Update::mask;
   if (changed) refresh_outputs(now);
   if (timer_cr2::MasterMode::of(cr2_) == timer_cr2::master_update && trigger_output_) trigger_output_(now);
 }
 
 /// True when a register that shapes the outputs has changed.
 bool AdvancedTimerModel::load_preloaded() {
-  repetitions_ = rcr_;
   if (!waiting_) return false;
-  psc_.active = psc_.preload;
   arr_.active = arr_.preload;
   for (PreloadedWord& compare : ccr_) compare.active = compare.preload;
   waiting_ = false;
@@ -140,13 +113,9 @@ void AdvancedTimerModel::trigger_input(BoardTime now) {
 
 void AdvancedTimerModel::clock_failure_break(BoardTime now) {
   advance(now);
-  if (timer_bdtr::BreakEnable::of(bdtr_) != 0) break_event(now);
-}
-
-void AdvancedTimerModel::break_event(BoardTime now) {
+  if (timer_bdtr::BreakEnable::of(bdtr_) == 0) return;
   bdtr_ &= ~timer_bdtr::MainOutputEnable::mask;
   sr_ |= timer_sr::Break::mask;
-  update_interrupts();
   refresh_outputs(now);
 }
 
@@ -159,7 +128,7 @@ void AdvancedTimerModel::show_trigger_level(BoardTime now) {
 }
 
 void AdvancedTimerModel::note_waiting() {
-  waiting_ = psc_.preload != psc_.active || arr_.preload != arr_.active;
+  waiting_ = arr_.preload != arr_.active;
   for (const PreloadedWord& compare : ccr_) waiting_ = waiting_ || compare.preload != compare.active;
 }
 
@@ -172,7 +141,7 @@ bool AdvancedTimerModel::preloaded(unsigned leg) const {
 }
 
 /// Section PWM mode: mode 2 is active while counting up for CNT >= CCR, down for CNT > CCR, which is top -
-/// CCR ticks of either half period; mode 1 is its inverse. Stopped, the comparison stands still.
+/// CCR ticks of either half period. Stopped, the comparison stands still.
 PwmLegOutput AdvancedTimerModel::leg_output(unsigned leg) const {
   const std::uint32_t both = timer_ccer::Enable<1>::mask | timer_ccer::ComplementaryEnable<1>::mask;
   if (!moe() || (channel_switches(ccer_, leg) & both) == 0) return {};
@@ -188,7 +157,7 @@ PwmLegOutput AdvancedTimerModel::leg_output(unsigned leg) const {
   const BoardTime dead_time_clock = clocks_.apb2_timer << timer_cr1::ClockDivision::of(cr1_);
   const auto code = static_cast<std::uint8_t>(timer_bdtr::DeadTime::of(bdtr_));
   return {.enabled = true,
-          .high_duty = output_mode(leg) == timer_ccmr::pwm_mode_2 ? above : 1.0 - above,
+          .high_duty = above,
           .dead_time = seconds(dead_time_clock * drivers::stm32f4::dead_time_ticks(code))};
 }
 
@@ -200,20 +169,6 @@ void AdvancedTimerModel::refresh_outputs(BoardTime now) {
     outputs_[leg] = output;
   }
   if (changed && output_change_) output_change_(now);
-}
-
-void AdvancedTimerModel::update_interrupts() {
-  const bool update = timer_sr::Update::of(sr_) != 0 && timer_dier::UpdateInterrupt::of(dier_) != 0;
-  const bool broken = timer_sr::Break::of(sr_) != 0 && timer_dier::BreakInterrupt::of(dier_) != 0;
-  const bool first = unit_ == AdvancedTimer::tim1;
-  if (update != update_level_) {
-    update_level_ = update;
-    interrupts_.set_level(first ? Interrupt::tim1_up_tim10 : Interrupt::tim8_up_tim13, update);
-  }
-  if (broken != break_level_) {
-    break_level_ = broken;
-    interrupts_.set_level(first ? Interrupt::tim1_brk_tim9 : Interrupt::tim8_brk_tim12, broken);
-  }
 }
 
 }  // namespace kmax::virtual_board

@@ -25,24 +25,23 @@ struct PwmLegOutput {
 
 /// TIM1 or TIM8 as a motor's PWM generator: RM0090, chapter Advanced-control timers (TIM1&TIM8).
 ///
-/// Modelled: centre-aligned counting; PSC, ARR and CCR1 to CCR3 with their preload; repetition counter;
-/// update event, UIF and its interrupt; UG, BG; TRGO as UG, CEN or update event; slave trigger mode from ITR0
-/// (TIM8 only, from TIM1); PWM modes 1 and 2 on channels 1 to 3 with complementary outputs; MOE, AOE, OSSI,
-/// OSSR, CKD and DTG; BIF and its interrupt; LOCK levels 1 to 3. No delay between the two timers (silicon: a
-/// tick or two through ITR0).
+/// Modelled: centre-aligned counting; ARR and CCR1 to CCR3 with their preload; update event and UIF; UG; TRGO
+/// as UG, CEN or update event; slave trigger mode from ITR0 (TIM8 only, from TIM1); PWM mode 2 on channels 1
+/// to 3 with complementary outputs; MOE, OSSI, OSSR, CKD and DTG; the break and BIF; LOCK levels 1 to 3. No
+/// delay between the two timers (silicon: a tick or two through ITR0).
 ///
-/// Refused: counting edge-aligned, UDIS, OPM, external clock and trigger, all DMA, CC interrupts, inputs,
-/// channel 4, active-low outputs, idle levels of 1, one output of a pair without the other, writing CNT or
-/// CMS or an ARR without preload while counting, a start with the count at the end of its direction. The
-/// compare flags CCxIF stay 0. No pin is mapped to BKIN on this board; it reads low, so BKE with BKP = 0
-/// would hold MOE at 0 and is refused.
+/// Refused, since no driver uses it: counting edge-aligned, PSC, the repetition counter, UDIS, OPM, external
+/// clock and trigger, all interrupts and DMA, BG, AOE, PWM mode 1, inputs, channel 4, active-low outputs,
+/// idle levels of 1, one output of a pair without the other, writing CNT or CMS or an ARR without preload
+/// while counting, a start with the count at the end of its direction. The compare flags CCxIF stay 0. No pin
+/// is mapped to BKIN on this board; it reads low, so BKE with BKP = 0 would hold MOE at 0 and is refused.
 ///
-/// The over- and underflow are events of the board only while somebody can see them: update interrupt,
-/// trigger output, a preloaded value that waits. At most two for each PWM period; otherwise they are made up
+/// The over- and underflow are events of the board only while somebody can see them: trigger output, a
+/// preloaded value that waits. At most two for each PWM period; otherwise they are made up
 /// for at the next access. Hence any write may bring next_event() forward.
 class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
  public:
-  AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks, InterruptLines& interrupts);
+  AdvancedTimerModel(AdvancedTimer unit, const BoardClocks& clocks);
 
   void advance(BoardTime now) override;
   BoardTime next_event() const override;
@@ -77,45 +76,38 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   std::uint32_t read_cnt(const Access& access) const { return counter_.count(access.now); }
   void write_cnt(const Access& access, std::uint32_t value);
   void write_arr(const Access& access, std::uint32_t value);
-  void write_psc(std::uint32_t value);
   void write_ccr(const Access& access, unsigned index, std::uint32_t value);
   void write_bdtr(const Access& access, std::uint32_t value);
   void require_defined_outputs(const Access& access) const;
-  void after_write() override { update_interrupts(); }
 
   bool centre_aligned() const;
-  BoardTime tick() const { return clocks_.apb2_timer * (psc_.active + 1); }
+  BoardTime tick() const { return clocks_.apb2_timer; }
   void start_counter(BoardTime now);
   void pass_turn();
   void update_event(BoardTime now, bool flagged, bool changed);
   bool load_preloaded();
   void software_update(BoardTime now);
-  void break_event(BoardTime now);
   void show_trigger_level(BoardTime now);
   void note_waiting();
   void refresh_outputs(BoardTime now);
   PwmLegOutput leg_output(unsigned leg) const;
-  void update_interrupts();
   std::uint32_t output_mode(unsigned leg) const;
   bool preloaded(unsigned leg) const;
 
   AdvancedTimer unit_;
   const BoardClocks& clocks_;
-  InterruptLines& interrupts_;
   std::function<void(BoardTime)> trigger_output_;
   std::function<void(BoardTime)> output_change_;
 
   CentreAlignedCounter counter_;
   std::uint32_t cr1_ = 0;  // without CEN and DIR, which the counter has
-  std::uint32_t cr2_ = 0, smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0, rcr_ = 0, bdtr_ = 0;
+  std::uint32_t cr2_ = 0, smcr_ = 0, sr_ = 0, ccer_ = 0, bdtr_ = 0;
   std::array<std::uint32_t, 2> ccmr_{};
-  PreloadedWord psc_, arr_;
+  PreloadedWord arr_;
   std::array<PreloadedWord, 3> ccr_{};
-  std::uint32_t repetitions_ = 0;
   bool lock_decided_ = false;
   bool waiting_ = false;  // a preloaded value differs from the active one
   bool trigger_level_ = false;
-  bool update_level_ = false, break_level_ = false;  // as told to interrupts_
   std::array<PwmLegOutput, 3> outputs_{};
 };
 

@@ -17,7 +17,6 @@ namespace timer_ccer = drivers::stm32f4::timer_ccer;
 namespace timer_ccmr = drivers::stm32f4::timer_ccmr;
 namespace timer_cr1 = drivers::stm32f4::timer_cr1;
 namespace timer_cr2 = drivers::stm32f4::timer_cr2;
-namespace timer_dier = drivers::stm32f4::timer_dier;
 namespace timer_egr = drivers::stm32f4::timer_egr;
 namespace timer_smcr = drivers::stm32f4::timer_smcr;
 namespace timer_sr = drivers::stm32f4::timer_sr;
@@ -27,8 +26,6 @@ constexpr std::uint32_t cr1_writable = timer_cr1::Enable::mask | timer_cr1::Upda
                                        timer_cr1::AutoReloadPreload::mask | timer_cr1::ClockDivision::mask;
 constexpr std::uint32_t cr1_of_counter = timer_cr1::Enable::mask | timer_cr1::CountingDown::mask;
 constexpr std::uint32_t smcr_writable = timer_smcr::SlaveMode::mask | timer_smcr::TriggerSelection::mask;
-constexpr std::uint32_t dier_writable = timer_dier::UpdateInterrupt::mask | timer_dier::BreakInterrupt::mask;
-constexpr std::uint32_t egr_writable = timer_egr::Update::mask | timer_egr::Break::mask;
 constexpr std::uint32_t channel_modes =
     timer_ccmr::CompareMode<1>::mask | timer_ccmr::ComparePreload<1>::mask;
 constexpr std::uint32_t ccmr_writable[2] = {channel_modes | channel_modes << timer_ccmr::bits_per_channel,
@@ -37,15 +34,13 @@ constexpr std::uint32_t pair = timer_ccer::Enable<1>::mask | timer_ccer::Complem
 constexpr std::uint32_t ccer_writable =
     pair | pair << timer_ccer::bits_per_channel | pair << 2 * timer_ccer::bits_per_channel;
 constexpr std::uint32_t half_word = 0xFFFF;
-constexpr std::uint32_t longest_repetition = 0xFF;
 
 /// What a LOCK level takes away from BDTR itself (register TIMx_BDTR, field LOCK); CR2 and CCER have nothing
 /// left to protect here, because idle levels and polarities other than 0 are refused anyway.
 std::uint32_t locked_bits(std::uint32_t level) {
   std::uint32_t locked = 0;
   if (level >= 1) {
-    locked |= timer_bdtr::DeadTime::mask | timer_bdtr::BreakEnable::mask | timer_bdtr::BreakActiveHigh::mask |
-              timer_bdtr::AutomaticOutputEnable::mask;
+    locked |= timer_bdtr::DeadTime::mask | timer_bdtr::BreakEnable::mask | timer_bdtr::BreakActiveHigh::mask;
   }
   if (level >= 2) locked |= timer_bdtr::IdleOffState::mask | timer_bdtr::RunOffState::mask;
   return locked;
@@ -64,9 +59,9 @@ const RegisterTable<AdvancedTimerModel>& AdvancedTimerModel::registers() {
        Row::takes<&Model::write_cr2>},
       {offsetof(Layout, smcr), "SMCR", Row::shows<&Model::smcr_>, smcr_writable,
        Row::takes<&Model::write_smcr>},
-      Row::word<&Model::dier_>(offsetof(Layout, dier), "DIER", dier_writable),
+      Row::reserved(offsetof(Layout, dier), "DIER"),
       {offsetof(Layout, sr), "SR", Row::shows<&Model::sr_>, any_bits, Row::clears_by_zeros<&Model::sr_>},
-      {offsetof(Layout, egr), "EGR", Row::zero, egr_writable, Row::takes<&Model::write_egr>},
+      {offsetof(Layout, egr), "EGR", Row::zero, timer_egr::Update::mask, Row::takes<&Model::write_egr>},
       {offsetof(Layout, ccmr[0]), "CCMR1", Row::shows<&Model::ccmr_, 0>, ccmr_writable[0],
        Row::takes<&Model::write_ccmr, 0>},
       {offsetof(Layout, ccmr[1]), "CCMR2", Row::shows<&Model::ccmr_, 1>, ccmr_writable[1],
@@ -74,11 +69,10 @@ const RegisterTable<AdvancedTimerModel>& AdvancedTimerModel::registers() {
       {offsetof(Layout, ccer), "CCER", Row::shows<&Model::ccer_>, ccer_writable,
        Row::takes<&Model::write_ccer>},
       {offsetof(Layout, cnt), "CNT", Row::shows<&Model::read_cnt>, half_word, Row::takes<&Model::write_cnt>},
-      {offsetof(Layout, psc), "PSC", Row::shows<&Model::psc_, &PreloadedWord::preload>, half_word,
-       Row::takes<&Model::write_psc>},
+      Row::reserved(offsetof(Layout, psc), "PSC"),
       {offsetof(Layout, arr), "ARR", Row::shows<&Model::arr_, &PreloadedWord::preload>, half_word,
        Row::takes<&Model::write_arr>},
-      Row::word<&Model::rcr_>(offsetof(Layout, rcr), "RCR", longest_repetition),
+      Row::reserved(offsetof(Layout, rcr), "RCR"),
       {offsetof(Layout, ccr[0]), "CCR1", Row::shows<&Model::ccr_, 0, &PreloadedWord::preload>, half_word,
        Row::takes<&Model::write_ccr, 0>},
       {offsetof(Layout, ccr[1]), "CCR2", Row::shows<&Model::ccr_, 1, &PreloadedWord::preload>, half_word,
@@ -86,7 +80,8 @@ const RegisterTable<AdvancedTimerModel>& AdvancedTimerModel::registers() {
       {offsetof(Layout, ccr[2]), "CCR3", Row::shows<&Model::ccr_, 2, &PreloadedWord::preload>, half_word,
        Row::takes<&Model::write_ccr, 2>},
       Row::reserved(offsetof(Layout, ccr[3]), "CCR4"),
-      {offsetof(Layout, bdtr), "BDTR", Row::shows<&Model::bdtr_>, half_word, Row::takes<&Model::write_bdtr>}};
+      {offsetof(Layout, bdtr), "BDTR", Row::shows<&Model::bdtr_>,
+       half_word & ~timer_bdtr::AutomaticOutputEnable::mask, Row::takes<&Model::write_bdtr>}};
   return table;
 }
 
@@ -152,7 +147,6 @@ void AdvancedTimerModel::write_smcr(const Access& access, std::uint32_t value) {
 }
 
 void AdvancedTimerModel::write_egr(const Access& access, std::uint32_t value) {
-  if (timer_egr::Break::of(value) != 0) break_event(access.now);
   if (timer_egr::Update::of(value) != 0) software_update(access.now);
 }
 
@@ -160,8 +154,8 @@ void AdvancedTimerModel::write_ccmr(const Access& access, unsigned index, std::u
   if (timer_bdtr::Lock::of(bdtr_) == 3) return;
   for (unsigned shift = 0; shift <= timer_ccmr::bits_per_channel; shift += timer_ccmr::bits_per_channel) {
     const std::uint32_t mode = timer_ccmr::CompareMode<1>::of(value >> shift);
-    if (mode != 0 && mode != timer_ccmr::pwm_mode_1 && mode != timer_ccmr::pwm_mode_2) {
-      refuse(access, "OCxM = " + std::to_string(mode) + " is not modelled; 0, 6 and 7 are");
+    if (mode != 0 && mode != timer_ccmr::pwm_mode_2) {
+      refuse(access, "OCxM = " + std::to_string(mode) + " is not modelled; 0 and 7 are");
     }
   }
   ccmr_[index] = value;
@@ -190,11 +184,6 @@ void AdvancedTimerModel::write_cnt(const Access& access, std::uint32_t value) {
   if (counter_.running()) refuse(access, "CNT must not be written while counting centre-aligned");
   counter_.set_count(value);
   refresh_outputs(access.now);
-}
-
-void AdvancedTimerModel::write_psc(std::uint32_t value) {
-  psc_.preload = value;
-  note_waiting();
 }
 
 void AdvancedTimerModel::write_arr(const Access& access, std::uint32_t value) {

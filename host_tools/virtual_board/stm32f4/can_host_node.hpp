@@ -30,8 +30,6 @@ class CanHostNode final : public CanBusNode {
     bus_.request(now);
   }
   void on_frame(Receiver receiver) { receiver_ = std::move(receiver); }
-  /// Called for each frame of its own that was sent.
-  void on_sent(Receiver receiver) { sent_receiver_ = std::move(receiver); }
 
   /// False: hears without acknowledging.
   void set_listen_only(bool listen_only) { listen_only_ = listen_only; }
@@ -64,7 +62,7 @@ class CanHostNode final : public CanBusNode {
     if (babble_) return babble_;
     return queue_.empty() ? std::nullopt : std::optional(queue_.front());
   }
-  void on_result(CanOutcome outcome, BoardTime now) override {
+  void on_result(CanOutcome outcome, BoardTime /*now*/) override {
     if (outcome == CanOutcome::arbitration_lost) {
       ++lost_;
       return;
@@ -76,9 +74,7 @@ class CanHostNode final : public CanBusNode {
     errors_.sent();
     ++sent_;
     if (babble_ || queue_.empty()) return;
-    const drivers::CanFrame frame = queue_.front();
     queue_.pop_front();
-    if (sent_receiver_) sent_receiver_(frame, now);
   }
   void on_received(const drivers::CanFrame& frame, BoardTime now) override {
     errors_.received();
@@ -91,7 +87,7 @@ class CanHostNode final : public CanBusNode {
   BoardTime bit_time_;
   std::deque<drivers::CanFrame> queue_;
   std::optional<drivers::CanFrame> babble_;
-  Receiver receiver_, sent_receiver_;
+  Receiver receiver_;
   bool listen_only_ = false, connected_ = true;
   CanFaultConfinement errors_;
   std::uint64_t sent_ = 0, lost_ = 0;

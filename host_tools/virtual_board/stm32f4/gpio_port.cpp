@@ -108,22 +108,13 @@ void GpioPortModel::drive(unsigned pin, PinDrive drive, BoardTime now) {
   if (std::exchange(drives_.at(pin), drive) != drive) update(now);
 }
 
-void GpioPortModel::drive_alternate(unsigned pin, PinOutput output, BoardTime now) {
-  if (std::exchange(alternates_.at(pin), output) != output && mode(pin) == GpioMode::alternate) update(now);
-}
-
 GpioMode GpioPortModel::mode(unsigned pin) const {
   return static_cast<GpioMode>(two_bits(moder_, pin));
-}
-
-unsigned GpioPortModel::alternate_function(unsigned pin) const {
-  return afr_.at(pin / 8) >> (4 * (pin % 8)) & 0xFU;
 }
 
 PinOutput GpioPortModel::output_of(unsigned pin) const {
   PinOutput wanted = PinOutput::released;
   if (mode(pin) == GpioMode::output) wanted = (odr_ >> pin & 1U) != 0 ? PinOutput::high : PinOutput::low;
-  if (mode(pin) == GpioMode::alternate) wanted = alternates_[pin];
   const bool open_drain = (otyper_ >> pin & 1U) == static_cast<std::uint32_t>(GpioOutput::open_drain);
   return open_drain && wanted == PinOutput::high ? PinOutput::released : wanted;
 }

@@ -23,7 +23,8 @@ enum class PinDrive : std::uint8_t {
 enum class PinOutput : std::uint8_t { released, low, high };
 
 /// One GPIO port, A to D: RM0090, chapter General-purpose I/Os (GPIO), sections I/O port control registers,
-/// Input configuration, Output configuration, Alternate function configuration, Analog configuration.
+/// Input configuration, Output configuration, Analog configuration. In alternate mode a pin is released: what
+/// peripherals do is wired past the ports.
 ///
 /// The level of a pin is decided by the first that drives it: the output inside, the drive outside, a pull-up
 /// or pull-down outside, the pull inside. A pin that nothing drives reads low (undefined on silicon: floats()
@@ -46,9 +47,6 @@ class GpioPortModel final : public RegisterBlock<GpioPortModel> {
 
   /// The world's side of a pin (0 to 15).
   void drive(unsigned pin, PinDrive drive, BoardTime now);
-  /// A peripheral's side: takes effect while the pin is in alternate mode. The board connects only the
-  /// peripheral that owns the pin and may check alternate_function().
-  void drive_alternate(unsigned pin, PinOutput output, BoardTime now);
 
   /// Level on the pin, as an instrument would see it.
   bool level(unsigned pin) const { return (levels_ >> pin & 1U) != 0; }
@@ -56,8 +54,6 @@ class GpioPortModel final : public RegisterBlock<GpioPortModel> {
   bool floats(unsigned pin) const { return (floating_ >> pin & 1U) != 0; }
   PinOutput output(unsigned pin) const { return outputs_[pin]; }
   drivers::stm32f4::GpioMode mode(unsigned pin) const;
-  /// AFR field; means something in alternate mode only.
-  unsigned alternate_function(unsigned pin) const;
 
   /// Called when the part begins or ceases to drive a pin or changes the level that it drives, and at once
   /// (with time 0) for those that it drives already.
@@ -86,7 +82,6 @@ class GpioPortModel final : public RegisterBlock<GpioPortModel> {
   std::uint32_t moder_ = 0, otyper_ = 0, ospeedr_ = 0, pupdr_ = 0, odr_ = 0;
   std::array<std::uint32_t, 2> afr_{};
   std::array<PinDrive, 16> drives_{};
-  std::array<PinOutput, 16> alternates_{};
   std::array<PinOutput, 16> outputs_{};
   std::uint32_t levels_ = 0;    // on the pins
   std::uint32_t floating_ = 0;  // driven by nothing

@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <string>
 
-#include "host_tools/virtual_board/stm32f4/clock_rules.hpp"
-
 namespace kmax::virtual_board {
 
 namespace {
@@ -46,6 +44,96 @@ constexpr std::uint32_t apb2_bits = rcc_apb2enr::Timer1::mask | rcc_apb2enr::Tim
                                     rcc_apb2enr::Adc1::mask | rcc_apb2enr::Adc2::mask |
                                     rcc_apb2enr::Adc3::mask | rcc_apb2enr::SystemConfiguration::mask;
 
+// The arithmetic of the clock tree and its limits: RM0090, chapter Reset and clock control for STM32F405xx
+// (RCC), section Clocks; STM32F405 data sheet, general operating conditions and main PLL characteristics. All
+// throw RefusedAccess with the value and what is allowed.
+constexpr std::uint64_t internal_oscillator_hz = 16'000'000;
+constexpr std::uint64_t crystal_hz = 8'000'000;
+
+/// What the highest HCLK depends on.
+struct ClockConditions {
+  std::uint32_t flash_wait_states;
+  bool voltage_scale_1;
+};
+
+constexpr std::uint64_t mhz = 1'000'000;
+
+std::uint64_t ahb_divider(std::uint32_t code) {
+  constexpr std::uint64_t dividers[8] = {2, 4, 8, 16, 64, 128, 256, 512};
+  return code < 8 ? 1 : dividers[code - 8];
+}
+std::uint64_t apb_divider(std::uint32_t code) {
+  return code < 4 ? 1 : std::uint64_t{2} << (code - 4);
+}
+
+std::string in_mhz(std::uint64_t hz) {
+  return std::to_string(hz / mhz) + "." + std::to_string(hz % mhz / 10'000 + 100).substr(1) + " MHz";
+}
+
+[[noreturn]] void refuse_clock(const std::string& what) {
+  throw RefusedAccess("RCC: " + what);
+}
+
+void check_limit(const char* what, std::uint64_t hz, std::uint64_t maximum) {
+  if (hz > maximum) refuse_clock(std::string(what) + " at " + in_mhz(hz) + ", at most " + in_mhz(maximum));
+}
+
+std::uint64_t pll_source_hz(std::uint32_t pllcfgr) {
+  return rcc_pllcfgr::FromCrystal::of(pllcfgr) != 0 ? crystal_hz : internal_oscillator_hz;
+}
+
+/// M, N and Q of a PLLCFGR: input, VCO and the 48 MHz output within their limits.
+void check_pll(std::uint32_t pllcfgr) {
+  const std::uint32_t divider = rcc_pllcfgr::InputDivider::of(pllcfgr);
+  if (divider < 2) refuse_clock("PLLCFGR: M = " + std::to_string(divider) + ", must be 2 to 63");
+  const std::uint64_t input = pll_source_hz(pllcfgr) / divider;
+  if (input < 950'000 || input > 2'100'000)
+    refuse_clock("PLLCFGR: PLL input " + in_mhz(input) + ", must be 0.95 to 2.10 MHz");
+  const std::uint64_t vco = pll_source_hz(pllcfgr) * rcc_pllcfgr::Multiplier::of(pllcfgr) / divider;
+  if (vco < 192 * mhz || vco > 432 * mhz)
+    refuse_clock("PLLCFGR: VCO at " + in_mhz(vco) + ", must be 192 to 432 MHz");
+  const std::uint32_t usb_divider = rcc_pllcfgr::UsbDivider::of(pllcfgr);
+  if (usb_divider < 2 || vco > 48 * mhz * usb_divider)
+    refuse_clock("PLLCFGR: Q = " + std::to_string(usb_divider) + " is below 2 or gives more than 48 MHz");
+}
+
+/// System clock that a PLLCFGR makes.
+std::uint64_t pll_output_hz(std::uint32_t pllcfgr) {
+  const std::uint64_t product = pll_source_hz(pllcfgr) * rcc_pllcfgr::Multiplier::of(pllcfgr);
+  const std::uint64_t divider = std::uint64_t{2} * (rcc_pllcfgr::OutputDivider::of(pllcfgr) + 1) *
+                                std::max(rcc_pllcfgr::InputDivider::of(pllcfgr), 1U);
+  if (product % divider != 0) refuse_clock("PLL output is no whole number of hertz: not modelled");
+  return product / divider;
+}
+
+/// The periods behind the prescalers of a CFGR, all of them within their limits.
+BoardClocks board_clocks(std::uint64_t system_clock_hz, std::uint32_t cfgr,
+                         const ClockConditions& conditions) {
+  const std::uint64_t divider = ahb_divider(rcc_cfgr::AhbPrescaler::of(cfgr));
+  const std::uint64_t divider1 = apb_divider(rcc_cfgr::Apb1Prescaler::of(cfgr));
+  const std::uint64_t divider2 = apb_divider(rcc_cfgr::Apb2Prescaler::of(cfgr));
+  const std::uint64_t hclk = system_clock_hz / divider;
+  check_limit("HCLK", hclk, 168 * mhz);
+  check_limit("PCLK1", hclk / divider1, 42 * mhz);
+  check_limit("PCLK2", hclk / divider2, 84 * mhz);
+  const BoardTime source_period = units_per_period(system_clock_hz);
+  if (source_period == 0)
+    refuse_clock("system clock of " + in_mhz(system_clock_hz) + " does not divide 336 MHz: not modelled");
+  const BoardTime core = source_period * divider;
+  const std::uint32_t needed = FlashInterface::wait_states_needed(core);
+  if (conditions.flash_wait_states < needed) {
+    refuse_clock("HCLK at " + in_mhz(hclk) + " with " + std::to_string(conditions.flash_wait_states) +
+                 " flash wait states, needs " + std::to_string(needed));
+  }
+  if (hclk > PwrModel::scale_2_maximum_hz && !conditions.voltage_scale_1)
+    refuse_clock("HCLK at " + in_mhz(hclk) + " without voltage scale 1 (PWR_CR.VOS)");
+  // The timers' clock is that of their bus, doubled when the bus is divided.
+  const auto timer = [&](std::uint64_t bus_divider) {
+    return core * (bus_divider == 1 ? 1 : bus_divider / 2);
+  };
+  return {core, core * divider1, core * divider2, timer(divider1), timer(divider2)};
+}
+
 }  // namespace
 
 const RegisterTable<PwrModel>& PwrModel::registers() {
@@ -74,7 +162,6 @@ void RccModel::restore_reset_values() {
   cr_ = rcc_cr::InternalOn::mask | rcc_cr::InternalTrim::bits(trim_reset_value);
   pllcfgr_ = rcc_pllcfgr::reset_value;
   cfgr_ = cir_ = 0;
-  ahb1rstr_ = apb1rstr_ = apb2rstr_ = 0;
   ahb1enr_ = rcc_ahb1enr::Ccm::mask;
   apb1enr_ = apb2enr_ = 0;
   internal_ready_ = 0;
@@ -133,9 +220,6 @@ const RegisterTable<RccModel>& RccModel::registers() {
   using Model = RccModel;
   using Row = Register<Model>;
   using Layout = RccRegisters;
-  // The converters have one reset between them.
-  constexpr std::uint32_t apb2_resets =
-      (apb2_bits & ~(rcc_apb2enr::Adc2::mask | rcc_apb2enr::Adc3::mask)) | stm32::rcc_apb2rstr::Adc::mask;
   static const RegisterTable<Model> table{
       {offsetof(Layout, cr), "CR", Row::shows<&Model::read_control>, cr_stored | cr_read_only,
        Row::takes<&Model::write_control>},
@@ -147,12 +231,9 @@ const RegisterTable<RccModel>& RccModel::registers() {
       {offsetof(Layout, cir), "CIR", Row::shows<&Model::cir_>,
        rcc_cir::ClockSecurityFlag::mask | rcc_cir::ClockSecurityClear::mask,
        Row::takes<&Model::write_interrupts>},
-      {offsetof(Layout, ahb1rstr), "AHB1RSTR", Row::shows<&Model::ahb1rstr_>, ports,
-       Row::takes<&Model::write_resets<&Model::ahb1rstr_>>},
-      {offsetof(Layout, apb1rstr), "APB1RSTR", Row::shows<&Model::apb1rstr_>, apb1_bits,
-       Row::takes<&Model::write_resets<&Model::apb1rstr_>>},
-      {offsetof(Layout, apb2rstr), "APB2RSTR", Row::shows<&Model::apb2rstr_>, apb2_resets,
-       Row::takes<&Model::write_resets<&Model::apb2rstr_>>},
+      Row::reserved(offsetof(Layout, ahb1rstr), "AHB1RSTR"),
+      Row::reserved(offsetof(Layout, apb1rstr), "APB1RSTR"),
+      Row::reserved(offsetof(Layout, apb2rstr), "APB2RSTR"),
       Row::word<&Model::ahb1enr_>(offsetof(Layout, ahb1enr), "AHB1ENR", ports | rcc_ahb1enr::Ccm::mask),
       Row::word<&Model::apb1enr_>(offsetof(Layout, apb1enr), "APB1ENR", apb1_bits),
       Row::word<&Model::apb2enr_>(offsetof(Layout, apb2enr), "APB2ENR", apb2_bits),
@@ -234,14 +315,6 @@ void RccModel::write_interrupts(const Access& access, std::uint32_t value) {
 void RccModel::write_status(std::uint32_t value) {
   csr_ = (csr_ & flag_bits) | (value & rcc_csr::RemoveFlags::mask);
   if (rcc_csr::RemoveFlags::of(value) != 0) csr_ &= ~flag_bits;
-}
-
-template <std::uint32_t RccModel::*stored>
-void RccModel::write_resets(const Access& access, std::uint32_t value) {
-  if (!peripheral_reset_) refuse(access, "peripheral resets are not connected");
-  const std::uint32_t rising = value & ~(this->*stored);
-  this->*stored = value;
-  if (rising != 0) peripheral_reset_(access.offset, rising, access.now);
 }
 
 BoardTime RccModel::next_event() const {

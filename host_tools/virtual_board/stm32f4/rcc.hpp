@@ -49,8 +49,8 @@ class PwrModel final : public RegisterBlock<PwrModel> {
 /// a ready source; changes of a PLL that is on; stopping what the core runs on (silicon ignores that); HCLK
 /// above 168, PCLK1 above 42, PCLK2 above 84 MHz; HCLK above what the flash wait states and the voltage scale
 /// allow; frequencies of which 336 MHz is no multiple, which BoardTime cannot express; clock outputs, I2S
-/// PLL, backup domain, LSION, ready interrupts, low-power enables; enable and reset bits of peripherals that
-/// the board does not have.
+/// PLL, backup domain, LSION, ready interrupts, low-power enables; peripheral resets; enable bits of
+/// peripherals that the board does not have.
 class RccModel final : public RegisterBlock<RccModel> {
  public:
   static constexpr std::uint32_t size = 0x90;
@@ -80,13 +80,6 @@ class RccModel final : public RegisterBlock<RccModel> {
   }
   /// Called when the clock security system finds the crystal dead: also a break for TIM1 and TIM8.
   void on_clock_failure(std::function<void(BoardTime)> callback) { clock_failure_ = std::move(callback); }
-  /// Called when bits of a reset register (offset) go from 0 to 1; writing such a register is refused without
-  /// it.
-  void on_peripheral_reset(
-      std::function<void(std::uint32_t offset, std::uint32_t mask, BoardTime)> callback) {
-    peripheral_reset_ = std::move(callback);
-  }
-
   /// A crystal that does not oscillate, from the next start on.
   void set_crystal_works(bool works) { crystal_works_ = works; }
   /// A PLL that does not lock, from the next start on.
@@ -106,8 +99,6 @@ class RccModel final : public RegisterBlock<RccModel> {
   void write_interrupts(const Access& access, std::uint32_t value);
   void write_status(std::uint32_t value);
   std::uint32_t read_status() const;
-  template <std::uint32_t RccModel::*stored>
-  void write_resets(const Access& access, std::uint32_t value);
   BoardTime ready_at(std::uint32_t source) const;
   /// The clocks that a CFGR would give with the core on `source`; throws RefusedAccess when they are not
   /// allowed.
@@ -121,7 +112,6 @@ class RccModel final : public RegisterBlock<RccModel> {
   const FlashInterface& flash_;
   const PwrModel& power_;
   std::uint32_t cr_ = 0, pllcfgr_ = 0, cfgr_ = 0, cir_ = 0;  // CR without the ready flags
-  std::uint32_t ahb1rstr_ = 0, apb1rstr_ = 0, apb2rstr_ = 0;
   std::uint32_t ahb1enr_ = 0, apb1enr_ = 0, apb2enr_ = 0;
   std::uint32_t csr_ = 0;
   BoardTime internal_ready_ = 0;
@@ -134,7 +124,6 @@ class RccModel final : public RegisterBlock<RccModel> {
   bool low_speed_runs_ = false;
   std::function<void(bool, BoardTime)> clock_security_interrupt_;
   std::function<void(BoardTime)> clock_failure_;
-  std::function<void(std::uint32_t, std::uint32_t, BoardTime)> peripheral_reset_;
 };
 
 }  // namespace kmax::virtual_board

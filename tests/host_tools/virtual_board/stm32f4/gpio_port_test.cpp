@@ -124,23 +124,6 @@ TEST(GpioPortModel, OutputConfiguration_ShortCircuitIsRefused) {
   EXPECT_NO_THROW(drain.model.drive(5, PinDrive::low, 1)) << "an open drain that is off is no short circuit";
 }
 
-TEST(GpioPortModel, AlternateFunctionConfiguration_PeripheralDrivesThePin) {
-  Port port{GpioPort::b};
-  port.model.drive_alternate(13, PinOutput::high, 1);
-  EXPECT_EQ(port.model.output(13), PinOutput::released) << "still an input";
-  port.write(offsetof(Registers, afr) + 4, 1U << 20);
-  port.write(moder, 0x280U | 2U << 26);
-  EXPECT_EQ(port.model.output(13), PinOutput::high);
-  EXPECT_EQ(port.model.alternate_function(13), 1U);
-  EXPECT_EQ(port.model.alternate_function(12), 0U);
-  port.model.drive_alternate(13, PinOutput::low, 2);
-  EXPECT_FALSE(port.model.level(13));
-  port.write(odr, 1U << 13);
-  EXPECT_FALSE(port.model.level(13)) << "ODR has no say";
-  port.model.reset(3);
-  EXPECT_EQ(port.model.output(13), PinOutput::released);
-}
-
 TEST(GpioPortModel, AnalogConfiguration_ReadsZeroAndDoesNotPull) {
   Port port;
   port.model.drive(1, PinDrive::high, 1);

@@ -34,8 +34,8 @@ struct Board : testing::ModelBench {
   }
   bool start() { return pwm1.configure() && pwm8.configure() && start_phase_shifted(pwm1, pwm8); }
 
-  AdvancedTimerModel tim1{AdvancedTimer::tim1, clocks, interrupts};
-  AdvancedTimerModel tim8{AdvancedTimer::tim8, clocks, interrupts};
+  AdvancedTimerModel tim1{AdvancedTimer::tim1, clocks};
+  AdvancedTimerModel tim8{AdvancedTimer::tim8, clocks};
   TimerOnModel timer1 = block_on_model<TimerOnModel>(*this, tim1);
   TimerOnModel timer8 = block_on_model<TimerOnModel>(*this, tim8);
   ThreePhasePwm<TimerOnModel> pwm1, pwm8;
