@@ -29,8 +29,8 @@
 // left, so a write to the unit or the baud rate is still answered under the old ones. The application sets
 // its USART to config() whenever that differs (after reply_sent(), poll() and configure()).
 //
-// Host supervision: counters().requests + counters().broadcasts rises, and last_valid_request_time() moves,
-// only with frames of good CRC that were meant for this unit, whatever the server answers.
+// Host supervision: last_valid_request_time() moves only with frames of good CRC that were meant for this
+// unit or for all, whatever the server answers.
 //
 // Time and calling context as in rtu_receiver.hpp: all calls from one context, the bank's functions run
 // inside receive(), poll() or reply_due(). Memory: about 650 bytes.
@@ -69,15 +69,9 @@ struct RtuPortConfig {
 
 // They wrap. Frames that were no frames are in RtuReceiverCounters.
 struct RtuPortCounters {
-  std::uint32_t requests = 0;            // addressed to this unit
-  std::uint32_t broadcasts = 0;          // unit 0, executed or ignored
-  std::uint32_t broadcasts_ignored = 0;  // of these: not a write
   std::uint32_t other_units = 0;
-  std::uint32_t replies = 0;                 // handed out by reply_due()
-  std::uint32_t exceptions = 0;              // requests answered with an exception
-  std::uint32_t replies_dropped = 0;         // superseded by the next request before they were fetched
-  std::uint32_t echo_bytes = 0;              // received while sending, half duplex
-  std::uint32_t requests_while_sending = 0;  // complete before the last reply had left, full duplex
+  std::uint32_t replies = 0;     // handed out by reply_due()
+  std::uint32_t exceptions = 0;  // requests answered with an exception
 };
 
 template <RegisterBank Bank>
@@ -91,10 +85,7 @@ class RtuPort {
 
   // A character whose last stop bit ended at `time_us`; `line_error` for parity, framing or overrun.
   void receive(std::uint8_t byte, bool line_error, std::uint32_t time_us) {
-    if (is_echo(time_us)) {
-      ++counters_.echo_bytes;
-      return;
-    }
+    if (is_echo(time_us)) return;
     drop_reply();
     if (const std::optional<RtuFrame> frame = receiver_.receive(byte, line_error, time_us)) {
       handle(*frame);
@@ -144,7 +135,7 @@ class RtuPort {
   [[nodiscard]] const RtuTiming& timing() const { return receiver_.timing(); }
 
   // End of the latest frame for this unit or for all; nothing before the first. On a clock that wraps every
-  // 71 minutes: whoever compares it with the present must do so more often, or watch the counters.
+  // 71 minutes: whoever compares it with the present must do so more often.
   [[nodiscard]] std::optional<std::uint32_t> last_valid_request_time() const {
     return last_valid_request_us_;
   }
@@ -179,15 +170,8 @@ class RtuPort {
       return;
     }
     last_valid_request_us_ = frame.end_us;
-    ++(broadcast ? counters_.broadcasts : counters_.requests);
-    if (state_ == State::sending) {  // the buffer still holds the reply
-      ++counters_.requests_while_sending;
-      return;
-    }
-    if (broadcast && !is_write(frame.pdu[0])) {
-      ++counters_.broadcasts_ignored;
-      return;
-    }
+    if (state_ == State::sending) return;  // the buffer still holds the reply
+    if (broadcast && !is_write(frame.pdu[0])) return;
     state_ = State::executing;
     const std::size_t length =
         server_.process(frame.pdu, std::span(reply_).template subspan<1, pdu_size_max>());
@@ -205,9 +189,7 @@ class RtuPort {
   }
 
   void drop_reply() {
-    if (state_ != State::reply_waiting) return;
-    ++counters_.replies_dropped;
-    finish_request();
+    if (state_ == State::reply_waiting) finish_request();
   }
 
   void finish_request() {

@@ -16,6 +16,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -72,7 +73,7 @@ class InMemoryBank {
     }
     ++writes;
     for (std::size_t i = 0; i < in.size(); ++i) holding[static_cast<std::uint16_t>(address + i)] = in[i];
-    if (on_write != nullptr) on_write(on_write_context);
+    if (on_write) on_write();
     return Exception::none;
   }
 
@@ -94,8 +95,7 @@ class InMemoryBank {
   int reads = 0;
   int writes = 0;
   bool asked_beyond_contract = false;  // a range that the concept promises never to pass
-  void (*on_write)(void*) = nullptr;
-  void* on_write_context = nullptr;
+  std::function<void()> on_write;
 
  private:
   static constexpr std::pair<std::size_t, std::size_t> ranges[] = {

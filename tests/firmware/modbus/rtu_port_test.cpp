@@ -1,22 +1,82 @@
 #include "firmware/modbus/rtu_port.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "tests/firmware/modbus/in_memory_bank.hpp"
-#include "tests/firmware/modbus/rtu_client.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
 
 namespace kmax::firmware::modbus::rtu_port_test {
 namespace {
 
-using Port = RtuPort<InMemoryBank>;
-
 const Bytes read_pdu{3, 0, 2, 0, 1};
 const Bytes read_reply_pdu{3, 2, 0x5A, 0x02};
+const Bytes written_reply_pdu{3, 2, 0x12, 0x34};
 const Bytes write_pdu{6, 0, 2, 0x12, 0x34};
+
+// A Modbus client and the line to one port, in virtual time. It sends requests and collects whole replies.
+struct RtuClient {
+  explicit RtuClient(RtuPortConfig config = {}, std::uint32_t start_us = 0)
+      : line(config.baud_rate, start_us, config.format.bits()), port(bank, config) {}
+
+  void send(const Bytes& bytes) { line.send(port, bytes); }
+
+  // The silence that ends a frame, seen by the port.
+  void settle() {
+    line.silence(line.t3_5_us() + line.character_us() + 4);
+    port.poll(line.now());
+  }
+
+  Bytes reply_due() {
+    const auto reply = port.reply_due(line.now());
+    return Bytes(reply.begin(), reply.end());
+  }
+
+  // Fetches a reply and plays it out, with its echo if the line has two wires.
+  Bytes take_reply(bool echo = false) {
+    const std::span<const std::uint8_t> reply = port.reply_due(line.now());
+    Bytes bytes(reply.begin(), reply.end());
+    if (bytes.empty()) return bytes;
+    for (const std::uint8_t byte : bytes) {
+      const std::uint32_t end = line.character();
+      if (echo) port.receive(byte, false, end);
+      EXPECT_TRUE(reply_due().empty());
+    }
+    EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), reply.begin()));
+    port.reply_sent(line.now());
+    return bytes;
+  }
+
+  Bytes exchange(const Bytes& request, bool echo = false) {
+    send(request);
+    settle();
+    return take_reply(echo);
+  }
+
+  bool is_alive() {
+    settle();
+    (void)take_reply();
+    settle();
+    return exchange(adu(port.config().unit, {4, 0, 1, 0, 1})) == adu(port.config().unit, {4, 2, 0x80, 0x01});
+  }
+
+  InMemoryBank bank;
+  RtuLine line;
+  RtuPort<InMemoryBank> port;
+};
+
+Bytes beginning_of(const Bytes& request) {
+  return Bytes(request.begin(), request.begin() + 3);
+}
+Bytes rest_of(const Bytes& request) {
+  return Bytes(request.begin() + 3, request.end());
+}
 
 class RtuPortAtBaud : public testing::TestWithParam<std::uint32_t> {};
 INSTANTIATE_TEST_SUITE_P(BaudRates, RtuPortAtBaud, testing::ValuesIn(tested_baud_rates));
@@ -24,7 +84,6 @@ INSTANTIATE_TEST_SUITE_P(BaudRates, RtuPortAtBaud, testing::ValuesIn(tested_baud
 TEST_P(RtuPortAtBaud, AnswersItsUnit) {
   RtuClient client({.unit = 17, .baud_rate = GetParam()});
   EXPECT_EQ(client.exchange(adu(17, read_pdu)), adu(17, read_reply_pdu));
-  EXPECT_EQ(client.port.counters().requests, 1U);
   EXPECT_EQ(client.port.counters().replies, 1U);
   EXPECT_EQ(client.port.receiver_counters().frames_received, 1U);
 }
@@ -40,13 +99,12 @@ TEST_P(RtuPortAtBaud, ReplyIsDueNotBeforeT3_5AndOnlyOnce) {
     while (reply.empty() && silence < 1e5) {
       client.line.silence(7.0);
       silence += 7.0;
-      const auto due = client.port.reply_due(client.line.now());
-      reply.assign(due.begin(), due.end());
+      reply = client.reply_due();
     }
     EXPECT_EQ(reply, adu(1, read_reply_pdu));
     EXPECT_GE(silence, client.line.t3_5_us());
     EXPECT_LE(silence, client.line.t3_5_us() + client.line.character_us() + 10.0);
-    EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+    EXPECT_TRUE(client.reply_due().empty());
   }
 }
 
@@ -56,11 +114,8 @@ TEST_P(RtuPortAtBaud, EchoOfTheReplyIsIgnored) {
   for (std::uint32_t i = 1; i <= 3; ++i) {
     EXPECT_EQ(client.exchange(adu(1, write_pdu), true), adu(1, write_pdu));
     client.settle();
-    client.port.poll(client.line.now());
     EXPECT_TRUE(client.take_reply().empty());
     EXPECT_EQ(client.bank.writes, static_cast<int>(i));
-    EXPECT_EQ(client.port.counters().echo_bytes, 8 * i);
-    EXPECT_EQ(client.port.counters().requests, i);
   }
   EXPECT_EQ(client.port.receiver_counters().frames_received, 3U);
   EXPECT_EQ(client.port.receiver_counters().crc_errors, 0U);
@@ -73,7 +128,6 @@ TEST_P(RtuPortAtBaud, LateEchoOfTheLastCharacterIsIgnored) {
     RtuClient client({.unit = 1, .baud_rate = GetParam()});
     (void)client.exchange(adu(1, read_pdu));
     client.port.receive(0x55, false, client.line.now() + static_cast<std::uint32_t>(offset));
-    EXPECT_EQ(client.port.counters().echo_bytes, 1U);
     EXPECT_TRUE(client.is_alive());
     EXPECT_EQ(client.port.receiver_counters().undersize, 0U);
   }
@@ -90,11 +144,11 @@ TEST_P(RtuPortAtBaud, RequestThatBeginsRightAfterTheReplyIsServed) {
 TEST_P(RtuPortAtBaud, GapInsideARequestIsSilentAndHarmless) {
   RtuClient client({.unit = 1, .baud_rate = GetParam()});
   const Bytes request = adu(1, write_pdu);
-  client.send(Bytes(request.begin(), request.begin() + 3));
+  client.send(beginning_of(request));
   client.line.silence(client.line.t1_5_us() + 4);
-  client.send(Bytes(request.begin() + 3, request.end()));
+  client.send(rest_of(request));
   client.settle();
-  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_TRUE(client.reply_due().empty());
   EXPECT_EQ(client.bank.writes, 0);
   EXPECT_EQ(client.port.receiver_counters().gap_errors, 1U);
   EXPECT_TRUE(client.is_alive());
@@ -106,15 +160,9 @@ TEST_P(RtuPortAtBaud, OfTwoBackToBackRequestsTheSecondIsAnswered) {
   for (const bool polled : {false, true}) {
     RtuClient client({.unit = 1, .baud_rate = GetParam()});
     client.send(adu(1, write_pdu));
-    if (polled) {
-      client.settle();
-      client.port.poll(client.line.now());
-    } else {
-      client.line.silence(client.line.t3_5_us() + 4);
-    }
-    EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, {3, 2, 0x12, 0x34}));
-    EXPECT_EQ(client.port.counters().replies_dropped, 1U);
-    EXPECT_EQ(client.port.counters().requests, 2U);
+    if (polled) client.settle();
+    if (!polled) client.line.silence(client.line.t3_5_us() + 4);
+    EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, written_reply_pdu));
     EXPECT_EQ(client.bank.writes, 1);
     client.settle();
     EXPECT_TRUE(client.take_reply().empty());
@@ -126,12 +174,10 @@ TEST(RtuPort, NoReplyStartsWhileCharactersComeIn) {
   RtuClient client;
   client.send(adu(1, read_pdu));
   client.settle();
-  client.port.poll(client.line.now());
   client.send({0x02});
-  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_TRUE(client.reply_due().empty());
   client.settle();
-  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
-  EXPECT_EQ(client.port.counters().replies_dropped, 1U);
+  EXPECT_TRUE(client.reply_due().empty());
   EXPECT_TRUE(client.is_alive());
 }
 
@@ -141,8 +187,7 @@ TEST(RtuPort, NoReplyStartsOnTheCharacterThatEndedTheRequest) {
   client.send(adu(1, read_pdu));
   client.line.silence(client.line.t3_5_us() + 4);
   client.send({0x01});
-  EXPECT_EQ(client.port.counters().requests, 1U);
-  EXPECT_TRUE(client.port.reply_due(client.line.now()).empty());
+  EXPECT_TRUE(client.reply_due().empty());
   EXPECT_TRUE(client.is_alive());
 }
 
@@ -174,8 +219,6 @@ TEST(RtuPort, BroadcastWritesAreExecutedWithoutReply) {
     RtuClient client;
     EXPECT_TRUE(client.exchange(adu(0, pdu)).empty());
     EXPECT_EQ(client.bank.holding[2], 0x1234) << int{pdu[0]};
-    EXPECT_EQ(client.port.counters().broadcasts, 1U);
-    EXPECT_EQ(client.port.counters().broadcasts_ignored, 0U);
     EXPECT_EQ(client.port.counters().replies, 0U);
     EXPECT_TRUE(client.is_alive());
   }
@@ -188,9 +231,7 @@ TEST(RtuPort, BroadcastNeverGetsAReplyWhateverTheFunction) {
       const int reads = client.bank.reads;
       EXPECT_TRUE(client.exchange(adu(0, Bytes{static_cast<std::uint8_t>(function)} + rest)).empty())
           << function;
-      EXPECT_EQ(client.port.counters().broadcasts, 1U);
       if (!is_write(static_cast<std::uint8_t>(function))) {
-        EXPECT_EQ(client.port.counters().broadcasts_ignored, 1U);
         EXPECT_EQ(client.bank.reads, reads);
       }
       EXPECT_TRUE(client.is_alive());
@@ -236,7 +277,6 @@ TEST(RtuPort, HostSupervisionCountsOnlyValidFramesForThisUnit) {
     client.send(frame);
     const std::uint32_t end = client.line.now();
     client.settle();
-    client.port.poll(client.line.now());
     (void)client.take_reply();
     EXPECT_EQ(time(), end);
     client.settle();
@@ -244,7 +284,6 @@ TEST(RtuPort, HostSupervisionCountsOnlyValidFramesForThisUnit) {
     EXPECT_EQ(time(), end);
     client.settle();
   }
-  EXPECT_EQ(client.port.counters().requests + client.port.counters().broadcasts, 4U);
 }
 
 TEST(RtuPort, InvalidConfigurationsAreRefused) {
@@ -279,35 +318,24 @@ TEST(RtuPort, ConfigurationTakesEffectAtOnceWhenNoReplyIsUnderWay) {
 TEST(RtuPort, ChangeOfTheUnitAloneLeavesAFrameUnderWayIntact) {
   RtuClient client;
   const Bytes request = adu(9, read_pdu);
-  client.send(Bytes(request.begin(), request.begin() + 3));
+  client.send(beginning_of(request));
   EXPECT_TRUE(client.port.configure({.unit = 9}));
-  client.send(Bytes(request.begin() + 3, request.end()));
+  client.send(rest_of(request));
   client.settle();
   EXPECT_EQ(client.take_reply(), adu(9, read_reply_pdu));
 }
 
 // The bank configures the port from inside the write, as modbus.unit and modbus.baud_rate do.
-struct Reconfiguration {
-  Port* port;
-  RtuPortConfig config;
-  static void apply(void* context) {
-    auto* self = static_cast<Reconfiguration*>(context);
-    EXPECT_TRUE(self->port->configure(self->config));
-  }
-};
-
 TEST(RtuPort, WriteThatReconfiguresIsAnsweredUnderTheOldConfiguration) {
   for (const bool echo : {false, true}) {
     RtuClient client({.unit = 1, .baud_rate = 115200});
-    Reconfiguration change{&client.port, {.unit = 42, .baud_rate = 9600}};
-    client.bank.on_write = Reconfiguration::apply;
-    client.bank.on_write_context = &change;
+    const RtuPortConfig changed{.unit = 42, .baud_rate = 9600};
+    client.bank.on_write = [&] { EXPECT_TRUE(client.port.configure(changed)); };
     client.send(adu(1, write_pdu));
     client.settle();
-    client.port.poll(client.line.now());
     EXPECT_EQ(client.port.config().unit, 1);
     EXPECT_EQ(client.take_reply(echo), adu(1, write_pdu));
-    EXPECT_EQ(client.port.config(), change.config);
+    EXPECT_EQ(client.port.config(), changed);
     EXPECT_EQ(client.port.timing(), rtu_timing(9600));
     client.bank.on_write = nullptr;
 
@@ -315,7 +343,7 @@ TEST(RtuPort, WriteThatReconfiguresIsAnsweredUnderTheOldConfiguration) {
     client.settle();
     EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
     client.settle();
-    EXPECT_EQ(client.exchange(adu(42, read_pdu)), adu(42, {3, 2, 0x12, 0x34}));
+    EXPECT_EQ(client.exchange(adu(42, read_pdu)), adu(42, written_reply_pdu));
   }
 }
 
@@ -323,7 +351,7 @@ TEST(RtuPort, ReconfigurationWaitsForAReplyThatIsBeingSent) {
   RtuClient client;
   client.send(adu(1, read_pdu));
   client.settle();
-  ASSERT_FALSE(client.port.reply_due(client.line.now()).empty());
+  ASSERT_FALSE(client.reply_due().empty());
   EXPECT_TRUE(client.port.configure({.unit = 5}));
   EXPECT_TRUE(client.port.configure({.unit = 6}));
   client.port.poll(client.line.now());
@@ -334,19 +362,17 @@ TEST(RtuPort, ReconfigurationWaitsForAReplyThatIsBeingSent) {
 
 TEST(RtuPort, ReconfigurationByBroadcastOrWithADroppedReplyIsNotLost) {
   RtuClient client;
-  Reconfiguration change{&client.port, {.unit = 42}};
-  client.bank.on_write = Reconfiguration::apply;
-  client.bank.on_write_context = &change;
+  std::uint8_t unit = 42;
+  client.bank.on_write = [&] { EXPECT_TRUE(client.port.configure({.unit = unit})); };
   EXPECT_TRUE(client.exchange(adu(0, write_pdu)).empty());
   EXPECT_EQ(client.port.config().unit, 42);
   client.settle();
 
-  change.config.unit = 43;
+  unit = 43;
   client.send(adu(42, write_pdu));
   client.settle();
-  client.port.poll(client.line.now());
   EXPECT_EQ(client.port.config().unit, 42);
-  EXPECT_EQ(client.exchange(adu(43, read_pdu)), adu(43, {3, 2, 0x12, 0x34}));
+  EXPECT_EQ(client.exchange(adu(43, read_pdu)), adu(43, written_reply_pdu));
   EXPECT_EQ(client.port.config().unit, 43);
 }
 
@@ -359,25 +385,129 @@ TEST(RtuPort, ReplySentWithoutAReplyChangesNothing) {
   EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
 }
 
-TEST(RtuPort, AliveAfterLongIdleTime) {
+TEST(RtuPort, AliveAfterLongIdleTimeAndAReplyMayWaitForHours) {
   RtuClient client;
+  const auto idle = [&](int hours) {
+    for (int second = 0; second < 3600 * hours; ++second) {
+      client.line.silence(1e6);
+      client.port.poll(client.line.now());
+    }
+  };
   (void)client.exchange(adu(1, read_pdu));
-  for (int second = 0; second < 3 * 3600; ++second) {
-    client.line.silence(1e6);
-    client.port.poll(client.line.now());
-  }
-  EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, read_reply_pdu));
-  EXPECT_EQ(client.port.counters().echo_bytes, 0U);
+  idle(3);
+  client.send(adu(1, read_pdu));
+  idle(1);
+  EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
 }
 
-TEST(RtuPort, AReplyMayWaitForHours) {
-  RtuClient client;
-  client.send(adu(1, read_pdu));
-  for (int second = 0; second < 3600; ++second) {
-    client.line.silence(1e6);
-    client.port.poll(client.line.now());
+// On a full-duplex line nothing that comes in is an echo. The driver reports the end of a reply late; the
+// client, which has the last character, goes on at once.
+TEST(RtuPort, OnAFullDuplexLineARequestThatBeginsBeforeTheReplyIsReportedSentIsAnswered) {
+  RtuClient client({.unit = 1, .half_duplex = false});
+  const Bytes request = adu(1, read_pdu);
+  client.send(request);
+  for (int i = 0; i < 10; ++i) {
+    client.settle();
+    ASSERT_EQ(client.reply_due(), adu(1, read_reply_pdu));
+    client.send(beginning_of(request));
+    client.port.reply_sent(client.line.now());
+    client.send(rest_of(request));
   }
-  EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
+  EXPECT_EQ(client.port.receiver_counters().crc_errors, 0U);
+}
+
+TEST(RtuPort, OnAFullDuplexLineARequestCompleteWhileSendingLeavesTheReplyAlone) {
+  RtuClient client({.unit = 1, .half_duplex = false});
+  client.send(adu(1, read_pdu));
+  client.settle();
+  const auto reply = client.port.reply_due(client.line.now());
+  const Bytes before(reply.begin(), reply.end());
+  client.send(adu(1, {6, 0, 0, 0, 7}));
+  client.settle();
+  EXPECT_EQ(Bytes(reply.begin(), reply.end()), before);
+  EXPECT_EQ(client.bank.writes, 0);
+  client.port.reply_sent(client.line.now());
+  EXPECT_TRUE(client.is_alive());
+}
+
+Bytes some_request(std::uint8_t unit) {
+  static const std::vector<Bytes> pdus{{3, 0, 2, 0, 1},
+                                       {4, 0, 0, 0, 9},
+                                       {6, 0, 2, 0x12, 0x34},
+                                       {6, 0, 0x40, 1, 1},
+                                       {16, 0, 2, 0, 2, 4, 1, 2, 3, 4},
+                                       {16, 0, 0x41, 0, 2, 4, 1, 2, 3, 4},
+                                       {22, 0, 3, 0xF0, 0xF0, 1, 1},
+                                       {23, 0, 0, 0, 2, 0, 4, 0, 1, 2, 9, 9},
+                                       {23, 2, 0, 0, 2, 0, 4, 0, 1, 2, 9, 9},
+                                       {43, 14, 1, 0},
+                                       {43, 14, 4, 9},
+                                       {99, 1}};
+  return adu(unit, *rc::gen::elementOf(pdus));
+}
+
+// What the client sends is damaged in every way a line can: never a reply or a write for a frame with a bad
+// CRC, never a change with an exception, and the next good request is answered.
+RC_GTEST_PROP(RtuPort, DamagedTrafficIsHarmless, ()) {
+  const auto start = *rc::gen::element<std::uint32_t>(0, 0xFFFF'0000, 0x7FFF'0000);
+  const auto echo = *rc::gen::arbitrary<bool>();
+  RtuClient client({.unit = 1, .baud_rate = tested_baud_rates[*rc::gen::inRange<std::size_t>(0, 8)]}, start);
+  for (int i = 0; i < 10; ++i) {
+    Bytes frame = *rc::gen::inRange(0, 4) == 0
+                      ? *rc::gen::resize(300, rc::gen::arbitrary<Bytes>())
+                      : some_request(*rc::gen::element<std::uint8_t>(0, 1, 1, 1, 2, 250));
+    switch (*rc::gen::inRange(0, 5)) {
+      case 0:
+        if (!frame.empty())
+          frame[*rc::gen::inRange<std::size_t>(0, frame.size())] ^= *rc::gen::inRange<std::uint8_t>(1, 255);
+        break;
+      case 1:
+        frame.resize(*rc::gen::inRange<std::size_t>(0, frame.size() + 1));
+        break;
+      case 2:
+        frame.insert(frame.end(), *rc::gen::inRange<std::size_t>(1, 300),
+                     *rc::gen::arbitrary<std::uint8_t>());
+        break;
+      default:
+        break;
+    }
+    const auto line_error_at = *rc::gen::inRange<std::size_t>(0, 60);
+    const auto before = client.bank.holding;
+    for (std::size_t k = 0; k < frame.size(); ++k)
+      client.port.receive(frame[k], k == line_error_at, client.line.character());
+    client.settle();
+    const Bytes reply = client.take_reply(echo);
+    const bool good = frame.size() >= 4 && frame.size() <= 256 && line_error_at >= frame.size() &&
+                      with_crc(Bytes(frame.begin(), frame.end() - 2)) == frame;
+    RC_ASSERT(reply.empty() != (good && frame[0] == 1));
+    if (!good || frame[0] > 1) RC_ASSERT(client.bank.holding == before);
+    if (!reply.empty()) {
+      RC_ASSERT(reply[0] == 1);
+      RC_ASSERT(with_crc(Bytes(reply.begin(), reply.end() - 2)) == reply);
+      if ((reply[1] & 0x80) != 0) RC_ASSERT(client.bank.holding == before);
+    }
+    client.settle();
+  }
+  RC_ASSERT(!client.bank.asked_beyond_contract);
+  RC_ASSERT(client.is_alive());
+}
+
+// Random characters at random distances, errors included, with calls in any order.
+RC_GTEST_PROP(RtuPort, NoiseNeverGetsAReplyAndNeverStopsThePort, ()) {
+  RtuClient client({}, *rc::gen::element<std::uint32_t>(0, 0xFFFF'F000));
+  const auto before = client.bank.holding;
+  const auto count = *rc::gen::inRange(0, 600);
+  for (int i = 0; i < count; ++i) {
+    // No frame for unit 0 or 1 can begin in this alphabet.
+    const auto byte = *rc::gen::inRange<std::uint8_t>(2, 255);
+    client.line.silence(*rc::gen::element(0.0, 0.0, 0.0, 0.0, 400.0, 800.0, 1740.0, 1760.0, 5000.0));
+    client.port.receive(byte, *rc::gen::inRange(0, 100) == 0, client.line.character());
+    if (*rc::gen::inRange(0, 10) == 0) client.port.poll(client.line.now());
+    if (*rc::gen::inRange(0, 10) == 0) RC_ASSERT(client.reply_due().empty());
+    if (*rc::gen::inRange(0, 50) == 0) client.port.reply_sent(client.line.now());
+  }
+  RC_ASSERT(client.bank.holding == before);
+  RC_ASSERT(client.is_alive());
 }
 
 }  // namespace

@@ -14,8 +14,10 @@ namespace {
 
 constexpr double resolution_us = 4.0;  // rounding of limits and time stamps
 
-// A receiver, a line, and everything that came out. `poll_every_us` > 0 also polls regularly between
-// characters.
+const Bytes request_body{0x11, 0x03, 0x00, 0x6B, 0x00, 0x03};
+const Bytes other_body{0x11, 0x06, 0x00, 0x01, 0x00, 0x03};
+
+// A receiver, a line, and everything that came out.
 class Listener {
  public:
   explicit Listener(std::uint32_t baud_rate, std::uint32_t start_us = 0)
@@ -43,21 +45,40 @@ class Listener {
     ends.push_back(frame->end_us);
   }
 
+  // What came was one burst without a frame in it, counted as that; and the next frame is received.
+  void expect_discarded(std::uint32_t RtuReceiverCounters::*reason) {
+    end();
+    const RtuReceiverCounters& c = receiver.counters();
+    EXPECT_TRUE(frames.empty());
+    EXPECT_EQ(c.*reason, 1U);
+    EXPECT_EQ(bursts(), 1U);
+    expect_alive();
+  }
+  void expect_alive() {
+    send(with_crc(other_body));
+    end();
+    EXPECT_EQ(frames.back(), other_body);
+  }
+  std::uint32_t bursts() const {
+    const RtuReceiverCounters& c = receiver.counters();
+    return c.frames_received + c.crc_errors + c.line_errors + c.gap_errors + c.oversize + c.undersize +
+           c.abandoned;
+  }
+
   RtuLine line;
   RtuReceiver receiver;
   std::vector<Bytes> frames;
   std::vector<std::uint32_t> ends;
 };
 
-const Bytes request_body{0x11, 0x03, 0x00, 0x6B, 0x00, 0x03};
-const Bytes other_body{0x11, 0x06, 0x00, 0x01, 0x00, 0x03};
-
-std::uint32_t bursts(const RtuReceiverCounters& c) {
-  return c.frames_received + c.crc_errors + c.line_errors + c.gap_errors + c.oversize + c.undersize +
-         c.abandoned;
-}
-
-class RtuReceiverAtBaud : public testing::TestWithParam<std::uint32_t> {};
+class RtuReceiverAtBaud : public testing::TestWithParam<std::uint32_t> {
+ protected:
+  // From here the clock wraps around after so many characters.
+  static std::uint32_t start_before_wrap(int characters) {
+    return static_cast<std::uint32_t>(
+        -static_cast<std::int64_t>(RtuLine(GetParam()).character_us() * characters + 1.0));
+  }
+};
 INSTANTIATE_TEST_SUITE_P(BaudRates, RtuReceiverAtBaud, testing::ValuesIn(tested_baud_rates));
 
 TEST_P(RtuReceiverAtBaud, FrameEndsOnceAfterT3_5) {
@@ -76,44 +97,24 @@ TEST_P(RtuReceiverAtBaud, FrameEndsOnceAfterT3_5) {
   EXPECT_EQ(listener.receiver.counters().frames_received, 1U);
 }
 
-TEST_P(RtuReceiverAtBaud, GapJustUnderT1_5AnywhereKeepsTheFrame) {
-  for (std::size_t position = 1; position < 8; ++position) {
-    Listener listener(GetParam());
-    const Bytes frame = with_crc(request_body);
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (i == position) listener.silence(listener.line.t1_5_us() - resolution_us);
-      listener.character(frame[i]);
+TEST_P(RtuReceiverAtBaud, AGapDiscardsTheFrameJustOverT1_5WhereverItAndTheClocksWrapAre) {
+  const Bytes frame = with_crc(request_body);
+  for (const double beyond : {-resolution_us, resolution_us}) {
+    for (std::size_t position = 0; position < 8; ++position) {  // 0: everywhere
+      for (int before = 0; before < 10; ++before) {
+        Listener listener(GetParam(), start_before_wrap(before));
+        for (std::size_t i = 0; i < frame.size(); ++i) {
+          if (i == position || (position == 0 && i != 0)) listener.silence(listener.line.t1_5_us() + beyond);
+          listener.character(frame[i]);
+        }
+        if (beyond > 0) {
+          listener.expect_discarded(&RtuReceiverCounters::gap_errors);
+        } else {
+          listener.end();
+          EXPECT_EQ(listener.frames, std::vector<Bytes>{request_body}) << position;
+        }
+      }
     }
-    listener.end();
-    EXPECT_EQ(listener.frames, std::vector<Bytes>{request_body}) << position;
-  }
-}
-
-TEST_P(RtuReceiverAtBaud, GapJustUnderT1_5EverywhereKeepsTheFrame) {
-  Listener listener(GetParam());
-  for (const std::uint8_t byte : with_crc(request_body)) {
-    listener.character(byte);
-    listener.silence(listener.line.t1_5_us() - resolution_us);
-  }
-  listener.end();
-  EXPECT_EQ(listener.frames, std::vector<Bytes>{request_body});
-}
-
-TEST_P(RtuReceiverAtBaud, GapJustOverT1_5AnywhereDiscardsTheFrame) {
-  for (std::size_t position = 1; position < 8; ++position) {
-    Listener listener(GetParam());
-    const Bytes frame = with_crc(request_body);
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (i == position) listener.silence(listener.line.t1_5_us() + resolution_us);
-      listener.character(frame[i]);
-    }
-    listener.end();
-    EXPECT_TRUE(listener.frames.empty()) << position;
-    EXPECT_EQ(listener.receiver.counters().gap_errors, 1U);
-    EXPECT_EQ(bursts(listener.receiver.counters()), 1U);
-    listener.send(with_crc(other_body));
-    listener.end();
-    EXPECT_EQ(listener.frames, std::vector<Bytes>{other_body});
   }
 }
 
@@ -122,57 +123,27 @@ TEST_P(RtuReceiverAtBaud, GapJustOverT1_5AnywhereDiscardsTheFrame) {
 TEST_P(RtuReceiverAtBaud, GapJustUnderT3_5DiscardsBothFrames) {
   Listener listener(GetParam());
   listener.send(with_crc(request_body));
-  listener.silence(listener.line.t3_5_us() - resolution_us);
-  listener.send(with_crc(other_body));
-  listener.silence(listener.line.t3_5_us() - resolution_us);
-  listener.send(with_crc(other_body));
-  listener.end();
-  EXPECT_TRUE(listener.frames.empty());
-  EXPECT_EQ(listener.receiver.counters().gap_errors, 1U);
-  EXPECT_EQ(bursts(listener.receiver.counters()), 1U);
+  for (int i = 0; i < 2; ++i) {
+    listener.silence(listener.line.t3_5_us() - resolution_us);
+    listener.send(with_crc(other_body));
+  }
+  listener.expect_discarded(&RtuReceiverCounters::gap_errors);
 }
 
-TEST_P(RtuReceiverAtBaud, GapJustOverT3_5SeparatesFramesWithOrWithoutPolling) {
+TEST_P(RtuReceiverAtBaud, GapJustOverT3_5SeparatesFramesPolledOrNotWhereverTheClockWraps) {
   for (const bool polled : {false, true}) {
-    Listener listener(GetParam());
-    listener.send(with_crc(request_body));
-    if (polled) listener.silence(0.0);
-    listener.line.silence(listener.line.t3_5_us() + resolution_us);
-    if (polled) listener.silence(0.0);
-    listener.send(with_crc(other_body));
-    listener.end();
-    EXPECT_EQ(listener.frames, (std::vector<Bytes>{request_body, other_body}));
-  }
-}
-
-TEST_P(RtuReceiverAtBaud, ClockWrapsAtEveryCharacterAndInTheSilence) {
-  const double character = RtuLine(GetParam()).character_us();
-  for (int before = 0; before < 14; ++before) {
-    const auto start = static_cast<std::uint32_t>(-static_cast<std::int64_t>(character * before + 1.0));
-    Listener listener(GetParam(), start);
-    listener.send(with_crc(request_body));
-    listener.end();
-    listener.send(with_crc(other_body));
-    listener.line.silence(listener.line.t3_5_us() + resolution_us);
-    listener.send(with_crc(request_body));
-    listener.end();
-    EXPECT_EQ(listener.frames, (std::vector<Bytes>{request_body, other_body, request_body})) << before;
-  }
-}
-
-TEST_P(RtuReceiverAtBaud, ShortGapIsFoundAcrossTheWrap) {
-  for (int before = 0; before < 10; ++before) {
-    const double character = RtuLine(GetParam()).character_us();
-    const auto start = static_cast<std::uint32_t>(-static_cast<std::int64_t>(character * before + 1.0));
-    Listener listener(GetParam(), start);
-    const Bytes frame = with_crc(request_body);
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (i == 4) listener.silence(listener.line.t1_5_us() + resolution_us);
-      listener.character(frame[i]);
+    for (int before = 0; before < 14; ++before) {
+      Listener listener(GetParam(), start_before_wrap(before));
+      listener.send(with_crc(request_body));
+      if (polled) listener.silence(0.0);
+      listener.line.silence(listener.line.t3_5_us() + resolution_us);
+      if (polled) listener.silence(0.0);
+      listener.send(with_crc(other_body));
+      listener.end();
+      listener.send(with_crc(request_body));
+      listener.end();
+      EXPECT_EQ(listener.frames, (std::vector<Bytes>{request_body, other_body, request_body})) << before;
     }
-    listener.end();
-    EXPECT_TRUE(listener.frames.empty());
-    EXPECT_EQ(listener.receiver.counters().gap_errors, 1U);
   }
 }
 
@@ -184,10 +155,7 @@ TEST_P(RtuReceiverAtBaud, IdleForThreeHoursWithOnePollPerSecond) {
       listener.silence(1e6);
       ASSERT_TRUE(listener.receiver.is_idle());
     }
-    listener.frames.clear();
-    listener.send(with_crc(other_body));
-    listener.end();
-    EXPECT_EQ(listener.frames, std::vector<Bytes>{other_body});
+    listener.expect_alive();
   }
 }
 
@@ -219,9 +187,7 @@ TEST(RtuReceiver, SizesAround4And256) {
     EXPECT_EQ(counters.frames_received, size >= 4 && size <= 256 ? 1U : 0U) << size;
     EXPECT_EQ(listener.frames, size >= 4 && size <= 256 ? std::vector<Bytes>{body} : std::vector<Bytes>{})
         << size;
-    listener.send(with_crc(other_body));
-    listener.end();
-    EXPECT_EQ(listener.frames.back(), other_body) << size;
+    listener.expect_alive();
   }
 }
 
@@ -230,13 +196,7 @@ TEST(RtuReceiver, OversizedIsDroppedUpToTheNextSilence) {
   Listener listener(115200);
   listener.send(Bytes(256, 0xAA));
   for (int i = 0; i < 1000; ++i) listener.send(with_crc(request_body));
-  listener.end();
-  EXPECT_TRUE(listener.frames.empty());
-  EXPECT_EQ(listener.receiver.counters().oversize, 1U);
-  EXPECT_EQ(bursts(listener.receiver.counters()), 1U);
-  listener.send(with_crc(other_body));
-  listener.end();
-  EXPECT_EQ(listener.frames, std::vector<Bytes>{other_body});
+  listener.expect_discarded(&RtuReceiverCounters::oversize);
 }
 
 TEST(RtuReceiver, LineErrorAtEveryPositionDiscardsTheFrame) {
@@ -245,13 +205,7 @@ TEST(RtuReceiver, LineErrorAtEveryPositionDiscardsTheFrame) {
     Listener listener(19200);
     for (std::size_t i = 0; i < frame.size(); ++i)
       listener.character(frame[i], i >= position && i < position + 2);
-    listener.end();
-    EXPECT_TRUE(listener.frames.empty()) << position;
-    EXPECT_EQ(listener.receiver.counters().line_errors, 1U);
-    EXPECT_EQ(bursts(listener.receiver.counters()), 1U);
-    listener.send(with_crc(other_body));
-    listener.end();
-    EXPECT_EQ(listener.frames, std::vector<Bytes>{other_body});
+    listener.expect_discarded(&RtuReceiverCounters::line_errors);
   }
 }
 
@@ -273,9 +227,7 @@ TEST(RtuReceiver, CrcHighByteFirstIsRefused) {
   std::swap(frame[frame.size() - 1], frame[frame.size() - 2]);
   Listener listener(115200);
   listener.send(frame);
-  listener.end();
-  EXPECT_TRUE(listener.frames.empty());
-  EXPECT_EQ(listener.receiver.counters().crc_errors, 1U);
+  listener.expect_discarded(&RtuReceiverCounters::crc_errors);
 }
 
 TEST(RtuReceiver, FrameReturnedByReceiveIsNotOverwrittenByTheCharacterThatEndedIt) {
@@ -384,7 +336,7 @@ RC_GTEST_PROP(RtuReceiver, FramesFollowTheDefinitionHoweverOftenItIsPolled, ()) 
   std::size_t burst_count = 0;
   RC_ASSERT(listener.frames ==
             expected_frames(events, listener.line.t1_5_us(), listener.line.t3_5_us(), burst_count));
-  RC_ASSERT(bursts(listener.receiver.counters()) == burst_count);
+  RC_ASSERT(listener.bursts() == burst_count);
   RC_ASSERT(listener.receiver.is_idle());
 }
 

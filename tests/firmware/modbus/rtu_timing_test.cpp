@@ -15,23 +15,15 @@ static_assert(CharacterFormat{Parity::none, 2}.bits() == 11);
 static_assert(CharacterFormat{Parity::none, 1}.bits() == 10);
 static_assert(CharacterFormat{Parity::odd, 2}.bits() == 12);
 static_assert(rtu_timing(9600) == RtuTiming{1146, 1719, 4011});
+static_assert(rtu_timing(9600, {Parity::none, 1}) == RtuTiming{1042, 1563, 3646});
+static_assert(rtu_timing(19200) == RtuTiming{573, 860, 2006});
+static_assert(rtu_timing(19201) == RtuTiming{573, 750, 1750}, "fixed above 19200 baud");
 
-TEST(RtuTiming, ProportionalUpTo19200Baud) {
-  EXPECT_EQ(rtu_timing(1200), (RtuTiming{9167, 13750, 32084}));
-  EXPECT_EQ(rtu_timing(9600), (RtuTiming{1146, 1719, 4011}));
-  EXPECT_EQ(rtu_timing(19200), (RtuTiming{573, 860, 2006}));
-}
-
-TEST(RtuTiming, FixedAbove19200Baud) {
-  EXPECT_EQ(rtu_timing(19201), (RtuTiming{573, 750, 1750}));
-  EXPECT_EQ(rtu_timing(38400), (RtuTiming{287, 750, 1750}));
-  EXPECT_EQ(rtu_timing(115200), (RtuTiming{96, 750, 1750}));
-  EXPECT_EQ(rtu_timing(921600), (RtuTiming{12, 750, 1750}));
-}
-
-TEST(RtuTiming, TenBitCharacters) {
-  EXPECT_EQ(rtu_timing(9600, {Parity::none, 1}), (RtuTiming{1042, 1563, 3646}));
-}
+// Wraps, and never goes backwards.
+static_assert(elapsed_us(5, 0xFFFF'FFFE) == 7);
+static_assert(elapsed_us(0x7FFF'FFFF, 0) == 0x7FFF'FFFF);
+static_assert(elapsed_us(10, 11) == 0);
+static_assert(elapsed_us(0xFFFF'FFFF, 3) == 0);
 
 RC_GTEST_PROP(RtuTiming, RoundedUpByLessThanOneMicrosecond, ()) {
   const auto baud_rate = *rc::gen::inRange<std::uint32_t>(baud_rate_min, baud_rate_max + 1);
@@ -50,13 +42,6 @@ RC_GTEST_PROP(RtuTiming, RoundedUpByLessThanOneMicrosecond, ()) {
     RC_ASSERT(timing.t1_5_us == 750U);
     RC_ASSERT(timing.t3_5_us == 1750U);
   }
-}
-
-TEST(ElapsedUs, WrapsAndNeverGoesBackwards) {
-  static_assert(elapsed_us(5, 0xFFFF'FFFE) == 7);
-  static_assert(elapsed_us(0x7FFF'FFFF, 0) == 0x7FFF'FFFF);
-  static_assert(elapsed_us(10, 11) == 0);
-  static_assert(elapsed_us(0xFFFF'FFFF, 3) == 0);
 }
 
 }  // namespace
