@@ -8,13 +8,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "board/odrive_v3/description.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "tests/benchmarks/speed_and_error/sections.hpp"
 
 namespace kmax::benchmark {
 namespace {
 
-constexpr double clock_frequency = 168e6;  // Hz, the STM32F405's highest
+constexpr double clock_frequency = board::odrive_v3::description.core_clock_hz;
 
 // Of a tick's steps, those that are HapticLoop::tick().
 constexpr std::array haptic_steps{"re-sampling",  "velocity (FOAW)", "adaptive wall",
