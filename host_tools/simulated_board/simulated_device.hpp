@@ -8,7 +8,7 @@
 
 #include "firmware/application.hpp"
 #include "host_tools/simulated_board/simulated_power.hpp"
-#include "host_tools/simulation/axis_encoder.hpp"
+#include "host_tools/simulation/quadrature_encoder.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulated_board {

@@ -52,7 +52,7 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
     supply.draw(flow.charge);
     torque_sum += torque;
     const double force = torque / transmission_;
-    handle_.advance(force, background_from_motor_ ? force : background_force_, piece);
+    handle_.advance(force, background_force_, piece);
     acceleration_ = (handle_.velocity() - velocity) / piece;
     coupling_.update(handle_.position(), torque);
     encoder_.update(coupling_.disc());
@@ -99,7 +99,6 @@ void MotorDrive::set_background_force(double force) {
   if (!(std::abs(force) <= 1e6))
     throw std::invalid_argument(fmt::format("background force = {} N: allowed is -1e6 to 1e6 N", force));
   background_force_ = force;
-  background_from_motor_ = false;
 }
 
 TerminalValues MotorDrive::currents() const {

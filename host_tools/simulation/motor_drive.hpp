@@ -20,10 +20,7 @@
 //
 // Background force: CoupledHandle wants to know the background force (the field's and F_B) that makes the
 // person co-contract, apart from the whole force. A motor shows only the whole. So it is a setting: 0 unless
-// set_background_force() is called, by whoever knows what the firmware commands. background_from_motor()
-// takes the motor's own force instead; that counts the wall's force as background too, and so overstates the
-// activation against the calibration in operator_model.hpp, by the push force when pressing against a plain
-// wall.
+// set_background_force() is called, by whoever knows what the firmware commands.
 //
 // Cost of advance() for 25 us with a person, who costs 0.1 us of it: brushed 0.3 us, synchronous 0.5 us, and
 // with a current in the dead time's band 0.4 and 0.7 us (a busy machine: three tasks on each core). No heap.
@@ -93,7 +90,6 @@ class MotorDrive {
   void hold(bool held);
 
   void set_background_force(double force);  // N; throws std::invalid_argument unless finite
-  void background_from_motor() { background_from_motor_ = true; }
 
   TerminalValues currents() const;      // A, into the motor's terminals, now
   TerminalValues leg_currents() const;  // A, out of the inverter's legs, now
@@ -118,7 +114,6 @@ class MotorDrive {
   std::array<bool, terminal_count> leg_on_{};
   double acceleration_ = 0.0;  // m/s2, of the last piece
   double background_force_ = 0.0;
-  bool background_from_motor_ = false;
   double mean_torque_ = 0.0;
 };
 

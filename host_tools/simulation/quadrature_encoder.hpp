@@ -17,6 +17,7 @@
 // Cost of update(): 10 ns; with dropouts 1 ns per edge more. No heap.
 
 #include <cstdint>
+#include <optional>
 
 #include "host_tools/simulation/encoder_config.hpp"
 #include "host_tools/simulation/noise_generator.hpp"
@@ -59,6 +60,37 @@ class QuadratureEncoder {
   std::int64_t edges_;
   std::int64_t lost_ = 0;
   bool plugged_ = true;
+};
+
+// The encoder of an axis without a motor: true position in, counter value out. Ideal (EncoderModel) unless
+// the scene asks for noise or dropouts; then the lines are simulated. sample() costs a division, or update().
+class AxisEncoder {
+ public:
+  // `position`: m, where the handle is now. Throws std::invalid_argument.
+  AxisEncoder(const EncoderConfig& config, double position, std::uint64_t seed)
+      : ideal_(config.count_length()) {
+    if (has_defects(config)) lines_.emplace(config, position, seed);
+  }
+
+  // Once in every tick: with noise every look shows something else. Throws std::domain_error for a position
+  // that cannot be counted.
+  std::uint32_t sample(double position) {
+    if (!lines_) return ideal_.counts(position);
+    lines_->update(position);
+    return static_cast<std::uint32_t>(lines_->edges());
+  }
+
+  // What a look now would show, without looking: with defects what the last sample() has shown.
+  std::uint32_t counts(double position) const {
+    return lines_ ? static_cast<std::uint32_t>(lines_->edges()) : ideal_.counts(position);
+  }
+
+  // By dropouts, number of.
+  std::int64_t lost_edges() const { return lines_ ? lines_->lost_edges() : 0; }
+
+ private:
+  EncoderModel ideal_;
+  std::optional<QuadratureEncoder> lines_;
 };
 
 }  // namespace kmax::simulation

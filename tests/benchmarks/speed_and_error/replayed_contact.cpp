@@ -35,11 +35,7 @@ CoupledHandle held_handle(const Method& method) {
 }
 
 simulation::ReferenceHandle reference_handle() {
-  const simulation::OperatorModel person;
-  simulation::ReferenceHandle handle(simulation::DeviceModel{}, &person, motion(), motion().start_position,
-                                     0.0, 1e-6);
-  handle.begin();
-  return handle;
+  return {simulation::DeviceModel{}, simulation::OperatorModel{}, motion()};
 }
 
 // `advance(force, background)` goes on by one period and returns the handle's position.

@@ -26,8 +26,7 @@ class RandomChains {
 
   template <std::size_t masses>
   ChainDynamics chain() {
-    ChainDynamics chain;
-    chain.masses = masses;
+    ChainDynamics chain{.masses = masses};
     for (std::size_t i = 0; i < masses; ++i) {
       chain.mass[i] = over(1e-3, 1.0);
       if (masses == 1) break;
@@ -61,31 +60,44 @@ struct Counts {
 };
 
 template <std::size_t masses>
-void slides_like_the_series(Counts& counts, bool prepared) {
-  RandomChains random(41 + masses);
+void like_the_series(Counts& counts, bool resting, bool prepared = false) {
+  RandomChains random((resting ? 7 : 41) + masses);
   for (int n = 0; n < 4000; ++n) {
     const ChainDynamics chain = random.chain<masses>();
-    const double duration = random.over(1e-5, 4e-3);
-    const ChainPropagator<masses> propagator(chain, duration);
+    const ChainPropagator<masses> propagator(chain, random.over(1e-5, 4e-3));
     if (prepared) propagator.prepare_reversals();
     const double h = propagator.step();
     ASSERT_LE(propagator.coefficients().largest_rate() * h, 1.25 * (1.0 + 1e-12));
     for (int k = 0; k < 8; ++k) {
-      MovingChain fast;
-      fast.state = random.state<masses>(false);
+      MovingChain fast{.state = random.state<masses>(resting)};
+      const double origin = fast.state.position[0];
+      for (std::size_t i = 1; i < masses && resting; ++i) {  // a net force near the friction
+        fast.state.position[i] = origin + random.between(-1.5, 1.5) * chain.friction / chain.stiffness[0];
+        fast.state.velocity[i] *= random.over(1e-4, 1.0);
+      }
       MovingChain slow = fast;
-      const ChainInput input{random.sign() * random.over(1e-3, 5.0),
-                             fast.state.position[0] + random.between(-1e-2, 1e-2), random.between(-0.3, 0.3)};
+      slow.blocked = resting && k == 0;
+      const ChainInput input =
+          resting ? ChainInput{random.between(-0.5, 0.5) * chain.friction,
+                               origin + random.between(-1e-3, 1e-3), random.between(-0.01, 0.01)}
+                  : ChainInput{random.sign() * random.over(1e-3, 5.0), origin + random.between(-1e-2, 1e-2),
+                               random.between(-0.3, 0.3)};
       ++counts.tried;
-      if (!propagator.slide(fast.state, input.force, input.intended, input.intended_rate)) {
-        for (std::size_t i = 0; i < masses; ++i) ASSERT_EQ(fast.state.position[i], slow.state.position[i]);
+      const bool accepted =
+          resting
+              ? propagator.rest(fast.state, input.force, input.intended, input.intended_rate, slow.blocked)
+              : propagator.slide(fast.state, input.force, input.intended, input.intended_rate);
+      if (!accepted) {
+        ASSERT_FALSE(slow.blocked);
+        ASSERT_EQ(fast.state.position, slow.state.position);
         continue;
       }
       ++counts.accepted;
       counts.reversed += fast.state.velocity[0] * slow.state.velocity[0] < 0.0 ? 1 : 0;
-      double scale = 1.0 + std::abs(input.force) * h / chain.mass[0];
+      double scale = 1.0 + (resting ? 0.0 : std::abs(input.force) * h / chain.mass[0]);
       for (std::size_t i = 0; i < masses; ++i) scale += std::abs(slow.state.velocity[i]);
       ChainMotion<masses>(chain, masses).move_by_series(slow, input, h, 1.0);
+      ASSERT_TRUE(slow.sticking || !resting);
       for (std::size_t i = 0; i < masses; ++i) {
         ASSERT_NEAR(fast.state.velocity[i], slow.state.velocity[i], 1e-12 * scale) << n << " mass " << i;
         ASSERT_NEAR(fast.state.position[i], slow.state.position[i], 1e-14 * scale) << n << " mass " << i;
@@ -96,9 +108,9 @@ void slides_like_the_series(Counts& counts, bool prepared) {
 
 TEST(ChainPropagator, SlidesLikeTheSeries) {
   Counts one, two, three;
-  slides_like_the_series<1>(one, false);
-  slides_like_the_series<2>(two, false);
-  slides_like_the_series<3>(three, true);
+  like_the_series<1>(one, false);
+  like_the_series<2>(two, false);
+  like_the_series<3>(three, false, true);
   for (const Counts& counts : {one, two, three}) {
     EXPECT_GT(counts.accepted, counts.tried / 3) << counts.tried;
     EXPECT_LT(counts.accepted, counts.tried);
@@ -106,48 +118,10 @@ TEST(ChainPropagator, SlidesLikeTheSeries) {
   }
 }
 
-template <std::size_t masses>
-void rests_like_the_series(Counts& counts) {
-  RandomChains random(7 + masses);
-  for (int n = 0; n < 4000; ++n) {
-    const ChainDynamics chain = random.chain<masses>();
-    const ChainPropagator<masses> propagator(chain, random.over(1e-5, 4e-3));
-    const double h = propagator.step();
-    for (int k = 0; k < 8; ++k) {
-      MovingChain fast;
-      fast.state = random.state<masses>(true);
-      for (std::size_t i = 1; i < masses; ++i) {  // a net force near the friction
-        fast.state.position[i] =
-            fast.state.position[0] + random.between(-1.5, 1.5) * chain.friction / chain.stiffness[0];
-        fast.state.velocity[i] *= random.over(1e-4, 1.0);
-      }
-      MovingChain slow = fast;
-      slow.blocked = k == 0;
-      const ChainInput input{random.between(-0.5, 0.5) * chain.friction,
-                             fast.state.position[0] + random.between(-1e-3, 1e-3),
-                             random.between(-0.01, 0.01)};
-      ++counts.tried;
-      if (!propagator.rest(fast.state, input.force, input.intended, input.intended_rate, slow.blocked)) {
-        ASSERT_FALSE(slow.blocked);
-        continue;
-      }
-      ++counts.accepted;
-      ChainMotion<masses>(chain, masses).move_by_series(slow, input, h, 1.0);
-      ASSERT_TRUE(slow.sticking);
-      double scale = 1.0;
-      for (std::size_t i = 1; i < masses; ++i) scale += std::abs(slow.state.velocity[i]);
-      for (std::size_t i = 0; i < masses; ++i) {
-        ASSERT_NEAR(fast.state.velocity[i], slow.state.velocity[i], 1e-12 * scale) << n << " mass " << i;
-        ASSERT_NEAR(fast.state.position[i], slow.state.position[i], 1e-14 * scale) << n << " mass " << i;
-      }
-    }
-  }
-}
-
 TEST(ChainPropagator, RestsLikeTheSeries) {
   Counts two, three;
-  rests_like_the_series<2>(two);
-  rests_like_the_series<3>(three);
+  like_the_series<2>(two, true);
+  like_the_series<3>(three, true);
   for (const Counts& counts : {two, three}) {
     EXPECT_GT(counts.accepted, counts.tried / 5) << counts.tried;
     EXPECT_LT(counts.accepted, counts.tried);
@@ -155,10 +129,7 @@ TEST(ChainPropagator, RestsLikeTheSeries) {
 }
 
 TEST(ChainPropagator, DividesAnIntervalThatIsLongForTheChain) {
-  ChainDynamics chain;
-  chain.masses = 2;
-  chain.mass = {1e-3, 0.2};
-  chain.stiffness = {1e6, 100.0};
+  ChainDynamics chain{.masses = 2, .mass = {1e-3, 0.2}, .stiffness = {1e6, 100.0}};
   const ChainPropagator<2> propagator(chain, 0.002);
   EXPECT_GT(propagator.steps(), 40);
   EXPECT_NEAR(propagator.step() * propagator.steps(), 0.002, 1e-18);
@@ -166,11 +137,7 @@ TEST(ChainPropagator, DividesAnIntervalThatIsLongForTheChain) {
 
 // What is not a number or overflows is never proven: the series, and its caller's checks, decide.
 TEST(ChainPropagator, AcceptsNothingThatIsNotFinite) {
-  ChainDynamics chain;
-  chain.masses = 2;
-  chain.mass = {0.045, 0.2};
-  chain.stiffness = {500.0, 100.0};
-  chain.friction = 0.1;
+  ChainDynamics chain{.masses = 2, .mass = {0.045, 0.2}, .stiffness = {500.0, 100.0}, .friction = 0.1};
   const ChainPropagator<2> propagator(chain, 0.002);
   for (const double bad : {std::nan(""), 1e300, -1e300}) {
     ChainState state;

@@ -21,10 +21,7 @@ std::vector<ContactSample> record(const std::function<double(double)>& position,
 }
 
 ContactCriterion window() {
-  ContactCriterion criterion;
-  criterion.window_begin = 2.0;
-  criterion.window_end = 3.0;
-  return criterion;
+  return ContactCriterion{.window_begin = 2.0, .window_end = 3.0};
 }
 
 TEST(ContactMeasure, StillHandleInsideTheWallIsStable) {

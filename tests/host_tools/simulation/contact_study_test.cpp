@@ -151,8 +151,7 @@ TEST(ContactStudy, VerdictsDoNotHangOnDetailsThatNobodyKnows) {
     for (const bool nearest : {false, true}) {
       for (const double offset : {0.0, 2e-5}) {
         for (const double delay : {0.0, 50e-6, 200e-6, 500e-6}) {
-          IntendedMotionConfig motion;
-          motion.approach_speed = speed;
+          IntendedMotionConfig motion{.approach_speed = speed};
           const auto trial = [&](double coefficient) {
             return run({.coefficient = coefficient,
                         .round_to_nearest = nearest,
@@ -180,10 +179,8 @@ TEST(ContactStudy, VerdictsDoNotHangOnDetailsThatNobodyKnows) {
 // N, and a clipped force cannot swing upwards: even a hand that does not stiffen is still at 2 N. Without
 // clipping it swings by more than the plain wall, so figure 11 alone is no evidence for a stiffening hand.
 TEST(ContactStudy, ClippingAloneMakesTwoNewtonsStable) {
-  OperatorModel unchanged;
-  unchanged.activation_gain = 0.0;
-  DeviceModel unclipped;
-  unclipped.force_limit = 0.0;
+  OperatorModel unchanged{.activation_gain = 0.0};
+  DeviceModel unclipped{.force_limit = 0.0};
   EXPECT_EQ(run({.coefficient = 2.0}, {}, unchanged).measure.verdict, ContactVerdict::stable);
   const Trial free = run({.coefficient = 2.0}, {}, unchanged, unclipped);
   EXPECT_EQ(free.measure.verdict, ContactVerdict::unstable);
@@ -196,8 +193,7 @@ TEST(ContactStudy, ClippingAloneMakesTwoNewtonsStable) {
 // A slow approach does not start the oscillation of 1 N and of the adaptive wall at all; that of the plain
 // wall starts at any speed.
 TEST(ContactStudy, ASlowApproachHidesTheInstabilityOfAWeakField) {
-  IntendedMotionConfig slow;
-  slow.approach_speed = 0.1;
+  IntendedMotionConfig slow{.approach_speed = 0.1};
   EXPECT_EQ(run({.coefficient = 0.0}, slow).measure.verdict, ContactVerdict::unstable);
   EXPECT_EQ(run({.coefficient = 1.0}, slow).measure.verdict, ContactVerdict::stable);
   EXPECT_EQ(run({.field = Field::instant}, slow).measure.verdict, ContactVerdict::stable);

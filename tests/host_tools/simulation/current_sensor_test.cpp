@@ -12,9 +12,7 @@ namespace {
 using Channel = CurrentSensor::Channel;
 
 TEST(CurrentSensor, VoltsAtThePinAreMiddleAndOffsetAndGainTimesShuntTimesCurrent) {
-  CurrentSensorConfig config;
-  config.offset_b = 0.010;
-  config.offset_c = -0.020;
+  CurrentSensorConfig config{.offset_b = 0.010, .offset_c = -0.020};
   CurrentSensor sensor(config);
   EXPECT_NEAR(sensor.sample(Channel::b, 0.0), 1.660, 1e-15);
   EXPECT_NEAR(sensor.sample(Channel::c, 0.0), 1.630, 1e-15);
@@ -42,8 +40,7 @@ TEST(CurrentSensor, ShortedInputsShowTheOffsetAlone) {
 }
 
 TEST(CurrentSensor, NoiseHasItsSizeAndGrowsWithTheGain) {
-  CurrentSensorConfig config;
-  config.noise = 10e-6;
+  CurrentSensorConfig config{.noise = 10e-6};
   for (const double gain : {10.0, 80.0}) {
     config.gain = gain;
     CurrentSensor sensor(config, 5);
@@ -60,8 +57,7 @@ TEST(CurrentSensor, NoiseHasItsSizeAndGrowsWithTheGain) {
 }
 
 TEST(CurrentSensor, TheSameSeedGivesTheSameNoiseOnEachChannel) {
-  CurrentSensorConfig config;
-  config.noise = 10e-6;
+  CurrentSensorConfig config{.noise = 10e-6};
   CurrentSensor one(config, 7), two(config, 7), other(config, 8);
   int equal = 0;
   for (int n = 0; n < 100; ++n) {
@@ -75,8 +71,7 @@ TEST(CurrentSensor, TheSameSeedGivesTheSameNoiseOnEachChannel) {
 }
 
 TEST(CurrentSensor, AnInvertedChannelReadsTheOtherSignAndKeepsItsOffset) {
-  CurrentSensorConfig config;
-  config.offset_b = 0.01;
+  CurrentSensorConfig config{.offset_b = 0.01};
   CurrentSensor sensor(config);
   sensor.invert(Channel::b, true);
   EXPECT_NEAR(sensor.sample(Channel::b, 5.0), 1.65 + 0.01 - 0.1, 1e-12);
@@ -90,12 +85,9 @@ TEST(CurrentSensor, RefusesWhatIsNotANumberOrNoSensor) {
   EXPECT_THROW(sensor.sample(Channel::b, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
   EXPECT_THROW(sensor.set_gain(0.0), std::invalid_argument);
   EXPECT_EQ(sensor.gain(), 40.0);
-  CurrentSensorConfig config;
-  config.shunt = 0.0;
-  EXPECT_THROW(CurrentSensor{config}, std::invalid_argument);
-  config = {};
-  config.noise = -1e-6;
-  EXPECT_THROW(CurrentSensor{config}, std::invalid_argument);
+  for (const CurrentSensorConfig& config :
+       {CurrentSensorConfig{.shunt = 0.0}, CurrentSensorConfig{.noise = -1e-6}})
+    EXPECT_THROW(CurrentSensor{config}, std::invalid_argument);
 }
 
 }  // namespace

@@ -11,12 +11,8 @@ namespace kmax::simulation::intended_motion_test {
 namespace {
 
 IntendedMotionConfig example() {
-  IntendedMotionConfig config;
-  config.start_position = 0.02;
-  config.approach_speed = 0.2;
-  config.push_force = 1.0;
-  config.hold_time = 0.5;
-  return config;
+  return IntendedMotionConfig{
+      .start_position = 0.02, .approach_speed = 0.2, .push_force = 1.0, .hold_time = 0.5};
 }
 
 // The short cut says the same as advance() wherever it applies, and applies to nearly all pieces.

@@ -231,15 +231,13 @@ TEST(Inverter, SwitchingOffOneLegOfThree) {
 
 TEST(Inverter, EveryStateOfEveryLegStaysFiniteAndNeverFeedsBackThroughAWrongDiode) {
   const Inverter inverter;
-  SynchronousMotorConfig salient;
-  salient.inductance_q = 0.5e-3;
+  SynchronousMotorConfig salient{.inductance_q = 0.5e-3};
   SynchronousMotor motor(salient);
   std::uint64_t state = 1;
   double angle = 0.0;
   for (int n = 0; n < 20000; ++n) {
     state = state * 6364136223846793005u + 1442695040888963407u;
-    InverterCommand command;
-    command.dead_time = (state >> 60 & 1) != 0 ? 400e-9 : 0.0;
+    InverterCommand command{.dead_time = (state >> 60 & 1) != 0 ? 400e-9 : 0.0};
     for (std::size_t k = 0; k < 3; ++k) {
       command.legs[k].enabled = (state >> (20 + k) & 1) != 0;
       command.legs[k].duty = static_cast<double>(state >> (30 + 8 * k) & 0xFF) / 255.0;

@@ -38,29 +38,19 @@ void check_every_field(const std::array<ModelField<Model>, count>& fields) {
   }
 }
 
-TEST(ModelField, EveryNumberOfTheDeviceHasARange) {
-  // The structure behind it has a table of its own.
+TEST(ModelField, EveryNumberHasARange) {
+  // The structure behind the device has a table of its own.
   static_assert(offsetof(DeviceModel, structure) == device_fields.size() * sizeof(double));
-  check_every_field(device_fields);
-}
-
-TEST(ModelField, EveryNumberOfTheStructureHasARange) {
   static_assert(sizeof(StructureModel) == structure_fields.size() * sizeof(double));
-  check_every_field(structure_fields);
-}
-
-TEST(ModelField, EveryNumberOfTheOperatorHasARange) {
   static_assert(sizeof(OperatorModel) == operator_fields.size() * sizeof(double));
+  check_every_field(device_fields);
+  check_every_field(structure_fields);
   check_every_field(operator_fields);
-}
-
-TEST(ModelField, EveryNumberOfTheIntegratorHasARange) {
   check_every_field(integrator_fields);
 }
 
 TEST(ModelField, MessageGivesValueAndRange) {
-  DeviceModel device;
-  device.mass = -1.0;
+  DeviceModel device{.mass = -1.0};
   try {
     validate(device);
     FAIL();

@@ -17,12 +17,10 @@ DeviceModel frictionless(double damping = 0.5) {
 }
 
 MotorDriveConfig config_of(const MotorConfig& motor) {
-  MotorDriveConfig config;
-  config.motor = motor;
-  config.inverter = {0.0, 0.8};
-  config.encoder.transmission = 0.01;
-  config.encoder.counts_per_turn = 4096;
-  return config;
+  return {.motor = motor,
+          .inverter = {0.0, 0.8},
+          .current_sensor = {},
+          .encoder = {.counts_per_turn = 4096, .transmission = 0.01}};
 }
 
 MotorDrive brushed_drive(const DeviceModel& device = frictionless()) {
@@ -48,37 +46,46 @@ InverterCommand along_q(const MotorDrive& drive, double volts, double supply) {
   return command;
 }
 
-void run(MotorDrive& drive, Supply& supply, const InverterCommand& command, double duration,
-         double step = interval) {
-  const int steps = static_cast<int>(std::lround(duration / step));
-  for (int n = 0; n < steps; ++n) {
-    drive.advance(step, command, supply);
-    supply.advance(step);
-  }
+// `volts` between the terminals of a brushed motor, from 24 V.
+InverterCommand brushed(double volts) {
+  return duties(0.0, 0.5 + volts / 48, 0.5 - volts / 48);
 }
+const InverterCommand forwards = duties(0.0, 0.6, 0.4);
 
-TEST(MotorDrive, ForceOnTheHandleIsTorqueOverTransmission) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
+struct Bench {
+  MotorDrive drive;
+  Supply supply{};
+
+  void run(const InverterCommand& command, double duration, double step = interval) {
+    for (int n = 0; n < std::lround(duration / step); ++n) {
+      drive.advance(step, command, supply);
+      supply.advance(step);
+    }
+  }
+};
+
+// With a brushed motor, unless a test has its own.
+class MotorDriveTest : public testing::Test, public Bench {
+ protected:
+  MotorDriveTest() : Bench{brushed_drive()} {}
+};
+
+TEST_F(MotorDriveTest, ForceOnTheHandleIsTorqueOverTransmission) {
   drive.block(true);
   // 1.1 A make 3.3 N.
-  run(drive, supply, duties(0.0, 0.5 + 1.1 / 48, 0.5 - 1.1 / 48), 0.02);
+  run(brushed(1.1), 0.02);
   EXPECT_NEAR(drive.currents()[terminal_b], 1.1, 1e-3);
   EXPECT_NEAR(drive.force(), 3.3, 4e-3);
   EXPECT_EQ(drive.handle().applied_force(), drive.force());
   EXPECT_EQ(drive.shaft_speed(), 0.0);
 }
 
-TEST(MotorDrive, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
+TEST_F(MotorDriveTest, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
   for (const bool brushed : {true, false}) {
-    MotorDrive drive = brushed ? brushed_drive() : synchronous_drive();
-    Supply supply({24.0, 1e-4, 1.0});  // stiff
-    for (int n = 0; n < 40000; ++n) {
-      drive.advance(interval,
-                    brushed ? duties(0.0, 0.5 + 2.0 / 48, 0.5 - 2.0 / 48) : along_q(drive, 2.0, 24.0),
-                    supply);
-      supply.advance(interval);
-    }
+    drive = brushed ? brushed_drive() : synchronous_drive();
+    supply = Supply({24.0, 1e-4, 1.0});  // stiff
+    for (int n = 0; n < 40000; ++n)
+      run(brushed ? motor_drive_test::brushed(2.0) : along_q(drive, 2.0, 24.0), interval);
     // Per radian of the shaft: k (V - E) / R = damping x transmission^2 x speed; the q axis sees E = 2/3 k
     // speed.
     const double k = brushed ? 0.03 : 0.05, resistance = brushed ? 1.0 : 0.6,
@@ -89,22 +96,18 @@ TEST(MotorDrive, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
   }
 }
 
-TEST(MotorDrive, EnergyFromTheSupplyIsHeatAndMotion) {
+TEST_F(MotorDriveTest, EnergyFromTheSupplyIsHeatAndMotion) {
   for (const bool brushed : {true, false}) {
     const DeviceModel device = frictionless(2.0);
-    MotorDrive drive = brushed ? brushed_drive(device) : synchronous_drive(device);
-    Supply supply({24.0, 1e-4, 1.0});
+    drive = brushed ? brushed_drive(device) : synchronous_drive(device);
+    supply = Supply({24.0, 1e-4, 1.0});
     double heat = 0.0, damped = 0.0, given = 0.0;
     for (int n = 0; n < 8000; ++n) {
       const double volts = n < 3000 ? 3.0 : n < 5000 ? -2.0 : 1.0;
       const TerminalValues begin = drive.currents();
       const double speed = drive.handle().velocity(), voltage = supply.voltage();
       const double source = supply.source_charge();
-      drive.advance(
-          interval,
-          brushed ? duties(0.0, 0.5 + volts / 48, 0.5 - volts / 48) : along_q(drive, volts, supply.voltage()),
-          supply);
-      supply.advance(interval);
+      run(brushed ? motor_drive_test::brushed(volts) : along_q(drive, volts, supply.voltage()), interval);
       const TerminalValues end = drive.currents();
       for (std::size_t k = 0; k < 3; ++k) {
         heat += (brushed ? 0.5 : 0.6) * interval / 3 *
@@ -122,101 +125,85 @@ TEST(MotorDrive, EnergyFromTheSupplyIsHeatAndMotion) {
   }
 }
 
-TEST(MotorDrive, SplittingIsOfSecondOrderInTheInterval) {
+TEST_F(MotorDriveTest, SplittingIsOfSecondOrderInTheInterval) {
   const auto end = [](double step) {
-    MotorDrive drive = brushed_drive();
-    Supply supply({24.0, 1e-4, 10.0});
-    run(drive, supply, duties(0.0, 0.6, 0.4), 0.01, step);
-    return drive.handle().velocity();
+    Bench bench{brushed_drive(), Supply({24.0, 1e-4, 10.0})};
+    bench.run(forwards, 0.01, step);
+    return bench.drive.handle().velocity();
   };
   const double fine = end(25e-6 / 64), coarse = end(25e-6), half = end(12.5e-6);
   EXPECT_NEAR(coarse, fine, 3e-6 * std::fabs(fine));
   EXPECT_LT(std::fabs(half - fine), 0.35 * std::fabs(coarse - fine) + 1e-12);
 }
 
-TEST(MotorDrive, LongIntervalsAreDivided) {
+TEST_F(MotorDriveTest, LongIntervalsAreDivided) {
   MotorDrive one = brushed_drive(), many = brushed_drive();
-  Supply supply({24.0, 1e-4, 10.0}), other({24.0, 1e-4, 10.0});
-  one.advance(1e-3, duties(0.0, 0.6, 0.4), supply);
-  for (int n = 0; n < 40; ++n) many.advance(25e-6, duties(0.0, 0.6, 0.4), other);
+  Supply first({24.0, 1e-4, 10.0}), other({24.0, 1e-4, 10.0});
+  one.advance(1e-3, forwards, first);
+  for (int n = 0; n < 40; ++n) many.advance(25e-6, forwards, other);
   EXPECT_NEAR(one.handle().velocity(), many.handle().velocity(), 1e-12);
 }
 
-TEST(MotorDrive, APersonPressesAgainstTheMotor) {
-  DeviceModel device;
-  device.force_limit = 0.0;
-  IntendedMotionConfig motion;
-  motion.start_position = 0.0;
-  motion.wall_position = -0.02;
-  CoupledHandle handle(device, OperatorModel{}, motion);
-  MotorDrive drive(config_of(BrushedDcMotorConfig{}), handle);
-  Supply supply;
+TEST_F(MotorDriveTest, APersonPressesAgainstTheMotor) {
+  const CoupledHandle handle(DeviceModel{.force_limit = 0.0}, OperatorModel{},
+                             IntendedMotionConfig{.start_position = 0.0, .wall_position = -0.02});
+  drive = MotorDrive(config_of(BrushedDcMotorConfig{}), handle);
   drive.handle().begin_motion();
   // A spring of 500 N/m by feedback from the encoder.
   for (int n = 0; n < 60000; ++n) {
     const double position =
         static_cast<double>(drive.encoder().edges()) * drive.encoder().config().count_length();
     const double force = std::fmax(0.0, -500.0 * (position + 0.02));
-    const double volts = force * 0.01 / 0.03 * 1.0;
-    drive.advance(interval, duties(0.0, 0.5 + volts / 48, 0.5 - volts / 48), supply);
-    supply.advance(interval);
+    run(brushed(force * 0.01 / 0.03), interval);
   }
   EXPECT_NEAR(drive.force(), 1.0, 0.3);
   EXPECT_NEAR(drive.handle().position(), -0.022, 0.001);
 }
 
-TEST(MotorDrive, AForceLimitIsRefusedWhenItClips) {
+TEST_F(MotorDriveTest, AForceLimitIsRefusedWhenItClips) {
   DeviceModel device = frictionless();
   device.force_limit = 1.0;
-  MotorDrive drive = brushed_drive(device);
+  Bench limited{brushed_drive(device)};
+  limited.drive.block(true);
+  EXPECT_THROW(limited.run(forwards, 0.01), std::logic_error);
   drive.block(true);
-  Supply supply;
-  EXPECT_THROW(run(drive, supply, duties(0.0, 0.6, 0.4), 0.01), std::logic_error);
-  device.force_limit = 0.0;
-  MotorDrive free = brushed_drive(device);
-  free.block(true);
-  run(free, supply, duties(0.0, 0.6, 0.4), 0.01);
-  EXPECT_GT(free.force(), 10.0);
+  run(forwards, 0.01);
+  EXPECT_GT(drive.force(), 10.0);
 }
 
-TEST(MotorDrive, BlockedItStandsAndLetGoItMoves) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+TEST_F(MotorDriveTest, BlockedItStandsAndLetGoItMoves) {
+  run(forwards, 0.01);
   const double position = drive.handle().position();
   ASSERT_GT(drive.handle().velocity(), 0.0);
   drive.block(true);
   EXPECT_EQ(drive.handle().velocity(), 0.0);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   EXPECT_EQ(drive.handle().position(), position);
   drive.block(false);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   EXPECT_GT(drive.handle().position(), position);
 }
 
-TEST(MotorDrive, LettingGoAHandDoesNotMendABlockedMotor) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
+TEST_F(MotorDriveTest, LettingGoAHandDoesNotMendABlockedMotor) {
   drive.hold(true);
   drive.block(true);
   drive.hold(false);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   EXPECT_EQ(drive.handle().position(), 0.0);
   drive.hold(true);
   drive.block(false);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   EXPECT_EQ(drive.handle().position(), 0.0);
   drive.hold(false);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   EXPECT_GT(drive.handle().position(), 0.0);
 }
 
-TEST(MotorDrive, SwappedWiresExchangeWhatTheLegsSee) {
-  MotorDrive drive = synchronous_drive();
+TEST_F(MotorDriveTest, SwappedWiresExchangeWhatTheLegsSee) {
+  drive = synchronous_drive();
   drive.block(true);
-  Supply supply;
   drive.swap_terminals(terminal_a, terminal_c);
-  run(drive, supply, duties(0.55, 0.48, 0.47), 0.02);
+  run(duties(0.55, 0.48, 0.47), 0.02);
   EXPECT_EQ(drive.leg_currents()[terminal_a], drive.currents()[terminal_c]);
   EXPECT_EQ(drive.leg_currents()[terminal_b], drive.currents()[terminal_b]);
   EXPECT_EQ(drive.leg_currents()[terminal_c], drive.currents()[terminal_a]);
@@ -225,15 +212,14 @@ TEST(MotorDrive, SwappedWiresExchangeWhatTheLegsSee) {
   EXPECT_THROW(drive.swap_terminals(terminal_a, 3), std::out_of_range);
 }
 
-TEST(MotorDrive, AReversedEncoderCountsDownAndItsIndexGoesWithIt) {
+TEST_F(MotorDriveTest, AReversedEncoderCountsDownAndItsIndexGoesWithIt) {
   MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
   config.encoder.reversed = true;
   config.encoder.index_position = 4000;
-  MotorDrive drive(config, CoupledHandle(frictionless()));
-  Supply supply;
+  drive = MotorDrive(config, CoupledHandle(frictionless()));
   bool seen = false;
   for (int n = 0; n < 3000; ++n) {
-    run(drive, supply, duties(0.0, 0.52, 0.48), interval);
+    run(duties(0.0, 0.52, 0.48), interval);
     ASSERT_EQ(drive.encoder().edges(),
               static_cast<std::int64_t>(std::floor(-drive.shaft_angle() / 6.283185307179586 * 4096)));
     seen = seen || (drive.encoder().lines().z && drive.encoder().edges() % 4096 == 4000 - 4096);
@@ -241,7 +227,7 @@ TEST(MotorDrive, AReversedEncoderCountsDownAndItsIndexGoesWithIt) {
   EXPECT_TRUE(seen);
 }
 
-TEST(MotorDrive, ABlockedHandleHoldsAgainstAPerson) {
+TEST_F(MotorDriveTest, ABlockedHandleHoldsAgainstAPerson) {
   for (const double friction : {0.0, 0.1}) {
     IntendedMotionConfig motion;
     CoupledHandle handle({0.045, 0.05, friction, 0.0}, OperatorModel{}, motion);
@@ -256,27 +242,23 @@ TEST(MotorDrive, ABlockedHandleHoldsAgainstAPerson) {
   }
 }
 
-TEST(MotorDrive, OpenPhases) {
-  MotorDrive dc = brushed_drive();
-  Supply supply;
-  dc.open_terminal(terminal_c, true);
-  run(dc, supply, duties(0.0, 0.9, 0.1), 0.01);
-  EXPECT_EQ(dc.force(), 0.0);
-  EXPECT_EQ(dc.handle().position(), 0.0);
+TEST_F(MotorDriveTest, OpenPhases) {
+  drive.open_terminal(terminal_c, true);
+  run(duties(0.0, 0.9, 0.1), 0.01);
+  EXPECT_EQ(drive.force(), 0.0);
+  EXPECT_EQ(drive.handle().position(), 0.0);
 
-  MotorDrive three = synchronous_drive();
-  three.block(true);
-  three.open_terminal(terminal_b, true);
-  run(three, supply, duties(0.6, 0.9, 0.4), 0.01);
-  EXPECT_NEAR(three.currents()[terminal_b], 0.0, 1e-14);
-  EXPECT_NEAR(three.currents()[terminal_a], 0.2 * supply.voltage() / 1.2, 1e-2);
+  drive = synchronous_drive();
+  drive.block(true);
+  drive.open_terminal(terminal_b, true);
+  run(duties(0.6, 0.9, 0.4), 0.01);
+  EXPECT_NEAR(drive.currents()[terminal_b], 0.0, 1e-14);
+  EXPECT_NEAR(drive.currents()[terminal_a], 0.2 * supply.voltage() / 1.2, 1e-2);
 }
 
-TEST(MotorDrive, ThePinsShowTheCurrentWhileSomethingConductsBelow) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
+TEST_F(MotorDriveTest, ThePinsShowTheCurrentWhileSomethingConductsBelow) {
   drive.block(true);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   const double current = drive.currents()[terminal_b];
   ASSERT_GT(current, 4.0);
   EXPECT_NEAR(drive.current_pin(Channel::b, true), 1.65 + 0.02 * current, 1e-12);
@@ -289,79 +271,64 @@ TEST(MotorDrive, ThePinsShowTheCurrentWhileSomethingConductsBelow) {
   EXPECT_EQ(drive.current_pin(Channel::c, true), 1.65);
 }
 
-TEST(MotorDrive, BrakingPumpsTheSupplyUp) {
-  MotorDrive drive = brushed_drive();
-  Supply supply({24.0, 0.05, 100e-6});
-  run(drive, supply, duties(0.0, 0.75, 0.25), 0.2);
+TEST_F(MotorDriveTest, BrakingPumpsTheSupplyUp) {
+  supply = Supply({24.0, 0.05, 100e-6});
+  run(duties(0.0, 0.75, 0.25), 0.2);
   EXPECT_LT(supply.voltage(), 24.0);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.02);
+  run(forwards, 0.02);
   EXPECT_GT(supply.voltage(), 24.1);
 }
 
-TEST(MotorDrive, WithoutSupplyThereIsSoonNoForce) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
+TEST_F(MotorDriveTest, WithoutSupplyThereIsSoonNoForce) {
   drive.block(true);
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.01);
+  run(forwards, 0.01);
   supply.disconnect();
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.3);
+  run(forwards, 0.3);
   EXPECT_LT(supply.voltage(), 0.1);
   EXPECT_NEAR(drive.force(), 0.0, 0.1);
 }
 
-TEST(MotorDrive, TheEncoderFollowsTheHandle) {
-  MotorDrive drive = brushed_drive();
-  Supply supply;
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.1);
+TEST_F(MotorDriveTest, TheEncoderFollowsTheHandle) {
+  run(forwards, 0.1);
   const double turns = drive.handle().position() / 0.01 / 6.283185307179586;
   EXPECT_EQ(drive.encoder().edges(), static_cast<std::int64_t>(std::floor(turns * 4096)));
   drive.encoder().set_plugged(false);
   const std::int64_t before = drive.encoder().edges();
-  run(drive, supply, duties(0.0, 0.6, 0.4), 0.1);
+  run(forwards, 0.1);
   EXPECT_EQ(drive.encoder().edges(), before);
 }
 
-TEST(MotorDrive, TheBackgroundForceIsASetting) {
-  IntendedMotionConfig motion;
-  const CoupledHandle handle({0.045, 0.05, 0.093, 0.0}, OperatorModel{}, motion);
-  Supply supply;
-  const auto activation = [&](auto prepare) {
-    MotorDrive drive(config_of(BrushedDcMotorConfig{}), handle);
-    prepare(drive);
-    run(drive, supply, duties(0.0, 0.5 + 0.01, 0.5 - 0.01), 0.2);
-    return drive.handle().activation();
-  };
-  EXPECT_EQ(activation([](MotorDrive&) {}), 0.0);
-  EXPECT_NEAR(activation([](MotorDrive& drive) { drive.set_background_force(2.0); }),
-              2.0 * (1.0 - std::exp(-0.5)), 1e-9);
-  EXPECT_GT(activation([](MotorDrive& drive) { drive.background_from_motor(); }), 0.2);
+TEST_F(MotorDriveTest, TheBackgroundForceIsASetting) {
+  for (const double force : {0.0, 2.0}) {
+    drive = MotorDrive(config_of(BrushedDcMotorConfig{}),
+                       CoupledHandle({.force_limit = 0.0}, OperatorModel{}, IntendedMotionConfig{}));
+    drive.set_background_force(force);
+    run(brushed(0.48), 0.2);
+    EXPECT_NEAR(drive.handle().activation(), force * (1.0 - std::exp(-0.5)), 1e-9);
+  }
 }
 
-TEST(MotorDrive, CoggingMovesAFreeHandleIntoItsPosition) {
-  SynchronousMotorConfig motor;
-  motor.cogging_torque = 2e-3;
-  motor.cogging_periods = 36;
+TEST_F(MotorDriveTest, CoggingMovesAFreeHandleIntoItsPosition) {
+  SynchronousMotorConfig motor{.cogging_torque = 2e-3, .cogging_periods = 36};
   CoupledHandle start(frictionless(5.0), {0.0004, 0.0});  // 0.04 rad, a positions' distance is 0.175 rad
-  MotorDrive drive(config_of(motor), start);
-  Supply supply;
-  run(drive, supply, InverterCommand{}, 1.0);
+  drive = MotorDrive(config_of(motor), start);
+  run(InverterCommand{}, 1.0);
   EXPECT_NEAR(drive.shaft_angle(), 0.0, 1e-6);
 }
 
-TEST(MotorDrive, TheSameSeedGivesTheSameRun) {
+TEST_F(MotorDriveTest, TheSameSeedGivesTheSameRun) {
   MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
   config.current_sensor.noise = 1e-5;
   config.encoder.dropout_probability = 0.1;
   config.encoder.counts_per_turn = 40000;
   config.seed = 17;
   const auto record = [&] {
-    MotorDrive drive(config, CoupledHandle(frictionless()));
-    Supply supply;
+    Bench bench{MotorDrive(config, CoupledHandle(frictionless()))};
     double sum = 0.0;
     for (int n = 0; n < 2000; ++n) {
-      const double pin = drive.current_pin(Channel::b, true);
-      sum += pin * (n + 1) + static_cast<double>(drive.encoder().edges());
-      run(drive, supply, duties(0.0, pin > 1.65 ? 0.55 : 0.6, 0.4), interval);
+      const double pin = bench.drive.current_pin(Channel::b, true);
+      sum += pin * (n + 1) + static_cast<double>(bench.drive.encoder().edges());
+      bench.run(duties(0.0, pin > 1.65 ? 0.55 : 0.6, 0.4), interval);
     }
     return sum;
   };
@@ -371,12 +338,10 @@ TEST(MotorDrive, TheSameSeedGivesTheSameRun) {
   EXPECT_NE(first, record());
 }
 
-TEST(MotorDrive, RefusesWhatIsNotANumber) {
+TEST_F(MotorDriveTest, RefusesWhatIsNotANumber) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  MotorDrive drive = brushed_drive();
-  Supply supply;
-  EXPECT_THROW(drive.advance(nan, duties(0, 0.5, 0.5), supply), std::invalid_argument);
-  EXPECT_THROW(drive.advance(-1e-6, duties(0, 0.5, 0.5), supply), std::invalid_argument);
+  for (const double duration : {nan, -1e-6})
+    EXPECT_THROW(drive.advance(duration, duties(0, 0.5, 0.5), supply), std::invalid_argument);
   EXPECT_THROW(drive.advance(25e-6, duties(0, nan, 0.5), supply), std::invalid_argument);
   EXPECT_THROW(drive.set_background_force(nan), std::invalid_argument);
   EXPECT_EQ(drive.handle().samples(), 0u);

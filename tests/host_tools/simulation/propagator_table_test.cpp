@@ -77,24 +77,13 @@ TEST(PropagatorTable, KeepsSixteenDurations) {
 
 TEST(PropagatorTable, ServesOnePersonWithOneDevice) {
   const PropagatorTable table(DeviceModel{}, OperatorModel{});
-  EXPECT_TRUE(table.fits(DeviceModel{}, OperatorModel{}));
-  DeviceModel late;
-  late.delay = 0.001;
-  late.force_limit = 0.0;
-  EXPECT_TRUE(table.fits(late, OperatorModel{}));
-  OperatorModel calm;
-  calm.activation_gain = 0.0;
-  EXPECT_TRUE(table.fits(DeviceModel{}, calm));
-  DeviceModel heavy;
-  heavy.mass = 0.05;
-  EXPECT_FALSE(table.fits(heavy, OperatorModel{}));
-  DeviceModel bending;
-  bending.structure = StructureModel{};
-  EXPECT_FALSE(table.fits(bending, OperatorModel{}));
-  OperatorModel firm;
-  firm.grip_damping = 2.0;
-  EXPECT_FALSE(table.fits(DeviceModel{}, firm));
-
+  EXPECT_TRUE(table.fits({}, {}));
+  EXPECT_TRUE(table.fits({.force_limit = 0.0, .delay = 0.001}, {}));
+  EXPECT_TRUE(table.fits({}, {.activation_gain = 0.0}));
+  const DeviceModel heavy{.mass = 0.05};
+  EXPECT_FALSE(table.fits(heavy, {}));
+  EXPECT_FALSE(table.fits({.structure = StructureModel{}}, {}));
+  EXPECT_FALSE(table.fits({}, {.grip_damping = 2.0}));
   const auto shared = std::make_shared<PropagatorTable>(DeviceModel{}, OperatorModel{});
   CoupledHandle other(heavy, OperatorModel{}, IntendedMotionConfig{});
   EXPECT_THROW(other.share(shared), std::invalid_argument);
@@ -150,8 +139,7 @@ double largest_difference(const Trace& one, const Trace& other) {
 }
 
 TEST(PropagatorTable, InterpolatesOverTheGainOfAField) {
-  DeviceModel bending;
-  bending.structure = StructureModel{};
+  DeviceModel bending{.structure = StructureModel{}};
   for (const DeviceModel& device : {DeviceModel{}, bending}) {
     for (const double interval : {0.002, 50e-6}) {
       const Trace exact = contact(nullptr, 2.0, 5500.0, interval, device);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "host_tools/simulation/encoder_config.hpp"
+#include "host_tools/simulation/encoder_coupling.hpp"
 
 namespace kmax::simulation::quadrature_encoder_test {
 namespace {
@@ -15,10 +16,8 @@ namespace {
 constexpr double count = 0x1p-20;  // m; a power of two, so that positions have no rounding of their own
 
 EncoderConfig config_of(double counts_per_turn = 16.0) {
-  EncoderConfig config;
-  config.counts_per_turn = counts_per_turn;
-  config.transmission = counts_per_turn * count / 6.283185307179586;
-  return config;
+  return EncoderConfig{.counts_per_turn = counts_per_turn,
+                       .transmission = counts_per_turn * count / 6.283185307179586};
 }
 
 // What a timer in encoder mode counts from one pair of levels to the next.
@@ -199,6 +198,146 @@ RC_GTEST_PROP(EncoderModel, DifferencesSurviveTheWrap, (std::int32_t from, std::
   const double start = (static_cast<double>(from) + 0.5) * 0x1p-20;
   const double end = start + by * 0x1p-20;
   RC_ASSERT(static_cast<std::int32_t>(encoder.counts(end) - encoder.counts(start)) == by);
+}
+
+TEST(AxisEncoder, WithoutDefectsIsTheIdealOneToTheCount) {
+  const EncoderModel ideal(config_of(4000.0).count_length());
+  AxisEncoder encoder(config_of(4000.0), 0.3, 1);
+  for (int n = -1000; n < 1000; ++n) {
+    const double position = 1e-4 * std::sin(0.37 * n) + 1e-7 * n;
+    EXPECT_EQ(encoder.sample(position), ideal.counts(position));
+    EXPECT_EQ(encoder.counts(-position), ideal.counts(-position));
+  }
+  EXPECT_EQ(encoder.lost_edges(), 0);
+  EncoderConfig odd = config_of(4000.0);
+  odd.counts_per_turn = 16.5;  // no lines, so any unit will do
+  EXPECT_NO_THROW(AxisEncoder(odd, 0.0, 1));
+  odd.edge_noise = 0.1;
+  EXPECT_THROW(AxisEncoder(odd, 0.0, 1), std::invalid_argument);
+}
+
+TEST(AxisEncoder, WithNoiseEveryLookIsAnother) {
+  EncoderConfig config = config_of(4000.0);
+  config.edge_noise = 2.0;
+  AxisEncoder encoder(config, 10.5 * count, 7), same(config, 10.5 * count, 7), other(config, 10.5 * count, 8);
+  EXPECT_EQ(encoder.counts(0.0), 10u) << "nobody has looked yet";
+  double sum = 0.0, squares = 0.0;
+  bool differs = false;
+  constexpr int looks = 20000;
+  for (int n = 0; n < looks; ++n) {
+    const auto seen = static_cast<std::int32_t>(encoder.sample(10.5 * count));
+    EXPECT_EQ(encoder.counts(0.0), static_cast<std::uint32_t>(seen)) << "asking again is not looking again";
+    EXPECT_EQ(same.sample(10.5 * count), static_cast<std::uint32_t>(seen));
+    differs = differs || other.sample(10.5 * count) != static_cast<std::uint32_t>(seen);
+    sum += seen - 10;
+    squares += (seen - 10) * (seen - 10);
+  }
+  EXPECT_TRUE(differs);
+  EXPECT_NEAR(sum / looks, 0.0, 0.06);
+  EXPECT_NEAR(squares / looks, 4.0 + 1.0 / 12.0, 0.15);
+}
+
+TEST(AxisEncoder, CountsBelowZeroWrapAsATimerDoes) {
+  EncoderConfig config = config_of(4000.0);
+  config.dropout_probability = 1e-12;
+  AxisEncoder encoder(config, 0.5 * count, 1);
+  EXPECT_EQ(encoder.sample(-0.5 * count), 0xFFFFFFFFu);
+  EXPECT_EQ(encoder.sample(0.5 * count), 0u);
+}
+
+TEST(AxisEncoder, DropoutsAreCounted) {
+  EncoderConfig config = config_of(4000.0);
+  config.dropout_probability = 0.1;
+  AxisEncoder encoder(config, 0.5 * count, 1);
+  const std::uint32_t seen = encoder.sample(1000.5 * count);
+  EXPECT_EQ(seen, static_cast<std::uint32_t>(1000 - encoder.lost_edges()));
+  EXPECT_NEAR(static_cast<double>(encoder.lost_edges()), 100.0, 40.0);
+}
+
+TEST(AxisEncoder, RefusesWhatCannotBeCounted) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EncoderConfig config = config_of(4000.0);
+  EXPECT_THROW(AxisEncoder(config, 0.0, 1).sample(nan), std::domain_error);
+  config.edge_noise = 0.5;
+  EXPECT_THROW(AxisEncoder(config, 0.0, 1).sample(nan), std::domain_error);
+  config.edge_noise = nan;
+  config.dropout_probability = 0.5;
+  EXPECT_THROW(AxisEncoder(config, 0.0, 1), std::invalid_argument);
+}
+
+TEST(EncoderCoupling, WithoutDefectsTheDiscIsExactlyWhereTheShaftIs) {
+  EncoderCoupling coupling(0.1, false);
+  EXPECT_EQ(coupling.disc(), 0.1);
+  for (const double position : {0.3, -0.7, 1e-9, 0.123456789}) {
+    coupling.update(position, 5.0);
+    EXPECT_EQ(coupling.disc(), position);
+  }
+}
+
+TEST(EncoderCoupling, MountedTheOtherWayRoundItIsTheMirrorImage) {
+  EncoderCoupling coupling(0.1, true);
+  EXPECT_EQ(coupling.disc(), -0.1);
+  coupling.update(0.3, 0.0);
+  EXPECT_EQ(coupling.disc(), -0.3);
+}
+
+TEST(EncoderCoupling, ADefectActsOnTheMotionThatFollowsAndNothingJumps) {
+  EncoderCoupling coupling(0.0, false);
+  coupling.update(0.5, 0.0);
+  coupling.set_reversed(true);
+  coupling.update(0.5, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.5);
+  coupling.update(0.75, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.25);
+  coupling.set_reversed(false);
+  coupling.update(1.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.5);
+  coupling.set_stuck(true);
+  coupling.update(-3.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.5);
+  coupling.set_stuck(false);
+  coupling.update(-2.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 1.5);
+}
+
+TEST(EncoderCoupling, SlipLosesItsShareInBothDirections) {
+  EncoderCoupling coupling(0.0, false);
+  coupling.set_slip(0.25);
+  coupling.update(1.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.75);
+  coupling.update(-1.0, 0.0);
+  EXPECT_EQ(coupling.disc(), -0.75);
+  coupling.set_slip(1.0);
+  coupling.update(5.0, 0.0);
+  EXPECT_EQ(coupling.disc(), -0.75);
+  coupling.set_slip(0.0);
+  coupling.update(6.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.25);
+}
+
+TEST(EncoderCoupling, AHubThatHoldsUpToATorqueSlipsAboveItOnly) {
+  EncoderCoupling coupling(0.0, false);
+  coupling.set_slip(0.5, 0.02);
+  coupling.update(1.0, 0.0199);
+  EXPECT_EQ(coupling.disc(), 1.0);
+  coupling.update(2.0, -0.02);
+  EXPECT_EQ(coupling.disc(), 1.5);
+  coupling.update(1.0, 0.0);
+  EXPECT_EQ(coupling.disc(), 0.5) << "what is lost stays lost";
+  EncoderCoupling reversed(0.0, true);
+  reversed.set_slip(0.5, 0.02);
+  reversed.update(1.0, 0.03);
+  EXPECT_EQ(reversed.disc(), -0.5);
+}
+
+TEST(EncoderCoupling, RefusesWhatIsNoShareOrTorque) {
+  EncoderCoupling coupling(0.0, false);
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double share : {-0.1, 1.1, nan}) EXPECT_THROW(coupling.set_slip(share), std::invalid_argument);
+  for (const double torque : {-1.0, nan, 1e7})
+    EXPECT_THROW(coupling.set_slip(0.5, torque), std::invalid_argument);
+  coupling.update(1.0, 10.0);
+  EXPECT_EQ(coupling.disc(), 1.0);
 }
 
 }  // namespace

@@ -17,42 +17,31 @@ class ReferenceHandle {
  public:
   using Real = long double;
 
-  ReferenceHandle(const DeviceModel& device, const OperatorModel* person, const IntendedMotionConfig& motion,
-                  double position, double velocity, double longest_step = 1e-6)
-      : d_(device), m_(motion), longest_step_(longest_step), held_(person != nullptr) {
-    if (held_) p_ = *person;
-    s_ = {static_cast<Real>(position), static_cast<Real>(velocity), static_cast<Real>(position), 0.0L};
-    u_ = motion.start_position;
-    target_ = motion.wall_position;
+  // At rest at the start of the motion, which begins now.
+  ReferenceHandle(const DeviceModel& device, const OperatorModel& person, const IntendedMotionConfig& motion)
+      : d_(device), p_(person), m_(motion), u_(motion.start_position), target_(motion.wall_position) {
+    s_ = {u_, 0.0L, u_, 0.0L};
   }
-
-  void begin() { moving_ = true; }
 
   // At most 2 ms, as the activation is constant over it. Approach and hold only.
   void advance(double commanded, double background, double duration) {
     Real force = commanded;
     if (d_.force_limit > 0.0)
       force = std::fmin(std::fmax(force, -Real(d_.force_limit)), Real(d_.force_limit));
-    Real target_end = target_;
-    if (held_) {
-      const Real h = duration;
-      const Real b = std::fabs(Real(background));
-      g_ = 1.0L + p_.activation_gain * (b + (a_ - b) * std::exp(-0.5L * h / p_.activation_time));
-      a_ = b + (a_ - b) * std::exp(-h / p_.activation_time);
-      lag_ = b + (lag_ - b) * std::exp(-h / p_.push_lag);
-      const Real series =
-          1.0L / (1.0L / p_.grip_stiffness + 1.0L / p_.arm_stiffness) * (1.0L + p_.activation_gain * a_);
-      target_end = m_.wall_position - m_.wall_side * (m_.push_force + lag_) / series;
-    }
-    const int steps = static_cast<int>(std::ceil(duration / longest_step_ - 1e-9));
+    const Real whole = duration;
+    const Real b = std::fabs(Real(background));
+    g_ = 1.0L + p_.activation_gain * (b + (a_ - b) * std::exp(-0.5L * whole / p_.activation_time));
+    a_ = b + (a_ - b) * std::exp(-whole / p_.activation_time);
+    lag_ = b + (lag_ - b) * std::exp(-whole / p_.push_lag);
+    const Real series =
+        1.0L / (1.0L / p_.grip_stiffness + 1.0L / p_.arm_stiffness) * (1.0L + p_.activation_gain * a_);
+    const Real target_end = m_.wall_position - m_.wall_side * (m_.push_force + lag_) / series;
+    const int steps = static_cast<int>(std::ceil(duration / longest_step - 1e-9));
     const Real h = Real(duration) / steps;
     for (int n = 0; n < steps; ++n) {
       const Real goal = target_ + (target_end - target_) * (n + 1) / steps;
-      Real u_next = u_;
-      if (held_ && moving_) {
-        const Real reach = m_.approach_speed * h;
-        u_next = u_ + std::fmin(std::fmax(goal - u_, -reach), reach);
-      }
+      const Real reach = m_.approach_speed * h;
+      const Real u_next = u_ + std::fmin(std::fmax(goal - u_, -reach), reach);
       tiny_step(force, h, (u_next - u_) / h);
       u_ = u_next;
     }
@@ -60,17 +49,12 @@ class ReferenceHandle {
   }
 
   Real position() const { return s_[0]; }
-  Real velocity() const { return s_[1]; }
-  Real hand_position() const { return s_[2]; }
-  Real hand_velocity() const { return s_[3]; }
-  bool sticking() const { return stuck_; }
-  int stops() const { return stops_; }
 
  private:
+  static constexpr double longest_step = 1e-6;  // s
   using State = std::array<Real, 4>;
 
   Real net(const State& s, Real force) const {
-    if (!held_) return force;
     return force + g_ * (p_.grip_stiffness * (s[2] - s[0]) + p_.grip_damping * (s[3] - s[1]));
   }
 
@@ -80,12 +64,10 @@ class ReferenceHandle {
       ds[0] = s[1];
       ds[1] = (net(s, force) - d_.damping * s[1] - sign_ * d_.friction) / d_.mass;
     }
-    if (held_) {
-      const Real grip = g_ * (p_.grip_stiffness * (s[0] - s[2]) + p_.grip_damping * (s[1] - s[3]));
-      const Real arm = g_ * (p_.arm_stiffness * (u - s[2]) + p_.arm_damping * (du - s[3]));
-      ds[2] = s[3];
-      ds[3] = (grip + arm) / p_.hand_mass;
-    }
+    const Real grip = g_ * (p_.grip_stiffness * (s[0] - s[2]) + p_.grip_damping * (s[1] - s[3]));
+    const Real arm = g_ * (p_.arm_stiffness * (u - s[2]) + p_.arm_damping * (du - s[3]));
+    ds[2] = s[3];
+    ds[3] = (grip + arm) / p_.hand_mass;
     return ds;
   }
 
@@ -137,8 +119,6 @@ class ReferenceHandle {
         sign_ = net(s_, force) > 0.0L ? 1.0L : -1.0L;
         stuck_ = false;
         leaving_ = true;
-      } else {
-        ++stops_;
       }
       u += du * high;
       h -= high;
@@ -148,19 +128,15 @@ class ReferenceHandle {
   DeviceModel d_;
   OperatorModel p_;
   IntendedMotionConfig m_;
-  double longest_step_;
-  bool held_;
-  bool moving_ = false;
   bool stuck_ = false;
   bool leaving_ = false;
   Real sign_ = 1.0L;
   State s_{};
-  Real u_ = 0.0L;
-  Real target_ = 0.0L;
+  Real u_;
+  Real target_;
   Real a_ = 0.0L;
   Real lag_ = 0.0L;
   Real g_ = 1.0L;
-  int stops_ = 0;
 };
 
 }  // namespace kmax::simulation

@@ -68,9 +68,7 @@ double error_against_exact(const DeviceModel& device, const OperatorModel& perso
                            const std::vector<double>& forces, const Integrator& integrate) {
   CoupledHandle exact(device, person, {.start_position = 0.0}, HandleStart{0.004, 0.05});
   const ChainDynamics chain = held_chain(device, &person, 1.0);
-  ChainState state;
-  state.position = {0.004, 0.004, 0.0};
-  state.velocity = {0.05, 0.0, 0.0};
+  ChainState state{.position = {0.004, 0.004, 0.0}, .velocity = {0.05, 0.0, 0.0}};
   double worst = 0.0;
   for (const double force : forces) {
     exact.advance(force, 0.0, 0.002);
@@ -251,8 +249,7 @@ TEST(ReferenceIntegrators, ALosslessChainKeepsItsEnergy) {
     return sum;
   };
   const auto drift = [&](const Integrator& integrate) {
-    ChainState state;
-    state.position = {0.001, -0.002, 0.003};
+    ChainState state{.position = {0.001, -0.002, 0.003}};
     const double before = energy(state);
     for (int n = 0; n < 2000; ++n) integrate(chain, state, {}, 0.002);
     return energy(state) / before - 1.0;
@@ -274,8 +271,7 @@ TEST(ReferenceIntegrators, FrictionNeverGivesEnergy) {
             chain.stiffness[0] * grip * grip + chain.stiffness[1] * s.position[1] * s.position[1]);
   };
   for (const auto& [name, integrate, error] : all()) {
-    ChainState state;
-    state.position = {0.01, -0.01, 0.0};
+    ChainState state{.position = {0.01, -0.01, 0.0}};
     double before = energy(state);
     const double first = before;
     for (int n = 0; n < 500; ++n) {
@@ -329,8 +325,7 @@ TEST(ReferenceIntegrators, AGrazingSpringDoesNotHang) {
   for (const double excess : {-1e-12, -1e-15, 0.0, 1e-15, 1e-12}) {
     chain.friction = 100.0 * amplitude * (1.0 + excess);
     for (const auto& [name, integrate, error] : all()) {
-      ChainState state;
-      state.position = {0.0, amplitude, 0.0};
+      ChainState state{.position = {0.0, amplitude, 0.0}};
       for (int n = 0; n < 100; ++n) integrate(chain, state, {}, 0.01);
       EXPECT_LT(std::abs(state.position[0]), 1e-9) << name << ' ' << excess;
     }
@@ -487,8 +482,7 @@ TEST(ReferenceIntegratorsRefuse, WhatCannotBeAndLeaveTheStateAlone) {
     for (const Case& bad : cases) {
       const OperatorModel person;
       ChainDynamics chain = held_chain(DeviceModel{}, &person, 1.0);
-      ChainState state;
-      state.position = {0.1, 0.2, 0.3};
+      ChainState state{.position = {0.1, 0.2, 0.3}};
       ChainInput input;
       double duration = 0.002;
       bad.spoil(chain, state, input, duration);

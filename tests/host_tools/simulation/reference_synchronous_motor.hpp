@@ -4,6 +4,7 @@
 // Runge-Kutta in long double. Written from the machine's equations in the stator; shares no code with the
 // simulation. A floating star point, or one phase open, enters through the constraint on the currents.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -21,7 +22,6 @@ class ReferenceSynchronousMotor {
   Real currents[3] = {0, 0, 0};
   Real torque_integral = 0;
   Real charge[3] = {0, 0, 0};
-  Real heat = 0;
 
   // `open`: the terminal without current, or 3.
   void advance(const double (&u)[3], std::size_t open, Real angle, Real speed, Real duration, int steps) {
@@ -51,7 +51,7 @@ class ReferenceSynchronousMotor {
   }
 
  private:
-  using State = std::array<Real, 8>;  // currents, charges, heat, integral of the torque
+  using State = std::array<Real, 7>;  // currents, charges, integral of the torque
   static constexpr Real turn = 6.283185307179586476925286766559L;
 
   Real electrical(Real angle) const { return c_.pole_pairs * angle + c_.electrical_offset; }
@@ -71,15 +71,14 @@ class ReferenceSynchronousMotor {
   }
 
   State state() const {
-    return {currents[0], currents[1], currents[2], charge[0], charge[1], charge[2], heat, torque_integral};
+    return {currents[0], currents[1], currents[2], charge[0], charge[1], charge[2], torque_integral};
   }
   void store(const State& s) {
     for (std::size_t k = 0; k < 3; ++k) {
       currents[k] = s[k];
       charge[k] = s[3 + k];
     }
-    heat = s[6];
-    torque_integral = s[7];
+    torque_integral = s[6];
   }
   static State add(State s, const State& k, Real h) {
     for (std::size_t i = 0; i < s.size(); ++i) s[i] += h * k[i];
@@ -115,11 +114,8 @@ class ReferenceSynchronousMotor {
       out[1] = (m[0][0] * r[1] - m[1][0] * r[0]) / determinant;
       out[2] = -out[0] - out[1];
     }
-    for (std::size_t k = 0; k < 3; ++k) {
-      out[3 + k] = s[k];
-      out[6] += c_.resistance * s[k] * s[k];
-    }
-    out[7] = torque(angle);
+    std::copy_n(s.begin(), 3, out.begin() + 3);
+    out[6] = torque(angle);
     return out;
   }
 

@@ -102,8 +102,7 @@ inline std::vector<double> currents_of(const SineThroughZero& asked,
   const auto c = control::DcCurrentController<float>::prepare(config, static_cast<float>(sine_tick));
   const auto shares = measured_share(run);
   control::DcCurrentController<float> controller;
-  InverterCommand active;
-  active.dead_time = run.dead_time;
+  InverterCommand active{.dead_time = run.dead_time};
   for (auto& leg : active.legs) leg = {true, 0.5};
   const int period = static_cast<int>(std::lround(1.0 / run.frequency / sine_tick));
   std::vector<double> currents;
@@ -137,8 +136,7 @@ inline std::vector<double> currents_of(const SineThroughZero& asked,
   const auto c = control::FieldOrientedController<float>::prepare(config, static_cast<float>(sine_tick));
   const auto shares = measured_share(run);
   control::FieldOrientedController<float> controller;
-  InverterCommand active;
-  active.dead_time = run.dead_time;
+  InverterCommand active{.dead_time = run.dead_time};
   for (auto& leg : active.legs) leg = {true, 0.5};
   const int period = static_cast<int>(std::lround(1.0 / run.frequency / sine_tick));
   ShaftMotion shaft{0.0, 2.0 * std::numbers::pi * run.frequency / motor_config.pole_pairs};

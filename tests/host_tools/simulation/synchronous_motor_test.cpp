@@ -15,11 +15,7 @@ namespace {
 constexpr double pi = 3.141592653589793;
 
 SynchronousMotorConfig salient() {
-  SynchronousMotorConfig config;
-  config.inductance_d = 0.2e-3;
-  config.inductance_q = 0.45e-3;
-  config.electrical_offset = 0.7;
-  return config;
+  return SynchronousMotorConfig{.inductance_d = 0.2e-3, .inductance_q = 0.45e-3, .electrical_offset = 0.7};
 }
 
 TerminalDrive driven(const double (&u)[3], double leg_resistance = 0.0) {
@@ -88,8 +84,7 @@ TEST(SynchronousMotor, WithOnePhaseOpenTheOtherTwoCarryOneCurrent) {
 }
 
 TEST(SynchronousMotor, TorqueIsTheConstantTimesTheQCurrent) {
-  SynchronousMotorConfig config;
-  config.electrical_offset = -2.0;
+  SynchronousMotorConfig config{.electrical_offset = -2.0};
   for (const double angle : {0.0, 0.4, -3.0, 100.0}) {
     SynchronousMotor motor(config);
     motor.advance(holding(config, angle, 0.0, 2.0), {angle, 0.0}, 0.1);
@@ -190,9 +185,7 @@ RC_GTEST_PROP(SynchronousMotor, HalvesMakeAWhole, (int u_seed, int speed_seed)) 
 }
 
 TEST(SynchronousMotor, CoggingPullsIntoItsPositions) {
-  SynchronousMotorConfig config;
-  config.cogging_torque = 1e-3;
-  config.cogging_periods = 42;
+  SynchronousMotorConfig config{.cogging_torque = 1e-3, .cogging_periods = 42};
   const SynchronousMotor motor(config);
   EXPECT_EQ(motor.cogging_torque(0.0), 0.0);
   EXPECT_NEAR(motor.cogging_torque(pi / 84), -1e-3, 1e-15);
