@@ -52,12 +52,11 @@ std::optional<simulation::ContactMeasure> judge(const simulation::Scene& scene, 
     return std::nullopt;
   std::vector<simulation::ContactSample> positions;
   for (const RunSample& sample : result.samples) positions.push_back({sample.time, sample.true_position});
-  simulation::ContactCriterion criterion;
-  criterion.window_begin = result.judged_from;
-  criterion.window_end = result.judged_to;
-  criterion.threshold = scene.measurement.threshold;
-  criterion.wall_position = scene.axes[0].motion->wall_position;
-  criterion.wall_side = scene.axes[0].motion->wall_side;
+  simulation::ContactCriterion criterion{.window_begin = result.judged_from,
+                                         .window_end = result.judged_to,
+                                         .threshold = scene.measurement.threshold,
+                                         .wall_position = scene.axes[0].motion->wall_position,
+                                         .wall_side = scene.axes[0].motion->wall_side};
   return simulation::measure_contact(positions, criterion);
 }
 }  // namespace

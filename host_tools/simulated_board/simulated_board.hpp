@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "board/native/native_board.hpp"
-#include "host_tools/simulated_board/memory_flash.hpp"
+#include "host_tools/simulated_board/file_flash.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_device.hpp"
 

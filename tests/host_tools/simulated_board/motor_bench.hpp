@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "firmware/drive/haptic_configuration.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::simulated_board {
@@ -67,15 +68,18 @@ class MotorBench {
   }
 
   /// A wall whose field reaches the handle where it is, without strength yet. Then the power stage is ready.
-  void prepare_wall() {
+  void prepare_wall(double side = 1.0) {
+    run(1e-3);
+    const double at =
+        static_cast<double>(report().haptic.position) * firmware::count_length(application().values(), 0);
     EXPECT_EQ(set<"wall.law">(2), firmware::Refusal::none);
     set<"wall.magnetic_coefficient">(0.0);
-    set<"wall.position">(-0.0005);
-    set<"wall.side">(1);
+    set<"wall.position">(at - side * 0.0005);
+    set<"wall.side">(side);
     set<"force.ramp_time">(0.0);
     run(0.1);
   }
-  /// N of force that this wall makes on a handle at 0.
+  /// N of force that this wall makes on the handle there.
   void set_wall_force(double force) { set<"wall.magnetic_coefficient">(2.25 * force); }
 
   /// N that the motor's current makes on the handle, without cogging.

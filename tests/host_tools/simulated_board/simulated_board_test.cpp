@@ -11,17 +11,6 @@ using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 using simulation::SceneError;
 
-TEST(SimulatedBoard, EverySuppliedSceneOpensUnderItsNameAndRuns) {
-  ASSERT_EQ(supplied_scenes().size(), 22u);
-  for (const SuppliedScene& supplied : supplied_scenes()) {
-    const simulation::Scene scene = open_scene(std::string(supplied.name));
-    EXPECT_EQ(scene.name, supplied.name);
-    SimulatedBoard simulation(scene);
-    simulation.board().advance(100);
-    EXPECT_EQ(simulation.board().now_us(), 5000u);
-  }
-}
-
 TEST(SimulatedBoard, FilesComeBeforeSuppliedScenes) {
   const TemporaryFolder folder;
   const auto file = folder.write("touch", "duration = 2.5\n[device]\n");

@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <string>
 
 #include "firmware/drive/axis.hpp"
 #include "host_tools/simulated_board/converter_code.hpp"
-#include "host_tools/simulation/scene.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "tests/host_tools/simulated_board/torque_ripple.hpp"
 
 namespace kmax::simulated_board::spin_out_test {
 namespace {
@@ -30,37 +30,19 @@ struct Course {
 
 class SpinOut {
  public:
-  SpinOut(const std::string& scene_name, const Wrong& wrong, float hand_force) {
-    const auto folder =
-        std::filesystem::path(__FILE__).parent_path() / "../../../host_tools/simulation/scenes";
-    scene_ = simulation::load_scene((folder / (scene_name + ".toml")).string());
+  SpinOut(const std::string& scene, const Wrong& wrong, float hand_force) : scene_(open_scene(scene)) {
     auto& axis = scene_.axes[0];
     axis.encoder.reversed = false;  // as calibrated
     axis.device.force_limit = 0.0;
-    firmware::MotorControlConfig motor;
-    motor.transmission = static_cast<float>(axis.encoder.transmission);
-    motor.counts_per_turn = static_cast<std::uint32_t>(axis.encoder.counts_per_turn);
+    firmware::MotorControlConfig motor = torque_ripple::motor_config_of(axis, 0.0);
     motor.current_limit = 10.0f;
-    if (const auto* three = std::get_if<simulation::SynchronousMotorConfig>(&*axis.motor)) {
-      motor.kind = firmware::MotorKind::pmsm;
-      motor.torque_constant = static_cast<float>(three->torque_constant);
-      motor.resistance = static_cast<float>(three->resistance);
-      motor.inductance = static_cast<float>(three->inductance_d);
-      motor.inductance_q = static_cast<float>(three->inductance_q);
-      motor.pole_pairs = static_cast<std::int32_t>(three->pole_pairs);
+    if (const auto* three = std::get_if<simulation::SynchronousMotorConfig>(&*axis.motor))
       motor.electrical_offset =
           static_cast<float>(std::remainder(three->electrical_offset + wrong.angle, 2 * pi));
-    } else {
-      const auto& brushed = std::get<simulation::BrushedDcMotorConfig>(*axis.motor);
-      motor.torque_constant = static_cast<float>(brushed.torque_constant);
-      motor.resistance = static_cast<float>(brushed.resistance);
-      motor.inductance = static_cast<float>(brushed.inductance);
-    }
     pmsm_ = motor.kind == firmware::MotorKind::pmsm;
     setting_.motor = firmware::MotorControl::prepare(motor);
-    control::MotionPlausibilityConfig<float> plausibility;
-    plausibility.mass = static_cast<float>(axis.device.mass);
-    plausibility.hand_force = hand_force;
+    control::MotionPlausibilityConfig<float> plausibility{.mass = static_cast<float>(axis.device.mass),
+                                                          .hand_force = hand_force};
     setting_.plausibility =
         control::MotionPlausibility<float>::prepare(plausibility, static_cast<float>(tick));
     setting_.watch_motion = true;
@@ -109,8 +91,7 @@ class SpinOut {
     }
     const double per_volt = 1.0 / (40.0 * drive.current_sensor().config().shunt);
     firmware::Axis axis;
-    simulation::InverterCommand command;
-    command.dead_time = 20 / 168e6;
+    simulation::InverterCommand command{.dead_time = 20 / 168e6};
     for (std::uint32_t n = 0; n < 20000; ++n) {
       firmware::Axis::Input in{};
       in.count = static_cast<std::uint32_t>(drive.encoder().edges());

@@ -49,6 +49,29 @@ struct Trace {
   std::vector<double> position, felt;  // m, N
 };
 
+/// The values of the axis' motor, with the resistance of the bridge's legs.
+inline firmware::MotorControlConfig motor_config_of(const simulation::SceneAxis& axis,
+                                                    double leg_resistance) {
+  firmware::MotorControlConfig config{
+      .transmission = static_cast<float>(axis.encoder.transmission),
+      .counts_per_turn = static_cast<std::uint32_t>(axis.encoder.counts_per_turn)};
+  if (const auto* motor = std::get_if<simulation::SynchronousMotorConfig>(&*axis.motor)) {
+    config.kind = firmware::MotorKind::pmsm;
+    config.torque_constant = static_cast<float>(motor->torque_constant);
+    config.resistance = static_cast<float>(motor->resistance + leg_resistance);
+    config.inductance = static_cast<float>(motor->inductance_d);
+    config.inductance_q = static_cast<float>(motor->inductance_q);
+    config.pole_pairs = static_cast<std::int32_t>(motor->pole_pairs);
+    config.electrical_offset = static_cast<float>(motor->electrical_offset);
+  } else {
+    const auto& brushed = std::get<simulation::BrushedDcMotorConfig>(*axis.motor);
+    config.torque_constant = static_cast<float>(brushed.torque_constant);
+    config.resistance = static_cast<float>(brushed.resistance + 2 * leg_resistance);
+    config.inductance = static_cast<float>(brushed.inductance);
+  }
+  return config;
+}
+
 class Rig {
  public:
   static constexpr double tick = 50e-6, half_tick = 25e-6, dead_time = 20 / 168e6;
@@ -174,29 +197,16 @@ class Rig {
   }
 
   void prepare_motor(bool dead_time_compensated, double limit) {
-    const double legs = axis_.inverter.on_resistance;
-    firmware::MotorControlConfig config;
-    config.transmission = static_cast<float>(axis_.encoder.transmission);
-    config.counts_per_turn = static_cast<std::uint32_t>(axis_.encoder.counts_per_turn);
+    firmware::MotorControlConfig config = motor_config_of(axis_, axis_.inverter.on_resistance);
     config.current_limit = static_cast<float>(limit);
     config.dead_time = static_cast<float>(dead_time_compensated ? dead_time : 0.0);
     double inductance = 0.0;
     if (const auto* motor = synchronous()) {
       motor_.emplace<simulation::SynchronousMotor>(*motor);
-      config.kind = firmware::MotorKind::pmsm;
-      config.torque_constant = static_cast<float>(motor->torque_constant);
-      config.resistance = static_cast<float>(motor->resistance + legs);
-      config.inductance = static_cast<float>(motor->inductance_d);
-      config.inductance_q = static_cast<float>(motor->inductance_q);
-      config.pole_pairs = static_cast<std::int32_t>(motor->pole_pairs);
-      config.electrical_offset = static_cast<float>(motor->electrical_offset);
       inductance = 0.75 * (motor->inductance_d + motor->inductance_q);
     } else {
       const auto& brushed = std::get<simulation::BrushedDcMotorConfig>(*axis_.motor);
       motor_.emplace<simulation::BrushedDcMotor>(brushed);
-      config.torque_constant = static_cast<float>(brushed.torque_constant);
-      config.resistance = static_cast<float>(brushed.resistance + 2 * legs);
-      config.inductance = static_cast<float>(brushed.inductance);
       inductance = brushed.inductance;
     }
     // The band in which the current ends within the dead time, and what the converter cannot tell from zero.

@@ -2,21 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
+#include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::torque_ripple::torque_ripple_test {
 namespace {
 
-simulation::Scene scene(const std::string& name) {
-  const auto root = std::filesystem::path(__FILE__).parent_path() / "../../..";
-  return simulation::load_scene((root / "host_tools/simulation/scenes" / (name + ".toml")).string());
-}
+using simulated_board::open_scene;
 
 constexpr double unbounded = 100.0;
 
 class TorqueRipple : public testing::TestWithParam<const char*> {
  protected:
-  simulation::Scene scene_ = scene(GetParam());
+  simulation::Scene scene_ = open_scene(GetParam());
   double friction() const { return scene_.axes[0].device.friction; }
   double cogging() const {
     const auto* motor = std::get_if<simulation::SynchronousMotorConfig>(&*scene_.axes[0].motor);
@@ -79,7 +76,7 @@ TEST_P(TorqueRipple, DeadTimeCompensationDoesNoHarm) {
 
 // Where its 57 mV a leg stand against 52 mOhm they are felt once all else is gone.
 TEST(TorqueRippleRig, DeadTimeCompensationSmoothsAMotorOfLowResistance) {
-  const auto motor = scene("drone");
+  const auto motor = open_scene("drone");
   Compensations on{true, true, true, true, unbounded};
   const double with = Rig(motor, on).moving().ripple;
   on.dead_time = false;
@@ -91,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(Motors, TorqueRipple, testing::Values("dc_coreless_a", 
 
 // A map with the wrong sign doubles the cogging, within the bound: the tests above would see one.
 TEST(TorqueRippleRig, AWrongMapIsFelt) {
-  const auto motor = scene("gimbal_b");
+  const auto motor = open_scene("gimbal_b");
   const double none = Rig(motor, {}).moving().ripple;
   EXPECT_GT(Rig(motor, {.cogging = true, .limit_share = unbounded, .map_share = -1.0}).moving().ripple,
             1.9 * none);
@@ -101,7 +98,7 @@ TEST(TorqueRippleRig, AWrongMapIsFelt) {
 }
 
 TEST(TorqueRippleRig, NeedsAMotor) {
-  EXPECT_THROW(Rig(scene("touch"), {}), std::invalid_argument);
+  EXPECT_THROW(Rig(open_scene("touch"), {}), std::invalid_argument);
 }
 
 }  // namespace
