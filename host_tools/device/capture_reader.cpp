@@ -231,12 +231,11 @@ Captured CaptureReader::read(const Tell& tell) {
   }
   if (status() != before) throw taken_away();
 
-  Captured captured;
-  captured.first_tick = before.first_tick;
-  captured.trigger_sample = before.trigger_sample;
-  captured.interval = settings_.interval;
-  captured.tick_rate = firmware::tick_rate_hz;
-  captured.count_length = count_length_;
+  Captured captured{.first_tick = before.first_tick,
+                    .trigger_sample = before.trigger_sample,
+                    .interval = settings_.interval,
+                    .tick_rate = firmware::tick_rate_hz,
+                    .count_length = count_length_};
   for (const CaptureChannel channel : channels_)
     captured.columns.push_back({std::string(text_of(channel).name), std::string(text_of(channel).unit), {}});
   for (std::size_t i = 0; i < words.size(); ++i) {

@@ -31,12 +31,12 @@ struct CaptureColumn {
 
 /// Samples of an axis, as wide apart as `interval` ticks of the device.
 struct Captured {
-  std::vector<CaptureColumn> columns;  ///< in the order asked
-  std::uint32_t first_tick = 0;        ///< of sample 0; wraps at 2^32
-  std::uint32_t trigger_sample = 0;    ///< less than pre_trigger if the trigger came soon
-  std::uint32_t interval = 1;          ///< ticks
-  double tick_rate = 0;                ///< Hz
-  double count_length = 0;             ///< m per encoder count
+  std::vector<CaptureColumn> columns{};  ///< in the order asked
+  std::uint32_t first_tick = 0;          ///< of sample 0; wraps at 2^32
+  std::uint32_t trigger_sample = 0;      ///< less than pre_trigger if the trigger came soon
+  std::uint32_t interval = 1;            ///< ticks
+  double tick_rate = 0;                  ///< Hz
+  double count_length = 0;               ///< m per encoder count
 
   std::size_t samples() const { return columns.empty() ? 0 : columns.front().values.size(); }
   /// s since the trigger; negative before it.

@@ -32,17 +32,13 @@ constexpr std::string_view nothing_changed = "nothing was changed";
 
 /// Refusals that say that the values are at fault, not the moment.
 bool is_about_values(Refusal reason) {
-  switch (reason) {
-    case Refusal::out_of_range:
-    case Refusal::not_a_choice:
-    case Refusal::not_finite:
-    case Refusal::rate_does_not_divide:
-    case Refusal::adaptive_interval_empty:
-    case Refusal::supply_interval_empty:
-      return true;
-    default:
-      return false;
-  }
+  constexpr Refusal about_values[] = {Refusal::out_of_range,
+                                      Refusal::not_a_choice,
+                                      Refusal::not_finite,
+                                      Refusal::rate_does_not_divide,
+                                      Refusal::adaptive_interval_empty,
+                                      Refusal::supply_interval_empty};
+  return std::ranges::find(about_values, reason) != std::end(about_values);
 }
 
 /// What the guard found in the set that an axis would have had, as "; " and its words. The device keeps no

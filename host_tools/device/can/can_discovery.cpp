@@ -65,10 +65,9 @@ class Search {
       found(id).in_use = true;
       return;
     }
-    drivers::CanFrame request;
-    request.identifier = cob_id::sdo_request + id;
-    request.length = 8;
-    request.data = canopen::sdo_bytes(discovery_request, device_type);
+    drivers::CanFrame request{.identifier = cob_id::sdo_request + id,
+                              .length = 8,
+                              .data = canopen::sdo_bytes(discovery_request, device_type)};
     port_->send(request);
     locks_[id] = std::move(lock);
     ever_asked_.insert(id);
@@ -128,8 +127,7 @@ class Search {
   }
 
   void read_identity(FoundNode& node) {
-    CanPortOptions options;
-    options.filters = SdoClient::filters_for(node.node);
+    CanPortOptions options{.filters = SdoClient::filters_for(node.node)};
     const auto port = open_can_port(bus_, options);
     // It is there: however slow it is, its answers are waited for.
     SdoClient sdo(*port, node.node);

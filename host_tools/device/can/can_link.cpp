@@ -53,9 +53,7 @@ SdoClient::Bytes bytes_of(std::uint32_t number, std::size_t count) {
 }
 
 CanPortOptions options_for(std::uint8_t node) {
-  CanPortOptions options;
-  options.filters = SdoClient::filters_for(node);
-  return options;
+  return CanPortOptions{.filters = SdoClient::filters_for(node)};
 }
 }  // namespace
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <linux/can.h>
+
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -80,6 +82,12 @@ class CanPort {
  protected:
   CanPortCounters counters_;
 };
+
+/// The kernel's form of a classical frame (linux/can.h), 16 bytes; also what a Unix domain bus carries.
+can_frame to_kernel(const drivers::CanFrame& frame);
+
+/// Nothing for an error frame, and for one that no bus can carry (length above 8, identifier too large).
+std::optional<drivers::CanFrame> from_kernel(const can_frame& frame);
 
 /// True if the frame passes.
 bool passes(const drivers::CanFrame& frame, const std::vector<CanFilter>& filters);

@@ -30,15 +30,7 @@ canopen::SdoBytes message(unsigned command, SdoClient::Object object, std::uint3
 
 /// Aborts that are about the transfer, not about the object: another attempt may do better.
 bool is_about_transfer(Abort code) {
-  switch (code) {
-    case Abort::toggle:
-    case Abort::timeout:
-    case Abort::sequence:
-    case Abort::crc:
-      return true;
-    default:
-      return false;
-  }
+  return code == Abort::toggle || code == Abort::timeout || code == Abort::sequence || code == Abort::crc;
 }
 
 // Objects every node must have (CiA 301, 7.5.1), as markers.
@@ -77,10 +69,7 @@ std::vector<CanFilter> SdoClient::filters_for(std::uint8_t node) {
 }
 
 void SdoClient::send(const Data& data) {
-  drivers::CanFrame frame;
-  frame.identifier = cob_id::sdo_request + node_;
-  frame.length = 8;
-  frame.data = data;
+  drivers::CanFrame frame{.identifier = cob_id::sdo_request + node_, .length = 8, .data = data};
   port_.send(frame);
 }
 

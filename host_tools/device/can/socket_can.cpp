@@ -20,7 +20,6 @@
 #include <thread>
 
 #include "host_tools/base/file_descriptor.hpp"
-#include "host_tools/device/can/kernel_frame.hpp"
 #include "host_tools/device/link.hpp"
 
 namespace kmax::link {

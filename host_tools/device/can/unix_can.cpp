@@ -10,7 +10,6 @@
 #include <cstring>
 
 #include "host_tools/base/file_descriptor.hpp"
-#include "host_tools/device/can/kernel_frame.hpp"
 #include "host_tools/device/link.hpp"
 
 namespace kmax::link {

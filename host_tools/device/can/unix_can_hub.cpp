@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "host_tools/device/can/kernel_frame.hpp"
+#include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/link.hpp"
 
 namespace kmax::link {

@@ -19,22 +19,14 @@ using device::Table;
 
 namespace {
 const char* words_of_exception(std::uint8_t exception) {
-  switch (exception) {
-    case 1:
-      return "it does not know this function";
-    case 2:
-      return "there is no such register, or it cannot be written";
-    case 3:
-      return "the value is not allowed";
-    case 4:
-      return "it cannot do this now";
-    case 5:
-      return "it needs more time";
-    case 6:
-      return "it is busy, or another link has a transaction open; try again in 2 s";
-    default:
-      return "for a reason this program does not know";
-  }
+  constexpr const char* words[] = {"for a reason this program does not know",
+                                   "it does not know this function",
+                                   "there is no such register, or it cannot be written",
+                                   "the value is not allowed",
+                                   "it cannot do this now",
+                                   "it needs more time",
+                                   "it is busy, or another link has a transaction open; try again in 2 s"};
+  return words[exception < std::size(words) ? exception : 0];
 }
 
 constexpr std::uint16_t trace_words = firmware::trace_words_per_record;

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -22,18 +23,8 @@ constexpr milliseconds silence{50};
 
 // What libmodbus leaves in errno when the port is gone; ECONNRESET stands for end of file.
 bool is_vanished(int error) {
-  switch (error) {
-    case EIO:
-    case ENODEV:
-    case ENXIO:
-    case ENOENT:
-    case EBADF:
-    case EPIPE:
-    case ECONNRESET:
-      return true;
-    default:
-      return false;
-  }
+  constexpr int vanished[] = {EIO, ENODEV, ENXIO, ENOENT, EBADF, EPIPE, ECONNRESET};
+  return std::ranges::find(vanished, error) != std::end(vanished);
 }
 
 bool is_exception(int error) {
@@ -110,7 +101,8 @@ void SerialLink::write_holding_idempotent(std::uint16_t address, std::span<const
   write_words(address, values, attempts);
 }
 
-void SerialLink::write_words(std::uint16_t address, std::span<const std::uint16_t> values, int attempts_allowed) {
+void SerialLink::write_words(std::uint16_t address, std::span<const std::uint16_t> values,
+                             int attempts_allowed) {
   exchange({16, address, values.size()}, attempts_allowed, [&] {
     return modbus_write_registers(context_.get(), address, static_cast<int>(values.size()), values.data());
   });

@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <map>
 #include <numbers>
 
 #include "firmware/drive/haptic_configuration.hpp"
 #include "host_tools/base/errors.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "tests/host_tools/capturing_link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -40,17 +44,17 @@ void expect_thrown(Call call, const std::string& part) {
 
 CaptureSettings settings_of(std::vector<std::string> channels, std::uint32_t samples,
                             CaptureTrigger trigger = CaptureTrigger::now) {
-  CaptureSettings settings;
-  settings.channels = std::move(channels);
-  settings.samples = samples;
-  settings.trigger = trigger;
-  return settings;
+  return CaptureSettings{.channels = std::move(channels), .samples = samples, .trigger = trigger};
 }
 
-TEST(CaptureReader, GivesEachChannelInItsUnitAndEachSampleItsTick) {
+class CaptureReaderTest : public testing::Test {
+ protected:
   Bench bench;
+  CaptureReader reader{bench.device};
+};
+
+TEST_F(CaptureReaderTest, GivesEachChannelInItsUnitAndEachSampleItsTick) {
   bench.device.link().wait(seconds(1));
-  CaptureReader reader(bench.device);
   CaptureSettings settings =
       settings_of({"position", "force", "electrical_angle", "count"}, 100, CaptureTrigger::contact);
   settings.interval = 3;
@@ -89,9 +93,7 @@ TEST(CaptureReader, GivesEachChannelInItsUnitAndEachSampleItsTick) {
   expect_thrown<ValueError>([&] { captured.column("velocity"); }, "position, force, electrical_angle, count");
 }
 
-TEST(CaptureReader, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
   reader.arm(settings_of({"velocity", "current", "voltage"}, 0));
   reader.wait(seconds(1));
   std::uint32_t told = 0, calls = 0;
@@ -111,9 +113,7 @@ TEST(CaptureReader, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
       << "a complete capture need not be stopped";
 }
 
-TEST(CaptureReader, WithoutATriggerItSaysWhichAndStopsTheCapture) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, WithoutATriggerItSaysWhichAndStopsTheCapture) {
   reader.arm(settings_of({"force"}, 10, CaptureTrigger::contact));
   const auto began = bench.link->now();
   int waiting = 0;
@@ -137,9 +137,7 @@ TEST(CaptureReader, WithoutATriggerItSaysWhichAndStopsTheCapture) {
 }
 
 // The patience is for the trigger: 100 samples of 0.05 s each are waited for nevertheless.
-TEST(CaptureReader, ASlowCaptureIsWaitedForOnceItHasTriggered) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, ASlowCaptureIsWaitedForOnceItHasTriggered) {
   CaptureSettings settings = settings_of({"force"}, 100);
   settings.interval = 1000;
   reader.arm(settings);
@@ -152,10 +150,8 @@ TEST(CaptureReader, ASlowCaptureIsWaitedForOnceItHasTriggered) {
   EXPECT_EQ(reader.read().samples(), 100u);
 }
 
-TEST(CaptureReader, AnAxisWithoutTicksIsNotWaitedForForever) {
-  Bench bench;
+TEST_F(CaptureReaderTest, AnAxisWithoutTicksIsNotWaitedForForever) {
   bench.link->ticking = false;
-  CaptureReader reader(bench.device);
   reader.arm(settings_of({"force"}, 100));
   expect_thrown<DeviceError>([&] { reader.wait(seconds(1)); }, "did not come");
   bench.link->ticking = true;
@@ -182,16 +178,12 @@ TEST(CaptureReader, WhatTheCallbackThrowsComesThroughAndTheCaptureEnds) {
   EXPECT_TRUE(bench.stopped());
 }
 
-TEST(CaptureReader, ItsEndWithoutALinkIsQuiet) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, ItsEndWithoutALinkIsQuiet) {
   reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
   bench.link->lost = true;
 }
 
-TEST(CaptureReader, StoppedItHasWhatWasTakenSinceTheTrigger) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, StoppedItHasWhatWasTakenSinceTheTrigger) {
   reader.arm(settings_of({"force"}, 0));
   bench.link->wait(std::chrono::milliseconds(50));
   reader.stop();
@@ -201,9 +193,7 @@ TEST(CaptureReader, StoppedItHasWhatWasTakenSinceTheTrigger) {
   EXPECT_EQ(captured.column("force").front(), captured.first_tick + 0.5);
 }
 
-TEST(CaptureReader, ACaptureThatIsNotCompleteCannotBeRead) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, ACaptureThatIsNotCompleteCannotBeRead) {
   expect_thrown<DeviceError>([&] { reader.read(); }, "idle");
   reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
   expect_thrown<DeviceError>([&] { reader.read(); }, "waiting");
@@ -237,17 +227,13 @@ TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
   Bench bench;
   CaptureReader reader(bench.device);
   reader.arm(settings_of({"force"}, 10));
-  firmware::CaptureConfig wider;
-  wider.channels = {CaptureChannel::force, CaptureChannel::flags};
-  wider.samples = 10;
+  firmware::CaptureConfig wider{.channels = {CaptureChannel::force, CaptureChannel::flags}, .samples = 10};
   bench.link->capture.arm(wider);
   reader.wait(seconds(1));
   expect_thrown<DeviceError>([&] { reader.read(); }, "another program");
 }
 
-TEST(CaptureReader, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSent) {
-  Bench bench;
-  CaptureReader reader(bench.device);
+TEST_F(CaptureReaderTest, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSent) {
   const int before = bench.link->requests;
   const auto refused = [&](auto change, const std::string& part) {
     CaptureSettings settings = settings_of({"force", "count"}, 100);
@@ -268,10 +254,8 @@ TEST(CaptureReader, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSent) {
   EXPECT_EQ(bench.link->requests, before);
 }
 
-TEST(CaptureReader, ADeviceThatRefusesSaysWhy) {
-  Bench bench;
+TEST_F(CaptureReaderTest, ADeviceThatRefusesSaysWhy) {
   bench.link->refuses = true;
-  CaptureReader reader(bench.device);
   expect_thrown<DeviceError>([&] { reader.arm(settings_of({"force"}, 10)); }, "could not be armed");
 }
 
@@ -280,6 +264,115 @@ TEST(CaptureChannels, HaveUnitsAndNoneIsNotOne) {
   EXPECT_EQ(capture_channel_unit("velocity"), "m/s");
   EXPECT_EQ(capture_channel_unit("duty_a"), "");
   expect_thrown<ValueError>([&] { capture_channel_unit("dutty_a"); }, "duty_a");
+}
+
+/// What the firmware of a simulated board computed in each tick of `ticks`, by its tick number.
+std::map<std::uint32_t, firmware::AxisReport> watch_ticks(link::SimLink& link, std::size_t axis, int ticks) {
+  std::map<std::uint32_t, firmware::AxisReport> seen;
+  auto& board = link.simulation().board();
+  for (int i = 0; i < ticks; ++i) {
+    board.advance(1);
+    const firmware::AxisReport report = board.application().ISR_report(axis);
+    seen[report.tick] = report;
+  }
+  return seen;
+}
+
+// On the whole firmware: dictionary, tick, memory, line and the simulated device. Nothing may be late by a
+// tick, or rounded on the way.
+TEST(CaptureReaderOnSimulatedBoard, EveryValueIsWhatThatTickComputed) {
+  auto owned = std::make_unique<link::SimLink>(simulated_board::open_scene("two_axes"));
+  link::SimLink& link = *owned;
+  Device device(std::move(owned));
+  link.wait(seconds(1));
+  CaptureReader reader(device);
+  Drive drive(device, 0);
+  drive.arm();
+  CaptureSettings settings =
+      settings_of({"position", "velocity", "force", "distance"}, 2000, CaptureTrigger::contact);
+  settings.pre_trigger = 400;
+  settings.interval = 2;
+  reader.arm(settings);
+  const auto seen = watch_ticks(link, 0, 40000);
+  reader.wait(seconds(1));
+  drive.disarm();
+  const Captured captured = reader.read();
+  ASSERT_EQ(captured.samples(), 2000u);
+  ASSERT_EQ(captured.trigger_sample, 400u);
+  bool moved = false, pushed = false;
+  for (std::size_t s = 0; s < captured.samples(); ++s) {
+    const auto report = seen.find(captured.tick(s));
+    ASSERT_NE(report, seen.end()) << s;
+    const auto& haptic = report->second.haptic;
+    ASSERT_EQ(captured.column("position")[s],
+              static_cast<double>(static_cast<std::int32_t>(haptic.position)) * captured.count_length);
+    ASSERT_EQ(captured.column("velocity")[s], static_cast<double>(haptic.velocity));
+    ASSERT_EQ(captured.column("force")[s], static_cast<double>(haptic.force));
+    ASSERT_EQ(captured.column("distance")[s], static_cast<double>(haptic.outside_distance));
+    moved = moved || haptic.velocity < -0.01f;
+    pushed = pushed || haptic.force > 0.1f;
+  }
+  EXPECT_TRUE(moved && pushed);
+  EXPECT_GT(captured.column("distance")[399], 0.0);
+  EXPECT_LE(captured.column("distance")[400], 0.0);
+}
+
+TEST(CaptureReaderOnSimulatedBoard, ArmingWithoutReadingLeavesTheNextOneFree) {
+  Device device(std::make_unique<link::SimLink>(simulated_board::open_scene("two_axes")));
+  {
+    CaptureReader forgotten(device);
+    forgotten.arm(settings_of({"count"}, 10, CaptureTrigger::fault));
+  }
+  CaptureReader reader(device);
+  CaptureSettings settings = settings_of({"count", "flags"}, 0);
+  settings.axis = 1;
+  reader.arm(settings);
+  reader.wait(seconds(1));
+  const Captured captured = reader.read();
+  EXPECT_EQ(captured.samples(), 6144u);
+  // The second handle of the scene lies at 5 mm.
+  EXPECT_NEAR(captured.column("count").back() * captured.count_length, 0.005, 1e-4);
+}
+
+// The square wave of voltage begins in the trigger's own tick, and the winding's current follows it.
+TEST(CaptureReaderOnSimulatedBoard, AnExcitationIsSeenFromItsFirstTick) {
+  Device device(std::make_unique<link::SimLink>(simulated_board::open_scene("dc_coreless_a")));
+  device.link().wait(seconds(1));
+  device.apply(parse_assignments({"drive.mode=excitation", "excitation.kind=voltage", "excitation.bias=1.5",
+                                  "excitation.ramp=0", "excitation.duration=0.5", "excitation.travel=0.2"}));
+  CaptureReader reader(device);
+  CaptureSettings settings =
+      settings_of({"voltage", "current", "supply", "flags"}, 600, CaptureTrigger::excitation);
+  settings.pre_trigger = 100;
+  reader.arm(settings);
+  device.link().wait(std::chrono::milliseconds(50));
+  Drive drive(device, 0);
+  drive.arm();
+  device.apply(parse_assignments({"excitation.run=1"}));
+  reader.wait(seconds(2));
+  drive.disarm();
+  const Captured captured = reader.read();
+  ASSERT_EQ(captured.samples(), 600u);
+  ASSERT_EQ(captured.trigger_sample, 100u);
+  const auto& voltage = captured.column("voltage");
+  const auto& current = captured.column("current");
+  const auto& flags = captured.column("flags");
+  for (std::size_t s = 0; s < 600; ++s) {
+    const bool on = s >= 100;
+    ASSERT_NEAR(voltage[s], on ? 1.5 : 0.0, 0.01) << s;
+    const auto bits = static_cast<std::uint32_t>(flags[s]);
+    ASSERT_EQ((bits & firmware::capture_flag::excitation_started) != 0, s == 100) << s;
+    ASSERT_NE(bits & firmware::capture_flag::armed, 0u) << s;
+    ASSERT_EQ(bits & firmware::capture_flag::fault, 0u) << s;
+    ASSERT_NEAR(captured.column("supply")[s], 24.0, 0.5) << s;
+    // The voltage acts half a tick after the sample.
+    if (s <= 100) {
+      ASSERT_NEAR(current[s], 0.0, 0.1) << s;
+    }
+  }
+  const double most = *std::max_element(current.begin(), current.end());
+  EXPECT_GT(most, 0.8 * 1.5 / 2.3);
+  EXPECT_LT(most, 1.2 * 1.5 / 2.3);
 }
 
 }  // namespace

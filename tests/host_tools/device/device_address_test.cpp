@@ -73,8 +73,7 @@ TEST(DeviceAddress, ErrorsSayWhatIsAllowed) {
 }
 
 RC_GTEST_PROP(DeviceAddress, ItsTextGivesItBack, ()) {
-  DeviceAddress address;
-  address.kind = *rc::gen::element(Kind::serial, Kind::can);
+  DeviceAddress address{.kind = *rc::gen::element(Kind::serial, Kind::can)};
   address.path = *rc::gen::nonEmpty(
       rc::gen::container<std::string>(rc::gen::element('a', '/', ':', '.', '-', '=', '&')));
   if (address.kind == Kind::serial) {

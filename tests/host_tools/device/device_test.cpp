@@ -32,9 +32,13 @@ std::vector<Assignment> assignments(std::vector<std::string> texts) {
   return parse_assignments(texts);
 }
 
-TEST(Device, ReadsEverythingInOneRequestPerGroup) {
+class OpenDevice : public testing::Test {
+ protected:
   Connection connection;
   Device device = connection.open();
+};
+
+TEST_F(OpenDevice, ReadsEverythingInOneRequestPerGroup) {
   connection.fake->registers.values().set_whole<"encoder.direction">(0xFFFFFFFFu, 1);
   connection.fake->registers.values().set_whole<"encoder.offset">(0x89ABCDEFu, 1);
   connection.link->requests = 0;
@@ -48,9 +52,7 @@ TEST(Device, ReadsEverythingInOneRequestPerGroup) {
   }
 }
 
-TEST(Device, OneGroupIsOneRequest) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, OneGroupIsOneRequest) {
   connection.link->requests = 0;
   std::vector<Parameter> wall;
   for (const Parameter& parameter : all_parameters()) {
@@ -69,9 +71,7 @@ TEST(Device, AnotherDictionaryIsRefusedWithAdvice) {
   EXPECT_CONTAINS(message, "flash");
 }
 
-TEST(Device, SetsManyValuesAtOnceAndReadsThemBack) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, SetsManyValuesAtOnceAndReadsThemBack) {
   device.apply(
       assignments({"wall.stiffness=3.58N/mm", "wall.law=magnetic", "axis1.wall.side=-1", "link.timeout=2"}));
   const auto& values = connection.fake->registers.values();
@@ -83,17 +83,13 @@ TEST(Device, SetsManyValuesAtOnceAndReadsThemBack) {
   EXPECT_FALSE(connection.fake->registers.transaction_open());
 }
 
-TEST(Device, NothingToSetSendsNothing) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, NothingToSetSendsNothing) {
   connection.link->requests = 0;
   device.apply({});
   EXPECT_EQ(connection.link->requests, 0);
 }
 
-TEST(Device, AParameterGivenTwiceIsRefused) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, AParameterGivenTwiceIsRefused) {
   const Assignment one{Parameter::of<"wall.stiffness">(), std::bit_cast<std::uint32_t>(5.0f)};
   const Assignment twice[] = {one, one};
   EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.apply(twice); }), "twice");
@@ -132,9 +128,7 @@ TEST(Device, EveryRefusalIsExplainedAndChangesNothing) {
   }
 }
 
-TEST(Device, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
     connection.fake->machines[1].command(word, Refusal::none, false);
   const auto before = connection.fake->settings();
@@ -147,9 +141,7 @@ TEST(Device, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
   device.apply(assignments({"wall.damping=7"}));
 }
 
-TEST(Device, ATransactionLeftOpenIsWaitedFor) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, ATransactionLeftOpenIsWaitedFor) {
   device.write(Parameter::of<"transaction.control">(), 1, false);
   device.apply(assignments({"wall.stiffness=50"}));
   EXPECT_EQ(connection.fake->registers.values().real<"wall.stiffness">(), 50.0f);
@@ -157,9 +149,7 @@ TEST(Device, ATransactionLeftOpenIsWaitedFor) {
   EXPECT_CONTAINS(connection.notices[0], "waiting");
 }
 
-TEST(Device, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
   device.write(Parameter::of<"transaction.control">(), 1, false);
   connection.link->while_waiting = [&] {
     const std::uint16_t words[] = {0x3F80, 0};
@@ -169,9 +159,7 @@ TEST(Device, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
                   "a transaction is open");
 }
 
-TEST(Device, AnotherWriterIsFoundOut) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, AnotherWriterIsFoundOut) {
   connection.link->after_request = [&](int) {
     if (connection.fake->registers.values().real<"wall.stiffness">() == 3580.0f)
       connection.fake->registers.values().set_real<"wall.stiffness">(42.0f);
@@ -231,9 +219,7 @@ INSTANTIATE_TEST_SUITE_P(RequestsAndReplies, LostMessages,
 
 // If only the answer to its first message was lost, the program is the one that left the transaction open,
 // and need not wait for the device to drop it.
-TEST(Device, ItsOwnUnansweredTransactionIsNotWaitedFor) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, ItsOwnUnansweredTransactionIsNotWaitedFor) {
   connection.link->requests = 0;
   connection.link->loss = FakeLink::Loss::reply;
   connection.link->first_lost = connection.link->last_lost = 1;
@@ -264,9 +250,7 @@ TEST(Device, AProgramThatIsSuspendedOnceBeginsAnew) {
   }
 }
 
-TEST(Device, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
-  Connection connection;
-  Device device = connection.open();
+TEST_F(OpenDevice, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
   const auto before = connection.fake->settings();
   connection.link->requests = 0;
   connection.link->after_request = [&](int) { connection.fake->pass(5'000'000); };

@@ -17,10 +17,7 @@ using Frames = FakeSdoNode::Frames;
 using namespace std::chrono_literals;
 
 CanDiscoverySettings quick() {
-  CanDiscoverySettings settings;
-  settings.listening = 60ms;
-  settings.response_timeout = 40ms;
-  return settings;
+  return CanDiscoverySettings{.listening = 60ms, .response_timeout = 40ms};
 }
 
 /// Until `count` nodes are found: one that a busy machine holds up for longer than is listened is looked for

@@ -47,10 +47,7 @@ class ForgetfulNode {
       for (const drivers::CanFrame& frame : connection_.received()) {
         if (frame.identifier != 0x600u + node_id) continue;
         for (const auto& data : server_.handle(frame.data)) {
-          drivers::CanFrame reply;
-          reply.identifier = 0x580u + node_id;
-          reply.length = 8;
-          reply.data = data;
+          drivers::CanFrame reply{.identifier = 0x580u + node_id, .length = 8, .data = data};
           connection_.send(reply);
         }
       }

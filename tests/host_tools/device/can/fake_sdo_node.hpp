@@ -22,9 +22,7 @@
 namespace kmax::host_tools_test {
 
 inline drivers::CanFrame frame_of(std::uint32_t identifier, std::vector<std::uint8_t> data) {
-  drivers::CanFrame frame;
-  frame.identifier = identifier;
-  frame.length = static_cast<std::uint8_t>(data.size());
+  drivers::CanFrame frame{.identifier = identifier, .length = static_cast<std::uint8_t>(data.size())};
   std::copy(data.begin(), data.end(), frame.data.begin());
   return frame;
 }

@@ -9,10 +9,8 @@ namespace kmax::host_tools_test {
 
 /// For what is answered sooner or later: a machine that is busy must not look like a silent node.
 inline link::SdoSettings patient_sdo() {
-  link::SdoSettings settings;
-  settings.response_timeout = std::chrono::seconds(20);
-  settings.block_silence = std::chrono::milliseconds(100);
-  return settings;
+  return link::SdoSettings{.response_timeout = std::chrono::seconds(20),
+                           .block_silence = std::chrono::milliseconds(100)};
 }
 
 /// For what is never answered. Waited for whenever an answer is lost; a node that a busy machine holds up for
@@ -31,8 +29,7 @@ struct SdoBench {
   link::SdoClient& client() {
     if (client_) return *client_;
     node.start();
-    link::CanPortOptions options;
-    options.filters = link::SdoClient::filters_for(5);
+    link::CanPortOptions options{.filters = link::SdoClient::filters_for(5)};
     port = link::open_can_port(node.path(), options);
     return client_.emplace(*port, std::uint8_t{5}, settings_);
   }

@@ -16,9 +16,7 @@ using host_tools_test::thrown_message;
 using namespace std::chrono_literals;
 
 CanFrame frame_with(std::uint32_t identifier, std::uint32_t number = 0) {
-  CanFrame frame;
-  frame.identifier = identifier;
-  frame.length = 4;
+  CanFrame frame{.identifier = identifier, .length = 4};
   for (unsigned i = 0; i < 4; ++i) frame.data[i] = static_cast<std::uint8_t>(number >> (8 * i));
   return frame;
 }
@@ -71,8 +69,7 @@ TEST_F(SocketCanTest, CarriesEveryKindOfFrame) {
 }
 
 TEST_F(SocketCanTest, OnlyWhatItAskedForPasses) {
-  CanPortOptions options;
-  options.filters = {{0x585, 0x7FF}, {0x700, 0x780}};
+  CanPortOptions options{.filters = {{0x585, 0x7FF}, {0x700, 0x780}}};
   SocketCan a(interface), b(interface, options);
   CanFrame extended = frame_with(0x585), remote = frame_with(0x585);
   extended.extended = true;
