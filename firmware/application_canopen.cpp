@@ -139,7 +139,7 @@ void Application::refresh_can_readings() {
   v.set_whole<"can.rpdo_refused">(node_.rpdo_counters().refused);
   v.set_whole<"can.pdo_length_errors">(node_.rpdo_counters().too_short);
   v.set_whole<"can.tpdo_held_back">(node_.tpdo_counters().held_back);
-  v.set_whole<"can.emergencies_lost">(node_.emergency().counters().overflows);
+  v.set_whole<"can.emergencies_lost">(node_.emergency().overflows());
   v.set_whole<"can.heartbeats_lost">(node_.heartbeat_counters().lost);
   v.set_whole<"can.identity_conflicts">(node_.identity_conflicts());
   v.set_whole<"can.bit_rate_in_use">(node_.settings().bit_rate);

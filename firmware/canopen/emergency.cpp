@@ -4,12 +4,8 @@ namespace kmax::firmware::canopen {
 
 bool Emergency::raise(const EmergencyError& error) {
   if (find(error.code, error.manufacturer[0]) != present_) return true;
-  if (error.code == 0 || present_ == present_error_count) {
-    ++counters_.refused;
-    return false;
-  }
+  if (error.code == 0 || present_ == present_error_count) return false;
   errors_[present_++] = error;
-  ++counters_.raised;
   remember(error);
   announce();
   return true;

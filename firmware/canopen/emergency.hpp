@@ -41,15 +41,6 @@ struct EmergencyError {
   std::array<std::uint8_t, 5> manufacturer{};  ///< bytes 3 to 7 of the message; [0]: where it happened
 };
 
-/// They wrap.
-struct EmergencyCounters {
-  std::uint32_t raised = 0;     ///< new errors
-  std::uint32_t refused = 0;    ///< code 0, or more than `present_error_count` at the same time
-  std::uint32_t sent = 0;       ///< messages
-  std::uint32_t overflows = 0;  ///< messages that found the queue full
-  std::uint32_t not_valid = 0;  ///< messages that were not sent because bit 31 of object 0x1014 was set
-};
-
 /// Emergency producer of CiA 301 (7.2.7; objects 0x1001, 0x1003, 0x1014, 0x1015).
 ///
 /// An error is announced once, when it appears. When it goes while others remain, the latest of those is sent
@@ -64,15 +55,6 @@ struct EmergencyCounters {
 /// `now_us` wraps at 2^32: call next_frame() at least once an hour. Main loop only. Cost: a search among 16.
 class Emergency {
  public:
-  /// May `raw` be written to object 0x1014 while it is `present`? The identifier may change only while the
-  /// object is not valid (bit 31), or with the write that makes it so.
-  static constexpr Abort check(std::uint32_t raw, std::uint32_t present) {
-    const std::uint32_t id = raw & ~cob_id::invalid;
-    if (id > cob_id::identifier || cob_id::restricted(id)) return Abort::value_range;
-    const bool stays_valid = ((raw | present) & cob_id::invalid) == 0;
-    return stays_valid && raw != present ? Abort::value_range : Abort::none;
-  }
-
   /// Objects 0x1014, with the node ID already added, and 0x1015 in 100 us (0: no inhibit time). Both take
   /// effect at once, also on messages that wait.
   void configure(std::uint32_t cob_id_raw, std::uint16_t inhibit_100us) {
@@ -80,7 +62,6 @@ class Emergency {
     valid_ = (cob_id_raw & cob_id::invalid) == 0;
     inhibit_us_ = inhibit_100us * 100U;
     if (valid_) return;
-    counters_.not_valid += static_cast<std::uint32_t>(queued_);
     state_untold_ = state_untold_ || queued_ != 0;
     queued_ = 0;
   }
@@ -127,7 +108,6 @@ class Emergency {
     error_told_ = message[0] != 0 || message[1] != 0;
     inhibiting_ = true;
     sent_us_ = now_us;
-    ++counters_.sent;
     out = {.identifier = identifier_, .length = 8, .data = message};
     return true;
   }
@@ -156,14 +136,8 @@ class Emergency {
 
   void erase_history() { remembered_ = 0; }
 
-  /// `value` is written to object 0x1003, sub-index 0: 0 erases the history, any other one is refused.
-  Abort write_history_count(std::uint8_t value) {
-    if (value != 0) return Abort::value_range;
-    erase_history();
-    return Abort::none;
-  }
-
-  const EmergencyCounters& counters() const { return counters_; }
+  /// Messages that found the queue full. It wraps.
+  std::uint32_t overflows() const { return overflows_; }
 
  private:
   using Message = std::array<std::uint8_t, 8>;
@@ -197,7 +171,7 @@ class Emergency {
   // A message that goes into the queue tells the present state, so what was lost before it is told too.
   void announce() {
     if (!valid_ || queued_ == emergency_queue_length) {
-      ++(valid_ ? counters_.overflows : counters_.not_valid);
+      if (valid_) ++overflows_;
       state_untold_ = true;
       return;
     }
@@ -209,7 +183,7 @@ class Emergency {
   std::array<EmergencyError, present_error_count> errors_{};  // in the order in which they appeared
   std::array<Message, emergency_queue_length> queue_{};
   std::array<std::uint32_t, error_history_length> history_{};
-  EmergencyCounters counters_;
+  std::uint32_t overflows_ = 0;
   std::size_t present_ = 0;
   std::size_t first_ = 0, queued_ = 0;
   std::size_t newest_ = 0;

@@ -20,12 +20,8 @@ enum class HeartbeatWatch : std::uint8_t { unused, waiting, alive, lost };
 
 /// They wrap.
 struct HeartbeatConsumerCounters {
-  std::uint32_t heartbeats = 0;     ///< of watched nodes
-  std::uint32_t boot_ups = 0;       ///< of watched nodes
-  std::uint32_t wrong_length = 0;   ///< of watched nodes, not 1 byte
-  std::uint32_t unknown_state = 0;  ///< of watched nodes, no NMT state
-  std::uint32_t lost = 0;           ///< heartbeats that stayed away
-  std::uint32_t returned = 0;       ///< heartbeats that came again after that
+  std::uint32_t heartbeats = 0;  ///< of watched nodes
+  std::uint32_t lost = 0;        ///< heartbeats that stayed away
 };
 
 /// Heartbeat consumer of CiA 301 (7.2.8.3.2.2; object 0x1016). Bits 0..15 of an entry are the time in ms,
@@ -128,13 +124,9 @@ class HeartbeatConsumer {
   static constexpr bool used(std::uint32_t raw) { return node_of(raw) != 0 && (raw & 0xFFFF) != 0; }
 
   std::optional<std::uint8_t> take(Entry& entry, const drivers::CanFrame& frame, std::uint32_t now_us) {
-    if (frame.length != 1) {
-      ++counters_.wrong_length;
-      return std::nullopt;
-    }
+    if (frame.length != 1) return std::nullopt;
     switch (frame.data[0]) {
       case 0x00:
-        ++counters_.boot_ups;
         if (!entry.booted) entry.last_us = now_us;
         entry.booted = true;
         return std::nullopt;
@@ -143,7 +135,6 @@ class HeartbeatConsumer {
       case 0x7F:
         break;
       default:
-        ++counters_.unknown_state;
         return std::nullopt;
     }
     ++counters_.heartbeats;
@@ -151,9 +142,7 @@ class HeartbeatConsumer {
     entry.watch = HeartbeatWatch::alive;
     entry.booted = false;
     entry.last_us = now_us;
-    if (!was_lost) return std::nullopt;
-    ++counters_.returned;
-    return entry.node_id;
+    return was_lost ? std::optional(entry.node_id) : std::nullopt;
   }
 
   std::array<Entry, watched_node_count> entries_{};

@@ -33,16 +33,6 @@ enum class LssAction : std::uint8_t {
 /// Answers of the protocol "store configuration".
 enum class LssStore : std::uint8_t { stored = 0, not_supported = 1, failed = 2 };
 
-/// They wrap.
-struct LssCounters {
-  std::uint32_t requests = 0;      ///< 8 bytes from the master, known or not
-  std::uint32_t answers = 0;       ///< sent
-  std::uint32_t wrong_length = 0;  ///< not 8 bytes
-  std::uint32_t unknown = 0;       ///< not a service, or one that this state does not have
-  std::uint32_t busy = 0;          ///< came while the configuration was being stored, or while quiet
-  std::uint32_t withdrawn = 0;     ///< answers that had not gone when the next request came
-};
-
 /// LSS slave of CiA 305: node ID and bit rate over the bus, also for a device that has no node ID yet.
 ///
 /// Services and states (CiA 305, table of the LSS states and the services supported in them):
@@ -87,18 +77,12 @@ class LssSlave {
 
   /// A frame from the master, identifier 0x7E5; others are not for this part.
   LssAction receive(const drivers::CanFrame& frame, std::uint32_t now_us) {
-    if (frame.identifier != cob_id::lss_request || frame.extended || frame.remote) return LssAction::none;
-    if (frame.length != 8) {
-      ++counters_.wrong_length;
+    if (frame.identifier != cob_id::lss_request || frame.extended || frame.remote || frame.length != 8) {
       return LssAction::none;
     }
-    ++counters_.requests;
     const std::uint8_t which = frame.data[0];
-    if (quiet() || (storing_ && which != service::switch_global)) {
-      ++counters_.busy;
-      return LssAction::none;
-    }
-    withdraw_answer();
+    if (quiet() || (storing_ && which != service::switch_global)) return LssAction::none;
+    answer_waits_ = false;
     if (which == service::switch_global) return switch_global(frame.data[1]);
     if (which == service::identify_non_configured) return identify_non_configured();
     if (which >= service::identify_vendor && which <= service::identify_serial_high) {
@@ -109,7 +93,7 @@ class LssSlave {
       return select(which, number_of(frame));
     }
     if (which == service::fastscan) return fastscan(frame);
-    return unknown();
+    return LssAction::none;
   }
 
   /// `switch_bit_rate` when the first delay of "activate" is over.
@@ -135,7 +119,6 @@ class LssSlave {
   bool next_frame(drivers::CanFrame& out) {
     if (!answer_waits_) return false;
     answer_waits_ = false;
-    ++counters_.answers;
     out = {.identifier = cob_id::lss_response, .length = 8, .data = answer_};
     return true;
   }
@@ -148,7 +131,6 @@ class LssSlave {
   std::uint8_t pending_node_id() const { return pending_node_id_; }
   std::uint32_t active_bit_rate() const { return active_bit_rate_; }
   std::uint32_t pending_bit_rate() const { return pending_bit_rate_; }
-  const LssCounters& counters() const { return counters_; }
 
  private:
   enum class State : std::uint8_t { waiting, configuration };
@@ -181,19 +163,9 @@ class LssSlave {
            std::uint32_t{frame.data[3]} << 16 | std::uint32_t{frame.data[4]} << 24;
   }
 
-  void withdraw_answer() {
-    if (answer_waits_) ++counters_.withdrawn;
-    answer_waits_ = false;
-  }
-
   LssAction answer(const Data& data) {
     answer_ = data;
     answer_waits_ = true;
-    return LssAction::none;
-  }
-
-  LssAction unknown() {
-    ++counters_.unknown;
     return LssAction::none;
   }
 
@@ -204,7 +176,7 @@ class LssSlave {
   }
 
   LssAction switch_global(std::uint8_t mode) {
-    if (mode > 1) return unknown();
+    if (mode > 1) return LssAction::none;
     const bool first_node_id = mode == 0 && state_ == State::configuration &&
                                active_node_id_ == unconfigured_node_id &&
                                pending_node_id_ != unconfigured_node_id;
@@ -254,7 +226,7 @@ class LssSlave {
       scanned_ = 0;
       return answer({service::identified});
     }
-    if (check > 31 || sub >= address_.size() || next >= address_.size()) return unknown();
+    if (check > 31 || sub >= address_.size() || next >= address_.size()) return LssAction::none;
     if (sub != scanned_ || (number_of(frame) ^ address_[sub]) >> check != 0) return LssAction::none;
     scanned_ = next;
     if (check == 0 && next < sub) enter(State::configuration);
@@ -282,7 +254,7 @@ class LssSlave {
         // Without an active node ID the device has not left the NMT state initialising: the pending one.
         return answer({which, active_node_id_ == unconfigured_node_id ? pending_node_id_ : active_node_id_});
       default:
-        return unknown();
+        return LssAction::none;
     }
   }
 
@@ -307,7 +279,6 @@ class LssSlave {
   }
 
   std::array<std::uint32_t, 4> address_;
-  LssCounters counters_;
   std::uint32_t active_bit_rate_ = 1'000'000, pending_bit_rate_ = 1'000'000;
   std::uint32_t delay_us_ = 0, delay_start_us_ = 0;
   std::size_t selecting_ = 0, identifying_ = 0;  // numbers that were right so far

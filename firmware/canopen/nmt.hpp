@@ -22,18 +22,6 @@ enum class NmtEvent : std::uint8_t {
   reset_communication,
 };
 
-/// They wrap.
-struct NmtCounters {
-  std::uint32_t commands = 0;           ///< known ones for this node, repeated ones too
-  std::uint32_t wrong_length = 0;       ///< not 2 bytes
-  std::uint32_t unknown_command = 0;    ///< for this node or for all
-  std::uint32_t other_node = 0;         ///< known or not
-  std::uint32_t not_ready = 0;          ///< came while initialising: without a node ID, or before the boot-up
-  std::uint32_t boot_ups = 0;           ///< sent
-  std::uint32_t heartbeats = 0;         ///< sent
-  std::uint32_t heartbeats_missed = 0;  ///< left out because there was no room for a whole heartbeat time
-};
-
 /// NMT slave and heartbeat producer of CiA 301 (7.2.8, 7.3.2).
 ///
 ///   start()     -> initialising; the boot-up message waits to be sent
@@ -60,22 +48,21 @@ class Nmt {
   /// Frames with another identifier, extended and remote ones are not for this part.
   NmtEvent receive(const drivers::CanFrame& frame) {
     if (frame.identifier != cob_id::nmt || frame.extended || frame.remote) return NmtEvent::none;
-    if (frame.length != 2) return counted(counters_.wrong_length);
-    if (state_ == NmtState::initialising) return counted(counters_.not_ready);
-    if (frame.data[1] != 0 && frame.data[1] != node_id_) return counted(counters_.other_node);
+    if (frame.length != 2 || state_ == NmtState::initialising) return NmtEvent::none;
+    if (frame.data[1] != 0 && frame.data[1] != node_id_) return NmtEvent::none;
     switch (frame.data[0]) {
       case 0x01:
-        return obeyed(enter(NmtState::operational));
+        return enter(NmtState::operational);
       case 0x02:
-        return obeyed(enter(NmtState::stopped));
+        return enter(NmtState::stopped);
       case 0x80:
-        return obeyed(enter(NmtState::pre_operational));
+        return enter(NmtState::pre_operational);
       case 0x81:
-        return obeyed(reset(NmtEvent::reset_node));
+        return reset(NmtEvent::reset_node);
       case 0x82:
-        return obeyed(reset(NmtEvent::reset_communication));
+        return reset(NmtEvent::reset_communication);
       default:
-        return counted(counters_.unknown_command);
+        return NmtEvent::none;
     }
   }
 
@@ -100,7 +87,6 @@ class Nmt {
   bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
     if (boot_up_waits_) {
       boot_up_waits_ = false;
-      ++counters_.boot_ups;
       out = frame_of(NmtState::initialising);
       state_ = NmtState::pre_operational;
       last_us_ = now_us;
@@ -109,10 +95,7 @@ class Nmt {
     if (state_ == NmtState::initialising || heartbeat_us_ == 0) return false;
     const std::uint32_t elapsed_us = now_us - last_us_;
     if (elapsed_us < heartbeat_us_) return false;
-    const std::uint32_t periods = elapsed_us / heartbeat_us_;
-    last_us_ += periods * heartbeat_us_;
-    counters_.heartbeats_missed += periods - 1;
-    ++counters_.heartbeats;
+    last_us_ += elapsed_us / heartbeat_us_ * heartbeat_us_;
     out = frame_of(state_);
     return true;
   }
@@ -121,19 +104,8 @@ class Nmt {
   bool configured() const { return node_id_ != unconfigured_node_id; }
   /// 1..127, or 255 if there is none.
   std::uint8_t node_id() const { return node_id_; }
-  const NmtCounters& counters() const { return counters_; }
 
  private:
-  static NmtEvent counted(std::uint32_t& counter) {
-    ++counter;
-    return NmtEvent::none;
-  }
-
-  NmtEvent obeyed(NmtEvent event) {
-    ++counters_.commands;
-    return event;
-  }
-
   NmtEvent reset(NmtEvent which) {
     state_ = NmtState::initialising;
     return which;
@@ -144,7 +116,6 @@ class Nmt {
         .identifier = cob_id::heartbeat + node_id_, .length = 1, .data = {static_cast<std::uint8_t>(state)}};
   }
 
-  NmtCounters counters_;
   std::uint32_t heartbeat_us_ = 0;
   std::uint32_t last_us_ = 0;  // when the latest heartbeat was due
   NmtState state_ = NmtState::initialising;

@@ -21,13 +21,8 @@ enum class RpdoResult : std::uint8_t {
 
 /// They wrap.
 struct RpdoCounters {
-  std::uint32_t taken = 0;
-  std::uint32_t too_long = 0;  ///< of these
   std::uint32_t too_short = 0;
-  std::uint32_t replaced = 0;  ///< kept for a SYNC, but a newer one came first
-  std::uint32_t stale = 0;     ///< kept for a SYNC that came too late
-  std::uint32_t refused = 0;   ///< values that were not taken
-  std::uint32_t left_out = 0;  ///< not there since its stored settings break the rules, at a configure()
+  std::uint32_t refused = 0;  ///< values that were not taken
 };
 
 /// The PDOs that this device receives (CiA 301, 7.2.2; objects 0x1400 to 0x1403 and 0x1600 to 0x1603), in the
@@ -51,7 +46,7 @@ class Rpdos {
   void configure(const ParameterValues& values, std::uint8_t node_id) {
     for (std::size_t i = 0; i < pdo_count; ++i) {
       PdoSettings settings;
-      if (!read_pdo(PdoKind::receive, i, values, node_id, settings)) ++counters_.left_out;
+      (void)read_pdo(PdoKind::receive, i, values, node_id, settings);  // else it does not exist
       if (settings != pdos_[i].settings) pdos_[i] = {.settings = settings};
     }
   }
@@ -74,7 +69,6 @@ class Rpdos {
       result = one > result ? one : result;
       if (one == RpdoResult::too_short) continue;
       if (pdo.settings.synchronous()) {
-        if (pdo.kept) ++counters_.replaced;
         pdo.kept = true;
         pdo.kept_us = now_us;
         pdo.data = frame.data;
@@ -90,11 +84,7 @@ class Rpdos {
     for (Pdo& pdo : pdos_) {
       if (!pdo.kept) continue;
       pdo.kept = false;
-      if (now_us - pdo.kept_us > longest_kept_us) {
-        ++counters_.stale;
-        continue;
-      }
-      write_all(pdo.settings.mapping, pdo.data, write);
+      if (now_us - pdo.kept_us <= longest_kept_us) write_all(pdo.settings.mapping, pdo.data, write);
     }
   }
 
@@ -119,10 +109,7 @@ class Rpdos {
       ++counters_.too_short;
       return RpdoResult::too_short;
     }
-    ++counters_.taken;
-    if (frame.length == pdo.settings.mapping.bytes()) return RpdoResult::taken;
-    ++counters_.too_long;
-    return RpdoResult::too_long;
+    return frame.length == pdo.settings.mapping.bytes() ? RpdoResult::taken : RpdoResult::too_long;
   }
 
   template <typename Write>

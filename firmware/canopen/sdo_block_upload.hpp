@@ -76,9 +76,6 @@ class SdoBlockUpload {
     return Abort::none;
   }
 
-  /// Some of the block that is being acknowledged with `good` did not arrive.
-  [[nodiscard]] bool lost(std::uint8_t good) const { return phase_ == Phase::segments && good < sent_; }
-
   [[nodiscard]] SdoBytes end_request() const {
     return {static_cast<std::uint8_t>(sdo_response::end_block_upload | unused_ << 2),
             static_cast<std::uint8_t>(crc_ & 0xFFU), static_cast<std::uint8_t>(crc_ >> 8)};

@@ -60,16 +60,10 @@ struct SdoConfig {
 
 /// They wrap.
 struct SdoCounters {
-  std::uint32_t uploads = 0;            ///< values read to the end
-  std::uint32_t downloads = 0;          ///< values written
   std::uint32_t aborts_sent = 0;        ///< refused or failed, time-outs included
-  std::uint32_t aborts_received = 0;    ///< with or without a transfer under way
   std::uint32_t timeouts = 0;           ///< transfers that the client left unfinished
-  std::uint32_t replaced = 0;           ///< transfers ended by a new initiate
-  std::uint32_t ignored = 0;            ///< frames that are none of this protocol
   std::uint32_t segments_lost = 0;      ///< segments of a block download dropped behind a gap
   std::uint32_t segments_repeated = 0;  ///< segments of a block download that came again
-  std::uint32_t blocks_resumed = 0;     ///< blocks of an upload of which the client missed some
 };
 
 template <ObjectAccess Objects, std::size_t buffer_size = 2048>
@@ -100,7 +94,6 @@ class SdoServer {
     if (node_id_ == 0) return;
     if (frame.extended || frame.remote || frame.length != 8 ||
         frame.identifier != cob_id::sdo_request + node_id_) {
-      ++counters_.ignored;
       return;
     }
     last_us_ = now_us;
@@ -166,7 +159,6 @@ class SdoServer {
       case SdoRequest::block_download:
         return (bytes[0] & 1U) == 0 ? initiate_block_download(bytes) : end_block_download(bytes);
       case SdoRequest::abort:
-        ++counters_.aborts_received;
         transfer_ = Transfer::none;
         answer_waits_ = false;
         return;
@@ -219,7 +211,6 @@ class SdoServer {
 
   void complete_download(Abort refused, const SdoBytes& confirmation) {
     if (refused != Abort::none) return fail(refused);
-    ++counters_.downloads;
     transfer_ = Transfer::none;
     answer(confirmation);
   }
@@ -240,7 +231,6 @@ class SdoServer {
                                  address_);
       const Abort failed = source_.read(0, std::span(bytes).subspan(4, size));
       if (failed != Abort::none) return fail(failed);
-      ++counters_.uploads;
       return answer(bytes);
     }
     transfer_ = Transfer::upload;
@@ -262,13 +252,8 @@ class SdoServer {
         static_cast<std::uint8_t>(sdo_response::upload_segment | toggle_ | (sdo_segment_size - length) << 1 |
                                   (last ? sdo_flag::last_segment : 0U));
     toggle_ ^= sdo_flag::toggle;
-    if (last) complete_upload();
+    if (last) transfer_ = Transfer::none;
     answer(segment);
-  }
-
-  void complete_upload() {
-    ++counters_.uploads;
-    transfer_ = Transfer::none;
   }
 
   void block_upload(const SdoBytes& bytes) {
@@ -276,13 +261,14 @@ class SdoServer {
     if (kind == SdoBlockUploadRequest::initiate) return initiate_block_upload(bytes);
     if (transfer_ != Transfer::block_upload) return fail(Abort::command);
     if (kind == SdoBlockUploadRequest::end) {
-      return block_upload_.ending() ? complete_upload() : fail(Abort::command);
+      if (!block_upload_.ending()) return fail(Abort::command);
+      transfer_ = Transfer::none;
+      return;
     }
     if (kind == SdoBlockUploadRequest::start) {
       const Abort refused = block_upload_.start();
       return refused == Abort::none ? void() : fail(refused);
     }
-    if (block_upload_.lost(bytes[1])) ++counters_.blocks_resumed;
     bool ended = false;
     const Abort refused = block_upload_.acknowledge(bytes[1], bytes[2], ended);
     if (refused != Abort::none) return fail(refused);
@@ -337,7 +323,6 @@ class SdoServer {
 
   /// A new transfer, which ends the one under way.
   void initiate(const SdoBytes& bytes) {
-    if (transfer_ != Transfer::none) ++counters_.replaced;
     transfer_ = Transfer::none;
     address_ = sdo_address(bytes);
   }

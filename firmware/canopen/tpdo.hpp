@@ -21,9 +21,7 @@ concept PdoSource = requires(T source, std::size_t slot) {
 
 /// They wrap.
 struct TpdoCounters {
-  std::uint32_t sent = 0;
   std::uint32_t held_back = 0;  ///< due again before the bus had room for it: its newer values were sent
-  std::uint32_t left_out = 0;   ///< not there since its stored settings break the rules, at a configure()
 };
 
 /// The PDOs that this device sends (CiA 301, 7.2.2; objects 0x1800 to 0x1803 and 0x1A00 to 0x1A03). They go
@@ -65,7 +63,7 @@ class Tpdos {
     std::array<bool, pdo_count> starts{};
     for (std::size_t i = 0; i < pdo_count; ++i) {
       PdoSettings settings;
-      if (!read_pdo(PdoKind::transmit, i, values, node_id, settings)) ++counters_.left_out;
+      (void)read_pdo(PdoKind::transmit, i, values, node_id, settings);  // else it does not exist
       const std::uint32_t period_us = std::max(settings.event_us, least_us);
       Pdo& pdo = pdos_[i];
       if (settings == pdo.settings && period_us == pdo.period_us) continue;
@@ -216,7 +214,6 @@ class Tpdos {
     pdo.state = State::idle;
     pdo.sent_us = now_us;
     pdo.inhibited = pdo.timed() && pdo.settings.inhibit_us != 0;
-    ++counters_.sent;
   }
 
   std::array<Pdo, pdo_count> pdos_{};

@@ -50,30 +50,23 @@ struct Board {
   SerialEncoder<Bus, Select> encoder{bus, Select{&bus}};
 };
 
-TEST(SerialEncoder, ABusThatWasTakenForMillisecondsCostsNoTurnAndNeedsNobody) {
-  Board board;
-  board.start_at_twenty_thousand();
-  board.bus.taken = true;
-  EXPECT_FALSE(board.ticks(60, 20'100).valid);
-  board.bus.taken = false;
-  const auto sample = board.ticks(10, 20'100);
-  EXPECT_TRUE(sample.valid);
-  EXPECT_EQ(sample.count, 20'100U);
-  EXPECT_EQ(sample.reference_generation, 0U);
-  EXPECT_FALSE(board.bus.taken);
-  EXPECT_FALSE(board.bus.selected);
-}
-
-TEST(SerialEncoder, ABusThatWasTakenForLongerCostsTheTurnsAndSaysSo) {
-  Board board;
-  board.start_at_twenty_thousand();
-  board.bus.taken = true;
-  board.ticks(1000, 20'000);
-  board.bus.taken = false;
-  const auto sample = board.ticks(10, 20'000);
-  EXPECT_TRUE(sample.valid);
-  EXPECT_EQ(sample.count, 3616U);
-  EXPECT_EQ(sample.reference_generation, 1U);
+TEST(SerialEncoder, ABusThatWasTakenForMillisecondsCostsNoTurnAndForLongerTheTurnsWhichItSays) {
+  struct Row {
+    int ticks, position;
+    std::uint32_t count, generation;
+  };
+  for (const Row& row : {Row{60, 20'100, 20'100, 0}, Row{1000, 20'000, 3616, 1}}) {
+    Board board;
+    board.start_at_twenty_thousand();
+    board.bus.taken = true;
+    EXPECT_FALSE(board.ticks(row.ticks, row.position).valid);
+    board.bus.taken = false;
+    const auto sample = board.ticks(10, row.position);
+    EXPECT_TRUE(sample.valid);
+    EXPECT_EQ(sample.count, row.count);
+    EXPECT_EQ(sample.reference_generation, row.generation);
+    EXPECT_FALSE(board.bus.taken || board.bus.selected);
+  }
 }
 
 TEST(SerialEncoder, ARestartOfAnEncoderThatIsReadKeepsTheTurns) {

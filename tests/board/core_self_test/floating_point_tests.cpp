@@ -10,7 +10,6 @@
 namespace kmax::core_self_test {
 
 using namespace drivers::cortex_m;
-using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {

@@ -11,7 +11,6 @@
 namespace kmax::core_self_test {
 
 using namespace drivers::cortex_m;
-using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
 
 namespace {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "firmware/canopen/communication_rules.hpp"
 
 namespace kmax::firmware::canopen {
@@ -23,9 +25,9 @@ struct CommunicationWrites {
   }
 
   /// The standard's order, from whatever there was. The abort of the first write that was refused.
-  template <typename List>
-  Abort remap(std::uint16_t communication, const List& objects, std::uint32_t identifier,
-              std::uint32_t type = 255, std::uint32_t event_ms = 0, std::uint32_t inhibit_100us = 0) {
+  Abort remap(std::uint16_t communication, const std::vector<std::uint32_t>& objects,
+              std::uint32_t identifier, std::uint32_t type = 255, std::uint32_t event_ms = 0,
+              std::uint32_t inhibit_100us = 0) {
     const auto mapping = static_cast<std::uint16_t>(communication + 0x200);
     Abort abort = write(communication, 1, bit_31 | identifier);
     const auto next = [&](std::uint16_t index, unsigned subindex, std::uint32_t value) {
@@ -42,12 +44,6 @@ struct CommunicationWrites {
     }
     next(communication, 1, identifier);
     return abort;
-  }
-  Abort remap(std::uint16_t communication, std::initializer_list<std::uint32_t> objects,
-              std::uint32_t identifier, std::uint32_t type = 255, std::uint32_t event_ms = 0,
-              std::uint32_t inhibit_100us = 0) {
-    return remap<std::initializer_list<std::uint32_t>>(communication, objects, identifier, type, event_ms,
-                                                       inhibit_100us);
   }
 
   ParameterValues values;

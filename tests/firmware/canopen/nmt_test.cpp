@@ -47,11 +47,9 @@ TEST(Nmt, BootsUpOnceAndIsPreOperationalOnlyThen) {
   nmt.start(own_id, 0, 0);
   EXPECT_EQ(nmt.state(), NmtState::initialising);
   EXPECT_EQ(nmt.receive(command(0x01, 0)), NmtEvent::none) << "no command before the boot-up message";
-  EXPECT_EQ(nmt.counters().not_ready, 1U);
   EXPECT_EQ(next(nmt, 0), node_state(0x00));
   EXPECT_EQ(nmt.state(), NmtState::pre_operational);
   EXPECT_FALSE(next(nmt, 0));
-  EXPECT_EQ(nmt.counters().boot_ups, 1U);
 }
 
 TEST(Nmt, EveryResetIsFollowedByABootUpMessage) {
@@ -69,7 +67,6 @@ TEST(Nmt, EveryResetIsFollowedByABootUpMessage) {
       EXPECT_EQ(nmt.state(), NmtState::pre_operational);
     }
   }
-  EXPECT_EQ(nmt.counters().boot_ups, 7U);
 }
 
 TEST(Nmt, CommandsLeadFromEveryStateToTheirs) {
@@ -90,7 +87,6 @@ TEST(Nmt, CommandsLeadFromEveryStateToTheirs) {
         EXPECT_EQ(nmt.receive(command(to.specifier, address)),
                   from.state == to.state ? NmtEvent::none : to.event);
         EXPECT_EQ(nmt.state(), to.state);
-        EXPECT_EQ(nmt.counters().commands, 1U);
       }
     }
   }
@@ -98,45 +94,30 @@ TEST(Nmt, CommandsLeadFromEveryStateToTheirs) {
 
 TEST(Nmt, EveryOtherCommandAndNodeIsIgnored) {
   Nmt nmt = started();
-  std::uint32_t unknown = 0;
   for (unsigned specifier = 0; specifier < 256; ++specifier) {
     if (specifier == 1 || specifier == 2 || (specifier >= 0x80 && specifier <= 0x82)) continue;
     EXPECT_EQ(nmt.receive(command(static_cast<std::uint8_t>(specifier), 0)), NmtEvent::none);
-    ++unknown;
   }
-  std::uint32_t others = 0;
   for (unsigned node = 1; node < 256; ++node) {
     if (node == own_id) continue;
-    for (const std::uint8_t specifier : Bytes{0x01, 0x02, 0x81, 0x82}) {
+    for (const std::uint8_t specifier : Bytes{0x01, 0x02, 0x81, 0x82})
       EXPECT_EQ(nmt.receive(command(specifier, static_cast<std::uint8_t>(node))), NmtEvent::none);
-      ++others;
-    }
   }
   EXPECT_EQ(nmt.state(), NmtState::pre_operational);
-  EXPECT_EQ(nmt.counters().unknown_command, unknown);
-  EXPECT_EQ(nmt.counters().other_node, others);
-  EXPECT_EQ(nmt.counters().commands, 0U);
 }
 
 TEST(Nmt, FramesThatAreNoCommandsAreIgnored) {
   Nmt nmt = started();
   for (std::uint8_t length = 0; length <= 8; ++length) {
+    if (length == 2) continue;
     CanFrame frame = command(0x01, own_id);
     frame.length = length;
-    if (length != 2) {
-      EXPECT_EQ(nmt.receive(frame), NmtEvent::none) << int{length};
-    }
+    EXPECT_EQ(nmt.receive(frame), NmtEvent::none) << int{length};
   }
-  EXPECT_EQ(nmt.counters().wrong_length, 8U);
-  CanFrame frame = command(0x01, own_id);
-  frame.extended = true;
-  EXPECT_EQ(nmt.receive(frame), NmtEvent::none);
-  frame = command(0x01, own_id);
-  frame.remote = true;
-  EXPECT_EQ(nmt.receive(frame), NmtEvent::none);
-  frame = command(0x01, own_id);
-  frame.identifier = 0x001;
-  EXPECT_EQ(nmt.receive(frame), NmtEvent::none);
+  for (const CanFrame& frame : {CanFrame{.extended = true, .length = 2, .data = {0x01, own_id}},
+                                {.remote = true, .length = 2, .data = {0x01, own_id}},
+                                {.identifier = 0x001, .length = 2, .data = {0x01, own_id}}})
+    EXPECT_EQ(nmt.receive(frame), NmtEvent::none);
   EXPECT_EQ(nmt.state(), NmtState::pre_operational);
 }
 
@@ -230,9 +211,7 @@ TEST(Nmt, HeartbeatsThatGotNoRoomAreLeftOutNotMadeUpFor) {
   Nmt nmt = started(1, 0);
   EXPECT_TRUE(next(nmt, 5300));
   EXPECT_FALSE(next(nmt, 5350));
-  EXPECT_EQ(nmt.counters().heartbeats_missed, 4U);
   EXPECT_TRUE(next(nmt, 6000)) << "the grid stays";
-  EXPECT_EQ(nmt.counters().heartbeats, 2U);
 }
 
 TEST(Nmt, TheDevicesOwnChangeOfState) {

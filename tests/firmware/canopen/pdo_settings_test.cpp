@@ -64,11 +64,5 @@ TEST(PdoSettings, WhatDoesNotExistMayHoldAnything) {
   EXPECT_FALSE(read.settings.exists);
 }
 
-TEST(PdoSettings, AllowsTheTypesThatThereAre) {
-  for (std::uint32_t type = 0; type < 600; ++type)
-    EXPECT_EQ(transmission_type_allowed(type), type <= 240 || type == 254 || type == 255) << type;
-  EXPECT_FALSE(transmission_type_allowed(0xFFFFFFFF));
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::pdo_settings_test

@@ -9,7 +9,6 @@
 
 #include "firmware/canopen/sdo_server.hpp"
 #include "tests/firmware/canopen/sdo_bench.hpp"
-#include "tests/firmware/canopen/sdo_test_client.hpp"
 
 namespace kmax::firmware::canopen::sdo_garbage_test {
 namespace {

@@ -1,7 +1,6 @@
 #include "firmware/canopen/sdo_source.hpp"
 
 #include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include <array>
 
@@ -61,22 +60,6 @@ TEST_F(SdoSourceTest, EachBeginForgetsTheWindow) {
   ASSERT_EQ(source.begin(domain), Abort::none);
   ASSERT_EQ(source.read(0, piece), Abort::none);
   EXPECT_EQ(piece, (std::array<std::uint8_t, 7>{9, 9, 9, 9, 9, 9, 9}));
-}
-
-RC_GTEST_PROP(SdoSource, AnyPieceAtAnyOffset, ()) {
-  InMemoryObjects objects;
-  std::array<std::uint8_t, 112> window{};
-  SdoSource<InMemoryObjects> source(objects, window);
-  const Bytes value = pattern(*rc::gen::inRange<std::size_t>(1, 1000));
-  objects.at(domain).value = value;
-  RC_ASSERT(source.begin(domain) == Abort::none);
-  for (int i = 0; i < 20; ++i) {
-    const auto offset = *rc::gen::inRange<std::size_t>(0, value.size());
-    Bytes piece(std::min<std::size_t>(7, value.size() - offset));
-    RC_ASSERT(source.read(static_cast<std::uint32_t>(offset), piece) == Abort::none);
-    RC_ASSERT(std::equal(piece.begin(), piece.end(), value.begin() + static_cast<long>(offset)));
-  }
-  RC_ASSERT(objects.broken_promises == 0);
 }
 
 }  // namespace
