@@ -1,7 +1,7 @@
 #pragma once
 // An incremental encoder with its three lines and its defects: handle position in, edges and levels out.
 //
-// Quantization is encoder_model.hpp's: the disc's count is floor(position / count length). edges() is what a
+// Quantization is EncoderModel's: the disc's count is floor(position / count length). edges() is what a
 // lossless counter at the end of the cable holds; it begins with the disc's count, so it is 0 at position 0.
 // A leads B while the position grows: with edges() modulo 4 = 0, 1, 2, 3 the levels (A, B) are 00, 10, 11,
 // 01. The index Z is high while the disc's count within the turn is the index position, one state wide.
