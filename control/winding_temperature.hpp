@@ -141,13 +141,6 @@ class WindingTemperature {
   Scalar winding() const { return winding_.value; }  ///< degC
   Scalar motor_case() const { return case_.value; }  ///< degC
 
-  /// ohm of the winding at a temperature, for what a controller or a check makes of R; never below 0.
-  static constexpr Scalar resistance_at(const Coefficients& c, Scalar temperature) {
-    const Scalar factor =
-        Scalar(1) + copper_temperature_coefficient<Scalar> * (temperature - c.reference_temperature);
-    return factor < Scalar(0) ? Scalar(0) : c.resistance * factor;
-  }
-
  private:
   struct Sum {
     Scalar value = Scalar(25);

@@ -49,21 +49,6 @@ struct As5047pAngleConfig {
   std::uint16_t maximum_unseen = 100;      ///< frames over which restart() keeps the turns, below 65535
 };
 
-struct As5047pAngleCounters {
-  std::uint32_t frames = 0;  ///< angles accepted
-  std::uint32_t parity = 0;
-  std::uint32_t error_flags = 0;
-  std::uint32_t framing_errors = 0;  ///< of ERRFL, as are the next two
-  std::uint32_t invalid_commands = 0;
-  std::uint32_t command_parity = 0;
-  std::uint32_t stuck_high = 0;
-  std::uint32_t stuck_low = 0;
-  std::uint32_t jumps = 0;     ///< angles that were not where they could be
-  std::uint32_t missed = 0;    ///< ticks without a frame
-  std::uint32_t probes = 0;    ///< diagnostics asked for
-  std::uint32_t no_field = 0;  ///< diagnostics that said the angle is not valid
-};
-
 /// Why the count is not valid.
 enum class As5047pFault : std::uint8_t {
   none,
@@ -89,7 +74,7 @@ class As5047pAngle {
   explicit constexpr As5047pAngle(const As5047pAngleConfig& config = {}) : config_(config) {}
 
   /// Starts again: the count is invalid until three frames agree. It goes on from where it was if the turns
-  /// can be known (above), else it begins within one turn. Counters go on.
+  /// can be known (above), else it begins within one turn.
   constexpr void restart() {
     fault_ = As5047pFault::starting;
     awaited_ = sent_ = As5047pRegister::no_operation;
@@ -118,15 +103,12 @@ class As5047pAngle {
     age();
     switch (as5047p_check(reply)) {
       case As5047pFrame::stuck_high:
-        ++counters_.stuck_high;
         return hold(As5047pFault::stuck_high);
       case As5047pFrame::parity:
-        ++counters_.parity;
         return hold(As5047pFault::parity);
       case As5047pFrame::error_flag:
         // The data of ERRFL itself may come with the flag that it explains.
-        if (awaited_ == As5047pRegister::errors) return note_errors(reply);
-        ++counters_.error_flags;
+        if (awaited_ == As5047pRegister::errors) return hold(As5047pFault::error_flag);
         // Once per fault: not again while the answer is on its way.
         if (sent_ != As5047pRegister::errors) next_ = As5047pRegister::errors;
         return hold(As5047pFault::error_flag);
@@ -135,7 +117,7 @@ class As5047pAngle {
     }
     const auto data = static_cast<std::uint16_t>(reply & as5047p::data_mask);
     if (awaited_ == As5047pRegister::angle) return take_angle(data);
-    if (awaited_ == As5047pRegister::errors) return note_errors(data);
+    if (awaited_ == As5047pRegister::errors) return hold(As5047pFault::error_flag);
     if (awaited_ == As5047pRegister::diagnostics) return take_diagnostics(data);
     return hold(As5047pFault::missed);
   }
@@ -144,14 +126,11 @@ class As5047pAngle {
   /// called for it. The frame after brings a reply of unknown age and is left out too, so this costs two.
   constexpr As5047pSample ISR_missed() {
     age();
-    ++counters_.missed;
     sent_ = As5047pRegister::no_operation;
     return hold(As5047pFault::missed);
   }
 
   constexpr As5047pFault fault() const { return fault_; }
-  /// Written by the interrupt; each is a word that another context may read.
-  constexpr const As5047pAngleCounters& counters() const { return counters_; }
 
  private:
   static constexpr unsigned frames_to_agree = 3;
@@ -182,20 +161,11 @@ class As5047pAngle {
     return sample(true);
   }
 
-  constexpr As5047pSample note_errors(std::uint16_t data) {
-    if ((data & as5047p::framing_error) != 0) ++counters_.framing_errors;
-    if ((data & as5047p::invalid_command) != 0) ++counters_.invalid_commands;
-    if ((data & as5047p::parity_error) != 0) ++counters_.command_parity;
-    return hold(As5047pFault::error_flag);
-  }
-
   constexpr As5047pSample take_diagnostics(std::uint16_t data) {
     const As5047pDiagnostics found = as5047p_diagnostics(data);
     if (data == 0) {
-      ++counters_.stuck_low;
       fail(As5047pFault::stuck_low);
     } else if (!found.angle_valid()) {
-      ++counters_.no_field;
       fail(As5047pFault::no_field);
     } else {
       alive_ = true;
@@ -223,7 +193,6 @@ class As5047pAngle {
     } else if (reachable(before_, angle, frames + frames_between_, frames)) {
       accept(before_, angle, frames + frames_between_);
     } else {
-      ++counters_.jumps;
       return hold(As5047pFault::jump);
     }
     return sample(false);
@@ -234,7 +203,6 @@ class As5047pAngle {
     const bool first = agreeing_ == 0;
     const bool agrees = first || (agreeing_ == 1 ? within(step_to(last_, angle), config_.maximum_step)
                                                  : reachable(last_, angle, 1, 1));
-    if (!agrees) ++counters_.jumps;
     if (first || !agrees) {
       last_ = before_ = {angle, 0};
       agreeing_ = 1;
@@ -276,7 +244,6 @@ class As5047pAngle {
     frames_between_ = frames;
     last_ = {from.count + static_cast<std::uint32_t>(step), frames == 1 ? step : step / frames};
     held_ = 0;
-    ++counters_.frames;
     if (fault_ == As5047pFault::none) believe();
   }
 
@@ -287,9 +254,7 @@ class As5047pAngle {
     }
     if (++zeros_ < config_.zeros_until_probe) return;
     zeros_ = 0;
-    if (next_ != As5047pRegister::angle) return;
-    next_ = As5047pRegister::diagnostics;
-    ++counters_.probes;
+    if (next_ == As5047pRegister::angle) next_ = As5047pRegister::diagnostics;
   }
 
   static constexpr std::uint16_t angle_of(const Movement& movement) {
@@ -340,7 +305,6 @@ class As5047pAngle {
   std::uint16_t unseen_ = 0;    ///< frames since then
   std::uint32_t believed_ = 0;  ///< the last valid count of a frame
   std::uint32_t reference_generation_ = 0;
-  As5047pAngleCounters counters_{};
 };
 
 }  // namespace kmax::drivers

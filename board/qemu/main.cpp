@@ -15,8 +15,8 @@ namespace kmax::board {
 namespace {
 
 /// As of a board whose crystal runs.
-constexpr drivers::stm32f4::ClockFrequencies clocks{
-    drivers::stm32f4::ClockSource::unreadable, 168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000};
+constexpr drivers::stm32f4::ClockFrequencies clocks{drivers::stm32f4::ClockSource::unreadable, 168'000'000,
+                                                    42'000'000, 84'000'000};
 
 drivers::cortex_m::InterruptController interrupts{drivers::cortex_m::nvic(), drivers::cortex_m::scb()};
 drivers::cortex_m::SystemTick system_tick{drivers::cortex_m::system_tick(), drivers::cortex_m::scb()};

@@ -17,8 +17,7 @@
 // period too little if it strikes between the handler's entry and `ISR_count`.
 //
 // Time wraps after 2^32 us (71.6 min): take differences in std::uint32_t. A tick that is blocked for more
-// than a whole period is lost to the clock; `ISR_next_is_pending` at the end of a handler shows an overrun
-// before that happens.
+// than a whole period is lost to the clock.
 //
 // Cost of now_us: at most six loads and two 32-bit divisions (by hardware), no loop.
 
@@ -52,9 +51,6 @@ class SystemTick {
 
   /// First statement of the tick interrupt handler.
   void ISR_count() { tick_us_ = tick_us_ + period_us_; }
-
-  /// At the end of the handler: the next tick is already due, the handler took longer than a period.
-  bool ISR_next_is_pending() const { return tick_is_pending(); }
 
   /// Microseconds since `start`, modulo 2^32; never goes back.
   std::uint32_t now_us() const {

@@ -26,7 +26,6 @@ struct CanBitTiming {
   std::uint8_t jump_width = 0;  ///< 1 to 4 quanta, not above segment_2
 
   constexpr std::uint32_t quanta() const { return 1U + segment_1 + segment_2; }
-  constexpr std::uint32_t clocks_per_bit() const { return prescaler * quanta(); }
   constexpr std::uint32_t sample_point_permille() const {
     return (1000U * (1U + segment_1) + quanta() / 2) / quanta();
   }
@@ -40,15 +39,6 @@ struct CanBitTiming {
   constexpr std::uint32_t btr() const {
     return can_btr::Prescaler::bits(prescaler - 1U) | can_btr::Segment1::bits(segment_1 - 1U) |
            can_btr::Segment2::bits(segment_2 - 1U) | can_btr::JumpWidth::bits(jump_width - 1U);
-  }
-
-  /// How far two nodes' clocks may be from nominal, each its own way, in ppm: the smaller of the two bounds
-  /// of ISO 11898-1 (resynchronisation over ten bits; the bit after an error flag, 13 bits from the last
-  /// edge).
-  constexpr std::uint32_t clock_tolerance_ppm() const {
-    const std::uint32_t by_jump = 1'000'000U * jump_width / (20U * quanta());
-    const std::uint32_t by_phase = 1'000'000U * segment_2 / (2U * (13U * quanta() - segment_2));
-    return by_jump < by_phase ? by_jump : by_phase;
   }
 
   friend constexpr bool operator==(const CanBitTiming&, const CanBitTiming&) = default;

@@ -42,7 +42,6 @@ struct CanBusOffConfig {
 
 struct CanBusOffCounters {
   std::uint32_t bus_offs = 0;
-  std::uint32_t recoveries = 0;
 };
 
 class CanBusOff {
@@ -86,7 +85,6 @@ class CanBusOff {
         return CanBusOffAction::leave_initialization;
       case CanBusState::recovering:
         if (bus_off || in_initialization) return CanBusOffAction::none;
-        ++counters_.recoveries;
         enter(CanBusState::on_bus, now_us);
         return CanBusOffAction::resume;
     }

@@ -33,11 +33,9 @@ namespace kmax::drivers::stm32f4 {
 
 struct CanTransmitCounters {
   std::uint32_t sent = 0;
-  std::uint32_t queue_full = 0;        ///< refused by `send`
   std::uint32_t aborted = 0;           ///< taken back from a mailbox for a more urgent one, and sent later
   std::uint32_t discarded = 0;         ///< thrown away when halted
   std::uint32_t arbitration_lost = 0;  ///< frames that lost at least once before they left or were aborted
-  std::uint32_t transmit_errors = 0;   ///< frames that were destroyed at least once, likewise
 };
 
 template <typename Registers, std::size_t capacity>
@@ -74,7 +72,6 @@ class CanTransmitter {
       slot.state.store(State::waiting, std::memory_order_release);
       return true;
     }
-    ++counters_.queue_full;
     return false;
   }
 
@@ -131,7 +128,6 @@ class CanTransmitter {
       if (mailbox == aborting_) aborting_ = none;
       if (index == none) continue;
       if (can_tsr::ArbitrationLost::of(byte) != 0) ++counters_.arbitration_lost;
-      if (can_tsr::TransmitError::of(byte) != 0) ++counters_.transmit_errors;
       Slot& slot = slots_[index];
       if (can_tsr::TransmitOk::of(byte) != 0) {
         ++counters_.sent;

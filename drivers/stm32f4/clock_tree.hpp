@@ -39,10 +39,8 @@ enum class ClockSource : std::uint8_t {
 struct ClockFrequencies {
   ClockSource source;
   std::uint32_t core_hz;
-  std::uint32_t apb1_hz;        // USART2, UART4, CAN1, SPI3
-  std::uint32_t apb2_hz;        // ADC
-  std::uint32_t apb1_timer_hz;  // TIM2-TIM5: doubled by hardware when the bus is divided
-  std::uint32_t apb2_timer_hz;  // TIM1, TIM8
+  std::uint32_t apb1_hz;  // USART2, UART4, CAN1, SPI3
+  std::uint32_t apb2_hz;  // ADC
 };
 
 /// Limits of the waits, in register reads. One read in a loop takes at least five core cycles, 0.3 us at 16
@@ -93,10 +91,10 @@ class ClockTree {
   static constexpr std::uint32_t wait_states_at_168_mhz = 5;  // at 2.7-3.6 V
 
   static constexpr ClockFrequencies full_speed(ClockSource source) {
-    return {source, 168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000};
+    return {source, 168'000'000, 42'000'000, 84'000'000};
   }
   static constexpr ClockFrequencies base_speed(ClockSource source) {
-    return {source, 16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000};
+    return {source, 16'000'000, 16'000'000, 16'000'000};
   }
 
   /// Core on the RC oscillator, buses undivided, PLL off. The order keeps every bus below its limit on the

@@ -14,19 +14,13 @@
 //
 // The index signal (Z) is read as a level at the tick (drivers::QuadratureIndexWatch).
 //
-// Filter: a level is believed when it has been seen for `input_filter_clocks(code)` timer clocks, so edges of
-// one signal that are closer together are lost. Code 4 is 12 clocks, 143 ns at 84 MHz: up to 3.5 M lines/s.
+// Filter: a level is believed when it has been seen for as many timer clocks as RM0090 has for the code
+// (TIMx_CCMR1, IC1F), so edges of one signal that are closer together are lost. Code 4 is 12 clocks, 143 ns
+// at 84 MHz: up to 3.5 M lines/s.
 //
 // Contexts: `configure` with the interrupts off; `count` anywhere. Cost: one load.
 
 namespace kmax::drivers::stm32f4 {
-
-/// Timer clocks for which an input must be steady, by the code of ICxF (0 to 15; CR1.CKD = 0).
-constexpr std::uint32_t input_filter_clocks(std::uint8_t code) {
-  constexpr std::uint16_t clocks[16] = {0,     2,     4,      8,      2 * 6,  2 * 8,  4 * 6,  4 * 8,
-                                        8 * 6, 8 * 8, 16 * 5, 16 * 6, 16 * 8, 32 * 5, 32 * 6, 32 * 8};
-  return clocks[code & 0xFU];
-}
 
 struct QuadratureTimerConfig {
   std::uint8_t input_filter = 4;  // 0 to 15

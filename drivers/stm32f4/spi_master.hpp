@@ -31,26 +31,11 @@
 
 namespace kmax::drivers::stm32f4 {
 
-/// The fastest prescaler code whose bit rate does not exceed `maximum_hz`; none when even /256 does.
-constexpr std::optional<std::uint8_t> spi_prescaler_code(std::uint32_t kernel_clock_hz,
-                                                         std::uint32_t maximum_hz) {
-  for (std::uint8_t code = 0; code < 8; ++code) {
-    if (kernel_clock_hz / spi_cr1::divider(code) < maximum_hz) return code;
-    if (kernel_clock_hz == maximum_hz * spi_cr1::divider(code)) return code;
-  }
-  return std::nullopt;
-}
-
 struct SpiMasterConfig {
   std::uint8_t prescaler_code = 3;  ///< 0 to 7: /2 to /256
   /// Reads of SR that `exchange` waits for. A frame at /16 is 256 APB1 clocks = 1024 core clocks; a read
   /// costs at least five of those. 1000 is five frames; scale with the prescaler.
   std::uint32_t polls = 1000;
-};
-
-struct SpiMasterCounters {
-  std::uint32_t time_outs = 0;  ///< frames that did not end within `polls`
-  std::uint32_t overruns = 0;   ///< frames that found an unread one: a frame was started that nobody finished
 };
 
 template <typename Registers = SpiRegisters>
@@ -94,7 +79,6 @@ class SpiMaster {
     const auto word = static_cast<std::uint16_t>(static_cast<std::uint32_t>(registers_.dr));
     if ((status & spi_sr::Overrun::mask) != 0) {
       static_cast<void>(static_cast<std::uint32_t>(registers_.sr));  // DR, then SR: clears OVR
-      ++counters_.overruns;
       return std::nullopt;
     }
     return word;
@@ -103,7 +87,6 @@ class SpiMaster {
   /// One whole frame. None, with the bus restarted, when it does not end in time.
   std::optional<std::uint16_t> exchange(std::uint16_t word) {
     if (start(word) && wait_until(registers_.sr, ended_mask, ended, config_.polls)) return finish();
-    ++counters_.time_outs;
     restart();
     return std::nullopt;
   }
@@ -122,9 +105,6 @@ class SpiMaster {
     registers_.cr1 = settings | spi_cr1::Enable::mask;
   }
 
-  /// Written by the holder of the claim; each is a word that another context may read.
-  const SpiMasterCounters& counters() const { return counters_; }
-
  private:
   static constexpr std::uint32_t ended_mask =
       spi_sr::ReceiveNotEmpty::mask | spi_sr::TransmitEmpty::mask | spi_sr::Busy::mask;
@@ -132,7 +112,6 @@ class SpiMaster {
 
   Registers& registers_;
   SpiMasterConfig config_{};
-  SpiMasterCounters counters_{};
   std::atomic<bool> claimed_{false};
 };
 

@@ -129,8 +129,8 @@ class ThreePhasePwm {
     return true;
   }
 
-  /// Active from the next over- or underflow. Values outside 0 to maximum_duty() are limited. False, and
-  /// nothing written, when one is not a number: the caller disarms.
+  /// Active from the next over- or underflow. Values outside 0 to what maximum_ticks() are of the half period
+  /// are limited. False, and nothing written, when one is not a number: the caller disarms.
   [[nodiscard]] bool ISR_set_duty(const PhaseDuty& duty) {
     // One comparison for all: what is not a number, and what would not fit an integer.
     const float sum = magnitude(duty.a) + magnitude(duty.b) + magnitude(duty.c);
@@ -158,9 +158,6 @@ class ThreePhasePwm {
   /// Limit that keeps the low-side window open.
   constexpr std::uint16_t maximum_ticks() const {
     return static_cast<std::uint16_t>(config_.half_period_ticks - config_.minimum_low_ticks);
-  }
-  constexpr float maximum_duty() const {
-    return static_cast<float>(maximum_ticks()) / static_cast<float>(config_.half_period_ticks);
   }
   constexpr std::uint16_t half_period_ticks() const { return config_.half_period_ticks; }
 

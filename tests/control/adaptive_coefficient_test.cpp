@@ -34,12 +34,8 @@ TEST(AdaptiveCoefficient, EquationSevenIsVelocityPlusEightTenthsWithThePapersNum
 TEST(AdaptiveCoefficient, DefaultsKeepThePapersBestInterval) {
   EXPECT_DOUBLE_EQ(at(Config{}, 0.0), 0.8);
   EXPECT_NEAR(at(Config{}, -1.2), 2.0, 1e-12) << "reached at 1.2 m/s";
-  EXPECT_DOUBLE_EQ(at(Config{}, -2.4), 2.0);
   EXPECT_DOUBLE_EQ(at(Config{}, -1e300), 2.0);
-}
-
-TEST(AdaptiveCoefficient, NormalisedVelocityStopsAtOne) {
-  EXPECT_NEAR(at(literal(), -24.0), 3.2, 1e-12);
+  EXPECT_NEAR(at(literal(), -24.0), 3.2, 1e-12) << "the normalised velocity stops at one";
 }
 
 TEST(AdaptiveCoefficient, ApproachIgnoresMotionAwayAndSpeedDoesNot) {

@@ -11,24 +11,21 @@ namespace kmax::control::closed_form_criteria_test {
 namespace {
 
 // Numbers that no two formulas share, and every part of a minimum the smaller one in turn.
-StabilityCase<double> held_case() {
-  StabilityCase<double> c;
-  c.stiffness = 1100.0;
-  c.wall_damping = -0.3;
-  c.magnetic_coefficient = 0.9;
-  c.magnetic_length = 1.3e-3;
-  c.period = 0.7e-3;
-  c.delay = 0.45e-3;
-  c.quantum = 45e-6;
-  c.mass = 0.05;
-  c.damping = 0.8;
-  c.friction = 0.06;
-  c.operator_force = 0.4;
-  c.operator_speed = 0.17;
-  c.detection_share = 0.6;
-  c.force_limit = 3.1;
-  return c;
-}
+constexpr StabilityCase<double> held_case{.stiffness = 1100.0,
+                                          .wall_damping = -0.3,
+                                          .magnetic_coefficient = 0.9,
+                                          .magnetic_length = 1.3e-3,
+                                          .period = 0.7e-3,
+                                          .delay = 0.45e-3,
+                                          .quantum = 45e-6,
+                                          .mass = 0.05,
+                                          .damping = 0.8,
+                                          .friction = 0.06,
+                                          .operator_force = 0.4,
+                                          .operator_speed = 0.17,
+                                          .detection_share = 0.6,
+                                          .force_limit = 3.1,
+                                          .hand = {}};
 
 struct Expected {
   Criterion criterion;
@@ -76,7 +73,7 @@ void expect_the_formulas(const StabilityCase<double>& c) {
 }
 
 TEST(ClosedFormCriteria, AreTheFormulasOfTheTable) {
-  StabilityCase<double> c = held_case();
+  StabilityCase<double> c = held_case;
   expect_the_formulas(c);  // abbott_okamura and field_slope by the hold
   c.friction = 0.03;
   expect_the_formulas(c);  // and by the step
@@ -95,26 +92,22 @@ TEST(ClosedFormCriteria, AreTheFormulasOfTheTable) {
 // 2 N over 0.2 mm, counts of 0.055 mm, hardly any friction, a damper of 20 N s/m in the device. It
 // buzzes, and Colgate's bound of 40,000 N/m does not see it.
 TEST(ClosedFormCriteria, AFieldThatStepsBeyondTheFrictionFails) {
-  StabilityCase<double> c;
-  c.stiffness = 100.0;
-  c.magnetic_coefficient = 2.0;
-  c.magnetic_length = 0.2e-3;
-  c.period = 1e-3;
-  c.quantum = 55e-6;
-  c.damping = 20.0;
-  c.friction = 0.01;
+  const StabilityCase<double> c{.stiffness = 100.0,
+                                .magnetic_coefficient = 2.0,
+                                .magnetic_length = 0.2e-3,
+                                .period = 1e-3,
+                                .quantum = 55e-6,
+                                .damping = 20.0,
+                                .friction = 0.01,
+                                .hand = {}};
   EXPECT_TRUE(judge_closed_form(Criterion::colgate, c).pass);
   EXPECT_TRUE(judge_closed_form(Criterion::abbott_okamura, c).pass);
   EXPECT_FALSE(judge_closed_form(Criterion::field_slope, c).pass);
 }
 
 TEST(ClosedFormCriteria, ADamperAloneIsJudgedByItsStep) {
-  StabilityCase<double> c;
-  c.wall_damping = 1.0;
-  c.period = 1e-3;
-  c.quantum = 55e-6;
-  c.damping = 2.0;
-  c.friction = 0.056;
+  StabilityCase<double> c{
+      .wall_damping = 1.0, .period = 1e-3, .quantum = 55e-6, .damping = 2.0, .friction = 0.056, .hand = {}};
   EXPECT_TRUE(judge_closed_form(Criterion::abbott_okamura, c).pass);
   c.friction = 0.054;
   const auto result = judge_closed_form(Criterion::abbott_okamura, c);
@@ -122,7 +115,7 @@ TEST(ClosedFormCriteria, ADamperAloneIsJudgedByItsStep) {
 }
 
 TEST(ClosedFormCriteria, TheEigenvaluesAreNotAmongThem) {
-  const auto result = judge_closed_form(Criterion::sampled_eigenvalues, held_case());
+  const auto result = judge_closed_form(Criterion::sampled_eigenvalues, held_case);
   EXPECT_TRUE(!result.applies && result.pass);
 }
 
@@ -130,16 +123,16 @@ TEST(ClosedFormCriteria, WhatIsLeftOutDoesNotApplyAndTheRestIsTheSame) {
   constexpr unsigned some = 1U << static_cast<unsigned>(Criterion::colgate) |
                             1U << static_cast<unsigned>(Criterion::field_slope) |
                             1U << static_cast<unsigned>(Criterion::abbott_okamura);
-  const auto c = held_case();
   for (const Criterion criterion : {Criterion::colgate, Criterion::field_slope, Criterion::abbott_okamura}) {
-    const auto part = judge_closed_form<double, some>(criterion, c), whole = judge_closed_form(criterion, c);
+    const auto part = judge_closed_form<double, some>(criterion, held_case),
+               whole = judge_closed_form(criterion, held_case);
     EXPECT_TRUE(part.applies);
     EXPECT_EQ(part.value, whole.value);
     EXPECT_EQ(part.bound, whole.bound);
     EXPECT_EQ(part.pass, whole.pass);
   }
   for (const Criterion criterion : {Criterion::gil, Criterion::diolaiti, Criterion::saturation_depth}) {
-    const auto part = judge_closed_form<double, some>(criterion, c);
+    const auto part = judge_closed_form<double, some>(criterion, held_case);
     EXPECT_TRUE(!part.applies && part.pass);
   }
 }

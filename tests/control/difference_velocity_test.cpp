@@ -19,16 +19,6 @@ TEST(DifferenceVelocity, OneCountIsOneQuantumPerPeriod) {
   EXPECT_DOUBLE_EQ(velocity.update(coefficients, 6), -55e-3);
 }
 
-TEST(DifferenceVelocity, FloatKeepsASingleCountAtAnyDistanceFromZero) {
-  const auto coefficients = DifferenceVelocity<float>::prepare(5e-5F, 1e-7F);
-  for (const std::int64_t origin : {0LL, 100'000'000LL, -100'000'000LL, 864'000'000'000LL}) {
-    DifferenceVelocity<float> velocity;
-    velocity.reset(origin);
-    EXPECT_EQ(velocity.update(coefficients, origin + 1), coefficients.scale);
-    EXPECT_EQ(velocity.update(coefficients, origin), -coefficients.scale);
-  }
-}
-
 // One count in 10,000 ticks: 0.2 um/s. Any single sample is 0 or 2 mm/s; the sum is the path travelled.
 TEST(DifferenceVelocity, SumsToThePathAtVeryLowSpeed) {
   const auto coefficients = DifferenceVelocity<double>::prepare(5e-5, 1e-7);

@@ -22,34 +22,23 @@ constexpr TurnFraction turn(double turns) {
   return static_cast<TurnFraction>(static_cast<std::int64_t>(turns * 4294967296.0));
 }
 
-Config mapped() {
-  Config config;
-  config.friction = 0.06f;
-  config.friction_velocity = 0.05f;
-  config.cogging_periods = 42;
-  config.cogging_cosine_1 = 0.03f;
-  config.cogging_sine_1 = -0.02f;
-  config.cogging_cosine_2 = 0.01f;
-  config.cogging_sine_2 = 0.015f;
-  config.gravity_constant = 0.05f;
-  config.gravity_cosine = 0.2f;
-  config.gravity_sine = -0.1f;
-  config.limit = 10.0f;
-  return config;
-}
+constexpr Config mapped{.friction = 0.06f,
+                        .friction_velocity = 0.05f,
+                        .cogging_periods = 42,
+                        .cogging_cosine_1 = 0.03f,
+                        .cogging_sine_1 = -0.02f,
+                        .cogging_cosine_2 = 0.01f,
+                        .cogging_sine_2 = 0.015f,
+                        .gravity_constant = 0.05f,
+                        .gravity_cosine = 0.2f,
+                        .gravity_sine = -0.1f,
+                        .limit = 10.0f};
 
-double cogging_at(const Config& config, double shaft) {
-  const double angle = config.cogging_periods * shaft;
-  return static_cast<double>(config.cogging_cosine_1) * std::cos(angle) +
-         static_cast<double>(config.cogging_sine_1) * std::sin(angle) +
-         static_cast<double>(config.cogging_cosine_2) * std::cos(2 * angle) +
-         static_cast<double>(config.cogging_sine_2) * std::sin(2 * angle);
-}
-
-double gravity_at(const Config& config, double shaft) {
-  return static_cast<double>(config.gravity_constant) +
-         static_cast<double>(config.gravity_cosine) * std::cos(shaft) +
-         static_cast<double>(config.gravity_sine) * std::sin(shaft);
+/// Of the cogging and the weight that `mapped` says.
+double device_force(double shaft) {
+  const double angle = 42 * shaft;
+  return 0.03 * std::cos(angle) - 0.02 * std::sin(angle) + 0.01 * std::cos(2 * angle) +
+         0.015 * std::sin(2 * angle) + 0.05 + 0.2 * std::cos(shaft) - 0.1 * std::sin(shaft);
 }
 
 TEST(ForceCompensation, IsOffByDefault) {
@@ -59,15 +48,14 @@ TEST(ForceCompensation, IsOffByDefault) {
 }
 
 TEST(ForceCompensation, TheMapIsTheOppositeOfWhatTheDeviceDoes) {
-  const Config config = mapped();
-  const auto c = Compensation::prepare(config);
+  const auto c = Compensation::prepare(mapped);
   // Straight lines between 64 points of a harmonic n: (2 pi n / 64)^2 / 8 of its amplitude.
   const double first = std::hypot(0.03, 0.02) * std::pow(2 * pi / 64, 2) / 8;
   const double second = std::hypot(0.01, 0.015) * std::pow(4 * pi / 64, 2) / 8;
   const double weight = std::hypot(0.2, 0.1) * std::pow(2 * pi / 64, 2) / 8;
   for (int k = -20000; k <= 20000; ++k) {
     const double turns = k / 7919.0;
-    const double wanted = -cogging_at(config, 2 * pi * turns) - gravity_at(config, 2 * pi * turns);
+    const double wanted = -device_force(2 * pi * turns);
     ASSERT_NEAR(static_cast<double>(Compensation::update(c, turn(turns), 0.0f)), wanted,
                 first + second + weight + 1e-6)
         << turns;
@@ -75,7 +63,7 @@ TEST(ForceCompensation, TheMapIsTheOppositeOfWhatTheDeviceDoes) {
 }
 
 TEST(ForceCompensation, WithoutPeriodsThereIsNoCogging) {
-  Config config = mapped();
+  Config config = mapped;
   config.cogging_periods = 0;
   config.gravity_constant = config.gravity_cosine = config.gravity_sine = 0.0f;
   const auto c = Compensation::prepare(config);
@@ -83,11 +71,7 @@ TEST(ForceCompensation, WithoutPeriodsThereIsNoCogging) {
 }
 
 TEST(ForceCompensation, FrictionGoesThroughZeroInProportionToTheVelocity) {
-  Config config;
-  config.friction = 0.06f;
-  config.friction_velocity = 0.05f;
-  config.limit = 1.0f;
-  const auto c = Compensation::prepare(config);
+  const auto c = Compensation::prepare({.friction = 0.06f, .friction_velocity = 0.05f, .limit = 1.0f});
   const auto at = [&](float velocity) { return Compensation::update(c, 0, velocity); };
   EXPECT_EQ(at(0.0f), 0.0f);
   EXPECT_FLOAT_EQ(at(0.01f), 0.012f);
@@ -97,7 +81,7 @@ TEST(ForceCompensation, FrictionGoesThroughZeroInProportionToTheVelocity) {
 }
 
 TEST(ForceCompensation, IsContinuousInTheAngleAndOverTheTurn) {
-  const auto c = Compensation::prepare(mapped());
+  const auto c = Compensation::prepare(mapped);
   const TurnFraction step = 1u << 16;  // 1/65536 of a turn: 1/1560 of a cogging period
   float before = Compensation::update(c, 0u - step, 0.0f);
   for (std::uint64_t angle = 0; angle <= 0x100000000u; angle += step) {
@@ -108,7 +92,7 @@ TEST(ForceCompensation, IsContinuousInTheAngleAndOverTheTurn) {
 }
 
 TEST(ForceCompensation, TheSumIsBounded) {
-  Config config = mapped();
+  Config config = mapped;
   config.gravity_constant = -5.0f;
   config.limit = 0.07f;
   EXPECT_EQ(Compensation::update(Compensation::prepare(config), 0, 0.0f), 0.07f);
@@ -118,11 +102,7 @@ TEST(ForceCompensation, TheSumIsBounded) {
 
 // Friction is cut down so that the map is whole at every angle and in every direction.
 TEST(ForceCompensation, TheMapComesBeforeTheFriction) {
-  Config config;
-  config.cogging_periods = 10;
-  config.cogging_sine_1 = 0.06f;
-  config.friction = 0.09f;
-  config.limit = 0.1f;
+  Config config{.friction = 0.09f, .cogging_periods = 10, .cogging_sine_1 = 0.06f, .limit = 0.1f};
   const auto c = Compensation::prepare(config);
   for (int k = 0; k < 1000; ++k) {
     const TurnFraction angle = turn(k / 1000.0);
@@ -160,7 +140,7 @@ TEST(ForceCompensation, OneBadNumberInTheMapTurnsAllOff) {
   for (float Config::*const field : {&Config::friction, &Config::cogging_cosine_1, &Config::cogging_sine_2,
                                      &Config::gravity_constant, &Config::gravity_sine}) {
     for (const float bad : {nan, infinity, -infinity}) {
-      Config config = mapped();
+      Config config = mapped;
       config.*field = bad;
       const auto c = Compensation::prepare(config);
       for (int k = 0; k < 64; ++k) {
@@ -278,15 +258,14 @@ RC_GTEST_PROP(ForceCompensation, AShiftedMapMovesTheHandleNoFartherThanTheCoggin
   constexpr double amplitude = 0.3, friction = 0.1, limit = 0.08;
   constexpr int periods = 42;
   const Device device;
-  Config config;
-  config.friction = 0.05f;
-  config.friction_velocity = 0.001f;
-  config.cogging_periods = periods;
   const double shift = *rc::gen::inRange(0, 1000) * 1e-3 * 2 * pi;
-  config.cogging_cosine_1 = static_cast<float>(amplitude * std::sin(shift));
-  config.cogging_sine_1 = static_cast<float>(amplitude * std::cos(shift));
-  config.limit = static_cast<float>(limit);
-  Compensated compensated(config, device);
+  Compensated compensated({.friction = 0.05f,
+                           .friction_velocity = 0.001f,
+                           .cogging_periods = periods,
+                           .cogging_cosine_1 = static_cast<float>(amplitude * std::sin(shift)),
+                           .cogging_sine_1 = static_cast<float>(amplitude * std::cos(shift)),
+                           .limit = static_cast<float>(limit)},
+                          device);
   const auto angle = [&](double position) { return periods * position / device.transmission; };
   PassiveHandle handle{0.045, friction, *rc::gen::inRange(-1000, 1000) * 1e-6, 0.0};
   // F = amplitude sin(angle): the potential is amplitude x transmission / periods x cos(angle).
@@ -308,11 +287,8 @@ RC_GTEST_PROP(ForceCompensation, AShiftedMapMovesTheHandleNoFartherThanTheCoggin
 TEST(ForceCompensation, ARightMapFlattensTheCogging) {
   constexpr double amplitude = 0.3;
   const Device device;
-  Config config;
-  config.cogging_periods = 42;
-  config.cogging_sine_1 = static_cast<float>(amplitude);
-  config.limit = 1.0f;
-  Compensated compensated(config, device);
+  Compensated compensated(
+      {.cogging_periods = 42, .cogging_sine_1 = static_cast<float>(amplitude), .limit = 1.0f}, device);
   double largest = 0.0;
   for (int k = 0; k < 100000; ++k) {
     const double position = k * 1e-6;
@@ -326,10 +302,7 @@ TEST(ForceCompensation, ARightMapFlattensTheCogging) {
 
 // A limit above the real friction voids the proof; that this test sees it shows that the others can fail.
 TEST(ForceCompensation, BeyondTheFrictionAHandleIsMoved) {
-  Config config;
-  config.gravity_constant = -1.0f;
-  config.limit = 0.1f;
-  Compensated compensated(config, {});
+  Compensated compensated({.gravity_constant = -1.0f, .limit = 0.1f}, {});
   PassiveHandle handle{0.045, 0.093, 0.0, 0.0};
   for (int n = 0; n < 2000; ++n)
     handle.advance(static_cast<double>(compensated.force(handle.position, 0)), tick);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -139,54 +140,25 @@ TEST(HapticLoop, OverSpeedRemovesTheForceAndSaysSo) {
   EXPECT_EQ(out.force, 0.0f);
 }
 
-TEST(HapticLoop, AnExternalForceThatIsNotFiniteGivesZeroAndAFault) {
-  for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
-    Loop<float> loop(plain_wall<float>());
-    const auto& out = loop.at(-1000, true, bad);
-    // An infinity is brought back to the largest number and then limited; a NaN is a fault.
-    if (std::isnan(bad)) {
-      EXPECT_TRUE(out.not_finite);
-      EXPECT_EQ(out.force, 0.0f);
-    } else {
-      EXPECT_TRUE(std::isfinite(out.force));
-    }
-  }
+TEST(HapticLoop, AnExternalForceThatIsNotANumberGivesZeroAndAFault) {
+  const auto force_with = [](float bad) { return Loop<float>(plain_wall<float>()).at(-1000, true, bad); };
+  EXPECT_TRUE(force_with(std::nanf("")).not_finite);
+  EXPECT_EQ(force_with(std::nanf("")).force, 0.0f);
+  // An infinity is brought back to the largest number and then limited.
+  EXPECT_TRUE(std::isfinite(force_with(std::numeric_limits<float>::infinity()).force));
 }
 
 TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
-  const float bad[] = {std::nanf(""), std::numeric_limits<float>::infinity()};
-  for (const float value : bad) {
-    for (int field = 0; field < 8; ++field) {
+  for (const float value : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
+    for (std::size_t field = 0; field < 8; ++field) {
       auto config = plain_wall<float>();
       config.wall.kind = field < 4 ? WallKind::magnetic : WallKind::adaptive;
       config.wall.damping = 1.0f;
       auto c = HapticLoop<float>::prepare(config, 0);
-      switch (field) {
-        case 0:
-          c.wall.stiffness = value;
-          break;
-        case 1:
-          c.wall.magnetic_coefficient = value;
-          break;
-        case 2:
-          c.count_length = value;
-          break;
-        case 3:
-          c.wall_fraction = value;
-          break;
-        case 4:
-          c.wall.adaptive.gain = value;
-          break;
-        case 5:
-          c.wall.adaptive.offset = value;
-          break;
-        case 6:
-          c.side = value;
-          break;
-        case 7:
-          c.force.limit = value;
-          break;
-      }
+      *std::array{
+          &c.wall.stiffness,     &c.wall.magnetic_coefficient, &c.count_length, &c.wall_fraction,
+          &c.wall.adaptive.gain, &c.wall.adaptive.offset,      &c.side,         &c.force.limit}[field] =
+          value;
       HapticLoop<float> loop;
       for (int i = 0; i < 10; ++i) {
         const auto& out = loop.tick(c, -1000 - i, true);

@@ -57,23 +57,5 @@ TEST(LowPassVelocity, SineHasTheAmplitudeAndLagOfAFirstOrderFilter) {
       0.025 * peak);  // half a sample of the difference and one of the discretization, at 0.031 rad each
 }
 
-TEST(LowPassVelocity, FloatIsTheSameFarFromZeroAndCloseToDouble) {
-  const auto narrow = LowPassVelocity<float>::prepare(100.0F, 5e-5F, 1e-7F);
-  const auto wide = LowPassVelocity<double>::prepare(100.0, 5e-5, 1e-7);
-  LowPassVelocity<float> near_zero;
-  LowPassVelocity<float> far_away;
-  LowPassVelocity<double> reference;
-  constexpr std::int64_t far = 864'000'000'000;
-  near_zero.reset(0);
-  far_away.reset(far);
-  reference.reset(0);
-  for (int k = 1; k <= 20'000; ++k) {
-    const auto count = static_cast<std::int64_t>(std::floor(100'000.0 * std::sin(0.002 * k)));
-    const float estimate = near_zero.update(narrow, count);
-    ASSERT_EQ(estimate, far_away.update(narrow, far + count));
-    ASSERT_NEAR(static_cast<double>(estimate), reference.update(wide, count), 1e-6);
-  }
-}
-
 }  // namespace
 }  // namespace kmax::control::low_pass_velocity_test

@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 
 namespace kmax::control::phase_watch_test {
@@ -34,44 +35,40 @@ TEST(PhaseWatch, LimitsFollowTheConfiguration) {
   EXPECT_EQ(Watch::prepare(dead).patience, 1'000'000'000u);  // infinite, saturated before the conversion
 }
 
-TEST(PhaseWatch, CurrentThatVanishesIsFoundInTheSameSample) {
-  for (const float sign : {1.0f, -1.0f}) {
-    Watch watch;
-    for (int i = 0; i < 100; ++i) ASSERT_EQ(watch.update(c, dc(sign), dc(sign), true), PhaseCondition::good);
-    EXPECT_EQ(watch.update(c, dc(0.0f), dc(sign), true), PhaseCondition::open);
+// What is seen for a number of samples, and the verdicts on them: all are good but the last, which is `last`.
+struct Stretch {
+  Currents measured, reference;
+  bool slow = true;
+  std::uint32_t samples = 1;
+  PhaseCondition last = PhaseCondition::good;
+};
+
+void expect(Watch watch, std::initializer_list<Stretch> stretches, const char* what) {
+  SCOPED_TRACE(what);
+  for (const Stretch& s : stretches) {
+    for (std::uint32_t i = 1; i <= s.samples; ++i)
+      ASSERT_EQ(watch.update(c, s.measured, s.reference, s.slow),
+                i < s.samples ? PhaseCondition::good : s.last)
+          << i;
   }
 }
 
-TEST(PhaseWatch, FindsEachOfThreePhases) {
-  for (int open = 0; open < 3; ++open) {
-    Watch watch;
-    const Currents flowing{1.0f, -0.5f, -0.5f};
-    ASSERT_EQ(watch.update(c, flowing, flowing, true), PhaseCondition::good);
-    // The two that are left carry the same current.
-    Currents left{};
-    if (open == 0) left = {0.0f, 0.6f, -0.6f};
-    if (open == 1) left = {0.8f, 0.0f, -0.8f};
-    if (open == 2) left = {0.8f, -0.8f, 0.0f};
-    EXPECT_EQ(watch.update(c, left, flowing, true), PhaseCondition::open) << open;
-  }
+constexpr auto open = PhaseCondition::open, sum = PhaseCondition::sum,
+               over_current = PhaseCondition::over_current;
+
+TEST(PhaseWatch, CurrentThatVanishesIsFoundInTheSameSampleInEachOfThreePhases) {
+  for (const float sign : {1.0f, -1.0f})
+    expect({}, {{dc(sign), dc(sign), true, 100}, {dc(0.0f), dc(sign), true, 1, open}}, "a DC motor");
+  // The two phases that are left carry the same current.
+  const Currents flowing{1.0f, -0.5f, -0.5f};
+  for (const Currents& left : {Currents{0.0f, 0.6f, -0.6f}, {0.8f, 0.0f, -0.8f}, {0.8f, -0.8f, 0.0f}})
+    expect({}, {{flowing, flowing}, {left, flowing, true, 1, open}}, "three phases");
 }
 
 TEST(PhaseWatch, CurrentThatNeverComesIsFoundAfterThePatience) {
-  Watch watch;
-  for (std::uint32_t i = 0; i < c.patience; ++i)
-    ASSERT_EQ(watch.update(c, dc(0.0f), dc(1.0f), true), PhaseCondition::good) << i;
-  EXPECT_EQ(watch.update(c, dc(0.0f), dc(1.0f), true), PhaseCondition::open);
-}
-
-TEST(PhaseWatch, AFastMotorIsNotJudgedByCurrentThatDoesNotCome) {
-  Watch watch;
-  for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, dc(0.0f), dc(1.0f), false), PhaseCondition::good);
-}
-
-TEST(PhaseWatch, AFastMotorIsNotJudgedByCurrentThatVanishes) {
-  Watch watch;
-  ASSERT_EQ(watch.update(c, dc(1.0f), dc(1.0f), true), PhaseCondition::good);
-  EXPECT_EQ(watch.update(c, dc(0.0f), dc(1.0f), false), PhaseCondition::good);
+  expect({}, {{dc(0.0f), dc(1.0f), true, c.patience + 1, open}}, "it never comes");
+  expect({}, {{dc(0.0f), dc(1.0f), false, 1000}}, "a fast motor is not judged by it");
+  expect({}, {{dc(1.0f), dc(1.0f)}, {dc(0.0f), dc(1.0f), false}}, "nor by current that vanishes");
 }
 
 // A release of the force: the reference goes first, the current follows.
@@ -88,19 +85,14 @@ TEST(PhaseWatch, AReleaseOrAReversalIsNoOpenPhase) {
 
 TEST(PhaseWatch, NoiseBelowPresentSaysNothing) {
   Watch watch;
-  for (int i = 0; i < 1000; ++i) {
-    const float noise = i % 2 == 0 ? 0.2f : 0.0f;
-    ASSERT_EQ(watch.update(c, dc(noise), dc(0.24f), true), PhaseCondition::good);
-  }
+  for (int i = 0; i < 1000; ++i)
+    ASSERT_EQ(watch.update(c, dc(i % 2 == 0 ? 0.2f : 0.0f), dc(0.24f), true), PhaseCondition::good);
 }
 
 TEST(PhaseWatch, OverCurrentAndNanTripWhateverTheReference) {
-  Watch watch;
-  EXPECT_EQ(watch.update(c, dc(7.5f), dc(5.0f), true), PhaseCondition::good);
-  EXPECT_EQ(watch.update(c, dc(7.6f), dc(5.0f), true), PhaseCondition::over_current);
-  EXPECT_EQ(watch.update(c, {0.0f, -7.6f, 0.0f}, {}, false), PhaseCondition::over_current);
-  EXPECT_EQ(watch.update(c, {-7.6f, 3.0f, 3.0f}, {}, false), PhaseCondition::over_current);
-  EXPECT_EQ(watch.update(c, {0.0f, std::nanf(""), 0.0f}, {}, true), PhaseCondition::over_current);
+  expect({}, {{dc(7.5f), dc(5.0f)}, {dc(7.6f), dc(5.0f), true, 1, over_current}}, "a DC motor");
+  for (const Currents& bad : {Currents{0.0f, -7.6f, 0.0f}, {-7.6f, 3.0f, 3.0f}, {0.0f, std::nanf(""), 0.0f}})
+    expect({}, {{bad, {}, false, 1, over_current}}, "three phases");
 }
 
 TEST(PhaseWatch, ALimitThatIsNoLimitLetsNoCurrentPass) {
@@ -116,34 +108,19 @@ TEST(PhaseWatch, ALimitThatIsNoLimitLetsNoCurrentPass) {
 TEST(PhaseWatch, CurrentsThatDoNotAddUpAreFoundAfterThePatienceAtAnySpeed) {
   ASSERT_FLOAT_EQ(c.unbalanced, 0.75f);
   for (const bool slow : {true, false}) {
-    for (const float leak : {0.8f, -0.8f}) {
-      Watch watch;
-      const Currents leaking{0.0f, 2.0f + leak, -2.0f};
-      for (std::uint32_t i = 0; i < c.patience; ++i)
-        ASSERT_EQ(watch.update(c, leaking, dc(2.0f), slow), PhaseCondition::good) << i;
-      EXPECT_EQ(watch.update(c, leaking, dc(2.0f), slow), PhaseCondition::sum);
-    }
+    for (const float leak : {0.8f, -0.8f})
+      expect({}, {{{0.0f, 2.0f + leak, -2.0f}, dc(2.0f), slow, c.patience + 1, sum}}, "a leak");
   }
-}
-
-TEST(PhaseWatch, ThreeSensorsAreAddedUp) {
-  Watch watch;
   const Currents flowing{2.0f, -1.0f, -1.0f}, leaking{2.0f, -1.0f, -0.2f};
-  for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, flowing, flowing, true), PhaseCondition::good);
-  for (std::uint32_t i = 0; i < c.patience; ++i)
-    ASSERT_EQ(watch.update(c, leaking, flowing, true), PhaseCondition::good);
-  EXPECT_EQ(watch.update(c, leaking, flowing, true), PhaseCondition::sum);
+  expect({}, {{flowing, flowing, true, 1000}, {leaking, flowing, true, c.patience + 1, sum}},
+         "three sensors");
 }
 
 TEST(PhaseWatch, AShortImbalanceOrOneWithinTheToleranceIsForgiven) {
-  Watch watch;
-  const Currents leaking{0.0f, 2.8f, -2.0f}, within{0.0f, 2.7f, -2.0f};
-  for (int round = 0; round < 20; ++round) {
-    for (std::uint32_t i = 0; i < c.patience; ++i)
-      ASSERT_EQ(watch.update(c, leaking, dc(2.0f), true), PhaseCondition::good);
-    ASSERT_EQ(watch.update(c, within, dc(2.0f), true), PhaseCondition::good);
-  }
-  for (int i = 0; i < 1000; ++i) ASSERT_EQ(watch.update(c, within, dc(2.0f), true), PhaseCondition::good);
+  const Stretch leaking{{0.0f, 2.8f, -2.0f}, dc(2.0f), true, c.patience},
+      within{{0.0f, 2.7f, -2.0f}, dc(2.0f)};
+  expect({}, {leaking, within, leaking, within, leaking, within}, "short ones, again and again");
+  expect({}, {{within.measured, within.reference, true, 1000}}, "within the tolerance");
 }
 
 TEST(PhaseWatch, AnImpliedSumNeverSpeaks) {
@@ -161,13 +138,9 @@ TEST(PhaseWatch, AnImpliedSumNeverSpeaks) {
 // A wire that comes off loses the current in both phases of a DC motor; it is open, not unbalanced. A sensor
 // that fails loses it in one: with the current gone at once that is "open" too, the sum only confirms.
 TEST(PhaseWatch, AnOpenPhaseComesBeforeTheSum) {
-  Watch watch;
-  ASSERT_EQ(watch.update(c, dc(2.0f), dc(2.0f), true), PhaseCondition::good);
-  EXPECT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::open);
-  watch.reset();
-  for (std::uint32_t i = 0; i < c.patience; ++i)
-    ASSERT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::good);
-  EXPECT_EQ(watch.update(c, {0.0f, 0.0f, -2.0f}, dc(2.0f), true), PhaseCondition::open);
+  const Currents lost{0.0f, 0.0f, -2.0f};
+  expect({}, {{dc(2.0f), dc(2.0f)}, {lost, dc(2.0f), true, 1, open}}, "gone at once");
+  expect({}, {{lost, dc(2.0f), true, c.patience + 1, open}}, "never there");
 }
 
 // What update() was before its comparisons became integers, kept as the yardstick.
@@ -222,7 +195,7 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
   Watch watch;
   (void)watch.update(c, dc(1.0f), dc(1.0f), true);
   watch.reset();
-  EXPECT_EQ(watch.update(c, dc(0.0f), dc(1.0f), true), PhaseCondition::good);
+  expect(watch, {{dc(0.0f), dc(1.0f)}}, "after a reset");
 }
 
 }  // namespace

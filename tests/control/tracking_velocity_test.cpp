@@ -67,27 +67,6 @@ TEST(TrackingVelocity, StartsOnAKnownVelocity) {
     EXPECT_NEAR(velocity.update(coefficients, counts(0.1 * k * period)), 0.1, 1e-5);
 }
 
-// Relative state: the bits do not depend on the distance from zero, be it 10 m or what 24 h at 1 m/s amount
-// to.
-TEST(TrackingVelocity, FloatIsTheSameFarFromZeroAndCloseToDouble) {
-  const auto narrow = TrackingVelocity<float>::prepare(100.0F, 5e-5F, 1e-7F);
-  const auto wide = TrackingVelocity<double>::prepare(100.0, 5e-5, 1e-7);
-  for (const std::int64_t far : {100'000'000LL, -864'000'000'000LL}) {
-    TrackingVelocity<float> near_zero;
-    TrackingVelocity<float> far_away;
-    TrackingVelocity<double> reference;
-    near_zero.reset(0);
-    far_away.reset(far);
-    reference.reset(0);
-    for (int k = 1; k <= 20'000; ++k) {
-      const auto count = static_cast<std::int64_t>(std::floor(100'000.0 * std::sin(0.002 * k)));
-      const float estimate = near_zero.update(narrow, count);
-      ASSERT_EQ(estimate, far_away.update(narrow, far + count));
-      ASSERT_NEAR(static_cast<double>(estimate), reference.update(wide, count), 2e-6);
-    }
-  }
-}
-
 // A day at 20 kHz is 1.7e9 ticks. The state of a stable filter does not remember its age, so what could drift
 // is the accumulation within its memory: a million ticks (a thousand of its time constants) on a ramp of 0.37
 // counts per tick.

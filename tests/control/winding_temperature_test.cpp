@@ -122,7 +122,8 @@ RC_GTEST_PROP(WindingTemperature, SettlesWhereTheClosedFormSays, ()) {
   RC_ASSERT(std::fabs(static_cast<double>(model.motor_case()) - end.motor_case) < 1e-4 * rise + 2e-3);
 }
 
-// A winding of 0.1 J/K in a case of 5 kJ/K: the step's terms are 10^5 times the temperatures they leave behind.
+// A winding of 0.1 J/K in a case of 5 kJ/K: the step's terms are 10^5 times the temperatures they leave
+// behind.
 TEST(WindingTemperature, ALongStepIsRightForAFastWindingInASlowCase) {
   Config config;
   config.winding_capacity = 0.1;
@@ -225,15 +226,6 @@ TEST(WindingTemperature, NonsenseChangesNothingAndTakesTheCurrentAway) {
     EXPECT_TRUE(std::isnan(model.update(Model::prepare(broken), 1.0f, 1.0f))) << which;
     EXPECT_EQ(model.winding(), 80.0f);
   }
-}
-
-TEST(WindingTemperature, ResistanceGrowsWithTheTemperature) {
-  WindingTemperatureConfig<double> config;
-  config.resistance = 2.0;
-  const auto c = WindingTemperature<double>::prepare(config);
-  EXPECT_DOUBLE_EQ(WindingTemperature<double>::resistance_at(c, 25.0), 2.0);
-  EXPECT_NEAR(WindingTemperature<double>::resistance_at(c, 125.0), 2.786, 1e-12);
-  EXPECT_EQ(WindingTemperature<double>::resistance_at(c, -300.0), 0.0);
 }
 
 // With the derated current the winding stays below the limit for good, and the current that is left is the

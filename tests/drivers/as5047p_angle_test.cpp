@@ -74,7 +74,6 @@ TEST(As5047pAngle, FollowsThroughManyTurnsBothWaysOneTickLate) {
       ASSERT_TRUE(sample.valid && !sample.held) << speed << " at " << i;
       ASSERT_EQ(sample.count - begin, static_cast<std::uint32_t>((i - 3) * speed)) << speed;
     }
-    EXPECT_EQ(encoder.driver.counters().jumps, 0U);
   }
 }
 
@@ -122,7 +121,6 @@ TEST(As5047pAngle, HoldsAtMostAsLongAsItMayAndThenStaysInvalid) {
     encoder.line = [](std::uint16_t word) { return word; };
     for (int i = 0; i < 100; ++i) encoder.tick(8000);
     EXPECT_EQ(encoder.tick(8000).valid, bad <= 4) << "good frames do not bring a lost position back";
-    EXPECT_EQ(encoder.driver.counters().parity, static_cast<unsigned>(bad));
     EXPECT_EQ(encoder.driver.fault(), bad <= 4 ? As5047pFault::none : As5047pFault::parity);
     encoder.driver.restart();
     encoder.start(8000);
@@ -138,7 +136,6 @@ TEST(As5047pAngle, PersistentJumpIsNeverAccepted) {
     ASSERT_EQ(sample.valid, i < 5) << i;  // one frame late, then four held
   }
   EXPECT_EQ(encoder.driver.fault(), As5047pFault::jump);
-  EXPECT_EQ(encoder.driver.counters().jumps, 5U) << "after that nobody asks any more";
 }
 
 TEST(As5047pAngle, HeldFramesAreMadeUpForAtFullSpeed) {
@@ -154,7 +151,6 @@ TEST(As5047pAngle, HeldFramesAreMadeUpForAtFullSpeed) {
     ASSERT_TRUE(sample.valid && !sample.held) << gap;
     ASSERT_EQ(sample.count % 16384, static_cast<std::uint32_t>(position - 400) % 16384);
   }
-  EXPECT_EQ(encoder.driver.counters().jumps, 0U);
   EXPECT_EQ(encoder.tick(position + 400).count - begin, (1U + 2 + 3 + 4 + 4 + 1) * 400);
 }
 
@@ -179,7 +175,6 @@ TEST(As5047pAngle, LineStuckLowWhileTheMagnetStandsAtZero) {
   while (encoder.tick(2).valid && ticks < 1000) ++ticks;
   EXPECT_LT(ticks, 36);
   EXPECT_EQ(encoder.driver.fault(), As5047pFault::stuck_low);
-  EXPECT_EQ(encoder.driver.counters().stuck_low, 1U);
 }
 
 TEST(As5047pAngle, LineStuckLowFromTheStartNeverBecomesValid) {
@@ -195,8 +190,8 @@ TEST(As5047pAngle, MagnetThatReallyStandsAtZeroIsProbedAndStays) {
   Encoder encoder;
   for (int i = 0; i < 1000; ++i) encoder.tick(0);
   EXPECT_TRUE(encoder.tick(0).valid);
-  EXPECT_GT(encoder.driver.counters().probes, 10U);
-  EXPECT_EQ(encoder.driver.counters().jumps + encoder.driver.counters().stuck_low, 0U);
+  EXPECT_EQ(encoder.driver.fault(), As5047pFault::none);
+  EXPECT_GT(std::count(encoder.commands.begin(), encoder.commands.end(), 0xFFFC), 10) << "probes";
   encoder.diagnostics = 0x380;  // the magnet falls off
   for (int i = 0; i < 40; ++i) encoder.tick(0);
   EXPECT_EQ(encoder.driver.fault(), As5047pFault::no_field);
@@ -214,7 +209,6 @@ TEST(As5047pAngle, ErrorFlagIsReadBackOnceAndCostsNoMoreThanThreeFrames) {
   }
   EXPECT_LE(held, 3);
   EXPECT_EQ(std::count(encoder.commands.begin(), encoder.commands.end(), 0x4001), 1);
-  EXPECT_EQ(encoder.driver.counters().command_parity, 1U);
 }
 
 TEST(As5047pAngle, MissedFramesAreHeldLikeBadOnes) {

@@ -39,13 +39,16 @@ struct Board {
   FakeCommon common;
   CurrentSampling<FakeAdc, FakeCommon> sampling;
 
-  void started(unsigned first_axis = 0) {
-    ASSERT_TRUE(sampling.configure(apb2));
-    sampling.start(first_axis);
-  }
   void trigger(std::uint32_t b, std::uint32_t c) {
     adc2.done(b);
     adc3.done(c);
+  }
+};
+
+struct Started : Board {
+  Started() {
+    EXPECT_TRUE(sampling.configure(apb2));
+    sampling.start(0);
   }
 };
 
@@ -110,8 +113,7 @@ TEST(CurrentSampling, RefusesWhatCannotWorkAndTouchesNothing) {
 }
 
 TEST(CurrentSampling, AlternatesAndArmsTheOtherAxis) {
-  Board board;
-  board.started(0);
+  Started board;
   for (unsigned i = 0; i < 6; ++i) {
     const unsigned axis = i % 2;
     EXPECT_EQ(board.adc2.jsqr.value >> 15, axis == 0 ? 10U : 13U);
@@ -127,8 +129,7 @@ TEST(CurrentSampling, AlternatesAndArmsTheOtherAxis) {
 }
 
 TEST(CurrentSampling, WrongPhaseIsCountedAndHealsAtOnce) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   EXPECT_FALSE(board.sampling.ISR_read(1).valid) << "the list was that of axis 0";
   EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
@@ -140,8 +141,7 @@ TEST(CurrentSampling, WrongPhaseIsCountedAndHealsAtOnce) {
 }
 
 TEST(CurrentSampling, LostInterruptIsOverrunAndMismatch) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   EXPECT_TRUE(board.sampling.ISR_read(0).valid);
   board.trigger(3, 4);  // axis 1; nobody reads
@@ -154,8 +154,7 @@ TEST(CurrentSampling, LostInterruptIsOverrunAndMismatch) {
 }
 
 TEST(CurrentSampling, TriggerBetweenReadingAndArmingIsCounted) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   // The next trigger starts its conversion just as the new list is written.
   board.adc2.jsqr.on_write = [&](std::uint32_t) { board.adc2.flags |= jstrt; };
@@ -172,8 +171,7 @@ TEST(CurrentSampling, TriggerBetweenReadingAndArmingIsCounted) {
 }
 
 TEST(CurrentSampling, MissingPhaseC) {
-  Board board;
-  board.started(0);
+  Started board;
   board.adc2.done(1);
   EXPECT_FALSE(board.sampling.ISR_read(0).valid);
   EXPECT_EQ(board.sampling.counters().missing_phase_c, 1U);
@@ -181,8 +179,7 @@ TEST(CurrentSampling, MissingPhaseC) {
 }
 
 TEST(CurrentSampling, SpuriousCallTouchesNothing) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   EXPECT_TRUE(board.sampling.ISR_read(0).valid);
   const auto lists = board.adc2.jsqr.writes.size();
@@ -197,8 +194,7 @@ TEST(CurrentSampling, SpuriousCallTouchesNothing) {
 }
 
 TEST(CurrentSampling, OnlyItsOwnFlagsAreCleared) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   board.adc2.flags |= 0x33;  // AWD, EOC, STRT, OVR
   board.sampling.ISR_read(0);
@@ -206,8 +202,7 @@ TEST(CurrentSampling, OnlyItsOwnFlagsAreCleared) {
 }
 
 TEST(CurrentSampling, SlowCodesAndTheirAge) {
-  Board board;
-  board.started(0);
+  Started board;
   board.trigger(1, 2);
   EXPECT_EQ(board.sampling.ISR_read(0).slow_age, 1U);
   const std::uint16_t codes[] = {1111, 2222, 3333, 444};

@@ -52,12 +52,5 @@ TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   EXPECT_TRUE(timer.smcr.writes.empty());
 }
 
-// RM0090, TIMx_CCMR1, IC1F: sampling divider and number of samples.
-TEST(QuadratureTimer, FilterTable) {
-  const std::uint32_t expected[16] = {0, 2, 4, 8, 12, 16, 24, 32, 48, 64, 80, 96, 128, 160, 192, 256};
-  for (std::uint8_t code = 0; code < 16; ++code)
-    EXPECT_EQ(input_filter_clocks(code), expected[code]) << +code;
-}
-
 }  // namespace
 }  // namespace kmax::drivers::stm32f4::quadrature_timer_test

@@ -33,15 +33,6 @@ TEST(SpiMaster, SettingsOfTheBoard) {
   EXPECT_EQ(bus.spi.cr1.value, 0x0B5DU);
 }
 
-TEST(SpiMaster, PrescalerNeverExceedsTheLimit) {
-  EXPECT_EQ(spi_prescaler_code(42'000'000, 10'000'000), 2);  // 5.25 MHz; /4 would be 10.5
-  EXPECT_EQ(spi_prescaler_code(42'000'000, 10'500'000), 1);
-  EXPECT_EQ(spi_prescaler_code(42'000'000, 10'499'999), 2);
-  EXPECT_EQ(spi_prescaler_code(42'000'000, 2'625'000), 3);
-  EXPECT_EQ(spi_prescaler_code(42'000'000, 100'000), std::nullopt);
-  EXPECT_EQ(spi_prescaler_code(16'000'000, 10'000'000), 0);
-}
-
 TEST(SpiMaster, FrameEndsWithBusyAndNotWithReceived) {
   Bus bus;
   ASSERT_TRUE(bus.master.start(0xA5F0));
@@ -73,7 +64,6 @@ TEST(SpiMaster, OverrunIsNotData) {
   EXPECT_EQ(bus.master.finish(), std::nullopt);
   EXPECT_EQ(bus.spi.dr.reads, data_reads + 1);
   EXPECT_EQ(bus.spi.sr.reads, status_reads + 2) << "OVR falls by reading DR and then SR";
-  EXPECT_EQ(bus.master.counters().overruns, 1U);
 }
 
 TEST(SpiMaster, ExchangeWaitsInBoundsAndRestarts) {
@@ -82,7 +72,6 @@ TEST(SpiMaster, ExchangeWaitsInBoundsAndRestarts) {
   const unsigned reads = bus.spi.sr.reads;
   EXPECT_EQ(bus.master.exchange(7), std::nullopt);
   EXPECT_LE(bus.spi.sr.reads - reads, SpiMasterConfig{}.polls + 3);
-  EXPECT_EQ(bus.master.counters().time_outs, 1U);
   EXPECT_EQ(bus.spi.cr1.value, 0x0B5DU) << "ready for the next";
 
   bus.spi.sr.value = txe;
@@ -98,7 +87,6 @@ TEST(SpiMaster, DeadPeripheralIsATimeOutAndNotAHang) {
   SpiMaster master{spi};
   ASSERT_TRUE(master.configure({}));
   EXPECT_EQ(master.exchange(1), std::nullopt);
-  EXPECT_EQ(master.counters().time_outs, 1U);
 }
 
 TEST(SpiMaster, OneHolderAtATime) {

@@ -42,9 +42,7 @@ TEST(UsartDivisor, RefusesWhatTheHardwareCannotDo) {
   EXPECT_FALSE(usart_divisor(apb1, 2'800'000).usable) << "15";
   EXPECT_FALSE(usart_divisor(apb1, 50'000'000).usable);
   EXPECT_FALSE(usart_divisor(apb1, 0xFFFF'FFFFU).usable);
-  EXPECT_FALSE(usart_divisor(16'000'000, 921'600).value < 17 && usart_divisor(16'000'000, 921'600).usable)
-      << "17.36 -> 17 is 2.1 % off";
-  EXPECT_FALSE(usart_divisor(16'000'000, 921'600).usable);
+  EXPECT_FALSE(usart_divisor(16'000'000, 921'600).usable) << "17.36 -> 17 is 2.1 % off";
 }
 
 RC_GTEST_PROP(UsartDivisor, NearestDivisorAndTrueError, ()) {
@@ -165,6 +163,12 @@ struct Line {
   Usart<FakeUsart> usart{registers};
   Line() { EXPECT_TRUE(usart.configure({}, apb1)); }
 
+  UsartEvent the_event() {
+    const auto events = serve();
+    EXPECT_EQ(events.size(), 1U);
+    return events.empty() ? UsartEvent{} : events[0];
+  }
+
   /// Serves until the hardware is content; a driver that never satisfies it would hang the board.
   std::vector<UsartEvent> serve() {
     std::vector<UsartEvent> events;
@@ -182,26 +186,21 @@ struct Line {
 TEST(Usart, ReceivesAByteWithoutItsParityBit) {
   Line line;
   line.registers.frame_received(0x1A5);
-  const auto events = line.serve();
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_TRUE(events[0].received);
-  EXPECT_EQ(events[0].byte, 0xA5);
-  EXPECT_FALSE(events[0].line_error);
-  EXPECT_FALSE(events[0].transmission_complete);
+  const UsartEvent event = line.the_event();
+  EXPECT_TRUE(event.received);
+  EXPECT_EQ(event.byte, 0xA5);
+  EXPECT_FALSE(event.line_error || event.transmission_complete);
 }
 
 TEST(Usart, EachErrorBelongsToItsByteOnly) {
   for (const std::uint32_t flag : {FakeUsart::pe, FakeUsart::fe, FakeUsart::ne}) {
     Line line;
     line.registers.frame_received(0x42, flag);
-    auto events = line.serve();
-    ASSERT_EQ(events.size(), 1U);
-    EXPECT_TRUE(events[0].line_error) << flag;
-    EXPECT_EQ(events[0].byte, 0x42);
+    const UsartEvent event = line.the_event();
+    EXPECT_TRUE(event.line_error) << flag;
+    EXPECT_EQ(event.byte, 0x42);
     line.registers.frame_received(0x43);
-    events = line.serve();
-    ASSERT_EQ(events.size(), 1U);
-    EXPECT_FALSE(events[0].line_error) << flag;
+    EXPECT_FALSE(line.the_event().line_error) << flag;
   }
 }
 
@@ -209,20 +208,12 @@ TEST(Usart, OverrunIsReportedAndCleared) {
   Line line;
   line.registers.frame_received(1);
   line.registers.frame_received(2);
-  const auto events = line.serve();
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_TRUE(events[0].received);
-  EXPECT_EQ(events[0].byte, 1);
-  EXPECT_TRUE(events[0].line_error);
-}
-
-TEST(Usart, OverrunWithoutAByteIsNotSilent) {
-  Line line;
+  const UsartEvent event = line.the_event();
+  EXPECT_TRUE(event.received && event.line_error);
+  EXPECT_EQ(event.byte, 1);
   line.registers.sr.value |= FakeUsart::ore;
-  const auto events = line.serve();
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_FALSE(events[0].received);
-  EXPECT_TRUE(events[0].line_error);
+  const UsartEvent without_a_byte = line.the_event();
+  EXPECT_TRUE(!without_a_byte.received && without_a_byte.line_error);
 }
 
 TEST(Usart, CompleteOnlyWhenTheLastStopBitHasLeft) {
@@ -234,9 +225,7 @@ TEST(Usart, CompleteOnlyWhenTheLastStopBitHasLeft) {
     EXPECT_TRUE(line.usart.transmitting());
     line.registers.frame_sent();
   }
-  const auto events = line.serve();
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_TRUE(events[0].transmission_complete);
+  EXPECT_TRUE(line.the_event().transmission_complete);
   EXPECT_FALSE(line.usart.transmitting());
   EXPECT_EQ(line.registers.line, (std::vector<std::uint8_t>{1, 2, 3}));
   EXPECT_FALSE(line.registers.asks_for_interrupt()) << "TC stays set for ever; its interrupt must not";
