@@ -18,6 +18,7 @@
 #include "tests/benchmarks/current_control_cost.hpp"
 #include "tests/benchmarks/current_control_picture.hpp"
 #include "tests/benchmarks/current_control_precision.hpp"
+#include "tests/benchmarks/gnuplot_pipe.hpp"
 #include "tests/benchmarks/instruction_budget/sine_variants.hpp"
 #include "tests/control/field_oriented_loop.hpp"
 #include "tests/host_tools/simulation/sine_through_zero.hpp"
@@ -56,10 +57,8 @@ test::DcLoop<double> with_pole_placement(test::DcLoop<double> loop, double asked
 std::vector<kmax::benchmark::BandwidthPoint> print_bandwidth() {
   std::printf(
       "## Bandwidth and overshoot\n\nDC motor at 20 kHz, solved exactly with the half tick of delay; swept. "
-      "\"Before\": "
-      "the gain 1 - e^(-w T), which\nplaces the closed loop's pole as if there were no delay. Overshoot: of "
-      "a step, and "
-      "the worst of all\ncombinations of R and L told wrong by 30 %%.\n\n```\n"
+      "\"Before\": the gain 1 - e^(-w T), which\nplaces the closed loop's pole as if there were no delay. "
+      "Overshoot: of a step, and the worst of all\ncombinations of R and L told wrong by 30 %%.\n\n```\n"
       "L/R, ticks  asked, Hz  -3 dB, Hz     off  before, Hz  overshoot  R, L +-30 %%\n");
   std::vector<kmax::benchmark::BandwidthPoint> points;
   for (const Winding& winding : windings) {
@@ -155,13 +154,10 @@ void print_distortion(const char* name, const Motor& motor) {
 void print_dead_time() {
   std::printf(
       "## Dead time\n\nA sine of 50 Hz through zero on the simulated inverter at 24 V, current loop 500 Hz: "
-      "harmonics 2 to 40 "
-      "as a share\nof the fundamental (THD, %%) and the largest current as a multiple of what was asked for. "
-      "Band: the "
-      "current that ends\nwithin the dead time. \"Twice\": the compensation is told twice the dead time "
-      "there is. From "
-      "the measured current it\nfeeds back on itself; from the reference it cannot. 119 ns: the "
-      "board's.\n\n```\n"
+      "harmonics 2 to 40 as a share\nof the fundamental (THD, %%) and the largest current as a multiple of "
+      "what was asked for. Band: the current that ends\nwithin the dead time. \"Twice\": the compensation is "
+      "told twice the dead time there is. From the measured current it\nfeeds back on itself; from the "
+      "reference it cannot. 119 ns: the board's.\n\n```\n"
       "motor                  dead, ns  A           none    reference         twice      measured         "
       "twice\n");
   print_distortion("DC 1 ohm 0.5 mH", BrushedDcMotorConfig{1.0, 0.5e-3, 0.03});
@@ -193,8 +189,7 @@ std::vector<kmax::benchmark::SinePoint> print_sines(const std::string& instructi
       {"libm", &by_libm, nullptr}};
   std::printf(
       "## Sine and cosine\n\nBoth of one angle, float. Error: the largest absolute one over 430 000 angles; "
-      "in "
-      "units of the last place of numbers\nfrom 1/2 to 1 (2^-24). The table has 512 entries, 4 KiB; the "
+      "in units of the last place of numbers\nfrom 1/2 to 1 (2^-24). The table has 512 entries, 4 KiB; the "
       "polynomials are minimax, of degree 7 and 8. The\nfield-oriented controller takes the first order: the "
       "converter's steps are 2.4e-4 of its range. Instructions:\nCortex-M4F, counted, with the "
       "return.\n\n```\n"
@@ -254,8 +249,7 @@ int main(int argc, char** argv) {
   std::printf(
       "# Current control: bandwidth, dead time, precision and cost\n\nMade by `scripts/docs`; all but the "
       "nanoseconds are exact, those are of the machine it ran on.\n\n![Bandwidth, a sine through zero, and "
-      "the "
-      "sine's error against its cost](pictures/current_control.svg)\n\n");
+      "the sine's error against its cost](pictures/current_control.svg)\n\n");
   const auto bandwidth = print_bandwidth();
   print_advance();
   print_dead_time();
@@ -270,5 +264,6 @@ int main(int argc, char** argv) {
   traces.with = through_zero::currents_of(run, motor);
   traces.amplitude = run.amplitude;
   traces.frequency = run.frequency;
-  return kmax::benchmark::draw(bandwidth, traces, sines, picture) ? 0 : 1;
+  const std::string script = kmax::benchmark::current_control_script(bandwidth, traces, sines, picture);
+  return kmax::benchmark::draw_by_gnuplot(script, picture) ? 0 : 1;
 }

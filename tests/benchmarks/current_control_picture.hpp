@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -38,10 +37,9 @@ inline std::string current_control_script(const std::vector<BandwidthPoint>& ban
       "set grid lc rgb '#dddddd'\nset key top left Left reverse samplen 2\n"
       "set title '-3 dB frequency, L/R 33 ticks'\nset xlabel 'asked for (Hz)'\nset ylabel 'measured (Hz)'\n"
       "set xrange [0:2700]\nset yrange [0:3700]\n"
-      "plot x with lines lc rgb '#999999' dt 2 title 'as asked for', "
-      "'-' using 1:2 with linespoints pt 7 ps 0.8 lw 2 lc rgb '#0072B2' title 'quadratic for g, with the "
-      "delay', "
-      "'-' using 1:2 with linespoints pt 5 ps 0.7 lw 2 lc rgb '#D55E00' title 'pole placement without it'\n";
+      "plot x with lines lc rgb '#999999' dt 2 title 'as asked for', '-' using 1:2 with linespoints pt 7 ps "
+      "0.8 lw 2 lc rgb '#0072B2' title 'quadratic for g, with the delay', '-' using 1:2 with linespoints pt "
+      "5 ps 0.7 lw 2 lc rgb '#D55E00' title 'pole placement without it'\n";
   for (const BandwidthPoint& point : bandwidth) script += line(point.asked, point.measured);
   script += "e\n";
   for (const BandwidthPoint& point : bandwidth) script += line(point.asked, point.before);
@@ -71,27 +69,6 @@ inline std::string current_control_script(const std::vector<BandwidthPoint>& ban
     script += "e\n";
   }
   return script + "unset multiplot\n";
-}
-
-inline bool draw(const std::vector<BandwidthPoint>& bandwidth, const CurrentTraces& traces,
-                 const std::vector<SinePoint>& sines, const std::string& path) {
-  if (path.find_first_of("'\n\\") != std::string::npos) {
-    std::fprintf(stderr, "--picture %s: quotes, backslashes and line ends are not allowed in the path\n",
-                 path.c_str());
-    return false;
-  }
-  std::FILE* const pipe = popen("gnuplot", "w");
-  const std::string script = current_control_script(bandwidth, traces, sines, path);
-  const bool written = pipe != nullptr && std::fwrite(script.data(), 1, script.size(), pipe) == script.size();
-  if (pipe == nullptr || pclose(pipe) != 0 || !written) {
-    std::fprintf(
-        stderr,
-        "--picture %s: gnuplot failed (its message is above); is it installed (Debian: gnuplot-nox), and the "
-        "folder writable?\n",
-        path.c_str());
-    return false;
-  }
-  return true;
 }
 
 }  // namespace kmax::benchmark

@@ -118,12 +118,9 @@ inline void print_precision(const std::string& instructions) {
   std::printf(
       "## Float against double\n\n%d ticks of hard inputs (steps, saturation, the supply's collapse), dead "
       "time and advance on; the largest\ndifference of a duty. One step of the timer is 2.4e-4. In "
-      "saturation "
-      "the q voltage is the root of what d leaves over:\nwhere that is next to nothing, rounding weighs "
-      "most. "
-      "\"Other verdict\": ticks in which only one of the two saturated;\nthey are not compared. "
-      "Instructions: "
-      "Cortex-M4F, the worst counted; in double the runtime library's are among them.\n\n```\n"
+      "saturation the q voltage is the root of what d leaves over:\nwhere that is next to nothing, rounding "
+      "weighs most. \"Other verdict\": ticks in which only one of the two saturated;\nthey are not compared. "
+      "Instructions: Cortex-M4F, the worst counted; in double the runtime library's are among them.\n\n```\n"
       "                     duty error  saturated  share of it  other verdict  float: instr.  ns  double: "
       "instr.  ns\n",
       ticks);

@@ -15,28 +15,23 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "control/haptic_loop.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
+#include "tests/benchmarks/speed_and_error/processor_time.hpp"
 
 namespace {
 
 using namespace kmax;
+using benchmark::processor_time;
 using simulation::CoupledHandle;
 using simulation::DeviceModel;
 using simulation::IntendedMotionConfig;
 using simulation::OperatorModel;
 using simulation::PropagatorTable;
 using simulation::StructureModel;
-
-double processor_time() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 struct Parts {
   const char* name;
@@ -196,8 +191,7 @@ void print_contacts() {
   }
   fmt::print(
       "ns/sample: with a table that interpolates; 10 bits: one that rounds; controller: its share, on the "
-      "positions of the same "
-      "touches\n");
+      "positions of the same touches\n");
 }
 
 }  // namespace

@@ -32,10 +32,9 @@ report::Section introduction() {
   return {
       "",
       {"What each method costs, how far its results are from the truth, and how its peers do: in every "
-       "section "
-       "the first sentences say what is compared and against what truth. Errors are reproducible; times are "
-       "processor time of one thread, the best of several runs, on the computer named below, and only their "
-       "ratios mean much elsewhere.",
+       "section the first sentences say what is compared and against what truth. Errors are reproducible; "
+       "times are processor time of one thread, the best of several runs, on the computer named below, and "
+       "only their ratios mean much elsewhere.",
        fmt::format("Made by scripts/speed_and_error, which measures all of it again and writes this page and "
                    "its pictures. All numbers are those of its last run: {}, g++ {}.",
                    processor(), __VERSION__)},

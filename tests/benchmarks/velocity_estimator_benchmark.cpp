@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/benchmarks/gnuplot_pipe.hpp"
 #include "tests/benchmarks/velocity_estimator_measurement.hpp"
 
 namespace {
@@ -117,34 +118,6 @@ std::string gnuplot_script(const std::vector<Row>& rows, const std::string& path
   return script + "unset multiplot\n";
 }
 
-bool draw(const std::vector<Row>& rows, const std::string& path) {
-  if (path.find_first_of("'\n\\") != std::string::npos) {
-    std::fprintf(stderr, "--picture %s: quotes, backslashes and line ends are not allowed in the path\n",
-                 path.c_str());
-    return false;
-  }
-  if (std::system("command -v gnuplot > /dev/null") != 0) {
-    std::fprintf(
-        stderr,
-        "--picture %s: gnuplot was not found; install it (Debian: gnuplot-nox) or leave out --picture\n",
-        path.c_str());
-    return false;
-  }
-  std::FILE* const pipe = popen("gnuplot", "w");
-  if (pipe == nullptr) {
-    std::fprintf(stderr, "--picture %s: gnuplot could not be started\n", path.c_str());
-    return false;
-  }
-  const std::string script = gnuplot_script(rows, path);
-  const bool written = std::fwrite(script.data(), 1, script.size(), pipe) == script.size();
-  if (pclose(pipe) != 0 || !written) {
-    std::fprintf(stderr, "--picture %s: gnuplot failed (its message is above); is the folder writable?\n",
-                 path.c_str());
-    return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -167,6 +140,6 @@ int main(int argc, char** argv) {
   const std::vector<Row> rows = measure_all();
   print(rows);
   if (!csv.empty() && !write_csv(rows, csv)) return 1;
-  if (!picture.empty() && !draw(rows, picture)) return 1;
+  if (!picture.empty() && !kmax::benchmark::draw_by_gnuplot(gnuplot_script(rows, picture), picture)) return 1;
   return 0;
 }

@@ -5,17 +5,11 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <ctime>
 
+#include "tests/benchmarks/speed_and_error/processor_time.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace {
-
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 void row(const char* name, std::size_t armed, double duration_s) {
   using namespace kmax;
@@ -25,9 +19,9 @@ void row(const char* name, std::size_t armed, double duration_s) {
   bench.start();
   for (std::size_t axis = 0; axis < armed; ++axis) bench.master->arm(axis);
   const auto instructions = bench.board->processor().instructions();
-  const double begin = processor_seconds();
+  const double begin = benchmark::processor_time();
   bench.board->run_for(duration_s);
-  const double taken = processor_seconds() - begin;
+  const double taken = benchmark::processor_time() - begin;
   fmt::print("{:<24} {:>6.2f} x real time, {:>6.1f} million instructions per second of board time\n", name,
              duration_s / taken,
              static_cast<double>(bench.board->processor().instructions() - instructions) * 1e-6 / duration_s);

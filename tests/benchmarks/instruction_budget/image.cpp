@@ -37,9 +37,19 @@ std::uint32_t count(const Registers& arguments, auto* function) {
 
 bool within = true;
 
-void report(const char* step, std::uint32_t worst, std::uint32_t usual, std::uint32_t budget) {
+/// Of all calls of a step; one of them is the usual one.
+struct Counts {
+  std::uint32_t usual = 0, worst = 0;
+  void add(std::uint32_t counted, bool is_usual) {
+    if (is_usual) usual = counted;
+    if (counted > worst) worst = counted;
+  }
+};
+
+void report(const char* step, const Counts& counts, std::uint32_t budget) {
+  const std::uint32_t worst = counts.worst;
   print(step);
-  print_number(usual, 7);
+  print_number(counts.usual, 7);
   print_number(worst, 7);
   if (budget == 0) {
     print("      -\n");
@@ -53,8 +63,7 @@ void report(const char* step, std::uint32_t worst, std::uint32_t usual, std::uin
 void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
   static Wall wall;
   static Wall::Output out;
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (int i = 0; i < 20000; ++i) {
     WallLawConfig<float> config;
     config.kind = kind;
@@ -68,11 +77,9 @@ void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
     const auto c = Wall::prepare(config, period);
     const Registers arguments{{&out, &wall, &c},
                               {inputs.hard(0.002F * inputs.unit()), inputs.hard(3.0F * inputs.unit())}};
-    const std::uint32_t counted = count(arguments, &wall_step);
-    if (i == 0) usual = counted;
-    if (counted > worst) worst = counted;
+    counts.add(count(arguments, &wall_step), i == 0);
   }
-  report(name, worst, usual, budget);
+  report(name, counts, budget);
 }
 
 template <typename Counter>
@@ -82,8 +89,7 @@ void measure_position(const char* name,
                       VelocityEstimatorKind kind, std::uint32_t budget) {
   static Position<Counter> position;
   static PositionOutput out;
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (const std::int32_t quantum : {1, 7, 550}) {
     for (const Rounding rounding : {Rounding::nearest, Rounding::floor, Rounding::hysteresis}) {
       VelocityEstimatorConfig<float> config;
@@ -100,18 +106,16 @@ void measure_position(const char* name,
         arguments.integers[3] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(raw));
         const std::uint32_t counted = count(arguments, step);
         // The first sample of a grid is not the tick's worst case: it comes once.
-        if (i > 0 && counted > worst) worst = counted;
-        if (i == 63 && quantum == 7 && rounding == Rounding::nearest) usual = counted;
+        if (i > 0) counts.add(counted, i == 63 && quantum == 7 && rounding == Rounding::nearest);
       }
     }
   }
-  report(name, worst, usual, budget);
+  report(name, counts, budget);
 }
 
 void measure_haptic() {
   static Haptic loop;
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   HapticLoopConfig<float> config;
   config.wall.kind = WallKind::adaptive;
   config.count_length = 1e-7;
@@ -126,10 +130,9 @@ void measure_haptic() {
     arguments.integers[2] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(position));
     arguments.integers[3] = reinterpret_cast<const void*>(static_cast<std::intptr_t>(position >> 31));
     const std::uint32_t counted = count(arguments, &haptic_step);
-    if (i > 0 && counted > worst) worst = counted;
-    if (i == 63) usual = counted;
+    if (i > 0) counts.add(counted, i == 63);
   }
-  report("haptic tick, adaptive wall, resampled  ", worst, usual, 0);
+  report("haptic tick, adaptive wall, resampled  ", counts, 0);
 }
 
 void measure_dc() {
@@ -139,8 +142,7 @@ void measure_dc() {
   config.dead_time = dead_time;
   config.torque_constant = 0.05F;
   const auto c = Dc::prepare(config, period);
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (int i = 0; i < 50000; ++i) {
     if (i % 100 == 0) dc.reset();
     const float size = (i / 100) % 2 == 0 ? 1.0F : 50.0F;
@@ -149,11 +151,9 @@ void measure_dc() {
         {i == 0 ? 0.1F : inputs.hard(size * inputs.unit()), i == 0 ? 0.0F : inputs.hard(size * inputs.unit()),
          i == 0 ? 0.0F : inputs.hard(100.0F * inputs.unit()),
          i == 0 ? 24.0F : inputs.hard(24.0F + 12.0F * inputs.unit())}};
-    const std::uint32_t counted = count(arguments, &dc_step);
-    if (i == 0) usual = counted;
-    if (counted > worst) worst = counted;
+    counts.add(count(arguments, &dc_step), i == 0);
   }
-  report("DC current step                        ", worst, usual, 45);
+  report("DC current step                        ", counts, 45);
 }
 
 void measure_field_oriented() {
@@ -165,8 +165,7 @@ void measure_field_oriented() {
   config.torque_constant = 0.05F;
   config.pole_pairs = 7;
   const auto c = FieldOriented::prepare(config, period);
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (int i = 0; i < 50000; ++i) {
     if (i % 100 == 0) controller.reset();
     const float size = (i / 100) % 2 == 0 ? 1.0F : 50.0F;
@@ -182,38 +181,30 @@ void measure_field_oriented() {
         {&out, &controller, &c, nullptr},
         {in.current_b, in.current_c, in.electrical_speed, in.reference_d, in.reference_q, in.supply}};
     arguments.integers[3] = reinterpret_cast<const void*>(in.angle);
-    const std::uint32_t counted = count(arguments, &field_oriented_step);
-    if (i == 0) usual = counted;
-    if (counted > worst) worst = counted;
+    counts.add(count(arguments, &field_oriented_step), i == 0);
   }
-  report("PMSM current step, sine and cosine in  ", worst, usual, 150);
+  report("PMSM current step, sine and cosine in  ", counts, 150);
 }
 
 void measure_small_steps() {
   static Transmission::Output out;
   const auto c = Transmission::prepare({});
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (int i = 0; i < 5000; ++i) {
     const Registers arguments{{&out, &c}, {i == 0 ? 1.0F : inputs.hard(40.0F * inputs.unit())}};
-    const std::uint32_t counted = count(arguments, &transmission_step);
-    if (i == 0) usual = counted;
-    if (counted > worst) worst = counted;
+    counts.add(count(arguments, &transmission_step), i == 0);
   }
-  report("force to current                       ", worst, usual, 0);
+  report("force to current                       ", counts, 0);
 }
 
 void measure_sine(const char* name, control::SineCosine<float> (*step)(std::uint32_t)) {
-  std::uint32_t worst = 0;
-  std::uint32_t usual = 0;
+  Counts counts;
   for (int i = 0; i < 5000; ++i) {
     Registers arguments;
     arguments.integers[0] = reinterpret_cast<const void*>(i == 0 ? 0x12345678U : inputs.random());
-    const std::uint32_t counted = count(arguments, step);
-    if (i == 0) usual = counted;
-    if (counted > worst) worst = counted;
+    counts.add(count(arguments, step), i == 0);
   }
-  report(name, worst, usual, 0);
+  report(name, counts, 0);
 }
 
 void measure_double() {
@@ -228,26 +219,20 @@ void measure_double() {
   config.pole_pairs = 7;
   config.dead_time = 119e-9;
   const auto c = FieldOrientedDouble::prepare(config, 5e-5);
-  std::uint32_t worst[2] = {};
-  std::uint32_t usual[2] = {};
+  Counts dc_counts, counts;
   static DcDouble::Output dc_out;
   static FieldOrientedDouble::Output out;
   const auto number = [](float scale) { return static_cast<double>(scale * inputs.unit()); };
   for (int i = 0; i < 2000; ++i) {
     const DcDoubleInput two = {number(1.0F), number(1.0F), number(100.0F), 24.0 + number(12.0F)};
-    const std::uint32_t one = count(Registers{{&dc, &dc_c, &two, &dc_out}, {}}, &dc_double_step);
+    dc_counts.add(count(Registers{{&dc, &dc_c, &two, &dc_out}, {}}, &dc_double_step), i == 0);
     const FieldOrientedDouble::Input three = {inputs.random(),     number(1.0F), number(1.0F),
                                               number(1000.0F),     0.0,          number(1.0F),
                                               24.0 + number(12.0F)};
-    const std::uint32_t other =
-        count(Registers{{&controller, &c, &three, &out}, {}}, &field_oriented_double_step);
-    if (i == 0) usual[0] = one;
-    if (i == 0) usual[1] = other;
-    if (one > worst[0]) worst[0] = one;
-    if (other > worst[1]) worst[1] = other;
+    counts.add(count(Registers{{&controller, &c, &three, &out}, {}}, &field_oriented_double_step), i == 0);
   }
-  report("DC current step in double              ", worst[0], usual[0], 0);
-  report("PMSM current step in double            ", worst[1], usual[1], 0);
+  report("DC current step in double              ", dc_counts, 0);
+  report("PMSM current step in double            ", counts, 0);
 }
 
 }  // namespace

@@ -98,10 +98,8 @@ report::Section field_section(const std::filesystem::path& pictures) {
       "Compared: control/wall_law.hpp outside the wall, F = F_MC / (s/x_0 + 1)^2 with the reciprocal of x_0 "
       "prepared, in float (the firmware) and in double, and the same by std::pow. Against: long double, from "
       "the same distances (floats); F_MC = 2 N, distances s from 1 nm to 1 m, 1000 per decade. Time: one "
-      "call of "
-      "WallLaw::update, or of the formula with std::pow, on this computer; each waits for the one before, "
-      "one "
-      "addition and multiplication included."};
+      "call of WallLaw::update, or of the formula with std::pow, on this computer; each waits for the one "
+      "before, one addition and multiplication included."};
   report::Table table{"",
                       {"x_0 (mm)", "method", "largest relative error", "RMS relative error",
                        "largest error of force (N)", "time (ns)"},

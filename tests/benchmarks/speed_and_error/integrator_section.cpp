@@ -169,39 +169,31 @@ report::Section integrator_section(const std::filesystem::path& pictures) {
   section.heading = "Integrators";
   section.paragraphs = {
       "Compared: the exact method of host_tools/simulation/coupled_handle.hpp, which the simulation works "
-      "with, "
-      "and the three textbook integrators of reference_integrators.hpp, all with true stick. The trial: the "
-      "default person (OperatorModel) moves the default device (45 g, 0.093 N of Coulomb friction) from 10 "
-      "mm "
-      "into a wall, with a field of F_MC = 1 N or none, and presses, 1.5 s in all; counts of 0.055 mm, force "
-      "clipped at 3.3 N. Trials are named by the controller's rate, K and F_MC.",
+      "with, and the three textbook integrators of reference_integrators.hpp, all with true stick. The "
+      "trial: the default person (OperatorModel) moves the default device (45 g, 0.093 N of Coulomb "
+      "friction) from 10 mm into a wall, with a field of F_MC = 1 N or none, and presses, 1.5 s in all; "
+      "counts of 0.055 mm, force clipped at 3.3 N. Trials are named by the controller's rate, K and F_MC.",
       "Against: the same equations in long double, Runge-Kutta steps of 1 us with bisected events, code of "
-      "its "
-      "own (tests/host_tools/simulation/reference_handle.hpp). Open loop: the forces of the reference's own "
-      "contact are applied to each integrator. 'Integration' is the error against the same reference with "
-      "the "
-      "arm's activation held over each interval, as all of the simulation holds it; 'total' is against the "
-      "reference that follows the activation every 10 us. Speed: simulated seconds per second of processor "
-      "time, one core, without the controller, best of 7.",
+      "its own (tests/host_tools/simulation/reference_handle.hpp). Open loop: the forces of the reference's "
+      "own contact are applied to each integrator. 'Integration' is the error against the same reference "
+      "with the arm's activation held over each interval, as all of the simulation holds it; 'total' is "
+      "against the reference that follows the activation every 10 us. Speed: simulated seconds per second of "
+      "processor time, one core, without the controller, best of 7.",
       "Closed loop: the controller answers to the integrator's own positions. A contact that oscillates on "
       "counts of 0.055 mm magnifies any difference, the smallest too, once it makes one count flip: the "
-      "distance "
-      "from the reference then says that two oscillations are out of step, and the peak-to-peak position of "
-      "the "
-      "last 0.5 s is what can be compared.",
-      "'Shared matrices': the exact method with CoupledHandle::share(), for many trials of one person; "
-      "their matrices are interpolated over the activation. Fixed substeps are equal parts of 2 ms, and at "
-      "least one per interval: 40 "
-      "at 20 kHz."};
+      "distance from the reference then says that two oscillations are out of step, and the peak-to-peak "
+      "position of the last 0.5 s is what can be compared.",
+      "'Shared matrices': the exact method with CoupledHandle::share(), for many trials of one person; their "
+      "matrices are interpolated over the activation. Fixed substeps are equal parts of 2 ms, and at least "
+      "one per interval: 40 at 20 kHz."};
   report::Table all{
       "All settings:",
       {"trial", "integrator", "substeps, tolerance", "simulated s per s", "integration, RMS (um)",
        "total, RMS (um)", "closed loop, RMS (um)", "closed loop, peak to peak (um)"},
       {}};
   report::Table equal{
-      "At equal error: the fewest substeps (1, 2, 4 .. 65536) or the largest tolerance (1e-4 .. "
-      "1e-14) with which the total error is at most 1.1 times that of the exact method in the "
-      "row above them.",
+      "At equal error: the fewest substeps (1, 2, 4 .. 65536) or the largest tolerance (1e-4 .. 1e-14) with "
+      "which the total error is at most 1.1 times that of the exact method in the row above them.",
       {"trial", "integrator", "needs", "simulated s per s", "total, RMS (um)",
        "exact is faster by a factor of"},
       {}};

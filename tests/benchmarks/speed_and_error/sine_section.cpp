@@ -96,19 +96,15 @@ report::Section sine_section(const std::filesystem::path& pictures) {
   section.paragraphs = {
       "Compared: control/sine_cosine.hpp (a table of 512 angles and a short series for the rest) and its "
       "first-order variant, with std::sin and std::cos of this computer's C library, each from an angle that "
-      "is "
-      "a fraction of a turn in 32 bits, as the firmware has it. Against: sine and cosine in long double of "
-      "the same angle, folded into +-45 degrees without rounding; a million angles all over the turn. The C "
-      "library's arguments are radians, whose rounding to float is part of its error.",
+      "is a fraction of a turn in 32 bits, as the firmware has it. Against: sine and cosine in long double "
+      "of the same angle, folded into +-45 degrees without rounding; a million angles all over the turn. The "
+      "C library's arguments are radians, whose rounding to float is part of its error.",
       "Errors are given absolute, in units of the last place of numbers from 1/2 to 1 (2^-24 in float, 2^-53 "
-      "in "
-      "double), and, in one column, in units of the last place of each true value: next to a zero the "
-      "relative "
-      "error is larger, the library's by the rounding of its argument near half a turn. Time: both functions "
-      "together, calls that do not wait for each other, on this computer; current_control.md counts "
-      "instructions "
-      "of the target. The firmware does not use the C library's: its bits differ from one library to the "
-      "next."};
+      "in double), and, in one column, in units of the last place of each true value: next to a zero the "
+      "relative error is larger, the library's by the rounding of its argument near half a turn. Time: both "
+      "functions together, calls that do not wait for each other, on this computer; current_control.md "
+      "counts instructions of the target. The firmware does not use the C library's: its bits differ from "
+      "one library to the next."};
   struct Method {
     const char* name;
     bool is_double;

@@ -63,13 +63,11 @@ report::Section square_root_section(const std::filesystem::path& pictures) {
   section.heading = "Square root";
   section.paragraphs = {
       "Compared: the square root of the processor in float, which control/ uses (one VSQRT.F32 of 14 cycles "
-      "on "
-      "the Cortex-M4F, and SQRTSS here; both round correctly, hence the same bits), with that in double "
-      "(which "
-      "the Cortex-M4F has not), and with the estimate from the bits of a float and 0 to 3 steps of Newton's "
-      "method, for processors without one. Against: the root in long double; 100,000 arguments from 1e-6 to "
-      "1e6, spread evenly over the logarithm. Time: each root waits for the one before, one addition and "
-      "multiplication included."};
+      "on the Cortex-M4F, and SQRTSS here; both round correctly, hence the same bits), with that in double "
+      "(which the Cortex-M4F has not), and with the estimate from the bits of a float and 0 to 3 steps of "
+      "Newton's method, for processors without one. Against: the root in long double; 100,000 arguments from "
+      "1e-6 to 1e6, spread evenly over the logarithm. Time: each root waits for the one before, one addition "
+      "and multiplication included."};
   struct Method {
     const char* name;
     Result result;

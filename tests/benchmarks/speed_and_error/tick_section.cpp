@@ -124,11 +124,9 @@ report::Section tick_section(const std::filesystem::path& pictures) {
   section.heading = "Float against double in the whole haptic tick";
   section.paragraphs = {
       "Compared: control::HapticLoop<float>, the firmware's, with control::HapticLoop<double>, the same "
-      "source, "
-      "on the same encoder counts: a contact of 1 s recorded in closed loop at 20 kHz (1 um per count, K = "
-      "5.5 "
-      "N/mm, the default device and person, force limit 3.3 N). Against: the double. Time: one tick on this "
-      "computer, best of 15; the Cortex-M4F has no double at all.",
+      "source, on the same encoder counts: a contact of 1 s recorded in closed loop at 20 kHz (1 um per "
+      "count, K = 5.5 N/mm, the default device and person, force limit 3.3 N). Against: the double. Time: "
+      "one tick on this computer, best of 15; the Cortex-M4F has no double at all.",
       "Positions are whole counts up to the distance from the wall, so a wall 10 m away loses nothing."};
   report::Table table{"",
                       {"wall law", "velocity", "largest force (N)", "largest difference (N)",

@@ -36,8 +36,7 @@ TEST_F(FlashPlanText, OpenOcdOverGpioLines) {
       texts[0],
       "tool -c 'gdb_port disabled' -c 'tcl_port disabled' -c 'telnet_port disabled' -c 'adapter driver "
       "linuxgpiod' -c 'adapter gpio swclk 25 -chip 1' -c 'adapter gpio swdio 24 -chip 0' -c 'transport "
-      "select "
-      "swd' -f target/stm32f4x.cfg -c 'adapter speed 1000' -c init -c 'reset halt' -c 'dump_image "
+      "select swd' -f target/stm32f4x.cfg -c 'adapter speed 1000' -c init -c 'reset halt' -c 'dump_image "
       "parameters_before.bin 0x08004000 32768' -c 'flash erase_address 0x08000000 16384' -c 'flash "
       "write_image erase image_0800c000.bin 0x0800c000 bin' -c 'verify_image image_0800c000.bin 0x0800c000 "
       "bin' -c 'flash write_image erase image_08000000.bin 0x08000000 bin' -c 'verify_image "
