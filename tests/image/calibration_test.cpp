@@ -8,7 +8,6 @@
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
-#include "tests/image/board_link.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::calibration_test {
@@ -30,7 +29,7 @@ struct Bench {
  private:
   static std::unique_ptr<link::Link> started(ImageBench& image) {
     image.start();
-    return std::make_unique<BoardLink>(*image.board);
+    return std::make_unique<virtual_board::BoardLink>(*image.board);
   }
 };
 

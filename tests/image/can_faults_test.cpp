@@ -194,8 +194,9 @@ TEST_F(BusFaults, ParametersInPdosAtAKilohertzDoNotStarveTheMainLoop) {
 // Initialization waits for the end of the frame on the bus, which at 125 kbit/s lasts a millisecond.
 TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
   const auto set_rate = [&](std::uint32_t rate) {
-    bench.master->write_registers(firmware::register_address(firmware::entry_of<"can.bit_rate">(), 0),
-                                  {static_cast<std::uint16_t>(rate >> 16), static_cast<std::uint16_t>(rate)});
+    bench.master->write_holding(
+        firmware::register_address(firmware::entry_of<"can.bit_rate">(), 0),
+        std::array{static_cast<std::uint16_t>(rate >> 16), static_cast<std::uint16_t>(rate)});
   };
   const auto follow = [&](std::uint32_t rate) {
     bench.port.node().set_bit_time(virtual_board::units_per_second / rate, bench.board->now());

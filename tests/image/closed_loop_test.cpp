@@ -206,8 +206,8 @@ TEST_F(ClosedLoop, AnEncoderThatCameOffStaysWrong) {
   bench.world.connect_encoder(0, false);
   bench.board->run_for(0.01);
   ASSERT_EQ(bench.fault(0), Fault::encoder);
-  bench.master->write_registers(firmware::register_address(firmware::entry_of<"wall.damping">(), 0),
-                                {0x3F80, 0});
+  bench.master->write_holding(firmware::register_address(firmware::entry_of<"wall.damping">(), 0),
+                              std::array<std::uint16_t, 2>{0x3F80, 0});
   bench.master->write_register(firmware::register_address(firmware::entry_of<"drive.controlword">(), 0),
                                0x80);
   EXPECT_EQ(bench.fault(0), Fault::encoder);

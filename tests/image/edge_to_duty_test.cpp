@@ -14,30 +14,23 @@ namespace {
 using virtual_board::BoardTime;
 
 /// A scene whose axis 0 has edges that no motion has made, and somebody who looks at its duty.
-class SteppingWorld final : public virtual_board::BoardWorld {
+class SteppingWorld final : public virtual_board::SceneWorld {
  public:
-  explicit SteppingWorld(const simulation::Scene& of_scene) : scene(of_scene) {}
+  using SceneWorld::SceneWorld;
 
   void set_bridge(std::size_t axis, const std::array<virtual_board::PwmLegOutput, 3>& legs,
                   BoardTime now) override {
-    scene.set_bridge(axis, legs, now);
+    SceneWorld::set_bridge(axis, legs, now);
     if (axis != 0) return;
     duty = legs[1].high_duty;
     if (on_duty) on_duty(now);
   }
-  void set_brake(bool on, BoardTime now) override { scene.set_brake(on, now); }
-  void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) override {
-    scene.set_amplifiers(axis, gain, shorted, now);
-  }
-  double supply_voltage() const override { return scene.supply_voltage(); }
-  double analogue(unsigned channel, BoardTime now) override { return scene.analogue(channel, now); }
   virtual_board::EncoderSignals encoder(std::size_t axis, BoardTime now) override {
-    auto signals = scene.encoder(axis, now);
+    auto signals = SceneWorld::encoder(axis, now);
     if (axis == 0) signals.edges += extra_edges;
     return signals;
   }
 
-  virtual_board::SceneWorld scene;
   std::int64_t extra_edges = 0;
   double duty = 0.5;
   std::function<void(BoardTime)> on_duty;
@@ -58,11 +51,10 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
     scene.parameters.push_back({name, value, "test"});
   scene.axes[0].motion->push_force = 2.0;
   SteppingWorld world(scene);
-  virtual_board::VirtualBoardConfig config;
-  config.identity.volts = 24;
-  virtual_board::VirtualBoard board(image(), &world, config);
+  const auto owned = board_for_24_v(&world);
+  virtual_board::VirtualBoard& board = *owned;
   virtual_board::store_parameters(board, simulated_board::assignments_of(scene));
-  virtual_board::ModbusMaster master(board);
+  virtual_board::BoardLink master(board);
   board.run_for(0.3);
   for (std::size_t axis = 0; axis < 2; ++axis) master.arm(axis);
   const auto missed = [&] {
@@ -71,7 +63,7 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
     return static_cast<std::uint32_t>(words[0]) << 16 | words[1];
   };
   board.run_for(1.2);
-  world.scene.drive(0).block(true);  // pressed in, and held there: nothing but our edges changes the force
+  world.drive(0).block(true);  // pressed in, and held there: nothing but our edges changes the force
   board.run_for(0.1);
   const std::uint32_t missed_before = missed();
 

@@ -11,7 +11,7 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
-#include "host_tools/virtual_board/run/modbus_master.hpp"
+#include "host_tools/virtual_board/run/board_link.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
 
 namespace kmax::tests {
@@ -35,6 +35,13 @@ inline virtual_board::BoardTime ticks(double count) {
                                                static_cast<double>(virtual_board::units_per_second));
 }
 
+/// The variant of the board for 24 V.
+inline std::unique_ptr<virtual_board::VirtualBoard> board_for_24_v(virtual_board::BoardWorld* world) {
+  virtual_board::VirtualBoardConfig config;
+  config.identity.volts = 24;
+  return std::make_unique<virtual_board::VirtualBoard>(image(), world, config);
+}
+
 /// A variant board of 24 V with the motors of a scene, started, with a master on its serial line.
 class ImageBench {
  public:
@@ -44,11 +51,9 @@ class ImageBench {
   explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
                       const std::string& scene_name = "motor_axes")
       : scene(with(simulated_board::open_scene(scene_name), parameters, push)), world(scene) {
-    virtual_board::VirtualBoardConfig config;
-    config.identity.volts = 24;
-    board = std::make_unique<virtual_board::VirtualBoard>(image(), &world, config);
+    board = board_for_24_v(&world);
     virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
-    master = std::make_unique<virtual_board::ModbusMaster>(*board);
+    master = std::make_unique<virtual_board::BoardLink>(*board);
   }
 
   /// Until the power stage is ready.
@@ -69,7 +74,7 @@ class ImageBench {
   simulation::Scene scene;
   virtual_board::SceneWorld world;
   std::unique_ptr<virtual_board::VirtualBoard> board;
-  std::unique_ptr<virtual_board::ModbusMaster> master;
+  std::unique_ptr<virtual_board::BoardLink> master;
 
  private:
   static simulation::Scene with(simulation::Scene scene, const Parameters& parameters, double push) {

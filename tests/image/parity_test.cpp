@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <bit>
-#include <cstring>
 #include <random>
 
 #include "drivers/stm32f4/current_sampling.hpp"
-#include "firmware/drive/axis.hpp"
-#include "tests/image/image_bench.hpp"
+#include "tests/image/axis_tick_calls.hpp"
 
 namespace kmax::tests::parity_test {
 namespace {
@@ -16,51 +14,30 @@ namespace {
 using firmware::Axis;
 using virtual_board::BoardTime;
 
-constexpr const char* tick_symbol =
-    "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbNS1_6DemandEm";
-
 /// Listens to the image and computes along.
 class Companion {
  public:
   explicit Companion(virtual_board::VirtualBoard& board)
-      : board_(board), entry_(image().required_symbol(tick_symbol).address) {
-    board.processor().on_block([this](std::uint32_t address, std::uint32_t /*size*/) {
-      if (address == entry_) enter();
-      if (address == return_to_) leave();
-    });
-  }
+      : board_(board),
+        calls_(
+            board, [this] { enter(); }, [this] { leave(); }) {}
 
   std::uint64_t ticks = 0, driven = 0, excited = 0, commanded = 0, differences = 0;
   std::string first_difference;
 
  private:
-  template <typename Value>
-  Value at(std::uint32_t address) {
-    Value value;
-    const auto bytes = board_.bus().memory(address, sizeof value);
-    if (bytes.size() < sizeof value) throw std::runtime_error("an argument outside memory");
-    std::memcpy(static_cast<void*>(&value), bytes.data(), sizeof value);
-    return value;
-  }
-
   void enter() {
-    auto& processor = board_.processor();
-    const std::uint32_t self = processor.core_register(0);
-    axis_ = self == first_self_ || first_self_ == 0 ? 0 : 1;
-    if (first_self_ == 0) first_self_ = self;
-    const auto setting = at<firmware::AxisSetting>(processor.core_register(1));
+    const auto setting = calls_.value_at<firmware::AxisSetting>(calls_.argument(1));
     mode_ = setting.mode;
-    const auto input = at<Axis::Input>(processor.core_register(2));
-    const bool enable = (processor.core_register(3) & 0xFFU) != 0;
-    const Axis::Demand demand{processor.fp_register(0), processor.fp_register(1)};
-    const auto tick = at<std::uint32_t>(processor.core_register(13));
-    expected_ = axes_[axis_].ISR_tick(setting, input, enable, demand, tick);
-    return_to_ = processor.core_register(14) & ~1U;
+    const auto input = calls_.value_at<Axis::Input>(calls_.argument(2));
+    const bool enable = (calls_.argument(3) & 0xFFU) != 0;
+    const Axis::Demand demand{board_.processor().fp_register(0), board_.processor().fp_register(1)};
+    const auto tick = calls_.value_at<std::uint32_t>(calls_.argument(13));
+    expected_ = axes_[calls_.axis()].ISR_tick(setting, input, enable, demand, tick);
   }
 
   void leave() {
-    const auto made = at<Axis::Output>(board_.processor().core_register(0));
-    return_to_ = 0;
+    const auto made = calls_.value_at<Axis::Output>(calls_.argument(0));
     ++ticks;
     driven += made.enabled ? 1 : 0;
     excited += made.enabled && mode_ == firmware::DriveMode::excitation ? 1 : 0;
@@ -82,31 +59,25 @@ class Companion {
 
   void note(const char* name, float made, float expected) {
     if (differences++ == 0)
-      first_difference =
-          fmt::format("tick {}, axis {}: {} is {} in the image, {} here", ticks, axis_, name, made, expected);
+      first_difference = fmt::format("tick {}, axis {}: {} is {} in the image, {} here", ticks, calls_.axis(),
+                                     name, made, expected);
   }
 
   virtual_board::VirtualBoard& board_;
-  std::uint32_t entry_, return_to_ = 0, first_self_ = 0;
-  std::size_t axis_ = 0;
+  AxisTickCalls calls_;
   firmware::DriveMode mode_ = firmware::DriveMode::haptic;
   std::array<Axis, 2> axes_;
   Axis::Output expected_{};
 };
 
 /// Handles that jump and drift, and sensors that read anything.
-class RandomWorld final : public virtual_board::BoardWorld {
+class RandomWorld final : public EmptyWorld {
  public:
   explicit RandomWorld(std::uint64_t seed) : random_(seed) {}
 
-  void set_bridge(std::size_t, const std::array<virtual_board::PwmLegOutput, 3>&, BoardTime) override {}
-  void set_brake(bool, BoardTime) override {}
-  void set_amplifiers(std::size_t, double, bool, BoardTime) override {}
-  double supply_voltage() const override { return 24.0; }
-  double analogue(unsigned channel, BoardTime) override {
-    if (channel == 6) return (quiet ? 24.0 : 22.0 + uniform(0, 3.9)) / 11.0;
-    if (channel == 15 || channel == 4 || channel == 5) return 0.82;
-    if (quiet) return 1.65;
+  double analogue(unsigned channel, BoardTime now) override {
+    if (!quiet && channel == 6) return (22.0 + uniform(0, 3.9)) / 11.0;
+    if (quiet || channel == 15 || channel == 4 || channel == 5) return EmptyWorld::analogue(channel, now);
     // The currents of B and C nearly add up to nothing, so that their sum does not end every run at once.
     constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
     for (const auto& axis : wiring.axes) {
@@ -144,69 +115,64 @@ void expect_equal(const Companion& companion) {
 
 TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
   RandomWorld world(20260101);
-  virtual_board::VirtualBoardConfig config;
-  config.identity.volts = 24;
-  virtual_board::VirtualBoard board(image(), &world, config);
+  const auto owned = board_for_24_v(&world);
+  virtual_board::VirtualBoard& board = *owned;
   Companion companion(board);
-  virtual_board::ModbusMaster master(board);
-  const auto write = [&master](std::size_t entry, std::size_t axis, std::uint32_t raw) {
+  virtual_board::BoardLink master(board);
+  const auto write = [&master](std::string_view name, std::size_t axis, std::uint32_t raw) {
+    const std::size_t entry = firmware::find_entry(name);
     const std::uint16_t address = firmware::register_address(entry, axis);
     if (firmware::register_count(firmware::descriptors[entry].type) == 1)
       return master.write_register(address, static_cast<std::uint16_t>(raw));
-    master.write_registers(address, {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
+    master.write_holding(address,
+                         std::array{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
   };
   const auto real = [](double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); };
   board.run_for(0.3);
   while (companion.ticks < 1'000'000) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      write(firmware::entry_of<"drive.controlword">(), axis, 0);
-      write(firmware::entry_of<"drive.controlword">(), axis, 0x80);
+      write("drive.controlword", axis, 0);
+      write("drive.controlword", axis, 0x80);
     }
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      write(firmware::entry_of<"wall.law">(), axis, static_cast<std::uint32_t>(world.uniform(0, 4)));
-      write(firmware::entry_of<"wall.side">(), axis, world.uniform(0, 1) < 0.5 ? 0xFFFFu : 1u);
-      write(firmware::entry_of<"wall.stiffness">(), axis, real(world.uniform(0, 20000)));
-      write(firmware::entry_of<"wall.damping">(), axis, real(world.uniform(0, 20)));
-      write(firmware::entry_of<"wall.adaptive_mode">(), axis,
-            static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write(firmware::entry_of<"wall.adaptive_relation">(), axis,
-            static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write(firmware::entry_of<"interference.mode">(), axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write(firmware::entry_of<"interference.force">(), axis, real(world.uniform(-1, 5)));
-      write(firmware::entry_of<"interference.background_force">(), axis, real(world.uniform(-1, 4)));
-      write(firmware::entry_of<"interference.onset_time">(), axis, real(world.uniform(0, 0.002)));
-      write(firmware::entry_of<"velocity.estimator">(), axis,
-            static_cast<std::uint32_t>(world.uniform(0, 5)));
-      write(firmware::entry_of<"velocity.window">(), axis, static_cast<std::uint32_t>(world.uniform(1, 17)));
-      write(firmware::entry_of<"velocity.limit">(), axis, real(0.0));
-      write(firmware::entry_of<"position.resolution">(), axis, real(world.uniform(0, 2e-4)));
-      write(firmware::entry_of<"position.rounding">(), axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write(firmware::entry_of<"motor.kind">(), axis, static_cast<std::uint32_t>(world.uniform(0, 2)));
-      write(firmware::entry_of<"motor.commutation_known">(), axis, 1);
-      write(firmware::entry_of<"compensation.dead_time">(), axis,
-            real(world.uniform(-1, 1) < 0 ? 0.0 : 2e-7));
-      write(firmware::entry_of<"guard.friction">(), axis, real(1.0));
-      write(firmware::entry_of<"compensation.limit">(), axis, real(world.uniform(-1, 1) < 0 ? 0.0 : 0.5));
-      write(firmware::entry_of<"compensation.friction">(), axis, real(world.uniform(0, 0.5)));
-      write(firmware::entry_of<"compensation.cogging_periods">(), axis, 42);
-      write(firmware::entry_of<"compensation.cogging_sine_1">(), axis, real(world.uniform(-0.3, 0.3)));
+      write("wall.law", axis, static_cast<std::uint32_t>(world.uniform(0, 4)));
+      write("wall.side", axis, world.uniform(0, 1) < 0.5 ? 0xFFFFu : 1u);
+      write("wall.stiffness", axis, real(world.uniform(0, 20000)));
+      write("wall.damping", axis, real(world.uniform(0, 20)));
+      write("wall.adaptive_mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write("wall.adaptive_relation", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write("interference.mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write("interference.force", axis, real(world.uniform(-1, 5)));
+      write("interference.background_force", axis, real(world.uniform(-1, 4)));
+      write("interference.onset_time", axis, real(world.uniform(0, 0.002)));
+      write("velocity.estimator", axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
+      write("velocity.window", axis, static_cast<std::uint32_t>(world.uniform(1, 17)));
+      write("velocity.limit", axis, real(0.0));
+      write("position.resolution", axis, real(world.uniform(0, 2e-4)));
+      write("position.rounding", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write("motor.kind", axis, static_cast<std::uint32_t>(world.uniform(0, 2)));
+      write("motor.commutation_known", axis, 1);
+      write("compensation.dead_time", axis, real(world.uniform(-1, 1) < 0 ? 0.0 : 2e-7));
+      write("guard.friction", axis, real(1.0));
+      write("compensation.limit", axis, real(world.uniform(-1, 1) < 0 ? 0.0 : 0.5));
+      write("compensation.friction", axis, real(world.uniform(0, 0.5)));
+      write("compensation.cogging_periods", axis, 42);
+      write("compensation.cogging_sine_1", axis, real(world.uniform(-0.3, 0.3)));
       // What jumps cannot be plausible: watched, but seldom tripped.
-      write(firmware::entry_of<"device.hand_force">(), axis, real(world.uniform(0, 1) < 0.1 ? 5.0 : 1000.0));
+      write("device.hand_force", axis, real(world.uniform(0, 1) < 0.1 ? 5.0 : 1000.0));
       const double mode = world.uniform(0, 1);
-      write(firmware::entry_of<"drive.mode">(), axis, mode < 0.25 ? 1 : mode < 0.4 ? 2 : 0);
-      write(firmware::entry_of<"excitation.kind">(), axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
-      write(firmware::entry_of<"excitation.bias">(), axis, real(world.uniform(-5, 5)));
-      write(firmware::entry_of<"excitation.alternation">(), axis, real(world.uniform(-5, 5)));
-      write(firmware::entry_of<"excitation.half_period">(), axis,
-            static_cast<std::uint32_t>(world.uniform(0, 40)));
-      write(firmware::entry_of<"excitation.alternation_axis">(), axis,
-            static_cast<std::uint32_t>(world.uniform(0, 2)));
-      write(firmware::entry_of<"excitation.angle_rate">(), axis, real(world.uniform(-300, 300)));
-      write(firmware::entry_of<"excitation.angle_span">(), axis, real(world.uniform(0, 60)));
-      write(firmware::entry_of<"excitation.stroke">(), axis, real(world.uniform(-0.05, 0.05)));
-      write(firmware::entry_of<"excitation.travel">(), axis, real(1.0));
-      write(firmware::entry_of<"current.limit">(), axis, real(20.0));
-      write(firmware::entry_of<"haptic.rate">(), axis, real(world.uniform(0, 1) < 0.5 ? 20000.0 : 2000.0));
+      write("drive.mode", axis, mode < 0.25 ? 1 : mode < 0.4 ? 2 : 0);
+      write("excitation.kind", axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
+      write("excitation.bias", axis, real(world.uniform(-5, 5)));
+      write("excitation.alternation", axis, real(world.uniform(-5, 5)));
+      write("excitation.half_period", axis, static_cast<std::uint32_t>(world.uniform(0, 40)));
+      write("excitation.alternation_axis", axis, static_cast<std::uint32_t>(world.uniform(0, 2)));
+      write("excitation.angle_rate", axis, real(world.uniform(-300, 300)));
+      write("excitation.angle_span", axis, real(world.uniform(0, 60)));
+      write("excitation.stroke", axis, real(world.uniform(-0.05, 0.05)));
+      write("excitation.travel", axis, real(1.0));
+      write("current.limit", axis, real(20.0));
+      write("haptic.rate", axis, real(world.uniform(0, 1) < 0.5 ? 20000.0 : 2000.0));
     }
     board.run_for(0.25);  // another amplifier gain restarts the power stage
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -215,8 +181,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       } catch (const std::runtime_error&) {
         // Inside the wall: it computes all the same.
       }
-      write(firmware::entry_of<"profile.target_torque">(), axis,
-            static_cast<std::uint16_t>(world.uniform(-1000, 1000)));
+      write("profile.target_torque", axis, static_cast<std::uint16_t>(world.uniform(-1000, 1000)));
     }
     world.quiet = false;
     board.run_for(0.8);

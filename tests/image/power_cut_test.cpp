@@ -27,9 +27,7 @@ class PowerCutBench {
  public:
   /// A board whose flash holds `before` (or is erased) and whose parameters are to become `old_set`.
   explicit PowerCutBench(const std::vector<std::uint8_t>& parameter_sectors) {
-    virtual_board::VirtualBoardConfig config;
-    config.identity.volts = 24;
-    board_ = std::make_unique<virtual_board::VirtualBoard>(image(), nullptr, config);
+    board_ = board_for_24_v(nullptr);
     std::copy(parameter_sectors.begin(), parameter_sectors.end(), sectors().begin());
     board_->run_for(0.02);
   }
@@ -67,13 +65,13 @@ class PowerCutBench {
   std::uint16_t state() { return master().read_input(register_address(entry_of<"store.state">(), 0), 1)[0]; }
 
   virtual_board::VirtualBoard& board() { return *board_; }
-  virtual_board::ModbusMaster master() { return virtual_board::ModbusMaster(*board_); }
+  virtual_board::BoardLink master() { return virtual_board::BoardLink(*board_); }
 
  private:
   void write_real(std::size_t entry, std::size_t axis, float value) {
     const auto raw = std::bit_cast<std::uint32_t>(value);
-    master().write_registers(register_address(entry, axis),
-                             {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
+    master().write_holding(register_address(entry, axis), std::array{static_cast<std::uint16_t>(raw >> 16),
+                                                                     static_cast<std::uint16_t>(raw)});
   }
   float read_real(std::size_t entry, std::size_t axis) {
     const auto words = master().read_holding(register_address(entry, axis), 2);
@@ -110,10 +108,10 @@ std::vector<std::uint8_t> prepared(bool sector_full) {
   return {};
 }
 
-// Each cut boots a board twice, so not every word: the first and the last ones, where a record and its sector begin and
-// end, and some between, an odd number apart so that both words of a value are met. The store itself is cut at every word
-// in tests/firmware/parameter_store_power_cut_test.cpp; this shows that the image erases, writes and starts as it does
-// there. KMAX_SOAK=1 in the environment tries five times as many.
+// Each cut boots a board twice, so not every word: the first and the last ones, where a record and its sector
+// begin and end, and some between, an odd number apart so that both words of a value are met. The store
+// itself is cut at every word in tests/firmware/parameter_store_power_cut_test.cpp; this shows that the image
+// erases, writes and starts as it does there. KMAX_SOAK=1 in the environment tries five times as many.
 bool is_tried(std::uint64_t cut, std::uint64_t operations) {
   static const bool soak = std::getenv("KMAX_SOAK") != nullptr;
   const std::uint64_t at_the_ends = soak ? 24 : 4, between = soak ? 7 : 47;

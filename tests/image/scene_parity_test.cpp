@@ -20,22 +20,17 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <tuple>
 
-#include "tests/image/image_bench.hpp"
+#include "tests/image/axis_tick_calls.hpp"
 
 namespace kmax::tests::scene_parity_test {
 namespace {
 
 using firmware::Axis;
 using simulated_board::SimulatedDevice;
-using virtual_board::BoardTime;
 
 constexpr std::uint32_t tick_us = board::NativeBoard<SimulatedDevice>::tick_us;
-
-constexpr const char* tick_symbol =
-    "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbNS1_6DemandEm";
 
 /// One tick of one axis: the handle as it was sampled, and what the firmware made of it.
 struct AxisTick {
@@ -102,38 +97,16 @@ simulation::Scene scene_of(const std::string& name, const ImageBench::Parameters
   return scene;
 }
 
-/// A board with nothing plugged in but a supply.
-class EmptyWorld final : public virtual_board::BoardWorld {
- public:
-  void set_bridge(std::size_t, const std::array<virtual_board::PwmLegOutput, 3>&, BoardTime) override {}
-  void set_brake(bool, BoardTime) override {}
-  void set_amplifiers(std::size_t, double, bool, BoardTime) override {}
-  double supply_voltage() const override { return 24.0; }
-  double analogue(unsigned channel, BoardTime) override {
-    if (channel == 6) return 24.0 / 11.0;
-    return channel == 15 || channel == 4 || channel == 5 ? 0.82 : 1.65;
-  }
-  virtual_board::EncoderSignals encoder(std::size_t, BoardTime) override { return {}; }
-};
-
 /// The image with a plant of its own, which replaces what the board has sampled.
 class ImageSide {
  public:
-  explicit ImageSide(const simulation::Scene& scene)
-      : scene_(scene), parameters_(scene), entry_(image().required_symbol(tick_symbol).address) {
-    virtual_board::VirtualBoardConfig config;
-    config.identity.volts = 24;
-    board_ = std::make_unique<virtual_board::VirtualBoard>(image(), &world_, config);
+  explicit ImageSide(const simulation::Scene& scene) : scene_(scene), parameters_(scene) {
     virtual_board::store_parameters(*board_, simulated_board::assignments_of(scene));
-    board_->processor().on_block([this](std::uint32_t address, std::uint32_t /*size*/) {
-      if (address == entry_) enter();
-      if (address == return_to_) leave();
-    });
   }
 
   /// Arms every axis of the scene when the plant is ready, and lets `duration` (s) pass.
   void run(double duration) {
-    virtual_board::ModbusMaster master(*board_);
+    virtual_board::BoardLink master(*board_);
     for (int tries = 0; tries < 100 && !board_->healthy(); ++tries) board_->run_for(0.01);
     board_->run_for(0.3);
     for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis) master.arm(axis);
@@ -144,38 +117,18 @@ class ImageSide {
   const Trace& trace() const { return trace_; }
 
  private:
-  template <typename Value>
-  std::span<std::uint8_t> bytes_at(std::uint32_t address) {
-    const auto bytes = board_->bus().memory(address, sizeof(Value));
-    if (bytes.size() < sizeof(Value)) throw std::runtime_error("an argument outside memory");
-    return bytes;
-  }
-
-  /// The same layout on both sides: whole numbers, floats and flags.
-  template <typename Value>
-  Value value_at(std::uint32_t address) {
-    static_assert(std::is_trivially_copyable_v<Value>);
-    Value value;
-    std::memcpy(static_cast<void*>(&value), bytes_at<Value>(address).data(), sizeof value);
-    return value;
-  }
-
   void enter() {
-    const auto& processor = board_->processor();
-    const std::uint32_t self = processor.core_register(0);
-    if (first_self_ == 0) first_self_ = self;
-    axis_ = self == first_self_ ? 0 : 1;
-    return_to_ = processor.core_register(14) & ~1U;
-    self_[axis_] = self;
-    firmware::AxisSetting& setting = setting_[axis_];
-    setting = value_at<firmware::AxisSetting>(processor.core_register(1));
+    const std::size_t axis = calls_.axis();
+    self_[axis] = calls_.self();
+    firmware::AxisSetting& setting = setting_[axis];
+    setting = calls_.value_at<firmware::AxisSetting>(calls_.argument(1));
     // The axis starts afresh, and with it its haptic samples.
-    if (axis_ == 0 && (!device_ || setting.generation != generation_)) start();
-    if (axis_ == 0) generation_ = setting.generation;
-    const Axis::Input input = device_->sample(axis_);
-    std::memcpy(bytes_at<Axis::Input>(processor.core_register(2)).data(), static_cast<const void*>(&input),
+    if (axis == 0 && (!device_ || setting.generation != generation_)) start();
+    if (axis == 0) generation_ = setting.generation;
+    const Axis::Input input = device_->sample(axis);
+    std::memcpy(calls_.bytes_at<Axis::Input>(calls_.argument(2)).data(), static_cast<const void*>(&input),
                 sizeof input);
-    tick_[axis_] = seen(*device_, axis_);
+    tick_[axis] = seen(*device_, axis);
   }
 
   void start() {
@@ -185,14 +138,14 @@ class ImageSide {
   }
 
   void leave() {
-    return_to_ = 0;
-    const auto output = value_at<Axis::Output>(board_->processor().core_register(0));
+    const std::size_t axis = calls_.axis();
+    const auto output = calls_.value_at<Axis::Output>(calls_.argument(0));
     // The image does not work it out: what it has, the same source makes into it here.
-    const float background_force = value_at<Axis>(self_[axis_]).ISR_background_force(setting_[axis_]);
-    add_output(tick_[axis_], output, background_force);
-    device_->set_background_force(axis_, background_force);
-    device_->drive(axis_, output);
-    if (axis_ != 1) return;
+    const float background_force = calls_.value_at<Axis>(self_[axis]).ISR_background_force(setting_[axis]);
+    add_output(tick_[axis], output, background_force);
+    device_->set_background_force(axis, background_force);
+    device_->drive(axis, output);
+    if (axis != 1) return;
     trace_.push_back(tick_);
     device_->advance(static_cast<double>(tick_us) * 1e-6);  // to the bit as NativeBoard does
     now_us_ += tick_us;
@@ -203,11 +156,10 @@ class ImageSide {
   /// Not run: its application only holds the parameters that the plant's power stage is set by.
   simulated_board::SimulatedBoard parameters_;
   EmptyWorld world_;
-  std::unique_ptr<virtual_board::VirtualBoard> board_;
-  std::uint32_t entry_, return_to_ = 0, first_self_ = 0;
+  std::unique_ptr<virtual_board::VirtualBoard> board_ = board_for_24_v(&world_);
+  AxisTickCalls calls_{*board_, [this] { enter(); }, [this] { leave(); }};
   std::array<std::uint32_t, 2> self_{};
   std::array<firmware::AxisSetting, 2> setting_{};
-  std::size_t axis_ = 0;
   std::uint32_t generation_ = 0, now_us_ = 0;
   std::optional<SimulatedDevice> device_;
   Tick tick_{};

@@ -14,7 +14,7 @@ namespace kmax::virtual_board {
 /// current, and an encoder that stands still at 0.
 ///
 /// When persons begin and handles are let go, and which defects can be planted: scene_drives.hpp.
-class SceneWorld final : public BoardWorld {
+class SceneWorld : public BoardWorld {
  public:
   /// Throws what the parts of the scene throw; std::invalid_argument for more than two axes or a second
   /// AS5047P.

@@ -1,0 +1,84 @@
+#include "host_tools/virtual_board/run/board_link.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "firmware/drive/axis_state_machine.hpp"
+#include "firmware/modbus/crc.hpp"
+#include "firmware/parameters/parameter_values.hpp"
+#include "firmware/parameters/refusal.hpp"
+
+namespace kmax::virtual_board {
+
+namespace {
+
+template <typename Exchange>
+auto again_if_lost(Exchange ask) {
+  for (int attempt = 1; attempt < 3; ++attempt) {
+    try {
+      return ask();
+    } catch (const link::LinkError&) {
+    }
+  }
+  return ask();
+}
+
+}  // namespace
+
+std::vector<std::uint16_t> BoardLink::read_holding(std::uint16_t address, std::uint16_t count) {
+  return again_if_lost([&] { return FrameLink::read_holding(address, count); });
+}
+
+std::vector<std::uint16_t> BoardLink::read_input(std::uint16_t address, std::uint16_t count) {
+  return again_if_lost([&] { return FrameLink::read_input(address, count); });
+}
+
+void BoardLink::write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
+  again_if_lost([&] { write_holding(address, values); });
+}
+
+std::chrono::microseconds BoardLink::now() const {
+  return std::chrono::microseconds(static_cast<std::int64_t>(seconds(board_.now()) * 1e6));
+}
+
+void BoardLink::wait(std::chrono::microseconds duration) {
+  if (duration.count() > 0) board_.run_for(static_cast<double>(duration.count()) * 1e-6);
+}
+
+std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> request) {
+  // An answer to a write repeats the first registers and their number; one to a reading has the registers.
+  const std::size_t expected = request[1] == 16 ? 8 : 5U + 2U * request[5];
+  static_cast<void>(board_.transmitted());
+  board_.receive(request);
+  std::vector<std::uint8_t> reply;
+  // An erase of the parameters' memory stops the processor for up to 0.5 s.
+  for (int tenths_of_ms = 0; tenths_of_ms < 6'000; ++tenths_of_ms) {
+    board_.run_for(0.0001);
+    const auto bytes = board_.transmitted();
+    reply.insert(reply.end(), bytes.begin(), bytes.end());
+    const bool refused = reply.size() >= 2 && (reply[1] & 0x80U) != 0;
+    if (reply.size() < (refused ? 5U : expected)) continue;
+    if (firmware::modbus::crc_of(reply) != 0) throw link::LinkError("the board's reply has a wrong CRC");
+    board_.run_for(0.002);  // the silence between two frames is 1.75 ms
+    return reply;
+  }
+  throw link::LinkError(fmt::format("the board does not answer within 0.6 s: {} of {} bytes; {} resets, {}",
+                                    reply.size(), expected, board_.resets() - 1, board_.where()));
+}
+
+void BoardLink::arm(std::size_t axis) {
+  const std::uint16_t controlword =
+      firmware::register_address(firmware::entry_of<"drive.controlword">(), axis);
+  for (const std::uint16_t word : {std::uint16_t{0x06}, std::uint16_t{0x07}, std::uint16_t{0x0F}})
+    write_register(controlword, word);
+  const auto status =
+      read_input(firmware::register_address(firmware::entry_of<"drive.statusword">(), axis), 1)[0];
+  if (firmware::statusword::state_of(status) == firmware::DriveState::operation_enabled) return;
+  const auto refusal =
+      read_input(firmware::register_address(firmware::entry_of<"drive.refusal">(), axis), 1)[0];
+  throw std::runtime_error(fmt::format("axis {} cannot be armed: {}", axis,
+                                       firmware::to_string(static_cast<firmware::Refusal>(refusal))));
+}
+
+}  // namespace kmax::virtual_board
