@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -183,6 +184,11 @@ class RegisterBlock : public Peripheral {
 
   [[noreturn]] void refuse(const Access& access, const std::string& why) const {
     virtual_board::refuse(access, block_, why);
+  }
+  template <typename... Arguments>
+  void refuse_if(bool condition, const Access& access, fmt::format_string<Arguments...> why,
+                 Arguments&&... arguments) const {
+    if (condition) refuse(access, fmt::format(why, std::forward<Arguments>(arguments)...));
   }
   const char* block() const { return block_; }
   const RegisterTable<Model>& table() const { return table_; }

@@ -60,7 +60,6 @@ EXCEPTIONS = {
         "host_tools/virtual_board/cortex_m/system_tick.cpp",
         "host_tools/virtual_board/run/main.cpp",
         "host_tools/virtual_board/stm32f4/can_controller.cpp",
-        "host_tools/virtual_board/stm32f4/can_controller_registers.cpp",
         "host_tools/virtual_board/stm32f4/can_filters.cpp",
     },
 }

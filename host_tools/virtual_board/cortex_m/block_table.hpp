@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -61,6 +62,62 @@ class BlockTable {
 
   std::vector<const Block*> slots_;
   std::unordered_map<std::uint64_t, std::unique_ptr<Block>> blocks_;
+};
+
+/// Finds out which instruction of a block makes an access. The emulator tells address and direction of an
+/// access but not its program counter; it does have the core registers up to date. The effective address of
+/// every load and store that may come next is therefore compared with the accessed one.
+///
+/// When two instructions qualify the earlier one is taken. It is wrong only if that one was executed already
+/// on other memory (not on registers) with a base that has since changed, or was skipped by IT.
+class AccessLocator {
+ public:
+  void begin_block(const Block& block) {
+    block_ = &block;
+    next_ = 0;
+    words_left_ = 0;
+  }
+
+  /// `core_register(n)` gives r0 to r15. None when no instruction qualifies.
+  template <typename CoreRegister>
+  const MemoryInstruction* locate(std::uint32_t address, bool store, CoreRegister core_register) {
+    // The base of a multiple access may have been loaded meanwhile; only the first of its words is looked
+    // for.
+    if (words_left_ != 0 && address == expected_) {
+      --words_left_;
+      expected_ += 4;
+      offset_ += 4;
+      return &block_->memory[next_ - 1];
+    }
+    for (std::size_t index = next_; index < block_->memory.size(); ++index) {
+      const MemoryInstruction& candidate = block_->memory[index];
+      const MemoryOperand& operand = candidate.operand;
+      if (operand.store != store) continue;
+      std::uint32_t effective = operand.offset;
+      if (operand.base != MemoryOperand::no_register) effective += core_register(operand.base);
+      if (operand.index != MemoryOperand::no_register)
+        effective += core_register(operand.index) << operand.shift;
+      if (address - effective >= operand.span) continue;
+      offset_ = address - effective;
+      span_ = operand.span;
+      next_ = index + 1;
+      expected_ = address + 4;
+      words_left_ = (operand.span - (address - effective) + 3) / 4 - 1;
+      return &candidate;
+    }
+    return nullptr;
+  }
+
+  /// The located access, `bytes` wide, is a piece of one that is not aligned: the emulator takes such apart.
+  bool is_piece(unsigned bytes) const { return offset_ % 4 != 0 || bytes < (span_ < 4 ? span_ : 4U); }
+
+ private:
+  const Block* block_ = nullptr;
+  std::size_t next_ = 0;
+  std::uint32_t words_left_ = 0;
+  std::uint32_t expected_ = 0;
+  std::uint32_t offset_ = 0;  // of the located access in its instruction's
+  std::uint32_t span_ = 0;
 };
 
 }  // namespace kmax::virtual_board

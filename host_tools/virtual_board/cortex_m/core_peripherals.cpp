@@ -43,7 +43,7 @@ const RegisterTable<DwtModel>& DwtModel::registers() {
 }
 
 void DwtModel::before_access(const Access& access) {
-  if (!trace_enabled_()) refuse(access, "DEMCR.TRCENA is not set");
+  refuse_if(!trace_enabled_(), access, "DEMCR.TRCENA is not set");
 }
 
 std::uint32_t DwtModel::count() const {
@@ -89,9 +89,8 @@ std::uint32_t FloatingPointControl::read_fpccr() const {
 }
 
 void FloatingPointControl::write_fpccr(const Access& access, std::uint32_t value) {
-  if (floating_point_fpccr::AutomaticPreservation::of(value) == 0) {
-    refuse(access, fmt::format("FPCCR = 0x{:08X}: only ASPEN with or without LSPEN is modelled", value));
-  }
+  refuse_if(floating_point_fpccr::AutomaticPreservation::of(value) == 0, access,
+            "FPCCR = 0x{:08X}: only ASPEN with or without LSPEN is modelled", value);
   fpccr_ = value & fpccr_settings;
 }
 
@@ -137,14 +136,13 @@ const RegisterTable<MemoryProtection>& MemoryProtection::registers() {
 }
 
 void MemoryProtection::write_control(const Access& access, std::uint32_t value) {
-  if (mpu_ctrl::Enable::of(value) == 0 && mpu_ctrl::InFaultHandlers::of(value) != 0) {
-    refuse(access, "HFNMIENA without ENABLE is unpredictable");
-  }
+  refuse_if(mpu_ctrl::Enable::of(value) == 0 && mpu_ctrl::InFaultHandlers::of(value) != 0, access,
+            "HFNMIENA without ENABLE is unpredictable");
   ctrl_ = value;
 }
 
 void MemoryProtection::select(const Access& access, std::uint32_t value) {
-  if (value >= mpu_region_count) refuse(access, fmt::format("region {} of eight", value));
+  refuse_if(value >= mpu_region_count, access, "region {} of eight", value);
   selected_ = value;
 }
 
@@ -161,14 +159,11 @@ void MemoryProtection::write_attributes(const Access& access, std::uint32_t valu
   if (mpu_rasr::Enable::of(value) != 0) {
     constexpr std::uint32_t smallest = 4;  // 32 bytes
     const std::uint32_t size_code = mpu_rasr::Size::of(value);
-    if (size_code < smallest) {
-      refuse(access, fmt::format("SIZE = {}: a region has at least 32 bytes", size_code));
-    }
+    refuse_if(size_code < smallest, access, "SIZE = {}: a region has at least 32 bytes", size_code);
     const std::uint32_t below = 0xFFFF'FFFFU >> (31 - size_code);
     const std::uint32_t address = regions_[selected_].address;
-    if ((address & below) != 0) {
-      refuse(access, fmt::format("region {} at 0x{:08X} is not aligned to its size", selected_, address));
-    }
+    refuse_if((address & below) != 0, access, "region {} at 0x{:08X} is not aligned to its size", selected_,
+              address);
   }
   regions_[selected_].attributes = value;
 }

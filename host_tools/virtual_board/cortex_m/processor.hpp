@@ -8,7 +8,6 @@
 
 #include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/bus.hpp"
-#include "host_tools/virtual_board/cortex_m/access_locator.hpp"
 #include "host_tools/virtual_board/cortex_m/block_table.hpp"
 #include "host_tools/virtual_board/cortex_m/core_engine.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"

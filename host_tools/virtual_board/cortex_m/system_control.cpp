@@ -121,15 +121,13 @@ void SystemControl::write(const Access& access, std::uint32_t value) {
 }
 
 void SystemControl::write_control(const Access& access, std::uint32_t value) {
-  if (value != ccr_reset)
-    refuse(access, fmt::format("CCR = 0x{:X}: only its reset value 0x200 is modelled", value));
+  refuse_if(value != ccr_reset, access, "CCR = 0x{:X}: only its reset value 0x200 is modelled", value);
 }
 
 void SystemControl::write_coprocessor_access(const Access& access, std::uint32_t value) {
   const std::uint32_t fpu = scb_cpacr::FpuAccess::of(value);
-  if (fpu != 0 && fpu != full_access) {
-    refuse(access, fmt::format("CPACR = 0x{:08X}: only no and full access to CP10 and CP11", value));
-  }
+  refuse_if(fpu != 0 && fpu != full_access, access,
+            "CPACR = 0x{:08X}: only no and full access to CP10 and CP11", value);
   cpacr_ = value;
 }
 
@@ -142,9 +140,8 @@ void SystemControl::write_interrupt_control(std::uint32_t value) {
 }
 
 void SystemControl::write_application_interrupt(const Access& access, std::uint32_t value) {
-  if (scb_aircr::Key::of(value) != scb_aircr::key) {
-    refuse(access, fmt::format("AIRCR = 0x{:08X}: the key 0x05FA is missing", value));
-  }
+  refuse_if(scb_aircr::Key::of(value) != scb_aircr::key, access,
+            "AIRCR = 0x{:08X}: the key 0x05FA is missing", value);
   exceptions_.set_priority_group(scb_aircr::PriorityGroup::of(value));
   if (scb_aircr::SystemResetRequest::of(value) == 0) return;
   reset_requested_ = true;
@@ -154,9 +151,8 @@ void SystemControl::write_application_interrupt(const Access& access, std::uint3
 void SystemControl::write_handler_control(const Access& access, std::uint32_t value) {
   const std::uint32_t enables = scb_shcsr::MemoryFaultEnable::mask | scb_shcsr::BusFaultEnable::mask |
                                 scb_shcsr::UsageFaultEnable::mask;
-  if ((value & ~enables) != (handler_control_state() & ~enables)) {
-    refuse(access, fmt::format("SHCSR = 0x{:X}: active and pending bits cannot be written", value));
-  }
+  refuse_if((value & ~enables) != (handler_control_state() & ~enables), access,
+            "SHCSR = 0x{:X}: active and pending bits cannot be written", value);
   exceptions_.set_enabled(number::memory_fault, scb_shcsr::MemoryFaultEnable::of(value) != 0);
   exceptions_.set_enabled(number::bus_fault, scb_shcsr::BusFaultEnable::of(value) != 0);
   exceptions_.set_enabled(number::usage_fault, scb_shcsr::UsageFaultEnable::of(value) != 0);

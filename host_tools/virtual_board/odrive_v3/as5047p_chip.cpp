@@ -22,9 +22,7 @@ void As5047pChip::select(bool level) {
 std::optional<std::uint16_t> As5047pChip::exchange(std::uint16_t mosi, BoardTime now) {
   if (!selected_ || !fitted_) return std::nullopt;
   ++frames_in_select_;
-  const auto out = static_cast<std::uint16_t>(reply_ ^ std::exchange(disturbance_, std::uint16_t{0}));
-  reply_ = answer(mosi, now);
-  return out;
+  return std::exchange(reply_, answer(mosi, now));
 }
 
 std::uint16_t As5047pChip::with_flags(std::uint16_t data) const {

@@ -31,8 +31,6 @@ class As5047pChip {
   std::optional<std::uint16_t> exchange(std::uint16_t mosi, BoardTime now);
 
   void set_fitted(bool fitted) { fitted_ = fitted; }
-  /// Flips these bits of the next reply: a disturbed line.
-  void disturb_next_reply(std::uint16_t bits) { disturbance_ = bits; }
 
  private:
   std::uint16_t answer(std::uint16_t command, BoardTime now);
@@ -44,7 +42,6 @@ class As5047pChip {
   unsigned frames_in_select_ = 0;
   std::uint16_t reply_ = 0;
   std::uint16_t errors_ = 0;
-  std::uint16_t disturbance_ = 0;
 };
 
 }  // namespace kmax::virtual_board

@@ -123,7 +123,7 @@ std::optional<std::uint16_t> Drv8301Chip::exchange(std::uint16_t mosi, BoardTime
     throw RefusedAccess("DRV8301: a second frame within one chip select; nSCS must rise after every 16 bits");
   }
   frame_taken_ = true;
-  const auto out = static_cast<std::uint16_t>(reply_ ^ std::exchange(disturbance_, std::uint16_t{0}));
+  const std::uint16_t out = reply_;
   const unsigned address = drv8301::address_of(mosi);
   if (address > static_cast<unsigned>(Drv8301Register::control_2)) {
     throw RefusedAccess(

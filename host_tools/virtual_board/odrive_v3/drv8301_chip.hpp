@@ -53,8 +53,6 @@ class Drv8301Chip {
   void over_current(Fault fault, BoardTime now);
   /// The next `count` writes to control registers have no effect.
   void lose_writes(unsigned count) { writes_to_lose_ = count; }
-  /// Flips these bits of the next reply: a disturbed line.
-  void disturb_next_reply(std::uint16_t bits) { disturbance_ = bits; }
   /// The chip is gone from the board: it drives nothing.
   void set_fitted(bool fitted) { fitted_ = fitted; }
 
@@ -86,7 +84,6 @@ class Drv8301Chip {
   std::uint16_t latched_ = 0;     ///< what holds the gates off
   std::array<std::uint16_t, 2> control_{};
   unsigned writes_to_lose_ = 0;
-  std::uint16_t disturbance_ = 0;
   bool fault_output_ = true;
   std::function<void(bool, BoardTime)> fault_callback_;
 };

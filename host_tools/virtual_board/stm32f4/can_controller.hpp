@@ -52,13 +52,11 @@ class CanController final : public RegisterBlock<CanController>, private CanBusN
  private:
   enum class Mode : std::uint8_t { sleep, initialization, synchronizing, normal };
   struct Mailbox {
-    std::uint32_t tir = 0, tdtr = 0, tdlr = 0, tdhr = 0;
+    std::array<std::uint32_t, 4> words{};  ///< TIR, TDTR, TDLR, TDHR
     bool pending = false, on_wire = false, abort = false;
     std::uint32_t status = 0;  ///< RQCP, TXOK, ALST and TERR
   };
-  struct Received {
-    std::uint32_t rir, rdtr, rdlr, rdhr;
-  };
+  using Received = std::array<std::uint32_t, 4>;  ///< RIR, RDTR, RDLR, RDHR
   struct Fifo {
     std::deque<Received> frames;
     bool full = false, overrun = false;

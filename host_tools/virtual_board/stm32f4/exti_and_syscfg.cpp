@@ -56,10 +56,8 @@ const RegisterTable<SyscfgModel>& SyscfgModel::registers() {
 void SyscfgModel::write_exticr(const Access& access, unsigned index, std::uint32_t value) {
   for (unsigned line = 4 * index; line < 4 * index + 4; ++line) {
     const std::uint32_t port = value >> syscfg_exticr::position(line) & syscfg_exticr::port_mask;
-    if (port >= port_count) {
-      refuse(access, "EXTI line " + std::to_string(line) + " is given port number " + std::to_string(port) +
-                         "; 0 (A) to 3 (D) are allowed");
-    }
+    refuse_if(port >= port_count, access, "EXTI line {} is given port number {}; 0 (A) to 3 (D) are allowed",
+              line, port);
   }
   exticr_[index] = value;
   if (routing_change_) routing_change_(access.now);
@@ -97,7 +95,7 @@ const RegisterTable<ExtiModel>& ExtiModel::registers() {
 /// Writing 1 to a bit that is 0 sets the pending bit; the bit falls when PR is cleared.
 void ExtiModel::write_swier(const Access& access, std::uint32_t value) {
   const std::uint32_t set = value & ~swier_;
-  if ((set & ~imr_) != 0) refuse(access, "SWIER of a masked line: its effect is not defined");
+  refuse_if((set & ~imr_) != 0, access, "SWIER of a masked line: its effect is not defined");
   swier_ |= set;
   pr_ |= set;
 }

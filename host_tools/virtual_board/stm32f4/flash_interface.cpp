@@ -104,16 +104,13 @@ std::uint32_t FlashInterface::read_status(const Access& access) const {
 
 void FlashInterface::write_access_control(const Access& access, std::uint32_t value) {
   const std::uint32_t needed = wait_states_needed(clocks_.core);
-  if (flash_acr::Latency::of(value) < needed) {
-    refuse(access, "ACR: " + std::to_string(flash_acr::Latency::of(value)) +
-                       " wait states, the present HCLK needs " + std::to_string(needed));
-  }
+  refuse_if(flash_acr::Latency::of(value) < needed, access, "ACR: {} wait states, the present HCLK needs {}",
+            flash_acr::Latency::of(value), needed);
   const bool resets_instructions = flash_acr::InstructionCacheReset::of(value) != 0;
   const bool resets_data = flash_acr::DataCacheReset::of(value) != 0;
-  if ((resets_instructions && flash_acr::InstructionCache::of(acr_ | value) != 0) ||
-      (resets_data && flash_acr::DataCache::of(acr_ | value) != 0)) {
-    refuse(access, "ACR: a cache can be reset only while it is disabled");
-  }
+  refuse_if((resets_instructions && flash_acr::InstructionCache::of(acr_ | value) != 0) ||
+                (resets_data && flash_acr::DataCache::of(acr_ | value) != 0),
+            access, "ACR: a cache can be reset only while it is disabled");
   if (resets_data) data_cache_is_stale_ = false;
   acr_ = value;
 }
@@ -138,29 +135,28 @@ void FlashInterface::write_key(const Access& access, std::uint32_t value) {
 }
 
 void FlashInterface::write_control(const Access& access, std::uint32_t value) {
-  if (access.now < busy_until_) refuse(access, "CR written while BSY is set: the bus would stall");
+  refuse_if(access.now < busy_until_, access, "CR written while BSY is set: the bus would stall");
   if (flash_cr::Lock::of(cr_) != 0) {
     if (value == cr_) return;
     refuse(access, "CR written while it is locked: ignored on silicon");
   }
-  if (flash_cr::Parallelism::of(value) == 3)
-    refuse(access, "CR: 64-bit parallelism needs Vpp, which the board does not have");
+  refuse_if(flash_cr::Parallelism::of(value) == 3, access,
+            "CR: 64-bit parallelism needs Vpp, which the board does not have");
   const bool start = flash_cr::Start::of(value) != 0;
-  if (start && flash_cr::Lock::of(value) != 0) refuse(access, "CR: STRT together with LOCK");
+  refuse_if(start && flash_cr::Lock::of(value) != 0, access, "CR: STRT together with LOCK");
   cr_ = value & ~flash_cr::Start::mask;
   if (start) start_erase(access);
 }
 
 void FlashInterface::start_erase(const Access& access) {
-  if (flash_cr::SectorErase::of(cr_) == 0 || flash_cr::Program::of(cr_) != 0)
-    refuse(access, "CR: STRT needs SER and no PG (RM0090: unpredictable)");
-  if (flash_cr::Parallelism::of(cr_) != flash_cr::by_word)
-    refuse(access, "CR: erase at other than x32: not modelled");
+  refuse_if(flash_cr::SectorErase::of(cr_) == 0 || flash_cr::Program::of(cr_) != 0, access,
+            "CR: STRT needs SER and no PG (RM0090: unpredictable)");
+  refuse_if(flash_cr::Parallelism::of(cr_) != flash_cr::by_word, access,
+            "CR: erase at other than x32: not modelled");
   const std::uint32_t sector = flash_cr::Sector::of(cr_);
-  if (sector >= stm32::flash_sector_count)
-    refuse(access, "CR: sector " + std::to_string(sector) + " does not exist; 0 to 11 do");
-  if ((sr_ & flash_sr::errors) != 0)
-    refuse(access, "erase started with error flags set in SR: clear them first");
+  refuse_if(sector >= stm32::flash_sector_count, access, "CR: sector {} does not exist; 0 to 11 do", sector);
+  refuse_if((sr_ & flash_sr::errors) != 0, access,
+            "erase started with error flags set in SR: clear them first");
   if (write_protected_[sector]) {
     sr_ |= flash_sr::WriteProtected::mask;
     return;

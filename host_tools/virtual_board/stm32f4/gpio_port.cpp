@@ -97,9 +97,7 @@ void GpioPortModel::write(const Access& access, std::uint32_t value) {
 
 void GpioPortModel::write_pulls(const Access& access, std::uint32_t value) {
   for (unsigned pin = 0; pin < pin_count; ++pin) {
-    if (two_bits(value, pin) == 3) {
-      refuse(access, "PUPDR of pin " + std::to_string(pin) + " is 3; 0, 1 (up) and 2 (down) exist");
-    }
+    refuse_if(two_bits(value, pin) == 3, access, "PUPDR of pin {} is 3; 0, 1 (up) and 2 (down) exist", pin);
   }
   pupdr_ = value;
 }

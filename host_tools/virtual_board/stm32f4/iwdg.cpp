@@ -82,8 +82,8 @@ std::uint32_t IwdgModel::read_status() const {
 }
 
 void IwdgModel::write_key(const Access& access, std::uint32_t key) {
-  if (key != stm32::iwdg_kr::start && key != stm32::iwdg_kr::reload && key != stm32::iwdg_kr::unlock)
-    refuse(access, "KR: key " + std::to_string(key) + " means nothing");
+  refuse_if(key != stm32::iwdg_kr::start && key != stm32::iwdg_kr::reload && key != stm32::iwdg_kr::unlock,
+            access, "KR: key {} means nothing", key);
   unlocked_ = key == stm32::iwdg_kr::unlock;
   const bool starts = key == stm32::iwdg_kr::start && !running_;
   if (starts) {
@@ -100,8 +100,8 @@ void IwdgModel::write_key(const Access& access, std::uint32_t key) {
 
 template <std::uint32_t IwdgModel::*setting, BoardTime IwdgModel::*effective>
 void IwdgModel::write_setting(const Access& access, std::uint32_t value) {
-  if (!unlocked_) refuse(access, "PR and RLR need the unlock key 0x5555 first");
-  if (this->*effective != never) refuse(access, "written again while PVU or RVU is set");
+  refuse_if(!unlocked_, access, "PR and RLR need the unlock key 0x5555 first");
+  refuse_if(this->*effective != never, access, "written again while PVU or RVU is set");
   this->*setting = value;
   this->*effective = running_ ? access.now + cycles(update_cycles) : 0;
 }

@@ -61,8 +61,8 @@ std::uint32_t SpiModel::read_data() {
 }
 
 void SpiModel::write_data(const Access& access, std::uint32_t value) {
-  if (spi_cr1::Enable::of(cr1_) == 0) refuse(access, "DR is written while SPE = 0");
-  if (buffer_full_) refuse(access, "DR is written while TXE = 0: the word before would be lost");
+  refuse_if(spi_cr1::Enable::of(cr1_) == 0, access, "DR is written while SPE = 0");
+  refuse_if(buffer_full_, access, "DR is written while TXE = 0: the word before would be lost");
   buffer_ = static_cast<std::uint16_t>(value);
   buffer_full_ = true;
   if (!shifting_) begin_frame(access.now + clocks_.apb1);
@@ -71,20 +71,15 @@ void SpiModel::write_data(const Access& access, std::uint32_t value) {
 void SpiModel::write_cr1(const Access& access, std::uint32_t value) {
   const bool was_enabled = spi_cr1::Enable::of(cr1_) != 0;
   const bool enabled = spi_cr1::Enable::of(value) != 0;
-  if (was_enabled && !enabled && (shifting_ || buffer_full_)) {
-    refuse(access, "SPE is cleared while a frame is under way (section Disabling the SPI): wait for BSY = 0");
-  }
+  refuse_if(was_enabled && !enabled && (shifting_ || buffer_full_), access,
+            "SPE is cleared while a frame is under way (section Disabling the SPI): wait for BSY = 0");
   if (enabled) {
-    if ((value & ~free_settings) != modelled_settings) {
-      refuse(
-          access,
-          fmt::format(
+    refuse_if((value & ~free_settings) != modelled_settings, access,
               "CR1 = 0x{:04X}: only a 16-bit full-duplex master with CPOL 0, CPHA 1, MSB first, SSM and SSI "
               "is modelled",
-              value));
-    }
-    if (was_enabled && value != cr1_) refuse(access, "CR1 is changed while SPE = 1");
-    if (!was_enabled && !wire_) refuse(access, "the model's bus is not connected");
+              value);
+    refuse_if(was_enabled && value != cr1_, access, "CR1 is changed while SPE = 1");
+    refuse_if(!was_enabled && !wire_, access, "the model's bus is not connected");
   }
   cr1_ = value;
 }
@@ -107,7 +102,6 @@ void SpiModel::advance(BoardTime now) {
     }
     if (!sampled_ && sampled_at_ <= now) {
       sampled_ = true;
-      ++frames_;
       const std::uint16_t word = wire_(shift_, sampled_at_);
       if (received_) {
         // The first word stays (section Overrun condition).

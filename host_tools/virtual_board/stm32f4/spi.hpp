@@ -22,26 +22,19 @@ namespace kmax::virtual_board {
 /// SPE while a frame is under way; changing the settings while SPE = 1. SR is read-only.
 class SpiModel final : public RegisterBlock<SpiModel> {
  public:
-  /// Given the word that went out, returns the one that came in. All chips whose select is low see it; the
-  /// board ands their outputs, and reads the pull's level where nobody drives.
-  using Wire = std::function<std::uint16_t(std::uint16_t mosi)>;
+  /// Given the word that went out and the end of its frame, returns the one that came in. All chips whose
+  /// select is low see it; the board ands their outputs, and reads the pull's level where nobody drives.
+  using Wire = std::function<std::uint16_t(std::uint16_t mosi, BoardTime now)>;
 
   explicit SpiModel(const BoardClocks& clocks) : RegisterBlock("SPI3", registers()), clocks_(clocks) {}
-  /// Called at the end of a frame, with its time; must be set before the first.
-  void on_frame(std::function<std::uint16_t(std::uint16_t mosi, BoardTime now)> wire) {
-    wire_ = std::move(wire);
-  }
-  void on_frame(Wire wire) {
-    wire_ = [wire = std::move(wire)](std::uint16_t mosi, BoardTime) { return wire(mosi); };
-  }
+  /// Must be set before the first frame.
+  void on_frame(Wire wire) { wire_ = std::move(wire); }
 
   void advance(BoardTime now) override;
   BoardTime next_event() const override { return next_event_; }
   void reset(BoardTime now) override;
 
   bool busy() const { return shifting_; }
-  /// Frames since power-up.
-  std::uint64_t frames() const { return frames_; }
   std::uint64_t overruns() const { return overruns_; }
 
  private:
@@ -56,7 +49,7 @@ class SpiModel final : public RegisterBlock<SpiModel> {
   BoardTime bit_time() const;
 
   const BoardClocks& clocks_;
-  std::function<std::uint16_t(std::uint16_t, BoardTime)> wire_;
+  Wire wire_;
   std::uint32_t cr1_ = 0;
   bool buffer_full_ = false;
   std::uint16_t buffer_ = 0;
@@ -68,7 +61,7 @@ class SpiModel final : public RegisterBlock<SpiModel> {
   std::uint16_t received_word_ = 0;
   bool overrun_ = false;
   bool overrun_half_cleared_ = false;  ///< DR has been read, SR not yet
-  std::uint64_t frames_ = 0, overruns_ = 0;
+  std::uint64_t overruns_ = 0;
   BoardTime next_event_ = never;
 };
 

@@ -176,7 +176,7 @@ void UsartModel::write_status(std::uint32_t value) {
 }
 
 std::uint32_t UsartModel::read_data(const Access& access) {
-  if (!enabled() && status_seen_ == 0) refuse(access, "DR read while UE is 0");
+  refuse_if(!enabled() && status_seen_ == 0, access, "DR read while UE is 0");
   sr_ &= ~(status_seen_ & cleared_by_data_read);
   sr_ &= ~usart_sr::ReceiveNotEmpty::mask;
   status_seen_ = 0;
@@ -185,19 +185,19 @@ std::uint32_t UsartModel::read_data(const Access& access) {
 }
 
 void UsartModel::write_baud_rate(const Access& access, std::uint32_t value) {
-  if (enabled()) refuse(access, "BRR changed while UE is 1");
-  if (value < smallest_divisor) refuse(access, "BRR = " + std::to_string(value) + ", must be 16 to 65535");
+  refuse_if(enabled(), access, "BRR changed while UE is 1");
+  refuse_if(value < smallest_divisor, access, "BRR = {}, must be 16 to 65535", value);
   brr_ = value;
 }
 
 void UsartModel::write_control_2(const Access& access, std::uint32_t value) {
-  if (enabled() && value != cr2_) refuse(access, "CR2: stop bits changed while UE is 1");
+  refuse_if(enabled() && value != cr2_, access, "CR2: stop bits changed while UE is 1");
   cr2_ = value;
 }
 
 void UsartModel::write_data(const Access& access, std::uint32_t value) {
-  if (!transmitter_on()) refuse(access, "DR written while UE or TE is 0: the byte would be lost");
-  if (data_) refuse(access, "DR written while TXE is 0: the byte before would be lost");
+  refuse_if(!transmitter_on(), access, "DR written while UE or TE is 0: the byte would be lost");
+  refuse_if(data_.has_value(), access, "DR written while TXE is 0: the byte before would be lost");
   // RM0090: the sequence of reading SR and writing DR clears TC (and PE).
   sr_ &= ~(status_seen_ & (usart_sr::TransmissionComplete::mask | usart_sr::ParityError::mask));
   status_seen_ = 0;
@@ -207,14 +207,14 @@ void UsartModel::write_data(const Access& access, std::uint32_t value) {
 }
 
 void UsartModel::write_control_1(const Access& access, std::uint32_t value) {
-  if ((usart_cr1::NineBits::of(value) != 0) != (usart_cr1::ParityEnable::of(value) != 0))
-    refuse(access, "CR1: only eight data bits are modelled: M must equal PCE");
+  refuse_if((usart_cr1::NineBits::of(value) != 0) != (usart_cr1::ParityEnable::of(value) != 0), access,
+            "CR1: only eight data bits are modelled: M must equal PCE");
   constexpr std::uint32_t format =
       usart_cr1::NineBits::mask | usart_cr1::ParityEnable::mask | usart_cr1::OddParity::mask;
-  if (((value ^ cr1_) & format) != 0 && usart_cr1::Enable::of(value & cr1_) != 0)
-    refuse(access, "CR1: frame format changed while UE is 1");
-  if (usart_cr1::Enable::of(value) != 0 && brr_ == 0)
-    refuse(access, "CR1: enabled without a baud rate in BRR");
+  refuse_if(((value ^ cr1_) & format) != 0 && usart_cr1::Enable::of(value & cr1_) != 0, access,
+            "CR1: frame format changed while UE is 1");
+  refuse_if(usart_cr1::Enable::of(value) != 0 && brr_ == 0, access,
+            "CR1: enabled without a baud rate in BRR");
   const bool transmitter_was_on = transmitter_on();
   cr1_ = value;
   if (transmitter_was_on && !transmitter_on()) drop_transmission(access.now);

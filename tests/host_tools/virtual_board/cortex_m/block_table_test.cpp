@@ -4,8 +4,6 @@
 
 #include <array>
 
-#include "host_tools/virtual_board/cortex_m/access_locator.hpp"
-
 namespace kmax::virtual_board::block_table_test {
 namespace {
 
