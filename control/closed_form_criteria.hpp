@@ -1,13 +1,10 @@
 #pragma once
 
-#include "control/abbott_okamura_criterion.hpp"
-#include "control/colgate_criterion.hpp"
 #include "control/diolaiti_criterion.hpp"
-#include "control/field_criterion.hpp"
-#include "control/gil_criterion.hpp"
 #include "control/resolution_criterion.hpp"
 #include "control/saturation_depth.hpp"
 #include "control/stability_case.hpp"
+#include "control/stiffness_limits.hpp"
 
 namespace kmax::control {
 

@@ -95,7 +95,7 @@ constexpr Scalar spectral_radius(const SampledLoop<Scalar>& loop, Scalar stiffne
 /// else the first loss among those is bisected. All loops are bounded.
 ///
 /// Assumes a linear loop (sampled_loop.hpp). Says nothing of buzzing by quantization, and is too strict where
-/// Coulomb friction holds the handle still (abbott_okamura_criterion.hpp, diolaiti_criterion.hpp).
+/// Coulomb friction holds the handle still (stiffness_limits.hpp, diolaiti_criterion.hpp).
 ///
 /// Trust: at the bound in double, the spectral radius by an independent matrix exponential and QR is 1 within
 /// 1e-9; the bound in float differs from that in double by less than 1e-4 for T from 0.05 to 4 ms

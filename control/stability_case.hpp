@@ -9,14 +9,14 @@ namespace kmax::control {
 
 /// The criteria, in the order of their numbers; each has a header with its formula, assumptions and source.
 enum class Criterion : std::uint8_t {
-  colgate = 0,              ///< colgate_criterion.hpp
-  gil = 1,                  ///< gil_criterion.hpp
+  colgate = 0,              ///< stiffness_limits.hpp
+  gil = 1,                  ///< stiffness_limits.hpp
   sampled_eigenvalues = 2,  ///< sampled_stability.hpp
-  abbott_okamura = 3,       ///< abbott_okamura_criterion.hpp
+  abbott_okamura = 3,       ///< stiffness_limits.hpp
   diolaiti = 4,             ///< diolaiti_criterion.hpp
   resolution = 5,           ///< resolution_criterion.hpp
   resolution_speed = 6,     ///< resolution_criterion.hpp
-  field_slope = 7,          ///< field_criterion.hpp
+  field_slope = 7,          ///< stiffness_limits.hpp
   saturation_depth = 8,     ///< saturation_depth.hpp
 };
 inline constexpr std::size_t criterion_count = 9;

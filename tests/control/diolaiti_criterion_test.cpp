@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "control/abbott_okamura_criterion.hpp"
+#include "control/stiffness_limits.hpp"
 
 namespace kmax::control::diolaiti_criterion_test {
 namespace {
