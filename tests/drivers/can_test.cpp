@@ -9,8 +9,6 @@
 namespace kmax::drivers::stm32f4::can_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeTransmitMailbox {
   FakeRegister tir, tdtr, tdlr, tdhr;
 };

@@ -10,8 +10,6 @@
 namespace kmax::drivers::stm32f4::clock_tree_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeRcc {
   FakeRegister cr, pllcfgr, cfgr, apb1enr;
 };

@@ -9,8 +9,6 @@
 namespace kmax::drivers::stm32f4::current_sampling_test {
 namespace {
 
-using testing::FakeRegister;
-
 constexpr std::uint32_t apb2 = 84'000'000;
 constexpr std::uint32_t jeoc = 1U << 2, jstrt = 1U << 3;
 

@@ -7,8 +7,6 @@
 namespace kmax::drivers::cortex_m::cycle_counter_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeDwt {
   FakeRegister ctrl, cyccnt;
 };

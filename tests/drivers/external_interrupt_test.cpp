@@ -10,8 +10,6 @@
 namespace kmax::drivers::stm32f4::external_interrupt_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeExti {
   FakeRegister imr, emr, rtsr, ftsr, swier, pr;
 };

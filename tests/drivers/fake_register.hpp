@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-namespace kmax::drivers::testing {
+namespace kmax::drivers {
 
 /// A register that acts: `on_read` may compute what is seen, `on_write` may react. Counts its reads, keeps
 /// its writes.
@@ -27,4 +27,13 @@ struct FakeRegister {
   }
 };
 
-}  // namespace kmax::drivers::testing
+/// A timer's register block of acting registers; plain memory otherwise.
+struct FakeTimer {
+  FakeRegister cr1, cr2, smcr, dier, sr, egr;
+  FakeRegister ccmr[2];
+  FakeRegister ccer, cnt, psc, arr, rcr;
+  FakeRegister ccr[4];
+  FakeRegister bdtr;
+};
+
+}  // namespace kmax::drivers

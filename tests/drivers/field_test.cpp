@@ -9,8 +9,6 @@
 namespace kmax::drivers::stm32f4::field_test {
 namespace {
 
-using testing::FakeRegister;
-
 static_assert(Register<volatile std::uint32_t>);
 static_assert(Register<FakeRegister>);
 static_assert(!Register<const volatile std::uint32_t>);

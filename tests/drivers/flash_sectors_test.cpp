@@ -15,8 +15,6 @@
 namespace kmax::drivers::stm32f4::flash_sectors_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeFlash {
   FakeRegister acr, keyr, sr, cr;
 };

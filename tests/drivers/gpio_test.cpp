@@ -10,8 +10,6 @@
 namespace kmax::drivers::stm32f4::gpio_test {
 namespace {
 
-using testing::FakeRegister;
-
 GpioRegisters filled_with(std::uint32_t word) {
   GpioRegisters port{};
   for (auto* each : {&port.moder, &port.otyper, &port.ospeedr, &port.pupdr, &port.afr[0], &port.afr[1]})

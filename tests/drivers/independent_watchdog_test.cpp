@@ -13,8 +13,6 @@
 namespace kmax::drivers::stm32f4::independent_watchdog_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeIwdg {
   FakeRegister kr, pr, rlr, sr;
 };

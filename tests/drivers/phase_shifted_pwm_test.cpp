@@ -2,14 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/drivers/fake_timer.hpp"
+#include "tests/drivers/fake_register.hpp"
 
 // What needs hardware that acts is tested on the virtual board's timers; here, what happens when it does not.
 
 namespace kmax::drivers::stm32f4::phase_shifted_pwm_test {
 namespace {
-
-using testing::FakeTimer;
 
 struct Pair {
   Pair() {

@@ -2,12 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/drivers/fake_timer.hpp"
+#include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::quadrature_timer_test {
 namespace {
-
-using testing::FakeTimer;
 
 TEST(QuadratureTimer, CountsAllFourEdgesOnBothInputs) {
   TimerRegisters timer{};

@@ -26,7 +26,7 @@ TEST(ResetCause, TheLaterOneCountsWhenThePowerOnFlagIsStillThere) {
 
 TEST(ResetCause, TakingItRemovesTheFlagsAndLeavesTheOscillatorOn) {
   struct {
-    testing::FakeRegister csr;
+    FakeRegister csr;
   } rcc;
   rcc.csr.value = 0x2400'0003;
   EXPECT_EQ(take_reset_cause(rcc), ResetCause::independent_watchdog);

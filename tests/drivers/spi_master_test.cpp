@@ -7,8 +7,6 @@
 namespace kmax::drivers::stm32f4::spi_master_test {
 namespace {
 
-using testing::FakeRegister;
-
 struct FakeSpi {
   FakeRegister cr1, cr2, sr, dr;
 };

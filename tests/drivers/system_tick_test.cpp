@@ -11,8 +11,6 @@
 namespace kmax::drivers::cortex_m::system_tick_test {
 namespace {
 
-using testing::FakeRegister;
-
 /// SysTick and the pending bit on a time line of core cycles. Each register access takes time; unless masked,
 /// the handler runs between two accesses as soon as a tick is pending.
 class Core {
@@ -93,7 +91,7 @@ class Core {
   bool started_ = false;
 };
 
-struct PlainSystemTick : ::testing::Test {
+struct PlainSystemTick : testing::Test {
   SystemTickRegisters registers{};
   ScbRegisters scb{};
   SystemTick<> tick{registers, scb};

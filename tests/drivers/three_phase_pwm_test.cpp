@@ -9,12 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/drivers/fake_timer.hpp"
+#include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::three_phase_pwm_test {
 namespace {
-
-using testing::FakeTimer;
 
 constexpr std::uint32_t moe = 1U << 15;
 // DTG 21, LOCK 2, OSSI, OSSR, BKE, BKP; AOE and MOE 0.

@@ -13,8 +13,6 @@
 namespace kmax::drivers::stm32f4::usart_test {
 namespace {
 
-using testing::FakeRegister;
-
 constexpr std::uint32_t apb1 = 42'000'000;
 
 TEST(UsartDivisor, TableAt42MHz) {
@@ -57,26 +55,23 @@ RC_GTEST_PROP(UsartDivisor, NearestDivisorAndTrueError, ()) {
   RC_ASSERT(std::abs((actual - baud) / baud) < 0.0201);
 }
 
-TEST(Usart, EvenParityIsNineBitsAndOneStopBit) {
-  UsartRegisters registers{};
-  Usart usart{registers};
-  ASSERT_TRUE(usart.configure({}, apb1));
-  EXPECT_EQ(registers.brr, 0x16DU);
-  // UE 13, M 12, PCE 10, RXNEIE 5, TE 3, RE 2; PS clear
-  EXPECT_EQ(registers.cr1, 0x342CU);
-  EXPECT_EQ(registers.cr2, 0U);
-  EXPECT_EQ(registers.cr3, 0U);
-}
-
-TEST(Usart, NoParityIsEightBitsAndTwoStopBits) {
-  UsartRegisters registers{};
-  registers.cr3 = 0xFFFF;
-  Usart usart{registers};
-  ASSERT_TRUE(usart.configure({.baud_rate = 1'000'000, .parity = UsartParity::none}, apb1));
-  EXPECT_EQ(registers.brr, 0x2AU);
-  EXPECT_EQ(registers.cr1, 0x202CU);
-  EXPECT_EQ(registers.cr2, 2U << 12);
-  EXPECT_EQ(registers.cr3, 0U);
+TEST(Usart, EvenParityIsNineBitsAndOneStopBitNoneIsEightAndTwo) {
+  struct Row {
+    UsartConfig config;
+    std::uint32_t brr, cr1, cr2;
+  };
+  // UE 13, M 12, PCE 10, RXNEIE 5, TE 3, RE 2; PS clear. STOP 13:12.
+  for (const Row& row : {Row{{}, 0x16D, 0x342C, 0},
+                         {{.baud_rate = 1'000'000, .parity = UsartParity::none}, 0x2A, 0x202C, 2U << 12}}) {
+    UsartRegisters registers{};
+    registers.cr3 = 0xFFFF;
+    Usart usart{registers};
+    ASSERT_TRUE(usart.configure(row.config, apb1));
+    EXPECT_EQ(registers.brr, row.brr);
+    EXPECT_EQ(registers.cr1, row.cr1);
+    EXPECT_EQ(registers.cr2, row.cr2);
+    EXPECT_EQ(registers.cr3, 0U);
+  }
 }
 
 TEST(Usart, ImpossibleBaudRateTouchesNothing) {
