@@ -6,23 +6,6 @@
 namespace kmax::firmware {
 
 namespace {
-/// Why an axis cannot be armed while the board is in this condition.
-Refusal refusal_for(Fault condition) {
-  switch (condition) {
-    case Fault::emergency_stop:
-      return Refusal::emergency_stop;
-    case Fault::gate_driver:
-      return Refusal::gate_driver_fault;
-    case Fault::under_voltage:
-    case Fault::over_voltage:
-      return Refusal::supply_out_of_range;
-    case Fault::current_sense:
-      return Refusal::current_sense_invalid;
-    default:
-      return Refusal::power_stage_not_ready;
-  }
-}
-
 modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
   modbus::RtuPortConfig config;
   config.unit = static_cast<std::uint8_t>(values.whole<"modbus.unit">());
@@ -45,7 +28,6 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
              .serial = board.serial_number},
             round_interval_us),
       tick_(settings_, capture_memory) {
-  for (AxisStateMachine& machine : machines_) machine.initialised();
   configure_thermal();
   make_scales();
   start_communication(true);
@@ -54,7 +36,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
 
 ArmedAxes Application::armed_axes() const {
   ArmedAxes armed;
-  for (std::size_t axis = 0; axis < axis_count; ++axis) armed.axis[axis] = machines_[axis].armed();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) armed.axis[axis] = supervisors_[axis].armed();
   return armed;
 }
 
@@ -173,132 +155,28 @@ bool Application::round_has_begun() {
   return true;
 }
 
-Refusal Application::obstacle_to_arming(std::size_t axis) const {
-  if (store_busy()) return Refusal::store_busy;  // an erase stops the tick
-  if (restarting_) return Refusal::restarting;
-  if (commander_[axis] == Link::can && node_.any_heartbeat_lost()) return Refusal::heartbeat_missing;
-  if (report_[axis].condition != Fault::none) return refusal_for(report_[axis].condition);
-  if (thermal_[axis].power_stage_too_hot()) return Refusal::too_hot;
-  if (thermal_[axis].motor_too_hot()) return Refusal::motor_too_hot;
-  if (!report_[axis].count_valid) return Refusal::encoder_invalid;
-  // Excitation begins without knowing anything of the rotor; what needs its angle is bounded in travel.
-  if (mode(axis) == DriveMode::excitation) return Refusal::none;
-  if (!commutation_known(axis)) return Refusal::commutation_unknown;
-  if (guard_[axis].verdict == GuardFinding::Verdict::fail &&
-      parameters_.values().choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
-    return Refusal::guard_refused;
-  const auto& haptic = report_[axis].haptic;
-  const bool makes_force = mode(axis) == DriveMode::haptic &&
-                           (settings_[axis].haptic.wall.kind != control::WallKind::none ||
-                            settings_[axis].haptic.interference.mode != control::InterferenceMode::none);
-  if (makes_force && haptic.inside) return Refusal::handle_inside_wall;
-  return Refusal::none;
-}
-
-void Application::trip(std::size_t axis, Fault fault, float value, float bound) {
-  machines_[axis].trip(fault);
-  if (machines_[axis].fault() != fault || machines_[axis].state() != DriveState::fault_reaction_active)
-    return;
-  fault_value_[axis] = value;
-  fault_bound_[axis] = bound;
-  // Counts were lost, and with them the rotor's angle.
-  if (fault == Fault::encoder || fault == Fault::spin_out)
-    commutation_[axis].forget(parameters_.values(), axis);
-  const AxisReport& report = report_[axis];
-  if (report.trip.fault == fault && report.fault == fault) {
-    trip_record_[axis] = report.trip;
-  } else {
-    // Found here and not in the tick: as the last report says.
-    trip_record_[axis] = {.position = Axis::position_of(report.counted, settings_[axis]),
-                          .tick = report.tick,
-                          .velocity = report.haptic.velocity,
-                          .force = report.force,
-                          .current = report.motor.current,
-                          .current_reference = report.motor.current_reference,
-                          .supply = readings_.supply_voltage,
-                          .value = value,
-                          .fault = fault};
-  }
-  fault_temperatures_[axis] = {readings_.power_stage_temperature[axis], thermal_[axis].winding_temperature()};
-}
-
-float Application::bound_of(Fault fault, std::size_t axis) const {
-  const ParameterValues& values = parameters_.values();
-  switch (fault) {
-    case Fault::over_speed:
-      return values.real<"velocity.limit">(axis);
-    case Fault::under_voltage:
-      return values.real<"supply.voltage_min">();
-    case Fault::over_voltage:
-      return values.real<"supply.voltage_max">();
-    case Fault::over_current:
-      return over_current_factor * values.real<"current.limit">(axis);
-    case Fault::current_sum:
-      return settings_[axis].motor.watch.unbalanced;
-    case Fault::spin_out:
-      return plausibility_configuration(values, axis).tolerance;
-    case Fault::excitation_travel:
-      return values.real<"excitation.travel">(axis);
-    default:
-      return 0.0f;
-  }
-}
-
-void Application::supervise(std::size_t axis) {
-  AxisStateMachine& machine = machines_[axis];
-  const AxisReport& report = report_[axis];
-  const ParameterValues& values = parameters_.values();
-
-  // Before the commands: a fault is reported even if the host disarms in the same moment.
-  if (machine.armed()) {
-    if (report.fault != Fault::none && tick_.enabled(axis)) {
-      trip(axis, report.fault, report.fault_value, bound_of(report.fault, axis));
-    }
-    if (thermal_[axis].power_stage_too_hot()) {
-      trip(axis, Fault::over_temperature, readings_.power_stage_temperature[axis],
-           values.real<"temperature.limit">(axis));
-    }
-    if (thermal_[axis].motor_too_hot()) {
-      trip(axis, Fault::motor_too_hot, thermal_[axis].winding_temperature(),
-           values.real<"temperature.motor_limit">(axis));
-    }
-    if (readings_.ticks_have_stopped) trip(axis, Fault::tick_missed, 0.0f, 0.0f);
-    const float timeout = values.real<"link.timeout">();
-    const auto last = last_heard_us(axis);
-    if (timeout > 0.0f && last.has_value()) {
-      const auto silent_us = modbus::elapsed_us(now_us_, *last);
-      if (static_cast<float>(silent_us) > timeout * 1e6f)
-        trip(axis, Fault::link_silent, static_cast<float>(silent_us) * 1e-6f, timeout);
-    }
-    // Off the bus, or never on it again after a bit rate that failed.
-    const bool off =
-        can_.state == CanState::bus_off || can_.state == CanState::stopped || can_.state == CanState::absent;
-    if (commander_[axis] == Link::can && off) trip(axis, Fault::bus_off, 0.0f, 0.0f);
-  }
-
-  std::uint16_t word = 0;
-  if (parameters_.fetch_controlword(axis, word)) {
-    // The latest command counts: one that still waits for the settings to arrive is superseded.
-    pending_command_[axis] = word;
-    command_pending_[axis] = true;
-  }
-  if (command_pending_[axis]) {
-    const std::uint16_t pending = pending_command_[axis];
-    if (!machine.asks_to_enable(pending) || settled(axis)) {
-      command_pending_[axis] = false;
-      const bool cause_remains =
-          (machine.fault() == Fault::encoder && !report.count_valid) ||
-          (machine.fault() == Fault::over_temperature && thermal_[axis].power_stage_too_hot()) ||
-          (machine.fault() == Fault::motor_too_hot && thermal_[axis].motor_too_hot()) ||
-          (machine.fault() == Fault::heartbeat_lost && node_.any_heartbeat_lost()) ||
-          (machine.fault() != Fault::none && machine.fault() == report.condition);
-      const bool stays = parameters_.values().whole<"profile.quick_stop_option">(axis) == 6;
-      machine.command(pending, obstacle_to_arming(axis), cause_remains, {.stay_in_quick_stop = stays});
-      halted_[axis] = halted(pending);
-    }
-  }
-  tick_.enable(axis, machine.armed());
-  machine.reaction_done();
+Supervisor::Situation Application::situation(std::size_t axis) {
+  const auto heard_us = last_heard_us(axis);
+  // Off the bus, or never on it again after a bit rate that failed.
+  const bool off_the_bus =
+      can_.state == CanState::bus_off || can_.state == CanState::stopped || can_.state == CanState::absent;
+  return {.values = parameters_.values(),
+          .commutation = commutation_[axis],
+          .thermal = thermal_[axis],
+          .report = report_[axis],
+          .setting = settings_[axis],
+          .silent_us = heard_us ? std::optional(modbus::elapsed_us(now_us_, *heard_us)) : std::nullopt,
+          .power_stage_temperature = readings_.power_stage_temperature[axis],
+          .supply_voltage = readings_.supply_voltage,
+          .enabled = tick_.enabled(axis),
+          .settled = settled(axis),
+          .ticks_have_stopped = readings_.ticks_have_stopped,
+          .commutation_known = commutation_known(axis),
+          .guard_failed = guard_[axis].verdict == GuardFinding::Verdict::fail,
+          .store_busy = store_busy(),
+          .restarting = restarting_,
+          .off_the_bus = off_the_bus,
+          .heartbeat_lost = node_.any_heartbeat_lost()};
 }
 
 void Application::act() {
@@ -306,7 +184,14 @@ void Application::act() {
     commutation_[axis].follow(parameters_.values(), axis, report_[axis].reference_generation);
   offer_settings_if_changed();
   judge_if_changed();
-  for (std::size_t axis = 0; axis < axis_count; ++axis) supervise(axis);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    Supervisor& supervisor = supervisors_[axis];
+    std::uint16_t word = 0;
+    if (parameters_.fetch_controlword(axis, word)) supervisor.request(word);
+    supervisor.poll(situation(axis), axis);
+    tick_.enable(axis, supervisor.armed());
+    supervisor.reaction_done();
+  }
   publish_torques();
 }
 

@@ -12,10 +12,8 @@
 #include "firmware/capture_commands.hpp"
 #include "firmware/crash_record.hpp"
 #include "firmware/drive/axes_tick.hpp"
-#include "firmware/drive/axis_state_machine.hpp"
-#include "firmware/drive/commutation.hpp"
 #include "firmware/drive/emergency_reports.hpp"
-#include "firmware/drive/thermal_supervisor.hpp"
+#include "firmware/drive/supervisor.hpp"
 #include "firmware/interrupt_queue.hpp"
 #include "firmware/modbus/rtu_port.hpp"
 #include "firmware/parameters/parameter_access.hpp"
@@ -80,8 +78,8 @@ struct BoardReadings {
 /// and the trace back (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN
 /// frames to the main loop (InterruptQueue). Nothing else is shared.
 ///
-/// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines. Whoever wrote
-/// an axis' controlword last commands it: that link's silence, bus-off or NMT stop takes the force away.
+/// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines; see
+/// ParameterAccess for whose settings are taken and Supervisor for who commands an axis.
 ///
 /// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
 /// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
@@ -153,9 +151,9 @@ class Application {
   bool any_armed() const { return armed_axes().any(); }
   /// A save is under way; its next step may stop the processor for half a second.
   bool store_busy() const { return store_.keeper().busy(); }
-  DriveState state(std::size_t axis) const { return machines_[axis].state(); }
-  Refusal refusal(std::size_t axis) const { return machines_[axis].refusal(); }
-  Fault fault(std::size_t axis) const { return machines_[axis].fault(); }
+  DriveState state(std::size_t axis) const { return supervisors_[axis].machine().state(); }
+  Refusal refusal(std::size_t axis) const { return supervisors_[axis].machine().refusal(); }
+  Fault fault(std::size_t axis) const { return supervisors_[axis].machine().fault(); }
   /// Of the last tick; for interrupt context, or where nothing interrupts.
   AxisReport ISR_report(std::size_t axis) const { return tick_.ISR_report(axis); }
   /// Likewise, N, outwards: what a simulated person answers to.
@@ -199,9 +197,7 @@ class Application {
   void judge_if_changed();
   [[gnu::cold]] void make_scales();
   void act();
-  void supervise(std::size_t axis);
-  Refusal obstacle_to_arming(std::size_t axis) const;
-  [[gnu::cold]] void trip(std::size_t axis, Fault fault, float value, float bound);
+  Supervisor::Situation situation(std::size_t axis);
   /// From the reports that the present poll began with: all that it tells is of one moment.
   void refresh_readings();
   /// Of the axis, or of the device, that this slot belongs to.
@@ -231,30 +227,21 @@ class Application {
   bool save_identity();
   void finish_saves();
   std::optional<std::uint32_t> last_heard_us(std::size_t axis) const;
-  [[gnu::cold]] float bound_of(Fault fault, std::size_t axis) const;
 
   BoardIdentity board_;
   ParameterAccess parameters_;
   Bank bank_;
   modbus::RtuPort<Bank> port_;
-  std::array<AxisStateMachine, axis_count> machines_;
-  std::array<bool, axis_count> command_pending_{};
-  std::array<std::uint16_t, axis_count> pending_command_{};
-  std::array<float, axis_count> fault_value_{}, fault_bound_{};
-  std::array<TripRecord, axis_count> trip_record_{};
-  /// When a fault was seen: power stage, winding.
-  std::array<std::array<float, 2>, axis_count> fault_temperatures_{};
+  std::array<Supervisor, axis_count> supervisors_;
   std::array<ThermalSupervisor, axis_count> thermal_;
   std::array<Commutation, axis_count> commutation_;
   std::array<Circumstances, axis_count> offered_{};
   BoardReadings readings_;
   CanReadings can_;
-  std::array<Link, axis_count> commander_{};  ///< whose controlword an axis obeyed last
   EmergencyReports emergencies_;
   bool was_bus_off_ = false;
   bool identity_saving_ = false;
   std::uint32_t configured_communication_ = 0;
-  std::array<bool, axis_count> halted_{};
   /// Of the settings in force; to work it out takes a division in double.
   struct Scale {
     double count_length = 0.0;  ///< m

@@ -46,8 +46,9 @@ void Application::poll_can() {
 
 void Application::act_on(const canopen::NodeEvents& events) {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    if (!machines_[axis].armed() || commander_[axis] != Link::can) continue;
-    if (events.heartbeat_lost) trip(axis, Fault::heartbeat_lost, 0.0f, 0.0f);
+    if (!supervisors_[axis].armed() || supervisors_[axis].commander() != Link::can) continue;
+    if (events.heartbeat_lost)
+      supervisors_[axis].trip(situation(axis), axis, Fault::heartbeat_lost, 0.0f, 0.0f);
     // Nobody can change the target any more.
     if (events.pdos_ended && mode(axis) == DriveMode::torque) disarm(axis);
   }
@@ -84,19 +85,19 @@ void Application::finish_saves() {
   identity_saving_ = false;
 }
 
-/// At once, and without a controlword.
 void Application::disarm(std::size_t axis) {
-  command_pending_[axis] = false;
-  machines_[axis].disable();
-  tick_.enable(axis, machines_[axis].armed());
+  supervisors_[axis].disarm();
+  tick_.enable(axis, supervisors_[axis].armed());
 }
 
 void Application::report_emergencies() {
-  EmergencyCauses now{.fault_values = fault_value_,
-                      .can_state = can_.state,
+  EmergencyCauses now{.can_state = can_.state,
                       .identity_conflicts = node_.identity_conflicts(),
                       .frames_lost = can_.overruns + can_queue_.overflows()};
-  for (std::size_t axis = 0; axis < axis_count; ++axis) now.faults[axis] = machines_[axis].fault();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    now.faults[axis] = fault(axis);
+    now.fault_values[axis] = supervisors_[axis].last_trip().value;
+  }
   emergencies_.poll(now, node_.emergency(), now_us_);
 }
 
@@ -105,19 +106,19 @@ bool Application::next_can_frame(drivers::CanFrame& frame) {
 }
 
 std::optional<std::uint32_t> Application::last_heard_us(std::size_t axis) const {
-  return commander_[axis] == Link::can ? node_.heard_us() : port_.last_valid_request_time();
+  return supervisors_[axis].commander() == Link::can ? node_.heard_us() : port_.last_valid_request_time();
 }
 
 void Application::publish_torques() {
   ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const bool armed = machines_[axis].armed();
+    const bool armed = supervisors_[axis].armed();
     // What was asked for while nothing could follow must not act later.
     if (!armed) {
       values.set_whole<"profile.target_torque">(0, axis);
       values.set_real<"profile.target_force">(0.0f, axis);
     }
-    tick_.command_force(axis, commanded_force(values, axis, armed, halted_[axis]));
+    tick_.command_force(axis, commanded_force(values, axis, armed, supervisors_[axis].is_halted()));
   }
 }
 

@@ -30,7 +30,7 @@ bool Application::saturated(std::size_t axis) const {
 std::uint32_t Application::flags_of(std::size_t axis) const {
   const auto& haptic = report_[axis].haptic;
   return (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) | (haptic.slew_limited ? 4u : 0u) |
-         (haptic.ramping ? 8u : 0u) | (machines_[axis].armed() ? 16u : 0u) | (saturated(axis) ? 32u : 0u);
+         (haptic.ramping ? 8u : 0u) | (supervisors_[axis].armed() ? 16u : 0u) | (saturated(axis) ? 32u : 0u);
 }
 
 void Application::refresh_axis_readings(std::size_t axis) {
@@ -41,7 +41,7 @@ void Application::refresh_axis_readings(std::size_t axis) {
   const GuardFinding& guard = guard_[axis];
   const bool guard_warns = guard.verdict == GuardFinding::Verdict::fail &&
                            v.choice<GuardMode, "guard.mode">(axis) == GuardMode::warn;
-  const AxisStateMachine& machine = machines_[axis];
+  const AxisStateMachine& machine = supervisors_[axis].machine();
   const bool supply_fault =
       report.condition == Fault::under_voltage || report.condition == Fault::over_voltage;
   const DriveStatus status{.state = machine.state(),
@@ -50,20 +50,21 @@ void Application::refresh_axis_readings(std::size_t axis) {
                            .power_stage_on = machine.armed(),
                            .warning = thermal_[axis].allowance() < 1.0f || guard_warns,
                            .limited = haptic.limited || haptic.slew_limited || saturated(axis),
-                           .halted = halted_[axis],
+                           .halted = supervisors_[axis].is_halted(),
                            .force_is_zero = report.force == 0.0f,
                            .excitation_finished = report.motor.excitation_finished};
   v.set_whole<"drive.statusword">(statusword_of(status), axis);
   v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
   v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
   const bool faulty = machine.fault() != Fault::none;
-  v.set_real<"drive.fault_value">(faulty ? fault_value_[axis] : 0.0f, axis);
-  v.set_real<"drive.fault_bound">(faulty ? fault_bound_[axis] : 0.0f, axis);
 
   const double length = scale_[axis].count_length;
-  const TripRecord& record = trip_record_[axis];
+  const Supervisor::Trip& trip = supervisors_[axis].last_trip();
+  const TripRecord& record = trip.record;
   v.set_whole<"trip.tick">(faulty ? record.tick : 0U, axis);
   const auto of_trip = [faulty](float value) { return faulty ? value : 0.0f; };
+  v.set_real<"drive.fault_value">(of_trip(trip.value), axis);
+  v.set_real<"drive.fault_bound">(of_trip(trip.bound), axis);
   v.set_real<"trip.position">(of_trip(static_cast<float>(static_cast<double>(record.position) * length)),
                               axis);
   v.set_real<"trip.velocity">(of_trip(record.velocity), axis);
@@ -71,8 +72,8 @@ void Application::refresh_axis_readings(std::size_t axis) {
   v.set_real<"trip.current">(of_trip(record.current), axis);
   v.set_real<"trip.current_reference">(of_trip(record.current_reference), axis);
   v.set_real<"trip.supply">(of_trip(record.supply), axis);
-  v.set_real<"trip.temperature">(of_trip(fault_temperatures_[axis][0]), axis);
-  v.set_real<"trip.winding_temperature">(of_trip(fault_temperatures_[axis][1]), axis);
+  v.set_real<"trip.temperature">(of_trip(trip.power_stage_temperature), axis);
+  v.set_real<"trip.winding_temperature">(of_trip(trip.winding_temperature), axis);
 
   v.set_whole<"measured.tick">(report.tick, axis);
   v.set_real<"measured.position">(static_cast<float>(static_cast<double>(haptic.position) * length), axis);

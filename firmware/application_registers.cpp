@@ -53,7 +53,7 @@ ParameterAccess::Result Application::write(std::span<const SlotValue> wanted, Li
   const auto result = parameters_.write(wanted, by, armed_axes(), now_us_);
   for (const SlotValue& one : wanted) {
     const auto [of, axis] = owner_of(one.slot);
-    if (of == entry_of<"drive.controlword">()) commander_[axis] = by;
+    if (of == entry_of<"drive.controlword">()) supervisors_[axis].set_commander(by);
   }
   // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come
   // alone, by the settings that came before it. Else settings act at the end of the poll, whichever link they

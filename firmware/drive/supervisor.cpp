@@ -1,0 +1,151 @@
+#include "firmware/drive/supervisor.hpp"
+
+#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/stability_guard.hpp"
+
+namespace kmax::firmware {
+
+namespace {
+/// Why an axis cannot be armed while the board is in this condition.
+Refusal refusal_for(Fault condition) {
+  switch (condition) {
+    case Fault::emergency_stop:
+      return Refusal::emergency_stop;
+    case Fault::gate_driver:
+      return Refusal::gate_driver_fault;
+    case Fault::under_voltage:
+    case Fault::over_voltage:
+      return Refusal::supply_out_of_range;
+    case Fault::current_sense:
+      return Refusal::current_sense_invalid;
+    default:
+      return Refusal::power_stage_not_ready;
+  }
+}
+
+DriveMode mode_of(const ParameterValues& values, std::size_t axis) {
+  return values.choice<DriveMode, "drive.mode">(axis);
+}
+
+float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) {
+  const ParameterValues& values = now.values;
+  switch (fault) {
+    case Fault::over_speed:
+      return values.real<"velocity.limit">(axis);
+    case Fault::under_voltage:
+      return values.real<"supply.voltage_min">();
+    case Fault::over_voltage:
+      return values.real<"supply.voltage_max">();
+    case Fault::over_current:
+      return over_current_factor * values.real<"current.limit">(axis);
+    case Fault::current_sum:
+      return now.setting.motor.watch.unbalanced;
+    case Fault::spin_out:
+      return plausibility_configuration(values, axis).tolerance;
+    case Fault::excitation_travel:
+      return values.real<"excitation.travel">(axis);
+    default:
+      return 0.0f;
+  }
+}
+}  // namespace
+
+Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) const {
+  if (now.store_busy) return Refusal::store_busy;  // an erase stops the tick
+  if (now.restarting) return Refusal::restarting;
+  if (commander_ == Link::can && now.heartbeat_lost) return Refusal::heartbeat_missing;
+  if (now.report.condition != Fault::none) return refusal_for(now.report.condition);
+  if (now.thermal.power_stage_too_hot()) return Refusal::too_hot;
+  if (now.thermal.motor_too_hot()) return Refusal::motor_too_hot;
+  if (!now.report.count_valid) return Refusal::encoder_invalid;
+  // Excitation begins without knowing anything of the rotor; what needs its angle is bounded in travel.
+  if (mode_of(now.values, axis) == DriveMode::excitation) return Refusal::none;
+  if (!now.commutation_known) return Refusal::commutation_unknown;
+  if (now.guard_failed && now.values.choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
+    return Refusal::guard_refused;
+  const auto& haptic = now.setting.haptic;
+  const bool makes_force = mode_of(now.values, axis) == DriveMode::haptic &&
+                           (haptic.wall.kind != control::WallKind::none ||
+                            haptic.interference.mode != control::InterferenceMode::none);
+  return makes_force && now.report.haptic.inside ? Refusal::handle_inside_wall : Refusal::none;
+}
+
+void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float value, float bound) {
+  machine_.trip(fault);
+  if (machine_.fault() != fault || machine_.state() != DriveState::fault_reaction_active) return;
+  // Counts were lost, and with them the rotor's angle.
+  if (fault == Fault::encoder || fault == Fault::spin_out) now.commutation.forget(now.values, axis);
+  const AxisReport& report = now.report;
+  trip_ = {.record = report.trip,
+           .value = value,
+           .bound = bound,
+           .power_stage_temperature = now.power_stage_temperature,
+           .winding_temperature = now.thermal.winding_temperature()};
+  if (report.trip.fault == fault && report.fault == fault) return;
+  // Found here and not in the tick: as the last report says.
+  trip_.record = {.position = Axis::position_of(report.counted, now.setting),
+                  .tick = report.tick,
+                  .velocity = report.haptic.velocity,
+                  .force = report.force,
+                  .current = report.motor.current,
+                  .current_reference = report.motor.current_reference,
+                  .supply = now.supply_voltage,
+                  .value = value,
+                  .fault = fault};
+}
+
+void Supervisor::watch(const Situation& now, std::size_t axis) {
+  const ParameterValues& values = now.values;
+  const AxisReport& report = now.report;
+  if (report.fault != Fault::none && now.enabled)
+    trip(now, axis, report.fault, report.fault_value, bound_of(report.fault, now, axis));
+  if (now.thermal.power_stage_too_hot())
+    trip(now, axis, Fault::over_temperature, now.power_stage_temperature,
+         values.real<"temperature.limit">(axis));
+  if (now.thermal.motor_too_hot())
+    trip(now, axis, Fault::motor_too_hot, now.thermal.winding_temperature(),
+         values.real<"temperature.motor_limit">(axis));
+  if (now.ticks_have_stopped) trip(now, axis, Fault::tick_missed, 0.0f, 0.0f);
+  const float timeout = values.real<"link.timeout">();
+  if (timeout > 0.0f && now.silent_us) {
+    const auto silent_us = static_cast<float>(*now.silent_us);
+    if (silent_us > timeout * 1e6f) trip(now, axis, Fault::link_silent, silent_us * 1e-6f, timeout);
+  }
+  if (commander_ == Link::can && now.off_the_bus) trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
+}
+
+bool Supervisor::cause_remains(const Situation& now) const {
+  switch (machine_.fault()) {
+    case Fault::none:
+      return false;
+    case Fault::encoder:
+      if (!now.report.count_valid) return true;
+      break;
+    case Fault::over_temperature:
+      if (now.thermal.power_stage_too_hot()) return true;
+      break;
+    case Fault::motor_too_hot:
+      if (now.thermal.motor_too_hot()) return true;
+      break;
+    case Fault::heartbeat_lost:
+      if (now.heartbeat_lost) return true;
+      break;
+    default:
+      break;
+  }
+  return machine_.fault() == now.report.condition;
+}
+
+void Supervisor::poll(const Situation& now, std::size_t axis) {
+  // Before the commands: a fault is reported even if the host disarms in the same moment.
+  if (armed()) watch(now, axis);
+  if (waiting_ && (!machine_.asks_to_enable(*waiting_) || now.settled)) {
+    const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
+    machine_.command(*waiting_, obstacle_to_arming(now, axis), cause_remains(now),
+                     {.stay_in_quick_stop = stays});
+    halted_ = halted(*waiting_);
+    waiting_.reset();
+  }
+}
+
+}  // namespace kmax::firmware

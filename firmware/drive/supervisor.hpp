@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "firmware/drive/axis.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
+#include "firmware/drive/commutation.hpp"
+#include "firmware/drive/thermal_supervisor.hpp"
+#include "firmware/parameters/parameter_access.hpp"
+
+namespace kmax::firmware {
+
+/// The main loop's judgement of one axis: what trips it, whether it may be armed, and which commands it
+/// obeys. Whoever wrote its controlword last commands it: that link's silence, bus-off or NMT stop takes the
+/// force away. No failure; what goes wrong becomes a fault or a refusal.
+class Supervisor {
+ public:
+  /// All that it judges by, of one moment.
+  struct Situation {
+    ParameterValues& values;
+    Commutation& commutation;
+    const ThermalSupervisor& thermal;
+    const AxisReport& report;                ///< the tick's
+    const AxisSetting& setting;              ///< in force
+    std::optional<std::uint32_t> silent_us;  ///< since the link that commands was heard; nothing: never
+    float power_stage_temperature;           ///< degC
+    float supply_voltage;                    ///< V
+    bool enabled;                            ///< for the tick
+    bool settled;  ///< the tick works by the present settings, and knows of the axis' last disarming
+    bool ticks_have_stopped, commutation_known, guard_failed, store_busy, restarting;
+    bool off_the_bus, heartbeat_lost;  ///< of CAN, whoever commands
+  };
+  /// The last trip, and the temperatures then.
+  struct Trip {
+    TripRecord record;
+    float value = 0.0f, bound = 0.0f;  ///< in the fault's unit
+    float power_stage_temperature = 0.0f, winding_temperature = 0.0f;
+  };
+
+  Supervisor() { machine_.initialised(); }
+
+  /// A controlword; it supersedes one that still waits.
+  void request(std::uint16_t controlword) { waiting_ = controlword; }
+  void set_commander(Link link) { commander_ = link; }
+  Link commander() const { return commander_; }
+
+  /// In every poll, and after every controlword.
+  void poll(const Situation& now, std::size_t axis);
+  [[gnu::cold]] void trip(const Situation& now, std::size_t axis, Fault fault, float value, float bound);
+  /// After poll(), when the tick knows whether the axis is armed.
+  void reaction_done() { machine_.reaction_done(); }
+  /// At once, and without a controlword.
+  void disarm() {
+    waiting_.reset();
+    machine_.disable();
+  }
+
+  const AxisStateMachine& machine() const { return machine_; }
+  bool armed() const { return machine_.armed(); }
+  const Trip& last_trip() const { return trip_; }
+  /// Halt, as the last controlword that was obeyed says.
+  bool is_halted() const { return halted_; }
+
+ private:
+  void watch(const Situation& now, std::size_t axis);
+  // Rare: small code rather than fast code.
+  [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, std::size_t axis) const;
+  [[gnu::cold]] bool cause_remains(const Situation& now) const;
+
+  AxisStateMachine machine_;
+  std::optional<std::uint16_t> waiting_;  ///< until the settings have arrived, if it asks to enable
+  Trip trip_;
+  Link commander_ = Link::serial;
+  bool halted_ = false;
+};
+
+}  // namespace kmax::firmware
