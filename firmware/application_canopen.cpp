@@ -8,6 +8,23 @@ namespace {
 
 constexpr int frames_per_poll = 16;
 
+canopen::NodeSettings node_settings(const ParameterValues& values) {
+  const auto number = [&values](std::size_t entry) { return values.raw(slot_of(entry, 0)); };
+  canopen::NodeSettings settings{
+      .node_id = static_cast<std::uint8_t>(number(entry_of<"node.id">())),
+      .bit_rate = number(entry_of<"can.bit_rate">()),
+      .sync_cob_id = number(entry_of<"canopen.sync_cob_id">()),
+      .emergency_cob_id = number(entry_of<"canopen.emergency_cob_id">()),
+      .emergency_inhibit_time =
+          static_cast<std::uint16_t>(number(entry_of<"canopen.emergency_inhibit_time">())),
+      .heartbeat_ms = static_cast<std::uint16_t>(number(entry_of<"canopen.heartbeat_time">())),
+      .error_behaviour = static_cast<std::uint8_t>(number(entry_of<"canopen.error_behaviour">())),
+      .watched = {}};
+  for (std::size_t i = 0; i < settings.watched.size(); ++i)
+    settings.watched[i] = number(entry_of<"heartbeat_consumer.node_1">() + i);
+  return settings;
+}
+
 }  // namespace
 
 /// At a start, and when a host resets the communication, which then has the settings of the last start again.
@@ -20,9 +37,9 @@ void Application::start_communication(bool power_on) {
   }
   configured_communication_ = parameters_.communication_changes();
   if (power_on) {
-    node_.power_on(values, now_us_);
+    node_.power_on(node_settings(values), values, now_us_);
   } else {
-    node_.start(values, now_us_);
+    node_.start(node_settings(values), values, now_us_);
   }
 }
 
@@ -33,7 +50,7 @@ void Application::poll_can() {
     act_on(node_.receive(frame, parameters_.values(), now_us_));
   if (parameters_.communication_changes() != configured_communication_) {
     configured_communication_ = parameters_.communication_changes();
-    node_.configure(parameters_.values(), now_us_);
+    node_.configure(node_settings(parameters_.values()), parameters_.values(), now_us_);
   }
   act_on(node_.poll(now_us_));
   if (round_has_begun()) node_.poll_pdos(round_clock_us_);
@@ -59,7 +76,7 @@ void Application::act_on(const canopen::NodeEvents& events) {
     identity_saving_ = save_identity();
     if (!identity_saving_) node_.lss().finish(canopen::LssStore::failed);
   }
-  if (events.start_node) node_.start(parameters_.values(), now_us_);
+  if (events.start_node) node_.start(node_settings(parameters_.values()), parameters_.values(), now_us_);
   if (events.reset_communication) {
     parameters_.drop(Link::can, now_us_);
     start_communication(false);

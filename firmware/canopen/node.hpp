@@ -17,6 +17,18 @@
 
 namespace kmax::firmware::canopen {
 
+/// What a node is set to, apart from its PDOs; COB-IDs as they are stored, without the node ID where they are
+/// the predefined ones.
+struct NodeSettings {
+  std::uint8_t node_id = 1;
+  std::uint32_t bit_rate = 1'000'000;
+  std::uint32_t sync_cob_id = cob_id::sync, emergency_cob_id = cob_id::emergency;
+  std::uint16_t emergency_inhibit_time = 0;  ///< 100 us
+  std::uint16_t heartbeat_ms = 0;
+  std::uint8_t error_behaviour = 0;                         ///< object 0x1029
+  std::array<std::uint32_t, watched_node_count> watched{};  ///< object 0x1016
+};
+
 /// What the owner of a node has to do; several at a time.
 struct NodeEvents {
   bool remove_force = false;         ///< NMT stop or a reset: no axis may be driven
@@ -51,28 +63,28 @@ class Node {
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
-  /// Power-on and after a reset of the node: node ID and bit rate are those of the parameters.
-  void power_on(const ParameterValues& values, std::uint32_t now_us) {
-    node_parameters_ = {values.whole<"node.id">(), values.whole<"can.bit_rate">()};
-    lss_.start(static_cast<std::uint8_t>(node_parameters_[0]),
-               static_cast<std::uint32_t>(node_parameters_[1]));
-    start(values, now_us);
+  /// Power-on and after a reset of the node: node ID and bit rate are those of the settings. `pdos` here and
+  /// below: the values among which are those of the objects 0x1400 to 0x1BFF.
+  void power_on(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
+    lss_.start(settings.node_id, settings.bit_rate);
+    wanted_.node_id = settings.node_id;
+    wanted_.bit_rate = settings.bit_rate;
+    start(settings, pdos, now_us);
   }
 
   /// NMT's initialising: ends with the boot-up message. Node ID and bit rate are those that LSS was told, or
-  /// those of the parameters if these have changed since.
-  void start(const ParameterValues& values, std::uint32_t now_us) {
-    const std::array<std::int32_t, 2> wanted{values.whole<"node.id">(), values.whole<"can.bit_rate">()};
-    if (wanted != node_parameters_)
-      lss_.start(static_cast<std::uint8_t>(wanted[0]), static_cast<std::uint32_t>(wanted[1]));
-    node_parameters_ = wanted;
+  /// those of the settings if these have changed since.
+  void start(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
+    if (settings.node_id != wanted_.node_id || settings.bit_rate != wanted_.bit_rate)
+      lss_.start(settings.node_id, settings.bit_rate);
     lss_.reset_communication();
-    heartbeat_ms_ = static_cast<std::uint16_t>(values.whole<"canopen.heartbeat_time">());
-    nmt_.start(lss_.active_node_id(), heartbeat_ms_, now_us);
+    wanted_.heartbeat_ms = settings.heartbeat_ms;
+    nmt_.start(lss_.active_node_id(), settings.heartbeat_ms, now_us);
     emergency_.start();
     heartbeats_.start();
     stop_pdos();
-    configure(values, now_us);
+    configure(settings, pdos, now_us);
+    wanted_ = settings;
     sdo_silent_ = !nmt_.configured();
     if (sdo_silent_) {
       sdo_.stop();
@@ -82,38 +94,32 @@ class Node {
   }
 
   /// CANopen's own settings have changed.
-  void configure(const ParameterValues& values, std::uint32_t now_us) {
-    const auto setting = [&](std::size_t entry) { return values.raw(slot_of(entry, 0)); };
+  void configure(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    sync_.configure(setting(entry_of<"canopen.sync_cob_id">()));
-    const std::uint32_t emergency = setting(entry_of<"canopen.emergency_cob_id">());
-    emergency_.configure(
-        resolved_cob_id(emergency, descriptors[entry_of<"canopen.emergency_cob_id">()].default_value(), id),
-        static_cast<std::uint16_t>(setting(entry_of<"canopen.emergency_inhibit_time">())));
-    const auto heartbeat_ms = static_cast<std::uint16_t>(setting(entry_of<"canopen.heartbeat_time">()));
-    if (heartbeat_ms != heartbeat_ms_) nmt_.set_heartbeat(heartbeat_ms, now_us);
-    heartbeat_ms_ = heartbeat_ms;
+    sync_.configure(settings.sync_cob_id);
+    emergency_.configure(resolved_cob_id(settings.emergency_cob_id, cob_id::emergency, id),
+                         settings.emergency_inhibit_time);
+    if (settings.heartbeat_ms != wanted_.heartbeat_ms) nmt_.set_heartbeat(settings.heartbeat_ms, now_us);
+    wanted_.heartbeat_ms = settings.heartbeat_ms;
     for (std::size_t i = 0; i < watched_node_count; ++i) {
-      const std::uint32_t raw = setting(entry_of<"heartbeat_consumer.node_1">() + i);
-      if (raw != watched_[i]) {
-        if (const auto forgotten = heartbeats_.configure(i, raw))
-          emergency_.clear(0x8130, source_of(*forgotten));
-      }
-      watched_[i] = raw;
+      if (settings.watched[i] == wanted_.watched[i]) continue;
+      if (const auto forgotten = heartbeats_.configure(i, settings.watched[i]))
+        emergency_.clear(0x8130, source_of(*forgotten));
     }
-    error_behaviour_ = static_cast<std::uint8_t>(setting(entry_of<"canopen.error_behaviour">()));
-    rpdos_.configure(values, id);
-    if (nmt_.state() == NmtState::operational) configure_tpdos(values);
+    wanted_.watched = settings.watched;
+    wanted_.error_behaviour = settings.error_behaviour;
+    rpdos_.configure(pdos, id);
+    if (nmt_.state() == NmtState::operational) configure_tpdos(pdos);
     list_identifiers(id);
   }
 
-  [[nodiscard]] NodeEvents receive(const drivers::CanFrame& frame, const ParameterValues& values,
+  [[nodiscard]] NodeEvents receive(const drivers::CanFrame& frame, const ParameterValues& pdos,
                                    std::uint32_t now_us) {
     NodeEvents events;
     if (frame.extended || frame.remote) return events;
     const std::uint32_t id = frame.identifier;
     if (id == cob_id::nmt) {
-      follow(nmt_.receive(frame), values, events);
+      follow(nmt_.receive(frame), pdos, events);
     } else if (id == cob_id::lss_request) {
       act_on(lss_.receive(frame, now_us), events);
     } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
@@ -226,14 +232,14 @@ class Node {
     }
   }
 
-  void follow(NmtEvent event, const ParameterValues& values, NodeEvents& events) {
+  void follow(NmtEvent event, const ParameterValues& pdos, NodeEvents& events) {
     switch (event) {
       case NmtEvent::none:
         break;
       case NmtEvent::entered_operational:
         sdo_start_if_silent();
-        rpdos_.configure(values, node_id());
-        configure_tpdos(values);
+        rpdos_.configure(pdos, node_id());
+        configure_tpdos(pdos);
         break;
       case NmtEvent::entered_pre_operational:
         sdo_start_if_silent();
@@ -262,9 +268,9 @@ class Node {
 
   // Those that start do so at the next call of poll_pdos() but one: to start them takes so long that the next
   // may be late.
-  void configure_tpdos(const ParameterValues& values) {
+  void configure_tpdos(const ParameterValues& pdos) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    tpdos_.configure(values, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
+    tpdos_.configure(pdos, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
   }
 
   void sdo_start_if_silent() {
@@ -280,12 +286,12 @@ class Node {
 
   /// Object 0x1029.
   void communication_error(NodeEvents& events) {
-    if (error_behaviour_ == 0 && nmt_.state() == NmtState::operational) {
+    if (wanted_.error_behaviour == 0 && nmt_.state() == NmtState::operational) {
       if (nmt_.enter(NmtState::pre_operational) != NmtEvent::none) {
         stop_pdos();
         events.pdos_ended = true;
       }
-    } else if (error_behaviour_ == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
+    } else if (wanted_.error_behaviour == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
       stop_pdos();
       sdo_.stop();
       sdo_silent_ = true;
@@ -311,7 +317,7 @@ class Node {
       for (std::size_t i = 0; i < pdo_count; ++i) {
         if (const auto identifier = rpdos_.identifier(i)) listen(*identifier);
       }
-      for (const std::uint32_t watched : watched_) {
+      for (const std::uint32_t watched : wanted_.watched) {
         const std::uint32_t node = watched >> 16 & 0x7F;
         if (node != 0 && (watched & 0xFFFF) != 0) listen(cob_id::heartbeat + node);
       }
@@ -330,12 +336,9 @@ class Node {
   Tpdos tpdos_;
   Rpdos rpdos_;
   CanSettings settings_;
-  std::array<std::uint32_t, watched_node_count> watched_{};
-  std::array<std::int32_t, 2> node_parameters_{};  // node.id and can.bit_rate as last taken over
+  NodeSettings wanted_;  ///< as last taken over: node ID and bit rate at a start, all else at a configure()
   std::optional<std::uint32_t> heard_us_;
   std::uint32_t identity_conflicts_ = 0;
-  std::uint16_t heartbeat_ms_ = 0;
-  std::uint8_t error_behaviour_ = 0;
   bool sdo_silent_ = false;
 };
 
