@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -58,5 +60,21 @@ struct DescribedIndex {
 std::vector<DescribedIndex> described_indices();
 
 std::string_view text_of(ObjectAccess access);  ///< "const", "ro", "rw"
+
+/// The messages of a device with factory settings as a DBC file, for programs that show or log a CAN bus by
+/// name: its PDOs with their signals in the dictionary's units, heartbeat, emergency message, and SYNC.
+/// `node`: node ID, 1 to 127. A device whose mapping was changed sends something else.
+void write_dbc(std::ostream& out, std::uint8_t node);
+
+struct EdsFile {
+  std::string file_name = "kmax.eds";
+  std::string version;      ///< of the firmware that is described: "0.1.0"
+  std::time_t created = 0;  ///< written in UTC
+};
+
+/// The object dictionary as an electronic data sheet (CiA 306-1): what a configuration tool or a CANopen
+/// master knows about the device before it meets it. It has every object that SDO reaches. Defaults are
+/// those of the factory; what is measured has none. Numbers with a fraction are decimal.
+void write_eds(std::ostream& out, const EdsFile& file);
 
 }  // namespace kmax::description

@@ -1,4 +1,3 @@
-#include "host_tools/description/eds.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 #include <fmt/chrono.h>

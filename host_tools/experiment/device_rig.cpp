@@ -4,12 +4,24 @@
 
 #include <algorithm>
 
+#include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/experiment/touch_journal.hpp"
 
 namespace kmax::experiment {
+
 namespace {
-std::vector<std::size_t> further_axes(const TouchLimits& limits, RigAxes axes) {
-  return axes == RigAxes::wall ? std::vector<std::size_t>{} : std::vector{1 - limits.axis};
+std::vector<std::size_t> axes_of(const TouchLimits& limits, RigAxes axes) {
+  if (axes == RigAxes::wall) return {limits.axis};
+  return {limits.axis, 1 - limits.axis};
+}
+
+std::vector<std::string> protective_of(device::Device& device, const TouchLimits& limits, RigAxes axes) {
+  std::vector<std::string> all;
+  for (const std::size_t axis : axes_of(limits, axes))
+    for (const std::string& one : protective_assignments(device, axis, limits.force_limit))
+      if (std::find(all.begin(), all.end(), one) == all.end()) all.push_back(one);
+  return all;
 }
 
 std::string force_text(const ForceChange& change) {
@@ -22,22 +34,47 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
   const auto choice = [](const device::Parameter& parameter, auto value) {
     return device::value_text(parameter, static_cast<std::uint32_t>(value));
   };
+  const std::string law = "wall.law=" + choice(device::Parameter::of<"wall.law">(), wall.law),
+                    stiffness = fmt::format("wall.stiffness={}", wall.stiffness),
+                    rate = fmt::format("haptic.rate={}", wall.haptic_rate),
+                    resolution = fmt::format("position.resolution={}", wall.resolution),
+                    mode = "interference.mode=" +
+                           choice(device::Parameter::of<"interference.mode">(), wall.interference);
+  if (wall.law != control::WallKind::plain)
+    return {stiffness,
+            rate,
+            "wall.damping=0",
+            resolution,
+            "wall.magnetic_length=0.001",
+            "wall.adaptive_gain=2.4",
+            "wall.adaptive_offset=0.8",
+            "wall.adaptive_velocity_max=2.4",
+            "wall.adaptive_relation=linear",
+            "wall.adaptive_velocity=approach",
+            "wall.adaptive_force_min=0.8",
+            "wall.adaptive_force_max=2",
+            "wall.adaptive_hold_time=1.2",
+            mode,
+            law,
+            wall.law == control::WallKind::magnetic
+                ? fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient)
+                : "wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)};
   std::vector<std::string> all = {
-      "wall.law=plain",
+      law,
       "wall.damping=0",
       "interference.onset_time=0",
-      fmt::format("wall.stiffness={}", wall.stiffness),
-      fmt::format("haptic.rate={}", wall.haptic_rate),
-      fmt::format("position.resolution={}", wall.resolution),
+      stiffness,
+      rate,
+      resolution,
       "position.rounding=" + choice(device::Parameter::of<"position.rounding">(), wall.rounding),
-      "interference.mode=" + choice(device::Parameter::of<"interference.mode">(), wall.interference),
+      mode,
       fmt::format("interference.force={}", wall.force),
       fmt::format("interference.background_force={}", wall.background_force)};
   if (axes == RigAxes::wall_along)
-    for (const std::string& text :
+    for (const std::string& one :
          {std::string("wall.law=none"), std::string("position.resolution=0"),
           std::string("interference.mode=none"), fmt::format("haptic.rate={}", wall.haptic_rate)})
-      all.push_back(fmt::format("axis{}.{}", 1 - axis, text));
+      all.push_back(fmt::format("axis{}.{}", 1 - axis, one));
   return all;
 }
 
@@ -54,16 +91,50 @@ double touch_speed(const WatchedTouch& touch) {
   return -touch.side * (last->position - first->position) / (last->time - first->time);
 }
 
+RunJournal::Json touch_settings(const std::string& experiment, device::Device& device,
+                                const TouchLimits& limits, const RunJournal::Json& own) {
+  RunJournal::Json all = {{"experiment", experiment}};
+  all.update(device_circumstances(device, limits.axis));
+  all.update(own);
+  all["force_limit_n"] = limits.force_limit;
+  all["abort_amplitude_m"] = limits.abort_amplitude;
+  return all;
+}
+
 DeviceRig::DeviceRig(device::Device& device, const TouchLimits& limits, const TouchParty& party, RigAxes axes)
     : device_(device),
       limits_(limits),
       axes_(axes),
       notice_(party.notice),
-      touches_(device, limits, wall_assignments({}, limits.axis, axes), party, further_axes(limits, axes)) {}
+      before_(device, limits.axis, party.notice),
+      standstill_(device, axes_of(limits, axes), party.notice),
+      session_{party.prompter, party.journal, party.tell, &standstill_} {
+  const std::vector<std::string> protective = protective_of(device, limits, axes);
+  std::vector<std::string> changed = wall_assignments({}, limits.axis, axes);
+  changed.insert(changed.end(), protective.begin(), protective.end());
+  before_.note(changed);
+  apply(protective);
+  force_limit_ = device.read_number(fmt::format("axis{}.force.limit", limits.axis));
+}
+
+void DeviceRig::apply(const std::vector<std::string>& assignments) {
+  before_.note(assignments);
+  device_.apply(device::parse_assignments(assignments, limits_.axis));
+}
 
 void DeviceRig::set(const RigWall& wall) {
   wall_ = wall;
-  touches_.set(wall_assignments(wall, limits_.axis, axes_));
+  apply(wall_assignments(wall, limits_.axis, axes_));
+}
+
+void DeviceRig::set_with_limits(const RigWall& wall) {
+  wall_ = wall;
+  std::vector<std::string> assignments = wall_assignments(wall, limits_.axis, axes_);
+  for (const std::string& one : protective_of(device_, limits_, axes_)) assignments.push_back(one);
+  before_.note(std::vector<std::string>{"wall.magnetic_coefficient", "wall.adaptive_mode"});
+  apply(assignments);
+  const device::Parameter estimator(firmware::entry_of<"velocity.estimator">(), limits_.axis);
+  velocity_estimator_ = device::value_text(estimator, device_.read(estimator));
 }
 
 double DeviceRig::resolution_step() {
@@ -77,20 +148,28 @@ void DeviceRig::note(const std::string& text) const {
 RigTouch DeviceRig::hold(const TouchPlan& plan) {
   // The touch before has left its last forces behind.
   if (!plan.changes.empty()) set(wall_);
-  touches_.ask(plan.request);
-  if (axes_ == RigAxes::wall_along)
-    return hold_on_two_axes(plan, watch_within(limits_, plan.name, plan.hold_time));
-  const WatchedTouch watched = touches_.watch(plan.name, plan.hold_time);
+  if (session_.prompter != nullptr) session_.prompter->ask(plan.request);
+  if (plan.wall) set_with_limits(*plan.wall);
+  TouchWatch watch;
+  watch.axis = limits_.axis;
+  watch.name = plan.name;
+  watch.hold_time = plan.hold_time;
+  watch.contact_patience = limits_.patience;
+  watch.abort_amplitude = limits_.abort_amplitude;
+  if (axes_ == RigAxes::wall_along) return hold_on_two_axes(plan, watch);
+  const WatchedTouch watched = watch_touch(device_, watch, session_.tell);
   RigTouch touch;
   touch.touched = true;
   touch.speed = std::max(0.0, touch_speed(watched));
+  touch.surface = watched.surface;
+  touch.side = watched.side;
   touch.limited_share = watched.limited_share;
-  touch.aborted = watched.aborted_at.has_value();
+  touch.aborted_at = watched.aborted_at;
   touch.lost_records = watched.lost_records;
   if (plan.threshold > 0.0) touch.judgement = measure_touch(watched, plan.hold_time, plan.threshold);
   for (const device::TraceSample& sample : watched.samples)
-    touch.samples.push_back(
-        {sample.time, watched.side * (sample.position - watched.surface), sample.force, 0.0, 0.0});
+    touch.samples.push_back({sample.time, watched.side * (sample.position - watched.surface), sample.force,
+                             0.0, 0.0, sample.magnetic_coefficient});
   return touch;
 }
 
@@ -99,18 +178,27 @@ RigTouch DeviceRig::hold_on_two_axes(const TouchPlan& plan, TouchWatch watch) {
   std::vector<TimedChange> changes;
   for (const ForceChange& change : plan.changes)
     changes.push_back({change.time, {force_text(change)}, change.of == ForceChange::Of::background});
-  TwoAxisTouch watched =
-      watch_two_axes(device_, watch, changes, touches_.tell(), limits_.wall_abort_amplitude);
+  TwoAxisTouch watched = watch_two_axes(device_, watch, changes, session_.tell, limits_.wall_abort_amplitude);
   RigTouch touch;
   touch.touched = true;
   touch.change_times = std::move(watched.change_times);
   touch.contact_share = watched.contact_share;
   touch.limited_share = watched.limited_share;
-  touch.aborted = watched.aborted_at.has_value();
+  touch.aborted_at = watched.aborted_at;
   touch.lost_records = watched.lost_records;
   for (const device::TraceSample& sample : watched.samples)
-    touch.samples.push_back({sample.time, 0.0, 0.0, sample.position, sample.force});
+    touch.samples.push_back({sample.time, 0.0, 0.0, sample.position, sample.force, 0.0});
   return touch;
+}
+
+RunJournal::Json device_circumstances(device::Device& device, std::size_t axis) {
+  RunJournal::Json all = {{"device", device.identify()}, {"axis", axis}};
+  for (const char* name : {"velocity.estimator", "force.slew_limit", "force.ramp_time", "device.transmission",
+                           "encoder.counts_per_turn"}) {
+    const device::Parameter parameter = device::resolve(name, axis);
+    all[name] = device::value_text(parameter, device.read(parameter));
+  }
+  return all;
 }
 
 }  // namespace kmax::experiment

@@ -4,17 +4,20 @@
 // and measures each: the same code for both.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "control/interference.hpp"
 #include "control/resampler.hpp"
+#include "control/wall_law.hpp"
 #include "host_tools/experiment/touch_journal.hpp"
 #include "host_tools/simulation/contact_measure.hpp"
 
 namespace kmax::experiment {
 
-/// A plain wall without damping, and what pushes the hand at it.
+/// A wall without damping, and what pushes the hand at it. Its law is the plain one unless it says otherwise;
+/// the others have paper 1's constants.
 struct RigWall {
   double stiffness = 1000.0;   ///< N/m
   double haptic_rate = 500.0;  ///< Hz
@@ -23,6 +26,9 @@ struct RigWall {
   double background_force = 0.0;  ///< N, F_B
   double resolution = 0.0;        ///< m of the position; 0: the encoder's own
   control::Rounding rounding = control::Rounding::nearest;
+  control::WallKind law = control::WallKind::plain;
+  double magnetic_coefficient = 0.0;  ///< N, of the magnetic law
+  control::AdaptiveMode mode = control::AdaptiveMode::instant;
 };
 
 /// F_I or F_B during a touch.
@@ -41,6 +47,8 @@ struct TouchPlan {
   double threshold =
       0.0;  ///< m peak to peak; above 0: the hold is judged by it, and a simulated one not recorded
   std::vector<ForceChange> changes{};  ///< in order of time
+  /// Set at each attempt, on a device with its limits; without it the wall that was set stays.
+  std::optional<RigWall> wall{};
 
   // Of simulated people.
   std::size_t person = 0;
@@ -50,23 +58,25 @@ struct TouchPlan {
 };
 
 struct RigSample {
-  double time = 0.0;              ///< s from the first touch
-  double outside_distance = 0.0;  ///< m from the surface, as the encoder shows it; <= 0 inside
-  double force = 0.0;             ///< N
-  double tangential = 0.0;        ///< m along the surface, as the encoder shows it
-  double tangential_force = 0.0;  ///< N along the surface
+  double time = 0.0;                  ///< s from the first touch
+  double outside_distance = 0.0;      ///< m from the surface, as the encoder shows it; <= 0 inside
+  double force = 0.0;                 ///< N
+  double tangential = 0.0;            ///< m along the surface, as the encoder shows it
+  double tangential_force = 0.0;      ///< N along the surface
+  double magnetic_coefficient = 0.0;  ///< N
 };
 
 struct RigTouch {
   std::vector<RigSample> samples;
   std::vector<double> change_times;      ///< s after the touch, of the changes that were made
   simulation::ContactMeasure judgement;  ///< with a threshold
+  double surface = 0.0, side = 1.0;      ///< m; where the wall is, and on which side is free space
   bool touched = false;
-  double speed = 0.0;               ///< m/s towards the wall at the touch
-  double contact_share = 0.0;       ///< of the touch, where a wall is on an axis of its own
-  double beyond_limit_share = 0.0;  ///< simulated: of the samples, with a force beyond the paper's 3.3 N
-  double limited_share = 0.0;       ///< on a device: of the haptic samples
-  bool aborted = false;
+  double speed = 0.0;                ///< m/s towards the wall at the touch
+  double contact_share = 0.0;        ///< of the touch, where a wall is on an axis of its own
+  double beyond_limit_share = 0.0;   ///< simulated: of the samples, with a force beyond the paper's 3.3 N
+  double limited_share = 0.0;        ///< on a device: of the haptic samples
+  std::optional<double> aborted_at;  ///< s after the touch, by the host
   std::uint64_t lost_records = 0;
 };
 
@@ -91,8 +101,12 @@ class Rig {
   Touch touch(const TouchPlan& plan, const Measure& measure) {
     const TouchSession* session = this->session();
     if (session == nullptr) return measure(hold(plan));
-    return journaled_touch<Touch>(*session, plan.key.empty() ? plan.name : plan.key, plan.name,
-                                  [&]() -> Touch { return measure(hold(plan)); });
+    const std::function<Touch()> once = [&]() -> Touch { return measure(hold(plan)); };
+    if constexpr (!kept_in_a_journal<Touch>) {
+      return repeated_touch(*session, plan.name, once);
+    } else {
+      return journaled_touch(*session, plan.key.empty() ? plan.name : plan.key, plan.name, once);
+    }
   }
 
  protected:

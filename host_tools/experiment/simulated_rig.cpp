@@ -16,7 +16,9 @@ constexpr double approach_distance = 0.02;  // m
 control::HapticLoopConfig<float> loop_of(const RigWall& wall, const SimulatedHands& hands) {
   control::HapticLoopConfig<float> config =
       touched_wall(wall.haptic_rate, hands.count_length, hands.device.force_limit);
-  config.wall.kind = control::WallKind::plain;
+  config.wall.kind = wall.law;
+  config.wall.magnetic_coefficient = static_cast<float>(wall.magnetic_coefficient);
+  config.wall.adaptive.mode = wall.mode;
   config.wall.stiffness = static_cast<float>(wall.stiffness);
   config.position_resolution = wall.resolution;
   config.position_rounding = wall.rounding;
@@ -63,6 +65,7 @@ TouchSetup SimulatedRig::setup_of(const TouchPlan& plan) const {
 }
 
 RigTouch SimulatedRig::hold(const TouchPlan& plan) {
+  if (plan.wall) set(*plan.wall);
   if (!(plan.threshold > 0.0)) return record(plan);
   const TouchOutcome outcome = simulate_touch(setup_of(plan));
   RigTouch touch;

@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/calibration/prompter.hpp"
+#include "host_tools/bench/held_up.hpp"
+#include "host_tools/bench/prompter.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/experiment/run_journal.hpp"
-#include "host_tools/experiment/standstill.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
@@ -25,10 +25,10 @@ inline constexpr int most_standstills = 3;  ///< that one touch survives
 RunJournal::Json device_circumstances(device::Device& device, std::size_t axis);
 
 struct TouchSession {
-  calibration::Prompter* prompter = nullptr;  ///< null: nobody is asked
-  RunJournal* journal = nullptr;              ///< null: none is kept
+  bench::Prompter* prompter = nullptr;  ///< null: nobody is asked
+  RunJournal* journal = nullptr;        ///< null: none is kept
   const Tell& tell;
-  Standstill* standstill = nullptr;  ///< null: a touch that was cut off is an error
+  bench::Standstill* standstill = nullptr;  ///< null: a touch that was cut off is an error
 };
 
 /// Why it is made again.
@@ -42,7 +42,7 @@ std::string reason_not_to_count(const Touch& touch) {
 
 /// The touch that `once` makes. One that does not count (Touch::counts()), or that nobody made although
 /// somebody was asked, is made again, up to three times in all; the last one that does not count is returned.
-/// One that a standstill cut off (standstill.hpp) is made again up to three times more.
+/// One that a standstill cut off (bench/held_up.hpp) is made again up to three times more.
 /// Errors: those of `once`; NobodyTouched without a prompter or after the third time.
 template <typename Touch>
 Touch repeated_touch(const TouchSession& session, const std::string& name,
@@ -57,7 +57,7 @@ Touch repeated_touch(const TouchSession& session, const std::string& name,
   };
   for (int attempt = 1;;) {
     try {
-      if (session.standstill != nullptr) session.standstill->touch_begins();
+      if (session.standstill != nullptr) session.standstill->begin();
       Touch touch = once();
       if (touch.counts()) return touch;
       session.tell(fmt::format("{}: {}; once more", name, reason_not_to_count(touch)));
@@ -72,6 +72,12 @@ Touch repeated_touch(const TouchSession& session, const std::string& name,
     }
   }
 }
+
+template <typename Touch>
+concept kept_in_a_journal = requires(RunJournal::Json json, const RunJournal::Json& known, Touch touch) {
+  to_json(json, touch);
+  from_json(known, touch);
+};
 
 /// The touch that the journal has under `key`; else repeated_touch(), put into the journal if it counts: a
 /// run that is resumed tries again what did not.

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "host_tools/device/drive.hpp"
-#include "host_tools/experiment/late_abort.hpp"
+#include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
 namespace {

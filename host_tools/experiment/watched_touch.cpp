@@ -6,9 +6,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/device/drive.hpp"
-#include "host_tools/experiment/late_abort.hpp"
 
 namespace kmax::experiment {
 
@@ -162,8 +162,14 @@ void require_sound(const TouchWatch& watch) {
                   watch.hold_time, watch.contact_patience, watch.abort_amplitude, watch.abort_window));
 }
 
-WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell) {
-  require_sound(watch);
+namespace {
+/// Somebody came to the wall between the look and the arming, which was refused.
+class CameTooSoon : public device::DeviceError {
+ public:
+  using device::DeviceError::DeviceError;
+};
+
+WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const Tell& tell) {
   WatchedTouch touch;
   touch.surface = axis_number(device, watch.axis, "wall.position");
   touch.side = axis_number(device, watch.axis, "wall.side");
@@ -174,7 +180,14 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
   Progress progress(watch, touch);
   LateAbort late;
   {
-    ArmedWhile armed(device, watch.axis);
+    std::optional<ArmedWhile> holding;
+    try {
+      holding.emplace(device, watch.axis);
+    } catch (const device::DeviceError& error) {
+      if (touch.side * (axis_number(device, watch.axis, "measured.position") - touch.surface) > 0.0) throw;
+      throw CameTooSoon(error.what());
+    }
+    ArmedWhile& armed = *holding;
     auto last_news = device.link().now();
     for (int round = 0; !progress.over(); ++round) {
       device.link().wait(milliseconds(20));
@@ -203,6 +216,20 @@ WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const 
   touch.lost_records = trace.lost();
   for (TraceSample& sample : touch.samples) sample.time -= progress.touched_at();
   return touch;
+}
+}  // namespace
+
+WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell) {
+  require_sound(watch);
+  const auto begin = device.link().now();
+  for (;;) {
+    try {
+      return watch_once(device, watch, tell);
+    } catch (const CameTooSoon&) {
+      const std::chrono::duration<double> waited = device.link().now() - begin;
+      if (waited.count() >= watch.contact_patience) throw;
+    }
+  }
 }
 
 simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_time, double threshold) {

@@ -8,6 +8,7 @@
 // force when this program or its link dies; the host, which disarms when the handle oscillates more than it
 // should (abort_amplitude). protective_assignments() sees to the first two.
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -17,6 +18,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
+#include "host_tools/device/drive.hpp"
 #include "host_tools/device/trace_reader.hpp"
 #include "host_tools/simulation/contact_measure.hpp"
 
@@ -76,5 +78,33 @@ simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_
 /// What the device should have set before anybody is asked to touch a wall: force.limit, lowered to
 /// `force_limit` N if it is above, and link.timeout, if that is off or longer than 1 s.
 std::vector<std::string> protective_assignments(device::Device& device, std::size_t axis, double force_limit);
+
+// Tells an oscillation of an armed axis from what a handle does after its force was removed unseen.
+//
+// A host that stood still for longer than link.timeout reads the trace of that time afterwards, and sees in
+// it the handle leave the place where the force held it. That is no instability of the wall.
+
+class LateAbort {
+ public:
+  /// At each look at the trace: the time of its last record, s.
+  void looked(double time) { looks_.push_back(time); }
+
+  /// Whether the device, which has `status` after the touch, had removed the force for link.timeout before
+  /// `time` of the trace. It cannot have done so earlier than link.timeout after the last look before the
+  /// first gap that is as long; a tenth is for requests between two looks.
+  bool is_late(double time, const device::DriveStatus& status) const {
+    if (device::fault_of(status) != firmware::Fault::link_silent) return false;
+    const double timeout = 0.9 * static_cast<double>(status.fault_bound);
+    double before = 0.0;
+    for (const double look : looks_) {
+      if (look - before >= timeout) return time > before + timeout;
+      before = look;
+    }
+    return false;
+  }
+
+ private:
+  std::vector<double> looks_;
+};
 
 }  // namespace kmax::experiment

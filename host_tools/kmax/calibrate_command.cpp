@@ -1,6 +1,5 @@
 // kmax calibrate.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <string>
 
@@ -9,7 +8,6 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 
 namespace kmax::cli {
@@ -27,6 +25,24 @@ struct CalibrateOptions {
   double current = 0.0;
   bool no_save = false;
   bool hand = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("--steps", sets, "Which steps")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"electrical", "encoder", "mechanical", "compensation", "all"}))
+        ->capture_default_str();
+    add_number(command, "--travel", settings.travel, "How far the handle may move to either side, m", 0.001,
+               1.0);
+    command
+        .add_option("--current", current,
+                    "Motor current to measure with, A; half of current.limit without it")
+        ->check(within(0.01, 120.0));
+    command.add_flag("--keep-pole-pairs", settings.keep_pole_pairs,
+                     "Fail if motor.pole_pairs is not what is measured, rather than correct it");
+    command.add_flag("--hand", hand, "Ask for a move of the handle by hand, which shows where positive is");
+    command.add_flag("--dry-run", settings.dry_run, "Measure, and put every parameter back");
+    command.add_flag("--no-save", no_save, "Keep the result until the next restart only");
+  }
 };
 
 void choose_sets(CalibrationSettings& settings, const std::vector<std::string>& names) {
@@ -122,7 +138,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<CalibrateOptions>(
       app, context,
       {"calibrate",
        "Identifies motor, encoder and handle of an axis, names what is wrong with them, and saves them.",
@@ -135,29 +151,8 @@ void add_calibrate_command(CLI::App& app, Context& context) {
        "motor.kind,\n"
        "encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be right.\n"
        "The parameters change only if every step passes; the axis is disarmed at the end and on Ctrl-C.\n"
-       "Exit code 3: a step failed; its cause has a name that docs/calibration.md explains."});
-  auto options = std::make_shared<CalibrateOptions>();
-  CalibrationSettings& settings = options->settings;
-  command->add_option("--steps", options->sets, "Which steps")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"electrical", "encoder", "mechanical", "compensation", "all"}))
-      ->capture_default_str();
-  command->add_option("--travel", settings.travel, "How far the handle may move to either side, m")
-      ->check(finite_number() & CLI::Range(0.001, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--current", options->current,
-                   "Motor current to measure with, A; half of current.limit without it")
-      ->check(finite_number() & CLI::Range(0.01, 120.0));
-  command->add_flag("--keep-pole-pairs", settings.keep_pole_pairs,
-                    "Fail if motor.pole_pairs is not what is measured, rather than correct it");
-  command->add_flag("--hand", options->hand,
-                    "Ask for a move of the handle by hand, which shows where positive is");
-  command->add_flag("--dry-run", settings.dry_run, "Measure, and put every parameter back");
-  command->add_flag("--no-save", options->no_save, "Keep the result until the next restart only");
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_calibrate(context, *options); };
-  });
+       "Exit code 3: a step failed; its cause has a name that docs/calibration.md explains."},
+      Takes::device_and_axis, run_calibrate);
 }
 
 }  // namespace kmax::cli

@@ -1,5 +1,3 @@
-#include "host_tools/kmax/command_line.hpp"
-
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -10,10 +8,11 @@
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/context.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
-#include "host_tools/wall/wall_table.hpp"
+#include "host_tools/wall/wall_evaluation.hpp"
 
 namespace kmax::cli {
 
@@ -121,6 +120,31 @@ int run(std::vector<std::string> arguments, Context& context) {
     return report_error(context, usage_message(app, error, arguments), wrong_usage);
   }
   return run_action(context);
+}
+
+std::string Context::device_address() const {
+  return device_option.empty() ? link::default_device_address() : device_option;
+}
+
+std::vector<std::size_t> Context::axes() const {
+  if (axis_option) return {*axis_option};
+  std::vector<std::size_t> all;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) all.push_back(axis);
+  return all;
+}
+
+device::Device Context::connect() {
+  const link::Notice notice = [this](const std::string& text) { note(text); };
+  auto opened = opener_(device_address(), notice);
+  if (simulated())
+    note(
+        "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
+        "names a lasting one");
+  return device::Device(std::move(opened), notice);
+}
+
+void Context::note(const std::string& text) {
+  messages_ << "kmax: " << text << std::endl;
 }
 
 }  // namespace kmax::cli

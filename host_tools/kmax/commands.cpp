@@ -1,9 +1,9 @@
 #include "host_tools/kmax/commands.hpp"
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <array>
+#include <cmath>
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
@@ -45,6 +45,15 @@ CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* he
   return command.add_option("--axis", context.axis_option, help)
       ->type_name("N")
       ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
+}
+
+CLI::Validator within(double least, double most) {
+  const auto finite = [](const std::string& text) {
+    double number = 0.0;
+    const bool good = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+    return good ? std::string() : fmt::format("'{}' is not a number", text);
+  };
+  return CLI::Validator(finite, "NUMBER") & CLI::Range(least, most);
 }
 
 void add_device_option(CLI::App& command, Context& context) {

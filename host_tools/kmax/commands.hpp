@@ -1,8 +1,12 @@
 #pragma once
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
+
 #include <memory>
 #include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
 
 #include "host_tools/kmax/context.hpp"
 
@@ -21,6 +25,7 @@ namespace kmax::cli {
 //     add_command<XOptions>(app, context, {"x", "Does x.", "  kmax x --fast"}, Takes::device, run_x);
 //   }
 //
+// Options that declare one of the context's own, such as --axis, take it as declare()'s second argument.
 // run_x() returns an ExitCode and reports errors by throwing: UsageError, device::ValueError and
 // link::AddressError become exit code 2, every other exception 1; the message is shown, with --json as
 // {"error": "..."}.
@@ -40,6 +45,22 @@ CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* he
 /// --device.
 void add_device_option(CLI::App& command, Context& context);
 
+/// A finite number from `least` to `most`: CLI::Range alone lets a NaN pass.
+CLI::Validator within(double least, double most);
+
+/// A number from `least` to `most`, whose default the help shows.
+template <typename Number>
+CLI::Option* add_number(CLI::App& command, const char* name, Number& value, const char* help,
+                        std::type_identity_t<Number> least, std::type_identity_t<Number> most) {
+  CLI::Option* option = command.add_option(name, value, help);
+  if constexpr (std::is_floating_point_v<Number>) {
+    option->check(within(least, most));
+  } else {
+    option->check(CLI::Range(least, most));
+  }
+  return option->capture_default_str();
+}
+
 /// What a command takes besides its own arguments.
 enum class Takes { nothing, axis, device, device_and_axis };
 
@@ -53,14 +74,24 @@ void add_command(CLI::App& app, Context& context, const CommandText& text, Takes
 
 /// One whose arguments `Options` declares; `run` gets what was given.
 template <typename Options>
-void add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes,
-                 int (*run)(Context&, const Options&)) {
+CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes,
+                      int (*run)(Context&, const Options&)) {
   CLI::App* command = add_command(app, context, text, takes);
   const auto options = std::make_shared<Options>();
-  options->declare(*command);
-  command->callback([&context, options, run] {
+  if constexpr (requires { options->declare(*command, context); }) {
+    options->declare(*command, context);
+  } else {
+    options->declare(*command);
+  }
+  command->callback([&context, command, options, run] {
+    if (!command->get_subcommands().empty()) return;  // that one acts
     context.action = [&context, options, run] { return run(context, *options); };
   });
+  return command;
 }
+
+/// The whole program behind main(): parses the arguments (without the program's name), runs the command,
+/// turns what is thrown into a message and an exit code.
+int run(std::vector<std::string> arguments, Context& context);
 
 }  // namespace kmax::cli

@@ -8,8 +8,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/suggestion.hpp"
-#include "host_tools/description/dbc.hpp"
-#include "host_tools/description/eds.hpp"
+#include "host_tools/description/described_objects.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/value_json.hpp"

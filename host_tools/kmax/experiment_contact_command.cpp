@@ -1,28 +1,36 @@
 // kmax experiment contact.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 
-#include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
-#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/contact/contact_report.hpp"
-#include "host_tools/experiment/touch_journal.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
-#include "host_tools/kmax/finite_number.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 
 namespace kmax::cli {
 
 namespace {
 struct ContactOptions {
   experiment::ContactSettings settings;
+  experiment::TouchLimits limits = experiment::contact_limits();
   int trials = 3;
   ExperimentFiles files;
   bool no_prompt = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")
+        ->capture_default_str();
+    command.add_option("--rate", settings.haptic_rate, "Rate of the haptic loop, Hz")->capture_default_str();
+    add_number(command, "--hold", settings.hold_time, "Time from the first touch to the end of judging, s",
+               1.0, 60.0);
+    add_number(command, "--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m",
+               1e-9, 1.0);
+    add_number(command, "--trials", trials, "Touches per condition; the worst one counts", 1, 1000);
+    add_file_options(command, files, "Folder for a page, and a picture and a CSV file per condition");
+    add_safety_options(command, limits);
+    add_touch_options(command, no_prompt, limits.patience);
+  }
 };
 
 Json condition_json(const experiment::ContactResult& result) {
@@ -42,68 +50,37 @@ Json condition_json(const experiment::ContactResult& result) {
           {"lost_records", result.lost_records}};
 }
 
-/// A trial that was not held or was cut off is made again, as every experiment does (touch_journal.hpp).
-experiment::ContactResult make_trial(device::Device& device, const experiment::ContactCondition& condition,
-                                     const experiment::ContactSettings& settings,
-                                     const experiment::TouchSession& session) {
-  return experiment::repeated_touch<experiment::ContactResult>(session, condition.name, [&] {
-    if (session.prompter != nullptr)
-      session.prompter->ask(fmt::format(
-          "{}: take the handle out of the wall and be ready to press it against the wall for {:g} s",
-          condition.name, settings.hold_time));
-    return experiment::run_contact(device, condition, settings, session.tell);
-  });
-}
-
 int run_contact_experiment(Context& context, const ContactOptions& options) {
   const Interruption interruption;
-  experiment::ContactSettings settings = options.settings;
-  settings.axis = context.axis();
+  const experiment::ContactSettings& settings = options.settings;
   const auto conditions = experiment::contact_conditions();
+  const auto trials = static_cast<std::size_t>(options.trials);
   make_folder(options.files);
   device::Device device = context.connect();
-  const auto check_interruption = [&] {
-    if (interruption.requested()) throw ExperimentInterrupted("interrupted; the axis has been disarmed");
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  // The person of the simulated device presses by itself.
-  const bool asks = !options.no_prompt && !context.simulated();
-  const experiment::RestoredAfterwards restored(device, settings.axis, experiment::contact_changes(settings),
-                                                [&](const std::string& text) { context.note(text); });
+  TouchRun run{options.limits, !options.no_prompt && !context.simulated()};  // who presses by itself
+  std::size_t made = 0;
+  run.so_far = [&] { return fmt::format("{} of {}, ", made + 1, conditions.size() * trials); };
   std::vector<experiment::ContactResult> results;
-  Json list = Json::array();
+  const std::string velocity_estimator =
+      make_touches(context, device, interruption, run, [&](experiment::DeviceRig& rig) {
+        for (const experiment::ContactCondition& condition : conditions) {
+          std::vector<experiment::ContactResult> touches;
+          for (std::size_t trial = 0; trial < trials; ++trial, ++made)
+            touches.push_back(run_contact(rig, condition, settings));
+          results.push_back(experiment::worst_of(std::move(touches)));
+        }
+        return rig.velocity_estimator();
+      });
+  const auto words = experiment::contact_words(settings, trials, velocity_estimator);
   std::vector<std::filesystem::path> files, pictures;
-  {
-    Progress progress(context.messages());
-    experiment::Standstill standstill(device, {settings.axis}, [&](const std::string& text) {
-      progress.make_room();
-      context.note(text);
-    });
-    const std::size_t all_trials = conditions.size() * static_cast<std::size_t>(options.trials);
-    std::size_t done_trials = 0;
-    for (const experiment::ContactCondition& condition : conditions) {
-      const auto tell = [&](const std::string& text) {
-        check_interruption();
-        progress.show(fmt::format("{} of {}, {}", done_trials + 1, all_trials, text));
-      };
-      std::vector<experiment::ContactResult> trials;
-      for (int trial = 0; trial < options.trials; ++trial, ++done_trials)
-        trials.push_back(make_trial(device, condition, settings,
-                                    {asks ? &prompter : nullptr, nullptr, tell, &standstill}));
-      results.push_back(experiment::worst_of(std::move(trials)));
-      list.push_back(condition_json(results.back()));
-      if (options.files.folder.empty()) continue;
-      const auto written =
-          experiment::write_contact(results.back(), options.files.folder, options.files.ending);
+  if (!options.files.folder.empty()) {
+    for (const experiment::ContactResult& result : results) {
+      const auto written = experiment::write_contact(result, options.files.folder, options.files.ending);
       files.insert(files.end(), written.begin(), written.end());
       pictures.push_back(written.front());
     }
-  }
-  const auto trials = static_cast<std::size_t>(options.trials);
-  if (!options.files.folder.empty()) {
     const auto origin = context.simulated() ? report::Origin::predicted : report::Origin::measured;
-    const auto pages =
-        experiment::write_contact_page(results, settings, trials, pictures, options.files.folder, origin);
+    const auto pages = experiment::write_contact_page(results, words, pictures, options.files.folder, origin);
     files.insert(files.end(), pages.begin(), pages.end());
   }
   const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {
@@ -111,18 +88,18 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   });
   const int verdict = all_agree ? done : verdict_is_no;
   if (context.json) {
+    Json list = Json::array();
+    for (const experiment::ContactResult& result : results) list.push_back(condition_json(result));
     context.print({{"stiffness_n_per_m", settings.stiffness},
                    {"haptic_rate_hz", settings.haptic_rate},
                    {"hold_time_s", settings.hold_time},
                    {"threshold_m", settings.threshold},
-                   {"velocity_estimator", results.front().velocity_estimator},
+                   {"velocity_estimator", velocity_estimator},
                    {"conditions", list},
                    {"files", names_json(files)}});
     return verdict;
   }
-  for (const std::string& line :
-       experiment::contact_words(settings, trials, results.front().velocity_estimator))
-    print(context.out, "{}\n", line);
+  for (const std::string& line : words) print(context.out, "{}\n", line);
   print(context.out, "\n{}", experiment::contact_table(results));
   print_names(context.out, files);
   for (const auto& result : results) {
@@ -139,7 +116,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
 }  // namespace
 
 void add_contact_experiment(CLI::App& experiment, Context& context) {
-  auto* contact = add_command(
+  add_command<ContactOptions>(
       experiment, context,
       {"contact",
        "Touches a stiff wall under each law and judges whether it holds still (paper 1, Figs. 9 to 12).",
@@ -150,26 +127,8 @@ void add_contact_experiment(CLI::App& experiment, Context& context) {
        "press against the wall until the time is over; a simulated person does so by itself. The axis is "
        "disarmed after each trial and on Ctrl-C, and its parameters are put back at the end.\n"
        "A fast touch bounces by millimetres, which is no instability: approach at 0.2 m/s or so.\n"
-       "Exit code 3: some condition did not come out as the paper says."});
-  auto options = std::make_shared<ContactOptions>();
-  experiment::ContactSettings& settings = options->settings;
-  contact->add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")->capture_default_str();
-  contact->add_option("--rate", settings.haptic_rate, "Rate of the haptic loop, Hz")->capture_default_str();
-  contact->add_option("--hold", settings.hold_time, "Time from the first touch to the end of judging, s")
-      ->check(finite_number() & CLI::Range(1.0, 60.0))
-      ->capture_default_str();
-  contact->add_option("--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m")
-      ->check(finite_number() & CLI::Range(1e-9, 1.0))
-      ->capture_default_str();
-  contact->add_option("--trials", options->trials, "Touches per condition; the worst one counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  add_file_options(*contact, options->files, "Folder for a page, and a picture and a CSV file per condition");
-  add_safety_options(*contact, settings.force_limit, settings.abort_amplitude);
-  add_touch_options(*contact, options->no_prompt, settings.contact_patience);
-  contact->callback([&context, options] {
-    context.action = [&context, options] { return run_contact_experiment(context, *options); };
-  });
+       "Exit code 3: some condition did not come out as the paper says."},
+      Takes::device_and_axis, run_contact_experiment);
 }
 
 }  // namespace kmax::cli

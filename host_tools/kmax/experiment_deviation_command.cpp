@@ -1,12 +1,9 @@
 // kmax experiment deviation.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include "host_tools/experiment/deviation/deviation_report.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
-#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -18,6 +15,27 @@ struct DeviationOptions : StudyOptions {
     limits = experiment::deviation_limits();
   }
   experiment::DeviationSettings settings;
+
+  void declare(CLI::App& command, Context& context) {
+    add_number(command, "--stiffness", settings.protocol.stiffness,
+               "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
+    add_number(command, "--rate", settings.protocol.haptic_rate, "Rate of the haptic loop, Hz", 100.0,
+               20000.0);
+    add_number(command, "--pulse", settings.protocol.pulse_on, "Length of a pulse, s; the paper gives none",
+               0.1, 10.0);
+    add_number(command, "--pause", settings.protocol.pulse_off, "Time between pulses, s", 0.1, 10.0);
+    add_number(command, "--pulses", settings.protocol.pulses, "Pulses without F_B, and as many with it", 1,
+               100);
+    add_number(command, "--rest", settings.protocol.rest,
+               "Time for the arm to adjust, after the touch and with F_B, s", 0.1, 60.0);
+    add_file_options(command, files);
+
+    declare_for_people(command);
+    add_people_options(*simulated, people);
+    add_number(*simulated, "--push", hands.push, "Push against the wall, N; above every F_B", 0.01, 100.0);
+    add_clip_option(*simulated, people.clip);
+    declare_for_device(command, context);
+  }
 };
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
@@ -98,10 +116,14 @@ StudyReport report_of(const experiment::DeviationStudy& study) {
 
 constexpr StudyCommand<experiment::DeviationStudy, DeviationOptions> deviation_study{
     simulate, measure, experiment::write_deviation, report_of};
+
+int run_deviation(Context& context, const DeviationOptions& options) {
+  return run_study(context, options, deviation_study);
+}
 }  // namespace
 
 void add_deviation_experiment(CLI::App& experiment, Context& context) {
-  auto* command = add_command(
+  add_command<DeviationOptions>(
       experiment, context,
       {"deviation", "Pushes a hand along the wall and sees how far it gives way (paper 1, Table II).",
        "  kmax experiment deviation                                          simulated people, takes "
@@ -123,36 +145,7 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
        "are put\n"
        "back, on Ctrl-C too.\n"
        "Exit code 3: the deviation did not fall, or too little was touched to tell."},
-      Takes::device);
-  auto options = std::make_shared<DeviationOptions>();
-  experiment::DeviationProtocol& protocol = options->settings.protocol;
-  command->add_option("--stiffness", protocol.stiffness, "Stiffness of the wall, N/m; the paper gives none")
-      ->check(finite_number() & CLI::Range(1.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--rate", protocol.haptic_rate, "Rate of the haptic loop, Hz")
-      ->check(finite_number() & CLI::Range(100.0, 20000.0))
-      ->capture_default_str();
-  command->add_option("--pulse", protocol.pulse_on, "Length of a pulse, s; the paper gives none")
-      ->check(finite_number() & CLI::Range(0.1, 10.0))
-      ->capture_default_str();
-  command->add_option("--pause", protocol.pulse_off, "Time between pulses, s")
-      ->check(finite_number() & CLI::Range(0.1, 10.0))
-      ->capture_default_str();
-  command->add_option("--pulses", protocol.pulses, "Pulses without F_B, and as many with it")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  command->add_option("--rest", protocol.rest, "Time for the arm to adjust, after the touch and with F_B, s")
-      ->check(finite_number() & CLI::Range(0.1, 60.0))
-      ->capture_default_str();
-  add_file_options(*command, options->files);
-
-  auto* people = command->add_option_group("Simulated", "Without --device");
-  add_people_options(*people, options->people);
-  people->add_option("--push", options->hands.push, "Push against the wall, N; above every F_B")
-      ->check(finite_number() & CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  add_clip_option(*people, options->people.clip);
-  add_study_action(*command, context, *people, options, deviation_study);
+      Takes::device, run_deviation);
 }
 
 }  // namespace kmax::cli

@@ -1,12 +1,9 @@
 // kmax experiment jitter.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include "host_tools/experiment/jitter/jitter_report.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
-#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -18,6 +15,26 @@ struct JitterOptions : StudyOptions {
     limits = experiment::jitter_limits();
   }
   experiment::JitterSettings settings;
+
+  void declare(CLI::App& command, Context& context) {
+    add_number(command, "--stiffness", settings.wall.stiffness,
+               "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
+    add_number(command, "--rate", settings.wall.haptic_rate, "Rate of the haptic loop, Hz", 100.0, 20000.0);
+    add_number(command, "--window", settings.wall.window, "Time after the touch that is judged, s", 0.5,
+               60.0);
+    add_number(command, "--touches", settings.touches, "Touches per person and pair of forces", 1, 1000);
+    add_file_options(command, files);
+
+    declare_for_people(command);
+    add_people_options(*simulated, people);
+    add_number(*simulated, "--push", hands.push, "Push without the forces that the person answers to, N",
+               0.01, 100.0);
+    add_number(*simulated, "--speed", hands.approach_speed, "Speed of the approach, m/s", 0.001, 5.0);
+    add_number(*simulated, "--reaction", hands.reaction, "Share of F_I that the person answers to, 0 to 1",
+               0.0, 1.0);
+    add_clip_option(*simulated, people.clip);
+    declare_for_device(command, context);
+  }
 };
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
@@ -82,10 +99,14 @@ StudyReport report_of(const experiment::JitterStudy& study) {
 
 constexpr StudyCommand<experiment::JitterStudy, JitterOptions> jitter_study{
     simulate, measure, experiment::write_jitter, report_of};
+
+int run_jitter(Context& context, const JitterOptions& options) {
+  return run_study(context, options, jitter_study);
+}
 }  // namespace
 
 void add_jitter_experiment(CLI::App& experiment, Context& context) {
-  auto* command = add_command(
+  add_command<JitterOptions>(
       experiment, context,
       {"jitter",
        "Throws a hand out of the wall and sees how far, and how long until it is back (paper 1, Table I).",
@@ -101,38 +122,7 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
        "the\n"
        "handle swings too far, and all parameters are put back, on Ctrl-C too.\n"
        "Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell."},
-      Takes::device);
-  auto options = std::make_shared<JitterOptions>();
-  experiment::JitterSettings& settings = options->settings;
-  experiment::SimulatedHands& hands = options->hands;
-  command
-      ->add_option("--stiffness", settings.wall.stiffness, "Stiffness of the wall, N/m; the paper gives none")
-      ->check(finite_number() & CLI::Range(1.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--rate", settings.wall.haptic_rate, "Rate of the haptic loop, Hz")
-      ->check(finite_number() & CLI::Range(100.0, 20000.0))
-      ->capture_default_str();
-  command->add_option("--window", settings.wall.window, "Time after the touch that is judged, s")
-      ->check(finite_number() & CLI::Range(0.5, 60.0))
-      ->capture_default_str();
-  command->add_option("--touches", settings.touches, "Touches per person and pair of forces")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  add_file_options(*command, options->files);
-
-  auto* people = command->add_option_group("Simulated", "Without --device");
-  add_people_options(*people, options->people);
-  people->add_option("--push", hands.push, "Push without the forces that the person answers to, N")
-      ->check(finite_number() & CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  people->add_option("--speed", hands.approach_speed, "Speed of the approach, m/s")
-      ->check(finite_number() & CLI::Range(0.001, 5.0))
-      ->capture_default_str();
-  people->add_option("--reaction", hands.reaction, "Share of F_I that the person answers to, 0 to 1")
-      ->check(finite_number() & CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  add_clip_option(*people, options->people.clip);
-  add_study_action(*command, context, *people, options, jitter_study);
+      Takes::device, run_jitter);
 }
 
 }  // namespace kmax::cli

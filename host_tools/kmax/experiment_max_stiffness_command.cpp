@@ -1,15 +1,11 @@
 // kmax experiment max-stiffness.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
-#include "host_tools/kmax/finite_number.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
 
 namespace kmax::cli {
@@ -57,75 +53,69 @@ double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-namespace {
-using Options = std::vector<CLI::Option*>;
+void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
+  command.add_option("--conditions", conditions, "Walls: 0,0.5,1,1.5,2,instant,latched,peak_hold")
+      ->delimiter(',')
+      ->type_name("LIST");
+  command.add_option("--out", files.folder, "Folder for a page, pictures, CSV and the journal")
+      ->type_name("DIR");
+  add_resume_option(command, resume);
+  add_format_option(command, files.ending);
 
-Options add_model_options(CLI::App& command, MaxStiffnessOptions& options) {
-  auto* group = command.add_option_group("Simulated people", "Without --device");
-  return {
-      group
-          ->add_option("--subjects", options.subjects,
-                       "People and device: a TOML file, 'clipped' or 'unclipped'; else as --clip says")
-          ->type_name("FILE"),
-      group
-          ->add_option("--clip", options.clip,
-                       "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its "
-                       "own, whose gamma was fitted to it; on, unless --subjects says otherwise")
-          ->check(CLI::IsMember({"on", "off", "both"})),
-      group->add_option("--seed", options.seed,
-                        "Draw other people with this seed; not fitted unless --calibrate"),
-      group->add_flag(
-          "--calibrate", options.calibrate,
-          "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out"),
-      group->add_option("--jobs", options.jobs, "Searches at a time; all processors without it")
-          ->check(CLI::Range(1, 4096)),
-  };
+  simulated = command.add_option_group("Simulated people", "Without --device");
+  simulated
+      ->add_option("--subjects", subjects,
+                   "People and device: a TOML file, 'clipped' or 'unclipped'; else as --clip says")
+      ->type_name("FILE");
+  simulated
+      ->add_option(
+          "--clip", clip,
+          "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, "
+          "whose gamma was fitted to it; on, unless --subjects says otherwise")
+      ->check(CLI::IsMember({"on", "off", "both"}));
+  simulated->add_option("--seed", seed, "Draw other people with this seed; not fitted unless --calibrate");
+  simulated->add_flag(
+      "--calibrate", calibrate,
+      "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out");
+  simulated->add_option("--jobs", jobs, "Searches at a time; all processors without it")
+      ->check(CLI::Range(1, 4096));
+
+  on_device = command.add_option_group("Device", "With --device");
+  add_axis_option(*on_device, context, "Axis that the wall is on");
+  add_number(*on_device, "--start", device.start, "First stiffness, N/m", 1.0, 1e6);
+  add_number(*on_device, "--start-adaptive", device.start_adaptive, "First stiffness of adaptive walls, N/m",
+             1.0, 1e6);
+  add_number(*on_device, "--step", device.step, "Step, N/m", 1.0, 1e6);
+  add_number(*on_device, "--last", device.last, "The search ends there, N/m", 1.0, 1e6);
+  add_number(*on_device, "--trials", device.trials, "Touches at each stiffness; one unstable touch decides",
+             1, 1000);
+  on_device->add_option("--rate", device.touch.haptic_rate, "Rate of the haptic loop, Hz")
+      ->capture_default_str();
+  add_number(*on_device, "--hold", device.touch.hold_time,
+             "Time from the first touch to the end of judging, s", 1.0, 60.0);
+  add_number(*on_device, "--threshold", device.touch.threshold,
+             "Peak to peak above which a wall is unstable, m", 1e-9, 1.0);
+  add_number(*on_device, "--patience", limits.patience, "Time from arming to the first touch, s", 1.0, 600.0);
+  on_device->add_flag("--no-prompt", no_prompt,
+                      "Ask nobody: for a device with a simulated person ('kmax serve')");
+  add_safety_options(*on_device, limits);
 }
 
-Options add_device_options(CLI::App& command, Context& context, MaxStiffnessOptions& options) {
-  auto* group = command.add_option_group("Device", "With --device");
-  experiment::DeviceStiffnessSettings& device = options.device;
-  const auto stiffness = finite_number() & CLI::Range(1.0, 1e6);
-  Options added = {
-      add_axis_option(*group, context, "Axis that the wall is on"),
-      group->add_option("--start", device.start, "First stiffness, N/m")
-          ->check(stiffness)
-          ->capture_default_str(),
-      group->add_option("--start-adaptive", device.start_adaptive, "First stiffness of adaptive walls, N/m")
-          ->check(stiffness)
-          ->capture_default_str(),
-      group->add_option("--step", device.step, "Step, N/m")->check(stiffness)->capture_default_str(),
-      group->add_option("--last", device.last, "The search ends there, N/m")
-          ->check(stiffness)
-          ->capture_default_str(),
-      group->add_option("--trials", device.trials, "Touches at each stiffness; one unstable touch decides")
-          ->check(CLI::Range(1, 1000))
-          ->capture_default_str(),
-      group->add_option("--rate", device.touch.haptic_rate, "Rate of the haptic loop, Hz")
-          ->capture_default_str(),
-      group
-          ->add_option("--hold", device.touch.hold_time, "Time from the first touch to the end of judging, s")
-          ->check(finite_number() & CLI::Range(1.0, 60.0))
-          ->capture_default_str(),
-      group
-          ->add_option("--threshold", device.touch.threshold,
-                       "Peak to peak above which a wall is unstable, m")
-          ->check(finite_number() & CLI::Range(1e-9, 1.0))
-          ->capture_default_str(),
-      group->add_option("--patience", device.touch.contact_patience, "Time from arming to the first touch, s")
-          ->check(finite_number() & CLI::Range(1.0, 600.0))
-          ->capture_default_str(),
-      group->add_flag("--no-prompt", options.no_prompt,
-                      "Ask nobody: for a device with a simulated person ('kmax serve')"),
-  };
-  add_safety_options(*group, device.touch.force_limit, device.touch.abort_amplitude);
-  for (const char* name : {"--force-limit", "--abort-amplitude"}) added.push_back(group->get_option(name));
-  return added;
+namespace {
+int run_max_stiffness(Context& context, const MaxStiffnessOptions& options) {
+  require_folder_to_resume(options.files.folder, options.resume);
+  const Interruption interruption;
+  if (context.simulated()) {
+    require_none(options.on_device->get_options(), for_a_device);
+    return run_model_max_stiffness(context, options, interruption);
+  }
+  require_none(options.simulated->get_options(), for_simulated_people);
+  return run_device_max_stiffness(context, options, interruption);
 }
 }  // namespace
 
 void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
-  auto* command = add_command(
+  add_command<MaxStiffnessOptions>(
       experiment, context,
       {"max-stiffness",
        "Looks for the largest stiffness of a wall that stays stable, under each law (paper 1, Figs. 6 and "
@@ -147,29 +137,7 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
        "Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a "
        "device,\n"
        "2 N or an adaptive wall does not allow more than the plain wall."},
-      Takes::device);
-  auto options = std::make_shared<MaxStiffnessOptions>();
-  command->add_option("--conditions", options->conditions, "Walls: 0,0.5,1,1.5,2,instant,latched,peak_hold")
-      ->delimiter(',')
-      ->type_name("LIST");
-  command->add_option("--out", options->folder, "Folder for a page, pictures, CSV and the journal")
-      ->type_name("DIR");
-  add_resume_option(*command, options->resume);
-  add_format_option(*command, options->ending);
-  const Options of_model = add_model_options(*command, *options);
-  const Options of_device = add_device_options(*command, context, *options);
-  command->callback([&context, options, of_model, of_device] {
-    context.action = [&context, options, of_model, of_device] {
-      require_folder_to_resume(options->folder, options->resume);
-      const Interruption interruption;
-      if (context.simulated()) {
-        require_none(of_device, "is for a device; name one with --device");
-        return run_model_max_stiffness(context, *options, interruption);
-      }
-      require_none(of_model, "is for simulated people; leave --device out");
-      return run_device_max_stiffness(context, *options, interruption);
-    };
-  });
+      Takes::device, run_max_stiffness);
 }
 
 }  // namespace kmax::cli

@@ -7,7 +7,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
-#include "host_tools/kmax/finite_number.hpp"
+#include "host_tools/kmax/commands.hpp"
 
 namespace kmax::cli {
 
@@ -56,13 +56,11 @@ void add_people_options(CLI::App& command, PeopleOptions& options) {
   command
       .add_option("--activation-gain", options.activation_gain,
                   "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
-      ->check(finite_number() & CLI::Range(0.0, 100.0));
+      ->check(within(0.0, 100.0));
 }
 
 void add_clip_option(CLI::App& command, double& clip) {
-  command.add_option("--clip", clip, "Largest force of the simulated device, N; 0: no limit")
-      ->check(finite_number() & CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
+  add_number(command, "--clip", clip, "Largest force of the simulated device, N; 0: no limit", 0.0, 1000.0);
 }
 
 std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
@@ -74,25 +72,18 @@ std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
   return people;
 }
 
-void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude) {
-  command
-      .add_option("--force-limit", force_limit,
-                  "Largest force on a device, N: lowers force.limit, never raises it")
-      ->check(finite_number() & CLI::Range(0.01, 1000.0))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--abort-amplitude", abort_amplitude,
-          "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then")
-      ->check(finite_number() & CLI::Range(1e-5, 1.0))
-      ->capture_default_str();
+void add_safety_options(CLI::App& command, experiment::TouchLimits& limits) {
+  add_number(command, "--force-limit", limits.force_limit,
+             "Largest force on a device, N: lowers force.limit, never raises it", 0.01, 1000.0);
+  add_number(
+      command, "--abort-amplitude", limits.abort_amplitude,
+      "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then", 1e-5,
+      1.0);
 }
 
 void add_touch_options(CLI::App& command, bool& no_prompt, double& patience) {
   command.add_flag("--no-prompt", no_prompt, "Ask nobody: a simulated person needs no asking");
-  command.add_option("--patience", patience, "Time to come to the wall, s")
-      ->check(finite_number() & CLI::Range(1.0, 600.0))
-      ->capture_default_str();
+  add_number(command, "--patience", patience, "Time to come to the wall, s", 1.0, 600.0);
 }
 
 }  // namespace kmax::cli

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
@@ -54,8 +55,8 @@ void add_clip_option(CLI::App& command, double& clip);
 std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
                                                  simulation::DeviceModel& device);
 
-/// --force-limit and --abort-amplitude, which every experiment on a device takes; values in N and m.
-void add_safety_options(CLI::App& command, double& force_limit, double& abort_amplitude);
+/// --force-limit and --abort-amplitude, which every experiment on a device takes.
+void add_safety_options(CLI::App& command, experiment::TouchLimits& limits);
 /// --no-prompt and --patience (s), for somebody who is told before each touch what to do.
 void add_touch_options(CLI::App& command, bool& no_prompt, double& patience);
 

@@ -1,12 +1,9 @@
 // kmax experiment resolution.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include "host_tools/experiment/resolution/resolution_report.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
-#include "host_tools/kmax/finite_number.hpp"
 #include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
@@ -19,6 +16,38 @@ struct ResolutionOptions : StudyOptions {
   std::vector<double> speeds, pushes = experiment::ResolutionSettings().pushes;
   int touches = 0;
   std::string rounding = "nearest";
+
+  void declare(CLI::App& command, Context& context) {
+    add_number(command, "--stiffness", wall.stiffness, "Stiffness of the wall, N/m", 1.0, 1e6);
+    add_number(command, "--rate", wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none",
+               100.0, 20000.0);
+    add_number(command, "--hold", wall.hold, "Time from the touch to the end of judging, s", 1.0, 60.0);
+    add_number(command, "--threshold", wall.threshold, "Peak to peak above which a wall vibrates, m", 1e-9,
+               1.0);
+    command.add_option("--rounding", rounding, "How positions are re-sampled")
+        ->check(CLI::IsMember({"nearest", "floor", "hysteresis"}))
+        ->capture_default_str();
+    command.add_option("--speeds", speeds, "Speeds of the touch, m/s; else some from 0.02 to 0.5")
+        ->delimiter(',')
+        ->check(within(0.001, 5.0));
+    command.add_option("--touches", touches, "Touches per speed (and push); else 4, on a device 1")
+        ->check(CLI::Range(1, 1000));
+    add_file_options(command, files);
+
+    declare_for_people(command);
+    add_subjects_option(*simulated, people.subjects);
+    add_number(*simulated, "--grip", weak.grip, "Factor of the grip's stiffness and damping", 0.01, 10.0);
+    add_number(*simulated, "--delay", weak.delay, "From a command to its force, s", 0.0, 0.1);
+    add_number(*simulated, "--friction", hands.device.friction, "Coulomb friction of the handle, N", 0.0,
+               10.0);
+    simulated->add_option("--pushes", pushes, "Static pushes, N; a wall vibrates when it does with any")
+        ->delimiter(',')
+        ->check(within(0.01, 100.0))
+        ->capture_default_str();
+    add_number(*simulated, "--clip", hands.device.force_limit, "Largest force of the device, N; 0: no limit",
+               0.0, 1000.0);
+    declare_for_device(command, context);
+  }
 };
 
 control::Rounding rounding_of(const std::string& name) {
@@ -106,10 +135,14 @@ StudyReport report_of(const experiment::ResolutionStudy& study) {
 
 constexpr StudyCommand<experiment::ResolutionStudy, ResolutionOptions> resolution_study{
     simulate, measure, experiment::write_resolution, report_of};
+
+int run_resolution(Context& context, const ResolutionOptions& options) {
+  return run_study(context, options, resolution_study);
+}
 }  // namespace
 
 void add_resolution_experiment(CLI::App& experiment, Context& context) {
-  auto* command = add_command(
+  add_command<ResolutionOptions>(
       experiment, context,
       {"resolution",
        "Touches a wall with coarser and coarser positions and sees what vibrates (paper 2, section 3).",
@@ -126,51 +159,7 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
        "Ctrl-C\n"
        "too.\n"
        "Exit code 3: one of the two did not come out, or was not tested."},
-      Takes::device);
-  auto options = std::make_shared<ResolutionOptions>();
-  command->add_option("--stiffness", options->wall.stiffness, "Stiffness of the wall, N/m")
-      ->check(finite_number() & CLI::Range(1.0, 1e6))
-      ->capture_default_str();
-  command
-      ->add_option("--rate", options->wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none")
-      ->check(finite_number() & CLI::Range(100.0, 20000.0))
-      ->capture_default_str();
-  command->add_option("--hold", options->wall.hold, "Time from the touch to the end of judging, s")
-      ->check(finite_number() & CLI::Range(1.0, 60.0))
-      ->capture_default_str();
-  command->add_option("--threshold", options->wall.threshold, "Peak to peak above which a wall vibrates, m")
-      ->check(finite_number() & CLI::Range(1e-9, 1.0))
-      ->capture_default_str();
-  command->add_option("--rounding", options->rounding, "How positions are re-sampled")
-      ->check(CLI::IsMember({"nearest", "floor", "hysteresis"}))
-      ->capture_default_str();
-  command->add_option("--speeds", options->speeds, "Speeds of the touch, m/s; else some from 0.02 to 0.5")
-      ->delimiter(',')
-      ->check(finite_number() & CLI::Range(0.001, 5.0));
-  command->add_option("--touches", options->touches, "Touches per speed (and push); else 4, on a device 1")
-      ->check(CLI::Range(1, 1000));
-  add_file_options(*command, options->files);
-
-  auto* people = command->add_option_group("Simulated", "Without --device");
-  add_subjects_option(*people, options->people.subjects);
-  people->add_option("--grip", options->weak.grip, "Factor of the grip's stiffness and damping")
-      ->check(finite_number() & CLI::Range(0.01, 10.0))
-      ->capture_default_str();
-  people->add_option("--delay", options->weak.delay, "From a command to its force, s")
-      ->check(finite_number() & CLI::Range(0.0, 0.1))
-      ->capture_default_str();
-  people->add_option("--friction", options->hands.device.friction, "Coulomb friction of the handle, N")
-      ->check(finite_number() & CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  people->add_option("--pushes", options->pushes, "Static pushes, N; a wall vibrates when it does with any")
-      ->delimiter(',')
-      ->check(finite_number() & CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  people
-      ->add_option("--clip", options->hands.device.force_limit, "Largest force of the device, N; 0: no limit")
-      ->check(finite_number() & CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  add_study_action(*command, context, *people, options, resolution_study);
+      Takes::device, run_resolution);
 }
 
 }  // namespace kmax::cli

@@ -5,9 +5,50 @@
 #include <utility>
 
 #include "host_tools/base/print.hpp"
-#include "host_tools/report/terminal_text.hpp"
+#include "host_tools/experiment/report_words.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::cli {
+
+void StudyOptions::declare_for_people(CLI::App& command) {
+  simulated = command.add_option_group("Simulated", "Without --device");
+}
+
+void StudyOptions::declare_for_device(CLI::App& command, Context& context) {
+  on_device = command.add_option_group("Device", "With --device");
+  add_axis_option(*on_device, context, "Axis that the wall is on");
+  add_safety_options(*on_device, limits);
+  add_touch_options(*on_device, no_prompt, limits.patience);
+  add_resume_option(*on_device, resume);
+}
+
+void require_none(const std::vector<CLI::Option*>& options, const char* why) {
+  for (const CLI::Option* option : options) {
+    if (option->count() > 0) throw UsageError(fmt::format("{} {}", option->get_name(), why));
+  }
+}
+
+void add_resume_option(CLI::App& device, bool& resume) {
+  device.add_flag("--resume", resume, "Go on with the interrupted run in --out");
+}
+
+void require_folder_to_resume(const std::string& folder, bool resume) {
+  if (resume && folder.empty())
+    throw UsageError("--resume goes on with the run in a folder: name it with --out");
+}
+
+std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
+                                                           const std::string& name,
+                                                           const experiment::RunJournal::Json& settings,
+                                                           bool resume) {
+  using experiment::RunJournal;
+  require_folder_to_resume(folder, resume);
+  if (folder.empty()) return nullptr;
+  auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
+                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
+  if (resume) context.note(fmt::format("done already: {}", experiment::touch_words(journal->resumed())));
+  return journal;
+}
 
 std::string force_pairs_words(std::size_t done, std::size_t all) {
   return fmt::format("{} of {} pairs of forces", done, all);

@@ -2,10 +2,9 @@
 // How the commands of those experiments go that end in a study (jitter, deviation, resolution): made with
 // simulated people or touch by touch on a device, written into a folder, printed, answered by an exit code.
 
-#include <CLI/App.hpp>
-
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -19,7 +18,6 @@
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/terminal_prompter.hpp"
 #include "host_tools/report/page.hpp"
@@ -33,7 +31,30 @@ struct StudyOptions {
   experiment::SimulatedHands hands;
   PeopleOptions people;
   experiment::TouchLimits limits;
+  CLI::App* simulated = nullptr;  ///< the options for simulated people, in a group
+  CLI::App* on_device = nullptr;  ///< and those for a device
+
+  void declare_for_people(CLI::App& command);
+  void declare_for_device(CLI::App& command, Context& context);
 };
+
+/// What has no meaning here is refused, rather than passed over: UsageError naming the first one given.
+void require_none(const std::vector<CLI::Option*>& options, const char* why);
+inline constexpr auto for_a_device = "is for a device; name one with --device";
+inline constexpr auto for_simulated_people = "is for simulated people; leave --device out";
+
+/// --resume, of the experiments on a device that keep a journal.
+void add_resume_option(CLI::App& device, bool& resume);
+
+/// UsageError for --resume without --out.
+void require_folder_to_resume(const std::string& folder, bool resume);
+
+/// The journal NAME.journal of the touches, in `folder`; none without a folder. Errors:
+/// require_folder_to_resume(), experiment::JournalError.
+std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, const std::string& folder,
+                                                           const std::string& name,
+                                                           const experiment::RunJournal::Json& settings,
+                                                           bool resume);
 
 /// What is printed of a study.
 struct StudyReport {
@@ -66,6 +87,11 @@ int print_study(Context& context, StudyReport study, const std::vector<std::file
 /// exit code.
 template <typename Study, typename Options>
 int run_study(Context& context, const Options& options, const StudyCommand<Study, Options>& command) {
+  if (context.simulated()) {
+    require_none(options.on_device->get_options(), for_a_device);
+  } else {
+    require_none(options.simulated->get_options(), for_simulated_people);
+  }
   const Interruption interruption;
   make_folder(options.files);
   const Study study =
@@ -73,23 +99,6 @@ int run_study(Context& context, const Options& options, const StudyCommand<Study
   std::vector<std::filesystem::path> files;
   if (!options.files.folder.empty()) files = command.write(study, options.files.folder, options.files.ending);
   return print_study(context, command.report(study), files);
-}
-
-/// The options for a device, and what the command does. `people`: the group of options for simulated people.
-template <typename Study, typename Options>
-void add_study_action(CLI::App& command, Context& context, CLI::App& people,
-                      const std::shared_ptr<Options>& options, const StudyCommand<Study, Options>& study) {
-  auto* device = command.add_option_group("Device", "With --device");
-  add_axis_option(*device, context, "Axis that the wall is on");
-  add_safety_options(*device, options->limits.force_limit, options->limits.abort_amplitude);
-  add_touch_options(*device, options->no_prompt, options->limits.patience);
-  add_resume_option(*device, options->resume);
-  command.callback([&context, &people, device, options, study] {
-    context.action = [&context, &people, device, options, study] {
-      require_kind(context, people, *device);
-      return run_study(context, *options, study);
-    };
-  });
 }
 
 /// What a run that keeps no journal says on Ctrl-C.
@@ -114,9 +123,44 @@ auto simulate_study(Context& context, const Interruption& interruption,
 /// "3 of 16 pairs of forces".
 std::string force_pairs_words(std::size_t done, std::size_t all);
 
-/// What `make` makes of the touches on the device in use, on --axis: kept in the journal `name` in --out,
-/// asked for at the terminal unless --no-prompt is given. Ctrl-C is an ExperimentInterrupted. Errors: those
-/// of open_touch_journal() and of `make`.
+/// Touches on a device, asked for at the terminal.
+struct TouchRun {
+  experiment::TouchLimits limits;  ///< on --axis
+  bool asks = true;
+  experiment::RunJournal* journal = nullptr;
+  experiment::RigAxes axes = experiment::RigAxes::wall;
+  std::function<std::string()> so_far{};  ///< before each line of progress
+};
+
+/// What `make` makes of the touches on `device`. Ctrl-C is an ExperimentInterrupted. Errors: those of the rig
+/// and of `make`.
+template <typename Make>
+auto make_touches(Context& context, device::Device& device, const Interruption& interruption,
+                  const TouchRun& run, const Make& make) {
+  experiment::TouchLimits limits = run.limits;
+  limits.axis = context.axis();
+  const auto check_interruption = [&] {
+    if (!interruption.requested()) return;
+    throw ExperimentInterrupted(std::string(interrupted_study) +
+                                (run.journal != nullptr ? "; --resume goes on" : ""));
+  };
+  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
+  Progress progress(context.messages());
+  const experiment::Tell tell = [&](const std::string& text) {
+    check_interruption();
+    progress.show(run.so_far ? run.so_far() + text : text);
+  };
+  const experiment::Tell notice = [&](const std::string& text) {
+    progress.make_room();
+    context.note(text);
+  };
+  experiment::DeviceRig rig(device, limits, {run.asks ? &prompter : nullptr, run.journal, tell, notice},
+                            run.axes);
+  return make(rig);
+}
+
+/// The study that `make` makes on the device in use, kept in the journal `name` in --out. Errors: those of
+/// open_touch_journal() and of make_touches().
 template <typename Settings, typename Make>
 auto measure_study(Context& context, const Interruption& interruption, const std::string& name,
                    const Settings& settings, const StudyOptions& options, experiment::RigAxes axes,
@@ -126,24 +170,7 @@ auto measure_study(Context& context, const Interruption& interruption, const std
   device::Device device = context.connect();
   const auto journal = open_touch_journal(context, options.files.folder, name,
                                           journal_settings(device, limits, settings), options.resume);
-  const auto check_interruption = [&] {
-    if (interruption.requested())
-      throw ExperimentInterrupted(journal ? "interrupted; nothing is armed; --resume goes on"
-                                          : interrupted_study);
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  Progress progress(context.messages());
-  const experiment::Tell tell = [&](const std::string& text) {
-    check_interruption();
-    progress.show(text);
-  };
-  const experiment::Tell notice = [&](const std::string& text) {
-    progress.make_room();
-    context.note(text);
-  };
-  experiment::DeviceRig rig(device, limits,
-                            {options.no_prompt ? nullptr : &prompter, journal.get(), tell, notice}, axes);
-  return make(rig);
+  return make_touches(context, device, interruption, {limits, !options.no_prompt, journal.get(), axes}, make);
 }
 
 }  // namespace kmax::cli

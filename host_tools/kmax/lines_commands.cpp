@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
@@ -25,16 +24,54 @@ struct LinesOptions {
   std::vector<std::string> texts;
   double duration = 0;
   std::string board;
+
+  void declare(CLI::App& command) { add_lines_option(command, file); }
+  void declare_duration(CLI::App& command) {
+    command.add_option("--for", duration, "Ends after so many seconds instead of at Ctrl-C")
+        ->type_name("S")
+        ->check(within(0.001, 1e6));
+  }
+};
+
+struct WatchLinesOptions : LinesOptions {
+  void declare(CLI::App& command) {
+    LinesOptions::declare(command);
+    // Not positional: `reset` would be taken for the command of that name.
+    command
+        .add_option("--line", texts,
+                    "Line as in the configuration, may be repeated (default: fault and healthy)")
+        ->type_name("NAME")
+        ->allow_extra_args(false);
+    declare_duration(command);
+  }
+};
+
+struct SetLinesOptions : LinesOptions {
+  void declare(CLI::App& command) {
+    LinesOptions::declare(command);
+    command
+        .add_option("assignments", texts,
+                    "emergency_stop=stop|run, reset=reset|run, boot0=bootloader|application")
+        ->option_text("NAME=STATE ...");
+    declare_duration(command);
+  }
+};
+
+struct BootloaderOptions : LinesOptions {
+  void declare(CLI::App& command) {
+    LinesOptions::declare(command);
+    command.add_option("--board", board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
+  }
 };
 
 constexpr milliseconds look_around{100};
 
 /// A line that the configuration lacks is wrong usage; whatever else goes wrong is not.
-template <typename Call>
-int with_lines(const LinesOptions& options, Call call) {
+template <typename Options, int (*run)(Context&, const LinesOptions&, const LinesConfig&)>
+int with_lines(Context& context, const Options& options) {
   const LinesConfig config = read_lines_config(options.file);
   try {
-    return call(config);
+    return run(context, options, config);
   } catch (const lines::LinesConfigError& error) {
     throw UsageError(error.what());
   }
@@ -55,12 +92,6 @@ std::function<bool()> until(const LinesOptions& options, const Interruption& int
                                       std::chrono::duration<double>(options.duration));
   const bool limited = options.duration > 0;
   return [=, &interruption] { return interruption.requested() || (limited && Clock::now() >= end); };
-}
-
-/// CLI's ranges let a NaN pass.
-void check_duration(const LinesOptions& options) {
-  if (!std::isfinite(options.duration))
-    throw UsageError(fmt::format("--for: {} is not a number of seconds", options.duration));
 }
 
 int list_lines(Context& context, const LinesOptions&, const LinesConfig& config) {
@@ -117,7 +148,6 @@ std::string seconds_text(std::chrono::nanoseconds time) {
 }
 
 int watch_lines(Context& context, const LinesOptions& options, const LinesConfig& config) {
-  check_duration(options);
   std::vector<LineRole> roles;
   for (const std::string& name : options.texts) roles.push_back(role_of(name));
   if (options.texts.empty()) {
@@ -187,7 +217,6 @@ LineAssignment parsed(const std::string& text) {
 }
 
 int set_lines(Context& context, const LinesOptions& options, const LinesConfig& config) {
-  check_duration(options);
   if (options.texts.empty()) throw UsageError("write NAME=STATE, as in 'kmax lines set emergency_stop=stop'");
   std::vector<LineAssignment> assignments;
   for (const std::string& text : options.texts) {
@@ -211,8 +240,7 @@ int set_lines(Context& context, const LinesOptions& options, const LinesConfig& 
   if (std::ranges::any_of(assignments, [](const auto& one) { return one.role == LineRole::emergency_stop; }))
     context.note(
         "the emergency stop is a normally closed contact to ground: open is stop. This line must lie in "
-        "series "
-        "with the button, never beside it, where it would bridge it");
+        "series with the button, never beside it, where it would bridge it");
   context.note(fmt::format(
       "holding {}; then the lines are let go and fall back to their pulls",
       options.duration > 0 ? fmt::format("for {} s", options.duration) : std::string("until Ctrl-C")));
@@ -255,87 +283,39 @@ int run_bootloader(Context& context, const LinesOptions& options, const LinesCon
   return done;
 }
 
-CLI::App* add_watch(CLI::App& app, Context& context) {
-  return add_command(app, context,
-                     {"watch", "Prints every edge of a line with the kernel's time of it.",
-                      "  kmax lines watch                 fault and healthy, until Ctrl-C\n"
-                      "  kmax lines watch --line healthy --for 10\n\n"
-                      "Sleeps until the kernel reports an edge. Times are seconds of the kernel's monotonic "
-                      "clock; with\n--json the edges come as one document at the end."},
-                     Takes::nothing);
-}
+}  // namespace
 
-CLI::App* add_set(CLI::App& app, Context& context) {
-  return add_command(
-      app, context,
+void add_lines_commands(CLI::App& app, Context& context) {
+  CLI::App* list =
+      add_command<LinesOptions>(app, context,
+                                {"lines", "Shows the GPIO lines to the board and their levels.",
+                                 "  kmax lines\n  kmax lines watch\n  kmax lines set emergency_stop=stop\n\n"
+                                 "Nothing is changed: a line is looked at as it is."},
+                                Takes::nothing, with_lines<LinesOptions, list_lines>);
+  add_command<WatchLinesOptions>(
+      *list, context,
+      {"watch", "Prints every edge of a line with the kernel's time of it.",
+       "  kmax lines watch                 fault and healthy, until Ctrl-C\n"
+       "  kmax lines watch --line healthy --for 10\n\n"
+       "Sleeps until the kernel reports an edge. Times are seconds of the kernel's monotonic clock; with\n"
+       "--json the edges come as one document at the end."},
+      Takes::nothing, with_lines<WatchLinesOptions, watch_lines>);
+  add_command<SetLinesOptions>(
+      *list, context,
       {"set", "Drives lines for as long as the command runs.",
        "  kmax lines set emergency_stop=stop\n  kmax lines set emergency_stop=run --for 60\n"
        "  kmax lines set reset=reset --for 1\n\n"
        "The emergency stop is a normally closed contact to ground: open is stop, closed is run. At the end\n"
        "it goes to stop, reset to run and BOOT0 to application; then the lines are let go."},
-      Takes::nothing);
-}
-}  // namespace
-
-void add_lines_commands(CLI::App& app, Context& context) {
-  const auto options = std::make_shared<LinesOptions>();
-  const auto act = [&context, options](CLI::App& command, auto run) {
-    command.callback([&context, &command, options, run] {
-      if (!command.get_subcommands().empty()) return;
-      context.action = [&context, options, run] {
-        return with_lines(*options,
-                          [&](const LinesConfig& config) { return run(context, *options, config); });
-      };
-    });
-  };
-  const auto add_duration = [options](CLI::App* command) {
-    command->add_option("--for", options->duration, "Ends after so many seconds instead of at Ctrl-C")
-        ->type_name("S")
-        ->check(CLI::Range(0.001, 1e6));
-  };
-
-  auto* list = add_command(app, context,
-                           {"lines", "Shows the GPIO lines to the board and their levels.",
-                            "  kmax lines\n  kmax lines watch\n  kmax lines set emergency_stop=stop\n\n"
-                            "Nothing is changed: a line is looked at as it is."},
-                           Takes::nothing);
-  add_lines_option(*list, options->file);
-  act(*list, list_lines);
-
-  auto* watch = add_watch(*list, context);
-  add_lines_option(*watch, options->file);
-  // Not positional: `reset` would be taken for the command of that name.
-  watch
-      ->add_option("--line", options->texts,
-                   "Line as in the configuration, may be repeated (default: fault and healthy)")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
-  add_duration(watch);
-  act(*watch, watch_lines);
-
-  auto* set = add_set(*list, context);
-  add_lines_option(*set, options->file);
-  set->add_option("assignments", options->texts,
-                  "emergency_stop=stop|run, reset=reset|run, boot0=bootloader|application")
-      ->option_text("NAME=STATE ...");
-  add_duration(set);
-  act(*set, set_lines);
-
-  auto* reset =
-      add_command(app, context, {"reset", "Resets the board's processor by its NRST line.", "  kmax reset"},
-                  Takes::nothing);
-  add_lines_option(*reset, options->file);
-  act(*reset, run_reset);
-
-  auto* bootloader =
-      add_command(app, context,
-                  {"bootloader", "Starts the ROM bootloader of the board's processor by BOOT0 and NRST.",
-                   "  kmax bootloader\n\n'kmax flash' does this by itself where it needs it."},
-                  Takes::nothing);
-  add_lines_option(*bootloader, options->file);
-  bootloader->add_option("--board", options->board, "Kind of board: " + flash::board_kinds())
-      ->type_name("KIND");
-  act(*bootloader, run_bootloader);
+      Takes::nothing, with_lines<SetLinesOptions, set_lines>);
+  add_command<LinesOptions>(app, context,
+                            {"reset", "Resets the board's processor by its NRST line.", "  kmax reset"},
+                            Takes::nothing, with_lines<LinesOptions, run_reset>);
+  add_command<BootloaderOptions>(
+      app, context,
+      {"bootloader", "Starts the ROM bootloader of the board's processor by BOOT0 and NRST.",
+       "  kmax bootloader\n\n'kmax flash' does this by itself where it needs it."},
+      Takes::nothing, with_lines<BootloaderOptions, run_bootloader>);
 }
 
 }  // namespace kmax::cli

@@ -1,7 +1,7 @@
 #include <iostream>
 
 #include "host_tools/device/open_link.hpp"
-#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/kmax/commands.hpp"
 
 int main(int argc, char** argv) {
   const auto open = [](const std::string& address, const kmax::link::Notice& notice) {

@@ -4,14 +4,11 @@
 #include <filesystem>
 
 #include "host_tools/base/print.hpp"
-#include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
-#include "host_tools/experiment/remaining_time.hpp"
-#include "host_tools/kmax/experiment_commands.hpp"
-#include "host_tools/kmax/experiment_options.hpp"
+#include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
-#include "host_tools/report/terminal_text.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::cli {
 
@@ -19,8 +16,7 @@ namespace {
 using experiment::DeviceStiffnessResult;
 
 void print_results(Context& context, const std::vector<DeviceStiffnessResult>& results,
-                   const experiment::DeviceStiffnessSettings& settings, const std::string& device,
-                   const std::vector<std::filesystem::path>& files) {
+                   const std::vector<std::string>& words, const std::vector<std::filesystem::path>& files) {
   if (context.json) {
     Json conditions = Json::array();
     for (const DeviceStiffnessResult& result : results) {
@@ -33,8 +29,7 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
     for (const auto& file : files) context.note(file.string());
     return;
   }
-  for (const std::string& line : experiment::device_stiffness_words(settings, device))
-    print(context.out, "{}\n", line);
+  for (const std::string& line : words) print(context.out, "{}\n", line);
   print(context.out, "\n{}", report::terminal_text(experiment::device_stiffness_table(results)));
   print_names(context.out, files);
 }
@@ -42,53 +37,37 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
 
 int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& options,
                              const Interruption& interruption) {
-  experiment::DeviceStiffnessSettings settings = options.device;
-  settings.touch.axis = context.axis();
+  const experiment::DeviceStiffnessSettings& settings = options.device;
+  experiment::TouchLimits limits = options.limits;
+  limits.axis = context.axis();
   const auto conditions = conditions_for(options.conditions);
   for (const auto& condition : conditions) {
     if (settings.last < (condition.adaptive ? settings.start_adaptive : settings.start))
       throw UsageError(
           fmt::format("--last {} is below the first stiffness of '{}'", settings.last, condition.name));
   }
-  // Before anybody presses anything.
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  make_folder(options.files);
   device::Device device = context.connect();
-  const auto journal = open_touch_journal(context, options.folder, "max_stiffness",
-                                          experiment::journal_settings(device, settings), options.resume);
-  const auto check_interruption = [&] {
-    if (interruption.requested())
-      throw ExperimentInterrupted(journal ? "interrupted; the axis has been disarmed; --resume goes on"
-                                          : "interrupted; the axis has been disarmed");
-  };
-  TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  const experiment::RestoredAfterwards restored(device, settings.touch.axis,
-                                                experiment::contact_changes(settings.touch),
-                                                [&](const std::string& text) { context.note(text); });
+  const auto journal = open_touch_journal(context, options.files.folder, "max_stiffness",
+                                          journal_settings(device, limits, settings), options.resume);
+  TouchRun run{limits, !options.no_prompt, journal.get()};
   std::vector<DeviceStiffnessResult> results;
-  {
-    Progress progress(context.messages());
-    const experiment::RemainingTime remaining(seconds_now());
-    for (const experiment::StiffnessCondition& condition : conditions) {
-      const auto tell = [&](const std::string& text) {
-        check_interruption();
-        const std::string far =
-            experiment::progress_words(results.size(), conditions.size(),
-                                       remaining.seconds(seconds_now(), results.size(), conditions.size()));
-        progress.show(fmt::format("walls: {}; {}", far, text));
-      };
-      results.push_back(experiment::find_max_stiffness(device, condition, settings,
-                                                       options.no_prompt ? nullptr : &prompter, journal.get(),
-                                                       tell, [&](const std::string& text) {
-                                                         progress.make_room();
-                                                         context.note(text);
-                                                       }));
-    }
-  }
+  const experiment::RemainingTime remaining(seconds_now());
+  run.so_far = [&] {
+    const std::size_t all = conditions.size(), made = results.size();
+    return fmt::format("walls: {}; ",
+                       experiment::progress_words(made, all, remaining.seconds(seconds_now(), made, all)));
+  };
+  make_touches(context, device, interruption, run, [&](experiment::Rig& rig) {
+    for (const experiment::StiffnessCondition& condition : conditions)
+      results.push_back(experiment::find_max_stiffness(rig, condition, settings));
+  });
   std::vector<std::filesystem::path> files;
-  if (!options.folder.empty())
-    files = experiment::write_device_stiffness(results, settings, device.description(), options.folder,
-                                               options.ending);
-  print_results(context, results, settings, device.description(), files);
+  if (!options.files.folder.empty())
+    files = experiment::write_device_stiffness(results, settings, limits, device.description(),
+                                               options.files.folder, options.files.ending);
+  print_results(context, results, experiment::device_stiffness_words(settings, limits, device.description()),
+                files);
   return experiment::order_is_the_papers(results) ? done : verdict_is_no;
 }
 

@@ -8,11 +8,10 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
-#include "host_tools/experiment/remaining_time.hpp"
+#include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/kmax/experiment_options.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
-#include "host_tools/report/page_files.hpp"
-#include "host_tools/report/terminal_text.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::cli {
 
@@ -99,7 +98,7 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
                             const Interruption& interruption,
                             std::vector<experiment::OperatorCalibration>& calibrations,
                             std::vector<std::filesystem::path>& files) {
-  const std::filesystem::path folder = options.folder;
+  const std::filesystem::path folder = options.files.folder;
   Progress progress(context.messages());
   experiment::StiffnessRun run;
   run.threads = options.jobs;
@@ -117,7 +116,7 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
     experiment::store_subject_set(set, files.back());
   }
   std::optional<RunJournal> journal;
-  if (!options.folder.empty()) {
+  if (!options.files.folder.empty()) {
     const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::anew;
     journal.emplace(folder / ("max_stiffness" + suffix(set) + ".journal"), journal_settings(set, run), begin);
     run.journal = &*journal;
@@ -152,11 +151,11 @@ void print_section(std::ostream& out, const report::Section& section) {
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,
                             const Interruption& interruption) {
   const auto conditions = conditions_for(options.conditions);
-  if (options.calibrate && options.folder.empty())
+  if (options.calibrate && options.files.folder.empty())
     throw UsageError("--calibrate writes the subject set to a folder: name it with --out");
   if (!options.subjects.empty() && options.clip == "both")
     throw UsageError("--clip both takes two sets of people, and --subjects names one; run it twice");
-  if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  make_folder(options.files);
 
   std::vector<std::filesystem::path> files;
   std::vector<experiment::OperatorCalibration> calibrations;
@@ -169,10 +168,10 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
   }
   report::Page page{"Largest stable stiffness", {experiment::max_stiffness_section(studies)}};
   if (!calibrations.empty()) page.sections.push_back(experiment::calibration_section(calibrations));
-  if (!options.folder.empty()) {
-    const std::filesystem::path folder = options.folder;
+  if (!options.files.folder.empty()) {
+    const std::filesystem::path folder = options.files.folder;
     page.sections.front().pictures.push_back(
-        experiment::draw_max_stiffness(studies, folder / ("max_stiffness" + options.ending)));
+        experiment::draw_max_stiffness(studies, folder / ("max_stiffness" + options.files.ending)));
     files.push_back(page.sections.front().pictures.back().file);
     for (const MaxStiffnessStudy& study : studies) {
       files.push_back(folder / ("max_stiffness_people" + suffix(study.set) + ".csv"));

@@ -8,13 +8,14 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/kmax/context.hpp"
+#include "host_tools/kmax/experiment_options.hpp"
 
 namespace kmax::cli {
 
 /// Of `kmax experiment max-stiffness`.
 struct MaxStiffnessOptions {
   std::vector<std::string> conditions;  ///< keys of conditions_for(); empty: all
-  std::string folder, ending = ".svg";
+  ExperimentFiles files;
   bool resume = false;
 
   // On simulated people.
@@ -26,7 +27,12 @@ struct MaxStiffnessOptions {
 
   // On a device.
   experiment::DeviceStiffnessSettings device;
+  experiment::TouchLimits limits = experiment::contact_limits();
   bool no_prompt = false;
+
+  CLI::App* simulated = nullptr;  ///< the options for simulated people, in a group
+  CLI::App* on_device = nullptr;  ///< and those for a device
+  void declare(CLI::App& command, Context& context);
 };
 
 /// How --conditions names them: "0", "0.5", "1", "1.5", "2", "instant", "latched", "peak_hold".

@@ -1,9 +1,7 @@
 // kmax selftest.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <cmath>
-#include <memory>
 #include <optional>
 
 #include "host_tools/base/interruption.hpp"
@@ -20,6 +18,12 @@ struct SelfTestOptions {
   bool hand = false;
   double patience = 20.0;
   int exchanges = 50;
+
+  void declare(CLI::App& command) {
+    command.add_flag("--hand", hand, "Also asks you to move the handle and to press the emergency stop");
+    add_number(command, "--patience", patience, "How long --hand waits for each, s", 1.0, 600.0);
+    add_number(command, "--exchanges", exchanges, "Messages exchanged to test the link", 1, 10000);
+  }
 };
 
 Json check_json(const selftest::CheckResult& check) {
@@ -89,9 +93,6 @@ void print_table(Context& context, const selftest::Report& report) {
 }
 
 int run_selftest_command(Context& context, const SelfTestOptions& options) {
-  // CLI's ranges let a NaN pass.
-  if (!std::isfinite(options.patience))
-    throw UsageError(fmt::format("--patience: {} is not a number of seconds", options.patience));
   const Interruption interruption;
   device::Device device = context.connect();
   selftest::SelfTestSettings settings;
@@ -120,25 +121,14 @@ int run_selftest_command(Context& context, const SelfTestOptions& options) {
 }  // namespace
 
 void add_selftest_command(CLI::App& app, Context& context) {
-  auto* command = add_command(
+  add_command<SelfTestOptions>(
       app, context,
       {"selftest", "Finds the faulty part of an axis: supply, gate driver, phases, sensors, encoder, lines.",
        "  kmax selftest\n  kmax selftest --axis 1 --json\n  kmax selftest --hand\n\n"
        "Gives small voltages that move the handle by well under 1 mm; keep it free. The axis is disarmed\n"
        "afterwards and every parameter is as it was; a fault that it had before is shown and cleared.\n"
-       "Exit code 3: a check failed."});
-  auto options = std::make_shared<SelfTestOptions>();
-  command->add_flag("--hand", options->hand,
-                    "Also asks you to move the handle and to press the emergency stop");
-  command->add_option("--patience", options->patience, "How long --hand waits for each, s")
-      ->check(CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->add_option("--exchanges", options->exchanges, "Messages exchanged to test the link")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  command->callback([&context, options] {
-    context.action = [&context, options] { return run_selftest_command(context, *options); };
-  });
+       "Exit code 3: a check failed."},
+      Takes::device_and_axis, run_selftest_command);
 }
 
 }  // namespace kmax::cli

@@ -10,8 +10,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/wall/force_curve.hpp"
-#include "host_tools/wall/wall_table.hpp"
+#include "host_tools/wall/wall_evaluation.hpp"
 
 namespace kmax::cli {
 

@@ -8,7 +8,7 @@
 
 #include "host_tools/device/drive.hpp"
 #include "host_tools/kmax/context.hpp"
-#include "host_tools/record/measurement.hpp"
+#include "host_tools/record/row.hpp"
 
 namespace kmax::cli {
 

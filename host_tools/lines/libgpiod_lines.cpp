@@ -1,7 +1,8 @@
 // The only file that knows libgpiod (1.6, C++). For version 2 this file is written anew.
-#include <fmt/format.h>
-#include <poll.h>
 
+#include <fmt/format.h>
+
+#include <poll.h>
 #include <algorithm>
 #include <cerrno>
 #include <gpiod.hpp>
@@ -10,6 +11,7 @@
 #include "host_tools/lines/gpio_lines.hpp"
 
 namespace kmax::lines {
+
 namespace {
 
 constexpr const char* consumer = "kmax";
@@ -234,6 +236,12 @@ class KernelLines final : public GpioLines {
 
 std::unique_ptr<GpioLines> kernel_gpio_lines() {
   return std::make_unique<KernelLines>();
+}
+
+std::string text_of(const LineSettings& settings) {
+  if (settings.offset) return fmt::format("{} line {}", settings.chip, *settings.offset);
+  if (settings.chip.empty()) return fmt::format("line \"{}\"", settings.name);
+  return fmt::format("{} line \"{}\"", settings.chip, settings.name);
 }
 
 }  // namespace kmax::lines

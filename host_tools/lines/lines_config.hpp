@@ -20,7 +20,7 @@
 //   chip = "gpiochip0"           name, label or path; not needed if `name` is unique
 //   line = 17                    its number on the chip, or
 //   name = "NRST"                its name
-//   active = "low"               or "high"; default by role (line_role.hpp)
+//   active = "low"               or "high"; default by role (gpio_lines.hpp)
 //   drive = "open_drain"         or "push_pull", "open_source"; default by role
 //   bias = "pull_up"             or "pull_down", "disabled"; default: left as it is
 //

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/record/measurement.hpp"
+#include "host_tools/record/row.hpp"
 
 namespace kmax::record {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <ostream>
 
-#include "host_tools/record/row_csv.hpp"
+#include "host_tools/record/row.hpp"
 #include "host_tools/record/row_source.hpp"
 
 namespace kmax::record {

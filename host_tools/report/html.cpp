@@ -1,9 +1,7 @@
-#include "host_tools/report/html.hpp"
 
 #include <string_view>
 
-#include "host_tools/report/column_alignment.hpp"
-#include "host_tools/report/url_path.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::report {
 

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <stdexcept>
+#include <string_view>
 
 namespace kmax::report {
 
@@ -26,6 +28,82 @@ void require_rectangular(const Table& table) {
     throw std::invalid_argument(fmt::format("table '{}', row {}: has {} cells for {} columns", table.caption,
                                             i + 1, table.rows[i].size(), table.columns.size()));
   }
+}
+
+std::string url_path(const std::filesystem::path& file) {
+  constexpr std::string_view unreserved =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
+  std::string written;
+  for (const char c : file.filename().string()) {
+    if (unreserved.find(c) != std::string_view::npos) {
+      written += c;
+    } else {
+      written += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return written;
+}
+
+namespace {
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+void add_record(std::string& text, const std::vector<std::string>& cells) {
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (i > 0) text += ',';
+    // A record of one empty field would be an empty line, which readers pass over.
+    text += cells.size() == 1 && cells[i].empty() ? "\"\"" : field(cells[i]);
+  }
+  text += "\r\n";
+}
+}  // namespace
+
+std::string csv(const Table& table) {
+  require_rectangular(table);
+  std::string text;
+  if (table.columns.empty()) return text;
+  add_record(text, table.columns);
+  for (const auto& row : table.rows) add_record(text, row);
+  return text;
+}
+
+namespace {
+/// Whole or not at all: a page that is read while it is written anew is the old one or the new one.
+void write(const std::filesystem::path& file, const std::string& text) {
+  std::filesystem::path part = file;
+  part += ".part";
+  std::ofstream stream(part, std::ios::binary);
+  stream << text;
+  stream.close();
+  std::error_code failure;
+  if (stream) std::filesystem::rename(part, file, failure);
+  if (stream && !failure) return;
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  throw std::runtime_error(
+      fmt::format("{}: cannot be written; may you write there, and is the disk full?", file.string()));
+}
+}  // namespace
+
+std::vector<std::filesystem::path> write_page(const Page& page, const std::filesystem::path& folder,
+                                              const std::string& name) {
+  const std::string as_markdown = markdown(page), as_html = html(page);
+  std::filesystem::create_directories(folder);
+  const std::vector<std::filesystem::path> files = {folder / (name + ".md"), folder / (name + ".html")};
+  write(files[0], as_markdown);
+  write(files[1], as_html);
+  return files;
+}
+
+void write_csv(const Table& table, const std::filesystem::path& file) {
+  write(file, csv(table));
 }
 
 }  // namespace kmax::report

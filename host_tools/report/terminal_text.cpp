@@ -1,10 +1,9 @@
-#include "host_tools/report/terminal_text.hpp"
+#include "host_tools/report/page.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
-
-#include "host_tools/report/column_alignment.hpp"
+#include <regex>
 
 namespace kmax::report {
 
@@ -111,6 +110,33 @@ std::string terminal_text(const Table& table) {
     if (number == 0) add_line(text, rule);
   }
   return text;
+}
+
+bool reads_as_number(std::string_view text) {
+  // Perhaps "at least"; the number; a unit, which has no digit in front and no words, or a spread.
+  static const std::regex number(R"([<>= ]*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(?: (.+))?)");
+  std::cmatch match;
+  if (!std::regex_match(text.data(), text.data() + text.size(), match, number)) return false;
+  const std::string unit = match[3];
+  if (unit.size() > 2 && unit.front() == '(' && unit.back() == ')')
+    return reads_as_number(std::string_view(unit).substr(1, unit.size() - 2));
+  static const std::regex no_unit(R"([-+(\d].*|(of|to|or|and|x)( .*)?)");
+  return unit.size() <= 8 && !std::regex_match(unit, no_unit);
+}
+
+std::vector<bool> number_columns(const Table& table) {
+  require_rectangular(table);
+  std::vector<bool> numbers(table.columns.size(), false);
+  for (std::size_t column = 0; column < numbers.size(); ++column) {
+    bool any = false, other = false;
+    for (const auto& row : table.rows) {
+      const std::string& cell = row[column];
+      if (cell.empty() || cell == "-" || cell == "NA") continue;
+      (reads_as_number(cell) ? any : other) = true;
+    }
+    numbers[column] = any && !other;
+  }
+  return numbers;
 }
 
 }  // namespace kmax::report

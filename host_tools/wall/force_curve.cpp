@@ -1,4 +1,3 @@
-#include "host_tools/wall/force_curve.hpp"
 
 #include <fmt/format.h>
 

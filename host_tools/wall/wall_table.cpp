@@ -1,4 +1,4 @@
-#include "host_tools/wall/wall_table.hpp"
+#include "host_tools/wall/wall_evaluation.hpp"
 
 #include <fmt/format.h>
 

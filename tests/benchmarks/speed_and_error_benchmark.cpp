@@ -13,7 +13,7 @@
 #include <string>
 #include <string_view>
 
-#include "host_tools/report/markdown.hpp"
+#include "host_tools/report/page.hpp"
 #include "tests/benchmarks/speed_and_error/sections.hpp"
 
 namespace {

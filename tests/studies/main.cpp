@@ -5,9 +5,8 @@
 
 #include <cstdio>
 
-#include "host_tools/experiment/remaining_time.hpp"
-#include "host_tools/report/page_files.hpp"
-#include "host_tools/report/terminal_text.hpp"
+#include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/report/page.hpp"
 #include "tests/studies/studies.hpp"
 
 namespace kmax::studies {

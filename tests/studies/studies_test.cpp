@@ -5,7 +5,6 @@
 #include <set>
 
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
-#include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

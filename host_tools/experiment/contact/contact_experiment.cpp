@@ -5,53 +5,51 @@
 #include <algorithm>
 #include <utility>
 
-#include "host_tools/device/value_text.hpp"
-
 namespace kmax::experiment {
+
+namespace {
+using control::AdaptiveMode;
+constexpr std::pair<AdaptiveMode, const char*> adaptive_modes[] = {{AdaptiveMode::instant, "instant"},
+                                                                   {AdaptiveMode::latched, "latched"},
+                                                                   {AdaptiveMode::peak_hold, "peak_hold"}};
+}  // namespace
 
 std::vector<ContactCondition> contact_conditions() {
   std::vector<ContactCondition> conditions;
   for (const paper::ContactVerdict& verdict : paper::contact_verdicts) {
-    const auto add = [&](const std::string& name, std::vector<std::string> assignments) {
+    const auto add = [&](const std::string& name, std::vector<std::string> assignments, const RigWall& wall) {
       conditions.push_back({name, std::string(verdict.figure), std::move(assignments),
-                            std::string(verdict.words), verdict.stable});
+                            std::string(verdict.words), verdict.stable, wall});
     };
+    RigWall wall;
+    wall.law = verdict.adaptive ? control::WallKind::adaptive : control::WallKind::magnetic;
+    wall.magnetic_coefficient = verdict.magnetic_coefficient;
     if (!verdict.adaptive) {
       const std::string coefficient = fmt::format("{:g}", verdict.magnetic_coefficient);
       add(fmt::format("F_MC = {} N", coefficient),
-          {"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", coefficient)});
+          {"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", coefficient)}, wall);
       continue;
     }
-    for (const char* mode : {"instant", "latched", "peak_hold"})
-      add(fmt::format("adaptive, {}", mode),
-          {"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)});
+    for (const auto& [mode, name] : adaptive_modes) {
+      wall.mode = mode;
+      add(fmt::format("adaptive, {}", name),
+          {"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", name)}, wall);
+    }
   }
   return conditions;
 }
 
-std::vector<std::string> contact_setup(const ContactSettings& settings) {
-  return {fmt::format("wall.stiffness={}", settings.stiffness),
-          fmt::format("haptic.rate={}", settings.haptic_rate),
-          "wall.damping=0",
-          "position.resolution=0",
-          "wall.magnetic_length=0.001",
-          "wall.adaptive_gain=2.4",
-          "wall.adaptive_offset=0.8",
-          "wall.adaptive_velocity_max=2.4",
-          "wall.adaptive_relation=linear",
-          "wall.adaptive_velocity=approach",
-          "wall.adaptive_force_min=0.8",
-          "wall.adaptive_force_max=2",
-          "wall.adaptive_hold_time=1.2",
-          "interference.mode=none"};
+TouchLimits contact_limits() {
+  TouchLimits limits;
+  limits.abort_amplitude = 5e-3;
+  limits.patience = 10.0;
+  return limits;
 }
 
-std::vector<std::string> contact_changes(const ContactSettings& settings) {
-  std::vector<std::string> changed = contact_setup(settings);
-  for (const char* name :
-       {"wall.law", "wall.magnetic_coefficient", "wall.adaptive_mode", "force.limit", "link.timeout"})
-    changed.push_back(name);
-  return changed;
+std::string press_request(const std::string& name, double hold_time) {
+  return fmt::format(
+      "{}: take the handle out of the wall and be ready to press it against the wall for {:g} s", name,
+      hold_time);
 }
 
 ContactResult worst_of(std::vector<ContactResult> trials) {
@@ -76,35 +74,30 @@ ContactResult worst_of(std::vector<ContactResult> trials) {
   return worst;
 }
 
-ContactResult run_contact(device::Device& device, const ContactCondition& condition,
-                          const ContactSettings& settings, const Tell& tell) {
-  std::vector<std::string> assignments = contact_setup(settings);
-  for (const auto& more :
-       {condition.assignments, protective_assignments(device, settings.axis, settings.force_limit)})
-    assignments.insert(assignments.end(), more.begin(), more.end());
-  device.apply(device::parse_assignments(assignments, settings.axis));
-  const device::Parameter estimator(firmware::entry_of<"velocity.estimator">(), settings.axis);
-
-  ContactResult result;
-  result.condition = condition;
-  result.velocity_estimator = device::value_text(estimator, device.read(estimator));
-  TouchWatch watch;
-  watch.axis = settings.axis;
-  watch.name = condition.name;
-  watch.hold_time = settings.hold_time;
-  watch.contact_patience = settings.contact_patience;
-  watch.abort_amplitude = settings.abort_amplitude;
-  WatchedTouch touch = watch_touch(device, watch, tell);
-  result.measure = measure_touch(touch, settings.hold_time, settings.threshold);
-  result.surface = touch.surface;
-  result.side = touch.side;
-  result.judged_to = settings.hold_time;
-  result.judged_from = settings.hold_time - std::min(1.0, settings.hold_time);
-  result.limited_share = touch.limited_share;
-  result.lost_records = touch.lost_records;
-  result.aborted_at = touch.aborted_at;
-  result.samples = std::move(touch.samples);
-  return result;
+ContactResult run_contact(Rig& rig, const ContactCondition& condition, const ContactSettings& settings) {
+  RigWall wall = condition.wall;
+  wall.stiffness = settings.stiffness;
+  wall.haptic_rate = settings.haptic_rate;
+  TouchPlan plan;
+  plan.wall = wall;
+  plan.name = condition.name;
+  plan.request = press_request(condition.name, settings.hold_time);
+  plan.hold_time = settings.hold_time;
+  plan.threshold = settings.threshold;
+  return rig.touch<ContactResult>(plan, [&](RigTouch touch) {
+    ContactResult result;
+    result.condition = condition;
+    result.measure = touch.judgement;
+    result.surface = touch.surface;
+    result.side = touch.side;
+    result.judged_to = settings.hold_time;
+    result.judged_from = settings.hold_time - std::min(1.0, settings.hold_time);
+    result.limited_share = touch.limited_share;
+    result.lost_records = touch.lost_records;
+    result.aborted_at = touch.aborted_at;
+    result.samples = std::move(touch.samples);
+    return result;
+  });
 }
 
 }  // namespace kmax::experiment

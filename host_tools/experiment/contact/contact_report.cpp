@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "host_tools/plot/figure.hpp"
-#include "host_tools/report/page_files.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 
@@ -60,11 +60,11 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
   std::ofstream file(csv);
   file << "time_s,position_m,force_n,magnetic_coefficient_n\n";
   plot::Series distance{"", {}, {}, true}, force{"", {}, {}, true}, coefficient{"", {}, {}, true};
-  for (const device::TraceSample& sample : result.samples) {
-    file << fmt::format("{},{},{},{}\n", sample.time, sample.position, sample.force,
+  for (const RigSample& sample : result.samples) {
+    file << fmt::format("{},{},{},{}\n", sample.time, result.position(sample), sample.force,
                         sample.magnetic_coefficient);
     for (plot::Series* series : {&distance, &force, &coefficient}) series->x.push_back(sample.time);
-    distance.y.push_back(result.outside_distance(sample) * 1e3);
+    distance.y.push_back(sample.outside_distance * 1e3);
     force.y.push_back(sample.force);
     coefficient.y.push_back(sample.magnetic_coefficient);
   }
@@ -102,7 +102,7 @@ std::vector<std::string> contact_words(const ContactSettings& settings, std::siz
 }
 
 std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,
-                                                      const ContactSettings& settings, std::size_t trials,
+                                                      const std::vector<std::string>& words,
                                                       const std::vector<std::filesystem::path>& pictures,
                                                       const std::filesystem::path& folder,
                                                       report::Origin origin) {
@@ -116,11 +116,7 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
                    "figure",
                    "verdict, " + theirs + " 1",
                    "agrees"};
-  report::Section section{
-      "Result",
-      contact_words(settings, trials, results.empty() ? "" : results.front().velocity_estimator),
-      {},
-      {}};
+  report::Section section{"Result", words, {}, {}};
   for (std::size_t i = 0; i < results.size(); ++i) {
     const ContactResult& result = results[i];
     table.rows.push_back({result.condition.name, fmt::format("{:.3f}", result.measure.peak_to_peak * 1e3),

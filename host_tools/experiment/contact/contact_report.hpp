@@ -23,10 +23,10 @@ std::vector<std::string> contact_words(const ContactSettings& settings, std::siz
                                        const std::string& velocity_estimator);
 
 /// contact.md and contact.html in the folder of the pictures, which must be as write_contact() left them:
-/// one for each result. `origin`: of the results, which a device measures and a simulation predicts. Returns
-/// the names written. Throws std::runtime_error.
+/// one for each result. `words`: contact_words(). `origin`: of the results, which a device measures and a
+/// simulation predicts. Returns the names written. Throws std::runtime_error.
 std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,
-                                                      const ContactSettings& settings, std::size_t trials,
+                                                      const std::vector<std::string>& words,
                                                       const std::vector<std::filesystem::path>& pictures,
                                                       const std::filesystem::path& folder,
                                                       report::Origin origin);

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/experiment/journal_fields.hpp"
-#include "host_tools/experiment/rank_correlation.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/setting_check.hpp"
+#include "host_tools/experiment/tested_claim.hpp"
 
 namespace kmax::experiment {
 
@@ -56,7 +56,7 @@ DeviationTouch measured_touch(const RigTouch& touch, const TouchPlan& plan, doub
           touch.beyond_limit_share,
           touch.limited_share,
           touch.touched,
-          touch.aborted,
+          touch.aborted_at.has_value(),
           touch.lost_records};
 }
 }  // namespace

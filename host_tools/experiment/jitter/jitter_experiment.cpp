@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/experiment/journal_fields.hpp"
-#include "host_tools/experiment/rank_correlation.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/setting_check.hpp"
+#include "host_tools/experiment/tested_claim.hpp"
 
 namespace kmax::experiment {
 
@@ -112,8 +112,8 @@ JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressRep
   check("settled time", wall.settled_time, 0.0, wall.window);
   check("touches", settings.touches, 1, 1000);
   const auto measured = [&](const RigTouch& touch) {
-    return JitterTouch{touch.aborted ? JitterMeasure{} : measure_jitter(touch.samples, wall), touch.aborted,
-                       touch.limited_share, touch.lost_records};
+    return JitterTouch{touch.aborted_at ? JitterMeasure{} : measure_jitter(touch.samples, wall),
+                       touch.aborted_at.has_value(), touch.limited_share, touch.lost_records};
   };
   JitterRun run;
   for (const paper::JitterCell& pair : settings.pairs) {

@@ -22,11 +22,11 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/experiment/background_trend.hpp"
-#include "host_tools/experiment/limited_touches.hpp"
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"
+#include "host_tools/experiment/tested_claim.hpp"
 
 namespace kmax::experiment {
 

@@ -6,9 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "host_tools/experiment/journal_fields.hpp"
-#include "host_tools/experiment/max_stiffness/stiffness_climb.hpp"
-#include "host_tools/experiment/touch_journal.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 
 namespace kmax::experiment {
 
@@ -27,61 +25,36 @@ constexpr auto journal_fields = [](auto& touch, const auto& field) {
   field("lost_records", touch.lost_records);
 };
 
-std::vector<std::string> assignments_of(const StiffnessCondition& condition) {
-  if (!condition.adaptive)
-    return {"wall.law=magnetic", fmt::format("wall.magnetic_coefficient={}", condition.magnetic_coefficient)};
-  const char* mode = condition.mode == control::AdaptiveMode::latched     ? "latched"
-                     : condition.mode == control::AdaptiveMode::peak_hold ? "peak_hold"
-                                                                          : "instant";
-  return {"wall.law=adaptive", fmt::format("wall.adaptive_mode={}", mode)};
+DeviceStiffnessTouch touch_once(Rig& rig, const StiffnessCondition& condition,
+                                const DeviceStiffnessSettings& settings, double stiffness,
+                                std::size_t trial) {
+  RigWall wall;
+  wall.stiffness = stiffness;
+  wall.haptic_rate = settings.touch.haptic_rate;
+  wall.law = condition.adaptive ? control::WallKind::adaptive : control::WallKind::magnetic;
+  wall.magnetic_coefficient = condition.magnetic_coefficient;
+  wall.mode = condition.mode;
+  TouchPlan plan;
+  plan.wall = wall;
+  plan.name =
+      fmt::format("{}, {:g} N/mm, touch {} of {}", condition.name, stiffness / 1000, trial, settings.trials);
+  plan.key = fmt::format("{}, {} N/m, touch {}", condition.name, stiffness, trial);
+  plan.request = press_request(plan.name, settings.touch.hold_time);
+  plan.hold_time = settings.touch.hold_time;
+  plan.threshold = settings.touch.threshold;
+  auto made = rig.touch<DeviceStiffnessTouch>(plan, [](const RigTouch& touch) {
+    return DeviceStiffnessTouch{0,
+                                0,
+                                touch.judgement.verdict,
+                                touch.judgement.peak_to_peak,
+                                touch.limited_share,
+                                touch.aborted_at.has_value(),
+                                touch.lost_records};
+  });
+  made.stiffness = stiffness;
+  made.trial = trial;
+  return made;
 }
-
-/// Touches of one condition, from the journal or from the device.
-class Toucher {
- public:
-  Toucher(device::Device& device, const StiffnessCondition& condition,
-          const DeviceStiffnessSettings& settings, const TouchSession& session)
-      : device_(device), settings_(settings), session_(session) {
-    wall_.name = condition.name;
-    wall_.assignments = assignments_of(condition);
-  }
-
-  DeviceStiffnessTouch touch(double stiffness, std::size_t trial) {
-    const std::string what =
-        fmt::format("{}, {:g} N/mm, touch {} of {}", wall_.name, stiffness / 1000, trial, settings_.trials);
-    DeviceStiffnessTouch made = journaled_touch<DeviceStiffnessTouch>(
-        session_, fmt::format("{}, {} N/m, touch {}", wall_.name, stiffness, trial), what,
-        [&] { return attempt_once(what, stiffness); });
-    made.stiffness = stiffness;
-    made.trial = trial;
-    return made;
-  }
-
- private:
-  DeviceStiffnessTouch attempt_once(const std::string& what, double stiffness) {
-    if (session_.prompter != nullptr)
-      session_.prompter->ask(fmt::format(
-          "{}: take the handle out of the wall and be ready to press it against the wall for {:g} s", what,
-          settings_.touch.hold_time));
-    ContactSettings contact = settings_.touch;
-    contact.stiffness = stiffness;
-    ContactCondition wall = wall_;
-    wall.name = what;
-    const ContactResult result = run_contact(device_, wall, contact, session_.tell);
-    DeviceStiffnessTouch made;
-    made.verdict = result.measure.verdict;
-    made.peak_to_peak = result.measure.peak_to_peak;
-    made.limited_share = result.limited_share;
-    made.aborted = result.aborted_at.has_value();
-    made.lost_records = result.lost_records;
-    return made;
-  }
-
-  device::Device& device_;
-  const DeviceStiffnessSettings& settings_;
-  const TouchSession session_;
-  ContactCondition wall_;
-};
 }  // namespace
 
 void to_json(RunJournal::Json& json, const DeviceStiffnessTouch& touch) {
@@ -100,38 +73,30 @@ void from_json(const RunJournal::Json& json, DeviceStiffnessTouch& touch) {
   read_fields(json, touch, journal_fields);
 }
 
-RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessSettings& settings) {
-  const ContactSettings& touch = settings.touch;
-  RunJournal::Json all = {{"experiment", "max-stiffness"}};
-  all.update(device_circumstances(device, touch.axis));
-  all.update(RunJournal::Json{{"position_resolution_m", 0},  // contact_setup()
-                              {"haptic_rate_hz", touch.haptic_rate},
-                              {"hold_time_s", touch.hold_time},
-                              {"threshold_m", touch.threshold},
-                              {"force_limit_n", touch.force_limit},
-                              {"abort_amplitude_m", touch.abort_amplitude},
-                              {"start_n_per_m", settings.start},
-                              {"start_adaptive_n_per_m", settings.start_adaptive},
-                              {"step_n_per_m", settings.step},
-                              {"last_n_per_m", settings.last},
-                              {"trials", settings.trials}});
-  return all;
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const DeviceStiffnessSettings& settings) {
+  return touch_settings("max-stiffness", device, limits,
+                        {{"position_resolution_m", 0},
+                         {"haptic_rate_hz", settings.touch.haptic_rate},
+                         {"hold_time_s", settings.touch.hold_time},
+                         {"threshold_m", settings.touch.threshold},
+                         {"start_n_per_m", settings.start},
+                         {"start_adaptive_n_per_m", settings.start_adaptive},
+                         {"step_n_per_m", settings.step},
+                         {"last_n_per_m", settings.last},
+                         {"trials", settings.trials}});
 }
 
-DeviceStiffnessResult find_max_stiffness(device::Device& device, const StiffnessCondition& condition,
-                                         const DeviceStiffnessSettings& settings,
-                                         calibration::Prompter* prompter, RunJournal* journal,
-                                         const Tell& tell, const Tell& notice) {
+DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& condition,
+                                         const DeviceStiffnessSettings& settings) {
   DeviceStiffnessResult result{condition, {}, {}};
-  Standstill standstill(device, {settings.touch.axis}, notice);
-  Toucher toucher(device, condition, settings, {prompter, journal, tell, &standstill});
   StiffnessClimb climb(condition.adaptive ? settings.start_adaptive : settings.start, settings.step,
                        settings.last);
   while (const auto stiffness = climb.next()) {
     bool stable = true;
     double limited = 0.0;
     for (std::size_t trial = 1; stable && trial <= settings.trials; ++trial) {
-      const DeviceStiffnessTouch touch = toucher.touch(*stiffness, trial);
+      const DeviceStiffnessTouch touch = touch_once(rig, condition, settings, *stiffness, trial);
       result.touches.push_back(touch);
       ++result.found.touches;
       limited = std::max(limited, touch.limited_share);

@@ -7,15 +7,15 @@
 // oscillates too much, which counts as unstable. Each touch that is over is in the journal at once: a run
 // that was interrupted goes on with the next one.
 
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "host_tools/calibration/prompter.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_search.hpp"
 #include "host_tools/experiment/max_stiffness/stiffness_condition.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
-#include "host_tools/experiment/run_journal.hpp"
 
 namespace kmax::experiment {
 
@@ -50,24 +50,70 @@ struct DeviceStiffnessResult {
 };
 
 /// Everything the touches depend on, for a journal.
-RunJournal::Json journal_settings(device::Device& device, const DeviceStiffnessSettings& settings);
+RunJournal::Json journal_settings(device::Device& device, const TouchLimits& limits,
+                                  const DeviceStiffnessSettings& settings);
 
-/// One condition. Whoever holds the handle is asked before each touch to take it out of the wall and presses
-/// when it is armed; without a prompter nobody is asked, and a simulated person needs no asking. `journal`
-/// may be null. A touch that leaves the wall too early or that cannot be judged is made again
-/// (touch_journal.hpp); then the search ends there (never_touched). One that a standstill of this computer
-/// cut off is made again too, and `notice` is told.
-///
-/// Parameters stay changed: RestoredAfterwards with contact_changes(settings.touch). Errors: those of
-/// run_contact() and of the journal; NobodyTouched after the third time.
-DeviceStiffnessResult find_max_stiffness(device::Device& device, const StiffnessCondition& condition,
-                                         const DeviceStiffnessSettings& settings,
-                                         calibration::Prompter* prompter, RunJournal* journal,
-                                         const Tell& tell, const Tell& notice = {});
+/// One condition. A touch that leaves the wall too early or that cannot be judged is made again
+/// (touch_journal.hpp); then the search ends there (never_touched). Errors: those of the rig and of its
+/// journal; NobodyTouched after the third time.
+DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& condition,
+                                         const DeviceStiffnessSettings& settings);
 
 /// What paper 1 claims and this can contradict: a field of 2 N and every adaptive wall allow more stiffness
 /// than the plain wall. Conditions that have not been measured say nothing, nor do those whose search ended
 /// before an unstable touch (beyond_last, never_touched).
 bool order_is_the_papers(const std::vector<DeviceStiffnessResult>& results);
+
+// Paper 1's way to the largest stable stiffness (section 4.2): from a start in equal steps upwards until a
+// touch is unstable; the last stable stiffness is the result. A start that is already unstable, which the
+// paper does not speak of, is left downwards until a touch is stable.
+
+class StiffnessClimb {
+ public:
+  /// N/m: 0 < step, 0 < first <= last. Throws std::invalid_argument.
+  StiffnessClimb(double first, double step, double last) : first_(first), step_(step), last_(last) {
+    if (!(step > 0.0 && first > 0.0 && last >= first && last <= 1e7))
+      throw std::invalid_argument(
+          "the stiffness search needs a start and a step above 0, and an end from the start to 1e7 N/m");
+  }
+
+  /// The stiffness to touch next, N/m; none: the search is over.
+  std::optional<double> next() const {
+    if (given_up_ || (unstable_seen_ && stable_seen_)) return std::nullopt;
+    const double stiffness = at(number_);
+    if (stiffness > last_ * (1.0 + 1e-12) || stiffness < rounding * step_) return std::nullopt;
+    return stiffness;
+  }
+
+  /// What next() has been found to be.
+  void tell(bool stable) {
+    if (stable) {
+      stable_seen_ = true;
+      best_ = at(number_);
+    } else {
+      unstable_seen_ = true;
+    }
+    number_ += unstable_seen_ ? -1 : 1;
+  }
+
+  /// Ends the search where it is: the touches say nothing any more.
+  void give_up() { given_up_ = true; }
+
+  /// The largest stable stiffness so far, N/m; 0: none was.
+  double result() const { return best_; }
+  /// Nothing was unstable up to the end.
+  bool beyond_last() const { return stable_seen_ && !unstable_seen_ && !given_up_ && !next(); }
+
+ private:
+  /// Of a step: what is left of it where the way down ends at 0.
+  static constexpr double rounding = 1e-9;
+  /// Counted in steps, so that they add no rounding.
+  double at(int number) const { return first_ + step_ * number; }
+
+  double first_, step_, last_;
+  int number_ = 0;
+  bool stable_seen_ = false, unstable_seen_ = false, given_up_ = false;
+  double best_ = 0.0;
+};
 
 }  // namespace kmax::experiment

@@ -6,7 +6,7 @@
 
 #include "host_tools/experiment/contact/contact_report.hpp"
 #include "host_tools/plot/figure.hpp"
-#include "host_tools/report/page_files.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 
@@ -90,23 +90,24 @@ report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& resul
 }
 
 std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& settings,
-                                                const std::string& device) {
+                                                const TouchLimits& limits, const std::string& device) {
   const ContactSettings& touch = settings.touch;
   return {
       fmt::format("Largest stable stiffness on {}, axis {}, at {:g} Hz: from {:g} N/mm ({:g} N/mm for "
                   "adaptive walls) in steps of {:g} N/mm, {} at each, held for {:g} s.",
-                  device, touch.axis, touch.haptic_rate, settings.start / 1000,
+                  device, limits.axis, touch.haptic_rate, settings.start / 1000,
                   settings.start_adaptive / 1000, settings.step / 1000,
                   settings.trials == 1 ? "one touch" : fmt::format("{} touches", settings.trials),
                   touch.hold_time),
       fmt::format(
           "Unstable: more than {:g} mm peak to peak in every quarter of the last second, or more than {:g} "
           "mm within 0.25 s, at which the host ended the touch. The force is limited to {:g} N or less.",
-          touch.threshold * 1000, touch.abort_amplitude * 1000, touch.force_limit)};
+          touch.threshold * 1000, limits.abort_amplitude * 1000, limits.force_limit)};
 }
 
 std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
                                                           const DeviceStiffnessSettings& settings,
+                                                          const TouchLimits& limits,
                                                           const std::string& device,
                                                           const std::filesystem::path& folder,
                                                           const std::string& picture_ending) {
@@ -118,7 +119,7 @@ std::vector<std::filesystem::path> write_device_stiffness(const std::vector<Devi
   report::write_csv(table, csv);
   report::write_csv(device_touch_table(results), touches);
   report::Page page{"Largest stable stiffness (paper 1, Figs. 6 and 8)", {}};
-  page.sections.push_back({"Result", device_stiffness_words(settings, device), {table}, {}});
+  page.sections.push_back({"Result", device_stiffness_words(settings, limits, device), {table}, {}});
   const bool touched = std::any_of(results.begin(), results.end(), [](const DeviceStiffnessResult& result) {
     return !result.touches.empty();
   });

@@ -17,12 +17,13 @@ report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& resul
 
 /// What was done, in sentences.
 std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& settings,
-                                                const std::string& device);
+                                                const TouchLimits& limits, const std::string& device);
 
 /// max_stiffness.md, .html, both tables as .csv, and a picture of every touch's oscillation over its
 /// stiffness, if there are touches. Returns the names written. Throws plot::FigureError, std::runtime_error.
 std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
                                                           const DeviceStiffnessSettings& settings,
+                                                          const TouchLimits& limits,
                                                           const std::string& device,
                                                           const std::filesystem::path& folder,
                                                           const std::string& picture_ending);

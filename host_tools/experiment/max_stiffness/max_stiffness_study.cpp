@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/experiment/journal_fields.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 
 namespace kmax::experiment {
 

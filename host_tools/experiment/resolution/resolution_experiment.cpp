@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "control/resolution_criterion.hpp"
-#include "host_tools/experiment/journal_fields.hpp"
+#include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/setting_check.hpp"
 
 namespace kmax::experiment {
@@ -28,7 +28,7 @@ ResolutionTouch judged_touch(const RigTouch& touch) {
   return {touch.speed,
           touch.judgement.verdict == simulation::ContactVerdict::unstable,
           touch.judgement.verdict == simulation::ContactVerdict::no_contact,
-          touch.aborted,
+          touch.aborted_at.has_value(),
           touch.judgement.peak_to_peak,
           touch.lost_records};
 }

@@ -29,7 +29,7 @@
 #include <vector>
 
 #include "control/resampler.hpp"
-#include "host_tools/experiment/limited_touches.hpp"
+#include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"

@@ -8,7 +8,7 @@
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/plot/figure.hpp"
-#include "host_tools/report/page_files.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "host_tools/serve/host_side.hpp"
+#include "host_tools/serve/real_time.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 #include "host_tools/virtual_board/run/gpio_bridge.hpp"
 

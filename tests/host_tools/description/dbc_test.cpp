@@ -1,4 +1,4 @@
-#include "host_tools/description/dbc.hpp"
+#include "host_tools/description/described_objects.hpp"
 
 #include <gtest/gtest.h>
 

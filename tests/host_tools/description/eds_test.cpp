@@ -1,4 +1,3 @@
-#include "host_tools/description/eds.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,7 @@
 #include <optional>
 
 #include "host_tools/experiment/device_rig.hpp"
-#include "tests/host_tools/experiment/asked_person.hpp"
-#include "tests/host_tools/experiment/stalled_board.hpp"
+#include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -74,7 +73,7 @@ class DeviceExperiment : public StalledBoard {
   RigAxes axes = RigAxes::wall;
   TouchLimits limits;
   AskedPerson person;
-  calibration::Prompter* prompter = &person;
+  bench::Prompter* prompter = &person;
   std::vector<std::string> notices;
   Tell notice = [this](const std::string& text) { notices.push_back(text); };
   double force_limit = 0.0;  ///< N, that was at work

@@ -8,7 +8,7 @@
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
 #include "host_tools/experiment/resolution/resolution_experiment.hpp"
 #include "tests/host_tools/experiment/device_experiment.hpp"
-#include "tests/host_tools/experiment/two_held_axes.hpp"
+#include "tests/host_tools/experiment/touched_board.hpp"
 
 namespace kmax::experiment::device_rig_test {
 namespace {

@@ -1,4 +1,3 @@
-#include "host_tools/experiment/standstill.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +8,7 @@
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/experiment/touch_journal.hpp"
-#include "tests/host_tools/experiment/asked_person.hpp"
-#include "tests/host_tools/experiment/stalled_board.hpp"
+#include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::standstill_test {
@@ -23,7 +21,7 @@ class StandstillTest : public TouchedBoard {
   StandstillTest() { simulation_wait(2000); }
   void simulation_wait(int milliseconds) { cable().sim.wait(std::chrono::milliseconds(milliseconds)); }
   bool cut_off(const std::exception& error) {
-    return Standstill(device, {0, 1}, tell).cut_off(error, "a wall");
+    return bench::Standstill(device, {0, 1}, tell).cut_off(error, "a wall");
   }
   Fault fault(std::size_t axis) { return device::fault_of(device::Drive(device, axis).status()); }
 
@@ -87,8 +85,8 @@ TEST_F(StandstillTest, WhoStoppedAnAxisMeantIt) {
 }
 
 TEST_F(StandstillTest, ADeviceThatCannotBeReachedOrWasStartedAnewIsNotReady) {
-  Standstill standstill(device, {0}, tell);
-  standstill.touch_begins();
+  bench::Standstill standstill(device, {0}, tell);
+  standstill.begin();
   cable().cut = true;
   EXPECT_FALSE(standstill.cut_off(no_answer, "a wall"));
   cable().cut = false;
@@ -100,7 +98,7 @@ TEST_F(StandstillTest, ADeviceThatCannotBeReachedOrWasStartedAnewIsNotReady) {
 }
 
 TEST_F(StandstillTest, NobodyNeedsToBeTold) {
-  EXPECT_TRUE(Standstill(device, {0}, {}).cut_off(no_answer, "a wall"));
+  EXPECT_TRUE(bench::Standstill(device, {0}, {}).cut_off(no_answer, "a wall"));
 }
 
 /// Whole experiments, disturbed: contact and max-stiffness. Those of the other experiments are theirs.
@@ -112,21 +110,21 @@ class DisturbedTouches : public StalledBoard {
     set({"force.limit=10", "link.timeout=5"});
   }
 
+  template <typename Run>
+  auto with_rig(const Run& run) {
+    DeviceRig rig(device, touch_limits, {prompter, nullptr, tell, notice});
+    return run(rig);
+  }
   /// Three touches of a wall that holds still.
   std::vector<ContactResult> run_contacts() {
-    const RestoredAfterwards restored(device, 0, contact_changes(contact));
-    Standstill standstill(device, {0}, notice);
-    std::vector<ContactResult> results;
-    for (int trial = 0; trial < 3; ++trial) {
-      results.push_back(repeated_touch<ContactResult>({prompter, nullptr, tell, &standstill}, "wall", [&]() {
-        if (prompter != nullptr) prompter->ask("press");
+    return with_rig([&](Rig& rig) {
+      std::vector<ContactResult> results;
+      for (int trial = 0; trial < 3; ++trial) {
+        results.push_back(run_contact(rig, contact_conditions()[2], contact));
         limits.push_back(device.read_number("force.limit"));
-        ContactResult result = run_contact(device, contact_conditions()[2], contact, tell);
-        limits.push_back(device.read_number("force.limit"));
-        return result;
-      }));
-    }
-    return results;
+      }
+      return results;
+    });
   }
   void expect_left_in_order() {
     expect_disarmed();
@@ -136,7 +134,8 @@ class DisturbedTouches : public StalledBoard {
   }
 
   ContactSettings contact;
-  calibration::Prompter* prompter = nullptr;
+  TouchLimits touch_limits = contact_limits();
+  bench::Prompter* prompter = nullptr;
   AskedPerson person;
   std::vector<std::string> notices;
   std::vector<double> limits;
@@ -159,9 +158,9 @@ TEST_F(DisturbedTouches, OneOfThemIsMadeAgainAndMeasuresTheSame) {
       EXPECT_EQ(touches, 4);
       ASSERT_EQ(notices.size(), 1u);
       EXPECT_CONTAINS(notices[0], "thrown away");
-      ASSERT_EQ(limits.size(), 7u);
-      EXPECT_NEAR(limits[2], 3.3, 1e-6) << "lowered before the touch that is disturbed";
-      EXPECT_NEAR(limits[3], 3.3, 1e-6) << "and before its repetition";
+      ASSERT_EQ(limits.size(), 3u);
+      EXPECT_NEAR(limits[0], 3.3, 1e-6) << "lowered before the touch that is disturbed";
+      EXPECT_NEAR(limits[1], 3.3, 1e-6) << "and after its repetition";
       ASSERT_EQ(disturbed.size(), 3u);
       for (std::size_t i = 0; i < 3; ++i) {
         EXPECT_EQ(disturbed[i].measure.verdict, undisturbed[i].measure.verdict);
@@ -246,19 +245,12 @@ TEST_F(DisturbedTouches, NothingIsArmedAgainAfterAnInterruption) {
 }
 
 TEST_F(DisturbedTouches, AnOscillationIsAVerdictAndNotRepeated) {
-  contact.abort_amplitude = 0.5e-3;  // any touch bounces by more
+  touch_limits.abort_amplitude = 0.5e-3;  // any touch bounces by more
   stall = {Stall::Of::program, 1000, [](int) { return true; }};
   const auto results = run_contacts();
   EXPECT_EQ(touches, 3);
   for (const ContactResult& result : results) EXPECT_TRUE(result.aborted_at);
   EXPECT_TRUE(notices.empty());
-}
-
-TEST_F(DisturbedTouches, WithoutAStandstillToLookForTheyAreErrorsAsAnyOther) {
-  stall = {Stall::Of::program, 40, [](int) { return true; }};
-  const auto once = [&] { return run_contact(device, contact_conditions()[2], contact, tell); };
-  EXPECT_THROW(repeated_touch<ContactResult>({nullptr, nullptr, tell}, "wall", once), device::DeviceError);
-  EXPECT_EQ(touches, 1);
 }
 
 TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
@@ -269,7 +261,7 @@ TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
   StiffnessCondition plain;
   plain.name = "plain";
   const auto search = [&] {
-    return find_max_stiffness(device, plain, settings, prompter, nullptr, tell, notice);
+    return with_rig([&](Rig& rig) { return find_max_stiffness(rig, plain, settings); });
   };
   const DeviceStiffnessResult undisturbed = search();
   for (const Stall::Of of : every_stall) {

@@ -22,14 +22,14 @@ void from_json(const RunJournal::Json& json, Counted& touch) {
   touch.number = json.at("number").get<int>();
 }
 
-class Asked final : public calibration::Prompter {
+class Asked final : public bench::Prompter {
  public:
   void ask(const std::string&) override {}
 };
 
 class TouchJournal : public testing::Test {
  protected:
-  Counted touch(const std::string& key, calibration::Prompter* prompter = nullptr) {
+  Counted touch(const std::string& key, bench::Prompter* prompter = nullptr) {
     return journaled_touch<Counted>({prompter, journal.get(), tell}, key, "wall", once);
   }
   void reopen(RunJournal::Begin begin) {

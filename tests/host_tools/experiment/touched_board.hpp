@@ -7,9 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/bench/prompter.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/simulation/scene.hpp"
 
 namespace kmax::experiment {
 
@@ -75,5 +78,78 @@ class TouchedBoard : public testing::Test {
   std::vector<std::string> told;
   std::function<void(const std::string&)> tell = [this](const std::string& text) { told.push_back(text); };
 };
+
+/// What stands still in the touches of a board that are to be disturbed, always at the same request.
+struct Stall {
+  enum class Of {
+    nothing,
+    program,  ///< the host sends nothing while the device goes on
+    link,     ///< the host gets no answers while the device goes on
+    device,   ///< the host gets no answers, and the device's time does not pass
+  };
+  Of of = Of::nothing;
+  int at_request = 40;                  ///< of the touch, counted from arming
+  std::function<bool(int touch)> when;  ///< touches are counted from 1
+};
+
+/// A touched board on whose way to the host something stands still.
+class StalledBoard : public TouchedBoard {
+ protected:
+  explicit StalledBoard(const simulation::Scene& scene = simulated_board::factory_scene())
+      : TouchedBoard(scene) {
+    cable().before_request = [this] { each_request(); };
+  }
+
+  Stall stall;
+  int touches = 0;  ///< times that axis 0 was armed
+
+ private:
+  void each_request() {
+    constexpr int unanswered_requests = 2;
+    if (unanswered_ > 0) lose();
+    const bool on = forceful();
+    if (on && !was_on_) {
+      ++touches;
+      requests_ = 0;
+    }
+    was_on_ = on;
+    if (stall.of == Stall::Of::nothing || !on || ++requests_ != stall.at_request || !stall.when(touches))
+      return;
+    if (stall.of == Stall::Of::program) return cable().sim.wait(std::chrono::milliseconds(1500));
+    unanswered_ = unanswered_requests;
+    lose();
+  }
+  [[noreturn]] void lose() {
+    --unanswered_;
+    if (stall.of == Stall::Of::link) cable().sim.wait(std::chrono::milliseconds(1500));
+    throw link::LinkError("no answer");
+  }
+
+  bool was_on_ = false;
+  int requests_ = 0, unanswered_ = 0;
+};
+
+/// Somebody who does what is asked at once, and remembers it.
+class AskedPerson final : public bench::Prompter {
+ public:
+  void ask(const std::string& what_to_do) override {
+    requests.push_back(what_to_do);
+    if (answer) answer();
+  }
+
+  std::vector<std::string> requests;
+  std::function<void()> answer;  ///< may be empty
+};
+
+/// Axis 0 pressed against its wall, axis 1 held where it is.
+inline simulation::Scene two_held_axes() {
+  simulation::Scene scene = simulated_board::factory_scene();
+  scene.axes[0].motion->push_force = 2.5;
+  scene.axes[0].motion->hold_time = 3.6;
+  scene.axes.push_back(scene.axes[0]);
+  scene.axes[1].motion->start_position = scene.axes[1].motion->wall_position = 0.0;
+  scene.axes[1].motion->push_force = 0.0;
+  return scene;
+}
 
 }  // namespace kmax::experiment

@@ -3,7 +3,7 @@
 
 #include "host_tools/experiment/deviation/deviation_experiment.hpp"
 #include "tests/host_tools/experiment/device_experiment.hpp"
-#include "tests/host_tools/experiment/two_held_axes.hpp"
+#include "tests/host_tools/experiment/touched_board.hpp"
 
 namespace kmax::experiment::two_axis_rig_test {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::calibrate_command_test {
 namespace {

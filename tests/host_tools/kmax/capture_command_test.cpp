@@ -4,7 +4,7 @@
 
 #include "host_tools/plot/csv_table.hpp"
 #include "tests/host_tools/capturing_link.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::capture_command_test {
 namespace {

@@ -1,5 +1,5 @@
 #include "host_tools/check/criterion_text.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::check_command_test {
 namespace {

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/device/open_link.hpp"
+#include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -62,6 +63,14 @@ class CommandLineFixture : public testing::Test {
 
   host_tools_test::TemporaryFolder folder;
   std::string output, said;
+};
+
+/// The whole program in process, with the links that it really has.
+class SimulatedCommandLine : public CommandLineFixture {
+ protected:
+  std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) override {
+    return link::open_link(link::parse_device_address(address), notice);
+  }
 };
 
 }  // namespace kmax::cli

@@ -1,4 +1,4 @@
-#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/kmax/commands.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #include <filesystem>
 
-#include "host_tools/kmax/experiment_commands.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "host_tools/kmax/experiment_study.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_command_test {
 namespace {

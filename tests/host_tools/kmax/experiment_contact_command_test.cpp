@@ -2,7 +2,7 @@
 #include <unistd.h>
 
 #include "host_tools/device/sim/sim_link.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_contact_command_test {
 namespace {

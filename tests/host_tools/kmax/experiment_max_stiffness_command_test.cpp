@@ -2,7 +2,7 @@
 
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_max_stiffness_command_test {
 namespace {

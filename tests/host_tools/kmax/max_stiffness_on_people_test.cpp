@@ -77,7 +77,7 @@ TEST_F(MaxStiffnessOnPeople, AHandWrittenSetIsNotAndNeedNotMeetThePaper) {
 
 TEST_F(MaxStiffnessOnPeople, ACalibrationSaysInItsSetWhatItWasFittedTo) {
   options.subjects = own_set("", 0.1);
-  options.folder = (folder / "out").string();
+  options.files.folder = (folder / "out").string();
   options.calibrate = true;
   measure();
   EXPECT_TRUE(says_calibrated()) << output;
@@ -89,7 +89,7 @@ TEST_F(MaxStiffnessOnPeople, ACalibrationSaysInItsSetWhatItWasFittedTo) {
 }
 
 TEST_F(MaxStiffnessOnPeople, WhatASetWasFittedToIsNoReasonToRefuseItsJournal) {
-  options.folder = (folder / "out").string();
+  options.files.folder = (folder / "out").string();
   options.subjects = own_set("", 0.1);
   measure();
   options.resume = true;

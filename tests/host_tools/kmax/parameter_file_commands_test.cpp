@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "host_tools/device/parameter_file.hpp"
-#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/kmax/commands.hpp"
 #include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::parameter_file_commands_test {

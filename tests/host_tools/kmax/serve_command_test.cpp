@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "host_tools/device/can/unix_can.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::serve_command_test {
 namespace {

@@ -1,5 +1,5 @@
 #include "host_tools/plot/csv_table.hpp"
-#include "tests/host_tools/kmax/simulated_command_line.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::simulate_command_test {
 namespace {

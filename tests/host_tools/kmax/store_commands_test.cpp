@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "host_tools/kmax/command_line.hpp"
+#include "host_tools/kmax/commands.hpp"
 #include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::store_commands_test {

@@ -1,4 +1,4 @@
-#include "host_tools/report/markdown.hpp"
+#include "host_tools/report/page.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

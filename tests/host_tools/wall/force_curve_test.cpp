@@ -1,4 +1,4 @@
-#include "host_tools/wall/force_curve.hpp"
+#include "host_tools/wall/wall_evaluation.hpp"
 
 #include <gtest/gtest.h>
 

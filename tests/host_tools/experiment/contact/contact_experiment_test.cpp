@@ -4,7 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
-#include <set>
+#include <optional>
 
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
@@ -22,10 +22,15 @@ class Contact : public TouchedBoard {
   }
 
   ContactResult run(std::size_t condition) {
-    return run_contact(device, contact_conditions()[condition], settings, tell);
+    const Tell nobody = [](const std::string&) {};
+    rig.reset();
+    rig.emplace(device, limits, TouchParty{nullptr, nullptr, tell, nobody});
+    return run_contact(*rig, contact_conditions()[condition], settings);
   }
 
   ContactSettings settings;
+  TouchLimits limits = contact_limits();
+  std::optional<DeviceRig> rig;  ///< as it was left
 };
 
 TEST(ContactConditions, AreThePapersWallsWithTheAdaptiveOneInEachMode) {
@@ -64,12 +69,12 @@ TEST_F(Contact, ATrialHasTheTouchAtTimeZeroAndLosesNothing) {
   EXPECT_LT(result.samples.front().time, 0.0);
   EXPECT_GT(result.samples.back().time, 1.0);
   for (const auto& sample : result.samples) {
-    ASSERT_TRUE(sample.time >= 0 || result.outside_distance(sample) > 0.0) << sample.time;
-    ASSERT_TRUE(sample.time != 0 || result.outside_distance(sample) <= 0.0);
+    ASSERT_TRUE(sample.time >= 0 || sample.outside_distance > 0.0) << sample.time;
+    ASSERT_TRUE(sample.time != 0 || sample.outside_distance <= 0.0);
+    ASSERT_EQ(result.position(sample), sample.outside_distance) << "of a surface at 0";
   }
   EXPECT_EQ(std::count_if(result.samples.begin(), result.samples.end(), [](auto& s) { return s.time == 0; }),
             1);
-  EXPECT_FALSE(result.velocity_estimator.empty());
   ASSERT_FALSE(told.empty());
   EXPECT_CONTAINS(told.front(), "F_MC = 1 N: waiting for the touch");
   EXPECT_CONTAINS(told.back(), "of 1.0 s");
@@ -145,22 +150,20 @@ class ContactWithoutAPerson : public Contact {
 };
 
 TEST_F(ContactWithoutAPerson, NoTouchWithinPatienceIsAnError) {
-  settings.contact_patience = 2.0;
+  limits.patience = 2.0;
   const auto begin = device.link().now();
   EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "nobody touched the wall within 2 s");
   EXPECT_LT(device.link().now() - begin, std::chrono::seconds(4));
   expect_disarmed();
 }
 
-TEST(ContactSetup, ConditionsCanBeSetTogetherWithTheSetup) {
-  std::set<std::string> names;
+TEST(ContactConditions, AreWhatTheirRigSets) {
   for (const ContactCondition& condition : contact_conditions()) {
-    auto all = contact_setup({});
-    all.insert(all.end(), condition.assignments.begin(), condition.assignments.end());
-    EXPECT_NO_THROW(device::parse_assignments(all, 1)) << condition.name;
-    names.insert(condition.name);
+    const auto set = wall_assignments(condition.wall, 1, RigAxes::wall);
+    EXPECT_NO_THROW(device::parse_assignments(set, 1)) << condition.name;
+    for (const std::string& one : condition.assignments)
+      EXPECT_TRUE(std::find(set.begin(), set.end(), one) != set.end()) << one;
   }
-  EXPECT_EQ(names.size(), contact_conditions().size());
 }
 
 ContactResult trial(ContactVerdict verdict, double peak_to_peak, std::uint64_t lost = 0) {

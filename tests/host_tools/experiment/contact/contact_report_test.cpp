@@ -16,12 +16,13 @@ using host_tools_test::thrown_message;
 
 ContactResult result_of(const std::string& name) {
   ContactResult result;
-  result.condition = {name, "9", {}, "stable", true};
+  result.condition = {name, "9", {}, "stable", true, {}};
   result.measure.verdict = simulation::ContactVerdict::stable;
   result.measure.peak_to_peak = 0.1234e-3;
   result.judged_to = 1.0;
   result.trials = 3;
-  for (int i = 0; i < 100; ++i) result.samples.push_back({i * 0.01 - 0.1, 1e-3 - i * 2e-5, 0.5 * i, 1.0});
+  for (int i = 0; i < 100; ++i)
+    result.samples.push_back({i * 0.01 - 0.1, 1e-3 - i * 2e-5, 0.5 * i, 0.0, 0.0, 1.0});
   return result;
 }
 
@@ -46,7 +47,7 @@ TEST(ContactReport, PictureAndTableShareASafeName) {
   const plot::CsvTable csv = plot::read_csv(files[1]);
   ASSERT_EQ(csv.column("time_s").size(), result.samples.size());
   for (std::size_t i = 0; i < result.samples.size(); ++i) {
-    ASSERT_EQ(csv.column("position_m")[i], result.samples[i].position);
+    ASSERT_EQ(csv.column("position_m")[i], result.position(result.samples[i]));
     ASSERT_EQ(csv.column("force_n")[i], result.samples[i].force);
   }
   EXPECT_CONTAINS(folder.read("new/folder/contact_f_mc_2_n_x.svg"), "0.12 mm peak to peak");

@@ -1,13 +1,14 @@
 #include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
+#include <vector>
 
 #include "host_tools/device/value_text.hpp"
-#include "host_tools/experiment/max_stiffness/stiffness_climb.hpp"
-#include "tests/host_tools/experiment/asked_person.hpp"
 #include "tests/host_tools/experiment/touched_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -33,15 +34,23 @@ class DeviceStiffness : public TouchedBoard {
     settings.start = 3000;
     settings.step = 500;
   }
-  DeviceStiffnessResult find(const StiffnessCondition& condition, calibration::Prompter* prompter = nullptr,
+  DeviceStiffnessResult find(const StiffnessCondition& condition, bench::Prompter* prompter = nullptr,
                              RunJournal* journal = nullptr) {
-    return find_max_stiffness(device, condition, settings, prompter, journal, tell);
+    const Tell nobody = [](const std::string&) {};
+    DeviceRig rig(device, limits, {prompter, journal, tell, nobody});
+    const DeviceStiffnessResult found = find_max_stiffness(rig, condition, settings);
+    adaptive_mode = device.read_number("wall.adaptive_mode");
+    law = device.read_number("wall.law");
+    return found;
   }
   std::unique_ptr<RunJournal> open(RunJournal::Begin begin) {
-    return std::make_unique<RunJournal>(folder / "run.jsonl", journal_settings(device, settings), begin);
+    return std::make_unique<RunJournal>(folder / "run.jsonl", journal_settings(device, limits, settings),
+                                        begin);
   }
   const TemporaryFolder folder;
   DeviceStiffnessSettings settings;
+  TouchLimits limits = contact_limits();
+  double adaptive_mode = 0, law = 0;  ///< at the end of the search
 };
 
 TEST_F(DeviceStiffness, IsTheLastStableStepBeforeTheFirstUnstableTouch) {
@@ -72,13 +81,13 @@ TEST_F(DeviceStiffness, AFieldOfTwoNewtonsAllowsMoreAndStartsAreThoseOfTheLaw) {
   settings.start_adaptive = 4500;
   const DeviceStiffnessResult result = find(adaptive);
   EXPECT_EQ(result.touches.front().stiffness, 4500);
-  EXPECT_EQ(device.read_number("wall.adaptive_mode"), 1);
-  EXPECT_EQ(device.read_number("wall.law"), 3);
+  EXPECT_EQ(adaptive_mode, 1);
+  EXPECT_EQ(law, 3);
 }
 
 // Half a millimetre is less than the handle bounces by at the first touch of any wall.
 TEST_F(DeviceStiffness, AbortedTouchesAreUnstableAndTheSearchGoesDownToTheBottom) {
-  settings.touch.abort_amplitude = 0.5e-3;
+  limits.abort_amplitude = 0.5e-3;
   const DeviceStiffnessResult result = find(wall_with(0));
   EXPECT_EQ(result.found.stiffness, 0);
   ASSERT_EQ(result.touches.size(), 6u);
@@ -124,9 +133,9 @@ TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
   EXPECT_EQ(result.touches.front().stiffness, 3000);
   EXPECT_EQ(result.touches.size(), journal->size());
   // Once more, from the journal alone.
-  const auto before = device.link().now();
+  told.clear();
   const DeviceStiffnessResult again = find(wall_with(2), nullptr, journal.get());
-  EXPECT_EQ(device.link().now(), before);
+  EXPECT_TRUE(told.empty());
   EXPECT_EQ(again.found.stiffness, result.found.stiffness);
   EXPECT_EQ(again.found.ending_peak_to_peak, result.found.ending_peak_to_peak);
   EXPECT_EQ(again.found.saturated_share, result.found.saturated_share);
@@ -167,19 +176,14 @@ TEST_F(DeviceStiffness, EverythingThatWasChangedIsPutBackHoweverItEnds) {
     EXPECT_FLOAT_EQ(static_cast<float>(device.read_number("force.limit")), 3.3F);
     throw std::runtime_error("enough");
   };
-  try {
-    const RestoredAfterwards restored(device, 0, contact_changes(settings.touch));
-    find(wall_with(1));
-    FAIL();
-  } catch (const std::runtime_error&) {
-  }
+  EXPECT_THROW(find(wall_with(1)), std::runtime_error);
   for (std::size_t i = 0; i < names.size(); ++i)
     EXPECT_EQ(device.read_number(names[i]), before[i]) << names[i];
 }
 
 class DeviceStiffnessWithoutAPerson : public DeviceStiffness {
  protected:
-  DeviceStiffnessWithoutAPerson() : DeviceStiffness(nobody()) { settings.touch.contact_patience = 0.5; }
+  DeviceStiffnessWithoutAPerson() : DeviceStiffness(nobody()) { limits.patience = 0.5; }
 };
 
 TEST_F(DeviceStiffnessWithoutAPerson, IsAskedThreeTimesAndNotWithoutAPrompter) {
@@ -308,5 +312,90 @@ TEST(OrderOfThePaper, IsContradictedByAFieldThatDoesNotHelp) {
   EXPECT_TRUE(order_is_the_papers({found(0, false, 3500), found(0.5, false, 3400)}));
 }
 
+/// The stiffnesses it asks for while everything up to `limit` is stable.
+std::vector<double> climb_to(StiffnessClimb& climb, double limit) {
+  std::vector<double> asked;
+  while (const auto stiffness = climb.next()) {
+    asked.push_back(*stiffness);
+    climb.tell(*stiffness <= limit);
+  }
+  return asked;
+}
+
+TEST(StiffnessClimb, GoesUpToTheFirstUnstableOne) {
+  StiffnessClimb climb(3000, 100, 20e3);
+  EXPECT_EQ(climb_to(climb, 3250), (std::vector<double>{3000, 3100, 3200, 3300}));
+  EXPECT_EQ(climb.result(), 3200);
+  EXPECT_FALSE(climb.beyond_last());
+}
+
+TEST(StiffnessClimb, GoesDownFromAnUnstableStart) {
+  StiffnessClimb climb(5000, 1000, 20e3);
+  EXPECT_EQ(climb_to(climb, 3580), (std::vector<double>{5000, 4000, 3000}));
+  EXPECT_EQ(climb.result(), 3000);
+}
+
+TEST(StiffnessClimb, EndsAtBothEnds) {
+  StiffnessClimb nothing(300, 100, 1000);
+  EXPECT_EQ(climb_to(nothing, 0), (std::vector<double>{300, 200, 100}));
+  EXPECT_EQ(nothing.result(), 0);
+  EXPECT_FALSE(nothing.beyond_last());
+  StiffnessClimb everything(800, 100, 1000);
+  EXPECT_EQ(climb_to(everything, 1e9), (std::vector<double>{800, 900, 1000}));
+  EXPECT_EQ(everything.result(), 1000);
+  EXPECT_TRUE(everything.beyond_last());
+}
+
+TEST(StiffnessClimb, GivenUpItKeepsWhatItHas) {
+  StiffnessClimb climb(3000, 100, 20e3);
+  climb.tell(true);
+  climb.give_up();
+  EXPECT_FALSE(climb.next());
+  EXPECT_EQ(climb.result(), 3000);
+  EXPECT_FALSE(climb.beyond_last());
+}
+
+RC_GTEST_PROP(StiffnessClimbProperty, FindsTheLimitWithinAStepFromAnyStart, ()) {
+  const double first = *rc::gen::inRange(1, 100) * 100.0, limit = *rc::gen::inRange(1, 200) * 50.0;
+  StiffnessClimb climb(first, 100, 20e3);
+  climb_to(climb, limit);
+  RC_ASSERT(climb.result() <= limit);
+  RC_ASSERT(limit < climb.result() + 100);
+}
+
+TEST(StiffnessClimb, AStartBelowHalfAStepIsTouched) {
+  StiffnessClimb up(40, 100, 1000);
+  EXPECT_EQ(climb_to(up, 250), (std::vector<double>{40, 140, 240, 340}));
+  EXPECT_EQ(up.result(), 240);
+  StiffnessClimb down(40, 100, 1000);
+  EXPECT_EQ(climb_to(down, 0), (std::vector<double>{40}));
+  StiffnessClimb remainder(230, 100, 1000);
+  EXPECT_EQ(climb_to(remainder, 110), (std::vector<double>{230, 130, 30}));
+  EXPECT_EQ(remainder.result(), 30);
+}
+
+RC_GTEST_PROP(StiffnessClimbProperty, FindsTheLimitWithinAStepFromAStartThatIsNoMultiple, ()) {
+  const double first = *rc::gen::inRange(1, 100000) * 0.1, step = *rc::gen::inRange(1, 20000) * 0.1;
+  const double limit = *rc::gen::inRange(1, 20000) * 1.0;
+  StiffnessClimb climb(first, step, 20e3);
+  const std::vector<double> asked = climb_to(climb, limit);
+  RC_ASSERT(!asked.empty() && asked.front() == first);
+  for (const double stiffness : asked) RC_ASSERT(stiffness > 0.0);
+  RC_ASSERT(climb.result() <= limit);
+  if (!climb.beyond_last()) RC_ASSERT(limit < climb.result() + step * (1.0 + 1e-9));
+}
+
+TEST(StiffnessClimb, RefusesAbsurdSteps) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(StiffnessClimb(0, 100, 1000), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(3000, 0, 1e4), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(3000, -1, 1e4), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(3000, 100, 2000), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(3000, 100, 1e8), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(nan, 100, 1e4), std::invalid_argument);
+  EXPECT_THROW(StiffnessClimb(3000, nan, 1e4), std::invalid_argument);
+}
+
 }  // namespace
+
 }  // namespace kmax::experiment::device_max_stiffness_test

@@ -38,4 +38,22 @@ inline SubjectSet two_people() {
   return set;
 }
 
+// A study of few touches and people, for tests.
+
+inline StiffnessRun quick_run(std::size_t threads = 2) {
+  StiffnessRun run;
+  run.threads = threads;
+  run.protocol.approach_speeds = {0.1, 0.5};
+  run.protocol.pushes = {0.6};
+  return run;
+}
+
+inline SubjectSet few_people(std::size_t count, double gain = simulation::OperatorModel{}.activation_gain) {
+  SubjectSet set;
+  set.name = "few";
+  set.subjects = draw_subjects(count, 1);
+  for (Subject& subject : set.subjects) subject.person.activation_gain = gain;
+  return set;
+}
+
 }  // namespace kmax::experiment

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
-#include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
+#include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::experiment::max_stiffness_study_test {

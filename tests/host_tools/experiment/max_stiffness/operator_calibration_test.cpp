@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/host_tools/experiment/max_stiffness/quick_study.hpp"
+#include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 
 namespace kmax::experiment::operator_calibration_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "host_tools/experiment/remaining_time.hpp"
+#include "host_tools/experiment/progress_report.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
-#include "host_tools/record/row_csv.hpp"
+#include "host_tools/record/row.hpp"
 
 #include <gtest/gtest.h>
 
-namespace kmax::record::row_csv_test {
+namespace kmax::record::row_test {
 namespace {
 Row row() {
   Row made{.tick = 1'000'020};
@@ -39,4 +39,4 @@ TEST(RowCsv, TimesOfLongRecordingsKeepTheTick) {
 }
 
 }  // namespace
-}  // namespace kmax::record::row_csv_test
+}  // namespace kmax::record::row_test
