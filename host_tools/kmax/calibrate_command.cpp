@@ -142,16 +142,15 @@ void add_calibrate_command(CLI::App& app, Context& context) {
       app, context,
       {"calibrate",
        "Identifies motor, encoder and handle of an axis, names what is wrong with them, and saves them.",
-       "  kmax calibrate                                  everything that control needs\n"
-       "  kmax calibrate --steps electrical --dry-run     look at the motor, change nothing\n"
-       "  kmax calibrate --steps all --travel 0.03        cogging, friction and gravity as well\n"
-       "  kmax calibrate --hand                           also tells swapped phases from a reversed "
-       "encoder\n\n"
-       "Nobody may hold the handle, which trembles and moves by up to --travel to either side. Before: "
-       "motor.kind,\n"
-       "encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be right.\n"
-       "The parameters change only if every step passes; the axis is disarmed at the end and on Ctrl-C.\n"
-       "Exit code 3: a step failed; its cause has a name that docs/calibration.md explains."},
+       R"(  kmax calibrate                                  everything that control needs
+  kmax calibrate --steps electrical --dry-run     look at the motor, change nothing
+  kmax calibrate --steps all --travel 0.03        cogging, friction and gravity as well
+  kmax calibrate --hand                           also tells swapped phases from a reversed encoder
+
+Nobody may hold the handle, which trembles and moves by up to --travel to either side. Before: motor.kind,
+encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be right.
+The parameters change only if every step passes; the axis is disarmed at the end and on Ctrl-C.
+Exit code 3: a step failed; its cause has a name that docs/calibration.md explains.)"},
       Takes::device_and_axis, run_calibrate);
 }
 

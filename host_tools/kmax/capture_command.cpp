@@ -259,14 +259,13 @@ void add_capture_command(CLI::App& app, Context& context) {
   add_command<CaptureOptions>(
       app, context,
       {"capture", "Records up to four channels of an axis at the full tick rate around an event.",
-       "  kmax capture --channels position,force --trigger contact --pre-trigger 1000 --out contact.csv\n"
-       "  kmax capture --channels current,current_reference,voltage --trigger excitation\n"
-       "  kmax capture --trigger force --level 2 --arm --json\n\n"
-       "The device holds 12288 values: 3072 samples of four channels last 0.15 s at 20 kHz, and an interval "
-       "of n\n"
-       "ticks makes it n times as long. Without --out the table goes to standard output, with --json it is "
-       "part of\n"
-       "the document. Times are the device's own and zero at the trigger. Ctrl-C stops the capture."},
+       R"(  kmax capture --channels position,force --trigger contact --pre-trigger 1000 --out contact.csv
+  kmax capture --channels current,current_reference,voltage --trigger excitation
+  kmax capture --trigger force --level 2 --arm --json
+
+The device holds 12288 values: 3072 samples of four channels last 0.15 s at 20 kHz, and an interval of n
+ticks makes it n times as long. Without --out the table goes to standard output, with --json it is part of
+the document. Times are the device's own and zero at the trigger. Ctrl-C stops the capture.)"},
       Takes::device_and_axis, run_capture);
 }
 

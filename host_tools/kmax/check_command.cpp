@@ -259,15 +259,14 @@ void add_check_command(CLI::App& app, Context& context) {
   add_command<CheckOptions>(
       app, context,
       {"check", "Judges by stability criteria whether the wall of a parameter set will hold still.",
-       "  kmax check                                 the device's parameters\n"
-       "  kmax check --set guard.damping=0.5 --set wall.stiffness=2N/mm --hand subject_1\n"
-       "  kmax check --explain colgate               formula, assumptions, source; without a name, of all\n"
-       "  kmax check --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log --picture "
-       "map.svg\n\n"
-       "Sets nothing. 'pass' takes every criterion that applies; most walls in use are without a guarantee "
-       "and\n"
-       "still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.\n"
-       "See docs/stability_check.md. Exit code of a map: 0."},
+       R"(  kmax check                                 the device's parameters
+  kmax check --set guard.damping=0.5 --set wall.stiffness=2N/mm --hand subject_1
+  kmax check --explain colgate               formula, assumptions, source; without a name, of all
+  kmax check --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log --picture map.svg
+
+Sets nothing. 'pass' takes every criterion that applies; most walls in use are without a guarantee and
+still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.
+See docs/stability_check.md. Exit code of a map: 0.)"},
       Takes::device_and_axis, run_check);
 }
 

@@ -100,11 +100,12 @@ std::string default_text(const Parameter& parameter) {
 void describe_markdown(Context& context) {
   print(
       context.out,
-      "# Parameters\n\n"
-      "Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis\n"
-      "parameters again: index + 0x{:X}, Modbus address + 0x{:X}, name with the prefix `axisN.`. Values of "
-      "two\n"
-      "registers have the high word first. What is set over CANopen only can be read over every link.\n",
+      R"(# Parameters
+
+Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis
+parameters again: index + 0x{:X}, Modbus address + 0x{:X}, name with the prefix `axisN.`. Values of two
+registers have the high word first. What is set over CANopen only can be read over every link.
+)",
       firmware::axis_index_offset, firmware::axis_modbus_offset);
   std::uint16_t group = 0;
   for (const Parameter& parameter : device::all_parameters()) {
@@ -115,8 +116,9 @@ void describe_markdown(Context& context) {
       print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
             parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
       print(context.out,
-            "| name | unit | allowed | default | type | object | register | help "
-            "|\n|---|---|---|---|---|---|---|---|\n");
+            R"(| name | unit | allowed | default | type | object | register | help |
+|---|---|---|---|---|---|---|---|
+)");
     }
     std::string help = escaped(entry.help);
     if (entry.change == firmware::Change::disarmed_only) help += " Changes only while disarmed.";

@@ -126,25 +126,19 @@ void add_deviation_experiment(CLI::App& experiment, Context& context) {
   add_command<DeviationOptions>(
       experiment, context,
       {"deviation", "Pushes a hand along the wall and sees how far it gives way (paper 1, Table II).",
-       "  kmax experiment deviation                                          simulated people, takes "
-       "seconds\n"
-       "  kmax experiment deviation --subjects unclipped --out results       with pictures and a page\n"
-       "  kmax experiment deviation --activation-gain 0                      a hand that cannot stiffen\n"
-       "  kmax experiment deviation --device serial:/dev/ttyUSB0             somebody's own hand\n"
-       "  kmax experiment deviation --device serial:/tmp/kmax --no-prompt    whom 'kmax serve --scene "
-       "paper1_deviation'\n"
-       "                                                                     simulates, in real time: 5 "
-       "minutes\n\n"
-       "Pulses of F_I act along the surface, five without and five with a background force F_B away from it. "
-       "The\n"
-       "paper finds that the deviation falls when F_B increases. A device needs two axes: the wall is on "
-       "--axis, the\n"
-       "other one lies along the surface. You are told before each touch what to do; both axes' force limits "
-       "are\n"
-       "lowered, each touch is disarmed at its end and when the handle swings too far, and all parameters "
-       "are put\n"
-       "back, on Ctrl-C too.\n"
-       "Exit code 3: the deviation did not fall, or too little was touched to tell."},
+       R"(  kmax experiment deviation                                          simulated people, takes seconds
+  kmax experiment deviation --subjects unclipped --out results       with pictures and a page
+  kmax experiment deviation --activation-gain 0                      a hand that cannot stiffen
+  kmax experiment deviation --device serial:/dev/ttyUSB0             somebody's own hand
+  kmax experiment deviation --device serial:/tmp/kmax --no-prompt    whom 'kmax serve --scene paper1_deviation'
+                                                                     simulates, in real time: 5 minutes
+
+Pulses of F_I act along the surface, five without and five with a background force F_B away from it. The
+paper finds that the deviation falls when F_B increases. A device needs two axes: the wall is on --axis, the
+other one lies along the surface. You are told before each touch what to do; both axes' force limits are
+lowered, each touch is disarmed at its end and when the handle swings too far, and all parameters are put
+back, on Ctrl-C too.
+Exit code 3: the deviation did not fall, or too little was touched to tell.)"},
       Takes::device, run_deviation);
 }
 

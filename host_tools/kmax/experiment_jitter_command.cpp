@@ -110,18 +110,16 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
       experiment, context,
       {"jitter",
        "Throws a hand out of the wall and sees how far, and how long until it is back (paper 1, Table I).",
-       "  kmax experiment jitter                                        simulated people, takes seconds\n"
-       "  kmax experiment jitter --subjects unclipped --out results     with pictures and a page\n"
-       "  kmax experiment jitter --activation-gain 0                    a hand that cannot stiffen\n"
-       "  kmax experiment jitter --device serial:/dev/ttyUSB0           somebody's own hand\n\n"
-       "Inside the wall an interference force F_I is added, everywhere a background force F_B (1 to 7 N and "
-       "0 to\n"
-       "4 N). The paper finds that jitter and adjustment time fall when F_B increases. On a device you are "
-       "told\n"
-       "before each touch what to do; the force limit is lowered, each touch is disarmed at its end and when "
-       "the\n"
-       "handle swings too far, and all parameters are put back, on Ctrl-C too.\n"
-       "Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell."},
+       R"(  kmax experiment jitter                                        simulated people, takes seconds
+  kmax experiment jitter --subjects unclipped --out results     with pictures and a page
+  kmax experiment jitter --activation-gain 0                    a hand that cannot stiffen
+  kmax experiment jitter --device serial:/dev/ttyUSB0           somebody's own hand
+
+Inside the wall an interference force F_I is added, everywhere a background force F_B (1 to 7 N and 0 to
+4 N). The paper finds that jitter and adjustment time fall when F_B increases. On a device you are told
+before each touch what to do; the force limit is lowered, each touch is disarmed at its end and when the
+handle swings too far, and all parameters are put back, on Ctrl-C too.
+Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell.)"},
       Takes::device, run_jitter);
 }
 

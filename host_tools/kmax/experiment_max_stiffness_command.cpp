@@ -120,23 +120,18 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
       {"max-stiffness",
        "Looks for the largest stiffness of a wall that stays stable, under each law (paper 1, Figs. 6 and "
        "8).",
-       "  kmax experiment max-stiffness                                  twelve simulated people, seconds\n"
-       "  kmax experiment max-stiffness --clip both --out results        a page with tables and pictures\n"
-       "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results\n"
-       "  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume\n\n"
-       "Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each "
-       "mode.\n"
-       "Simulated people touch each stiffness at several speeds with several pushes. On a device you are "
-       "told what to do:\n"
-       "before each touch take the handle out of the wall and press Enter, then press against the wall until "
-       "the time is\n"
-       "over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on "
-       "Ctrl-C; its\n"
-       "parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from "
-       "there.\n"
-       "Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a "
-       "device,\n"
-       "2 N or an adaptive wall does not allow more than the plain wall."},
+       R"(  kmax experiment max-stiffness                                  twelve simulated people, seconds
+  kmax experiment max-stiffness --clip both --out results        a page with tables and pictures
+  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results
+  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume
+
+Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each mode.
+Simulated people touch each stiffness at several speeds with several pushes. On a device you are told what to do:
+before each touch take the handle out of the wall and press Enter, then press against the wall until the time is
+over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on Ctrl-C; its
+parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from there.
+Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a device,
+2 N or an adaptive wall does not allow more than the plain wall.)"},
       Takes::device, run_max_stiffness);
 }
 

@@ -146,19 +146,16 @@ void add_resolution_experiment(CLI::App& experiment, Context& context) {
       experiment, context,
       {"resolution",
        "Touches a wall with coarser and coarser positions and sees what vibrates (paper 2, section 3).",
-       "  kmax experiment resolution                                  a simulated hand, takes seconds\n"
-       "  kmax experiment resolution --grip 1 --delay 0               a firm hand and no delay: nothing "
-       "vibrates\n"
-       "  kmax experiment resolution --out results                    with pictures and a page\n"
-       "  kmax experiment resolution --device serial:/dev/ttyUSB0     somebody's own hand\n\n"
-       "The paper finds that a wall of 1.2 N/mm vibrates at steps of 0.4 mm, and at 0.1 mm only when it is "
-       "touched\n"
-       "faster than 0.1 m/s. On a device you are told before each touch what to do; the force limit is "
-       "lowered, each\n"
-       "touch is disarmed at its end and when the handle swings too far, and all parameters are put back, on "
-       "Ctrl-C\n"
-       "too.\n"
-       "Exit code 3: one of the two did not come out, or was not tested."},
+       R"(  kmax experiment resolution                                  a simulated hand, takes seconds
+  kmax experiment resolution --grip 1 --delay 0               a firm hand and no delay: nothing vibrates
+  kmax experiment resolution --out results                    with pictures and a page
+  kmax experiment resolution --device serial:/dev/ttyUSB0     somebody's own hand
+
+The paper finds that a wall of 1.2 N/mm vibrates at steps of 0.4 mm, and at 0.1 mm only when it is touched
+faster than 0.1 m/s. On a device you are told before each touch what to do; the force limit is lowered, each
+touch is disarmed at its end and when the handle swings too far, and all parameters are put back, on Ctrl-C
+too.
+Exit code 3: one of the two did not come out, or was not tested.)"},
       Takes::device, run_resolution);
 }
 

@@ -195,15 +195,14 @@ void add_record_command(CLI::App& app, Context& context) {
   add_command<RecordOptions>(
       app, context,
       {"record", "Records position, velocity, force, current and flags as CSV for as long as you like.",
-       "  kmax record run.csv --for 60 --device can:can0    1000 rows a second, from the device's PDOs\n"
-       "  kmax record run.csv --axis 1                      until Ctrl-C\n"
-       "  kmax record - --for 1 | head\n\n"
-       "Over CAN both axes of a row are of the same tick; rows that are lost are counted, and show as gaps "
-       "in\n"
-       "the ticks. A node that is not operational is started and put back afterwards. Over other links "
-       "values\n"
-       "are read as fast as the link goes, one axis after the other: axis1_tick is when axis 1 was read.\n"
-       "Times are the device's own. 'kmax capture' records every tick of a short time instead."},
+       R"(  kmax record run.csv --for 60 --device can:can0    1000 rows a second, from the device's PDOs
+  kmax record run.csv --axis 1                      until Ctrl-C
+  kmax record - --for 1 | head
+
+Over CAN both axes of a row are of the same tick; rows that are lost are counted, and show as gaps in
+the ticks. A node that is not operational is started and put back afterwards. Over other links values
+are read as fast as the link goes, one axis after the other: axis1_tick is when axis 1 was read.
+Times are the device's own. 'kmax capture' records every tick of a short time instead.)"},
       Takes::device_and_axis, run_record);
 }
 

@@ -85,15 +85,14 @@ void add_serve_command(CLI::App& app, Context& context) {
       app, context,
       {"serve",
        "Runs the native firmware with a simulated device until Ctrl-C, behind a serial line or on a CAN bus.",
-       "  kmax serve --serial /tmp/kmax &\n"
-       "  export KMAX_DEVICE=serial:/tmp/kmax\n"
-       "  kmax info\n"
-       "  kmax serve --can vcan0 &                 kmax --device can:vcan0 info\n"
-       "  kmax serve --can /tmp/bus &              kmax --device can:/tmp/bus info, without any CAN "
-       "interface\n"
-       "  kmax serve --serial /tmp/kmax --store ~/kmax.store    what 'kmax save' keeps outlasts the "
-       "process\n\n"
-       "The person of the scene presses against the wall whenever axis 0 is armed."},
+       R"(  kmax serve --serial /tmp/kmax &
+  export KMAX_DEVICE=serial:/tmp/kmax
+  kmax info
+  kmax serve --can vcan0 &                 kmax --device can:vcan0 info
+  kmax serve --can /tmp/bus &              kmax --device can:/tmp/bus info, without any CAN interface
+  kmax serve --serial /tmp/kmax --store ~/kmax.store    what 'kmax save' keeps outlasts the process
+
+The person of the scene presses against the wall whenever axis 0 is armed.)"},
       Takes::nothing, run_serve);
 }
 

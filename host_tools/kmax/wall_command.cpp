@@ -103,13 +103,13 @@ void add_wall_command(CLI::App& app, Context& context) {
   add_command<WallOptions>(
       app, context,
       {"wall", "Evaluates the wall law as the firmware computes it, without a device.",
-       "  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.0001\n"
-       "  kmax wall --csv in.csv --out out.csv --set wall.law=adaptive\n"
-       "                        in: position_m,velocity_m_per_s; out: the same and force_n\n"
-       "  kmax wall --picture laws.svg      force against distance, each law with these parameters\n\n"
-       "Positions in m and velocities in m/s along +x. Parameters not set have their defaults. Every point "
-       "stands\n"
-       "alone, as the first sample of a contact; force limit, sampling and encoder are left out."},
+       R"(  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.0001
+  kmax wall --csv in.csv --out out.csv --set wall.law=adaptive
+                        in: position_m,velocity_m_per_s; out: the same and force_n
+  kmax wall --picture laws.svg      force against distance, each law with these parameters
+
+Positions in m and velocities in m/s along +x. Parameters not set have their defaults. Every point stands
+alone, as the first sample of a contact; force limit, sampling and encoder are left out.)"},
       Takes::axis, run_wall);
 }
 
