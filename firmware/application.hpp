@@ -144,9 +144,18 @@ class Application {
   /// saved. `flash` refers to a memory that outlives the application.
   const LoadReport& attach_store(AnyFlashSectors flash);
 
+  /// What a host wrote by this link: parameters, or one command to the store or the capture.
+  ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
+  /// Brings all readings among values() up to date: to the reports that the present poll began with, so that
+  /// all are of one moment.
+  void refresh_readings();
+  /// Only those of the axis, or of the device, that this slot belongs to.
+  void refresh_reading(std::size_t slot);
   const ParameterValues& values() const { return parameters_.values(); }
   /// Rises with every change of a parameter.
   std::uint32_t parameter_changes() const { return parameters_.changes(); }
+  /// Of the present poll().
+  std::uint32_t now_us() const { return now_us_; }
   ArmedAxes armed_axes() const;
   bool any_armed() const { return armed_axes().any(); }
   /// A save is under way; its next step may stop the processor for half a second.
@@ -160,8 +169,6 @@ class Application {
   float ISR_background_force(std::size_t axis) const { return tick_.ISR_background_force(axis); }
 
  private:
-  friend class ApplicationObjects;
-
   /// The registers as the Modbus server sees them.
   class Bank {
    public:
@@ -198,16 +205,11 @@ class Application {
   [[gnu::cold]] void make_scales();
   void act();
   Supervisor::Situation situation(std::size_t axis);
-  /// From the reports that the present poll began with: all that it tells is of one moment.
-  void refresh_readings();
-  /// Of the axis, or of the device, that this slot belongs to.
-  void refresh_reading(std::size_t slot);
   void refresh_axis_readings(std::size_t axis);
   void refresh_device_readings();
   std::uint32_t flags_of(std::size_t axis) const;
   bool saturated(std::size_t axis) const;
   void refresh_crash_readings();
-  ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
   void take_reports();
   bool round_has_begun();
   bool commutation_known(std::size_t axis) const;

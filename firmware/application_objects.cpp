@@ -97,7 +97,7 @@ Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::
       return Abort::none;
     case SpecialObject::error_history:
       size = 4;
-      return subindex <= app_.node_.emergency().history_count() ? Abort::none : Abort::no_subindex;
+      return subindex <= of_.node.emergency().history_count() ? Abort::none : Abort::no_subindex;
     case SpecialObject::device_type:
     case SpecialObject::store_parameters:
     case SpecialObject::restore_defaults:
@@ -112,8 +112,8 @@ Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::
       size = trace_object_bytes;
       return Abort::none;
     case SpecialObject::capture_samples: {
-      if (!app_.tick_.capture().readable()) return Abort::device_state;
-      const CaptureReadings readings = app_.tick_.capture().readings();
+      if (!of_.tick.capture().readable()) return Abort::device_state;
+      const CaptureReadings readings = of_.tick.capture().readings();
       size = 4 * readings.taken * readings.channels;
       return Abort::none;
     }
@@ -134,7 +134,7 @@ Abort ApplicationObjects::read_begin(ObjectAddress address, std::uint32_t& size)
 }
 
 std::uint32_t ApplicationObjects::number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const {
-  const auto& emergency = app_.node_.emergency();
+  const auto& emergency = of_.node.emergency();
   switch (place.what) {
     case SpecialObject::device_type:
       return device_type_of_several_axes;
@@ -152,7 +152,7 @@ std::uint32_t ApplicationObjects::number_of(const canopen::SpecialPlace& place, 
 std::span<const char> ApplicationObjects::text_of(SpecialObject what) const {
   constexpr std::string_view name = "Kmax haptic device controller";
   if (what == SpecialObject::device_name) return name;
-  if (what == SpecialObject::hardware_version) return app_.board_.board_name;
+  if (what == SpecialObject::hardware_version) return of_.board_name;
   return firmware_version_text;
 }
 
@@ -171,14 +171,14 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
       const auto first = trace_window + (subindex - 1U) * (trace_object_bytes / 2);
       put_words(offset, out, [&](std::uint32_t word) {
         const auto high = static_cast<std::uint16_t>(first + 2 * word);
-        return std::uint32_t{app_.tick_.trace().word_at(high)} << 16 |
-               app_.tick_.trace().word_at(static_cast<std::uint16_t>(high + 1));
+        return std::uint32_t{of_.tick.trace().word_at(high)} << 16 |
+               of_.tick.trace().word_at(static_cast<std::uint16_t>(high + 1));
       });
       return Abort::none;
     }
     case SpecialObject::capture_samples:
-      if (!app_.tick_.capture().readable()) return Abort::device_state;  // another capture has begun
-      put_words(offset, out, [&](std::uint32_t word) { return app_.tick_.capture().value_at(word); });
+      if (!of_.tick.capture().readable()) return Abort::device_state;  // another capture has begun
+      put_words(offset, out, [&](std::uint32_t word) { return of_.tick.capture().value_at(word); });
       return Abort::none;
     case SpecialObject::scratch:
       canopen::copy_bytes(std::span(scratch_).subspan(offset, out.size()), out);
@@ -198,7 +198,7 @@ Abort ApplicationObjects::read(ObjectAddress address, std::uint32_t offset, std:
     put_bytes(canopen::highest_subindex(address.index).value_or(0), offset, out);
     return Abort::none;
   }
-  if (!descriptors[owner_of(*slot).entry].kept) app_.refresh_reading(*slot);
+  if (!descriptors[owner_of(*slot).entry].kept) of_.application.refresh_reading(*slot);
   put_bytes(value(*slot), offset, out);
   return Abort::none;
 }
@@ -234,14 +234,14 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
   switch (place.what) {
     case SpecialObject::error_history_count:
       if (in[0] != 0) return Abort::value_range;
-      app_.node_.emergency().erase_history();
+      of_.node.emergency().erase_history();
       return Abort::none;
     case SpecialObject::store_parameters:
       if (little_endian(in) != signature_save) return Abort::not_transferred;
-      return abort_for(app_.store_.save(app_.any_armed()).refusal, {}, 0);
+      return abort_for(of_.store.save(of_.application.any_armed()).refusal, {}, 0);
     case SpecialObject::restore_defaults:
       if (little_endian(in) != signature_load) return Abort::not_transferred;
-      return abort_for(app_.store_.save_defaults(app_.any_armed()).refusal, {}, 0);
+      return abort_for(of_.store.save_defaults(of_.application.any_armed()).refusal, {}, 0);
     case SpecialObject::scratch:
       canopen::copy_bytes(in, scratch_);
       scratch_size_ = static_cast<std::uint32_t>(in.size());
@@ -254,33 +254,33 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
 /// A value that is taken is a sign of life of whoever commands; before it acts, since the command to arm
 /// needs it.
 Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw) {
-  const auto before = app_.node_.heard_us();
-  app_.node_.set_heard(app_.now_us_);
+  const auto before = of_.node.heard_us();
+  of_.node.set_heard(of_.application.now_us());
   const Abort abort = set_slot(slot, raw);
-  if (abort != Abort::none) app_.node_.set_heard(before);
+  if (abort != Abort::none) of_.node.set_heard(before);
   return abort;
 }
 
 Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
-    const std::uint8_t node_id = app_.node_.node_id();
-    const Abort abort = canopen::check_communication(app_.parameters_.values(), slot, raw, node_id);
+    const std::uint8_t node_id = of_.node.node_id();
+    const Abort abort = canopen::check_communication(of_.parameters.values(), slot, raw, node_id);
     if (abort != Abort::none) return abort;
-    app_.parameters_.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
+    of_.parameters.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
     return Abort::none;
   }
   const SlotValue one{static_cast<std::uint16_t>(slot), raw};
-  return abort_for(app_.write({&one, 1}, Link::can).refusal, descriptor, raw);
+  return abort_for(of_.application.write({&one, 1}, Link::can).refusal, descriptor, raw);
 }
 
 void ApplicationObjects::refresh() {
-  app_.refresh_readings();
+  of_.application.refresh_readings();
 }
 
 std::uint32_t ApplicationObjects::value(std::size_t slot) const {
-  const std::uint32_t raw = app_.parameters_.values().raw(slot);
-  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, app_.node_.node_id())
+  const std::uint32_t raw = of_.parameters.values().raw(slot);
+  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, of_.node.node_id())
                                          : raw;
 }
 

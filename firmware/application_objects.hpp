@@ -3,13 +3,21 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "firmware/canopen/object_places.hpp"
+#include "firmware/drive/axes_tick.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
+#include "firmware/parameters/parameter_access.hpp"
+#include "firmware/parameters/store_commands.hpp"
 
 namespace kmax::firmware {
 
 class Application;
+namespace canopen {
+template <typename Objects>
+class Node;
+}  // namespace canopen
 
 /// The application as CANopen sees it: what SDO reads and writes (canopen::ObjectAccess), where PDOs take
 /// their values from and bring them to (canopen::PdoSource).
@@ -18,7 +26,16 @@ class Application;
 /// as Modbus registers, and refusal.reason says why one was refused on either link. Main loop only.
 class ApplicationObjects {
  public:
-  explicit ApplicationObjects(Application& application) : app_(application) {}
+  /// What the objects stand for. Node and tick are used from the first request on, not before.
+  struct Sources {
+    Application& application;  ///< takes writes, brings readings up to date
+    ParameterAccess& parameters;
+    StoreCommands& store;
+    AxesTick<axis_count>& tick;  ///< its trace and captures
+    canopen::Node<ApplicationObjects>& node;
+    std::string_view board_name;
+  };
+  explicit ApplicationObjects(const Sources& sources) : of_(sources) {}
   ApplicationObjects(const ApplicationObjects&) = delete;
   ApplicationObjects& operator=(const ApplicationObjects&) = delete;
 
@@ -45,7 +62,7 @@ class ApplicationObjects {
   std::uint32_t number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const;
   std::span<const char> text_of(SpecialObject what) const;
 
-  Application& app_;
+  Sources of_;
   std::array<std::uint8_t, scratch_bytes> scratch_{};
   std::uint32_t scratch_size_ = 0;
 };

@@ -121,7 +121,9 @@ void Application::refresh_crash_readings() {
 
 void Application::refresh_device_readings() {
   ParameterValues& v = parameters_.values();
-  publish_telemetry(v, {flags_of(0), flags_of(1)}, report_[0].tick);
+  std::array<std::uint32_t, axis_count> flags{};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) flags[axis] = flags_of(axis);
+  publish_telemetry(v, flags, report_[0].tick);
   v.set_whole<"info.vendor_id">(vendor_id);
   v.set_whole<"info.product_code">(product_code);
   v.set_whole<"info.firmware_version">(firmware_version);

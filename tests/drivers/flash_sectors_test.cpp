@@ -10,7 +10,7 @@
 #include "tests/drivers/fake_register.hpp"
 
 // On fake registers: what is written in which order, and each way out. On the flash model:
-// tests/host_tools/virtual_board/stm32f4/flash_sectors_on_model_test.cpp.
+// tests/host_tools/virtual_board/stm32f4/flash_interface_test.cpp.
 
 namespace kmax::drivers::stm32f4::flash_sectors_test {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "tests/drivers/fake_register.hpp"
 
-// On the model: tests/host_tools/virtual_board/stm32f4/independent_watchdog_on_model_test.cpp.
+// On the model: tests/host_tools/virtual_board/stm32f4/iwdg_test.cpp.
 
 namespace kmax::drivers::stm32f4::independent_watchdog_test {
 namespace {

@@ -1,6 +1,4 @@
-// The tick of this firmware's axes, and with it its interrupt side.
-#include "firmware/drive/axes_tick.hpp"
-
+// The interrupt side of the application, compiled for speed.
 #include "firmware/application.hpp"
 
 namespace kmax::firmware {
