@@ -94,7 +94,7 @@ VoltageVariant voltage_variant() {
 
 firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   firmware::BoardIdentity identity{};
-  identity.board_name = "odrive_v3";
+  identity.board_name = description.name;
   identity.serial_number = serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
   identity.modulation_limit = description.modulation_limit;

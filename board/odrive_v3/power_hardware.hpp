@@ -44,6 +44,7 @@ class PowerHardware {
   /// In the conversions' interrupt: whose they are.
   bool ISR_sampled_axis_1() const { return bridge0_.counting_down(); }
 
+  static_assert(firmware::axis_count == 2, "the board has two bridges");
   static constexpr bool has(std::size_t) { return true; }
   auto& bridge(std::size_t axis) { return axis == 0 ? bridge0_ : bridge1_; }
   const drivers::stm32f4::CurrentSample& ISR_sample(std::size_t axis) {
