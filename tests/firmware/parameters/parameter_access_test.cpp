@@ -220,7 +220,6 @@ TEST(ParameterAccess, GapsEndsAndReadOnlyPlacesAreNotWritable) {
 }
 
 TEST(ParameterAccess, ReadableIsExactlyTheRegistersThereAre) {
-  Written w;
   for (const bool holding : {true, false}) {
     std::vector<bool> there(0x10000, false);
     for (std::size_t slot = 0; slot < slot_count; ++slot) {
