@@ -37,6 +37,8 @@ class ModelBench {
  public:
   explicit ModelBench(std::vector<Peripheral*> models, BoardTime begin = 1000)
       : now(begin), models_(std::move(models)) {}
+  /// A model that is part of something built after the bench.
+  void add(Peripheral& model) { models_.push_back(&model); }
   ModelBench(const ModelBench&) = delete;
   ModelBench& operator=(const ModelBench&) = delete;
 

@@ -205,7 +205,8 @@ struct SystemTickOnModel {
 };
 
 struct Core : testing::ModelBench {
-  Core() : ModelBench({&peripherals.system_tick}, 0) {
+  Core() : ModelBench({}, 0) {
+    add(peripherals.system_tick);
     clocks.core = 2;
     peripherals.reset(0);
   }
