@@ -37,9 +37,9 @@ struct MotionPlausibilityConfig {
 ///
 /// Trips. With the force reversed, or turned by the electrical angle d so that F cos d is what acts, a
 /// handle that nobody holds gains (|F| (1 - cos d) - friction - hand_force) J/m that are not explained. It
-/// trips
-///     (17/16 tolerance + 5/4 kinetic energy of late) / (|F| (1 - cos d) - friction - hand_force)
-/// metres of running after the fault, and 3 x smoothing later at most; from rest that way w takes
+/// trips at most 3 x smoothing after it has run, since the fault, the way (m)
+///     w = (17/16 tolerance + 5/4 kinetic energy of late) / (|F| (1 - cos d) - friction - hand_force)
+/// which takes from rest
 /// sqrt(2 w mass / (|F cos d| - friction)). F = 3.3 N reversed, 0.05 kg, no friction, the defaults: 13 mm,
 /// 20 ms + 6 ms, 520 ticks at 20 kHz. If hand_force >= 2 |F| any such motion could be a hand's, and none
 /// trips: set it below. At d = 90 degrees no torque is made: such a handle does not run away, and it trips

@@ -30,8 +30,7 @@ constexpr std::uint32_t rated_torque(const ParameterValues& values, std::size_t 
 /// was written last:
 ///
 ///   profile.target_torque  within +-profile.max_torque, as thousandths of the rated torque that a host
-///   reads;
-///                          torque = force x device.transmission
+///                          reads; torque = force x device.transmission
 ///   profile.target_force   as it is
 ///
 /// 0 unless `armed` in mode torque and not `halted`. Always finite. force.limit, force.slew_limit and the

@@ -6,8 +6,8 @@
 //                 (flux = 2 k / (3 p); N m per A of q current = V s/rad x 3/2)
 //
 // averaged over windows, so that nothing is differentiated:
-//   mean v - L (i_end - i_begin) / time = R mean i + k (angle_end - angle_begin) / time + V_dt mean share +
-//   offset
+//   mean v - L (i_end - i_begin) / time
+//     = R mean i + k (angle_end - angle_begin) / time + V_dt mean share + offset
 // Linear least squares for k, R, V_dt and offset; R and V_dt are pulled to what the winding fit found by the
 // standard errors that are given for it (infinite: free). share is the dead time's sign: brushed 2 x current
 // / dead_time_current within -2 .. 2; synchronous that of the three phases' currents at the electrical angle,

@@ -120,8 +120,7 @@ void find_direction_by_pushes(Calibration& run) {
   const double missing = (forwards.missing + backwards.missing) / 2.0;
   const std::string evidence = fmt::format(
       "pushed to and fro with {:.2f} V the encoder counts {:.1f}, and the current falls by {:.0f} % of what "
-      "a "
-      "standing motor draws",
+      "a standing motor draws",
       voltage, counts, 100.0 * missing);
   if (std::abs(counts) < few_counts) {
     if (missing >= turning_share) throw_encoder_dead(evidence);

@@ -74,8 +74,7 @@ void FieldSweep::diagnose_still(double counts, const Waveforms& to, const Wavefo
   const double flux = across / rate - known_.inductance * known_.current;
   const std::string evidence = fmt::format(
       "a turning field moves the count by {:.0f}; it induces {:.2f} mV across the current, of which {:.2f} "
-      "mV "
-      "are the inductance's",
+      "mV are the inductance's",
       counts, 1000.0 * across, 1000.0 * rate * known_.inductance * known_.current);
   if (flux > 0.7 * known_.inductance * known_.current) throw_encoder_dead(evidence);
   throw_motor_blocked(evidence);

@@ -5,20 +5,18 @@
 //     `voltage_factor` until the current's peak-to-peak span reaches the wanted current (or the supply's
 //     bound: a phase is open, or the supply too low). fit_winding() of that record gives the first R and L/R.
 //  2. Brushed: brushed_excitation(), one record, motion free; the current changes its sign, which shows the
-//  dead time.
+//     dead time.
 //  3. Synchronous, along: vector_excitation() at the angle 0, motion standing: R and L_d. The dead time comes
-//  from a
-//     wave without bias.
+//     from a wave without bias.
 //  4. Synchronous, across: across_excitation(), and again with winding_slow_half_period() of its half period,
-//  both in
-//     one call with motion free, fit_dead_time = false, known_resistance = R of step 3: L_q. The rotor swings
-//     with the wave; the two half periods tell its back-EMF from the inductance.
+//     both in one call with motion free, fit_dead_time = false, known_resistance = R of step 3: L_q. The
+//     rotor swings with the wave; the two half periods separate its back-EMF from the inductance.
 //
 // Half period: 3 L/R shows both the slope (L) and the end (R); at least 10 ticks, so that the motion's slope
 // shows beside them.
 //
-// Evidence, five simulated motors (tests/host_tools/calibration; 2 ohm 0.1 mH to 11 ohm 3.9 mH, 50 mOhm 25
-// uH; 30 mA of noise per sample, converter steps of 40 and 80 mA, dead time, sag, cogging, friction), 4000
+// Evidence, five simulated motors (tests/host_tools/calibration; 2 ohm 0.1 mH to 11 ohm 3.9 mH, 50 mOhm
+// 25 uH; 30 mA of noise per sample, converter steps of 40 and 80 mA, dead time, sag, cogging, friction), 4000
 // samples a record, worst of 20 seeds: R 1.0 %, L_d and L 0.8 %, L_q 1.0 %. 1500 samples: R 1.9 %, L 0.8 %
 // (brushed, one record), R 0.4 % (two records). One record without bias at 4 ticks: L wrong by up to 15 %.
 

@@ -1,15 +1,15 @@
 #pragma once
 // Resistance and inductance of a winding, seen along one axis, from voltages and currents at tick rate.
 //
-//   L di/dt = v - R i - V_dt sat(i / band) - offset - e,     de/dt = motion_rate x (i - its mean) - e /
-//   motion_decay
+//   L di/dt = v - R i - V_dt sat(i / band) - offset - e
+//   de/dt = motion_rate x (i - its mean) - e / motion_decay
 //
 // One axis is: a brushed motor between B and C; or a synchronous motor along a fixed direction of the stator
 // (alternation `along` a bias: L_d; `across` it: L_q), amplitudes kept, so that R and L are those of a phase.
 // R contains the on-resistance of the legs. It is the circuit that the controller drives.
 //
-// Timing. Sample k is taken at tick k, voltage[k] acts from k + 1/2 to k + 3/2 (ticks). So from sample to
-// sample
+// Timing. Sample k is taken at tick k, voltage[k] acts from k + 1/2 to k + 3/2 (ticks). From one
+// sample to the next, therefore,
 //   i[k+1] = a i[k] + (1/R) (s (1 - s) u[k-1] + (1 - s) u[k]),   a = e^(-R T/L),  s = sqrt(a)
 // with u the voltage less dead time, offset and e: exact for every L/R, also far below a tick.
 //
@@ -21,8 +21,8 @@
 //
 // Motion. A brushed motor's shaft turns to and fro with the wave. Without friction its back-EMF is the
 // integral of the current, motion_rate = k^2 / (inertia) in V/(A s); it is fitted when `motion` is free. Set
-// it to `standing` along the d axis. When shaft angles are given, the back-EMF is taken from them instead (k
-// x speed, k fitted); use that for motions of more than some 20 counts per half wave.
+// it to `standing` along the d axis. When shaft angles are given, the back-EMF is taken from them instead
+// (k x speed, k fitted); use that for motions of more than some 20 counts per half wave.
 //
 // Method: a scan over L/R (0.1 to 1000 ticks) with everything else solved linearly, as a start that no start
 // value can spoil, once with and once without dead time and motion; then the output error, sum of (measured -

@@ -52,15 +52,13 @@ std::string remedy_for(const GuardFinding& finding) {
   const Criterion criterion = finding.criterion;
   if (finding.bound <= 0.0f && criterion == Criterion::field_slope)
     return "no field passes while guard.damping is not above the magnitude of wall.damping, or "
-           "guard.friction "
-           "not above |B| step / T: measure them ('kmax calibrate'), or lower wall.damping";
+           "guard.friction not above |B| step / T: measure them ('kmax calibrate'), or lower wall.damping";
   if (finding.bound < 0.0f && criterion == Criterion::abbott_okamura)
     return "no stiffness passes while guard.friction is not above |B| step / T: lower wall.damping, or make "
            "the position's step finer";
   if (finding.bound <= 0.0f && needs_damping(criterion))
     return "no stiffness passes while guard.damping is not above the magnitude of wall.damping: measure it "
-           "('kmax "
-           "calibrate') or lower wall.damping";
+           "('kmax calibrate') or lower wall.damping";
   if (finding.bound <= 0.0f && criterion == Criterion::abbott_okamura)
     return "no stiffness passes while guard.damping or guard.friction is 0: measure them ('kmax calibrate')";
   std::string remedy(words_for(criterion).remedy);

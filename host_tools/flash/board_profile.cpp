@@ -9,9 +9,8 @@ constexpr std::array<BoardProfile, 2> boards = {{
      "kmax-odrive_v3.elf",
      true,
      "disconnect the motors or make sure that nobody turns the shaft of motor 0; set the DIP switch SW1 to "
-     "DFU; "
-     "leave GPIO6 of connector J3 open or low; connect USB; switch the DC supply off and on (USB does not "
-     "power the board)",
+     "DFU; leave GPIO6 of connector J3 open or low; connect USB; switch the DC supply off and on (USB does "
+     "not power the board)",
      "set the DIP switch SW1 back to RUN and switch the DC supply off and on",
      {{
          {true, "connector J2 has SWCLK, SWDIO, nRST and GND; needs GPIO lines wired to them"},
@@ -19,8 +18,7 @@ constexpr std::array<BoardProfile, 2> boards = {{
          {true, "USB is a port of the ROM bootloader, which the DIP switch SW1 starts"},
          {false,
           "its serial ports on connector J3 (UART4 on GPIO1 and 2, USART2 on GPIO3 and 4) are not ports of "
-          "the "
-          "ROM bootloader, and those that are drive the gates of motor 0 and of the brake"},
+          "the ROM bootloader, and those that are drive the gates of motor 0 and of the brake"},
      }}},
     {"generic_stm32f405",
      "another board with an STM32F405",

@@ -60,8 +60,7 @@ std::string what_happened(const std::string& program, const ProgramResult& resul
 
 constexpr const char* half_written =
     "the flash may be PARTLY WRITTEN: the board does not start until it is flashed again; the parameters are "
-    "in "
-    "{}";
+    "in {}";
 constexpr const char* untouched = "nothing on the board was changed";
 
 class Run {

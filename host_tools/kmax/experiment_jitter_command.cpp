@@ -109,7 +109,8 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
   add_command<JitterOptions>(
       experiment, context,
       {"jitter",
-       "Throws a hand out of the wall and sees how far, and how long until it is back (paper 1, Table I).",
+       "Throws a hand out of the wall and measures how far, and how long it takes to return (paper 1, Table "
+       "I).",
        R"(  kmax experiment jitter                                        simulated people, takes seconds
   kmax experiment jitter --subjects unclipped --out results     with pictures and a page
   kmax experiment jitter --activation-gain 0                    a hand that cannot stiffen

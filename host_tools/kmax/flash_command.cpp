@@ -160,8 +160,7 @@ void wait_for_dfu(const BoardServices& services) {
   }
   throw flash::FlashError(
       "BOOT0 and reset were moved, but no board in DFU mode (0483:df11) appeared on USB within 5 s; nothing "
-      "on "
-      "the board was changed. Is USB connected, and PB2 (BOOT1) low?");
+      "on the board was changed. Is USB connected, and PB2 (BOOT1) low?");
 }
 
 std::string hexadecimal(std::uint32_t value) {

@@ -37,8 +37,7 @@ int run_serve(Context& context, const ServeOptions& options) {
   if (options.serial.empty() && options.can.empty())
     throw UsageError(
         "--serial LINK or --can IFACE is needed: the name under which the serial line appears, or the bus to "
-        "be a "
-        "node on");
+        "be a node on");
   const Interruption interruption;
   const simulation::Scene scene =
       options.scene.empty() ? simulated_board::factory_scene() : simulated_board::open_scene(options.scene);

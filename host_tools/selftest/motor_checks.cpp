@@ -162,11 +162,11 @@ CheckResult check_phases(const Evidence& evidence) {
       return facts.synchronous
                  ? result.fail("motor cable (two or three phases open)",
                                seen + " between any two phases: is the motor plugged in?")
-                 : result.fail("motor winding or cable (B to C open)",
-                               seen +
-                                   ": is the motor plugged in? A DC motor is one circuit: whether the "
-                                   "lead of B, that "
-                                   "of C, the brushes or the winding is open cannot be told from here");
+                 : result.fail(
+                       "motor winding or cable (B to C open)",
+                       seen +
+                           ": is the motor plugged in? A DC motor is one circuit: whether the lead of B, "
+                           "that of C, the brushes or the winding is open cannot be told from here");
     }
     case Circuit::short_circuit:
       return result.fail(

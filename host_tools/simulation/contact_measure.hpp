@@ -73,8 +73,7 @@ inline ContactMeasure measure_contact(std::span<const ContactSample> recording,
       std::abs(criterion.wall_side) != 1.0 || !std::isfinite(criterion.wall_position)) {
     throw std::invalid_argument(fmt::format(
         "contact criterion with threshold {} m, margin {} m, wall at {} m, side {}: the threshold must be > "
-        "0, "
-        "the margin >= 0, the side -1 or +1",
+        "0, the margin >= 0, the side -1 or +1",
         criterion.threshold, criterion.contact_margin, criterion.wall_position, criterion.wall_side));
   }
 
@@ -113,8 +112,7 @@ inline ContactMeasure measure_contact(std::span<const ContactSample> recording,
     if (count[quarter] < 2) {
       throw std::invalid_argument(
           fmt::format("quarter {} of the contact window from {} s to {} s holds {} samples: at least 2 are "
-                      "needed; record "
-                      "longer or faster",
+                      "needed; record longer or faster",
                       quarter + 1, criterion.window_begin, criterion.window_end, count[quarter]));
     }
     measure.quarter_peak_to_peak[quarter] = high[quarter] - low[quarter];

@@ -3,8 +3,8 @@
 //
 //   leg on    voltage = share x supply, share = duty + dead-time error, bounded to 0 .. 1
 //   leg off   the motor's current finds a diode: into the motor through the lower one (voltage = -drop), out
-//   of
-//             it through the upper one (voltage = supply + drop), until it is zero; then the leg is blocked
+//             of it through the upper one (voltage = supply + drop), until it is zero; then the leg is
+//             blocked
 //
 // Legs are switched on one by one, so a brushed motor uses B and C alone. The on-resistance lies in series
 // with every leg's current, FET or diode. Blocked legs conduct again when the voltages that the turning shaft

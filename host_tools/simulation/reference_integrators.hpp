@@ -8,15 +8,13 @@
 //                                   that would turn mass 0 round ends in stick if friction can hold it, and
 //                                   otherwise continues backwards from the instant of rest.
 //   integrate_rk4                   the classical Runge-Kutta method. Order 4 between events. A step that
-//   would
-//                                   turn mass 0 round is divided where its velocity is 0; there it sticks or
-//                                   goes on. Break-away is only looked for at the beginning of a step: order
-//                                   2 where it happens.
+//                                   would turn mass 0 round is divided where its velocity is 0; there it
+//                                   sticks or goes on. Break-away is only looked for at the beginning of a
+//                                   step: order 2 where it happens.
 //   integrate_adaptive              Dormand and Prince's method of order 5 with step control and dense
-//   output,
-//                                   from Boost.Odeint. Stops and break-aways are both located: bracketed on
-//                                   the dense output at 8 points per step and at the lowest ones between
-//                                   them, then by repeating the step up to the instant.
+//                                   output, from Boost.Odeint. Stops and break-aways are both located:
+//                                   bracketed on the dense output at 8 points per step and at the lowest ones
+//                                   between them, then by repeating the step up to the instant.
 //
 // A velocity that dips through zero and back within one step of a fixed-step method is overlooked; so is, by
 // the adaptive one, a dip that its 8 points do not suggest. docs/speed_and_error.md compares speed and error

@@ -19,10 +19,10 @@
 // rule, is wrong by 1e-5 N m at worst, where the step is 1.25 of the rate, and 2e-8 N m in ordinary ones.
 //
 // Two terminals conducting, x and y (the third is open or blocked): one current, i_x = -i_y = i, with
-//   d/dt (L(angle) i + sqrt(3) flux cos delta) = u_x - u_y - 2 R i,  L = 2 (L_d cos^2 delta + L_q sin^2
-//   delta),
-// delta from the d axis to the pair's axis. Classical Runge-Kutta in steps of at most 0.03 of its rate: error
-// about 1e-9 of the current. It is a fault's mode and may cost more.
+//   d/dt (L(angle) i + sqrt(3) flux cos delta) = u_x - u_y - 2 R i
+//   L = 2 (L_d cos^2 delta + L_q sin^2 delta),  delta from the d axis to the pair's axis.
+// Classical Runge-Kutta in steps of at most 0.03 of its rate: error about 1e-9 of the current. It is a
+// fault's mode and may cost more.
 //
 // Fewer: no current. Not modelled: saturation, harmonics of the flux, iron losses.
 //

@@ -1,13 +1,11 @@
 // Simulated seconds per second of one axis. Prints two tables; decides nothing.
 //
 //   parts    what each part of a scene adds to an interval of a 500 Hz controller and of a 20 kHz one: the
-//   device
-//            alone, then a structure, a hand, a delay, and all of them; sliding to and fro with friction, and
-//            sticking
-//   contact  whole touches of a wall with the firmware's haptic loop in float in the loop, from the approach
-//   to the
-//            end of a hold of 3 s: walls that hold still and walls that oscillate, with and without a field,
-//            for a table of matrices shared between touches and for none
+//            device alone, then a structure, a hand, a delay, and all of them; sliding to and fro with
+//            friction, and sticking
+//   contact  whole touches of a wall with the firmware's haptic loop in float, from the approach to the end
+//            of a hold of 3 s: walls that hold still and walls that oscillate, with and without a field, for
+//            a table of matrices shared between touches and for none
 
 #include <fmt/format.h>
 

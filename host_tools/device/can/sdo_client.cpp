@@ -175,8 +175,7 @@ void SdoClient::fail(Object object, const Failed& last, int attempts) {
                                 trouble.empty() ? "" : "; " + trouble));
   std::string check =
       "check that the device is powered, the wiring, and that node ID and bit rate are the device's, or it "
-      "was "
-      "stopped by an NMT master";
+      "was stopped by an NMT master";
   if (state_) check = fmt::format("the device is there, its state is {}", state_text(*state_));
   if (!trouble.empty()) check = trouble;
   throw LinkError(fmt::format("{}: no answer from node {} within {} ms (object {}, {}); {}",

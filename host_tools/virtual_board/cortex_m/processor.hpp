@@ -18,8 +18,7 @@
 // Time. The unit of execution is the block: a straight run of instructions up to a branch or a change of
 // state (WFI, SVC, CPS, MSR, ISB). Interrupts are taken and run_until() stops between blocks only, so
 // - run_until(t) overshoots t by less than one block: its instructions are at most what fits into 1 KiB of
-// code, in
-//   compiled firmware some ten, well below a microsecond at 168 MHz;
+//   code, in compiled firmware some ten, well below a microsecond at 168 MHz;
 // - an interrupt that a register access raises is taken before the next block: after DSB; ISB, or some
 //   instructions after the access without them.
 // Inside a block every register access knows its own instruction, and so its own time, to the cycle:

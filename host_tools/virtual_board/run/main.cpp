@@ -119,9 +119,8 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app{
       "Runs a Kmax image, the very one that is flashed, on an emulated ODrive v3.6 with the motors and "
-      "handles of a "
-      "scene.\nWhat the firmware must not do (an unknown register, a clock that is off) stops it with the "
-      "place."};
+      "handles of a scene.\nWhat the firmware must not do (an unknown register, a clock that is off) stops "
+      "it with the place."};
   app.footer(
       "Examples:\n"
       "  kmax-board build/stm32f405/kmax-odrive_v3.elf --serial /tmp/board &\n"

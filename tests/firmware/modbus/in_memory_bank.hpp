@@ -2,8 +2,7 @@
 //
 //   holding 0x0000..0x003F  plain registers
 //           0x0040..0x0047  four values of two registers each, written whole or not at all: a write range
-//           that cuts one
-//                           in two gets illegal_data_address
+//                           that cuts one in two gets illegal_data_address
 //           0x0048          value at most 1000, else illegal_data_value
 //           0x0049          read-only: illegal_data_address on write
 //           0x004A          write fails: server_device_failure

@@ -251,8 +251,7 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
            "4:11: motor.defects = 3: allowed is a list of " + defects},
           {"[device]\n[inverter]\n",
            "2:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no current; add the "
-           "motor, "
-           "or remove the table"},
+           "motor, or remove the table"},
           {"[device]\n[axis1.device]\n[axis1.current_sensor]\n",
            "3:1: [axis1.current_sensor] without a [axis1.motor] of kind \"dc\" or \"pmsm\": there is no "
            "current; add the motor, or remove the table"},
