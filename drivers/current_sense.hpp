@@ -44,8 +44,6 @@ class CurrentSense {
         lowest_(config.lowest_linear_code),
         width_(static_cast<std::uint16_t>(config.highest_linear_code - config.lowest_linear_code)) {}
 
-  constexpr float amperes_per_code() const { return amperes_per_code_; }
-
   /// The code at zero current, from OffsetCalibration.
   constexpr void set_offset(float code) { offset_ = code; }
   constexpr float offset() const { return offset_; }

@@ -22,7 +22,6 @@ class SupplyDivider {
   constexpr explicit SupplyDivider(const SupplyDividerConfig& config = {})
       : volts_per_code_(config.reference_volt * (1.0F / 4096.0F) * config.ratio) {}
 
-  constexpr float volts_per_code() const { return volts_per_code_; }
   constexpr float volts(std::uint16_t code) const { return static_cast<float>(code) * volts_per_code_; }
   /// The supply may be anything above what the code says.
   constexpr bool saturated(std::uint16_t code) const { return code >= 4095; }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -11,7 +10,6 @@
 #include "drivers/drv8301.hpp"
 #include "drivers/stm32f4/gpio.hpp"
 #include "drivers/stm32f4/spi_master.hpp"
-#include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::board::odrive_v3 {
 
@@ -23,8 +21,7 @@ class GateDrivers {
  public:
   explicit GateDrivers(ChipBus& bus) : bus_(bus) {}
 
-  /// Both control registers written and read back. False: the chip does not answer or does not keep them; see
-  /// last_result().
+  /// Both control registers written and read back. False: the chip does not answer or does not keep them.
   bool configure(std::size_t axis, drivers::CurrentSenseGain gain) {
     // The tick's frame holds the bus for 25 us.
     bool claimed = bus_.claim();
@@ -32,20 +29,15 @@ class GateDrivers {
       delay_us(10);
       claimed = bus_.claim();
     }
-    if (!claimed) {
-      last_result_[axis] = drivers::Drv8301Result::bus_time_out;
-      return false;
-    }
+    if (!claimed) return false;
     Selected chip{bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
     drivers::Drv8301<Selected> driver{chip};
     drivers::Drv8301Config config;
     config.gain = gain;
-    last_result_[axis] = driver.configure(config);
+    const drivers::Drv8301Result result = driver.configure(config);
     bus_.release();
-    return last_result_[axis] == drivers::Drv8301Result::ok;
+    return result == drivers::Drv8301Result::ok;
   }
-
-  drivers::Drv8301Result last_result(std::size_t axis) const { return last_result_[axis]; }
 
  private:
   static void delay_us(std::uint32_t microseconds) {
@@ -75,7 +67,6 @@ class GateDrivers {
   };
 
   ChipBus& bus_;
-  std::array<drivers::Drv8301Result, firmware::axis_count> last_result_{};
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -57,7 +57,6 @@ class CanBusOff {
   bool may_send() const { return state_ == CanBusState::joining || state_ == CanBusState::on_bus; }
   const CanBusOffCounters& counters() const { return counters_; }
   /// Of the next bus-off.
-  std::uint32_t next_wait_us() const { return wait_us_; }
 
   /// `bus_off`: BOFF; `in_initialization`: INAK. One action at most, which the caller carries out.
   CanBusOffAction poll(std::uint32_t now_us, bool bus_off, bool in_initialization) {

@@ -11,7 +11,7 @@
 // A frame goes to the FIFO of the filter that accepts it. If several do, a list takes priority over a mask,
 // then the lower bank over the higher. What no filter accepts is not received at all.
 //
-// All of these accept data frames only, `can_filter_accept_all` takes everything.
+// The filter without an identifier or a mask, CanFilter{}, accepts everything.
 
 namespace kmax::drivers::stm32f4 {
 
@@ -29,27 +29,7 @@ constexpr std::uint32_t can_identifier_word(const CanFrame& frame) {
          (frame.remote ? can_identifier::Remote::mask : 0U);
 }
 
-constexpr CanFilter can_filter_accept_all(std::uint8_t fifo = 0) {
-  return {0, 0, false, fifo};
-}
-
-/// 11-bit identifiers that equal `identifier` wherever `mask` is 1.
-constexpr CanFilter can_filter_standard(std::uint32_t identifier, std::uint32_t mask, std::uint8_t fifo = 0) {
-  return {
-      can_identifier::StandardId::bits(identifier),
-      can_identifier::StandardId::bits(mask) | can_identifier::Extended::mask | can_identifier::Remote::mask,
-      false, fifo};
-}
-
-/// The same for 29-bit identifiers.
-constexpr CanFilter can_filter_extended(std::uint32_t identifier, std::uint32_t mask, std::uint8_t fifo = 0) {
-  return {
-      can_identifier::ExtendedId::bits(identifier) | can_identifier::Extended::mask,
-      can_identifier::ExtendedId::bits(mask) | can_identifier::Extended::mask | can_identifier::Remote::mask,
-      false, fifo};
-}
-
-/// Two 11-bit identifiers and no other; the same twice for one.
+/// Data frames of two 11-bit identifiers and no other; the same twice for one.
 constexpr CanFilter can_filter_standard_list(std::uint32_t first, std::uint32_t second,
                                              std::uint8_t fifo = 0) {
   return {can_identifier::StandardId::bits(first), can_identifier::StandardId::bits(second), true, fifo};

@@ -183,11 +183,4 @@ class FlashSectors {
   FlashResult result_ = FlashResult::done;
 };
 
-/// Sector `number` of the chip itself, 0 to 3.
-inline FlashSectors<>::Sector flash_sector_16_kib(std::uint32_t number) {
-  auto& first = peripheral_at<volatile std::uint32_t>(flash_memory_base + flash_sector_offset(number));
-  return {number, std::span<volatile std::uint32_t, FlashSectors<>::words_per_sector>(
-                      &first, FlashSectors<>::words_per_sector)};
-}
-
 }  // namespace kmax::drivers::stm32f4

@@ -52,7 +52,6 @@ struct PwmLegs {
   bool c = true;
   friend constexpr bool operator==(const PwmLegs&, const PwmLegs&) = default;
 };
-inline constexpr PwmLegs brushed_motor_legs{.a = false};
 
 struct ThreePhasePwmConfig {
   std::uint16_t half_period_ticks = 4200;                              // ARR

@@ -82,7 +82,6 @@ class AxesTick {
   const Axis::Output& ISR_tick(std::size_t axis, const Inputs& inputs) {
     return ISR_tick_at(axis, inputs[axis], ISR_positions(inputs));
   }
-  std::uint32_t ISR_ticks() const { return ticks_; }
   /// Between two ticks: the last one began a round, in which all axes report. Behind the last axis' tick the
   /// main loop should be woken: what it reads then is of this tick.
   bool ISR_round_begins() const { return ticks_ % round_ticks == 1; }

@@ -50,8 +50,6 @@ class ElfImage {
   ElfSymbol required_symbol(const std::string& name) const;
   /// "name+0x12" of the function that holds the address; "" when none does.
   std::string function_at(std::uint32_t address) const;
-  /// All functions by address, for tools that account by function.
-  const std::map<std::uint32_t, std::string>& functions() const { return functions_; }
 
  private:
   std::string name_;

@@ -57,8 +57,6 @@ struct MotorKnowledge {
 
   bool brushed() const { return kind == firmware::MotorKind::dc; }
   double count_length() const { return 2.0 * std::numbers::pi * transmission / counts_per_turn; }  // m
-  // m of the handle per electrical turn of the field.
-  double electrical_turn() const { return 2.0 * std::numbers::pi * transmission / pole_pairs; }
   double force_per_ampere() const { return torque_constant / transmission; }
   // Current that dies within the dead time, A: below it the dead time takes less.
   double dead_time_band() const {

@@ -7,6 +7,7 @@
 // Both give means over people, without spreads: paper 1's tables over six, its stiffnesses over twelve.
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string_view>
 
@@ -19,10 +20,7 @@ inline constexpr double update_rate = 500.0;             // Hz, section 4.2
 inline constexpr double stiffness_step = 100.0;          // N/m, section 4.2
 inline constexpr double search_start = 3000.0;           // N/m, section 4.2, constant F_MC
 inline constexpr double search_start_adaptive = 5000.0;  // N/m, section 4.3
-inline constexpr int study_subjects = 12;                // section 4.1
-inline constexpr int table_subjects = 6;                 // section 2.2
-inline constexpr double arm_adjustment_time_min = 1.2;   // s, section 5
-inline constexpr double arm_adjustment_time_max = 1.5;   // s, section 5
+inline constexpr std::size_t study_subjects = 12;        // section 4.1
 
 // --- Paper 1, Figs. 6 and 8: greatest stable stiffness, mean of twelve subjects ---------------------------
 struct MaxStiffness {
@@ -56,14 +54,8 @@ inline constexpr std::array<ContactVerdict, 4> contact_verdicts{{
     {"12", 0.0, true, true, "stable"},
 }};
 
-// --- Paper 1, Figs. 7 and 8: transparency, rated by people from 0 to 5. Nothing here computes a rating. ----
-inline constexpr double transparency_plain = 5.0;      // by definition
-inline constexpr double transparency_2_n = 2.58;       // Fig. 7
-inline constexpr double transparency_adaptive = 3.72;  // Fig. 8
-
 // --- Paper 1, Tables I and II: six people disturbed by F_I, with a background force F_B --------------------
-inline constexpr std::array<double, 5> background_forces{0.0, 1.0, 2.0, 3.0, 4.0};  // F_B, N
-inline constexpr std::array<double, 4> interference_forces{1.0, 3.0, 5.0, 7.0};     // F_I, N
+inline constexpr std::array<double, 4> interference_forces{1.0, 3.0, 5.0, 7.0};  // F_I, N
 
 struct JitterCell {
   double background, interference;  // N

@@ -31,8 +31,8 @@ SubjectSet drawn_set(std::uint64_t seed, bool clip) {
   set.seed = seed;
   set.device.force_limit = clip ? experiment::paper::touch_force_limit : 0.0;
   set.description = fmt::format("{} simulated people and a Geomagic-Touch-like device, {}",
-                                experiment::study_subjects, experiment::clip_words(set.device));
-  set.subjects = experiment::draw_subjects(experiment::study_subjects, seed);
+                                experiment::paper::study_subjects, experiment::clip_words(set.device));
+  set.subjects = experiment::draw_subjects(experiment::paper::study_subjects, seed);
   return set;
 }
 

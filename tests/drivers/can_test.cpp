@@ -81,7 +81,7 @@ struct Bench {
 
 struct OnTheBus : Bench {
   OnTheBus() {
-    EXPECT_EQ(driver.configure({}, std::array{can_filter_accept_all()}), CanConfigureResult::ok);
+    EXPECT_EQ(driver.configure({}, std::array{CanFilter{}}), CanConfigureResult::ok);
     EXPECT_EQ(driver.poll(0), CanBusState::on_bus);
     aborts = 0;
   }
@@ -89,7 +89,7 @@ struct OnTheBus : Bench {
 
 TEST(Can, ConfigureInOrder) {
   Bench bench;
-  std::vector<CanFilter> filters{can_filter_standard(0x601, 0x7FF), can_filter_standard_list(0, 0x80, 1)};
+  std::vector<CanFilter> filters{CanFilter{}, can_filter_standard_list(0, 0x80, 1)};
   ASSERT_EQ(bench.driver.configure({.timing = can_bit_timing<42'000'000, 1'000'000>()}, filters),
             CanConfigureResult::ok);
   EXPECT_EQ(bench.can.mcr.writes, (std::vector<std::uint32_t>{0x0001'0001, 0x0001'0000}))

@@ -14,7 +14,7 @@ TEST(SupplyDivider, FullScaleOfBothBoards) {
 TEST(SupplyDivider, TwentyFourVoltsComeBack) {
   // 24 V / 11 = 2.1818 V at the tap.
   const SupplyDivider divider{{.ratio = 11.0F}};
-  EXPECT_NEAR(divider.volts(2708), 24.0F, 0.5F * divider.volts_per_code());
+  EXPECT_NEAR(divider.volts(2708), 24.0F, 0.5F * divider.volts(1));
 }
 
 TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {

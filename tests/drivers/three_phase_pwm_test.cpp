@@ -107,7 +107,7 @@ TEST(ThreePhasePwm, ArmIsOneStoreAndLooksWhetherItTook) {
 }
 
 TEST(ThreePhasePwm, LegsChangeOnlyWhileDisarmed) {
-  Configured configured{{.legs = brushed_motor_legs}};
+  Configured configured{{.legs = {.a = false}}};
   auto& [timer, pwm] = configured;
   EXPECT_EQ(timer.ccer, 0x550U) << "leg A off";
   timer.cr1 = timer.cr1 | 1U;

@@ -60,7 +60,6 @@ struct HandRanges {
 };
 
 inline constexpr std::uint64_t study_seed = 1;
-inline constexpr std::size_t study_subjects = 12;  // paper 1, section 4.2
 
 // The same seed gives the same people on every machine. `activation_gain` and what else is common to all is
 // taken from `common`. Throws std::invalid_argument for a count of 0 or above 10,000.

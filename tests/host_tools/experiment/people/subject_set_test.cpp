@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -101,10 +102,10 @@ TEST(SubjectSet, TheSuppliedSetsAreThoseOfTheStudy) {
   EXPECT_EQ(unclipped.device.force_limit, 0.0);
   // One device, one group of people; only what clipping changes in the fit differs.
   EXPECT_EQ(clipped.device.friction, unclipped.device.friction);
-  const auto drawn = draw_subjects(study_subjects, study_seed);
-  ASSERT_EQ(clipped.subjects.size(), study_subjects);
-  ASSERT_EQ(unclipped.subjects.size(), study_subjects);
-  for (std::size_t n = 0; n < study_subjects; ++n) {
+  const auto drawn = draw_subjects(paper::study_subjects, study_seed);
+  ASSERT_EQ(clipped.subjects.size(), paper::study_subjects);
+  ASSERT_EQ(unclipped.subjects.size(), paper::study_subjects);
+  for (std::size_t n = 0; n < paper::study_subjects; ++n) {
     EXPECT_EQ(clipped.subjects[n].person.grip_damping, drawn[n].person.grip_damping);
     EXPECT_EQ(unclipped.subjects[n].person.grip_damping, drawn[n].person.grip_damping);
     EXPECT_EQ(clipped.subjects[n].person.activation_gain, clipped.subjects[0].person.activation_gain);

@@ -138,7 +138,7 @@ TEST(PhaseShiftedPwmOnModel, ClockFailureDisarmsAndArmingAgainIsSoftwares) {
 }
 
 TEST(PhaseShiftedPwmOnModel, BrushedMotorLeavesLegAOff) {
-  Board board({.legs = drivers::stm32f4::brushed_motor_legs});
+  Board board({.legs = {.a = false}});
   ASSERT_TRUE(board.start());
   ASSERT_TRUE(board.pwm1.arm());
   EXPECT_FALSE(board.tim1.outputs()[0].enabled);
