@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "host_tools/base/print.hpp"
-#include "host_tools/experiment/contact/contact_report.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
 

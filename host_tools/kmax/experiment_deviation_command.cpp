@@ -1,7 +1,7 @@
 // kmax experiment deviation.
 #include <fmt/format.h>
 
-#include "host_tools/experiment/deviation/deviation_report.hpp"
+#include "host_tools/experiment/deviation/deviation_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/value_json.hpp"

@@ -1,7 +1,7 @@
 // kmax experiment jitter.
 #include <fmt/format.h>
 
-#include "host_tools/experiment/jitter/jitter_report.hpp"
+#include "host_tools/experiment/jitter/jitter_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/value_json.hpp"

@@ -8,7 +8,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/experiment/contact/contact_report.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulated_board/scene_run.hpp"

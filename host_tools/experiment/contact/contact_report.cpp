@@ -1,4 +1,4 @@
-#include "host_tools/experiment/contact/contact_report.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "host_tools/experiment/deviation/deviation_report.hpp"
+#include "host_tools/experiment/deviation/deviation_experiment.hpp"
 
 #include <fmt/format.h>
 

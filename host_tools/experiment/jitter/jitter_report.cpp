@@ -1,4 +1,4 @@
-#include "host_tools/experiment/jitter/jitter_report.hpp"
+#include "host_tools/experiment/jitter/jitter_experiment.hpp"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host_tools/experiment/contact/contact_report.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
 

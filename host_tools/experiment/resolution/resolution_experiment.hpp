@@ -23,6 +23,7 @@
 // Beside it the paper's criterion, K max(eta, delta v T) <= F_h
 // (control/resolution_criterion.hpp), with delta = 1 and F_h = the push.
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,6 +35,7 @@
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 
@@ -163,5 +165,44 @@ std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& setti
 
 /// The lowest speed from which on every higher one vibrates; nothing if the highest does not.
 std::optional<double> onset_speed(std::span<const ResolutionCell> cells, double resolution);
+
+// Paper 2's two claims as they came out: maps of what vibrates, tables, a page.
+
+struct ResolutionStudy {
+  ResolutionWall wall;
+  report::Origin origin = report::Origin::calibrated;
+  std::vector<ResolutionRun> runs;              ///< the last one is what the claims are judged by
+  std::vector<ResolutionVariation> variations;  ///< empty for a device
+  std::vector<double> pushes;                   ///< N; empty for a device
+  std::string circumstances;
+  /// One touch at 0.4 mm and one at 0.1 mm with the last hand, 0.05 m/s; empty for a device.
+  std::vector<double> trace_time, trace_coarse, trace_fine;  ///< s, m, m
+
+  ResolutionVerdict verdict() const { return judge_resolution(runs.back().cells); }
+};
+
+/// The simulated study: every hand, and the weak one with one number changed.
+ResolutionStudy study_resolution(const ResolutionSettings& settings, const ResolutionHand& weak,
+                                 const SimulatedHands& hands,
+                                 const std::vector<simulation::OperatorModel>& people,
+                                 const ProgressReport& tell = {});
+
+/// What somebody did on a device, who is told by the rig.
+ResolutionStudy study_resolution(DeviceRig& rig, const ResolutionSettings& settings);
+
+std::string to_string(const ResolutionHand& hand);
+
+/// One row per resolution and speed, a column for each hand.
+report::Table resolution_table(const ResolutionStudy& study);
+/// The paper's claims for each hand.
+report::Table resolution_claims_table(const ResolutionStudy& study);
+/// What becomes of them when one number is another.
+report::Table resolution_variations_table(const ResolutionStudy& study);
+std::vector<std::string> resolution_words(const ResolutionStudy& study);
+
+/// As write_jitter().
+std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study,
+                                                    const std::filesystem::path& folder,
+                                                    const std::string& ending);
 
 }  // namespace kmax::experiment

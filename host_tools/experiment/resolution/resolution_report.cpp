@@ -1,4 +1,4 @@
-#include "host_tools/experiment/resolution/resolution_report.hpp"
+#include "host_tools/experiment/resolution/resolution_experiment.hpp"
 
 #include <fmt/format.h>
 
