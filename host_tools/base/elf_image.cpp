@@ -59,7 +59,7 @@ Elf32_Ehdr checked_header(const Reader& reader, std::span<const std::uint8_t> fi
   const auto header = reader.at<Elf32_Ehdr>(0);
   if (header.e_ident[EI_CLASS] != ELFCLASS32 || header.e_ident[EI_DATA] != ELFDATA2LSB ||
       header.e_machine != EM_ARM) {
-    reader.fail(fmt::format("not for a 32-bit little-endian ARM (machine {}); build the preset stm32f405",
+    reader.fail(fmt::format("not for a 32-bit little-endian ARM (machine {}); name an image for the board",
                             header.e_machine));
   }
   if (header.e_type != ET_EXEC) reader.fail("not a linked program (an object file or a library?)");

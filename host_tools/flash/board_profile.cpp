@@ -6,7 +6,8 @@ namespace {
 constexpr std::array<BoardProfile, 2> boards = {{
     {"odrive_v3",
      "ODrive v3.5 or v3.6",
-     "kmax-odrive_v3.elf",
+     "target/stm32f4x.cfg",
+     "stm32f405/kmax-odrive_v3.elf",
      true,
      "disconnect the motors or make sure that nobody turns the shaft of motor 0; set the DIP switch SW1 to "
      "DFU; leave GPIO6 of connector J3 open or low; connect USB; switch the DC supply off and on (USB does "
@@ -22,6 +23,7 @@ constexpr std::array<BoardProfile, 2> boards = {{
      }}},
     {"generic_stm32f405",
      "another board with an STM32F405",
+     "target/stm32f4x.cfg",
      "",
      false,
      "set BOOT0 high and PB2 (BOOT1) low, then reset the board",

@@ -38,8 +38,9 @@ struct MethodOnBoard {
 struct BoardProfile {
   std::string_view kind;  ///< as the configuration and --board call it
   std::string_view title;
-  std::string_view image;          ///< file name of its firmware image; empty: none is supplied
-  bool boot0_is_switch;            ///< no GPIO line can start the ROM bootloader
+  std::string_view openocd_target;  ///< the chip's configuration file of OpenOCD
+  std::string_view image;  ///< of its firmware, PRESET/FILE below the build folder; empty: none is supplied
+  bool boot0_is_switch;    ///< no GPIO line can start the ROM bootloader
   std::string_view to_bootloader;  ///< what a person does to start the ROM bootloader
   std::string_view to_application;
   std::array<MethodOnBoard, 4> methods;  ///< in the order of all_methods

@@ -54,11 +54,11 @@ void check_vectors(const std::vector<FlashPiece>& pieces, const std::string& nam
   const bool in_memory =
       (stack > 0x2000'0000 && stack <= 0x2002'0000) || (stack > 0x1000'0000 && stack <= 0x1001'0000);
   if (!in_memory || stack % 4 != 0)
-    refuse(name, fmt::format("no vector table for an STM32F405: its stack pointer is 0x{:08x}", stack));
+    refuse(name, fmt::format("no vector table for the chip: its stack pointer is 0x{:08x}", stack));
   bool found = false;
   for (const FlashPiece& piece : pieces) found = found || (start >= piece.address && start < piece.end());
   if ((start & 1U) == 0 || !found)
-    refuse(name, fmt::format("no vector table for an STM32F405: its start address is 0x{:08x}", start));
+    refuse(name, fmt::format("no vector table for the chip: its start address is 0x{:08x}", start));
 }
 
 }  // namespace

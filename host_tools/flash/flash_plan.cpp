@@ -45,7 +45,7 @@ Arguments openocd_adapter(Method method, const FlashTarget& target) {
                                                    (target.reset->active_low ? "" : " -active-high")});
     arguments.insert(arguments.end(), {"-c", "transport select swd"});
   }
-  arguments.insert(arguments.end(), {"-f", "target/stm32f4x.cfg"});
+  arguments.insert(arguments.end(), {"-f", target.openocd_target});
   if (method == Method::openocd_gpio && target.reset)
     arguments.insert(arguments.end(),
                      {"-c", fmt::format("reset_config srst_only srst_nogate {}",

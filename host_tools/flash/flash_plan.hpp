@@ -45,7 +45,8 @@ struct AdapterLine {
 
 /// What a method needs to know beside the image.
 struct FlashTarget {
-  std::string program;  ///< path
+  std::string program;         ///< path
+  std::string openocd_target;  ///< BoardProfile's
   AdapterLine swdio{}, swclk{};
   std::optional<AdapterLine> reset{};  ///< NRST on a line
   unsigned adapter_kilohertz = 1000;

@@ -32,7 +32,7 @@ struct FlashOptions {
   bool dry_run = false;
 
   void declare(CLI::App& command) {
-    command.add_option("image", image, "Linked image (default: the one of the preset stm32f405)")
+    command.add_option("image", image, "Linked image (default: the one built for the board)")
         ->option_text("IMAGE.elf");
     std::vector<std::string> methods = {"auto"};
     for (const auto& facts : flash::all_methods) methods.emplace_back(facts.name);
@@ -69,14 +69,14 @@ std::filesystem::path chosen_image(const FlashOptions& options, const BoardProfi
   if (!options.image.empty()) return options.image;
   if (board.image.empty())
     throw UsageError(fmt::format("name the image: none is supplied for {}", board.title));
-  const std::filesystem::path built = std::filesystem::path("stm32f405") / board.image;
+  const std::filesystem::path built = board.image;
   std::error_code ignored;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
   for (const auto& candidate : {"build" / built, program.parent_path().parent_path() / built}) {
     if (std::filesystem::exists(candidate, ignored)) return candidate;
   }
-  throw UsageError(
-      fmt::format("build/{} is not there: build the preset stm32f405 or name the image", built.string()));
+  throw UsageError(fmt::format("build/{} is not there: run scripts/build {} or name the image",
+                               built.string(), built.parent_path().string()));
 }
 
 /// OpenOCD wants the chip's number.
@@ -108,12 +108,13 @@ flash::AdapterLine adapter_line(const lines::LineSettings& settings, const Board
   return line;
 }
 
-flash::FlashTarget target_of(Method method, const FlashOptions& options, const lines::LinesConfig& config,
-                             const BoardServices& services) {
+flash::FlashTarget target_of(Method method, const BoardProfile& board, const FlashOptions& options,
+                             const lines::LinesConfig& config, const BoardServices& services) {
   flash::FlashTarget target;
   const std::string program(flash::facts_of(method).program);
   const auto found = flash::find_program(program);
   target.program = found ? found->string() : program;
+  target.openocd_target = board.openocd_target;
   target.adapter_kilohertz = options.speed_khz;
   target.usb_serial = options.usb_serial;
   target.serial_port = config.serial_port.empty() ? "SERIAL_PORT" : config.serial_port;
@@ -258,7 +259,7 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
   const bool by_lines = has_lines && (method == Method::serial || (method == Method::dfu && !dfu_is_there));
   const flash::FlashPlan plan =
-      flash::plan_flash(method, image, target_of(method, options, config, services));
+      flash::plan_flash(method, image, target_of(method, board, options, config, services));
   if (options.dry_run) return show_plan(context, board, method, image, plan, by_lines);
   return carry_out(context, services, config, board, method, image, plan, by_lines, options.at_most);
 } catch (const flash::ImageError& error) {

@@ -24,6 +24,7 @@ class FlashPlanText : public testing::Test {
   host_tools_test::TemporaryFolder folder;
   FlashImage image = FlashImage::load(folder.write("image.elf", made_elf(made_image())));
   FlashTarget target{.program = "tool",
+                     .openocd_target = "target/chip.cfg",
                      .swdio = {.chip_number = 0, .offset = 24},
                      .swclk = {.chip_number = 1, .offset = 25},
                      .serial_port = "/dev/ttyS0"};
@@ -36,7 +37,7 @@ TEST_F(FlashPlanText, OpenOcdOverGpioLines) {
       texts[0],
       "tool -c 'gdb_port disabled' -c 'tcl_port disabled' -c 'telnet_port disabled' -c 'adapter driver "
       "linuxgpiod' -c 'adapter gpio swclk 25 -chip 1' -c 'adapter gpio swdio 24 -chip 0' -c 'transport "
-      "select swd' -f target/stm32f4x.cfg -c 'adapter speed 1000' -c init -c 'reset halt' -c 'dump_image "
+      "select swd' -f target/chip.cfg -c 'adapter speed 1000' -c init -c 'reset halt' -c 'dump_image "
       "parameters_before.bin 0x08004000 32768' -c 'flash erase_address 0x08000000 16384' -c 'flash "
       "write_image erase image_0800c000.bin 0x0800c000 bin' -c 'verify_image image_0800c000.bin 0x0800c000 "
       "bin' -c 'flash write_image erase image_08000000.bin 0x08000000 bin' -c 'verify_image "
@@ -53,7 +54,7 @@ TEST_F(FlashPlanText, OpenOcdWithAResetLine) {
   target.reset = AdapterLine{.chip_number = 2, .offset = 7, .active_low = true};
   EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "-c 'adapter gpio srst 7 -chip 2' -c");
   EXPECT_CONTAINS(steps(Method::openocd_gpio)[0],
-                  "-f target/stm32f4x.cfg -c 'reset_config srst_only srst_nogate srst_open_drain' -c");
+                  "-f target/chip.cfg -c 'reset_config srst_only srst_nogate srst_open_drain' -c");
   target.reset = AdapterLine{.chip_number = 2, .offset = 7, .active_low = false, .push_pull = true};
   EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "-c 'adapter gpio srst 7 -chip 2 -active-high' -c");
   EXPECT_CONTAINS(steps(Method::openocd_gpio)[0], "srst_push_pull");
@@ -65,8 +66,7 @@ TEST_F(FlashPlanText, OpenOcdWithAnStLink) {
   target.reset = AdapterLine{.chip_number = 2, .offset = 7};
   const std::string text = steps(Method::openocd_stlink)[0];
   EXPECT_CONTAINS(
-      text,
-      "-f interface/stlink.cfg -c 'adapter serial 066CFF53' -f target/stm32f4x.cfg -c 'adapter speed 500'");
+      text, "-f interface/stlink.cfg -c 'adapter serial 066CFF53' -f target/chip.cfg -c 'adapter speed 500'");
   EXPECT_EQ(text.find("gpio"), std::string::npos);
   EXPECT_EQ(text.find("srst"), std::string::npos) << "the ST-Link has its own";
 }
