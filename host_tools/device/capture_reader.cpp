@@ -95,8 +95,8 @@ void command(Device& device, CaptureCommand what) {
   device.write(Parameter::of<"capture.command">(), static_cast<std::uint32_t>(what), true);
 }
 
-void tell_if_asked(const CaptureReader::Tell& tell, const CaptureProgress& progress) {
-  if (tell) tell(progress);
+void report_if_asked(const CaptureReader::ReportProgress& report, const CaptureProgress& progress) {
+  if (report) report(progress);
 }
 }  // namespace
 
@@ -164,7 +164,7 @@ CaptureReader::Status CaptureReader::status() {
   return {static_cast<CaptureState>(raw[0]), raw[1], raw[2], raw[3], raw[4]};
 }
 
-void CaptureReader::wait(microseconds patience, const Tell& tell) {
+void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
   const std::uint32_t all = samples_of(settings_);
   const auto needed = microseconds(static_cast<std::int64_t>(
       std::ceil(1e6 * static_cast<double>(all) * settings_.interval / firmware::tick_rate_hz)));
@@ -185,7 +185,7 @@ void CaptureReader::wait(microseconds patience, const Tell& tell) {
       triggered = true;
       deadline = device_.link().now() + needed + grace;
     }
-    tell_if_asked(tell, {triggered ? Phase::running : Phase::waiting, now.taken, all});
+    report_if_asked(report, {triggered ? Phase::running : Phase::waiting, now.taken, all});
     if (device_.link().now() >= deadline) {
       stop();
       if (!triggered) fail_without_trigger(patience);
@@ -206,7 +206,7 @@ void CaptureReader::fail_without_trigger(microseconds patience) {
                   device_.description(), name_of(settings_.trigger), level, seconds));
 }
 
-Captured CaptureReader::read(const Tell& tell) {
+Captured CaptureReader::read(const ReportProgress& report) {
   const Status before = status();
   if (before.state != CaptureState::complete)
     throw DeviceError(fmt::format("{}: there is no complete capture to read, but one that is {}",
@@ -223,8 +223,8 @@ Captured CaptureReader::read(const Tell& tell) {
   std::vector<std::uint32_t> words;
   try {
     words = device_.link().read_capture(all, [&](std::size_t done) {
-      tell_if_asked(tell,
-                    {Phase::reading, static_cast<std::uint32_t>(done), static_cast<std::uint32_t>(all)});
+      report_if_asked(report,
+                      {Phase::reading, static_cast<std::uint32_t>(done), static_cast<std::uint32_t>(all)});
     });
   } catch (const link::RefusedError&) {
     throw taken_away();

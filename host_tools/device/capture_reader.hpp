@@ -75,7 +75,7 @@ class CaptureReader {
  public:
   /// Called every 20 ms while waiting and after every request while reading. What it throws comes through;
   /// the capture in the device is then stopped by the destructor.
-  using Tell = std::function<void(const CaptureProgress&)>;
+  using ReportProgress = std::function<void(const CaptureProgress&)>;
 
   explicit CaptureReader(Device& device) : device_(device) {}
   /// Stops a capture that has not completed, if the device can still be reached.
@@ -88,14 +88,14 @@ class CaptureReader {
 
   /// Until the capture is complete. `patience`: for the trigger; from then on it lasts as long as it must.
   /// DeviceError, and the capture is stopped, if the trigger has not come by then.
-  void wait(std::chrono::microseconds patience, const Tell& tell = {});
+  void wait(std::chrono::microseconds patience, const ReportProgress& report = {});
 
   /// Ends the capture: what has been taken since the trigger can be read.
   void stop();
 
   /// All samples. On a serial line 62 values in a request: 12288 values take 6 s at 115200 baud. DeviceError
   /// if the capture is not complete.
-  Captured read(const Tell& tell = {});
+  Captured read(const ReportProgress& report = {});
 
  private:
   struct Status {

@@ -108,7 +108,7 @@ DeviceRig::DeviceRig(device::Device& device, const TouchLimits& limits, const To
       notice_(party.notice),
       before_(device, limits.axis, party.notice),
       standstill_(device, axes_of(limits, axes), party.notice),
-      session_{party.prompter, party.journal, party.tell, &standstill_} {
+      session_{party.prompter, party.journal, party.report, &standstill_} {
   const std::vector<std::string> protective = protective_of(device, limits, axes);
   std::vector<std::string> changed = wall_assignments({}, limits.axis, axes);
   changed.insert(changed.end(), protective.begin(), protective.end());
@@ -157,7 +157,7 @@ RigTouch DeviceRig::hold(const TouchPlan& plan) {
   watch.contact_patience = limits_.patience;
   watch.abort_amplitude = limits_.abort_amplitude;
   if (axes_ == RigAxes::wall_along) return hold_on_two_axes(plan, watch);
-  const WatchedTouch watched = watch_touch(device_, watch, session_.tell);
+  const WatchedTouch watched = watch_touch(device_, watch, session_.report);
   RigTouch touch;
   touch.touched = true;
   touch.speed = std::max(0.0, touch_speed(watched));
@@ -178,7 +178,8 @@ RigTouch DeviceRig::hold_on_two_axes(const TouchPlan& plan, TouchWatch watch) {
   std::vector<TimedChange> changes;
   for (const ForceChange& change : plan.changes)
     changes.push_back({change.time, {force_text(change)}, change.of == ForceChange::Of::background});
-  TwoAxisTouch watched = watch_two_axes(device_, watch, changes, session_.tell, limits_.wall_abort_amplitude);
+  TwoAxisTouch watched =
+      watch_two_axes(device_, watch, changes, session_.report, limits_.wall_abort_amplitude);
   RigTouch touch;
   touch.touched = true;
   touch.change_times = std::move(watched.change_times);

@@ -39,8 +39,8 @@ RunJournal::Json touch_settings(const std::string& experiment, device::Device& d
 struct TouchParty {
   bench::Prompter* prompter = nullptr;  ///< null: nobody is asked, as a simulated person needs no asking
   RunJournal* journal = nullptr;        ///< null: none is kept
-  const Tell& tell;                     ///< progress; what it throws ends the experiment
-  const Tell& notice;                   ///< what went wrong and was lived with; may be empty
+  const ReportText& report;             ///< progress; what it throws ends the experiment
+  const ReportText& notice;             ///< what went wrong and was lived with; may be empty
 };
 
 enum class RigAxes : std::uint8_t {
@@ -82,7 +82,7 @@ class DeviceRig final : public Rig {
   device::Device& device_;
   TouchLimits limits_;
   RigAxes axes_;
-  const Tell& notice_;
+  const ReportText& notice_;
   bench::Journal before_;
   bench::Standstill standstill_;
   TouchSession session_;

@@ -37,8 +37,8 @@ using ProgressReport = std::function<void(std::size_t done, std::size_t count)>;
 /// the part, which takes `own` of them. `whole` may be empty; it must live as long as what is returned.
 inline ProgressReport part_of(const ProgressReport& whole, std::size_t before, std::size_t own,
                               std::size_t shares) {
-  return [tell = &whole, before, own, shares](std::size_t done, std::size_t count) {
-    if (*tell) (*tell)(before * count + own * done, shares * count);
+  return [progress = &whole, before, own, shares](std::size_t done, std::size_t count) {
+    if (*progress) (*progress)(before * count + own * done, shares * count);
   };
 }
 

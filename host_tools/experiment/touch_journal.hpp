@@ -27,7 +27,7 @@ RunJournal::Json device_circumstances(device::Device& device, std::size_t axis);
 struct TouchSession {
   bench::Prompter* prompter = nullptr;  ///< null: nobody is asked
   RunJournal* journal = nullptr;        ///< null: none is kept
-  const Tell& tell;
+  const ReportText& report;
   bench::Standstill* standstill = nullptr;  ///< null: a touch that was cut off is an error
 };
 
@@ -52,7 +52,7 @@ Touch repeated_touch(const TouchSession& session, const std::string& name,
     if (session.standstill == nullptr || standstills == most_standstills) return false;
     if (!session.standstill->cut_off(error, name)) return false;
     ++standstills;
-    session.tell(fmt::format("{}: once more", name));
+    session.report(fmt::format("{}: once more", name));
     return true;
   };
   for (int attempt = 1;;) {
@@ -60,7 +60,7 @@ Touch repeated_touch(const TouchSession& session, const std::string& name,
       if (session.standstill != nullptr) session.standstill->begin();
       Touch touch = once();
       if (touch.counts()) return touch;
-      session.tell(fmt::format("{}: {}; once more", name, reason_not_to_count(touch)));
+      session.report(fmt::format("{}: {}; once more", name, reason_not_to_count(touch)));
       if (attempt++ == touch_attempts) return touch;
     } catch (const device::DeviceError& error) {
       // Nobody touches a wall whose force was removed unseen.

@@ -79,11 +79,11 @@ class BothArmed {
 class TwoAxisWatch {
  public:
   TwoAxisWatch(device::Device& device, const TouchWatch& watch, const std::vector<TimedChange>& changes,
-               const Tell& tell, double wall_abort_amplitude)
+               const ReportText& report, double wall_abort_amplitude)
       : device_(device),
         watch_(watch),
         changes_(changes),
-        tell_(tell),
+        report_(report),
         wall_abort_amplitude_(wall_abort_amplitude) {}
 
   TwoAxisTouch run() {
@@ -123,7 +123,7 @@ class TwoAxisWatch {
     const auto begin = device_.link().now();
     while (inside() &&
            device_.link().now() - begin < std::chrono::duration<double>(watch_.contact_patience)) {
-      tell_(fmt::format("{}: take the handle out of the wall", watch_.name));
+      report_(fmt::format("{}: take the handle out of the wall", watch_.name));
       device_.link().wait(milliseconds(200));
     }
   }
@@ -193,15 +193,15 @@ class TwoAxisWatch {
 
   void report(double now, BothArmed& armed) {
     armed.require_armed();
-    if (touched_ < 0.0) return tell_(fmt::format("{}: waiting for the touch", watch_.name));
-    tell_(fmt::format("{}: {:.1f} of {:.1f} s", watch_.name, std::min(now - touched_, watch_.hold_time),
-                      watch_.hold_time));
+    if (touched_ < 0.0) return report_(fmt::format("{}: waiting for the touch", watch_.name));
+    report_(fmt::format("{}: {:.1f} of {:.1f} s", watch_.name, std::min(now - touched_, watch_.hold_time),
+                        watch_.hold_time));
   }
 
   device::Device& device_;
   const TouchWatch& watch_;
   const std::vector<TimedChange>& changes_;
-  const Tell& tell_;
+  const ReportText& report_;
   TwoAxisTouch touch_;
   LateAbort late_;
   std::size_t looks_ = 0, touching_ = 0;
@@ -213,11 +213,11 @@ class TwoAxisWatch {
 }  // namespace
 
 TwoAxisTouch watch_two_axes(device::Device& device, const TouchWatch& watch,
-                            const std::vector<TimedChange>& changes, const Tell& tell,
+                            const std::vector<TimedChange>& changes, const ReportText& report,
                             double wall_abort_amplitude) {
   require_sound(watch);
   if (!(wall_abort_amplitude >= 0.0)) throw std::invalid_argument("wall_abort_amplitude must be 0 or above");
-  return TwoAxisWatch(device, watch, changes, tell, wall_abort_amplitude).run();
+  return TwoAxisWatch(device, watch, changes, report, wall_abort_amplitude).run();
 }
 
 }  // namespace kmax::experiment

@@ -37,7 +37,7 @@ struct TwoAxisTouch {
 /// order of time; each is made at the first round after its time, and when it was made is returned. Errors:
 /// as watch_touch(), device::ValueError.
 TwoAxisTouch watch_two_axes(device::Device& device, const TouchWatch& watch,
-                            const std::vector<TimedChange>& changes, const Tell& tell,
+                            const std::vector<TimedChange>& changes, const ReportText& report,
                             double wall_abort_amplitude = 0.0);
 
 }  // namespace kmax::experiment

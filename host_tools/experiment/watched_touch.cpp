@@ -77,13 +77,13 @@ bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
 /// Whoever pressed in the trial before may still be inside the wall, where arming is refused: waits until the
 /// handle is out, as long as the patience lasts.
 void wait_until_outside(device::Device& device, const WatchedTouch& touch, const TouchWatch& watch,
-                        const Tell& tell) {
+                        const ReportText& report) {
   const auto begin = device.link().now();
   const auto outside = [&] {
     return touch.side * (axis_number(device, watch.axis, "measured.position") - touch.surface) > 0.0;
   };
   while (!outside() && device.link().now() - begin < std::chrono::duration<double>(watch.contact_patience)) {
-    tell(fmt::format("{}: take the handle out of the wall", watch.name));
+    report(fmt::format("{}: take the handle out of the wall", watch.name));
     device.link().wait(milliseconds(200));
   }
 }
@@ -169,11 +169,11 @@ class CameTooSoon : public device::DeviceError {
   using device::DeviceError::DeviceError;
 };
 
-WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const Tell& tell) {
+WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const ReportText& report) {
   WatchedTouch touch;
   touch.surface = axis_number(device, watch.axis, "wall.position");
   touch.side = axis_number(device, watch.axis, "wall.side");
-  wait_until_outside(device, touch, watch, tell);
+  wait_until_outside(device, touch, watch, report);
   const double thinning =
       std::max(1.0, std::round(axis_number(device, watch.axis, "haptic.rate") / trace_rate));
   device::TraceReader trace(device, watch.axis, static_cast<std::uint16_t>(thinning));
@@ -204,7 +204,7 @@ WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const T
                         watch.contact_patience));
       if (round % 10 != 0 || progress.over()) continue;
       armed.require_armed();
-      tell(progress.words());
+      report(progress.words());
     }
     if (!touch.aborted_at) armed.require_armed();
     armed.disarm();
@@ -219,12 +219,12 @@ WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const T
 }
 }  // namespace
 
-WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell) {
+WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const ReportText& report) {
   require_sound(watch);
   const auto begin = device.link().now();
   for (;;) {
     try {
-      return watch_once(device, watch, tell);
+      return watch_once(device, watch, report);
     } catch (const CameTooSoon&) {
       const std::chrono::duration<double> waited = device.link().now() - begin;
       if (waited.count() >= watch.contact_patience) throw;

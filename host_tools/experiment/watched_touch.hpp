@@ -50,14 +50,14 @@ struct WatchedTouch {
   double aborted_amplitude = 0;      ///< m, of what it was aborted for
 };
 
-using Tell = std::function<void(const std::string&)>;
+using ReportText = std::function<void(const std::string&)>;
 
-/// Sets nothing; wall and law must be what they should be. `tell`: progress, called about five times a second
-/// with a short text; what it throws ends the touch.
+/// Sets nothing; wall and law must be what they should be. `report`: progress, called about five times a
+/// second with a short text; what it throws ends the touch.
 ///
 /// Errors: std::invalid_argument (require_sound); NobodyTouched; device::DeviceError (a fault with its words,
 /// a trace that stops, an axis that cannot be armed or disarmed), link::LinkError.
-WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const Tell& tell);
+WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const ReportText& report);
 
 /// A parameter of one axis, by its name without prefix.
 double axis_number(device::Device& device, std::size_t axis, const char* name);

@@ -114,12 +114,12 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   CalibrationReport report;
   {
     Progress progress(context.messages());
-    const auto tell = [&](const std::string& text) {
+    const auto show = [&](const std::string& text) {
       check_interruption();
       if (!text.empty()) progress.show(text);
     };
     report = calibration::calibrate(
-        device, settings, options.hand ? &prompter : nullptr, tell,
+        device, settings, options.hand ? &prompter : nullptr, show,
         [&](std::string_view step) { context.note(fmt::format("calibrating: {}", step)); });
   }
   if (context.json) {

@@ -199,7 +199,7 @@ Captured capture(Context& context, device::Device& device, const CaptureOptions&
   const Interruption interruption;
   device::CaptureReader reader(device);
   Progress progress(context.messages());
-  const auto tell = [&](const CaptureProgress& now) {
+  const auto show = [&](const CaptureProgress& now) {
     if (interruption.requested()) throw Interrupted(end_early(reader, now.phase));
     progress.show(progress_text(now, options.settings.trigger));
   };
@@ -207,9 +207,9 @@ Captured capture(Context& context, device::Device& device, const CaptureOptions&
   {
     std::optional<Armed> armed;
     if (options.arm) armed.emplace(context, device, options.settings.axis);
-    reader.wait(std::chrono::microseconds(static_cast<std::int64_t>(options.timeout * 1e6)), tell);
+    reader.wait(std::chrono::microseconds(static_cast<std::int64_t>(options.timeout * 1e6)), show);
   }
-  return reader.read(tell);
+  return reader.read(show);
 }
 
 CaptureOptions checked(const CaptureOptions& given, const Context& context) {

@@ -43,8 +43,8 @@ experiment::DeviationStudy simulate(Context& context, const DeviationOptions& op
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
   return simulate_study(context, interruption, force_pairs_words,
-                        [&](const experiment::ProgressReport& tell) {
-                          return experiment::study_deviation(options.settings, hands, people, tell);
+                        [&](const experiment::ProgressReport& progress) {
+                          return experiment::study_deviation(options.settings, hands, people, progress);
                         });
 }
 

@@ -42,8 +42,8 @@ experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
   return simulate_study(context, interruption, force_pairs_words,
-                        [&](const experiment::ProgressReport& tell) {
-                          return experiment::study_jitter(options.settings, hands, people, tell);
+                        [&](const experiment::ProgressReport& progress) {
+                          return experiment::study_jitter(options.settings, hands, people, progress);
                         });
 }
 

@@ -76,9 +76,10 @@ experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& 
   // Of a set the people only: the device is paper 2's.
   simulation::DeviceModel unused;
   const std::vector<simulation::OperatorModel> people = people_of(options.people.subjects, unused);
-  return simulate_study(context, interruption, percent_words, [&](const experiment::ProgressReport& tell) {
-    return experiment::study_resolution(settings, options.weak, options.hands, people, tell);
-  });
+  return simulate_study(
+      context, interruption, percent_words, [&](const experiment::ProgressReport& progress) {
+        return experiment::study_resolution(settings, options.weak, options.hands, people, progress);
+      });
 }
 
 experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,

@@ -146,15 +146,15 @@ auto make_touches(Context& context, device::Device& device, const Interruption& 
   };
   TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
   Progress progress(context.messages());
-  const experiment::Tell tell = [&](const std::string& text) {
+  const experiment::ReportText show = [&](const std::string& text) {
     check_interruption();
     progress.show(run.so_far ? run.so_far() + text : text);
   };
-  const experiment::Tell notice = [&](const std::string& text) {
+  const experiment::ReportText notice = [&](const std::string& text) {
     progress.make_room();
     context.note(text);
   };
-  experiment::DeviceRig rig(device, limits, {run.asks ? &prompter : nullptr, run.journal, tell, notice},
+  experiment::DeviceRig rig(device, limits, {run.asks ? &prompter : nullptr, run.journal, show, notice},
                             run.axes);
   return make(rig);
 }

@@ -122,11 +122,11 @@ class PulseSequence {
       }
       evidence_.motion = motion_evidence(evidence_.swings, facts);
       pulse.voltage = -pulse.voltage;
-      if (!another_set_would_tell()) return;
+      if (!another_set_would_decide()) return;
     }
   }
 
-  bool another_set_would_tell() const {
+  bool another_set_would_decide() const {
     if (!evidence_.motion) return false;
     const MotionEvidence& motion = *evidence_.motion;
     if (motion.encoder_moved())

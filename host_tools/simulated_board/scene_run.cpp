@@ -40,7 +40,7 @@ void add_report(RunSample& sample, const control::HapticLoop<float>::Output& hap
 }
 
 /// The axis that the run's end is about.
-std::size_t axis_to_tell(const firmware::Application& application, std::size_t axes) {
+std::size_t axis_to_report(const firmware::Application& application, std::size_t axes) {
   for (std::size_t axis = 0; axis < axes; ++axis) {
     if (application.state(axis) != firmware::DriveState::operation_enabled) return axis;
   }
@@ -70,7 +70,7 @@ RunResult run_scene(const simulation::Scene& scene) {
   RunResult result;
   const std::size_t axes = scene.axes.size();
   arm(simulation, axes);
-  result.axis = axis_to_tell(application, axes);
+  result.axis = axis_to_report(application, axes);
   result.end_state = application.state(result.axis);
   result.refusal = application.refusal(result.axis);
   if (result.end_state != firmware::DriveState::operation_enabled) return result;
@@ -94,7 +94,7 @@ RunResult run_scene(const simulation::Scene& scene) {
     }
   }
   const auto& report = application.ISR_report(0);
-  result.axis = axis_to_tell(application, axes);
+  result.axis = axis_to_report(application, axes);
   result.end_state = application.state(result.axis);
   result.fault = application.fault(result.axis);
   result.limited_share =

@@ -136,11 +136,11 @@ void print_distortion(const char* name, const Motor& motor) {
       std::printf("%-22s %6.0f %8.1f", name, 1e9 * dead_time, amplitude);
       for (const DeadTimeShare share :
            {DeadTimeShare::off, DeadTimeShare::of_reference, DeadTimeShare::of_measured}) {
-        for (const double told : {1.0, 2.0}) {
-          if (share == DeadTimeShare::off && told > 1.0) continue;
+        for (const double assumed : {1.0, 2.0}) {
+          if (share == DeadTimeShare::off && assumed > 1.0) continue;
           const auto result = through_zero::distortion_of({.amplitude = amplitude,
                                                            .dead_time = dead_time,
-                                                           .told_dead_time = told * dead_time,
+                                                           .assumed_dead_time = assumed * dead_time,
                                                            .share = share},
                                                           motor);
           std::printf("  %7.2f %4.1fx", 100.0 * result.harmonics, result.largest / amplitude);

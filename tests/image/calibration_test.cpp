@@ -33,7 +33,7 @@ struct Bench {
   }
 };
 
-std::string told(const selftest::Report& report) {
+std::string text_of(const selftest::Report& report) {
   std::string text;
   for (const selftest::CheckResult& check : report.checks)
     text += check.name + ": " + selftest::name_of(check.verdict) + " [" + check.part + "] " + check.message +
@@ -63,7 +63,7 @@ INSTANTIATE_TEST_SUITE_P(DISABLED_OtherScenes, ImageCalibration,
 TEST(ImageSelfTest, AHealthyBoardPasses) {
   Bench bench("gimbal_a");
   const auto report = bench.test();
-  EXPECT_TRUE(report.pass()) << told(report);
+  EXPECT_TRUE(report.pass()) << text_of(report);
 }
 
 TEST(ImageSelfTest, NamesTheSupplyTheEmergencyStopAndAPhase) {
@@ -72,15 +72,15 @@ TEST(ImageSelfTest, NamesTheSupplyTheEmergencyStopAndAPhase) {
     bench.image.world.supply().set_source(9.0);
     bench.image.board->run_for(0.2);
     const auto report = bench.test();
-    ASSERT_NE(report.first_failure(), nullptr) << told(report);
-    EXPECT_NE(report.first_failure()->part.find("supply"), std::string::npos) << told(report);
+    ASSERT_NE(report.first_failure(), nullptr) << text_of(report);
+    EXPECT_NE(report.first_failure()->part.find("supply"), std::string::npos) << text_of(report);
   }
   {
     Bench bench("gimbal_a");
     bench.image.world.drives().plant(0, simulation::Defect::phase_b_open);
     const auto report = bench.test();
-    ASSERT_NE(report.first_failure(), nullptr) << told(report);
-    EXPECT_NE(report.first_failure()->part.find("phase B"), std::string::npos) << told(report);
+    ASSERT_NE(report.first_failure(), nullptr) << text_of(report);
+    EXPECT_NE(report.first_failure()->part.find("phase B"), std::string::npos) << text_of(report);
   }
 }
 

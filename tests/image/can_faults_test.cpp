@@ -92,9 +92,10 @@ TEST_F(BusFaults, BusOffAndBack) {
   bench.board->run_for(0.3);
   EXPECT_EQ(serial_number("can.node_state"), 127U) << "the error behaviour's default";
   // The axis' fault and the bus-off itself are told when that is possible again.
-  bool told = false;
-  while (const auto emergency = bench.next(0x081, 0.001)) told = told || (emergency->frame.data[1] == 0x81);
-  EXPECT_TRUE(told);
+  bool reported = false;
+  while (const auto emergency = bench.next(0x081, 0.001))
+    reported = reported || (emergency->frame.data[1] == 0x81);
+  EXPECT_TRUE(reported);
   expect_link_is_back();
 }
 
@@ -134,9 +135,9 @@ TEST_F(BusFaults, TwoNodesHaveOneIdentifier) {
     bench.board->run_for(0.01);
   }
   EXPECT_EQ(serial_number("can.identity_conflicts"), 20U);
-  const auto told = bench.next(0x081, 0.1);
-  ASSERT_TRUE(told);
-  EXPECT_EQ(told->frame.data[0] | told->frame.data[1] << 8, 0x8100);
+  const auto reported = bench.next(0x081, 0.1);
+  ASSERT_TRUE(reported);
+  EXPECT_EQ(reported->frame.data[0] | reported->frame.data[1] << 8, 0x8100);
   // Its answers come beside this node's.
   twin.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime now) {
     if (frame.identifier == 0x601)

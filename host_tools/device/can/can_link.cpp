@@ -111,7 +111,7 @@ void CanLink::write(std::span<const SlotValue> values, Repeat repeat,
 }
 
 std::vector<std::uint32_t> CanLink::read_words(SdoClient::Object object, std::size_t bytes,
-                                               const SdoClient::Tell& progress) {
+                                               const SdoClient::ReportProgress& progress) {
   keep_alive();
   try {
     const auto received = sdo_.upload(object, bytes, progress);

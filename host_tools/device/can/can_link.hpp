@@ -52,7 +52,7 @@ class CanLink final : public Link {
  private:
   std::uint32_t read(std::size_t slot);
   std::vector<std::uint32_t> read_words(SdoClient::Object object, std::size_t bytes,
-                                        const SdoClient::Tell& progress = {});
+                                        const SdoClient::ReportProgress& progress = {});
   void note_command(const SlotValue& written);
   void keep_alive();
 

@@ -24,7 +24,7 @@ constexpr std::uint8_t command(canopen::SdoBlockUploadRequest request, unsigned 
 }
 }  // namespace
 
-SdoClient::Bytes SdoClient::upload_block(Object object, const Tell& tell) {
+SdoClient::Bytes SdoClient::upload_block(Object object, const ReportProgress& report) {
   using enum canopen::SdoBlockUploadRequest;
   // Protocol switch threshold 0: the node is not to fall back to segments for a short value.
   send(canopen::sdo_bytes(command(initiate, sdo_flag::block_crc), object, canopen::sdo_block_size_max));
@@ -49,7 +49,7 @@ SdoClient::Bytes SdoClient::upload_block(Object object, const Tell& tell) {
 
   Bytes bytes;
   send({command(start)});
-  for (std::size_t had = 0, idle = 0; !receive_block(object, bytes, tell); had = bytes.size()) {
+  for (std::size_t had = 0, idle = 0; !receive_block(object, bytes, report); had = bytes.size()) {
     idle = bytes.size() == had ? idle + 1 : 0;
     if (idle == idle_blocks_max)
       give_up(object, Abort::sequence, "its first segment is lost again and again");
@@ -71,7 +71,7 @@ SdoClient::Bytes SdoClient::upload_block(Object object, const Tell& tell) {
 
 /// Takes one block and acknowledges what came without a gap: the node goes on behind that. True: it was the
 /// last one.
-bool SdoClient::receive_block(Object object, Bytes& bytes, const Tell& tell) {
+bool SdoClient::receive_block(Object object, Bytes& bytes, const ReportProgress& report) {
   using enum canopen::SdoBlockUploadRequest;
   unsigned good = 0, seen = 0;
   bool last = false;
@@ -104,7 +104,7 @@ bool SdoClient::receive_block(Object object, Bytes& bytes, const Tell& tell) {
   }
   if (good != seen || (!last && good != canopen::sdo_block_size_max)) ++counters_.lost_segments;
   try {
-    if (tell) tell(bytes.size());
+    if (report) report(bytes.size());
   } catch (...) {
     send_abort(object, Abort::general);
     throw;

@@ -183,10 +183,10 @@ void SdoClient::fail(Object object, const Failed& last, int attempts) {
                               tried, check));
 }
 
-SdoClient::Bytes SdoClient::upload(Object object, std::size_t expected, const Tell& tell) {
+SdoClient::Bytes SdoClient::upload(Object object, std::size_t expected, const ReportProgress& report) {
   Bytes value;
   attempt(object, settings_.attempts, [&] {
-    value = expected >= settings_.block_from ? upload_block(object, tell) : upload_segmented(object);
+    value = expected >= settings_.block_from ? upload_block(object, report) : upload_segmented(object);
   });
   return value;
 }

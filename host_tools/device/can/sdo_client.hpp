@@ -62,7 +62,7 @@ class SdoClient {
   using Bytes = std::vector<std::uint8_t>;
   /// Bytes that have arrived, at least once for each block. What it throws comes through, and the transfer
   /// is aborted.
-  using Tell = std::function<void(std::size_t)>;
+  using ReportProgress = std::function<void(std::size_t)>;
 
   /// The port must let the node's replies pass: filters_for(node).
   SdoClient(CanPort& port, std::uint8_t node, const SdoSettings& settings = {});
@@ -70,7 +70,7 @@ class SdoClient {
   static std::vector<CanFilter> filters_for(std::uint8_t node);
 
   /// `expected`: how many bytes there will be, as far as is known; decides only how they travel.
-  Bytes upload(Object object, std::size_t expected = 0, const Tell& tell = {});
+  Bytes upload(Object object, std::size_t expected = 0, const ReportProgress& report = {});
 
   void download(Object object, std::span<const std::uint8_t> value, bool idempotent);
 
@@ -99,8 +99,8 @@ class SdoClient {
 
   Bytes upload_segmented(Object object);
   Bytes finish_upload(Object object, const Data& answer);
-  Bytes upload_block(Object object, const Tell& tell);
-  bool receive_block(Object object, Bytes& bytes, const Tell& tell);
+  Bytes upload_block(Object object, const ReportProgress& report);
+  bool receive_block(Object object, Bytes& bytes, const ReportProgress& report);
   void download_once(Object object, std::span<const std::uint8_t> value);
 
   CanPort& port_;

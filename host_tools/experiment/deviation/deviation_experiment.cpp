@@ -125,7 +125,7 @@ DeviationResult mean_deviation(const paper::DeviationCell& cell, std::span<const
   return result;
 }
 
-DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& tell) {
+DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& progress) {
   const DeviationProtocol& protocol = settings.protocol;
   constexpr SettingCheck check("deviation");
   check("rest", protocol.rest, 0.0, 60.0);
@@ -134,7 +134,7 @@ DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const Pr
   check("pulses", protocol.pulses, 1, 1000);
   DeviationRun run;
   for (const paper::DeviationCell& pair : settings.pairs) {
-    if (tell) tell(run.results.size(), settings.pairs.size());
+    if (progress) progress(run.results.size(), settings.pairs.size());
     rig.set({protocol.stiffness, protocol.haptic_rate, control::InterferenceMode::parallel});
     TouchPlan plan = deviation_plan(protocol, pair);
     std::vector<DeviationTouch> touches;

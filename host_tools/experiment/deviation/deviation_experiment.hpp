@@ -125,8 +125,9 @@ struct DeviationRun {
   std::uint64_t lost_records = 0;
 };
 
-/// All pairs of forces; a touch that was aborted is counted, not averaged. `tell` and errors as run_jitter().
-DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& tell = {});
+/// All pairs of forces; a touch that was aborted is counted, not averaged. `progress` and errors as
+/// run_jitter().
+DeviationRun run_deviation(Rig& rig, const DeviationSettings& settings, const ProgressReport& progress = {});
 
 struct DeviationVerdict {
   std::vector<BackgroundTrend> trends;  ///< m, one for each F_I that has a deviation in the paper
@@ -156,7 +157,7 @@ struct DeviationStudy {
 /// The simulated study. Throws std::invalid_argument for a push that loses the wall against an F_B.
 DeviationStudy study_deviation(const DeviationSettings& settings, const SimulatedHands& hands,
                                const std::vector<simulation::OperatorModel>& people,
-                               const ProgressReport& tell = {});
+                               const ProgressReport& progress = {});
 
 /// What somebody did on a device, who is told by the rig; it notes what was not counted.
 DeviationStudy study_deviation(DeviceRig& rig, const DeviationSettings& settings);

@@ -33,7 +33,7 @@ const DeviationFit* fit_named(const DeviationStudy& study, std::string_view name
 
 DeviationStudy study_deviation(const DeviationSettings& settings, const SimulatedHands& hands,
                                const std::vector<simulation::OperatorModel>& people,
-                               const ProgressReport& tell) {
+                               const ProgressReport& progress) {
   const DeviationProtocol& protocol = settings.protocol;
   for (const paper::DeviationCell& pair : settings.pairs)
     if (!(hands.push > pair.background))
@@ -42,12 +42,12 @@ DeviationStudy study_deviation(const DeviationSettings& settings, const Simulate
           hands.push, pair.background));
   SimulatedRig rig("deviation", people, hands);
   DeviationStudy study;
-  study.results = run_deviation(rig, settings, part_of(tell, 0, 1, 2)).results;
+  study.results = run_deviation(rig, settings, part_of(progress, 0, 1, 2)).results;
   study.verdict = judge_deviation(study.results);
   std::vector<simulation::OperatorModel> never_stiffer = people;
   for (simulation::OperatorModel& person : never_stiffer) person.activation_gain = 0.0;
   SimulatedRig slack("deviation", never_stiffer, hands);
-  study.without_stiffening = run_deviation(slack, settings, part_of(tell, 1, 1, 2)).results;
+  study.without_stiffening = run_deviation(slack, settings, part_of(progress, 1, 1, 2)).results;
   study.verdict_without_stiffening = judge_deviation(study.without_stiffening);
   study.fits = fit_table_2();
   study.touch = rig.record(deviation_plan(protocol, *paper::deviation(3.0, 5.0))).samples;

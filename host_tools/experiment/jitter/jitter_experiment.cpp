@@ -105,7 +105,7 @@ JitterResult mean_jitter(const paper::JitterCell& cell, std::span<const JitterMe
   return result;
 }
 
-JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& tell) {
+JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& progress) {
   const JitterWall& wall = settings.wall;
   constexpr SettingCheck check("jitter");
   check("window", wall.window, 0.01, 1000.0);
@@ -117,7 +117,7 @@ JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressRep
   };
   JitterRun run;
   for (const paper::JitterCell& pair : settings.pairs) {
-    if (tell) tell(run.results.size(), settings.pairs.size());
+    if (progress) progress(run.results.size(), settings.pairs.size());
     rig.set({wall.stiffness, wall.haptic_rate, control::InterferenceMode::perpendicular, pair.interference,
              pair.background});
     std::vector<JitterMeasure> measures;

@@ -101,9 +101,9 @@ struct JitterRun {
 };
 
 /// All pairs of forces. An aborted touch is counted, not averaged. One that lost records of its trace every
-/// time it was made is neither; the rig notes it. `tell` is called before each pair with how many are done,
-/// and may throw. Throws std::invalid_argument for settings out of range, and what the rig throws.
-JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& tell = {});
+/// time it was made is neither; the rig notes it. `progress` is called before each pair with how many are
+/// done, and may throw. Throws std::invalid_argument for settings out of range, and what the rig throws.
+JitterRun run_jitter(Rig& rig, const JitterSettings& settings, const ProgressReport& progress = {});
 
 struct JitterVerdict {
   std::vector<BackgroundTrend> amplitude, time;     ///< one for each F_I that has jitter in the paper
@@ -139,7 +139,7 @@ struct JitterStudy {
 /// The simulated study: the table, and the table without stiffening and without an answer to F_I.
 JitterStudy study_jitter(const JitterSettings& settings, const SimulatedHands& hands,
                          const std::vector<simulation::OperatorModel>& people,
-                         const ProgressReport& tell = {});
+                         const ProgressReport& progress = {});
 
 /// What somebody did on a device, who is told by the rig.
 JitterStudy study_jitter(DeviceRig& rig, const JitterSettings& settings);

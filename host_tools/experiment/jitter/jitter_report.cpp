@@ -37,11 +37,12 @@ std::string time_text(const JitterResult& result) {
 }  // namespace
 
 JitterStudy study_jitter(const JitterSettings& settings, const SimulatedHands& hands,
-                         const std::vector<simulation::OperatorModel>& people, const ProgressReport& tell) {
+                         const std::vector<simulation::OperatorModel>& people,
+                         const ProgressReport& progress) {
   const auto run = [&](const SimulatedHands& holding, const std::vector<simulation::OperatorModel>& held_by,
                        std::size_t number) {
     SimulatedRig rig("jitter", held_by, holding);
-    return run_jitter(rig, settings, part_of(tell, number, 1, 3)).results;
+    return run_jitter(rig, settings, part_of(progress, number, 1, 3)).results;
   };
   JitterStudy study;
   study.wall = settings.wall;

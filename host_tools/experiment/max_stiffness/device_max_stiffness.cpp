@@ -108,7 +108,7 @@ DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& con
       climb.give_up();
       break;
     }
-    climb.tell(stable);
+    climb.record(stable);
     if (stable) result.found.saturated_share = limited;
   }
   result.found.stiffness = climb.result();

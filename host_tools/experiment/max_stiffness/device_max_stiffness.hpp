@@ -86,7 +86,7 @@ class StiffnessClimb {
   }
 
   /// What next() has been found to be.
-  void tell(bool stable) {
+  void record(bool stable) {
     if (stable) {
       stable_seen_ = true;
       best_ = at(number_);

@@ -108,7 +108,8 @@ RunJournal::Json journal_settings(device::Device& device, const TouchLimits& lim
                          {"touches", settings.touches}});
 }
 
-ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings, const ProgressReport& tell) {
+ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings,
+                                 const ProgressReport& progress) {
   constexpr SettingCheck check("resolution");
   check("hold", settings.wall.hold, 1.0, 1000.0);
   check("touches", settings.touches, 1, 1000);
@@ -123,7 +124,7 @@ ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings, c
     rig.set(rig_wall(settings.wall, resolution));
     const double step = rig.resolution_step();
     for (const double speed : settings.speeds) {
-      if (tell) tell(done++, all);
+      if (progress) progress(done++, all);
       ResolutionCell cell = cell_at(settings.wall, resolution, step, speed);
       for (std::size_t person = 0; person < rig.people(); ++person) {
         const std::size_t unstable_before = cell.unstable;
@@ -157,12 +158,13 @@ ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings, c
 std::vector<ResolutionRun> run_hands(const ResolutionSettings& settings, const ResolutionHand& weak,
                                      const SimulatedHands& hands,
                                      const std::vector<simulation::OperatorModel>& people,
-                                     const ProgressReport& tell) {
+                                     const ProgressReport& progress) {
   const std::array<ResolutionHand, 4> each{{{1.0, 0.0}, {1.0, weak.delay}, {weak.grip, 0.0}, weak}};
   std::vector<ResolutionRun> runs;
   for (const ResolutionHand& hand : each) {
     SimulatedRig rig = rig_with(hand, people, hands);
-    runs.push_back({hand, run_resolution(rig, settings, part_of(tell, runs.size(), 1, each.size())).cells});
+    runs.push_back(
+        {hand, run_resolution(rig, settings, part_of(progress, runs.size(), 1, each.size())).cells});
   }
   return runs;
 }
@@ -232,7 +234,7 @@ struct VariedSetting {
 std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
                                                  const ResolutionHand& weak, const SimulatedHands& hands,
                                                  const std::vector<simulation::OperatorModel>& people,
-                                                 const ProgressReport& tell) {
+                                                 const ProgressReport& progress) {
   const VariedSetting own{settings, weak, hands};
   std::vector<std::pair<std::string, VariedSetting>> changes;
   const auto change = [&](std::string name, auto make) {
@@ -259,7 +261,7 @@ std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& setti
 
   std::vector<ResolutionVariation> variations;
   for (const auto& [name, changed] : changes) {
-    if (tell) tell(variations.size(), changes.size());
+    if (progress) progress(variations.size(), changes.size());
     SimulatedRig rig = rig_with(changed.weak, people, changed.hands);
     const std::vector<ResolutionCell> cells = run_resolution(rig, changed.settings).cells;
     variations.push_back({name, judge_resolution(cells),

@@ -121,16 +121,16 @@ struct ResolutionTouches {
   std::size_t aborted = 0;  ///< of the touches: taken as vibrating
   std::uint64_t lost_records = 0;
 };
-/// Every resolution at every speed. `tell` and errors as run_jitter().
+/// Every resolution at every speed. `progress` and errors as run_jitter().
 ResolutionTouches run_resolution(Rig& rig, const ResolutionSettings& settings,
-                                 const ProgressReport& tell = {});
+                                 const ProgressReport& progress = {});
 
 /// Of simulated people: full grip without delay, with delay, weak grip without delay, with delay, in this
 /// order.
 std::vector<ResolutionRun> run_hands(const ResolutionSettings& settings, const ResolutionHand& weak,
                                      const SimulatedHands& hands,
                                      const std::vector<simulation::OperatorModel>& people,
-                                     const ProgressReport& tell = {});
+                                     const ProgressReport& progress = {});
 
 struct ResolutionVerdict {
   TestedClaim coarse_vibrates;     ///< 0.4 mm: at every speed
@@ -161,7 +161,7 @@ struct ResolutionVariation {
 std::vector<ResolutionVariation> vary_resolution(const ResolutionSettings& settings,
                                                  const ResolutionHand& weak, const SimulatedHands& hands,
                                                  const std::vector<simulation::OperatorModel>& people,
-                                                 const ProgressReport& tell = {});
+                                                 const ProgressReport& progress = {});
 
 /// The lowest speed from which on every higher one vibrates; nothing if the highest does not.
 std::optional<double> onset_speed(std::span<const ResolutionCell> cells, double resolution);
@@ -185,7 +185,7 @@ struct ResolutionStudy {
 ResolutionStudy study_resolution(const ResolutionSettings& settings, const ResolutionHand& weak,
                                  const SimulatedHands& hands,
                                  const std::vector<simulation::OperatorModel>& people,
-                                 const ProgressReport& tell = {});
+                                 const ProgressReport& progress = {});
 
 /// What somebody did on a device, who is told by the rig.
 ResolutionStudy study_resolution(DeviceRig& rig, const ResolutionSettings& settings);

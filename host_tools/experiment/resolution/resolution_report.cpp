@@ -53,14 +53,14 @@ std::string to_string(const ResolutionHand& hand) {
 ResolutionStudy study_resolution(const ResolutionSettings& settings, const ResolutionHand& weak,
                                  const SimulatedHands& hands,
                                  const std::vector<simulation::OperatorModel>& people,
-                                 const ProgressReport& tell) {
+                                 const ProgressReport& progress) {
   ResolutionStudy study;
   study.wall = settings.wall;
   study.pushes = settings.pushes;
   // The variations take about three times as long as the runs.
-  const ProgressReport of_runs = part_of(tell, 0, 1, 4);
+  const ProgressReport of_runs = part_of(progress, 0, 1, 4);
   study.runs = run_hands(settings, weak, hands, people, of_runs);
-  study.variations = vary_resolution(settings, weak, hands, people, part_of(tell, 1, 3, 4));
+  study.variations = vary_resolution(settings, weak, hands, people, part_of(progress, 1, 3, 4));
   SimulatedRig rig = rig_with(weak, people, hands);
   const auto record = [&](double resolution) {
     rig.set(rig_wall(settings.wall, resolution));

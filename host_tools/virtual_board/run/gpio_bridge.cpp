@@ -36,8 +36,8 @@ fs::path find_chip(const std::string& chip) {
 
 }  // namespace
 
-GpioBridge::GpioBridge(VirtualBoard& board, const std::string& chip, Tell tell)
-    : board_(board), tell_(tell ? std::move(tell) : [](const std::string&) {}), chip_(find_chip(chip)) {
+GpioBridge::GpioBridge(VirtualBoard& board, const std::string& chip, ReportText report)
+    : board_(board), report_(report ? std::move(report) : [](const std::string&) {}), chip_(find_chip(chip)) {
   for (unsigned line = 0; line < line_count; ++line) {
     if (!fs::exists(line_folder(chip_, line) / "value"))
       throw std::runtime_error(fmt::format(
@@ -75,7 +75,7 @@ void GpioBridge::follow_emergency_stop(bool low) {
   stopped_ = low;
   const BoardTime then = board_.now();
   board_.open_emergency_stop(low);
-  if (!low) return tell_(fmt::format("{:.6f} s: ESTOP high, the contact is closed", seconds(then)));
+  if (!low) return report_(fmt::format("{:.6f} s: ESTOP high, the contact is closed", seconds(then)));
   const bool armed = board_.bridge_armed(0) || board_.bridge_armed(1);
   // In steps of a microsecond, so that the answer can be told in them.
   constexpr int longest_us = 1000;
@@ -84,24 +84,24 @@ void GpioBridge::follow_emergency_stop(bool low) {
     board_.run_until(then + static_cast<BoardTime>(++elapsed_us) * (units_per_second / 1'000'000));
   }
   if (board_.bridge_armed(0) || board_.bridge_armed(1))
-    return tell_(
+    return report_(
         fmt::format("{:.6f} s: ESTOP low, and a bridge is STILL ON {} us later", seconds(then), elapsed_us));
-  tell_(armed ? fmt::format("{:.6f} s: ESTOP low, both bridges off {} us later", seconds(then), elapsed_us)
-              : fmt::format("{:.6f} s: ESTOP low, no bridge was on", seconds(then)));
+  report_(armed ? fmt::format("{:.6f} s: ESTOP low, both bridges off {} us later", seconds(then), elapsed_us)
+                : fmt::format("{:.6f} s: ESTOP low, no bridge was on", seconds(then)));
 }
 
 bool GpioBridge::exchange() {
   const bool low = !level(reset);
   if (low && !held_) {
     board_.pull_reset();
-    tell_(fmt::format("{:.6f} s: NRST low, the board is held in reset", seconds(board_.now())));
+    report_(fmt::format("{:.6f} s: NRST low, the board is held in reset", seconds(board_.now())));
   }
   if (!low && held_) {
     in_boot_loader_ = level(boot0);
-    tell_(fmt::format("{:.6f} s: NRST high, {}", seconds(board_.now()),
-                      in_boot_loader_
-                          ? "BOOT0 high: the boot loader in ROM is not emulated, the board stands still"
-                          : "the board starts"));
+    report_(fmt::format("{:.6f} s: NRST high, {}", seconds(board_.now()),
+                        in_boot_loader_
+                            ? "BOOT0 high: the boot loader in ROM is not emulated, the board stands still"
+                            : "the board starts"));
   }
   held_ = low;
   if (held_ || in_boot_loader_) return false;

@@ -29,11 +29,11 @@ class GpioBridge {
   enum Line : unsigned { reset, boot0, emergency_stop, fault, healthy, line_count };
 
   /// A line of text for the person at the terminal.
-  using Tell = std::function<void(const std::string&)>;
+  using ReportText = std::function<void(const std::string&)>;
 
   /// `chip`: "gpiochip0", or its path under /dev or /sys. Throws std::runtime_error when that is no gpio-sim
   /// chip with these lines.
-  GpioBridge(VirtualBoard& board, const std::string& chip, Tell tell = {});
+  GpioBridge(VirtualBoard& board, const std::string& chip, ReportText report = {});
   GpioBridge(const GpioBridge&) = delete;
   GpioBridge& operator=(const GpioBridge&) = delete;
 
@@ -47,7 +47,7 @@ class GpioBridge {
   void follow_emergency_stop(bool low);
 
   VirtualBoard& board_;
-  Tell tell_;
+  ReportText report_;
   std::filesystem::path chip_;
   /// Kept open: a look at the lines is a few system calls, a thousand times a second.
   std::array<link::FileDescriptor, emergency_stop + 1> levels_;

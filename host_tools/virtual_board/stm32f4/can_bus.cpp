@@ -92,7 +92,7 @@ BoardTime CanBus::next_event() const {
   return never;
 }
 
-void CanBus::tell_busy(bool busy, bool after_frame, BoardTime now) {
+void CanBus::report_busy(bool busy, bool after_frame, BoardTime now) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (busy) {
       nodes_[i].node->on_bus_busy(now);
@@ -115,7 +115,7 @@ void CanBus::advance(BoardTime now) {
         busy_time_ += free_at_ - began_at_;
         phase_ = Phase::idle;
         if (stuck_) break;
-        tell_busy(false, true, due);
+        report_busy(false, true, due);
         start_at_ = due;
         break;
     }
@@ -165,7 +165,7 @@ void CanBus::begin(BoardTime now) {
   began_at_ = now;
   outcome_ = collision ? CanOutcome::recessive_bit_error : CanOutcome::sent;
   judge(winner->bits);
-  tell_busy(true, false, now);
+  report_busy(true, false, now);
 }
 
 /// Decides how the frame that begins now ends, and when.
@@ -238,10 +238,10 @@ void CanBus::set_stuck_dominant(bool stuck, BoardTime now) {
   if (stuck) {
     start_at_ = never;
     if (phase_ == Phase::frame) outcome_ = CanOutcome::recessive_bit_error;
-    tell_busy(true, false, now);
+    report_busy(true, false, now);
   } else if (phase_ == Phase::idle) {
     // Nothing may be sent before eleven recessive bits.
-    tell_busy(false, false, now);
+    report_busy(false, false, now);
     free_at_ = now;
     request(now);
   }

@@ -117,7 +117,7 @@ class CanBus {
   void begin(BoardTime now);
   void judge(const CanFrameBits& winner);
   void end_frame();
-  void tell_busy(bool busy, bool after_frame, BoardTime now);
+  void report_busy(bool busy, bool after_frame, BoardTime now);
   static bool same_rate(BoardTime a, BoardTime b);
 
   std::vector<Attached> nodes_;

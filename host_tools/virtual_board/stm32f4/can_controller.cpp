@@ -295,9 +295,10 @@ void CanController::note_errors(std::uint32_t before, CanOutcome last) {
 
 void CanController::settle() {
   const auto set = [this](Interrupt interrupt, bool level) {
-    bool& told = told_.at(static_cast<std::size_t>(interrupt) - static_cast<std::size_t>(Interrupt::can1_tx));
-    if (level == told) return;
-    told = level;
+    bool& reported =
+        reported_.at(static_cast<std::size_t>(interrupt) - static_cast<std::size_t>(Interrupt::can1_tx));
+    if (level == reported) return;
+    reported = level;
     interrupts_.set_level(interrupt, level);
   };
   bool completed = false;

@@ -120,7 +120,7 @@ class CanController final : public RegisterBlock<CanController>, private CanBusN
   BoardTime initialization_at_ = never;
   RecessiveBits recessive_;
   BoardTime self_test_ends_at_ = never;
-  std::array<bool, 4> told_{};  ///< levels of the interrupts, TX first
+  std::array<bool, 4> reported_{};  ///< levels of the interrupts, TX first
 };
 
 }  // namespace kmax::virtual_board

@@ -163,13 +163,13 @@ void GpioPortModel::report(BoardTime now) {
   // told before it is told, so that the inner call finishes the work and the outer one finds nothing left
   // that is out of date.
   for (unsigned pin = 0; pin < pin_count; ++pin) {
-    if (output_change_ && told_outputs_[pin] != outputs_[pin]) {
-      told_outputs_[pin] = outputs_[pin];
+    if (output_change_ && reported_outputs_[pin] != outputs_[pin]) {
+      reported_outputs_[pin] = outputs_[pin];
       output_change_(pin, outputs_[pin], now);
     }
     const std::uint32_t bit = 1U << pin;
-    if (input_change_ && ((told_idr_ ^ idr_) & bit) != 0) {
-      told_idr_ ^= bit;
+    if (input_change_ && ((reported_idr_ ^ idr_) & bit) != 0) {
+      reported_idr_ ^= bit;
       input_change_(pin, (idr_ & bit) != 0, now);
     }
   }

@@ -86,8 +86,8 @@ class GpioPortModel final : public RegisterBlock<GpioPortModel> {
   std::uint32_t levels_ = 0;    // on the pins
   std::uint32_t floating_ = 0;  // driven by nothing
   std::uint32_t idr_ = 0;
-  std::array<PinOutput, 16> told_outputs_{};  // as the callbacks know them
-  std::uint32_t told_idr_ = 0;
+  std::array<PinOutput, 16> reported_outputs_{};  // as the callbacks know them
+  std::uint32_t reported_idr_ = 0;
   PinChange input_change_;
   OutputChange output_change_;
 };

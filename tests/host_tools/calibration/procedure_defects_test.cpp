@@ -161,8 +161,8 @@ TEST(IndexSearch, FindsTheIndexAndRefersTheOffsetToIt) {
   const double counted = 2.0 * std::numbers::pi * device.device().read_number("measured.count") /
                          device.device().read_number("encoder.counts_per_turn");
   const double electrical = motor.pole_pairs * shaft + motor.electrical_offset;
-  const double told = motor.pole_pairs * counted + value_of(report, "motor.electrical_offset")->value;
-  EXPECT_NEAR(std::remainder(told - electrical, 2.0 * std::numbers::pi), 0.0, 0.02);
+  const double reported = motor.pole_pairs * counted + value_of(report, "motor.electrical_offset")->value;
+  EXPECT_NEAR(std::remainder(reported - electrical, 2.0 * std::numbers::pi), 0.0, 0.02);
   // Referred to the index, and not to where the handle was at the start.
   EXPECT_GT(
       std::abs(std::remainder(value_of(report, "motor.electrical_offset")->value - motor.electrical_offset,

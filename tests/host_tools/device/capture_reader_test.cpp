@@ -96,18 +96,18 @@ TEST_F(CaptureReaderTest, GivesEachChannelInItsUnitAndEachSampleItsTick) {
 TEST_F(CaptureReaderTest, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
   reader.arm(settings_of({"velocity", "current", "voltage"}, 0));
   reader.wait(seconds(1));
-  std::uint32_t told = 0, calls = 0;
+  std::uint32_t reported = 0, calls = 0;
   const Captured captured = reader.read([&](const CaptureProgress& progress) {
     EXPECT_EQ(progress.phase, CaptureProgress::Phase::reading);
     EXPECT_EQ(progress.all, 12288u);
-    EXPECT_GT(progress.done, told);
-    told = progress.done;
+    EXPECT_GT(progress.done, reported);
+    reported = progress.done;
     ++calls;
   });
   EXPECT_EQ(captured.samples(), 4096u);
   EXPECT_EQ(bench.link->window_requests, (2 * 12288 + 124) / 125);
   EXPECT_EQ(calls, (2 * 12288u + 124) / 125);
-  EXPECT_EQ(told, 12288u);
+  EXPECT_EQ(reported, 12288u);
   EXPECT_EQ(captured.column("voltage").back(), captured.tick(4095) + 0.5);
   EXPECT_EQ(bench.link->commands, (std::vector<std::uint16_t>{1}))
       << "a complete capture need not be stopped";

@@ -28,7 +28,7 @@ class DeviceExperiment : public StalledBoard {
   /// What `run` does with a rig on this board.
   template <typename Run>
   auto with_rig(const Run& run) {
-    DeviceRig rig(device, limits, {prompter, journal.get(), tell, notice}, axes);
+    DeviceRig rig(device, limits, {prompter, journal.get(), report, notice}, axes);
     force_limit = rig.force_limit();
     return run(rig);
   }
@@ -75,7 +75,7 @@ class DeviceExperiment : public StalledBoard {
   AskedPerson person;
   bench::Prompter* prompter = &person;
   std::vector<std::string> notices;
-  Tell notice = [this](const std::string& text) { notices.push_back(text); };
+  ReportText notice = [this](const std::string& text) { notices.push_back(text); };
   double force_limit = 0.0;  ///< N, that was at work
   std::vector<double> before;
   const host_tools_test::TemporaryFolder folder;

@@ -28,7 +28,7 @@ class Limited : public TouchedBoard {
     return all;
   }
   DeviceRig& begin(RigAxes axes = RigAxes::wall) {
-    rig.emplace(device, limits, TouchParty{nullptr, nullptr, tell, notice}, axes);
+    rig.emplace(device, limits, TouchParty{nullptr, nullptr, report, notice}, axes);
     return *rig;
   }
   bool aborts(double hold_time) {
@@ -50,7 +50,7 @@ class Limited : public TouchedBoard {
 
   TouchLimits limits;
   std::vector<std::string> notices;
-  Tell notice = [this](const std::string& text) { notices.push_back(text); };
+  ReportText notice = [this](const std::string& text) { notices.push_back(text); };
   std::vector<double> before;
   std::optional<DeviceRig> rig;
 };
@@ -111,8 +111,8 @@ TEST_F(Limited, WhatCannotBePutBackIsTold) {
 TEST_F(Limited, AnOscillationBeyondItsLimitEndsATouch) {
   begin().set({5500.0});
   EXPECT_FALSE(aborts(0.5));
-  ASSERT_FALSE(told.empty());
-  EXPECT_CONTAINS(told.back(), "wall: ");
+  ASSERT_FALSE(reported.empty());
+  EXPECT_CONTAINS(reported.back(), "wall: ");
   limits.abort_amplitude = 0.8e-3;
   rig.reset();
   begin().set({5500.0});

@@ -69,7 +69,7 @@ TEST_F(JitterDevice, ASwingTooLargeEndsATouchAndIsCounted) {
 }
 
 TEST_F(JitterDevice, GivingUpOnTheWayLeavesNothingBehind) {
-  tell = [this](const std::string&) {
+  report = [this](const std::string&) {
     if (forceful()) throw std::logic_error("enough");
   };
   EXPECT_THROW(run(), std::logic_error);
@@ -77,13 +77,13 @@ TEST_F(JitterDevice, GivingUpOnTheWayLeavesNothingBehind) {
 }
 
 TEST_F(JitterDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
-  tell = [this](const std::string& text) {
+  report = [this](const std::string& text) {
     if (text.starts_with("F_B = 2 N") && forceful()) throw std::runtime_error("Ctrl-C");
   };
   open_journal(settings, RunJournal::Begin::anew);
   EXPECT_THROW(run(), std::runtime_error);
   EXPECT_EQ(person.requests.size(), 2u);
-  tell = [](const std::string&) {};
+  report = [](const std::string&) {};
   open_journal(settings, RunJournal::Begin::resume);
   const JitterRun resumed = run();
   EXPECT_EQ(person.requests.size(), 3u) << "the first pair was done";
@@ -189,7 +189,7 @@ TEST_F(JitterOverASlowLink, ATouchWithLostRecordsIsMadeAgain) {
   // When the wall is sampled is chance: three counts.
   EXPECT_NEAR(result.results.front().amplitude, whole.amplitude, 3 * 0.055e-3);
   EXPECT_TRUE(notices.empty());
-  EXPECT_TRUE(std::any_of(told.begin(), told.end(), [](const std::string& text) {
+  EXPECT_TRUE(std::any_of(reported.begin(), reported.end(), [](const std::string& text) {
     return text.find("records of its trace were lost; once more") != std::string::npos;
   }));
 }
@@ -214,7 +214,7 @@ double served_jitter(double background, double activation_gain) {
   settings.pairs = {*paper::jitter(background, 5)};
   TouchLimits limits = jitter_limits();
   limits.force_limit = 20.0;
-  const Tell nobody = [](const std::string&) {};
+  const ReportText nobody = [](const std::string&) {};
   DeviceRig rig(device, limits, {nullptr, nullptr, nobody, nobody});
   const JitterResult result = run_jitter(rig, settings).results.front();
   EXPECT_EQ(result.touches, 6u) << "F_B = " << background << ", gamma = " << activation_gain;

@@ -10,15 +10,17 @@
 namespace kmax::experiment::progress_report_test {
 namespace {
 
-using Told = std::vector<std::pair<std::size_t, std::size_t>>;
+using Reported = std::vector<std::pair<std::size_t, std::size_t>>;
 
 TEST(PartOf, PartsFollowEachOtherUpToTheWhole) {
-  Told told;
-  const ProgressReport whole = [&](std::size_t done, std::size_t count) { told.emplace_back(done, count); };
+  Reported reported;
+  const ProgressReport whole = [&](std::size_t done, std::size_t count) {
+    reported.emplace_back(done, count);
+  };
   const ProgressReport first = part_of(whole, 0, 1, 4), rest = part_of(whole, 1, 3, 4);
   for (std::size_t done = 0; done <= 2; ++done) first(done, 2);
   for (std::size_t done = 0; done <= 2; ++done) rest(done, 2);
-  EXPECT_EQ(told, (Told{{0, 8}, {1, 8}, {2, 8}, {2, 8}, {5, 8}, {8, 8}}));
+  EXPECT_EQ(reported, (Reported{{0, 8}, {1, 8}, {2, 8}, {2, 8}, {5, 8}, {8, 8}}));
 }
 
 TEST(PartOf, NobodyNeedsToBeTold) {

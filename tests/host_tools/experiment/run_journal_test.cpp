@@ -172,7 +172,7 @@ TEST_F(Journal, AProgramThatIsKilledLeavesItsJobsAndNoLock) {
   if (child == 0) {
     RunJournal journal(file(), settings, Begin::anew);
     for (int i = 0; i < 5; ++i) journal.add(std::to_string(i), i);
-    [[maybe_unused]] const ssize_t told = ::write(ready[1], "x", 1);
+    [[maybe_unused]] const ssize_t reported = ::write(ready[1], "x", 1);
     for (;;) pause();
   }
   char byte = 0;

@@ -21,7 +21,7 @@ class StandstillTest : public TouchedBoard {
   StandstillTest() { simulation_wait(2000); }
   void simulation_wait(int milliseconds) { cable().sim.wait(std::chrono::milliseconds(milliseconds)); }
   bool cut_off(const std::exception& error) {
-    return bench::Standstill(device, {0, 1}, tell).cut_off(error, "a wall");
+    return bench::Standstill(device, {0, 1}, report).cut_off(error, "a wall");
   }
   Fault fault(std::size_t axis) { return device::fault_of(device::Drive(device, axis).status()); }
 
@@ -37,20 +37,20 @@ TEST_F(StandstillTest, ASilenceThatTrippedIsClearedAndTold) {
   EXPECT_TRUE(cut_off(any_error));
   EXPECT_EQ(fault(0), Fault::none);
   EXPECT_EQ(device::Drive(device, 0).status().state(), firmware::DriveState::switch_on_disabled);
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_CONTAINS(told[0], "a wall: this touch is thrown away and made again");
-  EXPECT_CONTAINS(told[0], "heard nothing for 1");
-  EXPECT_EQ(told[0].find('\n'), std::string::npos);
+  ASSERT_EQ(reported.size(), 1u);
+  EXPECT_CONTAINS(reported[0], "a wall: this touch is thrown away and made again");
+  EXPECT_CONTAINS(reported[0], "heard nothing for 1");
+  EXPECT_EQ(reported[0].find('\n'), std::string::npos);
 }
 
 TEST_F(StandstillTest, WithoutAFaultItIsTheErrorThatTells) {
   EXPECT_FALSE(cut_off(any_error));
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(reported.empty());
   EXPECT_TRUE(cut_off(no_answer));
   EXPECT_TRUE(cut_off(stopped));
-  ASSERT_EQ(told.size(), 2u);
-  EXPECT_CONTAINS(told[0], "no answer");
-  EXPECT_CONTAINS(told[1], "this program was stopped");
+  ASSERT_EQ(reported.size(), 2u);
+  EXPECT_CONTAINS(reported[0], "no answer");
+  EXPECT_CONTAINS(reported[1], "this program was stopped");
 }
 
 TEST_F(StandstillTest, AnAxisThatIsStillArmedIsDisarmed) {
@@ -74,7 +74,7 @@ TEST_F(StandstillTest, AnyOtherFaultOfOneOfTheAxesIsLeftAlone) {
     EXPECT_FALSE(cut_off(*error));
   EXPECT_EQ(fault(0), Fault::link_silent);
   EXPECT_EQ(fault(1), Fault::encoder);
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(reported.empty());
 }
 
 TEST_F(StandstillTest, WhoStoppedAnAxisMeantIt) {
@@ -85,7 +85,7 @@ TEST_F(StandstillTest, WhoStoppedAnAxisMeantIt) {
 }
 
 TEST_F(StandstillTest, ADeviceThatCannotBeReachedOrWasStartedAnewIsNotReady) {
-  bench::Standstill standstill(device, {0}, tell);
+  bench::Standstill standstill(device, {0}, report);
   standstill.begin();
   cable().cut = true;
   EXPECT_FALSE(standstill.cut_off(no_answer, "a wall"));
@@ -94,7 +94,7 @@ TEST_F(StandstillTest, ADeviceThatCannotBeReachedOrWasStartedAnewIsNotReady) {
   // It has forgotten the lowered limits.
   device = device::Device(std::make_unique<CutLink>(simulated_board::factory_scene()));
   EXPECT_FALSE(standstill.cut_off(no_answer, "a wall"));
-  EXPECT_EQ(told.size(), 1u);
+  EXPECT_EQ(reported.size(), 1u);
 }
 
 TEST_F(StandstillTest, NobodyNeedsToBeTold) {
@@ -112,7 +112,7 @@ class DisturbedTouches : public StalledBoard {
 
   template <typename Run>
   auto with_rig(const Run& run) {
-    DeviceRig rig(device, touch_limits, {prompter, nullptr, tell, notice});
+    DeviceRig rig(device, touch_limits, {prompter, nullptr, report, notice});
     return run(rig);
   }
   /// Three touches of a wall that holds still.
@@ -139,7 +139,7 @@ class DisturbedTouches : public StalledBoard {
   AskedPerson person;
   std::vector<std::string> notices;
   std::vector<double> limits;
-  const Tell notice = [this](const std::string& text) { notices.push_back(text); };
+  const ReportText notice = [this](const std::string& text) { notices.push_back(text); };
 };
 
 constexpr Stall::Of every_stall[] = {Stall::Of::program, Stall::Of::link, Stall::Of::device};
@@ -206,7 +206,7 @@ TEST_F(DisturbedTouches, ThreeStandstillsAreAllowedToEachTouch) {
 }
 
 TEST_F(DisturbedTouches, NoOtherErrorIsRepeated) {
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (touches == 2 && text.find("holding") != std::string::npos)
       simulation().device().connect_encoder(0, false);
   };
@@ -218,12 +218,12 @@ TEST_F(DisturbedTouches, NoOtherErrorIsRepeated) {
 
 TEST_F(DisturbedTouches, NeitherIsWhatTheUserOrAnotherProgramStops) {
   struct Interrupted {};
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (touches == 2 && text.find("holding") != std::string::npos) throw Interrupted();
   };
   EXPECT_THROW(run_contacts(), Interrupted);
   EXPECT_EQ(touches, 2);
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (touches == 4 && text.find("holding") != std::string::npos) device::Drive(device, 0).stop();
   };
   EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }), "Quick stop");
@@ -236,7 +236,7 @@ TEST_F(DisturbedTouches, NothingIsArmedAgainAfterAnInterruption) {
   struct Interrupted {};
   bool interrupted = false;
   stall = {Stall::Of::program, 40, [&](int) { return interrupted = true; }};
-  tell = [&](const std::string&) {
+  report = [&](const std::string&) {
     if (interrupted) throw Interrupted();
   };
   EXPECT_THROW(run_contacts(), Interrupted);

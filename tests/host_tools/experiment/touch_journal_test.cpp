@@ -30,7 +30,7 @@ class Asked final : public bench::Prompter {
 class TouchJournal : public testing::Test {
  protected:
   Counted touch(const std::string& key, bench::Prompter* prompter = nullptr) {
-    return journaled_touch<Counted>({prompter, journal.get(), tell}, key, "wall", once);
+    return journaled_touch<Counted>({prompter, journal.get(), report}, key, "wall", once);
   }
   void reopen(RunJournal::Begin begin) {
     journal.reset();
@@ -40,8 +40,8 @@ class TouchJournal : public testing::Test {
 
   const TemporaryFolder folder;
   std::unique_ptr<RunJournal> journal;
-  std::vector<std::string> told;
-  const Tell tell = [this](const std::string& text) { told.push_back(text); };
+  std::vector<std::string> reported;
+  const ReportText report = [this](const std::string& text) { reported.push_back(text); };
   int made = 0;
   std::function<Counted()> once = [this] { return Counted{++made, true}; };
   Asked person;
@@ -59,7 +59,7 @@ TEST_F(TouchJournal, ATouchIsMadeOnceAndKnownAfterwards) {
 TEST_F(TouchJournal, ATouchThatDoesNotCountIsMadeAgainAndNotKept) {
   once = [this] { return Counted{++made, made == 2}; };
   EXPECT_EQ(touch("a").number, 2);
-  EXPECT_EQ(told.size(), 1u);
+  EXPECT_EQ(reported.size(), 1u);
   once = [this] { return Counted{++made, false}; };
   EXPECT_EQ(touch("b").number, 5);
   EXPECT_EQ(journal->size(), 1u);

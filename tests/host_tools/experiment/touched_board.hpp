@@ -75,8 +75,10 @@ class TouchedBoard : public testing::Test {
   }
 
   device::Device device;
-  std::vector<std::string> told;
-  std::function<void(const std::string&)> tell = [this](const std::string& text) { told.push_back(text); };
+  std::vector<std::string> reported;
+  std::function<void(const std::string&)> report = [this](const std::string& text) {
+    reported.push_back(text);
+  };
 };
 
 /// What stands still in the touches of a board that are to be disturbed, always at the same request.

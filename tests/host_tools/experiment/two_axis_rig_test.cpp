@@ -95,7 +95,7 @@ TEST_F(DeviationDevice, ATouchComesBackFromTheJournal) {
 }
 
 TEST_F(DeviationDevice, GivingUpOnTheWayLeavesNothingBehind) {
-  tell = [this](const std::string&) {
+  report = [this](const std::string&) {
     if (device::Drive(device, 1).status().armed()) throw std::logic_error("enough");
   };
   EXPECT_THROW(run(), std::logic_error);
@@ -105,7 +105,7 @@ TEST_F(DeviationDevice, GivingUpOnTheWayLeavesNothingBehind) {
 TEST_F(DeviationDevice, BothForceLimitsAreLowered) {
   limits.force_limit = 2.0;
   std::vector<double> seen;
-  tell = [&](const std::string&) { seen.push_back(device.read_number("axis1.force.limit")); };
+  report = [&](const std::string&) { seen.push_back(device.read_number("axis1.force.limit")); };
   run();
   EXPECT_EQ(force_limit, 2.0);
   ASSERT_FALSE(seen.empty());
@@ -125,7 +125,7 @@ TEST_F(DeviationDevice, ABackgroundForceOnAStableWallEndsNothing) {
 DeviationRun served(const simulation::Scene& scene, const DeviationSettings& settings) {
   device::Device device(std::make_unique<link::SimLink>(scene));
   device.apply(device::parse_assignments({"axis1.wall.law=none"}));
-  const Tell nobody = [](const std::string&) {};
+  const ReportText nobody = [](const std::string&) {};
   DeviceRig rig(device, deviation_limits(), {nullptr, nullptr, nobody, nobody}, RigAxes::wall_along);
   return run_deviation(rig, settings);
 }
@@ -226,7 +226,7 @@ TEST_F(DeviationDisturbed, IsThatOfAnUndisturbedRun) {
 
 // The second axis is armed first, and trips with the first one; its other faults are nobody's standstill.
 TEST_F(DeviationDisturbed, AFaultOfTheSecondAxisIsNotRepeated) {
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (touches == 1 && text.find(" of ") != std::string::npos)
       simulation().device().connect_encoder(1, false);
   };

@@ -80,7 +80,7 @@ class Watched : public TouchedBoard {
     watch.name = "wall";
     watch.hold_time = 1.0;
   }
-  WatchedTouch touch() { return watch_touch(device, watch, tell); }
+  WatchedTouch touch() { return watch_touch(device, watch, report); }
   TouchWatch watch;
 };
 
@@ -140,7 +140,7 @@ TEST_F(Watched, AHandleThatIsTakenAwayIsNoOscillation) {
 TEST_F(Watched, ALostLinkEndsInAnErrorAndTheDeviceRemovesTheForce) {
   set(protective_assignments(device, 0, 3.3));
   bool forceful_then = false;
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (!text.starts_with("wall: holding")) return;
     forceful_then = forceful();
     cable().cut = true;
@@ -153,7 +153,7 @@ TEST_F(Watched, ALostLinkEndsInAnErrorAndTheDeviceRemovesTheForce) {
 }
 
 TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (text.starts_with("wall: holding")) throw std::logic_error("enough");
   };
   EXPECT_THROW(touch(), std::logic_error);
@@ -164,13 +164,13 @@ TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
 TEST_F(Watched, WhatWouldNeverEndTheTouchIsRefusedBeforeArming) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  tell = [&](const std::string&) { FAIL() << "begun"; };
+  report = [&](const std::string&) { FAIL() << "begun"; };
   for (const double bad : {nan, infinity, -1.0}) {
     for (double TouchWatch::*member : {&TouchWatch::hold_time, &TouchWatch::contact_patience,
                                        &TouchWatch::abort_amplitude, &TouchWatch::abort_window}) {
       TouchWatch one = watch;
       one.*member = bad;
-      EXPECT_NE(thrown_message<std::invalid_argument>([&] { watch_touch(device, one, tell); }), "") << bad;
+      EXPECT_NE(thrown_message<std::invalid_argument>([&] { watch_touch(device, one, report); }), "") << bad;
     }
   }
   expect_disarmed();
@@ -215,14 +215,14 @@ class WatchedSpringyHand : public StalledBoard {
 };
 
 TEST_F(WatchedSpringyHand, StaysWithinItsBoundUnderForce) {
-  EXPECT_EQ(watch_touch(device, watch, tell).aborted_at, std::nullopt);
+  EXPECT_EQ(watch_touch(device, watch, report).aborted_at, std::nullopt);
 }
 
 // The trace of the time in which this program stood still has a swing of 11 mm in it, after the device had
 // removed the force.
 TEST_F(WatchedSpringyHand, WhatItDoesAfterItsForceWasRemovedUnseenIsNoOscillation) {
   stall = {Stall::Of::program, 30, [](int) { return true; }};
-  const auto what = thrown_message<device::DeviceError>([&] { watch_touch(device, watch, tell); });
+  const auto what = thrown_message<device::DeviceError>([&] { watch_touch(device, watch, report); });
   EXPECT_CONTAINS(what, "lost its force during the trial: the host was silent");
   expect_disarmed();
 }
@@ -234,7 +234,7 @@ TEST_F(WatchedSpringyHand, WhatItDidUnderForceIsOneWhateverCameAfterwards) {
   for (const int at_request : {18, 20, 22, 24}) {
     stall = {Stall::Of::program, at_request, [](int) { return true; }};
     try {
-      if (!watch_touch(device, watch, tell).aborted_at) continue;
+      if (!watch_touch(device, watch, report).aborted_at) continue;
       tripped += device.read_number("drive.error_code") == 0x8130 ? 1 : 0;
     } catch (const device::DeviceError&) {
       // The records of the swing were overwritten.
@@ -254,7 +254,7 @@ TEST_F(WatchedByNobody, HasATypeOfItsOwn) {
   set({"haptic.rate=500"});
   TouchWatch watch;
   watch.contact_patience = 1.0;
-  EXPECT_THROW(watch_touch(device, watch, tell), NobodyTouched);
+  EXPECT_THROW(watch_touch(device, watch, report), NobodyTouched);
   expect_disarmed();
 }
 

@@ -46,8 +46,8 @@ TEST_F(ExperimentStudy, AClaimThatIsNotMetIsTheAnswerNo) {
 TEST_F(ExperimentStudy, ProgressIsShownInItsWords) {
   const Interruption interruption;
   EXPECT_EQ(simulate_study(context, interruption, force_pairs_words,
-                           [](const experiment::ProgressReport& tell) {
-                             tell(3, 16);
+                           [](const experiment::ProgressReport& progress) {
+                             progress(3, 16);
                              return 7;
                            }),
             7);
@@ -66,9 +66,9 @@ TEST_F(ExperimentStudy, SettingsThatAreRefusedAreWrongUsage) {
 
 TEST_F(ExperimentStudy, CtrlCEndsASimulation) {
   const Interruption interruption;
-  const auto interrupted = [](const experiment::ProgressReport& tell) {
+  const auto interrupted = [](const experiment::ProgressReport& progress) {
     std::raise(SIGINT);
-    tell(1, 16);
+    progress(1, 16);
     return 0;
   };
   EXPECT_EQ(thrown_message<ExperimentInterrupted>(

@@ -75,7 +75,7 @@ TEST(Probe, WithAnInvertedSensorTheWholeTestStaysBelowTheTestCurrent) {
     const double limit = tested.device->read_number("axis0.current.limit");
     const TrueCurrent current(tested);
     const Report report = tested.run();
-    EXPECT_EQ(faulty_part(report), "current sensor B") << told(report);
+    EXPECT_EQ(faulty_part(report), "current sensor B") << text_of(report);
     EXPECT_LT(current.largest(), 0.6 * limit) << scene;
     EXPECT_GT(current.largest(), 0.1 * limit) << scene;
   }

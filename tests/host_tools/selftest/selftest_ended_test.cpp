@@ -108,7 +108,7 @@ TEST(SelfTestLeaves, AFaultThatWasThereBeforeIsReportedAndCleared) {
   power.press_emergency_stop(false);
   tested.link->wait(std::chrono::milliseconds(100));
   const Report report = tested.run();
-  EXPECT_TRUE(report.pass()) << told(report);
+  EXPECT_TRUE(report.pass()) << text_of(report);
   ASSERT_TRUE(report.fault_at_start.has_value());
   EXPECT_EQ(report.fault_at_start->fault, firmware::Fault::emergency_stop);
   EXPECT_TRUE(report.fault_at_start->cleared);
@@ -127,7 +127,7 @@ TEST(SelfTestLeaves, AHandThatMovesTheHandleIsAFailedCheck) {
     TestedAxis tested(scene, 0);
     const auto before = tested.settings();
     const Report report = tested.run();
-    EXPECT_EQ(faulty_part(report), "handle") << name << "\n" << told(report);
+    EXPECT_EQ(faulty_part(report), "handle") << name << "\n" << text_of(report);
     EXPECT_NE(report.first_failure()->message.find("something else moved the handle; let go of it"),
               std::string::npos);
     EXPECT_TRUE(tested.disarmed());

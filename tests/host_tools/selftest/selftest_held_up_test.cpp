@@ -57,7 +57,7 @@ TEST(SelfTestHeldUp, OnceAnywhereChangesNoVerdict) {
     for (bool held_up = true; held_up; message += 7) {
       const Report report = run_held_up(tested, words, step, message, held_up);
       EXPECT_EQ(verdicts(report), expected) << words << " " << step << ", message " << message << "\n"
-                                            << told(report);
+                                            << text_of(report);
       EXPECT_FALSE(report.fault_at_start) << "the one before has left nothing behind";
     }
     EXPECT_GT(message, 7) << words << " " << step << ": held up at least once";

@@ -34,7 +34,7 @@ void expect_part(const std::string& scene, Defect defect, const std::string& par
   // The capacitors of a board that draws nothing would keep the voltage for ever.
   if (defect == Defect::supply_low) tested.drives().supply().set_voltage(12.0);
   const Report report = run_and_check(tested, what);
-  EXPECT_EQ(faulty_part(report), part) << what << "\n" << told(report);
+  EXPECT_EQ(faulty_part(report), part) << what << "\n" << text_of(report);
 }
 
 TEST(SelfTest, HealthyAxesPassCalibratedOrNot) {
@@ -42,7 +42,7 @@ TEST(SelfTest, HealthyAxesPassCalibratedOrNot) {
     for (const bool identified : {true, false}) {
       TestedAxis tested(scene, identified);
       const Report report = run_and_check(tested, scene);
-      EXPECT_EQ(faulty_part(report), "") << scene << " identified " << identified << "\n" << told(report);
+      EXPECT_EQ(faulty_part(report), "") << scene << " identified " << identified << "\n" << text_of(report);
       for (const CheckResult& check : report.checks)
         EXPECT_EQ(check.verdict, Verdict::pass) << scene << ": " << check.name << ": " << check.message;
       // It has moved, and has told by how much: the encoder's resolution and a moment between ticks.
@@ -57,7 +57,7 @@ TEST(SelfTest, BothAxesOfABoardWithTwoMotors) {
   for (const std::size_t axis : {0U, 1U}) {
     TestedAxis tested("motor_axes", true, axis);
     const Report report = run_and_check(tested, "motor_axes");
-    EXPECT_EQ(faulty_part(report), "") << axis << "\n" << told(report);
+    EXPECT_EQ(faulty_part(report), "") << axis << "\n" << text_of(report);
   }
 }
 
@@ -86,7 +86,7 @@ TEST(SelfTest, ADeadCurrentSensorIsNamed) {
       tested.drives().drive(0).current_sensor().short_inputs(of_b ? Channel::b : Channel::c, true);
       const Report report = run_and_check(tested, scene);
       EXPECT_EQ(faulty_part(report), of_b ? "current sensor B" : "current sensor C") << scene << "\n"
-                                                                                     << told(report);
+                                                                                     << text_of(report);
     }
   }
 }
@@ -121,7 +121,7 @@ TEST(SelfTest, ASupplyOutsideItsLimitsIsNamed) {
       tested.drives().supply().set_source(voltage);
       tested.drives().supply().set_voltage(voltage);
       const Report report = run_and_check(tested, scene);
-      EXPECT_EQ(faulty_part(report), "supply") << scene << " " << voltage << "\n" << told(report);
+      EXPECT_EQ(faulty_part(report), "supply") << scene << " " << voltage << "\n" << text_of(report);
       // What stands behind it is not blamed too.
       for (const CheckResult& check : report.checks)
         EXPECT_TRUE(check.name == "supply" || check.verdict != Verdict::fail)
@@ -134,7 +134,7 @@ TEST(SelfTest, AnOpenEmergencyStopIsNamed) {
   TestedAxis tested("gimbal_b");
   tested.link->hardware().power().press_emergency_stop(true);
   const Report report = run_and_check(tested, "emergency stop");
-  EXPECT_EQ(faulty_part(report), "emergency stop") << told(report);
+  EXPECT_EQ(faulty_part(report), "emergency stop") << text_of(report);
   EXPECT_EQ(report.checks.at(7).verdict, Verdict::not_judged);
   EXPECT_EQ(tested.link->largest_displacement(), 0.0);
 }
@@ -143,7 +143,7 @@ TEST(SelfTest, AGateDriverThatReportsAFaultIsNamed) {
   TestedAxis tested("dc_coreless_a");
   tested.link->hardware().power().set_gate_driver_fault(true);
   const Report report = run_and_check(tested, "gate driver");
-  EXPECT_EQ(faulty_part(report), "gate driver") << told(report);
+  EXPECT_EQ(faulty_part(report), "gate driver") << text_of(report);
 }
 
 TEST(SelfTest, ABrokenTemperatureSensorIsNamed) {
@@ -152,7 +152,7 @@ TEST(SelfTest, ABrokenTemperatureSensorIsNamed) {
     TestedAxis tested("dc_coreless_a");
     tested.drives().temperature(0).set_wiring(wiring);
     const Report report = run_and_check(tested, "temperature sensor");
-    EXPECT_EQ(faulty_part(report), "temperature sensor") << told(report);
+    EXPECT_EQ(faulty_part(report), "temperature sensor") << text_of(report);
   }
 }
 
@@ -160,7 +160,7 @@ TEST(SelfTest, AHotPowerStageIsNamed) {
   TestedAxis tested("dc_coreless_a");
   tested.drives().temperature(0).set_temperature(115.0);
   const Report report = run_and_check(tested, "hot");
-  EXPECT_EQ(faulty_part(report), "power stage (too hot)") << told(report);
+  EXPECT_EQ(faulty_part(report), "power stage (too hot)") << text_of(report);
 }
 
 TEST(SelfTest, AnAxisWithItsForceOnIsLeftAlone) {
@@ -199,7 +199,7 @@ TEST(SelfTest, ATripInTheMidstOfASwingIsReportedAndLeavesNothingBehind) {
     }
   });
   tested.link->before_tick = {};
-  EXPECT_EQ(faulty_part(report), "emergency stop") << told(report);
+  EXPECT_EQ(faulty_part(report), "emergency stop") << text_of(report);
   EXPECT_TRUE(tested.disarmed());
   EXPECT_EQ(tested.settings(), before);
 }

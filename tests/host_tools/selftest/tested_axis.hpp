@@ -169,7 +169,7 @@ class TestedAxis {
   std::unique_ptr<device::Device> device;
 };
 
-inline std::string told(const Report& report) {
+inline std::string text_of(const Report& report) {
   std::string text;
   for (const CheckResult& check : report.checks)
     text += check.name + ": " + name_of(check.verdict) + (check.part.empty() ? "" : " [" + check.part + "]") +

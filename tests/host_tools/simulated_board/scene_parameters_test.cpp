@@ -97,18 +97,18 @@ float real(const std::vector<device::Assignment>& all, const std::string& name, 
 
 TEST(SceneParameters, AnIdentifiedSceneTellsItsMotorAndAnotherDoesNot) {
   simulation::Scene scene = open_scene("gimbal_b");
-  const auto told = [&](const char* name) { return real(hardware_assignments_of(scene), name, -1.0f); };
+  const auto assigned = [&](const char* name) { return real(hardware_assignments_of(scene), name, -1.0f); };
   for (const char* name : {"motor.resistance", "motor.inductance", "motor.inductance_q",
                            "motor.torque_constant", "motor.electrical_offset", "device.mass"})
-    EXPECT_EQ(told(name), -1.0f) << name;
-  EXPECT_EQ(told("device.transmission"), 0.015f);
+    EXPECT_EQ(assigned(name), -1.0f) << name;
+  EXPECT_EQ(assigned("device.transmission"), 0.015f);
   scene.identified = true;
-  EXPECT_EQ(told("motor.resistance"), 10.402f) << "with the leg that the phase's current passes";
-  EXPECT_EQ(told("motor.inductance"), 3.1e-3f);
-  EXPECT_EQ(told("motor.inductance_q"), 4.35e-3f);
-  EXPECT_EQ(told("motor.torque_constant"), 0.093f);
-  EXPECT_EQ(told("motor.electrical_offset"), -1.3f);
-  EXPECT_EQ(told("device.mass"), 0.085f);
+  EXPECT_EQ(assigned("motor.resistance"), 10.402f) << "with the leg that the phase's current passes";
+  EXPECT_EQ(assigned("motor.inductance"), 3.1e-3f);
+  EXPECT_EQ(assigned("motor.inductance_q"), 4.35e-3f);
+  EXPECT_EQ(assigned("motor.torque_constant"), 0.093f);
+  EXPECT_EQ(assigned("motor.electrical_offset"), -1.3f);
+  EXPECT_EQ(assigned("device.mass"), 0.085f);
   SimulatedBoard simulation(scene);
   const auto& values = simulation.board().application().values();
   EXPECT_EQ(values.whole<"motor.pole_pairs">(), 7);

@@ -48,7 +48,7 @@ void expect_bounded(const Motor& motor, double share_voltages) {
     for (const double amplitude : {0.1, 1.0}) {
       SineThroughZero run{
           .amplitude = amplitude, .dead_time = dead_time, .share = DeadTimeShare::of_reference};
-      run.told_dead_time = 2.0 * dead_time;
+      run.assumed_dead_time = 2.0 * dead_time;
       const auto doubled = test::distortion_of(run, motor);
       const double surplus = share_voltages * dead_time * 20000.0 * run.supply;
       EXPECT_LT(doubled.largest, 1.1 * amplitude + surplus / motor.resistance) << motor.resistance;
@@ -68,7 +68,7 @@ TEST(DeadTimeUnderControl, TwiceTheDeadTimeDestabilisesNothing) {
 TEST(DeadTimeUnderControl, AtRestNothingMoves) {
   for (const double step : {0.0, 0.02}) {
     SineThroughZero run{.amplitude = 0.0, .dead_time = 500e-9, .share = DeadTimeShare::of_reference};
-    run.told_dead_time = 1e-6;
+    run.assumed_dead_time = 1e-6;
     run.converter_step = step;
     for (const auto& motor : brushed) {
       for (const double current : test::currents_of(run, motor)) ASSERT_NEAR(current, 0.0, 1e-6);
@@ -79,7 +79,7 @@ TEST(DeadTimeUnderControl, AtRestNothingMoves) {
 // Why the reference and not the measured current.
 TEST(DeadTimeUnderControl, TheMeasuredCurrentFeedsBackOnItself) {
   SineThroughZero run{.amplitude = 0.1, .dead_time = 500e-9, .share = DeadTimeShare::of_measured};
-  run.told_dead_time = 1e-6;
+  run.assumed_dead_time = 1e-6;
   EXPECT_GT(test::distortion_of(run, synchronous[1]).largest, 1.0) << "ten times what is asked for";
   run.share = DeadTimeShare::of_reference;
   EXPECT_LT(test::distortion_of(run, synchronous[1]).largest, 0.12);

@@ -21,14 +21,14 @@ namespace kmax::simulation::test {
 enum class DeadTimeShare { off, of_reference, of_measured };
 
 struct SineThroughZero {
-  double amplitude = 0.5;       // A
-  double frequency = 50.0;      // Hz
-  double bandwidth = 500.0;     // Hz, of the current loop
-  double supply = 24.0;         // V
-  double dead_time = 500e-9;    // s, of the inverter
-  double told_dead_time = 0.0;  // s, what the compensation is told; 0: the inverter's
-  double band = 0.0;            // A; 0: dead_time_band(), at least 5 mA
-  double converter_step = 0.0;  // A; 0: currents are measured exactly
+  double amplitude = 0.5;          // A
+  double frequency = 50.0;         // Hz
+  double bandwidth = 500.0;        // Hz, of the current loop
+  double supply = 24.0;            // V
+  double dead_time = 500e-9;       // s, of the inverter
+  double assumed_dead_time = 0.0;  // s, what the compensation is told; 0: the inverter's
+  double band = 0.0;               // A; 0: dead_time_band(), at least 5 mA
+  double converter_step = 0.0;     // A; 0: currents are measured exactly
   DeadTimeShare share = DeadTimeShare::off;
 };
 
@@ -68,7 +68,7 @@ inline Distortion distortion_of(const std::vector<double>& currents, double freq
 
 template <typename Motor>
 SineThroughZero completed(SineThroughZero run, const Motor& motor) {
-  if (run.told_dead_time == 0.0) run.told_dead_time = run.dead_time;
+  if (run.assumed_dead_time == 0.0) run.assumed_dead_time = run.dead_time;
   if (run.band == 0.0)
     run.band = std::fmax(0.005, control::dead_time_band(run.supply, run.dead_time, motor.loop_inductance()));
   return run;
@@ -76,17 +76,17 @@ SineThroughZero completed(SineThroughZero run, const Motor& motor) {
 
 inline control::DeadTimeCompensation<float> measured_share(const SineThroughZero& run) {
   return run.share == DeadTimeShare::of_measured
-             ? control::DeadTimeCompensation<float>::prepare(static_cast<float>(run.told_dead_time),
+             ? control::DeadTimeCompensation<float>::prepare(static_cast<float>(run.assumed_dead_time),
                                                              static_cast<float>(run.band), 20000.0F)
              : control::DeadTimeCompensation<float>{};
 }
 
 template <typename Config>
-void tell(const SineThroughZero& run, Config& config) {
+void set_dead_time(const SineThroughZero& run, Config& config) {
   config.bandwidth = static_cast<float>(2.0 * std::numbers::pi * run.bandwidth);
   config.modulation_limit = 0.88F;
   if (run.share != DeadTimeShare::of_reference) return;
-  config.dead_time = static_cast<float>(run.told_dead_time);
+  config.dead_time = static_cast<float>(run.assumed_dead_time);
   config.dead_time_current = static_cast<float>(run.band);
 }
 
@@ -98,7 +98,7 @@ inline std::vector<double> currents_of(const SineThroughZero& asked,
   control::DcCurrentControllerConfig<float> config;
   config.resistance = static_cast<float>(motor_config.resistance + 2.0 * inverter.config().on_resistance);
   config.inductance = static_cast<float>(motor_config.inductance);
-  tell(run, config);
+  set_dead_time(run, config);
   const auto c = control::DcCurrentController<float>::prepare(config, static_cast<float>(sine_tick));
   const auto shares = measured_share(run);
   control::DcCurrentController<float> controller;
@@ -132,7 +132,7 @@ inline std::vector<double> currents_of(const SineThroughZero& asked,
   config.inductance_q = static_cast<float>(motor_config.inductance_q);
   config.torque_constant = static_cast<float>(motor_config.torque_constant);
   config.pole_pairs = static_cast<std::int32_t>(motor_config.pole_pairs);
-  tell(run, config);
+  set_dead_time(run, config);
   const auto c = control::FieldOrientedController<float>::prepare(config, static_cast<float>(sine_tick));
   const auto shares = measured_share(run);
   control::FieldOrientedController<float> controller;

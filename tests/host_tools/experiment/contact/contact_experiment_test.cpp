@@ -25,9 +25,9 @@ class Contact : public TouchedBoard {
   }
 
   ContactResult run(std::size_t condition) {
-    const Tell nobody = [](const std::string&) {};
+    const ReportText nobody = [](const std::string&) {};
     rig.reset();
-    rig.emplace(device, limits, TouchParty{nullptr, nullptr, tell, nobody});
+    rig.emplace(device, limits, TouchParty{nullptr, nullptr, report, nobody});
     return run_contact(*rig, contact_conditions()[condition], settings);
   }
 
@@ -78,9 +78,9 @@ TEST_F(Contact, ATrialHasTheTouchAtTimeZeroAndLosesNothing) {
   }
   EXPECT_EQ(std::count_if(result.samples.begin(), result.samples.end(), [](auto& s) { return s.time == 0; }),
             1);
-  ASSERT_FALSE(told.empty());
-  EXPECT_CONTAINS(told.front(), "F_MC = 1 N: waiting for the touch");
-  EXPECT_CONTAINS(told.back(), "of 1.0 s");
+  ASSERT_FALSE(reported.empty());
+  EXPECT_CONTAINS(reported.front(), "F_MC = 1 N: waiting for the touch");
+  EXPECT_CONTAINS(reported.back(), "of 1.0 s");
   EXPECT_EQ(device.read_number("wall.magnetic_coefficient"), 1);
   EXPECT_EQ(device.read_number("trace.interval"), 0);
 }
@@ -98,7 +98,7 @@ TEST_F(Contact, AnotherTrialOnTheSameDeviceWaitsForTheHandle) {
 TEST_F(Contact, AnExceptionFromTellDisarms) {
   for (const std::size_t after : {0u, 1u}) {
     std::size_t calls = 0;
-    tell = [&](const std::string& text) {
+    report = [&](const std::string& text) {
       if (text.ends_with("out of the wall")) return;
       EXPECT_TRUE(simulation().board().output().axis[0].enabled);
       if (calls++ == after) throw std::logic_error("enough");
@@ -110,7 +110,7 @@ TEST_F(Contact, AnExceptionFromTellDisarms) {
 }
 
 TEST_F(Contact, AFaultOnTheWayIsReported) {
-  tell = [&](const std::string&) { simulation().device().connect_encoder(0, false); };
+  report = [&](const std::string&) { simulation().device().connect_encoder(0, false); };
   const auto what = thrown_message<device::DeviceError>([&] { run(0); });
   EXPECT_CONTAINS(what, "lost its force during the trial");
   EXPECT_CONTAINS(what, "encoder");
@@ -120,11 +120,11 @@ TEST_F(Contact, AFaultOnTheWayIsReported) {
 // Between the last look at the statusword and the end of the trial.
 TEST_F(Contact, AFaultJustBeforeTheEndIsReportedToo) {
   std::size_t trials = 0;
-  tell = [&](const std::string& text) { trials += text.ends_with("out of the wall") ? 0 : 1; };
+  report = [&](const std::string& text) { trials += text.ends_with("out of the wall") ? 0 : 1; };
   run(0);
   const std::size_t last = trials;
   std::size_t calls = 0;
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (!text.ends_with("out of the wall") && ++calls == last)
       simulation().device().connect_encoder(0, false);
   };
@@ -132,7 +132,7 @@ TEST_F(Contact, AFaultJustBeforeTheEndIsReportedToo) {
 }
 
 TEST_F(Contact, ATraceThatStopsEndsTheTrialDisarmed) {
-  tell = [&](const std::string&) { device.write(device::Parameter::of<"trace.interval">(), 0, true); };
+  report = [&](const std::string&) { device.write(device::Parameter::of<"trace.interval">(), 0, true); };
   EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "trace has stopped");
   expect_disarmed();
 }
@@ -143,7 +143,7 @@ TEST_F(Contact, ValuesThatAreNotAllowedAreRefusedBeforeArming) {
   settings.stiffness = 5500;
   settings.haptic_rate = 333;
   EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "haptic.rate");
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(reported.empty());
   expect_disarmed();
 }
 

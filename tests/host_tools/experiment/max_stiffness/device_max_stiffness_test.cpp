@@ -36,8 +36,8 @@ class DeviceStiffness : public TouchedBoard {
   }
   DeviceStiffnessResult find(const StiffnessCondition& condition, bench::Prompter* prompter = nullptr,
                              RunJournal* journal = nullptr) {
-    const Tell nobody = [](const std::string&) {};
-    DeviceRig rig(device, limits, {prompter, journal, tell, nobody});
+    const ReportText nobody = [](const std::string&) {};
+    DeviceRig rig(device, limits, {prompter, journal, report, nobody});
     const DeviceStiffnessResult found = find_max_stiffness(rig, condition, settings);
     adaptive_mode = device.read_number("wall.adaptive_mode");
     law = device.read_number("wall.law");
@@ -115,7 +115,7 @@ TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
   {
     const auto journal = open(RunJournal::Begin::anew);
     std::set<std::string> touched;
-    tell = [&](const std::string& text) {
+    report = [&](const std::string& text) {
       touched.insert(text.substr(0, text.find(" N/mm")));
       if (touched.size() == 3) throw std::runtime_error("Ctrl-C");
     };
@@ -123,19 +123,19 @@ TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
     EXPECT_EQ(journal->size(), 2u);
   }
   expect_disarmed();
-  told.clear();
-  tell = [this](const std::string& text) { told.push_back(text); };
+  reported.clear();
+  report = [this](const std::string& text) { reported.push_back(text); };
   settings.last = 20e3;
   const auto journal = open(RunJournal::Begin::resume);
   EXPECT_EQ(journal->resumed(), 2u);
   const DeviceStiffnessResult result = find(wall_with(2), nullptr, journal.get());
-  EXPECT_CONTAINS(told.front(), "4 N/mm");
+  EXPECT_CONTAINS(reported.front(), "4 N/mm");
   EXPECT_EQ(result.touches.front().stiffness, 3000);
   EXPECT_EQ(result.touches.size(), journal->size());
   // Once more, from the journal alone.
-  told.clear();
+  reported.clear();
   const DeviceStiffnessResult again = find(wall_with(2), nullptr, journal.get());
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(reported.empty());
   EXPECT_EQ(again.found.stiffness, result.found.stiffness);
   EXPECT_EQ(again.found.ending_peak_to_peak, result.found.ending_peak_to_peak);
   EXPECT_EQ(again.found.saturated_share, result.found.saturated_share);
@@ -153,7 +153,7 @@ TEST_F(DeviceStiffness, AJournalOfOtherSettingsOrOfSomethingElseIsRefused) {
 
 TEST_F(DeviceStiffness, AFaultEndsTheRunWithItsWordsAndKeepsTheTouchesBefore) {
   const auto journal = open(RunJournal::Begin::anew);
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (text.find("3.5 N/mm, touch 1 of 1: holding") != std::string::npos)
       simulation().device().connect_encoder(0, false);
   };
@@ -171,7 +171,7 @@ TEST_F(DeviceStiffness, EverythingThatWasChangedIsPutBackHoweverItEnds) {
                                           "wall.damping", "velocity.window"};
   std::vector<double> before;
   for (const char* name : names) before.push_back(device.read_number(name));
-  tell = [&](const std::string& text) {
+  report = [&](const std::string& text) {
     if (text.find("holding") == std::string::npos) return;
     EXPECT_FLOAT_EQ(static_cast<float>(device.read_number("force.limit")), 3.3F);
     throw std::runtime_error("enough");
@@ -204,9 +204,9 @@ TEST_F(DeviceStiffness, ATouchThatIsNotHeldIsMadeThreeTimesAndEndsTheSearch) {
   EXPECT_TRUE(result.found.never_touched);
   EXPECT_EQ(result.touches.size(), 1u);
   EXPECT_EQ(journal->size(), 0u) << "a run that is resumed tries again";
-  EXPECT_EQ(
-      std::count_if(told.begin(), told.end(), [](const auto& text) { return text.ends_with("once more"); }),
-      3);
+  EXPECT_EQ(std::count_if(reported.begin(), reported.end(),
+                          [](const auto& text) { return text.ends_with("once more"); }),
+            3);
 }
 
 // The same person, handle and protocol as the touch of the model alone, without firmware, link and trace.
@@ -231,7 +231,7 @@ TEST_F(DeviceStiffness, AgreesWithTheModelWithinAStep) {
       StiffnessClimb climb(settings.start, settings.step, settings.last);
       while (const auto stiffness = climb.next()) {
         setup.wall.wall.stiffness = static_cast<float>(*stiffness);
-        climb.tell(!simulate_touch(setup).unstable());
+        climb.record(!simulate_touch(setup).unstable());
       }
       least = std::min(least, climb.result());
       most = std::max(most, climb.result());
@@ -317,7 +317,7 @@ std::vector<double> climb_to(StiffnessClimb& climb, double limit) {
   std::vector<double> asked;
   while (const auto stiffness = climb.next()) {
     asked.push_back(*stiffness);
-    climb.tell(*stiffness <= limit);
+    climb.record(*stiffness <= limit);
   }
   return asked;
 }
@@ -348,7 +348,7 @@ TEST(StiffnessClimb, EndsAtBothEnds) {
 
 TEST(StiffnessClimb, GivenUpItKeepsWhatItHas) {
   StiffnessClimb climb(3000, 100, 20e3);
-  climb.tell(true);
+  climb.record(true);
   climb.give_up();
   EXPECT_FALSE(climb.next());
   EXPECT_EQ(climb.result(), 3000);
