@@ -16,6 +16,20 @@ enum class WallKind : std::uint8_t {
   adaptive,  ///< eqs. 5 to 7: the field's coefficient follows the velocity ("AIT")
 };
 
+/// Whether the field's coefficient answers to the velocity: a damper, or its opposite, that no criterion of
+/// stability covers.
+constexpr bool follows_velocity(WallKind kind) {
+  switch (kind) {
+    case WallKind::none:
+    case WallKind::plain:
+    case WallKind::magnetic:
+      return false;
+    case WallKind::adaptive:
+      return true;
+  }
+  return false;
+}
+
 template <typename Scalar>
 struct WallLawConfig {
   WallKind kind = WallKind::plain;

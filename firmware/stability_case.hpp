@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
@@ -8,6 +10,46 @@
 #include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware {
+
+/// A parameter of an axis that the stability case is made of. What wall law, guard and `kmax check` need to
+/// know of it stands here alone; tests hold the list against what is read.
+struct CaseParameter {
+  /// Which change of it alone may meet a criterion that fails.
+  enum class Remedy : std::uint8_t { none, lower, higher, either };
+
+  std::uint8_t entry;
+  Remedy remedy = Remedy::none;
+  bool fact = false;  ///< about device or operator: to be changed only if it is true
+  bool guard = true;  ///< the criteria of the guard read it too
+};
+
+/// The user's own choices first, the wall before all.
+inline constexpr auto case_parameters = [] {
+  using enum CaseParameter::Remedy;
+  return std::to_array<CaseParameter>({
+      {entry_of<"wall.stiffness">(), lower},
+      {entry_of<"wall.damping">(), either},
+      {entry_of<"wall.magnetic_coefficient">(), lower},
+      {entry_of<"wall.adaptive_force_max">(), lower},
+      {entry_of<"wall.magnetic_length">(), higher},
+      {entry_of<"wall.adaptive_gain">()},
+      {entry_of<"wall.adaptive_offset">()},
+      {entry_of<"wall.adaptive_force_min">()},
+      {entry_of<"wall.law">()},
+      {entry_of<"haptic.rate">(), higher},
+      {entry_of<"current.bandwidth">(), higher},
+      {entry_of<"position.resolution">(), lower},
+      {entry_of<"force.limit">(), higher, false, false},
+      {entry_of<"device.transmission">()},
+      {entry_of<"encoder.counts_per_turn">()},
+      {entry_of<"device.mass">(), none, true, false},
+      {entry_of<"guard.delay">(), lower, true},
+      {entry_of<"guard.damping">(), higher, true},
+      {entry_of<"guard.friction">(), higher, true},
+      {entry_of<"guard.operator_force">(), higher, true},
+      {entry_of<"guard.operator_speed">(), lower, true},
+  });
+}();
 
 /// What the stability criteria judge, out of one axis' parameters; the guard before arming and `kmax check`
 /// go by the same.

@@ -2,7 +2,6 @@
 #include "firmware/stability_guard.hpp"
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/stability_case.hpp"
 
 namespace kmax::firmware {
 

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
 #include "control/closed_form_criteria.hpp"
 #include "firmware/drive/armed_axes.hpp"
 #include "firmware/parameters/parameter_rules.hpp"
+#include "firmware/stability_case.hpp"
 
 namespace kmax::firmware {
 
@@ -34,29 +36,17 @@ inline constexpr std::array guard_criteria = {
 
 /// What of an axis the check reads, the wall first: the entries of the dictionary, of which an armed axis may
 /// change some.
-inline constexpr auto guard_entries = std::to_array<std::uint8_t>({
-    entry_of<"wall.stiffness">(),
-    entry_of<"wall.damping">(),
-    entry_of<"wall.magnetic_coefficient">(),
-    entry_of<"wall.magnetic_length">(),
-    entry_of<"wall.adaptive_gain">(),
-    entry_of<"wall.adaptive_offset">(),
-    entry_of<"wall.adaptive_force_min">(),
-    entry_of<"wall.adaptive_force_max">(),
-    entry_of<"guard.damping">(),
-    entry_of<"guard.friction">(),
-    entry_of<"guard.delay">(),
-    entry_of<"guard.operator_force">(),
-    entry_of<"guard.operator_speed">(),
-    entry_of<"guard.mode">(),
-    entry_of<"drive.mode">(),
-    entry_of<"wall.law">(),
-    entry_of<"position.resolution">(),
-    entry_of<"device.transmission">(),
-    entry_of<"encoder.counts_per_turn">(),
-    entry_of<"haptic.rate">(),
-    entry_of<"current.bandwidth">(),
-});
+inline constexpr auto guard_entries = [] {
+  constexpr auto guarded = std::ranges::count_if(case_parameters, &CaseParameter::guard);
+  std::array<std::uint8_t, guarded + 2> entries{};
+  std::size_t count = 0;
+  for (const CaseParameter& parameter : case_parameters) {
+    if (parameter.guard) entries[count++] = parameter.entry;
+  }
+  entries[count++] = entry_of<"guard.mode">();
+  entries[count] = entry_of<"drive.mode">();
+  return entries;
+}();
 
 /// The stability check of one axis' parameters (stability_case.hpp). Not judged where guard.mode is off,
 /// where drive.mode renders no wall, and for a law that makes no force. Value and bound are finite for every

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
-#include "firmware/object_dictionary/device_entries.hpp"
 #include "firmware/parameters/parameter_rules.hpp"
+#include "firmware/stability_case.hpp"
 
 namespace kmax::check {
 
@@ -14,37 +14,6 @@ using device::Parameter;
 using firmware::ParameterValues;
 
 namespace {
-struct Candidate {
-  Parameter parameter;
-  bool upwards;
-  bool fact;
-};
-
-std::vector<Candidate> candidates(const ParameterValues& values, std::size_t axis) {
-  std::vector<Candidate> all;
-  const auto add = [&all](const Parameter& parameter, bool upwards, bool fact = false) {
-    all.push_back({parameter, upwards, fact});
-  };
-  const auto law = values.choice<control::WallKind, "wall.law">(axis);
-  add(Parameter::of<"wall.stiffness">(axis), false);
-  add(Parameter::of<"wall.damping">(axis), false);
-  add(Parameter::of<"wall.damping">(axis), true);
-  if (law == control::WallKind::magnetic) add(Parameter::of<"wall.magnetic_coefficient">(axis), false);
-  if (law == control::WallKind::adaptive) add(Parameter::of<"wall.adaptive_force_max">(axis), false);
-  if (law == control::WallKind::magnetic || law == control::WallKind::adaptive)
-    add(Parameter::of<"wall.magnetic_length">(axis), true);
-  add(Parameter::of<"haptic.rate">(axis), true);
-  add(Parameter::of<"current.bandwidth">(axis), true);
-  add(Parameter::of<"position.resolution">(axis), false);
-  add(Parameter::of<"force.limit">(axis), true);
-  add(Parameter::of<"guard.delay">(axis), false, true);
-  add(Parameter::of<"guard.damping">(axis), true, true);
-  add(Parameter::of<"guard.friction">(axis), true, true);
-  add(Parameter::of<"guard.operator_force">(axis), true, true);
-  add(Parameter::of<"guard.operator_speed">(axis), false, true);
-  return all;
-}
-
 class Search {
  public:
   Search(const ParameterValues& values, const Parameter& parameter, const Wanted& wanted)
@@ -110,16 +79,22 @@ class Search {
 
 std::vector<Change> find_changes(const ParameterValues& values, std::size_t axis, const Wanted& wanted) {
   std::vector<Change> found;
-  for (const Candidate& candidate : candidates(values, axis)) {
-    const Search search(values, candidate.parameter, wanted);
-    const firmware::Entry& entry = candidate.parameter.definition();
-    const bool is_rate = candidate.parameter == Parameter::of<"haptic.rate">(axis);
+  using Remedy = firmware::CaseParameter::Remedy;
+  const auto try_change = [&](const firmware::CaseParameter& of, bool upwards) {
+    const Parameter parameter(of.entry, axis);
+    const Search search(values, parameter, wanted);
+    const firmware::Entry& entry = parameter.definition();
+    const bool is_rate = parameter == Parameter::of<"haptic.rate">(axis);
     const std::optional<float> value =
-        is_rate ? search.rate() : search.towards(candidate.upwards ? entry.maximum : entry.minimum);
-    if (!value || *value == search.present()) continue;
+        is_rate ? search.rate() : search.towards(upwards ? entry.maximum : entry.minimum);
+    if (!value || *value == search.present()) return;
     // A wall without stiffness is no wall.
-    if (candidate.parameter == Parameter::of<"wall.stiffness">(axis) && *value == 0.0f) continue;
-    found.push_back({candidate.parameter, *value, candidate.upwards, candidate.fact});
+    if (parameter == Parameter::of<"wall.stiffness">(axis) && *value == 0.0f) return;
+    found.push_back({parameter, *value, upwards, of.fact});
+  };
+  for (const firmware::CaseParameter& of : firmware::case_parameters) {
+    if (of.remedy == Remedy::lower || of.remedy == Remedy::either) try_change(of, false);
+    if (of.remedy == Remedy::higher || of.remedy == Remedy::either) try_change(of, true);
   }
   return found;
 }

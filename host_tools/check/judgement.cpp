@@ -71,8 +71,7 @@ std::string_view to_string(control::DiolaitiRegion region) {
 Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
                            const control::Hand<double>& hand) {
   Judgement judgement{parameter_case(values, axis, hand), {}, true, {}, false, false};
-  judgement.follows_velocity =
-      values.choice<control::WallKind, "wall.law">(axis) == control::WallKind::adaptive;
+  judgement.follows_velocity = control::follows_velocity(values.choice<control::WallKind, "wall.law">(axis));
   using control::VelocityEstimatorKind;
   const auto estimator = values.choice<VelocityEstimatorKind, "velocity.estimator">(axis);
   judgement.uncovered_damper = judgement.stability_case.wall_damping != 0 &&

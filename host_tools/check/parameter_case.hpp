@@ -15,6 +15,6 @@ control::StabilityCase<double> parameter_case(const firmware::ParameterValues& v
                                               const control::Hand<double>& hand = {});
 
 /// The parameters that it reads, of that axis.
-const std::vector<device::Parameter>& case_parameters(std::size_t axis);
+std::vector<device::Parameter> parameters_of_case(std::size_t axis);
 
 }  // namespace kmax::check

@@ -64,7 +64,7 @@ std::size_t slot_of(const Parameter& parameter) {
 firmware::ParameterValues values_of(Context& context, const CheckOptions& options,
                                     const std::vector<MapAxis>& sides) {
   const auto assignments = device::parse_assignments(options.assignments, context.axis());
-  std::vector<Parameter> read = check::case_parameters(context.axis());
+  std::vector<Parameter> read = check::parameters_of_case(context.axis());
   read.push_back(Parameter::of<"velocity.estimator">(context.axis()));  // what the guarantees cover
   for (const auto& assignment : assignments) {
     if (std::find(read.begin(), read.end(), assignment.parameter) == read.end())

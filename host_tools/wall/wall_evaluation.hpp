@@ -33,8 +33,8 @@ class WallEvaluator {
   double side_;
 };
 
-/// Draws force against distance for the plain, the magnetic and the adaptive law with the other parameters
-/// given, the adaptive one at rest and at 0.5 m/s towards the wall. Throws plot::FigureError.
+/// Draws force against distance for every law with the other parameters given, those that follow the velocity
+/// at rest and at 0.5 m/s towards the wall. Throws plot::FigureError.
 void write_force_curves(const firmware::ParameterValues& values, std::size_t axis,
                         const std::filesystem::path& picture);
 

@@ -159,12 +159,12 @@ TEST(GuardEntries, AreThoseThatCount) {
   for (std::size_t entry = 0; entry < axis_settings.size(); ++entry) {
     const Entry& e = entry_at(entry);
     bool counts = false;
-    for (const std::uint32_t law : {1U, 2U, 3U}) {
+    for (const NamedValue& law : names::wall_law) {
       for (const float widest : {2.0f, 50.0f}) {
         for (const float offset : {0.0f, 0.8f}) {
           ParameterValues values;
           values.set_whole<"guard.mode">(1);
-          values.set_whole<"wall.law">(law);
+          values.set_whole<"wall.law">(law.value);
           values.set_real<"guard.damping">(5);
           values.set_real<"guard.operator_force">(1);
           values.set_real<"guard.operator_speed">(0.1f);

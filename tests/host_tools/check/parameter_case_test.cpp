@@ -13,10 +13,6 @@ namespace kmax::check::parameter_case_test {
 namespace {
 using firmware::ParameterValues;
 
-void set_law(ParameterValues& values, control::WallKind law, std::size_t axis = 0) {
-  values.set_whole<"wall.law">(static_cast<std::uint32_t>(law), axis);
-}
-
 template <typename Scalar>
 std::array<double, 13> numbers_of(const control::StabilityCase<Scalar>& c) {
   const auto number = [](Scalar value) { return static_cast<double>(value); };
@@ -43,14 +39,13 @@ TEST(ParameterCase, ANumberIsTheOneThatTheUserWroteAndTheHandIsTheCallers) {
 // What is listed is what is read: any other parameter of the axis may take any value without a change.
 TEST(ParameterCase, TheListedParametersAreThoseThatCount) {
   for (const std::size_t axis : {std::size_t{0}, std::size_t{1}}) {
-    const auto& listed = case_parameters(axis);
+    const auto listed = parameters_of_case(axis);
     for (const device::Parameter& parameter : device::all_parameters()) {
       if (!parameter.writable()) continue;
       bool changes = false;
-      for (const auto law :
-           {control::WallKind::plain, control::WallKind::magnetic, control::WallKind::adaptive}) {
+      for (const auto& law : firmware::names::wall_law) {
         ParameterValues values;
-        set_law(values, law, axis);
+        values.set_whole<"wall.law">(law.value, axis);
         values.set_real<"position.resolution">(0.001f, axis);
         // Wide enough for gain and offset to show.
         for (const float widest : {2.0f, 50.0f}) {
@@ -80,7 +75,7 @@ TEST(ParameterCase, TheListedParametersAreThoseThatCount) {
 RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
   ParameterValues values;
   const std::size_t axis = *rc::gen::inRange<std::size_t>(0, 2);
-  for (const device::Parameter& parameter : case_parameters(axis)) {
+  for (const device::Parameter& parameter : parameters_of_case(axis)) {
     const firmware::Entry& entry = parameter.definition();
     const std::size_t slot = firmware::slot_of(parameter.entry(), parameter.axis());
     if (entry.type == firmware::Type::float32 && *rc::gen::arbitrary<bool>()) {
@@ -90,10 +85,7 @@ RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
                          entry.type, entry.minimum + std::pow(share, 8) * (entry.maximum - entry.minimum)));
     }
   }
-  set_law(values,
-          *rc::gen::element(control::WallKind::none, control::WallKind::plain, control::WallKind::magnetic,
-                            control::WallKind::adaptive),
-          axis);
+  values.set_whole<"wall.law">((*rc::gen::elementOf(std::to_array(firmware::names::wall_law))).value, axis);
   const auto here = parameter_case(values, axis);
   const auto there = firmware::stability_case(values, axis);
   const auto ours = numbers_of(here), guards = numbers_of(there);
