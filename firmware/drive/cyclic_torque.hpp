@@ -12,6 +12,11 @@ namespace kmax::firmware {
 // Mode torque, CiA 402's cyclic synchronous torque: what a host asks for in thousandths of the rated torque
 // and in newtons, as a force at the handle. Main loop.
 
+/// What a host asks for in mode torque: 0 whenever the axis is not armed.
+constexpr bool is_target(std::size_t entry) {
+  return entry == entry_of<"profile.target_torque">() || entry == entry_of<"profile.target_force">();
+}
+
 /// profile.rated_current, mA: current.limit to the nearest whole one; at least 1.
 constexpr std::uint32_t rated_current(const ParameterValues& values, std::size_t axis) {
   const auto whole = static_cast<std::uint32_t>(1e3f * values.real<"current.limit">(axis) + 0.5f);

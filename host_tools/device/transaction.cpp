@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "firmware/drive/cyclic_torque.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/guard_words.hpp"
@@ -213,6 +214,12 @@ void Device::verify(std::span<const Assignment> assignments) {
   }
   if (!difference) return;
   const Parameter& parameter = difference->wanted.parameter;
+  if (difference->found == 0 && firmware::is_target(parameter.entry()))
+    throw DeviceError(
+        fmt::format("{} was set to {}, but is {} again: the device holds a target only while the axis is "
+                    "armed with drive.mode torque; arm it first",
+                    parameter.name(), value_with_unit(parameter, difference->wanted.raw),
+                    value_with_unit(parameter, difference->found)));
   throw DeviceError(
       fmt::format("{} was set to {}, but the device now has {}: another program is writing to it; end that "
                   "one and try again",

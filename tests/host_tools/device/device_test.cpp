@@ -95,6 +95,20 @@ TEST_F(OpenDevice, AParameterGivenTwiceIsRefused) {
   EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.apply(twice); }), "twice");
 }
 
+TEST_F(OpenDevice, ATargetThatADisarmedAxisDropsIsExplainedAsThat) {
+  for (const char* target : {"profile.target_force=1", "axis1.profile.target_torque=100"}) {
+    connection.link->after_request = [this](int) {
+      for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+        connection.fake->registers.values().set_real<"profile.target_force">(0.0f, axis);
+        connection.fake->registers.values().set_whole<"profile.target_torque">(0, axis);
+      }
+    };
+    const auto message = thrown_message<DeviceError>([&] { device.apply(assignments({target})); });
+    EXPECT_CONTAINS(message, "only while the axis is armed");
+    EXPECT_EQ(message.find("another program"), std::string::npos);
+  }
+}
+
 struct RefusalCase {
   std::vector<Assignment> set;
   std::vector<std::string> said;
