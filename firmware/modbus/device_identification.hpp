@@ -31,12 +31,14 @@ class DeviceIdentification {
  public:
   static constexpr std::uint8_t mei_type = 14;
 
-  explicit DeviceIdentification(Bank& bank) : bank_(&bank) {}
+  // `pdu_size`: room for a response, from 64 on.
+  explicit DeviceIdentification(Bank& bank, std::size_t pdu_size = pdu_size_max)
+      : bank_(&bank), pdu_size_(pdu_size) {}
 
   // `request`: the whole PDU, at least the function. On `none` the response PDU is in response[0 .. length -
   // 1] (response[0] is the caller's: the function); otherwise neither `response` nor `length` means anything.
-  [[nodiscard]] Exception read(std::span<const std::uint8_t> request,
-                               std::span<std::uint8_t, pdu_size_max> response, std::size_t& length) const {
+  [[nodiscard]] Exception read(std::span<const std::uint8_t> request, std::span<std::uint8_t> response,
+                               std::size_t& length) const {
     if (request.size() < 2) return Exception::illegal_data_value;
     if (request[1] != mei_type) return Exception::illegal_function;
     if (request.size() != 4) return Exception::illegal_data_value;
@@ -60,7 +62,7 @@ class DeviceIdentification {
       for (; object <= last; ++object) {
         const auto id = static_cast<std::uint8_t>(object);
         if (!exists(id)) continue;
-        if (length + object_header_size + text(id).size() > pdu_size_max) {
+        if (length + object_header_size + text(id).size() > pdu_size_) {
           next = object;  // never 0: one object always fits
           break;
         }
@@ -79,7 +81,6 @@ class DeviceIdentification {
 
   static constexpr std::size_t header_size = 7;
   static constexpr std::size_t object_header_size = 2;
-  static constexpr std::size_t text_size_max = pdu_size_max - header_size - object_header_size;
 
   static constexpr std::uint8_t last_object(std::uint8_t code) {
     return code == basic ? 0x02 : code == regular ? 0x7F : 0xFF;
@@ -87,7 +88,7 @@ class DeviceIdentification {
 
   std::string_view text(std::uint8_t id) const {
     const std::string_view whole = bank_->identification(id);
-    return whole.substr(0, std::min(whole.size(), text_size_max));
+    return whole.substr(0, std::min(whole.size(), pdu_size_ - header_size - object_header_size));
   }
 
   bool exists(std::uint8_t id) const { return id <= last_object(basic) || !text(id).empty(); }
@@ -101,7 +102,7 @@ class DeviceIdentification {
     return 0x80U | category;
   }
 
-  void append(std::uint8_t id, std::span<std::uint8_t, pdu_size_max> response, std::size_t& length) const {
+  void append(std::uint8_t id, std::span<std::uint8_t> response, std::size_t& length) const {
     const std::string_view object = text(id);
     response[length++] = id;
     response[length++] = static_cast<std::uint8_t>(object.size());
@@ -112,6 +113,7 @@ class DeviceIdentification {
   }
 
   Bank* bank_;
+  std::size_t pdu_size_;
 };
 
 }  // namespace kmax::firmware::modbus

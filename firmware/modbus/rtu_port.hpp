@@ -29,6 +29,9 @@
 // left, so a write to the unit or the baud rate is still answered under the old ones. The application sets
 // its USART to config() whenever that differs (after reply_sent(), poll() and configure()).
 //
+// A tagged write (server.hpp) that comes a second time, byte for byte and with no other request in between,
+// is answered again as it was, and not carried out again.
+//
 // Host supervision: last_valid_request_time() moves only with frames of good CRC that were meant for this
 // unit or for all, whatever the server answers.
 //
@@ -70,6 +73,8 @@ struct RtuPortConfig {
 // They wrap. Frames that were no frames are in RtuReceiverCounters.
 struct RtuPortCounters {
   std::uint32_t other_units = 0;
+  std::uint32_t requests = 0;    // to this unit or to all
+  std::uint32_t broadcasts = 0;  // of them
   std::uint32_t replies = 0;     // handed out by reply_due()
   std::uint32_t exceptions = 0;  // requests answered with an exception
 };
@@ -170,22 +175,46 @@ class RtuPort {
       return;
     }
     last_valid_request_us_ = frame.end_us;
+    ++counters_.requests;
+    if (broadcast) ++counters_.broadcasts;
     if (state_ == State::sending) return;  // the buffer still holds the reply
     if (broadcast && !is_write(frame.pdu[0])) return;
+    if (is_repeated_write(frame)) {
+      state_ = State::reply_waiting;
+      return;
+    }
     state_ = State::executing;
+    server_.diagnostics().set(diagnostic_counters());
     const std::size_t length =
         server_.process(frame.pdu, std::span(reply_).template subspan<1, pdu_size_max>());
+    answered_ = broadcast ? 0 : crc_of(frame.pdu);
+    answered_size_ = broadcast ? 0 : frame.pdu.size();
     if (broadcast) {
       finish_request();
       return;
     }
-    if ((reply_[1] & 0x80U) != 0) ++counters_.exceptions;
+    if ((untagged(std::span(reply_).subspan(1, length))[0] & 0x80U) != 0) ++counters_.exceptions;
     reply_[0] = frame.unit;
     const std::uint16_t crc = crc_of(std::span(reply_).first(1 + length));
     reply_[1 + length] = static_cast<std::uint8_t>(crc & 0xFFU);
     reply_[2 + length] = static_cast<std::uint8_t>(crc >> 8U);
     reply_size_ = 1 + length + crc_size;
     state_ = State::reply_waiting;
+  }
+
+  // The very tagged write, tag and all, that the reply in the buffer is the answer to: the client has not got
+  // that answer, or the line has doubled the request. It is answered again and not carried out twice.
+  bool is_repeated_write(const RtuFrame& frame) const {
+    const auto request = untagged(frame.pdu);
+    return request.size() != frame.pdu.size() && is_write(request[0]) && frame.pdu.size() == answered_size_ &&
+           crc_of(frame.pdu) == answered_;
+  }
+
+  Diagnostics::Counters diagnostic_counters() const {
+    const RtuReceiverCounters& line = receiver_.counters();
+    return {line.frames_received,
+            line.crc_errors + line.line_errors + line.gap_errors + line.oversize + line.undersize,
+            counters_.exceptions, counters_.requests, counters_.broadcasts};
   }
 
   void drop_reply() {
@@ -214,6 +243,8 @@ class RtuPort {
   std::optional<std::uint32_t> last_valid_request_us_;
   std::uint32_t reply_end_us_ = 0;
   std::size_t reply_size_ = 0;
+  std::size_t answered_size_ = 0;  // of the request that `reply_` answers; 0: of none
+  std::uint16_t answered_ = 0;     // its CRC
   State state_ = State::listening;
   std::array<std::uint8_t, adu_size_max> reply_{};
 };

@@ -59,6 +59,12 @@ struct RtuClient {
     return take_reply(echo);
   }
 
+  // After the silence that follows a reply.
+  Bytes exchange_next(const Bytes& request) {
+    settle();
+    return exchange(request);
+  }
+
   bool is_alive() {
     settle();
     (void)take_reply();
@@ -237,6 +243,96 @@ TEST(RtuPort, BroadcastNeverGetsAReplyWhateverTheFunction) {
       EXPECT_TRUE(client.is_alive());
     }
   }
+}
+
+Bytes tagged(std::uint8_t tag, const Bytes& pdu) {
+  return adu(1, Bytes{65, 0, tag} + pdu);
+}
+
+// The client has not got the answer, or the line has doubled the request.
+TEST(RtuPort, ATaggedWriteThatComesAgainIsAnsweredAgainAndNotCarriedOutAgain) {
+  RtuClient client;
+  const Bytes reply = client.exchange_next(tagged(7, write_pdu));
+  EXPECT_EQ(reply, tagged(7, write_pdu));
+  for (int again = 0; again < 3; ++again) {
+    EXPECT_EQ(client.exchange_next(tagged(7, write_pdu)), reply);
+    EXPECT_EQ(client.bank.writes, 1);
+  }
+  EXPECT_EQ(client.exchange_next(tagged(8, write_pdu)), tagged(8, write_pdu));
+  EXPECT_EQ(client.bank.writes, 2) << "another tag is another write";
+  client.exchange_next(tagged(9, {6, 0, 2, 0, 1}));
+  client.exchange_next(tagged(9, {6, 0, 2, 0, 2}));
+  EXPECT_EQ(client.bank.writes, 4) << "another write is another one even under the same tag";
+  client.exchange_next(adu(1, read_pdu));
+  client.exchange_next(tagged(9, {6, 0, 2, 0, 2}));
+  EXPECT_EQ(client.bank.writes, 5) << "its answer is gone";
+}
+
+TEST(RtuPort, ATaggedWriteWhoseAnswerWasDroppedIsNotCarriedOutAgainEither) {
+  RtuClient client;
+  client.send(tagged(7, write_pdu));
+  client.settle();
+  EXPECT_EQ(client.exchange_next(tagged(7, write_pdu)), tagged(7, write_pdu));
+  EXPECT_EQ(client.bank.writes, 1);
+}
+
+TEST(RtuPort, ReadingsAndWritesWithoutATagAreCarriedOutEachTime) {
+  RtuClient client;
+  client.exchange_next(tagged(7, read_pdu));
+  client.bank.holding[2] = 0x4321;
+  EXPECT_EQ(client.exchange_next(tagged(7, read_pdu)), tagged(7, {3, 2, 0x43, 0x21}));
+  client.exchange_next(adu(1, write_pdu));
+  client.exchange_next(adu(1, write_pdu));
+  EXPECT_EQ(client.bank.writes, 2);
+}
+
+TEST(RtuPort, ABroadcastWriteIsNotTakenForARepetition) {
+  RtuClient client;
+  client.exchange_next(tagged(7, write_pdu));
+  client.exchange_next(adu(0, {6, 0, 2, 0, 9}));
+  client.exchange_next(tagged(7, write_pdu));
+  EXPECT_EQ(client.bank.holding[2], 0x1234);
+  EXPECT_TRUE(client.exchange_next(adu(0, Bytes{65, 0, 1, 6, 0, 2, 0, 5})).empty());
+  EXPECT_EQ(client.bank.holding[2], 0x1234) << "broadcasts are not tagged";
+}
+
+TEST(RtuPort, DiagnosticsCountWhatTheLineCarried) {
+  RtuClient client;
+  const auto count = [&client](std::uint8_t which) {
+    const Bytes reply = client.exchange_next(adu(1, {8, 0, which, 0, 0}));
+    return reply.size() == 8 ? reply[4] * 256 + reply[5] : -1;
+  };
+  client.exchange_next(adu(1, {8, 0, 10, 0, 0}));
+  client.exchange_next(adu(1, read_pdu));
+  client.exchange_next(adu(1, {99}));
+  client.exchange_next(adu(2, read_pdu));
+  client.exchange_next(adu(0, write_pdu));
+  Bytes torn = adu(1, read_pdu);
+  torn.pop_back();
+  client.exchange_next(torn);
+  client.exchange_next(tagged(1, {99}));
+  // Each asking is a frame, too.
+  EXPECT_EQ(count(11), 6);
+  EXPECT_EQ(count(12), 1);
+  EXPECT_EQ(count(13), 2);
+  EXPECT_EQ(count(14), 8);
+  EXPECT_EQ(count(15), 1);
+  client.exchange_next(adu(1, {8, 0, 10, 0, 0}));
+  for (const std::uint8_t which : {std::uint8_t{12}, std::uint8_t{13}, std::uint8_t{15}})
+    EXPECT_EQ(count(which), 0) << int{which};
+}
+
+TEST(RtuPort, DiagnosticsEchoAnyData) {
+  RtuClient client;
+  const Bytes echo = adu(1, Bytes{8, 0, 0} + Bytes(250, 0xA5));
+  EXPECT_EQ(client.exchange_next(echo), echo);
+  for (const Bytes& short_one :
+       {Bytes{8}, Bytes{8, 0, 0}, Bytes{8, 0, 0, 1}, Bytes{8, 0, 10, 0, 1}, Bytes{8, 0, 11, 0, 0, 0, 0}})
+    EXPECT_EQ(client.exchange_next(adu(1, short_one)), adu(1, {8 | 0x80, 3}));
+  for (const unsigned unknown : {1, 4, 9, 16, 20})
+    EXPECT_EQ(client.exchange_next(adu(1, {8, 0, static_cast<std::uint8_t>(unknown), 0, 0})),
+              adu(1, {8 | 0x80, 1}))
+        << unknown;
 }
 
 TEST(RtuPort, ExceptionsAreRepliesAndCounted) {

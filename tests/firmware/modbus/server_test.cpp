@@ -239,7 +239,7 @@ TEST(ModbusServer, OrderOfTheChecks) {
 TEST(ModbusServer, All256FunctionCodes) {
   for (unsigned function = 0; function < 256; ++function) {
     const bool served = function == 3 || function == 4 || function == 6 || function == 16 || function == 22 ||
-                        function == 23 || function == 43;
+                        function == 8 || function == 23 || function == 43 || function == 65;
     for (std::size_t size = 1; size <= pdu_size_max; ++size) {
       Fixture f;
       const int exception = f.exception_of(Bytes{low(function)} + Bytes(size - 1, 0));
@@ -273,6 +273,35 @@ TEST(ModbusServer, EveryOtherLengthOfEveryRequestIsAnException3) {
           << int{good[0]} << " with " << size << " bytes";
     }
   }
+}
+
+TEST(ModbusServer, ATaggedRequestIsTheOneWithinAndItsAnswerBearsTheTag) {
+  const Bytes refused[] = {read_request(3, 0x5000, 1), multiple_request(0x0049, {1}), {99}, {43, 13, 9, 9}};
+  auto requests = good_requests();
+  requests.insert(requests.end(), std::begin(refused), std::end(refused));
+  requests.push_back({8, 0, 0, 1, 2});
+  for (const Bytes& request : requests) {
+    Fixture plain, tagged;
+    EXPECT_EQ(tagged.process(Bytes{65, 0xC3, 0x07} + request),
+              (Bytes{65, 0xC3, 0x07} + plain.process(request)));
+    EXPECT_EQ(tagged.bank.holding, plain.bank.holding);
+  }
+}
+
+TEST(ModbusServer, ATaggedRequestWithNothingOrItselfWithinIsRefused) {
+  Fixture f;
+  EXPECT_EQ(f.exception_of({65, 1, 2}), 3);
+  EXPECT_EQ(f.exception_of(Bytes{65, 1, 2, 65, 3, 4} + read_request(3, 0, 1)), 0);
+  EXPECT_EQ(f.process(Bytes{65, 1, 2, 65, 3, 4} + read_request(3, 0, 1)), (Bytes{65, 1, 2, 65 | 0x80, 1}));
+}
+
+TEST(ModbusServer, ATaggedAnswerFitsInAFrame) {
+  Fixture f;
+  const Bytes tag{65, 0, 9};
+  EXPECT_EQ(f.process(tag + read_request(3, 0x0100, 124)).size(), 3U + 2 + 248);
+  EXPECT_EQ(f.process(tag + read_request(3, 0x0100, 125)), (tag + Bytes{3 | 0x80, 3}));
+  EXPECT_EQ(f.process(tag + read_write_request(0x0100, 125, 3, {1})), (tag + Bytes{23 | 0x80, 3}));
+  EXPECT_EQ(f.bank.writes, 0) << "what cannot be answered is not written";
 }
 
 TEST(ModbusServer, AnEmptyRequestHasNoResponse) {
