@@ -8,8 +8,8 @@
 
 namespace kmax::link {
 
-/// Read Device Identification (function 43, MEI type 14; MODBUS Application Protocol V1.1b3, 6.21): what
-/// libmodbus cannot do. Frames are whole RTU frames: unit first, CRC last.
+/// Read Device Identification (function 43, MEI type 14; MODBUS Application Protocol V1.1b3, 6.21). Frames
+/// are whole RTU frames: unit first, CRC last.
 namespace identification {
 
 inline constexpr std::uint8_t function = 43;

@@ -8,9 +8,9 @@
 #include <tuple>
 
 #include "firmware/capture.hpp"
-#include "firmware/modbus/crc.hpp"
 #include "firmware/trace.hpp"
 #include "host_tools/device/parameter.hpp"
+#include "host_tools/device/serial/tagged_exchange.hpp"
 
 namespace kmax::link {
 
@@ -38,18 +38,6 @@ std::vector<std::uint32_t> joined(std::span<const std::uint16_t> registers) {
   for (std::size_t i = 0; i + 1 < registers.size(); i += 2)
     words.push_back(std::uint32_t{registers[i]} << 16 | registers[i + 1]);
   return words;
-}
-
-void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
-  bytes.push_back(static_cast<std::uint8_t>(word >> 8));
-  bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
-}
-
-std::vector<std::uint8_t> with_crc(std::vector<std::uint8_t> frame) {
-  const std::uint16_t crc = firmware::modbus::crc_of(frame);
-  frame.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-  frame.push_back(static_cast<std::uint8_t>(crc >> 8));
-  return frame;
 }
 }  // namespace
 
@@ -160,21 +148,21 @@ std::map<std::string, std::string> RegisterLink::identify() {
 }
 
 std::vector<std::uint8_t> FrameLink::request(std::uint8_t function, std::uint16_t address, std::size_t count,
-                                             std::span<const std::uint16_t> values) {
+                                             Repeat repeat, std::span<const std::uint16_t> values) {
   std::vector<std::uint8_t> frame{unit_, function};
-  push(frame, address);
-  push(frame, static_cast<std::uint16_t>(count));
+  append_word(frame, address);
+  append_word(frame, static_cast<std::uint16_t>(count));
   constexpr std::uint8_t write_multiple_registers = 16;
   if (function == write_multiple_registers) frame.push_back(static_cast<std::uint8_t>(2 * count));
-  for (const std::uint16_t value : values) push(frame, value);
-  const auto reply = exchange(with_crc(std::move(frame)));
+  for (const std::uint16_t value : values) append_word(frame, value);
+  const auto reply = exchange(with_crc(std::move(frame)), repeat);
   if (reply.at(1) != function) throw RegisterRefused(reply.at(2), function, address);
   return reply;
 }
 
 std::vector<std::uint16_t> FrameLink::read_registers(std::uint8_t function, std::uint16_t address,
                                                      std::uint16_t count) {
-  const auto reply = request(function, address, count);
+  const auto reply = request(function, address, count, Repeat::if_lost);
   std::vector<std::uint16_t> registers;
   for (std::size_t i = 0; i < count; ++i)
     registers.push_back(static_cast<std::uint16_t>(reply.at(3 + 2 * i) << 8 | reply.at(4 + 2 * i)));
@@ -190,12 +178,17 @@ std::vector<std::uint16_t> FrameLink::read_input(std::uint16_t address, std::uin
 }
 
 void FrameLink::write_holding(std::uint16_t address, std::span<const std::uint16_t> values) {
-  static_cast<void>(request(16, address, values.size(), values));
+  static_cast<void>(request(16, address, values.size(), Repeat::never, values));
+}
+
+void FrameLink::write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
+  static_cast<void>(request(16, address, values.size(), Repeat::if_lost, values));
 }
 
 std::optional<identification::Page> FrameLink::read_identification(std::uint8_t first) {
   return identification::parse(exchange(with_crc({unit_, identification::function, identification::mei_type,
-                                                  identification::stream_regular, first})),
+                                                  identification::stream_regular, first}),
+                                        Repeat::if_lost),
                                unit_);
 }
 

@@ -44,8 +44,8 @@ std::vector<RegisterRange> plan_registers(std::span<const std::size_t> slots, st
 /// dictionary are read in one request and thus belong to one moment.
 class RegisterLink : public Link {
  public:
-  static constexpr std::uint16_t read_count_max = 125;   ///< registers in one read request
-  static constexpr std::uint16_t write_count_max = 123;  ///< registers in one write request
+  /// Registers in one request: as many as a tagged one can carry.
+  static constexpr std::uint16_t read_count_max = 124, write_count_max = 122;
 
   std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
   void write(std::span<const SlotValue> values, Repeat repeat,
@@ -72,12 +72,13 @@ class RegisterLink : public Link {
   }
 };
 
-/// A link that exchanges whole Modbus RTU frames with a device in this process, in the device's own time.
+/// A link that exchanges whole Modbus RTU frames.
 class FrameLink : public RegisterLink {
  public:
   std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override;
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override;
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override;
+  void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) override;
   void follow_serial_settings(std::optional<std::uint8_t> unit,
                               std::optional<std::uint32_t> /*baud_rate*/) override {
     unit_ = unit.value_or(unit_);
@@ -86,14 +87,15 @@ class FrameLink : public RegisterLink {
  protected:
   explicit FrameLink(std::uint8_t unit) : unit_(unit) {}
 
-  /// The frame that answers `frame`, with its CRC. Errors: LinkError if none comes, or one that is none.
-  virtual std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame) = 0;
+  /// The frame that answers `frame`, both with their CRC. Errors: LinkError if none comes, or one that is
+  /// none.
+  virtual std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame, Repeat repeat) = 0;
   std::optional<identification::Page> read_identification(std::uint8_t first) override;
 
  private:
   /// The answer to a request that begins with `function`, `address` and `count`.
   std::vector<std::uint8_t> request(std::uint8_t function, std::uint16_t address, std::size_t count,
-                                    std::span<const std::uint16_t> values = {});
+                                    Repeat repeat, std::span<const std::uint16_t> values = {});
   std::vector<std::uint16_t> read_registers(std::uint8_t function, std::uint16_t address,
                                             std::uint16_t count);
 

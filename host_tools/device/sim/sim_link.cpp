@@ -7,7 +7,7 @@ SimLink::SimLink(const simulation::Scene& scene) : FrameLink(0), simulation_(sce
   follow_serial_settings(static_cast<std::uint8_t>(unit), std::nullopt);
 }
 
-std::vector<std::uint8_t> SimLink::exchange(std::span<const std::uint8_t> frame) {
+std::vector<std::uint8_t> SimLink::exchange(std::span<const std::uint8_t> frame, Repeat /*repeat*/) {
   auto& board = simulation_.board();
   board.receive(frame);
   constexpr std::uint64_t patience_ticks = firmware::tick_rate_hz;

@@ -24,7 +24,7 @@ class SimLink final : public FrameLink {
   simulated_board::SimulatedBoard& simulation() { return simulation_; }
 
  private:
-  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame) override;
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame, Repeat /*repeat*/) override;
 
   simulated_board::SimulatedBoard simulation_;
 };

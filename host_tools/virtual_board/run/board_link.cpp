@@ -11,33 +11,6 @@
 
 namespace kmax::virtual_board {
 
-namespace {
-
-template <typename Exchange>
-auto again_if_lost(Exchange ask) {
-  for (int attempt = 1; attempt < 3; ++attempt) {
-    try {
-      return ask();
-    } catch (const link::LinkError&) {
-    }
-  }
-  return ask();
-}
-
-}  // namespace
-
-std::vector<std::uint16_t> BoardLink::read_holding(std::uint16_t address, std::uint16_t count) {
-  return again_if_lost([&] { return FrameLink::read_holding(address, count); });
-}
-
-std::vector<std::uint16_t> BoardLink::read_input(std::uint16_t address, std::uint16_t count) {
-  return again_if_lost([&] { return FrameLink::read_input(address, count); });
-}
-
-void BoardLink::write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) {
-  again_if_lost([&] { write_holding(address, values); });
-}
-
 std::chrono::microseconds BoardLink::now() const {
   return std::chrono::microseconds(static_cast<std::int64_t>(seconds(board_.now()) * 1e6));
 }
@@ -46,7 +19,17 @@ void BoardLink::wait(std::chrono::microseconds duration) {
   if (duration.count() > 0) board_.run_for(static_cast<double>(duration.count()) * 1e-6);
 }
 
-std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> request) {
+std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> request, link::Repeat repeat) {
+  for (int attempt = 1; repeat == link::Repeat::if_lost && attempt < 3; ++attempt) {
+    try {
+      return exchange_once(request);
+    } catch (const link::LinkError&) {
+    }
+  }
+  return exchange_once(request);
+}
+
+std::vector<std::uint8_t> BoardLink::exchange_once(std::span<const std::uint8_t> request) {
   // An answer to a write repeats the first registers and their number; one to a reading has the registers.
   const std::size_t expected = request[1] == 16 ? 8 : 5U + 2U * request[5];
   static_cast<void>(board_.transmitted());

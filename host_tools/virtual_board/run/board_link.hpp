@@ -18,9 +18,6 @@ class BoardLink final : public link::FrameLink {
  public:
   explicit BoardLink(VirtualBoard& board) : FrameLink(1), board_(board) {}
 
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override;
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override;
-  void write_holding_idempotent(std::uint16_t address, std::span<const std::uint16_t> values) override;
   void write_register(std::uint16_t address, std::uint16_t value) { write_holding(address, {&value, 1}); }
   std::chrono::microseconds now() const override;
   void wait(std::chrono::microseconds duration) override;
@@ -31,7 +28,8 @@ class BoardLink final : public link::FrameLink {
   void arm(std::size_t axis);
 
  private:
-  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> request) override;
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> request, link::Repeat repeat) override;
+  std::vector<std::uint8_t> exchange_once(std::span<const std::uint8_t> request);
 
   VirtualBoard& board_;
 };

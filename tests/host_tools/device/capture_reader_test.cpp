@@ -105,8 +105,10 @@ TEST_F(CaptureReaderTest, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
     ++calls;
   });
   EXPECT_EQ(captured.samples(), 4096u);
-  EXPECT_EQ(bench.link->window_requests, (2 * 12288 + 124) / 125);
-  EXPECT_EQ(calls, (2 * 12288u + 124) / 125);
+  constexpr int windows =
+      (2 * 12288 + link::RegisterLink::read_count_max - 1) / link::RegisterLink::read_count_max;
+  EXPECT_EQ(bench.link->window_requests, windows);
+  EXPECT_EQ(static_cast<int>(calls), windows);
   EXPECT_EQ(reported, 12288u);
   EXPECT_EQ(captured.column("voltage").back(), captured.tick(4095) + 0.5);
   EXPECT_EQ(bench.link->commands, (std::vector<std::uint16_t>{1}))

@@ -59,10 +59,11 @@ class PtyDevice {
 
  private:
   static std::size_t request_length(const Bytes& bytes) {
-    if (bytes.size() < 7) return 0;
-    if (bytes[1] == 43) return 7;
-    if (bytes[1] == 16) return 9u + bytes[6];
-    return 8;
+    const std::size_t within = bytes.size() > 1 && bytes[1] == 65 ? 3 : 0;
+    if (bytes.size() < within + 7) return 0;
+    if (bytes[within + 1] == 43) return within + 7;
+    if (bytes[within + 1] == 16) return within + 9u + bytes[within + 6];
+    return within + 8;
   }
 
   Bytes answer_to(const Bytes& request) {
@@ -73,10 +74,7 @@ class PtyDevice {
     const auto length = server.process(pdu, response);
     Bytes frame{request[0]};
     frame.insert(frame.end(), response.begin(), response.begin() + static_cast<std::ptrdiff_t>(length));
-    const auto crc = firmware::modbus::crc_of(frame);
-    frame.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-    frame.push_back(static_cast<std::uint8_t>(crc >> 8));
-    return frame;
+    return link::with_crc(std::move(frame));
   }
 
   void serve() {
