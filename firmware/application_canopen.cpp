@@ -46,13 +46,16 @@ void Application::start_communication(bool power_on) {
 void Application::poll_can() {
   // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
-  for (int i = 0; i < frames_per_poll && can_queue_.pop(frame); ++i)
+  for (int i = 0; i < frames_per_poll && can_queue_.pop(frame); ++i) {
+    node_.lss().hold_bit_rate(any_armed());
     act_on(node_.receive(frame, parameters_.values(), now_us_));
+  }
+  node_.lss().hold_bit_rate(any_armed());
   if (parameters_.communication_changes() != configured_communication_) {
     configured_communication_ = parameters_.communication_changes();
     node_.configure(node_settings(parameters_.values()), parameters_.values(), now_us_);
   }
-  act_on(node_.poll(now_us_));
+  act_on(node_.poll(parameters_.values(), now_us_));
   if (round_has_begun()) node_.poll_pdos(round_clock_us_);
   const bool bus_off = can_.state == CanState::bus_off;
   if (bus_off && !was_bus_off_) act_on(node_.bus_off());

@@ -96,6 +96,13 @@ class LssSlave {
     return LssAction::none;
   }
 
+  /// While it is held, "activate" is ignored and one that has begun is given up: whoever holds a device that
+  /// makes force would lose it with the bus.
+  void hold_bit_rate(bool held) {
+    held_ = held;
+    if (held && switching_ == Switching::before) switching_ = Switching::no;
+  }
+
   /// `switch_bit_rate` when the first delay of "activate" is over.
   LssAction poll(std::uint32_t now_us) {
     if (switching_ == Switching::no || now_us - delay_start_us_ < delay_us_) return LssAction::none;
@@ -272,6 +279,7 @@ class LssSlave {
   }
 
   LssAction activate(std::uint32_t delay_ms, std::uint32_t now_us) {
+    if (held_) return LssAction::none;
     switching_ = Switching::before;
     delay_us_ = delay_ms * 1000U;
     delay_start_us_ = now_us;
@@ -288,7 +296,7 @@ class LssSlave {
   Switching switching_ = Switching::no;
   std::uint8_t active_node_id_ = unconfigured_node_id, pending_node_id_ = unconfigured_node_id;
   std::uint8_t scanned_ = 0;  // the number that fastscan is at
-  bool answer_waits_ = false, storing_ = false;
+  bool answer_waits_ = false, storing_ = false, held_ = false;
 };
 
 }  // namespace kmax::firmware::canopen

@@ -121,7 +121,7 @@ class Node {
     if (id == cob_id::nmt) {
       follow(nmt_.receive(frame), pdos, events);
     } else if (id == cob_id::lss_request) {
-      act_on(lss_.receive(frame, now_us), events);
+      act_on(lss_.receive(frame, now_us), pdos, events);
     } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
       if (speaks()) sdo_.receive(frame, now_us);
     } else if (nmt_.configured() && only_ours(id)) {
@@ -132,14 +132,14 @@ class Node {
     return events;
   }
 
-  [[nodiscard]] NodeEvents poll(std::uint32_t now_us) {
+  [[nodiscard]] NodeEvents poll(const ParameterValues& pdos, std::uint32_t now_us) {
     NodeEvents events;
     while (const auto lost = heartbeats_.poll(now_us)) {
       emergency_.raise({0x8130, error_register::communication, {source_of(*lost)}});
       events.heartbeat_lost = true;
     }
     if (events.heartbeat_lost) communication_error(events);
-    act_on(lss_.poll(now_us), events);
+    act_on(lss_.poll(now_us), pdos, events);
     sdo_.poll(now_us);
     return events;
   }
@@ -278,8 +278,12 @@ class Node {
     sdo_silent_ = false;
   }
 
-  void act_on(LssAction action, NodeEvents& events) {
-    if (action == LssAction::switch_bit_rate) settings_.bit_rate = lss_.active_bit_rate();
+  void act_on(LssAction action, const ParameterValues& pdos, NodeEvents& events) {
+    if (action == LssAction::switch_bit_rate) {
+      settings_.bit_rate = lss_.active_bit_rate();
+      // What went often enough at the rate before may fill the bus at this one.
+      if (nmt_.state() == NmtState::operational) configure_tpdos(pdos);
+    }
     if (action == LssAction::store) events.store_identity = true;
     if (action == LssAction::start_node) events.start_node = true;
   }

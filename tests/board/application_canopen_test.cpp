@@ -1,6 +1,7 @@
 // The application on a CAN bus: who commands, and what takes the force away.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "firmware/object_dictionary/special_objects.hpp"
@@ -217,6 +218,72 @@ TEST_F(OnCan, LssStoresNothingWhileATransactionIsOpen) {
   EXPECT_EQ(heard.back().data[1], 0);
   EXPECT_EQ(bench.get("node.id"), 42);
   EXPECT_EQ(bench.get("store.state"), 2);
+}
+
+class LssOnCan : public OnCan {
+ protected:
+  void lss(const std::array<std::uint8_t, 8>& data) {
+    send({.identifier = 0x7E5, .length = 8, .data = data});
+  }
+  /// Bit rates by their place in CiA 305's table: 0 1000, 2 500, 3 250, 4 125 kbit/s.
+  void activate_bit_rate(std::uint8_t place) {
+    lss({4, 1});
+    lss({0x13, 0, place});
+    lss({0x15, 0, 0});
+    lss({4, 0});
+    run_ms(20);
+  }
+  std::size_t pdos_in_a_second() {
+    heard.clear();
+    run_ms(1000);
+    return static_cast<std::size_t>(std::count_if(heard.begin(), heard.end(), [](const auto& frame) {
+      return frame.identifier > 0x180 && frame.identifier < 0x580;
+    }));
+  }
+};
+
+// 1 M -> 500 k used to keep 4,000 PDOs a second, and nothing else got through.
+TEST_F(LssOnCan, PdosGoNoFasterThanANewBitRateAllows) {
+  nmt(1);
+  run_ms(20);
+  const auto at_1000_kbit = pdos_in_a_second();
+  for (const unsigned place : {2, 3, 4, 0}) {
+    activate_bit_rate(static_cast<std::uint8_t>(place));
+    const auto after_the_change = pdos_in_a_second();
+    nmt(0x80);
+    nmt(1);
+    run_ms(20);
+    const auto afresh = pdos_in_a_second();
+    EXPECT_NEAR(static_cast<double>(after_the_change), static_cast<double>(afresh), 4.0) << place;
+    if (place != 0) {
+      EXPECT_LT(afresh, 6 * at_1000_kbit / 10) << place;
+    }
+  }
+}
+
+TEST_F(LssOnCan, TheBitRateStaysWhileAnAxisIsArmed) {
+  const auto rate = [this] { return bench.application().can_settings().bit_rate; };
+  arm_torque(0);
+  activate_bit_rate(2);
+  EXPECT_EQ(rate(), 1'000'000U);
+  EXPECT_TRUE(armed());
+  command(6);
+  activate_bit_rate(2);
+  EXPECT_EQ(rate(), 500'000U);
+}
+
+// The change comes a second after "activate", and the axis is armed over serial in the meantime.
+TEST_F(LssOnCan, AChangeThatHasBegunIsGivenUpWhenAnAxisIsArmed) {
+  lss({4, 1});
+  lss({0x13, 0, 2});
+  lss({0x15, 0xE8, 0x03});
+  ASSERT_TRUE(bench.arm());
+  for (int i = 0; i < 30 && armed(); ++i) {
+    bench.set("link.sign_of_life", i);
+    run_ms(100);
+  }
+  EXPECT_TRUE(armed());
+  EXPECT_EQ(bench.application().can_settings().bit_rate, 1'000'000U);
 }
 
 TEST_F(OnCan, TheFirstWordOverCanDoesNotTripWhatSerialHasArmed) {
