@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <charconv>
 #include <cstdlib>
 #include <ctime>
 #include <map>
+#include <string_view>
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/suggestion.hpp"
@@ -59,10 +61,21 @@ void describe_modbus(Context& context) {
   }
 }
 
-/// Now, or what makes two runs give the same file (reproducible-builds.org, SOURCE_DATE_EPOCH).
+/// The same bytes from the same program, whenever it runs: a file that is kept under version control changes
+/// only with what it says. Who wants a date sets SOURCE_DATE_EPOCH (reproducible-builds.org) to the seconds
+/// since 1970. Throws UsageError if that is no such number, or beyond the year 9999.
 std::time_t time_of_file() {
+  constexpr std::time_t latest = 253'402'300'799;
   const char* epoch = std::getenv("SOURCE_DATE_EPOCH");
-  return epoch == nullptr ? std::time(nullptr) : static_cast<std::time_t>(std::strtoll(epoch, nullptr, 10));
+  if (epoch == nullptr) return 0;
+  const std::string_view text(epoch);
+  std::time_t time = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), time);
+  if (error != std::errc() || end != text.data() + text.size() || time < 0 || time > latest)
+    throw UsageError(fmt::format(
+        "SOURCE_DATE_EPOCH is '{}'; it takes seconds since 1970, 0 to {}: correct it, or unset it", text,
+        latest));
+  return time;
 }
 
 /// What a bar would be in a cell of a Markdown table.
@@ -162,7 +175,9 @@ void add_describe_command(CLI::App& app, Context& context) {
        "  kmax describe --format modbus      register map as CSV\n"
        "  kmax describe --format json        {\"objects\": [...]}\n"
        "  kmax describe --format eds > kmax.eds             for CANopen masters and configuration tools\n"
-       "  kmax describe --format dbc --node 5 > kmax.dbc    for programs that show a CAN bus by name"},
+       "  kmax describe --format dbc --node 5 > kmax.dbc    for programs that show a CAN bus by name\n\n"
+       "The EDS is dated 1970, so that the same program always writes the same file; with the environment\n"
+       "variable SOURCE_DATE_EPOCH, in seconds since then, it has the date that you give."},
       Takes::nothing, run_describe);
 }
 

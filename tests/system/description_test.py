@@ -2,10 +2,12 @@
 document of kmax describe --format json."""
 
 import configparser
+import os
 import re
+import subprocess
 import unittest
 
-from kmax_under_test import kmax, kmax_json
+from kmax_under_test import KMAX, kmax, kmax_json
 
 BITS = {0x2: 8, 0x3: 16, 0x4: 32, 0x5: 8, 0x6: 16, 0x7: 32, 0x8: 32}
 TYPES = {"integer8": 0x2, "integer16": 0x3, "integer32": 0x4, "unsigned8": 0x5, "unsigned16": 0x6,
@@ -65,6 +67,25 @@ class Eds(unittest.TestCase):
                     mapped = self.section(mapping >> 16, mapping >> 8 & 0xFF)
                     self.assertEqual("1", mapped["PDOMapping"])
                     self.assertEqual(mapping & 0xFF, BITS[int(mapped["DataType"], 16)])
+
+    def test_the_file_is_the_same_whenever_it_is_written(self):
+        def eds(epoch):
+            environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
+            if epoch is not None:
+                environment["SOURCE_DATE_EPOCH"] = epoch
+            return subprocess.run([KMAX, "describe", "--format", "eds"], capture_output=True, text=True,
+                                  env=environment, check=False)
+
+        self.assertIn("\nCreationTime=12:00AM\nCreationDate=01-01-1970\n", eds(None).stdout)
+        dated = eds("1700000000").stdout
+        self.assertIn("\nCreationTime=10:13PM\nCreationDate=11-14-2023\n", dated)
+        self.assertIn("\nModificationTime=10:13PM\nModificationDate=11-14-2023\n", dated)
+        self.assertIn("\nCreationDate=12-31-9999\n", eds("253402300799").stdout)
+        for wrong in ("", "today", "-1", "1.5", "253402300800", "99999999999999999999"):
+            with self.subTest(wrong):
+                done = eds(wrong)
+                self.assertEqual((2, ""), (done.returncode, done.stdout))
+                self.assertIn(f"SOURCE_DATE_EPOCH is '{wrong}'", done.stderr)
 
 
 class Dbc(unittest.TestCase):
