@@ -71,14 +71,14 @@ ObjectAccess access_of(ObjectAccessKind access) {
 
 DescribedObject described(const Parameter& parameter) {
   const Entry& entry = parameter.definition();
-  DescribedObject object{
-      .index = parameter.index(),
-      .subindex = entry.object_subindex(),
-      .name = parameter.name(),
-      .type = data_type_of(entry.type),
-      .length = firmware::bytes_of(entry.type),
-      .node_relative = entry.node_relative,
-      .mappable = firmware::canopen::tpdo_mappable(entry) || firmware::canopen::rpdo_mappable(entry)};
+  DescribedObject object{.index = parameter.index(),
+                         .subindex = entry.object_subindex(),
+                         .name = parameter.name(),
+                         .type = data_type_of(entry.type),
+                         .length = firmware::bytes_of(entry.type),
+                         .node_relative = entry.node_relative,
+                         .tpdo_mappable = firmware::canopen::tpdo_mappable(entry),
+                         .rpdo_mappable = firmware::canopen::rpdo_mappable(entry)};
   if (entry.access != firmware::Access::read_only) {
     object.access = ObjectAccess::read_write;
     object.default_raw = parameter.default_raw();
@@ -165,18 +165,6 @@ std::string name_of(std::uint16_t index, const std::vector<DescribedObject>& obj
   return first.substr(0, first.rfind('.'));
 }
 }  // namespace
-
-std::string_view text_of(ObjectAccess access) {
-  switch (access) {
-    case ObjectAccess::constant:
-      return "const";
-    case ObjectAccess::read_only:
-      return "ro";
-    case ObjectAccess::read_write:
-      break;
-  }
-  return "rw";
-}
 
 std::vector<DescribedObject> described_objects() {
   auto all = objects_with_values();

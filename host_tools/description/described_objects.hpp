@@ -38,7 +38,7 @@ struct DescribedObject {
   std::optional<std::uint32_t> default_raw{};
   bool node_relative = false;           ///< the node ID is added to the default
   std::optional<double> low{}, high{};  ///< bounds of what can be written
-  bool mappable = false;                ///< into a TPDO, an RPDO, or both
+  bool tpdo_mappable = false, rpdo_mappable = false;
 };
 
 /// Everything there is, both axes, in the order of index and sub-index: the entries of the dictionary, the
@@ -59,8 +59,6 @@ struct DescribedIndex {
 /// The same objects by their indices. Names differ from each other.
 std::vector<DescribedIndex> described_indices();
 
-std::string_view text_of(ObjectAccess access);  ///< "const", "ro", "rw"
-
 /// The messages of a device with factory settings as a DBC file, for programs that show or log a CAN bus by
 /// name: its PDOs with their signals in the dictionary's units, heartbeat, emergency message, and SYNC.
 /// `node`: node ID, 1 to 127. A device whose mapping was changed sends something else.
@@ -69,12 +67,14 @@ void write_dbc(std::ostream& out, std::uint8_t node);
 struct EdsFile {
   std::string file_name = "kmax.eds";
   std::string version;      ///< of the firmware that is described: "0.1.0"
-  std::time_t created = 0;  ///< written in UTC
+  std::time_t created = 0;  ///< written in UTC; two files of one version and moment are the same
 };
 
 /// The object dictionary as an electronic data sheet (CiA 306-1): what a configuration tool or a CANopen
 /// master knows about the device before it meets it. It has every object that SDO reaches. Defaults are
-/// those of the factory; what is measured has none. Numbers with a fraction are decimal.
+/// those of the factory; what is measured has none, nor has a float32, whose bounds are missing too: the
+/// file's comments say where they are. Access "rw" may be mapped into PDOs of both kinds or, with PDOMapping
+/// 0, of none; "rwr" and "ro" into those that the device sends; "rww" into those that it receives.
 void write_eds(std::ostream& out, const EdsFile& file);
 
 }  // namespace kmax::description

@@ -4,18 +4,20 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
-#include <bit>
+#include <algorithm>
 #include <charconv>
 #include <string_view>
 #include <vector>
 
 #include "firmware/application.hpp"
 #include "firmware/canopen/cob_id.hpp"
+#include "firmware/canopen/pdo_mapping.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
-#include "host_tools/base/numbers.hpp"
 #include "host_tools/description/described_objects.hpp"
 
 namespace kmax::description {
+
+using firmware::canopen::dummy_bits;
 
 namespace {
 /// Bit rates that CiA 306 asks about, in kbit/s.
@@ -32,36 +34,43 @@ bool is_signed(DataType type) {
   return type == DataType::integer8 || type == DataType::integer16 || type == DataType::integer32;
 }
 
-/// With a point or an exponent, so that a reader takes it for what it is.
-std::string real_text(double number) {
-  std::string text = device::number_text(number);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
+/// CiA 306: "rwr" can be written, but is an input of the process, for TPDOs; "rww" is an output, for RPDOs.
+std::string_view access_text(const DescribedObject& object) {
+  switch (object.access) {
+    case ObjectAccess::constant:
+      return "const";
+    case ObjectAccess::read_only:
+      return "ro";
+    case ObjectAccess::read_write:
+      break;
+  }
+  if (object.tpdo_mappable == object.rpdo_mappable) return "rw";
+  return object.tpdo_mappable ? "rwr" : "rww";
 }
 
 std::string default_text(const DescribedObject& object) {
   const std::uint32_t raw = *object.default_raw;
   if (object.node_relative) return fmt::format("$NODEID+0x{:X}", raw);
-  if (object.type == DataType::real32) return real_text(device::shortest_double(std::bit_cast<float>(raw)));
   if (is_signed(object.type)) return fmt::format("{}", static_cast<std::int32_t>(raw));
   if (object.type == DataType::unsigned32 && object.index < 0x2000) return fmt::format("0x{:08X}", raw);
   return fmt::format("{}", raw);
 }
 
-std::string limit_text(const DescribedObject& object, double limit) {
-  return object.type == DataType::real32 ? real_text(limit) : fmt::format("{:.0f}", limit);
-}
-
 void write_value_keys(std::ostream& out, const DescribedObject& object) {
   fmt::print(out, "DataType=0x{:04X}\nAccessType={}\n", static_cast<unsigned>(object.type),
-             text_of(object.access));
-  if (object.default_raw) fmt::print(out, "DefaultValue={}\n", default_text(object));
+             access_text(object));
+  // There is no text of a REAL32 that all readers take for the same number. lely-core takes an integer for
+  // the IEEE 754 pattern and nothing else: it refuses 2.4, and 1000 is 1.4e-42 to it. python-canopen, other
+  // masters and vendors' files have decimals, and python-canopen takes no limit but an integer. What is not
+  // there misleads nobody; both keys are optional.
+  const bool real = object.type == DataType::real32;
+  if (object.default_raw && !real) fmt::print(out, "DefaultValue={}\n", default_text(object));
   // The bounds of a COB-ID are no range.
-  if (object.low && !object.node_relative)
-    fmt::print(out, "LowLimit={}\nHighLimit={}\n", limit_text(object, *object.low),
-               limit_text(object, *object.high));
+  if (object.low && !object.node_relative && !real)
+    fmt::print(out, "LowLimit={:.0f}\nHighLimit={:.0f}\n", *object.low, *object.high);
   // A domain has no such key.
-  if (object.type != DataType::domain) fmt::print(out, "PDOMapping={}\n", object.mappable ? 1 : 0);
+  if (object.type != DataType::domain)
+    fmt::print(out, "PDOMapping={}\n", object.tpdo_mappable || object.rpdo_mappable ? 1 : 0);
 }
 
 void write_index(std::ostream& out, const DescribedIndex& index) {
@@ -135,16 +144,26 @@ void write_device_info(std::ostream& out, const EdsFile& file) {
              firmware::product_code, revision_number(file.version), file.version);
   for (const int rate : asked_rates) fmt::print(out, "BaudRate_{}={}\n", rate, has_bit_rate(rate) ? 1 : 0);
   fmt::print(out,
-             "SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0\n"
+             "SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity={}\nDynamicChannelsSupported=0\n"
              "CompactPDO=0\nGroupMessaging=0\nNrOfRxPDO={}\nNrOfTxPDO={}\nLSS_Supported=1\n\n",
-             firmware::canopen::pdo_count, firmware::canopen::pdo_count);
+             *std::min_element(dummy_bits.begin(), dummy_bits.end()), firmware::canopen::pdo_count,
+             firmware::canopen::pdo_count);
 }
 
-/// Gaps of an RPDO would be mapped with the basic types' own indices; this device has no such gaps.
+/// The basic types that an RPDO may hold where it has nothing for this device, by their own indices.
 void write_dummy_usage(std::ostream& out) {
   fmt::print(out, "[DummyUsage]\n");
-  for (int type = 1; type <= 7; ++type) fmt::print(out, "Dummy{:04X}=0\n", type);
+  for (std::size_t type = 1; type <= dummy_bits.size(); ++type) fmt::print(out, "Dummy{:04X}=1\n", type);
   fmt::print(out, "\n");
+}
+
+void write_comments(std::ostream& out) {
+  fmt::print(
+      out,
+      "[Comments]\nLines=2\n"
+      "Line1=REAL32 objects have neither default nor limits here, because programs disagree on how to write "
+      "them.\n"
+      "Line2=kmax describe --format markdown and --format json have them, and what each object is.\n\n");
 }
 }  // namespace
 
@@ -153,6 +172,7 @@ void write_eds(std::ostream& out, const EdsFile& file) {
   write_file_info(out, file);
   write_device_info(out, file);
   write_dummy_usage(out);
+  write_comments(out);
   write_list(out, "MandatoryObjects", indices, is_mandatory);
   write_list(out, "OptionalObjects", indices, is_optional);
   write_list(out, "ManufacturerObjects", indices, is_manufacturer);

@@ -6,10 +6,14 @@ import os
 import re
 import subprocess
 import unittest
+from datetime import datetime
 
 from kmax_under_test import KMAX, kmax, kmax_json
 
 BITS = {0x2: 8, 0x3: 16, 0x4: 32, 0x5: 8, 0x6: 16, 0x7: 32, 0x8: 32}
+RANGES = {0x2: (-0x80, 0x7F), 0x3: (-0x8000, 0x7FFF), 0x4: (-0x80000000, 0x7FFFFFFF), 0x5: (0, 0xFF),
+          0x6: (0, 0xFFFF), 0x7: (0, 0xFFFFFFFF)}
+REAL32, DOMAIN = 0x8, 0xF
 TYPES = {"integer8": 0x2, "integer16": 0x3, "integer32": 0x4, "unsigned8": 0x5, "unsigned16": 0x6,
          "unsigned32": 0x7, "float32": 0x8}
 
@@ -35,15 +39,11 @@ class Eds(unittest.TestCase):
                 section = self.section(entry["index"], entry["subindex"])
                 self.assertEqual(entry["name"], section["ParameterName"])
                 self.assertEqual(TYPES[entry["type"]], int(section["DataType"], 16))
-                self.assertEqual("ro" if entry["access"] == "ro" else "rw", section["AccessType"])
-                self.assertEqual(entry["access"] != "ro", "DefaultValue" in section)
-                if entry["access"] == "ro" or entry["values"]:
+                self.assertIn(section["AccessType"], ("ro",) if entry["access"] == "ro" else ("rw", "rwr", "rww"))
+                self.assertEqual(entry["access"] != "ro" and entry["type"] != "float32", "DefaultValue" in section)
+                if "DefaultValue" not in section or entry["values"]:
                     continue
-                default = section["DefaultValue"]
-                if default.startswith("$NODEID+"):
-                    default = default.removeprefix("$NODEID+")
-                number = float(default) if entry["type"] == "float32" else int(default, 0)
-                self.assertEqual(entry["default"], number)
+                self.assertEqual(entry["default"], int(section["DefaultValue"].removeprefix("$NODEID+"), 0))
 
     def test_lists_and_sub_numbers_add_up(self):
         listed = []
@@ -66,6 +66,7 @@ class Eds(unittest.TestCase):
                     mapping = int(self.section(kind + number, sub)["DefaultValue"], 16)
                     mapped = self.section(mapping >> 16, mapping >> 8 & 0xFF)
                     self.assertEqual("1", mapped["PDOMapping"])
+                    self.assertIn(mapped["AccessType"], ("rw", "rww") if kind == 0x1600 else ("rw", "rwr", "ro"))
                     self.assertEqual(mapping & 0xFF, BITS[int(mapped["DataType"], 16)])
 
     def test_the_file_is_the_same_whenever_it_is_written(self):
@@ -86,6 +87,116 @@ class Eds(unittest.TestCase):
                 done = eds(wrong)
                 self.assertEqual((2, ""), (done.returncode, done.stdout))
                 self.assertIn(f"SOURCE_DATE_EPOCH is '{wrong}'", done.stderr)
+
+
+class StrictEds(unittest.TestCase):
+    """What checkers of data sheets complain about, such as dcfchk of lely-core and CANchkEDS."""
+
+    INFORMATION = {
+        "FileInfo": "FileName FileVersion FileRevision EDSVersion Description CreationTime CreationDate CreatedBy "
+                    "ModificationTime ModificationDate ModifiedBy",
+        "DeviceInfo": "VendorName VendorNumber ProductName ProductNumber RevisionNumber OrderCode BaudRate_10 BaudRate_20 "
+                      "BaudRate_50 BaudRate_125 BaudRate_250 BaudRate_500 BaudRate_800 BaudRate_1000 SimpleBootUpMaster "
+                      "SimpleBootUpSlave Granularity DynamicChannelsSupported CompactPDO GroupMessaging NrOfRxPDO "
+                      "NrOfTxPDO LSS_Supported"}
+    LISTS = {"MandatoryObjects": lambda index: index in (0x1000, 0x1001, 0x1018),
+             "OptionalObjects": lambda index: index < 0x2000 or 0x6000 <= index < 0xFFFF,
+             "ManufacturerObjects": lambda index: 0x2000 <= index < 0x6000}
+    OBJECT = "ParameterName ObjectType DataType AccessType DefaultValue LowLimit HighLimit PDOMapping"
+    NUMBER = re.compile(r"(\$NODEID\+)?(0x[0-9A-F]+|0|-?[1-9][0-9]*)")  # a leading 0 would be octal
+    LAST_NODE = 127
+
+    @classmethod
+    def setUpClass(cls):
+        cls.text = kmax("describe", "--format", "eds").stdout
+        # To many readers what differs in case only is the same.
+        configparser.ConfigParser(interpolation=None, strict=True).read_string(cls.text.lower())
+        cls.eds = configparser.ConfigParser(interpolation=None, strict=True)
+        cls.eds.optionxform = str
+        cls.eds.read_string(cls.text)
+        cls.variables = {name: section for name, section in cls.eds.items()
+                         if re.fullmatch("[0-9A-F]{4}(sub(0|[1-9A-F][0-9A-F]?))?", name)
+                         and section.get("ObjectType") in ("0x7", "0x2")}
+
+    def number(self, text, node=0):
+        match = self.NUMBER.fullmatch(text)
+        self.assertTrue(match, f"{text!r} is no number")
+        return int(match[2], 0) + (node if match[1] else 0)
+
+    def test_lines_are_short_and_plain(self):
+        for line in self.text.splitlines():
+            self.assertTrue(line.isascii() and line == line.strip(), line)
+            self.assertLess(len(line), 255, line)
+            self.assertFalse(";" in line or "#" in line, line)  # comments to some readers
+            self.assertRegex(line, r"^$|^\[\w+\]$|^\w+=.")
+
+    def test_information(self):
+        for title, keys in self.INFORMATION.items():
+            self.assertEqual(set(keys.split()), set(self.eds[title]))
+        for what in ("Creation", "Modification"):
+            stamp = self.eds["FileInfo"][f"{what}Date"] + " " + self.eds["FileInfo"][f"{what}Time"]
+            datetime.strptime(stamp, "%m-%d-%Y %I:%M%p")
+        device = self.eds["DeviceInfo"]
+        for key in device:
+            if key not in ("VendorName", "ProductName", "OrderCode"):
+                self.number(device[key])
+        for key, kind in (("NrOfRxPDO", 0x1400), ("NrOfTxPDO", 0x1800)):
+            for index in (kind, kind + 0x200):
+                there = [name for name in self.eds if re.fullmatch(f"{index >> 8:X}[0-9A-F]{{2}}", name)]
+                self.assertEqual(int(device[key]), len(there))
+        dummies = self.eds["DummyUsage"]
+        self.assertEqual([f"Dummy{number:04X}" for number in range(1, 8)], list(dummies))
+        for key, allowed in dummies.items():
+            bits = {1: 1, **BITS}[int(key[5:], 16)]
+            self.assertTrue(allowed == "0" or allowed == "1" and bits >= int(device["Granularity"]), key)
+        self.assertEqual(["Lines"] + [f"Line{1 + i}" for i in range(int(self.eds["Comments"]["Lines"]))],
+                         list(self.eds["Comments"]))
+
+    def test_sections(self):
+        known = {"DEFAULT", "DummyUsage", "Comments", *self.INFORMATION, *self.LISTS}
+        for title, belongs in self.LISTS.items():
+            for key, index in self.eds[title].items():
+                if key != "SupportedObjects":
+                    self.assertTrue(belongs(int(index, 16)), f"{title}: {index}")
+                    known.add(f"{int(index, 16):04X}")
+        for name, section in self.eds.items():
+            if name in known:
+                continue
+            self.assertIn(name, self.variables)
+            self.assertIn(name[:4], known)
+            self.assertIn("SubNumber", self.eds[name[:4]])
+        for name in known - {"DEFAULT", "DummyUsage", "Comments", *self.INFORMATION, *self.LISTS}:
+            section = self.eds[name]
+            if "SubNumber" not in section:
+                continue
+            self.assertEqual({"ParameterName", "ObjectType", "SubNumber"}, set(section), name)
+            self.assertIn(section["ObjectType"], ("0x8", "0x9"), name)
+            self.assertEqual("0x0005", self.eds[f"{name}sub0"]["DataType"], name)
+            types = {self.eds[other]["DataType"] for other in self.variables if re.fullmatch(f"{name}sub[^0].*", other)}
+            self.assertTrue(section["ObjectType"] == "0x9" or len(types) == 1, name)
+
+    def test_variables(self):
+        self.assertGreater(len(self.variables), 600)
+        for name, section in self.variables.items():
+            with self.subTest(name):
+                self.assertLessEqual(set(section), set(self.OBJECT.split()))
+                self.assertTrue(0 < len(section["ParameterName"]) <= 241)
+                kind = int(section["DataType"], 16)
+                self.assertEqual(section["ObjectType"] == "0x2", kind == DOMAIN)
+                self.assertIn(section["AccessType"], ("const", "ro", "wo", "rw", "rwr", "rww"))
+                mapping = section.get("PDOMapping", "0")
+                self.assertIn(mapping, ("0", "1"))
+                self.assertTrue(mapping == "0" or kind in BITS)
+                self.assertTrue(mapping == "1" or section["AccessType"] not in ("rwr", "rww"))
+                numbers = [section[key] for key in ("LowLimit", "DefaultValue", "HighLimit") if key in section]
+                if kind in RANGES:
+                    low, high = RANGES[kind]
+                    for node in (1, self.LAST_NODE):
+                        ascending = [low, *(self.number(text, node) for text in numbers), high]
+                        self.assertEqual(sorted(ascending), ascending)
+                else:
+                    # Some read a REAL32 as a decimal, others as the pattern of its bits; a text has no quotes.
+                    self.assertEqual([], numbers)
 
 
 class Dbc(unittest.TestCase):

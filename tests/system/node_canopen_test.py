@@ -1,6 +1,7 @@
-"""The npm package `canopen`, a CANopen master that was not written here, against the image on the virtual board; and
-what joins them. scripts/install_node_client installs it."""
+"""The npm package `canopen`, a CANopen master that was not written here, against the image on the virtual board; what
+joins them; and its reader of data sheets. scripts/install_node_client installs it."""
 
+import json
 import os
 import shutil
 import socket
@@ -11,7 +12,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from kmax_under_test import PATIENCE, VirtualBoard
+from kmax_under_test import PATIENCE, VirtualBoard, kmax, kmax_json
 
 FOLDER = Path(__file__).resolve().parent / "node_canopen"
 
@@ -124,16 +125,56 @@ class BusBridge(unittest.TestCase):
         self.assertIn("/nowhere/bus", done.stderr)
 
 
-class Master(unittest.TestCase):
-    def master(self, argument):
-        """Runs the master to its end. Every step's line is shown where one failed."""
+class NodeTest(unittest.TestCase):
+    def run_script(self, script, argument):
+        """Runs a script of the folder to its end, and returns what it prints."""
         node = shutil.which("node")
         self.assertTrue(node, "node is missing: Debian package nodejs")
-        done = subprocess.run([node, str(FOLDER / "master.mjs"), str(argument)], capture_output=True,
-                              text=True, timeout=10 * PATIENCE, check=False)
+        done = subprocess.run([node, str(FOLDER / script), str(argument)], capture_output=True, text=True,
+                              timeout=10 * PATIENCE, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        self.assertIn(" 0 FAILED", done.stdout)
         return done.stdout
+
+
+class EdsReader(NodeTest):
+    TYPES = {"float32": "REAL32"}  # the others have the same name in both
+
+    def setUp(self):
+        with tempfile.NamedTemporaryFile("w", suffix=".eds") as file:
+            file.write(kmax("describe", "--format", "eds").stdout)
+            file.flush()
+            self.read = json.loads(self.run_script("eds_reader.mjs", file.name))
+
+    def test_values_are_those_of_the_dictionary(self):
+        objects = {(read["index"], read["subindex"]): read for read in self.read["objects"]}
+        entries = kmax_json("describe")["objects"]
+        for entry in entries:
+            with self.subTest(entry["name"]):
+                read = objects[entry["index"], entry["subindex"]]
+                self.assertEqual(entry["name"], read["name"])
+                self.assertEqual(self.TYPES.get(entry["type"], entry["type"].upper()), read["type"])
+                self.assertEqual(entry["access"] == "ro", read["access"] == "ro")
+                default = read.get("default")
+                if default is None:
+                    self.assertTrue(entry["access"] == "ro" or entry["type"] == "float32")
+                elif "$NODEID" not in default and not entry["values"]:
+                    self.assertEqual(entry["default"], read["value"])
+        self.assertGreater(len(objects), len(entries))
+
+    def test_the_device(self):
+        device = self.read["device"]
+        self.assertEqual(["Kmax", 4, 4, True],
+                         [device[key] for key in ("productName", "nrOfRXPDO", "nrOfTXPDO", "lssSupported")])
+        self.assertEqual([125000, 250000, 500000, 1000000], device["baudRates"])
+        self.assertEqual({f"Dummy{number:04X}": "1" for number in range(1, 8)}, device["dummyUsage"])
+
+
+class Master(NodeTest):
+    def master(self, argument):
+        """Every step's line is shown where one failed."""
+        printed = self.run_script("master.mjs", argument)
+        self.assertIn(" 0 FAILED", printed)
+        return printed
 
     def test_the_master_itself(self):
         self.assertIn("ok SDO block, 2000 bytes", self.master("--stand-in"))

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "firmware/canopen/object_places.hpp"
+#include "firmware/canopen/pdo_mapping.hpp"
 
 namespace kmax::description::described_objects_test {
 namespace {
@@ -50,6 +51,26 @@ TEST(DescribedObjects, TheFirmwareHasEveryObjectThatIsDescribed) {
   }
 }
 
+TEST(DescribedObjects, PdosMayHoldWhatTheFirmwareMaps) {
+  using firmware::canopen::Abort;
+  using firmware::canopen::PdoKind;
+  const auto maps = [](PdoKind kind, const DescribedObject& object) {
+    firmware::canopen::MappedObject found;
+    const std::uint32_t mapping =
+        firmware::mapping_of(object.index, object.subindex, 8 * object.length % 256);
+    return firmware::canopen::find_mapped(kind, mapping, found) == Abort::none;
+  };
+  std::size_t only_sent = 0, both = 0;
+  for (const DescribedObject& object : described_objects()) {
+    EXPECT_EQ(object.tpdo_mappable, maps(PdoKind::transmit, object)) << object.name;
+    EXPECT_EQ(object.rpdo_mappable, maps(PdoKind::receive, object)) << object.name;
+    if (object.access != ObjectAccess::read_write || !object.tpdo_mappable) continue;
+    ++(object.rpdo_mappable ? both : only_sent);
+  }
+  EXPECT_GT(only_sent, 100u);
+  EXPECT_GT(both, 50u);
+}
+
 TEST(DescribedObjects, ValuesAreDescribedAsTheyAre) {
   const auto all = described_objects();
   const DescribedObject* stiffness = find(all, 0x2800, 4);
@@ -60,7 +81,8 @@ TEST(DescribedObjects, ValuesAreDescribedAsTheyAre) {
   EXPECT_EQ(stiffness->length, 4u);
   EXPECT_EQ(stiffness->default_raw, 0x447A0000u);  // 1000
   EXPECT_EQ(stiffness->high, 1e6);
-  EXPECT_TRUE(stiffness->mappable);
+  EXPECT_TRUE(stiffness->tpdo_mappable);
+  EXPECT_TRUE(stiffness->rpdo_mappable);
 
   const DescribedObject* torque = find(all, 0x6077, 0);
   ASSERT_NE(torque, nullptr);
@@ -72,7 +94,8 @@ TEST(DescribedObjects, ValuesAreDescribedAsTheyAre) {
   ASSERT_NE(cob, nullptr);
   EXPECT_TRUE(cob->node_relative);
   EXPECT_EQ(cob->default_raw, 0x40000280u);
-  EXPECT_FALSE(cob->mappable);
+  EXPECT_FALSE(cob->tpdo_mappable);
+  EXPECT_FALSE(cob->rpdo_mappable);
 
   const DescribedObject* name = find(all, 0x1008, 0);
   ASSERT_NE(name, nullptr);

@@ -4,6 +4,7 @@
 #include <map>
 #include <sstream>
 
+#include "firmware/canopen/pdo_mapping.hpp"
 #include "host_tools/description/described_objects.hpp"
 
 namespace kmax::description::eds_test {
@@ -26,6 +27,14 @@ std::map<std::string, Section> sections_of(const std::string& text) {
     EXPECT_TRUE(sections[name].emplace(line.substr(0, equals), line.substr(equals + 1)).second) << line;
   }
   return sections;
+}
+
+/// "rwr": an input of the device's process, which it sends; "rww": an output, which it receives.
+std::string access_text(const DescribedObject& object) {
+  if (object.access == ObjectAccess::constant) return "const";
+  if (object.access == ObjectAccess::read_only) return "ro";
+  if (object.tpdo_mappable == object.rpdo_mappable) return "rw";
+  return object.tpdo_mappable ? "rwr" : "rww";
 }
 
 class Eds : public testing::Test {
@@ -52,6 +61,25 @@ TEST_F(Eds, SaysWhatTheDeviceIs) {
   EXPECT_EQ(device.at("RevisionNumber"), "0x00010203");
   EXPECT_EQ(sections["FileInfo"].at("CreationDate"), "11-14-2023");
   EXPECT_EQ(sections["FileInfo"].at("CreationTime"), "10:13PM");
+}
+
+TEST_F(Eds, DummiesAreThoseThatTheFirmwareMaps) {
+  using firmware::canopen::Abort;
+  using firmware::canopen::PdoKind;
+  for (std::uint16_t type = 1; type < 0x20; ++type) {
+    bool taken = false;
+    for (unsigned bits = 1; bits <= 64; ++bits) {
+      firmware::canopen::MappedObject found;
+      const std::uint32_t mapping = firmware::mapping_of(type, 0, bits);
+      if (firmware::canopen::find_mapped(PdoKind::receive, mapping, found) != Abort::none) continue;
+      taken = true;
+      EXPECT_GE(bits, std::stoul(sections["DeviceInfo"].at("Granularity"))) << type;
+    }
+    char name[16];
+    std::snprintf(name, sizeof name, "Dummy%04X", type);
+    const Section& usage = sections["DummyUsage"];
+    EXPECT_EQ(usage.contains(name) && usage.at(name) == "1", taken) << name;
+  }
   EXPECT_EQ(sections["DummyUsage"].size(), 7u);
 }
 
@@ -83,9 +111,15 @@ TEST_F(Eds, EveryObjectHasItsSection) {
       ASSERT_TRUE(sections.contains(name)) << name;
       const Section& section = sections[name];
       EXPECT_EQ(std::stoul(section.at("DataType"), nullptr, 16), static_cast<unsigned>(object.type));
-      EXPECT_EQ(section.at("AccessType"), text_of(object.access));
-      EXPECT_EQ(section.contains("DefaultValue"), object.default_raw.has_value()) << name;
+      EXPECT_EQ(section.at("AccessType"), access_text(object)) << name;
+      // No form of them that all readers take for the same number.
+      const bool real = object.type == DataType::real32;
+      EXPECT_EQ(section.contains("DefaultValue"), !real && object.default_raw) << name;
+      EXPECT_EQ(section.contains("LowLimit"), !real && object.low && !object.node_relative) << name;
+      EXPECT_EQ(section.contains("HighLimit"), section.contains("LowLimit")) << name;
       EXPECT_EQ(section.contains("PDOMapping"), object.type != DataType::domain) << name;
+      const bool mappable = object.tpdo_mappable || object.rpdo_mappable;
+      EXPECT_EQ(section.contains("PDOMapping") && section.at("PDOMapping") == "1", mappable) << name;
     }
   }
 }
@@ -95,9 +129,9 @@ TEST_F(Eds, NumbersAreWrittenAsReadersExpect) {
   EXPECT_FALSE(sections["1800sub1"].contains("LowLimit"));
   EXPECT_EQ(sections["1402sub1"].at("DefaultValue"), "$NODEID+0x80000400");
   EXPECT_EQ(sections["1A00sub1"].at("DefaultValue"), "0x60640020");
-  EXPECT_EQ(sections["2000sub4"].at("DefaultValue"), "1000.0");
-  EXPECT_EQ(sections["2000sub4"].at("HighLimit"), "1e6");
-  EXPECT_EQ(sections["2000sub8"].at("DefaultValue"), "2.4");
+  EXPECT_EQ(sections["2000sub4"].at("AccessType"), "rw");   // wall.stiffness
+  EXPECT_EQ(sections["2000sub1"].at("AccessType"), "rwr");  // wall.law
+  EXPECT_EQ(sections["2000sub1"].at("HighLimit"), "3");
   EXPECT_EQ(sections["6060"].at("DefaultValue"), "-1");
   EXPECT_EQ(sections["6060"].at("LowLimit"), "-2");
   EXPECT_EQ(sections["6064"].at("PDOMapping"), "1");

@@ -23,4 +23,4 @@ if (crc(Buffer.from('123456789')).readUInt16BE() !== 0x31c3)
 const place = require.resolve('node-crc');
 require.cache[place] = { id: place, filename: place, loaded: true, exports: { crc } };
 
-export const { Device, DataType, ObjectType, NmtState } = require('canopen');
+export const { Device, DataType, Eds, ObjectType, NmtState } = require('canopen');
