@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "firmware/canopen/cob_id.hpp"
+#include "firmware/canopen/emergency.hpp"
 #include "firmware/canopen/nmt.hpp"
 #include "firmware/canopen/object_places.hpp"
+#include "firmware/drive/fault.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/parameter.hpp"
 
@@ -111,15 +114,42 @@ Message heartbeat(std::uint8_t node) {
           .signals = {state}};
 }
 
+/// What an emergency message can be about: the faults of an axis, and the bus, which has no fault's name for
+/// these. What they share, such as bus-off, has one code for both.
+std::vector<std::pair<std::int32_t, std::string>> error_codes() {
+  std::vector<std::pair<std::int32_t, std::string>> codes{{0x8100, "identity_conflict"},
+                                                          {0x8110, "frames_lost"},
+                                                          {0x8120, "error_passive"},
+                                                          {0x8210, "rpdo_too_short"},
+                                                          {0x8220, "rpdo_too_long"}};
+  for (const firmware::FaultText& fault : firmware::fault_texts)
+    codes.emplace_back(fault.error_code, std::string(fault.name));
+  std::sort(codes.begin(), codes.end());
+  return codes;
+}
+
 Message emergency(std::uint8_t node) {
+  Signal code = plain("error_code", 0, 16, "CiA 402 error code of the fault; none: it is over.");
+  code.values = error_codes();
+  Signal place = plain("place", 24, 8, "The axis, 127 the bus, or 128 + the ID of a node that fell silent.");
+  for (std::int32_t axis = 0; axis < std::int32_t{firmware::axis_count}; ++axis)
+    place.values.emplace_back(axis, fmt::format("axis{}", axis));
+  place.values.emplace_back(firmware::canopen::bus_source, "bus");
+  std::vector<std::string> units;
+  for (const firmware::FaultText& fault : firmware::fault_texts) {
+    if (!fault.unit.empty()) units.push_back(fmt::format("{} {}", fault.name, fault.unit));
+  }
+  // Of the bus and of other nodes these bytes are 0, which is 0.0 as well.
+  Signal detail =
+      plain("detail", 32, 32,
+            fmt::format("drive.fault_value, the number that tripped the axis: {}. Others have none.",
+                        fmt::join(units, ", ")));
+  detail.has_sign = detail.real = true;
   return {.identifier = cob_id::emergency + node,
           .name = "EMERGENCY",
           .bytes = 8,
           .help = "A fault, or with error code 0 that it is over.",
-          .signals = {plain("error_code", 0, 16, "CiA 402 error code of the fault; 0: recovered."),
-                      plain("error_register", 16, 8, "Object 0x1001."),
-                      plain("place", 24, 8, "The axis, or the node that fell silent."),
-                      plain("detail", 32, 32, "The manufacturer's other bytes.")}};
+          .signals = {code, plain("error_register", 16, 8, "Object 0x1001."), place, detail}};
 }
 
 Message sync() {

@@ -2,8 +2,11 @@
 document of kmax describe --format json."""
 
 import configparser
+import importlib
+import logging
 import os
 import re
+import struct
 import subprocess
 import unittest
 from datetime import datetime
@@ -216,6 +219,29 @@ class Dbc(unittest.TestCase):
             self.assertLessEqual(max(used, default=-1), 8 * int(head[3]) - 1)
             if "PDO" in head[2]:
                 self.assertEqual(len(used), 8 * int(head[3]))
+
+    def test_a_reader_that_was_not_written_here_decodes_what_the_device_sends(self):
+        logging.getLogger("canmatrix").setLevel(logging.CRITICAL)  # which other formats it cannot read
+        formats = importlib.import_module("canmatrix.formats")
+        text = kmax("describe", "--format", "dbc", "--node", "9").stdout
+        matrix = formats.loads_flat(text, "dbc")
+        frames = {frame.name: frame for frame in matrix.frames}
+        self.assertEqual(9, len(frames))
+
+        def decoded(name, layout, *values):
+            signals = frames[name].decode(struct.pack(layout, *values))
+            return {signal: (value.raw_value, str(value.named_value)) for signal, value in signals.items()}
+
+        # An axis trips: error code, error register, axis, and the number that tripped it.
+        trip = decoded("EMERGENCY", "<HBBf", 0x2310, 3, 1, 12.5)
+        self.assertEqual((0x2310, "over_current"), trip["error_code"])
+        self.assertEqual((1, "axis1"), trip["place"])
+        self.assertEqual(12.5, trip["detail"][0])
+        self.assertEqual((0x8120, "error_passive"), decoded("EMERGENCY", "<HBBf", 0x8120, 17, 127, 0)["error_code"])
+        self.assertEqual("none", decoded("EMERGENCY", "<HBBf", 0, 0, 0, 0)["error_code"][1])
+        telemetry = decoded("TPDO1", "<if", -5, 1.5)
+        self.assertEqual((-5, 1.5), tuple(raw for raw, _ in telemetry.values()))
+        self.assertEqual((5, "operational"), decoded("HEARTBEAT", "<B", 5)["nmt_state"])
 
 
 if __name__ == "__main__":

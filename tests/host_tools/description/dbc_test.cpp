@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
 
+#include "firmware/drive/fault.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::description::dbc_test {
@@ -36,6 +38,26 @@ TEST(Dbc, SignalsAreWhatIsMappedLittleEndian) {
         "SIG_VALTYPE_ 385 axis0_measured_force : 1;\n", "SIG_VALTYPE_ 897 axis0_measured_velocity : 1;\n",
         "BA_ \"GenMsgCycleTime\" BO_ 385 1;\n", "VAL_ 1793 nmt_state 0 \"initialising\""})
     EXPECT_CONTAINS(text, line);
+}
+
+TEST(Dbc, EmergencyMessagesAreDescribedAsTheyAreSent) {
+  const std::string text = dbc(1);
+  for (const char* line :
+       {" SG_ place : 24|8@1+ (1,0) [0|0] \"\" Host\n", " SG_ detail : 32|32@1- (1,0) [0|0] \"\" Host\n",
+        "SIG_VALTYPE_ 129 detail : 1;\n", "VAL_ 129 place 0 \"axis0\" 1 \"axis1\" 127 \"bus\" ;\n",
+        "over_current A, phase_open A, over_temperature degC,"})
+    EXPECT_CONTAINS(text, line);
+  std::smatch table;
+  ASSERT_TRUE(std::regex_search(text, table, std::regex("VAL_ 129 error_code (.*) ;\n")));
+  const std::string row = table[1];
+  std::map<int, std::string> names;
+  const std::regex pair("(\\d+) \"(\\w+)\"");
+  for (std::sregex_iterator found(row.begin(), row.end(), pair), end; found != end; ++found)
+    EXPECT_TRUE(names.emplace(std::stoi((*found)[1]), (*found)[2]).second) << (*found)[1];
+  for (const firmware::FaultText& fault : firmware::fault_texts)
+    EXPECT_EQ(names[fault.error_code], fault.name);
+  // The bus's own, which are no fault of an axis.
+  for (const int code : {0x8100, 0x8110, 0x8120, 0x8210, 0x8220}) EXPECT_NE(names[code], "") << code;
 }
 
 TEST(Dbc, NamesAreUniqueAndShortEnough) {
