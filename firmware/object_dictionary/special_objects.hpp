@@ -58,11 +58,14 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
      "CiA 402, one device per axis; axis n's type is at 0x67FF + n x 0x800."},
     {SpecialObject::error_register, "Error register", 0x1001, 0, 0, ObjectType::unsigned8,
      ObjectAccessKind::read_only, 0,
-     "Bit 0 any error, 1 current, 2 voltage, 3 temperature, 4 communication, 5 device."},
+     "Bit 0 any error, 1 current, 2 voltage, 3 temperature, 4 communication, 5 device, 7 manufacturer's."},
     {SpecialObject::error_history_count, "Number of errors", 0x1003, 0, 0, ObjectType::unsigned8,
      ObjectAccessKind::read_write, 0, "Errors since start, at most 8; writing 0 erases them."},
     {SpecialObject::error_history, "Error", 0x1003, 1, error_history_length, ObjectType::unsigned32,
-     ObjectAccessKind::read_only, 0, "Error code, and axis x 65536; newest first."},
+     ObjectAccessKind::read_only, 0,
+     "Bytes 0, 1, 3 and 4 of the emergency message, newest first. Bits 0 to 15: error code; 16 to 23: the "
+     "axis, 127 for the bus, or 128 + the ID of a node that fell silent; 24 to 31: the low byte of the "
+     "number that tripped the axis, a float32, which says nothing by itself."},
     {SpecialObject::device_name, "Device name", 0x1008, 0, 0, ObjectType::visible_string,
      ObjectAccessKind::constant, 0, "Name of this device."},
     {SpecialObject::hardware_version, "Hardware version", 0x1009, 0, 0, ObjectType::visible_string,

@@ -301,7 +301,7 @@ step('EMCY 8130h when a watched heartbeat ends', async () => {
 stepOfFirmware('its place in the error history, 1003h', async () => {
   expect((await numberAt(0x1003, 0, 1)) >= 1, 'the history is empty');
   const newest = await numberAt(0x1003, 1, 4);
-  expect((newest & 0xffff) === 0x8130, `the newest is ${hex(newest)}`);
+  expect(newest === (0x80 + watched) * 0x10000 + 0x8130, `the newest is ${hex(newest)}`);
 });
 step('back to the start', async () => {
   await set(0x1016, 1, 0, 4);
