@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <map>
 #include <regex>
 #include <set>
 #include <sstream>
 
+#include "firmware/drive/emergency_reports.hpp"
 #include "firmware/drive/fault.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -16,6 +18,18 @@ std::string dbc(std::uint8_t node) {
   std::ostringstream out;
   write_dbc(out, node);
   return out.str();
+}
+
+/// The value table of the emergency message's error codes.
+std::map<int, std::string> error_names(const std::string& text) {
+  std::map<int, std::string> names;
+  std::smatch table;
+  EXPECT_TRUE(std::regex_search(text, table, std::regex("VAL_ 129 error_code (.*) ;\n")));
+  const std::string row = table[1];
+  const std::regex pair("(\\d+) \"(\\w+)\"");
+  for (std::sregex_iterator found(row.begin(), row.end(), pair), end; found != end; ++found)
+    EXPECT_TRUE(names.emplace(std::stoi((*found)[1]), (*found)[2]).second) << (*found)[1];
+  return names;
 }
 
 TEST(Dbc, MessagesHaveTheNodesIdentifiers) {
@@ -47,17 +61,62 @@ TEST(Dbc, EmergencyMessagesAreDescribedAsTheyAreSent) {
         "SIG_VALTYPE_ 129 detail : 1;\n", "VAL_ 129 place 0 \"axis0\" 1 \"axis1\" 127 \"bus\" ;\n",
         "over_current A, phase_open A, over_temperature degC,"})
     EXPECT_CONTAINS(text, line);
-  std::smatch table;
-  ASSERT_TRUE(std::regex_search(text, table, std::regex("VAL_ 129 error_code (.*) ;\n")));
-  const std::string row = table[1];
-  std::map<int, std::string> names;
-  const std::regex pair("(\\d+) \"(\\w+)\"");
-  for (std::sregex_iterator found(row.begin(), row.end(), pair), end; found != end; ++found)
-    EXPECT_TRUE(names.emplace(std::stoi((*found)[1]), (*found)[2]).second) << (*found)[1];
+  auto names = error_names(text);
   for (const firmware::FaultText& fault : firmware::fault_texts)
     EXPECT_EQ(names[fault.error_code], fault.name);
-  // The bus's own, which are no fault of an axis.
-  for (const int code : {0x8100, 0x8110, 0x8120, 0x8210, 0x8220}) EXPECT_NE(names[code], "") << code;
+  // PDOs of a wrong length; the others follow below.
+  for (const int code : {0x8210, 0x8220}) EXPECT_NE(names[code], "") << code;
+}
+
+TEST(Dbc, EveryEmergencyMessageHasANameAPlaceAndTheFaultsNumber) {
+  using firmware::CanState;
+  using firmware::canopen::Emergency;
+  auto names = error_names(dbc(1));
+  Emergency emergency;
+  emergency.configure(0x81, 0);
+  firmware::EmergencyReports reports;
+  firmware::EmergencyCauses causes{.can_state = CanState::active};
+  std::uint32_t now_us = 0;
+  const auto expect_message = [&](int code, unsigned place, float number) {
+    reports.poll(causes, emergency, now_us);
+    drivers::CanFrame frame;
+    ASSERT_TRUE(emergency.next_frame(frame, firmware::canopen::NmtState::operational, now_us)) << code;
+    EXPECT_EQ(frame.data[0] | frame.data[1] << 8, code);
+    EXPECT_NE(names[code], "") << code;
+    EXPECT_EQ(frame.data[3], place) << code;
+    float detail = -1.0f;
+    std::memcpy(&detail, &frame.data[4], sizeof detail);
+    EXPECT_EQ(detail, number) << code;
+    if (code == 0) return;
+    // Object 0x1003 keeps these four bytes.
+    EXPECT_EQ(emergency.history_at(0), std::uint32_t{frame.data[0]} | std::uint32_t{frame.data[1]} << 8 |
+                                           std::uint32_t{frame.data[3]} << 16 |
+                                           std::uint32_t{frame.data[4]} << 24);
+  };
+  for (const firmware::FaultText& fault : firmware::fault_texts) {
+    if (fault.fault == firmware::Fault::none) continue;
+    causes.faults[1] = fault.fault;
+    causes.fault_values[1] = 3.7f;
+    expect_message(fault.error_code, 1, 3.7f);
+    causes.faults[1] = firmware::Fault::none;
+    expect_message(0, 0, 0.0f);
+  }
+  const auto expect_from_bus = [&](int code) {
+    expect_message(code, firmware::canopen::bus_source, 0.0f);
+    causes.can_state = CanState::active;
+    now_us += 6'000'000;  // what is only counted is over by then
+    expect_message(0, 0, 0.0f);
+  };
+  causes.can_state = CanState::error_passive;
+  expect_from_bus(0x8120);
+  ++causes.identity_conflicts;
+  expect_from_bus(0x8100);
+  ++causes.frames_lost;
+  expect_from_bus(0x8110);
+  causes.can_state = CanState::bus_off;
+  reports.poll(causes, emergency, now_us);
+  causes.can_state = CanState::active;
+  expect_from_bus(0x8140);
 }
 
 TEST(Dbc, NamesAreUniqueAndShortEnough) {
