@@ -36,8 +36,14 @@ concept AxesLaw = requires(Law law, std::size_t axis, const AxesPositions<axes>&
   { law.ISR_rendered(axis, loop, driven) } -> std::same_as<void>;
 };
 
+/// The axis along the surface of this one's wall: the next one, and the first after the last.
+template <std::size_t axes>
+constexpr std::size_t axis_along(std::size_t axis) {
+  return (axis + 1) % axes;
+}
+
 /// Axes at right angles to each other: the interference along the surface of one axis' wall (eq. 4 of paper
-/// 1) is felt along the next axis; the last one's along the first. Each axis takes what the other made last.
+/// 1) is felt along axis_along() it. Each axis takes what the other made last.
 template <std::size_t axes>
 class TangentialInterference {
  public:
@@ -45,7 +51,7 @@ class TangentialInterference {
 
   float ISR_force(std::size_t axis, const AxesPositions<axes>& /*at*/) const { return along_[axis]; }
   void ISR_rendered(std::size_t axis, const control::HapticLoop<float>::Output& loop, bool driven) {
-    if constexpr (axes > 1) along_[(axis + 1) % axes] = driven ? loop.tangential_force : 0.0f;
+    if constexpr (axes > 1) along_[axis_along<axes>(axis)] = driven ? loop.tangential_force : 0.0f;
   }
 
  private:

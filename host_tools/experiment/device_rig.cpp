@@ -13,7 +13,7 @@ namespace kmax::experiment {
 namespace {
 std::vector<std::size_t> axes_of(const TouchLimits& limits, RigAxes axes) {
   if (axes == RigAxes::wall) return {limits.axis};
-  return {limits.axis, 1 - limits.axis};
+  return {limits.axis, along(limits.axis)};
 }
 
 std::vector<std::string> protective_of(device::Device& device, const TouchLimits& limits, RigAxes axes) {
@@ -74,7 +74,7 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
     for (const std::string& one :
          {std::string("wall.law=none"), std::string("position.resolution=0"),
           std::string("interference.mode=none"), fmt::format("haptic.rate={}", wall.haptic_rate)})
-      all.push_back(fmt::format("axis{}.{}", 1 - axis, one));
+      all.push_back(fmt::format("axis{}.{}", along(axis), one));
   return all;
 }
 

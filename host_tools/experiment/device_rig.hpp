@@ -45,7 +45,7 @@ struct TouchParty {
 
 enum class RigAxes : std::uint8_t {
   wall,        ///< one: the limits'
-  wall_along,  ///< the limits' axis is the normal, the other one lies along the surface
+  wall_along,  ///< the limits' axis is the normal, along() it lies along the surface
 };
 
 /// While it lives, the limits are at work, on every axis of the rig. Afterwards all parameters are as they

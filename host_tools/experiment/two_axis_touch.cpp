@@ -24,7 +24,7 @@ class BothArmed {
  public:
   /// The wall's axis last: it is what begins to push.
   BothArmed(device::Device& device, std::size_t wall_axis)
-      : drives_{device::Drive(device, 1 - wall_axis), device::Drive(device, wall_axis)} {
+      : drives_{device::Drive(device, along(wall_axis)), device::Drive(device, wall_axis)} {
     try {
       for (device::Drive& drive : drives_) drive.arm();
     } catch (...) {
@@ -88,9 +88,9 @@ class TwoAxisWatch {
 
   TwoAxisTouch run() {
     wait_until_outside();
-    const double rate = axis_number(device_, 1 - watch_.axis, "haptic.rate");
+    const double rate = axis_number(device_, along(watch_.axis), "haptic.rate");
     device::TraceReader trace(
-        device_, 1 - watch_.axis,
+        device_, along(watch_.axis),
         static_cast<std::uint16_t>(std::max(1.0, std::round(rate / two_axis_trace_rate))));
     {
       BothArmed armed(device_, watch_.axis);

@@ -7,9 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "firmware/drive/axes_law.hpp"
+#include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
+
+/// The axis along the surface of this one's wall.
+constexpr std::size_t along(std::size_t axis) {
+  return firmware::axis_along<firmware::axis_count>(axis);
+}
 
 inline constexpr double wall_settling = 0.5;  ///< s; a first bounce has died out then
 

@@ -94,7 +94,7 @@ RunJournal::Json journal_settings(device::Device& device, const TouchLimits& lim
                                   const DeviationSettings& settings) {
   const DeviationProtocol& protocol = settings.protocol;
   RunJournal::Json all = touch_settings("deviation", device, limits,
-                                        {{"other_axis", device_circumstances(device, 1 - limits.axis)},
+                                        {{"other_axis", device_circumstances(device, along(limits.axis))},
                                          {"stiffness_n_per_m", protocol.stiffness},
                                          {"haptic_rate_hz", protocol.haptic_rate},
                                          {"rest_s", protocol.rest},

@@ -75,8 +75,8 @@ DeviationStudy study_deviation(DeviceRig& rig, const DeviationSettings& settings
   study.circumstances = fmt::format(
       "Measured on {}: wall of {:g} N/mm at {:g} Hz on axis {}, pulses of {:g} s on axis {}, force limit "
       "{:g} N, which took something away in up to {:.0f} % of a touch's samples; {} trace records lost.",
-      rig.description(), protocol.stiffness / 1000, protocol.haptic_rate, axis, protocol.pulse_on, 1 - axis,
-      rig.force_limit(), 100 * run.limited_share, run.lost_records);
+      rig.description(), protocol.stiffness / 1000, protocol.haptic_rate, axis, protocol.pulse_on,
+      along(axis), rig.force_limit(), 100 * run.limited_share, run.lost_records);
   for (const DeviationResult& one : study.results) {
     const std::string pair =
         fmt::format("F_B = {:g} N, F_I = {:g} N: not counted", one.paper.background, one.paper.interference);

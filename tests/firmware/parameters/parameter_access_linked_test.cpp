@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "firmware/drive/axes_law.hpp"
 #include "firmware/parameters/persistent_parameters.hpp"
 #include "tests/firmware/parameters/register_access.hpp"
 
@@ -46,7 +47,8 @@ TEST_F(LinkedRegisters, WritingEitherSetsBothAndIsOneChange) {
           EXPECT_EQ(registers.restarting_changes(), restarts + (changed ? 1 : 0));
         }
       }
-      EXPECT_EQ(get(pair.own, 1 - axis), axis == 0 ? pair.values[0].first : pair.values.back().first)
+      EXPECT_EQ(get(pair.own, axis_along<axis_count>(axis)),
+                axis == 0 ? pair.values[0].first : pair.values.back().first)
           << "of the other axis nothing";
     }
   }
