@@ -225,6 +225,8 @@ class Application {
   void report_emergencies();
   void refresh_can_readings();
   void publish_torques();
+  bool commands_anothers_axis(const SlotValue& one, Link by) const;
+  void note_commander(std::span<const SlotValue> written, Link by);
   void disarm(std::size_t axis);
   bool save_identity();
   void finish_saves();

@@ -126,6 +126,7 @@ bool Application::next_can_frame(drivers::CanFrame& frame) {
 }
 
 std::optional<std::uint32_t> Application::last_heard_us(std::size_t axis) const {
+  if (const auto signed_us = supervisors_[axis].signed_us()) return signed_us;
   return supervisors_[axis].commander() == Link::can ? node_.heard_us() : port_.last_valid_request_time();
 }
 

@@ -226,7 +226,8 @@ Abort ApplicationObjects::write(ObjectAddress address, std::span<const std::uint
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
   if (special != nullptr) return write_special(*special, in);
   if (!slot) return Abort::read_only;
-  return write_slot(*slot, extended(descriptors[owner_of(*slot).entry].type, little_endian(in)));
+  const std::uint32_t raw = extended(descriptors[owner_of(*slot).entry].type, little_endian(in));
+  return write_slot(*slot, raw, acts_at_once(*slot));
 }
 
 Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
@@ -251,9 +252,10 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
   }
 }
 
-/// A value that is taken is a sign of life of whoever commands; before it acts, since the command to arm
-/// needs it.
-Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw) {
+/// A PDO and a command are signs of life of whoever commands, if they are taken; before they act, since the
+/// command to arm needs it. A setting is not: any tool on the bus may write one by SDO.
+Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw, bool is_sign_of_life) {
+  if (!is_sign_of_life) return set_slot(slot, raw);
   const auto before = of_.node.heard_us();
   of_.node.set_heard(of_.application.now_us());
   const Abort abort = set_slot(slot, raw);
@@ -280,12 +282,11 @@ void ApplicationObjects::refresh() {
 
 std::uint32_t ApplicationObjects::value(std::size_t slot) const {
   const std::uint32_t raw = of_.parameters.values().raw(slot);
-  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, of_.node.node_id())
-                                         : raw;
+  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, of_.node.node_id()) : raw;
 }
 
 bool ApplicationObjects::take(std::size_t slot, std::uint32_t raw) {
-  return write_slot(slot, raw) == Abort::none;
+  return write_slot(slot, raw, true) == Abort::none;
 }
 
 }  // namespace kmax::firmware

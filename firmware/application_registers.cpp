@@ -1,5 +1,6 @@
 // What a host can read and write: the bank behind the Modbus server.
 #include "firmware/application.hpp"
+#include "firmware/drive/cyclic_torque.hpp"
 #include "firmware/modbus/parameter_registers.hpp"
 
 namespace kmax::firmware {
@@ -42,6 +43,15 @@ Exception Application::Bank::write_holding(std::uint16_t address, std::span<cons
     app_.parameters_.refuse(wanted.refusal, wanted.address);
     return modbus::exception_for(wanted.refusal);
   }
+  if (app_.port_.is_broadcast()) {
+    for (const SlotValue& one : wanted.values()) {
+      if (owner_of(one.slot).entry == entry_of<"drive.controlword">() &&
+          asks_for_operation(one.raw & 0xFFFFU)) {
+        app_.parameters_.refuse_slot(Refusal::armed_by_broadcast, one.slot);
+        return modbus::exception_for(Refusal::armed_by_broadcast);
+      }
+    }
+  }
   return modbus::exception_for(app_.write(wanted.values(), Link::serial).refusal);
 }
 
@@ -50,11 +60,11 @@ ParameterAccess::Result Application::write(std::span<const SlotValue> wanted, Li
   if (entry == entry_of<"store.command">()) return store_.command(wanted[0].raw, any_armed());
   if (entry == entry_of<"capture.command">())
     return command_capture(wanted[0].raw, parameters_, tick_.capture());
-  const auto result = parameters_.write(wanted, by, armed_axes(), now_us_);
   for (const SlotValue& one : wanted) {
-    const auto [of, axis] = owner_of(one.slot);
-    if (of == entry_of<"drive.controlword">()) supervisors_[axis].set_commander(by);
+    if (commands_anothers_axis(one, by)) return parameters_.refuse_slot(Refusal::other_commander, one.slot);
   }
+  const auto result = parameters_.write(wanted, by, armed_axes(), now_us_);
+  if (result.refusal == Refusal::none) note_commander(wanted, by);
   // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come
   // alone, by the settings that came before it. Else settings act at the end of the poll, whichever link they
   // came over: thousands may come in a second.
@@ -63,6 +73,28 @@ ParameterAccess::Result Application::write(std::span<const SlotValue> wanted, Li
   else
     publish_torques();
   return result;
+}
+
+/// Whether it would keep another link's armed axis under force, or say how much.
+bool Application::commands_anothers_axis(const SlotValue& one, Link by) const {
+  const auto [entry, axis] = owner_of(one.slot);
+  const bool command =
+      is_target(entry) || (entry == entry_of<"drive.controlword">() && asks_for_operation(one.raw & 0xFFFFU));
+  return command && supervisors_[axis].armed() && supervisors_[axis].commander() != by;
+}
+
+void Application::note_commander(std::span<const SlotValue> written, Link by) {
+  const auto number_of = [](std::uint32_t raw) { return static_cast<std::uint16_t>(raw); };
+  for (const SlotValue& one : written) {
+    const auto [entry, axis] = owner_of(one.slot);
+    if (entry == entry_of<"drive.controlword">())
+      supervisors_[axis].set_commander(by, number_of(parameters_.values().whole<"drive.commander">(axis)),
+                                       now_us_);
+    if (entry == entry_of<"link.sign_of_life">()) {
+      for (Supervisor& supervisor : supervisors_)
+        supervisor.take_sign_of_life(by, number_of(one.raw), now_us_);
+    }
+  }
 }
 
 std::string_view Application::Bank::identification(std::uint8_t object_id) const {

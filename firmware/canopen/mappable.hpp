@@ -13,13 +13,13 @@ constexpr bool tpdo_mappable(const Entry& entry) {
   return entry.access != Access::communication;
 }
 
-/// May a PDO that this device receives set this entry? What an axis takes at any time. The mode of operation
-/// too, although it is refused while the axis is armed: a CiA 402 master has it in its PDO and repeats it.
-/// Not excitation.*, which is for calibration and self-test.
+/// May a PDO that this device receives set this entry? What an axis takes while it is armed. The mode of
+/// operation too, although it is refused while the axis is armed: a CiA 402 master has it in its PDO and
+/// repeats it. Not excitation.*, which is for calibration and self-test.
 constexpr bool rpdo_mappable(const Entry& entry) {
   if (entry.scope() != Scope::axis || entry.access != Access::read_write) return false;
   if (entry.group.index == group::excitation.index) return false;
-  return entry.change == Change::any_time || entry.name == "profile.operation_mode";
+  return entry.change != Change::disarmed_only || entry.name == "profile.operation_mode";
 }
 
 // The same by the entry's number, without the entries' texts, which stay on the host: a bit for each.

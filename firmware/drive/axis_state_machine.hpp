@@ -29,6 +29,14 @@ inline constexpr std::uint16_t fault_reset = 1u << 7;
 inline constexpr std::uint16_t halt = 1u << 8;
 }  // namespace controlword
 
+/// Enable operation, in the standard's command table: it arms an axis that is switched on, and leaves an
+/// armed one armed.
+constexpr bool asks_for_operation(std::uint16_t word) {
+  constexpr std::uint16_t wanted = controlword::switch_on | controlword::enable_voltage |
+                                   controlword::quick_stop | controlword::enable_operation;
+  return (word & (wanted | controlword::fault_reset)) == wanted;
+}
+
 /// The force is to go to zero while the axis stays armed; mode torque only. No matter to the automaton.
 constexpr bool halted(std::uint16_t word) {
   return (word & controlword::halt) != 0;

@@ -136,15 +136,25 @@ bool Supervisor::cause_remains(const Situation& now) const {
   return machine_.fault() == now.report.condition;
 }
 
+void Supervisor::obey(const Situation& now, std::size_t axis) {
+  const bool arms = machine_.asks_to_enable(*waiting_);
+  if (arms && !now.settled) return;
+  const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
+  machine_.command(*waiting_, obstacle_to_arming(now, axis), cause_remains(now),
+                   {.stay_in_quick_stop = stays});
+  halted_ = halted(*waiting_);
+  waiting_.reset();
+  if (arms) claimed_ = true;
+}
+
 void Supervisor::poll(const Situation& now, std::size_t axis) {
   // Before the commands: a fault is reported even if the host disarms in the same moment.
   if (armed()) watch(now, axis);
-  if (waiting_ && (!machine_.asks_to_enable(*waiting_) || now.settled)) {
-    const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
-    machine_.command(*waiting_, obstacle_to_arming(now, axis), cause_remains(now),
-                     {.stay_in_quick_stop = stays});
-    halted_ = halted(*waiting_);
-    waiting_.reset();
+  if (waiting_) obey(now, axis);
+  if (claimed_ && !armed()) {
+    claimed_ = false;
+    number_ = 0;
+    now.values.set_whole<"drive.commander">(0, axis);
   }
 }
 

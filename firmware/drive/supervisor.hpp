@@ -13,8 +13,11 @@
 namespace kmax::firmware {
 
 /// The main loop's judgement of one axis: what trips it, whether it may be armed, and which commands it
-/// obeys. Whoever wrote its controlword last commands it: that link's silence, bus-off or NMT stop takes the
-/// force away. No failure; what goes wrong becomes a fault or a refusal.
+/// obeys. No failure; what goes wrong becomes a fault or a refusal.
+///
+/// An armed axis belongs to its commander: the link whose controlword armed it, and on that link, if
+/// drive.commander was not 0 then, whoever knows that number. Only the commander's silence, bus-off or NMT
+/// stop counts, and nobody else's signs of life keep the axis armed. Others can disarm it and no more.
 class Supervisor {
  public:
   /// All that it judges by, of one moment.
@@ -24,7 +27,7 @@ class Supervisor {
     const ThermalSupervisor& thermal;
     const AxisReport& report;                ///< the tick's
     const AxisSetting& setting;              ///< in force
-    std::optional<std::uint32_t> silent_us;  ///< since the link that commands was heard; nothing: never
+    std::optional<std::uint32_t> silent_us;  ///< since the commander was heard; nothing: never
     float power_stage_temperature;           ///< degC
     float supply_voltage;                    ///< V
     bool enabled;                            ///< for the tick
@@ -43,8 +46,23 @@ class Supervisor {
 
   /// A controlword; it supersedes one that still waits.
   void request(std::uint16_t controlword) { waiting_ = controlword; }
-  void set_commander(Link link) { commander_ = link; }
+  /// Who wrote that controlword, and drive.commander then. An armed axis keeps its commander.
+  void set_commander(Link link, std::uint16_t number, std::uint32_t now_us) {
+    if (armed()) return;
+    commander_ = link;
+    number_ = number;
+    signed_us_ = now_us;
+  }
   Link commander() const { return commander_; }
+  /// link.sign_of_life was written.
+  void take_sign_of_life(Link link, std::uint16_t number, std::uint32_t now_us) {
+    if (link == commander_ && number == number_) signed_us_ = now_us;
+  }
+  /// When a commander with a number gave its last sign of life; nothing: it has none, and any of its link's
+  /// counts.
+  std::optional<std::uint32_t> signed_us() const {
+    return number_ != 0 ? std::optional(signed_us_) : std::nullopt;
+  }
 
   /// In every poll, and after every controlword.
   void poll(const Situation& now, std::size_t axis);
@@ -65,6 +83,7 @@ class Supervisor {
 
  private:
   void watch(const Situation& now, std::size_t axis);
+  void obey(const Situation& now, std::size_t axis);
   // Rare: small code rather than fast code.
   [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, std::size_t axis) const;
   [[gnu::cold]] bool cause_remains(const Situation& now) const;
@@ -73,6 +92,9 @@ class Supervisor {
   std::optional<std::uint16_t> waiting_;  ///< until the settings have arrived, if it asks to enable
   Trip trip_;
   Link commander_ = Link::serial;
+  std::uint16_t number_ = 0;  ///< of the commander
+  std::uint32_t signed_us_ = 0;
+  bool claimed_ = false;  ///< somebody has armed it, or tried to: the next one's number is another
   bool halted_ = false;
 };
 

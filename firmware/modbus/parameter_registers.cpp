@@ -100,6 +100,9 @@ Exception exception_for(Refusal refusal) {
     case Refusal::value_cut_in_two:
       return Exception::illegal_data_address;
     case Refusal::while_armed:
+    case Refusal::only_tightens:
+    case Refusal::other_commander:
+    case Refusal::armed_by_broadcast:
     case Refusal::no_transaction:
     case Refusal::store_missing:
     case Refusal::capture_missing:

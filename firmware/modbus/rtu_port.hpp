@@ -148,6 +148,9 @@ class RtuPort {
   [[nodiscard]] const RtuPortCounters& counters() const { return counters_; }
   [[nodiscard]] const RtuReceiverCounters& receiver_counters() const { return receiver_.counters(); }
 
+  // While the bank is being called: the request went to every unit.
+  bool is_broadcast() const { return broadcast_; }
+
  private:
   enum class State : std::uint8_t {
     listening,
@@ -184,6 +187,7 @@ class RtuPort {
       return;
     }
     state_ = State::executing;
+    broadcast_ = broadcast;
     server_.diagnostics().set(diagnostic_counters());
     const std::size_t length =
         server_.process(frame.pdu, std::span(reply_).template subspan<1, pdu_size_max>());
@@ -245,6 +249,7 @@ class RtuPort {
   std::size_t reply_size_ = 0;
   std::size_t answered_size_ = 0;  // of the request that `reply_` answers; 0: of none
   std::uint16_t answered_ = 0;     // its CRC
+  bool broadcast_ = false;         // what is being executed
   State state_ = State::listening;
   std::array<std::uint8_t, adu_size_max> reply_{};
 };

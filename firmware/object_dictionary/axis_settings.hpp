@@ -28,13 +28,17 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     choice("wall.side", group::wall, 3, names::wall_side, 1,
            "Free space is on this side of the surface, and the wall pushes towards it.")
         .disarmed_only(),
-    real("wall.stiffness", group::wall, 4, "N/m", 0, 1e6, 1000, "Stiffness K inside the wall."),
+    real("wall.stiffness", group::wall, 4, "N/m", 0, 1e6, 1000, "Stiffness K inside the wall.")
+        .only_lower("wall.stiffness_ceiling"),
     real("wall.damping", group::wall, 5, "N s/m", 0, 1000, 0,
-         "Damping B inside the wall; spring and damper together never pull the handle in."),
+         "Damping B inside the wall; spring and damper together never pull the handle in.")
+        .only_lower("wall.damping_ceiling"),
     real("wall.magnetic_coefficient", group::wall, 6, "N", 0, 100, 2,
-         "Magnetic coefficient F_MC of the law 'magnetic': the field's force at the surface and inside."),
+         "Magnetic coefficient F_MC of the law 'magnetic': the field's force at the surface and inside.")
+        .only_lower("force.ceiling"),
     real("wall.magnetic_length", group::wall, 7, "m", 1e-6, 1, 0.001,
-         "Length x_0 over which the field decays outside: a quarter of F_MC is left at x_0."),
+         "Length x_0 over which the field decays outside: a quarter of F_MC is left at x_0.")
+        .only_higher(),
     real("wall.adaptive_gain", group::wall, 8, "N", 0, 100, 2.4, "Gain of eq. 7, F_MC = gain V_k + offset."),
     real("wall.adaptive_offset", group::wall, 9, "N", 0, 100, 0.8, "Offset of eq. 7."),
     real("wall.adaptive_velocity_max", group::wall, 10, "m/s", 0.001, 100, 2.4,
@@ -44,22 +48,31 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     real("wall.adaptive_force_min", group::wall, 12, "N", 0, 100, 0.8,
          "Lower bound of the adaptive F_MC; must not exceed wall.adaptive_force_max."),
     real("wall.adaptive_force_max", group::wall, 13, "N", 0, 100, 2,
-         "Upper bound of the adaptive F_MC. A wide interval gives eq. 7 to the letter (3.2 N at V_max)."),
+         "Upper bound of the adaptive F_MC. A wide interval gives eq. 7 to the letter (3.2 N at V_max).")
+        .only_lower("force.ceiling"),
     choice("wall.adaptive_velocity", group::wall, 14, names::adaptive_velocity, 0,
            "Which velocity V is: only motion towards the wall, or the speed in either direction."),
     choice("wall.adaptive_mode", group::wall, 15, names::adaptive_mode, 0,
            "How F_MC follows V: at once, latched at contact, or held at its peak and decaying."),
     real("wall.adaptive_hold_time", group::wall, 16, "s", 0, 60, 1.2,
          "Time constant with which a peak_hold F_MC decays to its value at rest."),
+    real("wall.stiffness_ceiling", group::wall, 17, "N/m", 0, 1e6, 0,
+         "How far wall.stiffness may be raised while the axis is armed; 0: it can only be lowered.")
+        .disarmed_only(),
+    real("wall.damping_ceiling", group::wall, 18, "N s/m", 0, 1000, 0,
+         "How far wall.damping may be raised while the axis is armed; 0: it can only be lowered.")
+        .disarmed_only(),
 
     choice("interference.mode", group::interference, 1, names::interference_mode, 0,
            "Disturbance of paper 1 section 2: none, along the wall's normal (eq. 2), or along its surface "
            "(eq. 4; the interference force goes to the other axis).")
         .disarmed_only(),
     real("interference.force", group::interference, 2, "N", -100, 100, 0,
-         "Interference force F_I while inside."),
+         "Interference force F_I while inside.")
+        .only_nearer_zero("force.ceiling"),
     real("interference.background_force", group::interference, 3, "N", -100, 100, 0,
-         "Background force F_B along the normal, outwards positive."),
+         "Background force F_B along the normal, outwards positive.")
+        .only_nearer_zero("force.ceiling"),
     real("interference.onset_time", group::interference, 4, "s", 0, 3600, 0,
          "Time t_0 after contact at which F_B sets in; parallel mode only."),
 
@@ -83,16 +96,26 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
          "Bandwidth of low_pass and tracking.")
         .disarmed_only(),
     real("velocity.limit", group::velocity, 4, "m/s", 0, 1000, 5,
-         "Trip level: a faster handle removes the force with a fault; 0 turns it off."),
+         "Trip level: a faster handle removes the force with a fault; 0 turns it off.")
+        .only_lower()
+        .off_at_zero(),
 
     real("haptic.rate", group::haptic, 1, "Hz", 100, 20000, 20000,
          "Rate of the haptic loop; must divide the tick rate of 20000 Hz.")
         .disarmed_only(),
 
-    real("force.limit", group::force, 1, "N", 0, 1000, 3.3,
-         "Largest force that is ever asked of the device."),
-    real("force.slew_limit", group::force, 2, "N/s", 0, 1e9, 0, "Fastest change of the force; 0: no limit."),
-    real("force.ramp_time", group::force, 3, "s", 0, 60, 0.2, "Soft start: time from arming to full force."),
+    real("force.limit", group::force, 1, "N", 0, 1000, 3.3, "Largest force that is ever asked of the device.")
+        .only_lower("force.ceiling"),
+    real("force.slew_limit", group::force, 2, "N/s", 0, 1e9, 0, "Fastest change of the force; 0: no limit.")
+        .only_lower()
+        .off_at_zero(),
+    real("force.ramp_time", group::force, 3, "s", 0, 60, 0.2, "Soft start: time from arming to full force.")
+        .only_higher(),
+    real("force.ceiling", group::force, 4, "N", 0, 1000, 0,
+         "How far force.limit, and what acts without a push of the hand (field, interference, background), "
+         "may "
+         "be raised while the axis is armed; 0: they can only be lowered.")
+        .disarmed_only(),
 
     choice("passivity.mode", group::passivity, 1, names::passivity_mode, 0,
            "Time-domain passivity control. This firmware offers only 'off'.")
@@ -104,18 +127,22 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
            "guard.verdict tells. How the adaptive law's field follows the velocity is not judged.")
         .disarmed_only(),
     real("guard.damping", group::guard, 2, "N s/m", 0, 1000, 0,
-         "Viscous damping b at the handle that the stability check may count on."),
-    real(
-        "guard.friction", group::guard, 3, "N", 0, 100, 0,
-        "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does "
-        "not subtract what compensation.limit allows to be taken away; compensation.limit must be below it."),
+         "Viscous damping b at the handle that the stability check may count on.")
+        .only_lower(),
+    real("guard.friction", group::guard, 3, "N", 0, 100, 0,
+         "Coulomb friction f_c of the handle that may be counted on, by the stability check too, which does "
+         "not subtract what compensation.limit allows to be taken away; compensation.limit must be below it.")
+        .only_lower(),
     real("guard.operator_force", group::guard, 4, "N", 0, 1000, 0,
-         "Force F_h of the operator in paper 2's resolution criteria; 0: not known, they are not judged."),
+         "Force F_h of the operator in paper 2's resolution criteria; 0: not known, they are not judged.")
+        .disarmed_only(),
     real("guard.operator_speed", group::guard, 5, "m/s", 0, 100, 0,
-         "Speed v of the operator in paper 2's resolution criteria; 0: not known."),
+         "Speed v of the operator in paper 2's resolution criteria; 0: not known.")
+        .disarmed_only(),
     real("guard.delay", group::guard, 6, "s", 0, 1, 0,
          "Delay from a command to its force at the handle, beyond the current loop's own (1 / "
-         "current.bandwidth and 0.65 ticks)."),
+         "current.bandwidth and 0.65 ticks).")
+        .only_higher(),
 
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,
          "Handle travel per radian of the motor shaft.")
@@ -188,22 +215,30 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .disarmed_only(),
 
     real("temperature.limit", group::temperature, 1, "degC", -40, 200, 100,
-         "Trip level of the power stage's temperature."),
-    real(
-        "temperature.derating", group::temperature, 2, "degC", 0, 100, 20,
-        "The current limit falls in proportion over this much below a trip level, of power stage and motor."),
+         "Trip level of the power stage's temperature.")
+        .only_lower(),
+    real("temperature.derating", group::temperature, 2, "degC", 0, 100, 20,
+         "The current limit falls in proportion over this much below a trip level, of power stage and motor.")
+        .only_higher(),
     real("temperature.motor_limit", group::temperature, 3, "degC", 0, 300, 120,
-         "Trip level of the winding's computed temperature; 0 turns it off."),
+         "Trip level of the winding's computed temperature; 0 turns it off.")
+        .only_lower()
+        .off_at_zero(),
     real("temperature.ambient", group::temperature, 4, "degC", -40, 100, 25,
-         "Temperature around the motor, at which it is taken to start."),
+         "Temperature around the motor, at which it is taken to start.")
+        .only_higher(),
     real("temperature.winding_capacity", group::temperature, 5, "J/K", 0.01, 1e5, 15,
-         "Heat capacity of the winding."),
+         "Heat capacity of the winding.")
+        .only_lower(),
     real("temperature.winding_resistance", group::temperature, 6, "K/W", 0.01, 1000, 3,
-         "Thermal resistance from winding to case."),
+         "Thermal resistance from winding to case.")
+        .only_higher(),
     real("temperature.case_capacity", group::temperature, 7, "J/K", 0.01, 1e6, 150,
-         "Heat capacity of the motor's case."),
+         "Heat capacity of the motor's case.")
+        .only_lower(),
     real("temperature.case_resistance", group::temperature, 8, "K/W", 0.01, 1000, 8,
-         "Thermal resistance from case to ambient."),
+         "Thermal resistance from case to ambient.")
+        .only_higher(),
 
     whole("drive.controlword", group::drive, 1, unsigned16, "", 0, 65535, 0,
           "CiA 402 controlword: 6 shutdown, 7 switch on, 15 enable operation, 2 quick stop, 0 disable "
@@ -215,6 +250,12 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         "What an armed axis does: render the wall, follow excitation.* without a wall (identification and "
         "self-test), or make profile.target_torque. profile.operation_mode is the same in CiA 402's numbers.")
         .disarmed_only()
+        .volatile_value(),
+    whole(
+        "drive.commander", group::drive_mode, 2, unsigned16, "", 0, 65535, 0,
+        "Number of whoever is about to arm the axis, of its own choice. Not 0: link.timeout then goes by how "
+        "long link.sign_of_life has not been written with this number over the link that armed the axis, and "
+        "nothing else keeps it armed. Back to 0 when the axis is disarmed, or was not armed.")
         .volatile_value(),
 
     choice("excitation.kind", group::excitation, 1, names::excitation_kind, 0,
@@ -251,6 +292,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .volatile_value(),
     real("excitation.travel", group::excitation, 12, "m", 0, 1, 0.001,
          "Trip level: how far the handle may be from where it was when the axis was armed.")
+        .only_lower()
         .volatile_value(),
     real("excitation.stiffness", group::excitation, 13, "N/m", 0, 1e5, 200, "Spring of kind 'position'.")
         .volatile_value(),

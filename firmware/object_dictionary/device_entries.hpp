@@ -62,18 +62,23 @@ constexpr Entry rate_choice(std::string_view name, Group group, std::uint8_t sub
 
 inline constexpr std::array device_entries = std::to_array<Entry>({
     real("supply.voltage_min", group::supply, 1, "V", 0, 100, 8,
-         "Trip level of the supply, low: an armed axis loses its force at once."),
+         "Trip level of the supply, low: an armed axis loses its force at once.")
+        .only_higher(),
     real("supply.voltage_max", group::supply, 2, "V", 0, 100, 26,
-         "Trip level of the supply, high: an armed axis loses its force at once."),
+         "Trip level of the supply, high: an armed axis loses its force at once.")
+        .only_lower(),
     real("supply.brake_voltage", group::supply, 3, "V", 0, 100, 0,
-         "Supply voltage from which the brake resistor is switched on; 0: none is fitted."),
+         "Supply voltage from which the brake resistor is switched on; 0: none is fitted.")
+        .disarmed_only(),
 
     real("link.timeout", group::link, 1, "s", 0, 60, 1,
-         "Host silence after which an armed axis loses its force with a fault; 0 turns it off. On the serial "
-         "line any request is a sign of life; on CAN only what commands: a value written, a PDO taken, a "
-         "watched heartbeat."),
+         "Silence of whoever armed it after which an axis loses its force with a fault; 0 turns it off. Only "
+         "the link that armed it counts: on the serial line any request is a sign of life; on CAN what "
+         "commands: controlword, target or link.sign_of_life written, a PDO taken, a watched heartbeat. See "
+         "drive.commander.")
+        .disarmed_only(),
     whole("link.sign_of_life", group::link, 2, Type::unsigned16, "", 0, 65535, 0,
-          "Written by a host that commands over CAN and has nothing else to write; the number means nothing.")
+          "Written by a host that commands and has nothing else to write: the number in drive.commander.")
         .volatile_value(),
 
     whole("node.id", group::node, 1, Type::unsigned8, "", 1, 127, 1,

@@ -48,7 +48,26 @@ constexpr bool defaults_are_allowed() {
   return true;
 }
 
+/// Bounds that may only be tightened while armed are compared as reals; a ceiling must be of the same place
+/// and unit, and itself out of reach then.
+constexpr bool bounds_can_be_compared() {
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    const Entry& entry = entry_at(i);
+    const bool tightens = entry.change != Change::any_time && entry.change != Change::disarmed_only;
+    if (tightens && entry.type != Type::float32) return false;
+    if (!tightens && (entry.unbounded_at_zero || !entry.ceiling.empty())) return false;
+    if (entry.ceiling.empty()) continue;
+    const std::size_t at = find_entry(entry.ceiling);
+    if (at == entry_count || entry_at(at).change != Change::disarmed_only ||
+        entry_at(at).scope() != entry.scope() || entry_at(at).unit != entry.unit ||
+        entry_at(at).type != Type::float32)
+      return false;
+  }
+  return true;
+}
+
 static_assert(names_are_unique());
+static_assert(bounds_can_be_compared());
 static_assert(subindices_rise());
 static_assert(groups_hold_one_access());
 static_assert(defaults_are_allowed());

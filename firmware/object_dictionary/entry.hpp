@@ -41,9 +41,17 @@ enum class Type : std::uint8_t {
 /// 301 asks for.
 enum class Access : std::uint8_t { read_only, read_write, communication };
 
-/// When a value may be written: disarmed_only ones would make the force jump or the scale change under
-/// the hand.
-enum class Change : std::uint8_t { any_time, disarmed_only };
+/// When and how a value may be changed. disarmed_only ones would make the force jump or the scale change
+/// under the hand. The others bound what a hand may feel, and one direction of theirs is safe: while the axis
+/// is armed they go only there (a device entry: while any axis is), or the other way as far as a ceiling that
+/// was set before arming.
+enum class Change : std::uint8_t {
+  any_time,
+  disarmed_only,
+  only_lower,
+  only_higher,
+  only_nearer_zero,
+};
 
 /// An axis entry exists once per axis (axis n: index + n x 0x800), a device entry once.
 enum class Scope : std::uint8_t { axis, device };
@@ -81,6 +89,8 @@ struct Entry {
   std::uint16_t standard_index = 0;      ///< not 0: an object of CiA 301 or 402 at this index
   std::uint8_t standard_subindex = 0;    ///< its sub-index
   bool node_relative = false;            ///< a COB-ID whose default has the node ID added
+  bool unbounded_at_zero = false;        ///< 0 turns this bound off: looser than any other value
+  std::string_view ceiling{};            ///< entry up to which it may be loosened while armed; empty: none
 
   constexpr std::uint16_t index() const { return standard_index != 0 ? standard_index : group.index; }
   constexpr std::uint8_t object_subindex() const {
@@ -91,6 +101,19 @@ struct Entry {
   constexpr Entry disarmed_only() const {
     Entry e = *this;
     e.change = Change::disarmed_only;
+    return e;
+  }
+  /// While armed only lower, or up to `until`. The other two likewise.
+  constexpr Entry only_lower(std::string_view until = {}) const {
+    return tightening(Change::only_lower, until);
+  }
+  constexpr Entry only_higher() const { return tightening(Change::only_higher, {}); }
+  constexpr Entry only_nearer_zero(std::string_view until = {}) const {
+    return tightening(Change::only_nearer_zero, until);
+  }
+  constexpr Entry off_at_zero() const {
+    Entry e = *this;
+    e.unbounded_at_zero = true;
     return e;
   }
   constexpr Entry volatile_value() const {
@@ -114,6 +137,14 @@ struct Entry {
     e.access = Access::communication;
     return e;
   }
+
+ private:
+  constexpr Entry tightening(Change to, std::string_view until) const {
+    Entry e = *this;
+    e.change = to;
+    e.ceiling = until;
+    return e;
+  }
 };
 
 constexpr std::uint16_t register_count(Type type) {
@@ -130,7 +161,8 @@ constexpr bool is_signed(Type type) {
   return type == Type::integer8 || type == Type::integer16 || type == Type::integer32;
 }
 
-/// A value's 32-bit pattern from as many bits as its type has, the lowest of `bits`: signed ones keep their sign.
+/// A value's 32-bit pattern from as many bits as its type has, the lowest of `bits`: signed ones keep their
+/// sign.
 constexpr std::uint32_t extended(Type type, std::uint32_t bits) {
   const int unused = 8 * (4 - bytes_of(type));
   if (!is_signed(type)) return bits << unused >> unused;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "firmware/parameters/armed_change.hpp"
 #include "firmware/parameters/linked_parameters.hpp"
 #include "firmware/stability_guard.hpp"
 
@@ -12,20 +13,23 @@ constexpr std::size_t transaction_slot = slot_of(entry_of<"transaction.control">
 constexpr std::size_t store_entry = entry_of<"store.command">();
 constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 
-/// No part of a set of parameters: they act when they are written.
-constexpr bool acts_at_once(std::size_t slot) {
-  constexpr std::array entries{controlword_entry, entry_of<"profile.target_torque">(),
-                               entry_of<"profile.max_torque">(), entry_of<"profile.target_force">(),
-                               entry_of<"link.sign_of_life">()};
-  static_assert(std::none_of(entries.begin(), entries.end(), [](std::size_t entry) {
-    return descriptors[entry].disarmed_only || !descriptors[entry].writable;
-  }));
-  return std::find(entries.begin(), entries.end(), owner_of(slot).entry) != entries.end();
-}
-constexpr bool is_setting(const SlotValue& one) {
+bool is_setting(const SlotValue& one) {
   return !acts_at_once(one.slot);
 }
 }  // namespace
+
+bool acts_at_once(std::size_t slot) {
+  constexpr std::array entries{controlword_entry,
+                               entry_of<"drive.commander">(),
+                               entry_of<"profile.target_torque">(),
+                               entry_of<"profile.max_torque">(),
+                               entry_of<"profile.target_force">(),
+                               entry_of<"link.sign_of_life">()};
+  static_assert(std::none_of(entries.begin(), entries.end(), [](std::size_t entry) {
+    return descriptors[entry].change() != Change::any_time || !descriptors[entry].writable;
+  }));
+  return std::find(entries.begin(), entries.end(), owner_of(slot).entry) != entries.end();
+}
 
 ParameterAccess::Result ParameterAccess::refuse_slot(Refusal refusal, std::size_t slot) {
   const auto [entry, axis] = owner_of(slot);
@@ -45,12 +49,11 @@ void ParameterAccess::drop(Link owner, std::uint32_t now_us) {
   dropped_us_[static_cast<std::size_t>(owner)] = now_us;
 }
 
-ParameterAccess::Result ParameterAccess::check(const SlotValue& one, bool armed) {
+ParameterAccess::Result ParameterAccess::check(const SlotValue& one, const ArmedAxes& armed) {
   const std::size_t entry = owner_of(one.slot).entry;
   const SlotDescriptor& descriptor = descriptors[entry];
   Refusal refusal = descriptor.writable ? check_value(descriptor, one.raw) : Refusal::read_only;
-  if (refusal == Refusal::none && armed && descriptor.disarmed_only && one.raw != values_.raw(one.slot))
-    refusal = Refusal::while_armed;
+  if (refusal == Refusal::none) refusal = armed_change_refusal(values_, one.slot, one.raw, armed);
   // A command and no value; the application takes it before it comes here, if it has a store.
   if (refusal == Refusal::none && entry == store_entry) refusal = Refusal::store_missing;
   return refusal == Refusal::none ? Result{} : refuse_slot(refusal, one.slot);
@@ -74,18 +77,20 @@ void ParameterAccess::exchange() {
 
 /// What was put aside, if the rules allow it.
 ParameterAccess::Result ParameterAccess::apply(const ArmedAxes& armed) {
-  exchange();
-  BrokenRule broken = check_rules(values_);
+  BrokenRule refused;
   bool changed = false, restarts = false, communication_changed = false;
   for_each_written([&](std::size_t slot) {
     const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
     if (staged_.raw(slot) == values_.raw(slot)) return;
     // An axis may have been armed since the value was put aside.
-    if (armed.any() && descriptor.disarmed_only && broken.refusal == Refusal::none)
-      broken = {Refusal::while_armed, slot};
+    const Refusal refusal = armed_change_refusal(values_, slot, staged_.raw(slot), armed);
+    if (refusal != Refusal::none && refused.refusal == Refusal::none) refused = {refusal, slot};
     (descriptor.writable ? changed : communication_changed) = true;
-    restarts = restarts || descriptor.disarmed_only;
+    restarts = restarts || descriptor.disarmed_only();
   });
+  exchange();
+  BrokenRule broken = check_rules(values_);
+  if (broken.refusal == Refusal::none) broken = refused;
   const bool guarded = broken.refusal == Refusal::none && changed;
   if (guarded) broken = check_guard(values_, values_, armed);
   if (broken.refusal != Refusal::none) {
@@ -154,7 +159,7 @@ ParameterAccess::Result ParameterAccess::write(std::span<const SlotValue> wanted
   if (settings && dropped_us_[static_cast<std::size_t>(by)])
     return refuse_slot(Refusal::no_transaction, wanted[0].slot);
   for (const SlotValue& one : wanted) {
-    if (const Result checked = check(one, armed.any()); checked.refusal != Refusal::none) return checked;
+    if (const Result checked = check(one, armed); checked.refusal != Refusal::none) return checked;
   }
   if (settings) {
     if (!owner_) written_ = {};

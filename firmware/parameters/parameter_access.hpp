@@ -17,6 +17,9 @@ namespace kmax::firmware {
 enum class Link : std::uint8_t { serial, can, local };
 inline constexpr std::size_t link_count = 3;
 
+/// Whether what is written there acts at once, as a command does, and is no part of a set of parameters.
+bool acts_at_once(std::size_t slot);
+
 struct SlotValue {
   std::uint16_t slot;
   std::uint32_t raw;
@@ -26,12 +29,12 @@ struct SlotValue {
 /// registers (modbus/parameter_registers.hpp) and CANopen objects (application_objects.hpp) are edges of it.
 ///
 /// A write is whole or nothing: every value is checked, then the rules between parameters and, for an axis
-/// that is armed, the stability guard's, and only if all hold it stays. Outside a transaction it is in force
-/// at once; inside (transaction.control = 1) values are kept aside and take effect together with
-/// transaction.control = 2, which checks the rules over the whole set. A transaction changes what was written
-/// in it and nothing else: a value that the device changes meanwhile keeps that. Reading always gives the
-/// values in force, not those put aside. Why a write was refused stays in refusal.reason and
-/// refusal.register.
+/// that is armed, that its bounds are only tightened (armed_change.hpp) and the stability guard's, and only
+/// if all hold it stays. Outside a transaction it is in force at once; inside (transaction.control = 1)
+/// values are kept aside and take effect together with transaction.control = 2, which checks the rules over
+/// the whole set. A transaction changes what was written in it and nothing else: a value that the device
+/// changes meanwhile keeps that. Reading always gives the values in force, not those put aside. Why a write
+/// was refused stays in refusal.reason and refusal.register.
 ///
 /// A transaction belongs to the link that began it. Until it ends, every other link's settings, and its
 /// transaction.control whatever it asks for, are refused with transaction_open. It ends when its owner
@@ -40,9 +43,9 @@ struct SlotValue {
 /// without its owner's doing, that link can set nothing for 30 s, or until it writes transaction.control,
 /// lest a message that was held up takes effect by itself; the other links can at once.
 ///
-/// Commands (drive.controlword), setpoints (profile.target_torque, .max_torque, .target_force) and
-/// link.sign_of_life are no settings and so no part of a transaction: they act when they are written, in
-/// anybody's transaction too, and are no change of parameters. So are CANopen's own settings
+/// Commands (drive.controlword), setpoints (profile.target_torque, .max_torque, .target_force),
+/// drive.commander and link.sign_of_life are no settings and so no part of a transaction: they act when they
+/// are written, in anybody's transaction too, and are no change of parameters. So are CANopen's own settings
 /// (Access::communication), which only CANopen writes, one by one, with write_communication().
 ///
 /// Of two parameters that are one thing in two standards' numbers (linked_parameters.hpp), writing either
@@ -110,7 +113,7 @@ class ParameterAccess {
  private:
   static constexpr std::size_t words_of_slots = (slot_count + 31) / 32;
 
-  Result check(const SlotValue& one, bool armed);
+  Result check(const SlotValue& one, const ArmedAxes& armed);
   void put_aside(const SlotValue& one);
   Result control_transaction(std::uint32_t request, Link by, const ArmedAxes& armed, std::uint32_t now_us);
   Result apply(const ArmedAxes& armed);

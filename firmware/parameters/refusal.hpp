@@ -41,6 +41,9 @@ enum class Refusal : std::uint16_t {
   heartbeat_missing = 29,
   restarting = 30,
   guard_refused = 31,
+  only_tightens = 32,
+  other_commander = 33,
+  armed_by_broadcast = 34,
 };
 
 struct RefusalText {
@@ -93,6 +96,12 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::guard_refused,
      "the stability check fails: this wall is not guaranteed to be stable on this device (guard.mode is "
      "refuse); 'kmax check' explains it"},
+    {Refusal::only_tightens,
+     "while its axis is armed this bound can only be tightened, or loosened as far as a ceiling that was set "
+     "before; disarm first"},
+    {Refusal::other_commander,
+     "the axis is armed and belongs to the link that armed it; over another one it can only be disarmed"},
+    {Refusal::armed_by_broadcast, "a broadcast arms no axis; write the controlword to each unit"},
 });
 
 constexpr std::string_view to_string(Refusal refusal) {

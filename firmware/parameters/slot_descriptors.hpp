@@ -53,10 +53,12 @@ inline constexpr std::size_t most_choices = [] {
   return count;
 }();
 
-/// Which values an entry may have, and has at first: places of rows.
+/// Which values an entry may have, has at first, and may change to.
 struct ValueRule {
-  std::uint8_t first_choice, choice_count;  ///< in listed_choices; 0 choices: any value in range
-  std::uint8_t minimum_at, maximum_at, default_at;
+  std::uint8_t first_choice, choice_count;          ///< in listed_choices; 0 choices: any value in range
+  std::uint8_t minimum_at, maximum_at, default_at;  ///< in patterns
+  Change change;
+  bool unbounded_at_zero;
   friend constexpr bool operator==(const ValueRule&, const ValueRule&) = default;
 };
 
@@ -79,9 +81,10 @@ inline constexpr Layout layout = [] {
       return static_cast<std::uint8_t>(made.patterns.place(raw_from_number(e.type, number)));
     };
     const auto choices_at = made.choices.place(std::span<const std::int32_t>(choices).first(e.values.size()));
-    made.rule_at[i] = made.rules.place(
-        ValueRule{static_cast<std::uint8_t>(choices_at), static_cast<std::uint8_t>(e.values.size()),
-                  pattern_at(e.minimum), pattern_at(e.maximum), pattern_at(e.default_value)});
+    made.rule_at[i] = made.rules.place(ValueRule{static_cast<std::uint8_t>(choices_at),
+                                                 static_cast<std::uint8_t>(e.values.size()),
+                                                 pattern_at(e.minimum), pattern_at(e.maximum),
+                                                 pattern_at(e.default_value), e.change, e.unbounded_at_zero});
     made.group_at[i] = made.groups.place(e.group.index);
   }
   return made;
@@ -106,7 +109,6 @@ struct SlotDescriptor {
   Type type : 3;
   bool writable : 1;  ///< through Modbus
   bool kept : 1;      ///< a setting, whoever may write it: part of a set of parameters
-  bool disarmed_only : 1;
   bool per_axis : 1;
   bool persistent : 1;  ///< part of what save keeps
   std::uint8_t group;   ///< the same number for all entries of a group
@@ -119,6 +121,9 @@ struct SlotDescriptor {
   constexpr std::uint32_t minimum() const { return slot_descriptors::patterns[rule().minimum_at]; }
   constexpr std::uint32_t maximum() const { return slot_descriptors::patterns[rule().maximum_at]; }
   constexpr std::uint32_t default_value() const { return slot_descriptors::patterns[rule().default_at]; }
+  constexpr Change change() const { return rule().change; }
+  constexpr bool disarmed_only() const { return change() == Change::disarmed_only; }
+  constexpr bool unbounded_at_zero() const { return rule().unbounded_at_zero; }
 
  private:
   constexpr const slot_descriptors::ValueRule& rule() const { return slot_descriptors::rules[rule_at]; }
@@ -135,7 +140,6 @@ inline constexpr auto descriptors = [] {
                             e.type,
                             e.access == Access::read_write,
                             e.access != Access::read_only,
-                            e.change == Change::disarmed_only,
                             e.scope() == Scope::axis,
                             e.persistent,
                             static_cast<std::uint8_t>(slot_descriptors::layout.group_at[i]),

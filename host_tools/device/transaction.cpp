@@ -61,6 +61,25 @@ std::string guard_numbers(Device& device, std::span<const Assignment> assignment
   const std::string words = guard_words(firmware::guard_finding(wanted, axis));
   return words.empty() ? words : "; " + words;
 }
+
+/// Which way a bound may go while its axis is armed and how far, as "; " and words. Without the numbers if
+/// the device cannot be asked.
+std::string direction_words(Device& device, const Parameter& parameter) {
+  const firmware::Entry& entry = parameter.definition();
+  std::string words = entry.change == firmware::Change::only_higher ? "; it can only be raised"
+                      : entry.change == firmware::Change::only_nearer_zero
+                          ? "; it can only be brought nearer to 0"
+                          : "; it can only be lowered";
+  try {
+    words += fmt::format(" from {}", value_with_unit(parameter, device.read(parameter)));
+    if (entry.ceiling.empty()) return words;
+    const Parameter ceiling(firmware::find_entry(entry.ceiling), parameter.axis());
+    return words + fmt::format(", or raised up to {} ({})", ceiling.name(),
+                               value_with_unit(ceiling, device.read(ceiling)));
+  } catch (const std::exception&) {
+    return words;
+  }
+}
 }  // namespace
 
 /// The decisive message was lost: the values are applied or not, and only the device knows.
@@ -252,6 +271,7 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
       about += fmt::format(" (allowed: {})", allowed_text(*owner));
     about += ": ";
     if (report.reason == Refusal::guard_refused) numbers = guard_numbers(*this, assignments, owner->axis());
+    if (report.reason == Refusal::only_tightens) numbers = direction_words(*this, *owner);
   }
   const std::string message = fmt::format("{}the device refused: {}{}; {}", about, to_string(report.reason),
                                           numbers, nothing_changed);

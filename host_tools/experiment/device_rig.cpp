@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"
@@ -147,7 +148,13 @@ void DeviceRig::note(const std::string& text) const {
 
 RigTouch DeviceRig::hold(const TouchPlan& plan) {
   // The touch before has left its last forces behind.
-  if (!plan.changes.empty()) set(wall_);
+  if (!plan.changes.empty()) {
+    set(wall_);
+    // These changes come while the axis is armed, when forces are raised no farther than this.
+    double largest = 0.0;
+    for (const ForceChange& change : plan.changes) largest = std::max(largest, std::abs(change.force));
+    apply({fmt::format("force.ceiling={}", largest)});
+  }
   if (session_.prompter != nullptr) session_.prompter->ask(plan.request);
   if (plan.wall) set_with_limits(*plan.wall);
   TouchWatch watch;

@@ -110,16 +110,34 @@ std::string default_text(const Parameter& parameter) {
   return value_text(parameter, parameter.default_raw());
 }
 
+/// When it may change, as a sentence; empty: at any time.
+std::string change_text(const firmware::Entry& entry) {
+  const std::string until =
+      entry.ceiling.empty() ? "." : fmt::format(", or raised up to `{}`.", entry.ceiling);
+  switch (entry.change) {
+    case firmware::Change::any_time:
+      return "";
+    case firmware::Change::disarmed_only:
+      return " Changes only while disarmed.";
+    case firmware::Change::only_lower:
+      return " While armed it can only be lowered" + until;
+    case firmware::Change::only_higher:
+      return " While armed it can only be raised" + until;
+    case firmware::Change::only_nearer_zero:
+      return " While armed it can only be brought nearer to 0" + until;
+  }
+  return "";
+}
+
 void describe_markdown(Context& context) {
-  print(
-      context.out,
-      R"(# Parameters
+  print(context.out,
+        R"(# Parameters
 
 Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis
 parameters again: index + 0x{:X}, Modbus address + 0x{:X}, name with the prefix `axisN.`. Values of two
 registers have the high word first. What is set over CANopen only can be read over every link.
 )",
-      firmware::axis_index_offset, firmware::axis_modbus_offset);
+        firmware::axis_index_offset, firmware::axis_modbus_offset);
   std::uint16_t group = 0;
   for (const Parameter& parameter : device::all_parameters()) {
     if (parameter.axis() != 0) continue;
@@ -134,7 +152,7 @@ registers have the high word first. What is set over CANopen only can be read ov
 )");
     }
     std::string help = escaped(entry.help);
-    if (entry.change == firmware::Change::disarmed_only) help += " Changes only while disarmed.";
+    help += change_text(entry);
     if (parameter.writable() && !entry.persistent) help += " Not saved.";
     const bool settable = entry.access != firmware::Access::read_only;
     const Json type = description_json(parameter)["type"];

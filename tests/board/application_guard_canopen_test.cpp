@@ -21,6 +21,7 @@ class GuardOnCan : public testing::Test, public CanOpenHost {
     bench.preset("guard.damping", 1.23);
     bench.preset("guard.friction", 1);
     bench.preset("guard.mode", 2);
+    bench.preset("wall.stiffness_ceiling", 1e6);  // room for the guard to refuse in
     run_ms(5);
   }
   std::uint32_t write_real(std::uint16_t index, std::uint8_t subindex, float value) {

@@ -43,7 +43,7 @@ class BareBoard {
     now += 2000;
   }
   void hear_command(unsigned word) {
-    hear(modbus::adu(0,
+    hear(modbus::adu(1,
                      {6, 0x02, 0x00, static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)}));
   }
   void command(unsigned word) {
@@ -88,7 +88,7 @@ TEST_P(ClockStart, SilenceIsMeasuredRightWhereverTheClockStands) {
   board.preset("link.timeout", 0.5);
   ASSERT_TRUE(board.arm());
   board.count = static_cast<std::uint32_t>(-1000);
-  board.hear(modbus::adu(0, {6, 0x02, 0x00, 0, 0x0F}));
+  board.hear(modbus::adu(1, {6, 0x02, 0x00, 0, 0x0F}));
   const std::uint32_t heard = board.now - 2000;
   board.step();
   while (board.output.axis[0].force != 0.0f && board.now - heard < 2'000'000) board.step();
@@ -102,7 +102,7 @@ TEST_P(ClockStart, TalkingHostIsNeverCalledSilent) {
   board.preset("link.timeout", 0.05);
   ASSERT_TRUE(board.arm());
   for (int i = 0; i < 50; ++i) {
-    board.hear(modbus::adu(0, {3, 0, 0, 0, 1}));
+    board.hear(modbus::adu(1, {3, 0, 0, 0, 1}));
     for (int j = 0; j < 40; ++j) board.step(1000);
     ASSERT_EQ(board.application->state(0), DriveState::operation_enabled) << i;
   }
@@ -116,7 +116,7 @@ TEST(Clock, DayAndNightArmedWithAHostThatTalks) {
   std::uint64_t elapsed = 0;
   while (elapsed < 26ull * 3600 * 1'000'000) {
     const std::uint32_t before = board.now;
-    board.hear(modbus::adu(0, {3, 0, 0, 0, 1}));
+    board.hear(modbus::adu(1, {3, 0, 0, 0, 1}));
     for (int i = 0; i < 50; ++i) board.step(10'000);
     elapsed += board.now - before;
     ASSERT_EQ(board.application->state(0), DriveState::operation_enabled) << elapsed;
@@ -155,13 +155,13 @@ TEST(Clock, SilentHostWithoutSupervisionStaysArmedAcrossTheWrap) {
 TEST(Clock, ForgottenTransactionIsNotFoundAgainOneLapOfTheClockLater) {
   BareBoard board(0);
   const auto transaction = [&](std::uint8_t request) {
-    board.hear(modbus::adu(0, {6, 0x21, 0x00, 0, request}));
+    board.hear(modbus::adu(1, {6, 0x21, 0x00, 0, request}));
     board.application->poll(board.now);
   };
   transaction(1);
   const Words stiffness = words_for("wall.stiffness", 5000);
   board.hear(
-      modbus::adu(0, {16, 0x00, 0x04, 0, 2, 4, static_cast<std::uint8_t>(stiffness[0] >> 8),
+      modbus::adu(1, {16, 0x00, 0x04, 0, 2, 4, static_cast<std::uint8_t>(stiffness[0] >> 8),
                       static_cast<std::uint8_t>(stiffness[0]), static_cast<std::uint8_t>(stiffness[1] >> 8),
                       static_cast<std::uint8_t>(stiffness[1])}));
   board.application->poll(board.now);
@@ -229,7 +229,7 @@ TEST(LatePoll, WallMovedOntoTheHandleAndArmedInOnePollIsRefused) {
   board.command(0x06);
   const Words position = words_for("wall.position", 0.0015);
   board.hear(
-      modbus::adu(0, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
+      modbus::adu(1, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
                       static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
                       static_cast<std::uint8_t>(position[1])}));
   board.hear_command(0x0F);
@@ -248,11 +248,11 @@ TEST(LatePoll, SettingsTakenByATickInTheMiddleOfAPollAreNotJudgedByTheReportBefo
   board.command(0x06);
   const Words position = words_for("wall.position", 0.0015);
   board.hear(
-      modbus::adu(0, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
+      modbus::adu(1, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
                       static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
                       static_cast<std::uint8_t>(position[1])}));
   board.hear_command(0x0F);
-  board.hear(modbus::adu(0, {6, 0x20, 0x40, 0, 0}));     // a third request, whose end is seen only below
+  board.hear(modbus::adu(1, {6, 0x20, 0x40, 0, 0}));     // a third request, whose end is seen only below
   board.application->poll(board.now - 2000);             // the wall moves; the command waits for the tick
   board.tick();                                          // takes the settings
   (void)board.application->serial_reply_due(board.now);  // the third request, with the report from before
@@ -310,6 +310,7 @@ TEST(Interleaving, AnyNumberOfTicksBetweenPollsArmsAndDisarms) {
   for (const int ticks : {1, 2, 7}) {
     BareBoard board(0);
     board.preset("link.timeout", 0);
+    board.preset("wall.stiffness_ceiling", 2000);
     const auto several = [&] {
       for (int i = 0; i < 8; ++i) {
         for (int t = 0; t < ticks; ++t) board.tick();

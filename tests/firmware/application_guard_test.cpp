@@ -26,6 +26,10 @@ class GuardedArming : public testing::Test {
       bench.preset("guard.damping", 1.23, axis);
       bench.preset("guard.friction", 1, axis);
       bench.preset("guard.mode", 2, axis);
+      // Room for the guard to refuse in.
+      bench.preset("wall.stiffness_ceiling", 1e6, axis);
+      bench.preset("wall.damping_ceiling", 1000, axis);
+      bench.preset("force.ceiling", 1000, axis);
     }
     bench.run_ticks(20);
   }
@@ -169,14 +173,13 @@ TEST_F(GuardedArming, WhileArmedNoSingleWriteMayBreakACriterion) {
   expect_refused("guard.damping", 0.2);
   expect_refused("guard.friction", 1e-4);
   expect_refused("guard.delay", 0.002);
-  expect_refused("guard.operator_force", 1e-4);
   bench.run_ms(2);
   EXPECT_EQ(bench.force(), 1.0f) << "the wall is as it was";
   EXPECT_EQ(bench.state(), DriveState::operation_enabled);
   EXPECT_EQ(bench.set("wall.stiffness", 3999), 0);
-  EXPECT_EQ(bench.set("guard.damping", 2.2), 0);
-  EXPECT_EQ(bench.set("wall.stiffness", 7000), 0) << "the device has more damping than was thought";
-  // Nor may the guard itself be taken away.
+  // Nor may the guard itself be taken away, or what it counts on be said to be more.
+  EXPECT_NE(bench.set("guard.damping", 2.2), 0);
+  EXPECT_EQ(last_refusal(), Refusal::only_tightens);
   EXPECT_NE(bench.set("guard.mode", 0), 0);
   EXPECT_EQ(last_refusal(), Refusal::while_armed);
   bench.disarm();
@@ -193,7 +196,6 @@ TEST_F(GuardedArming, WhileArmedAFieldMayNotGrowBeyondItsBound) {
     bench.device.stand_at(100'000);
     bench.run_ms(5);
     ASSERT_TRUE(bench.arm()) << law;
-    expect_refused("wall.magnetic_length", 4e-4);
     if (law == 2) expect_refused("wall.magnetic_coefficient", 2.1);
     if (law == 3) expect_refused("wall.adaptive_force_max", 2.1);
   }
@@ -202,12 +204,12 @@ TEST_F(GuardedArming, WhileArmedAFieldMayNotGrowBeyondItsBound) {
 TEST_F(GuardedArming, WhileArmedATransactionIsJudgedAsAWhole) {
   ASSERT_TRUE(bench.arm());
   const auto transaction = [&](int request) { return bench.set("transaction.control", request); };
-  // Each by itself would be refused or allowed; together they pass.
+  // The first by itself would be refused; together they pass.
   EXPECT_EQ(transaction(1), 0);
-  EXPECT_EQ(bench.set("wall.stiffness", 5500), 0);
-  EXPECT_EQ(bench.set("guard.damping", 2), 0);
+  EXPECT_EQ(bench.set("guard.damping", 0.305), 0);
+  EXPECT_EQ(bench.set("wall.stiffness", 990), 0);
   EXPECT_EQ(transaction(2), 0);
-  EXPECT_EQ(bench.get("wall.stiffness"), 5500);
+  EXPECT_EQ(bench.get("wall.stiffness"), 990);
   // And here together they fail: nothing of it is taken.
   EXPECT_EQ(transaction(1), 0);
   EXPECT_EQ(bench.set("wall.damping", 1.5), 0);
@@ -224,14 +226,13 @@ TEST_F(GuardedArming, WhileArmedATransactionIsJudgedAsAWhole) {
   EXPECT_EQ(bench.set("wall.stiffness", 50'000), 0);
   ASSERT_TRUE(bench.arm());
   EXPECT_EQ(transaction(2), 3);
-  EXPECT_EQ(bench.get("wall.stiffness"), 5500);
+  EXPECT_EQ(bench.get("wall.stiffness"), 990);
 }
 
 TEST_F(GuardedArming, WhileArmedTheOtherAxisAndWhatIsNotJudgedChangeFreely) {
   ASSERT_TRUE(bench.arm(0));
   EXPECT_EQ(bench.set("wall.stiffness", 1e6, 1), 0);
   EXPECT_EQ(bench.set("force.limit", 1000), 0);
-  EXPECT_EQ(bench.set("link.timeout", 10), 0);
   EXPECT_EQ(bench.set("excitation.bias", 100), 0);
 }
 

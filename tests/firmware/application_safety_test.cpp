@@ -104,7 +104,7 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
       watch(60);
       bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, 0x06}));
       watch(60);
-      bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, 0x0F}));
+      bench.board().receive(firmware::modbus::adu(1, {6, 0x02, 0x00, 0, 0x0F}));
     }
     watch(*rc::gen::inRange(45, 160));
   }

@@ -35,14 +35,16 @@ class Settings : public testing::Test {
 };
 
 TEST_F(Settings, StiffnessWhileArmedTakesEffectInTheTickAfterTheRequestIsExecuted) {
+  ASSERT_EQ(bench.set("wall.stiffness_ceiling", 2000), 0);
   ASSERT_TRUE(bench.arm());
   bench.device.stand_at(-1000);
   bench.run_ms(2);
   EXPECT_EQ(bench.force(), 1.0f);
   send_write("wall.stiffness", 2000);
-  while (bench.application().values().real<"wall.stiffness">() != 2000.0f) {
+  for (int ticks = 0; bench.application().values().real<"wall.stiffness">() != 2000.0f; ++ticks) {
     EXPECT_EQ(bench.force(), 1.0f);
     bench.run_ticks(1);
+    ASSERT_LT(ticks, 1000) << "the write has not been taken";
   }
   bench.run_ticks(1);
   EXPECT_EQ(bench.force(), 2.0f);

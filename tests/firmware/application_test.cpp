@@ -206,6 +206,8 @@ TEST(Application, IsDeterministicWhateverTheMemoryHeldBefore) {
   for (const int pattern : {0x00, 0xFF, 0xA5}) {
     for (auto& byte : place) byte = static_cast<unsigned char>(pattern);
     auto* application = new (place) firmware::Application(firmware::BoardIdentity{});
+    application->preset(firmware::entry_named("force.ramp_time"), 0, 0);
+    application->preset(firmware::entry_named("velocity.limit"), 0, 0);
     for (std::uint32_t i = 1; i < 10; ++i) {
       (void)application->ISR_tick({{{{5u, true}, {5u, true}}}});
       application->poll(i * 50);
@@ -217,8 +219,6 @@ TEST(Application, IsDeterministicWhateverTheMemoryHeldBefore) {
     application->poll(550);
     EXPECT_EQ(application->state(0), DriveState::operation_enabled) << pattern;
     // The main loop stops: within 0.1 s the tick takes the force away by itself, and the fault is told later.
-    application->preset(firmware::entry_named("force.ramp_time"), 0, 0);
-    application->preset(firmware::entry_named("velocity.limit"), 0, 0);
     application->poll(600);
     const firmware::TickInput deep{{{{static_cast<std::uint32_t>(-50), true}, {5u, true}}}};
     for (int tick = 0; tick < 1990; ++tick) (void)application->ISR_tick(deep);

@@ -235,10 +235,11 @@ TEST_F(Trips, ClearedAndArmedAgainWithinOneHapticSampleDoesNotTripAgain) {
   ASSERT_EQ(bench.state(), DriveState::fault);
   bench.device.valid[0] = true;
   bench.run_ticks(2);
-  // Broadcasts need no reply: four commands in less than a sample.
+  // Broadcasts need no reply: four commands in less than a sample. The one that arms must not be one.
   const auto start = bench.device.tick;
   for (const unsigned word : {0x00u, 0x80u, 0x06u, 0x0Fu}) {
-    bench.board().receive(firmware::modbus::adu(0, {6, 0x02, 0x00, 0, static_cast<std::uint8_t>(word)}));
+    bench.board().receive(
+        firmware::modbus::adu(word == 0x0Fu ? 1 : 0, {6, 0x02, 0x00, 0, static_cast<std::uint8_t>(word)}));
     bench.run_ms(2.0);
   }
   ASSERT_LT(bench.device.tick - start, 170u);

@@ -158,12 +158,15 @@ TEST_F(BusFaults, TwoNodesHaveOneIdentifier) {
 TEST_F(BusFaults, AFloodOfWritesDoesNotStarveTheMainLoop) {
   ASSERT_EQ(state, DriveState::operation_enabled);
   bench.port.node().on_frame({});
-  // Each of them changes a parameter and so the settings of the tick.
+  // Each of them changes a parameter and so the settings of the tick. They are no signs of life of whoever
+  // commands, so some of those are in between.
   for (std::uint32_t i = 0; i < 12'000; ++i) {
-    const auto value = std::bit_cast<std::uint32_t>(i % 2 == 0 ? 1000.0f : 1001.0f);
+    if (i % 500 == 0)
+      bench.port.send({.identifier = 0x601, .length = 8, .data = {0x2B, 0x01, 0x58, 2, 0, 0, 0, 0}});
+    const auto value = std::bit_cast<std::uint32_t>(i % 2 == 0 ? 2.4f : 2.5f);
     bench.port.send({.identifier = 0x601,
                      .length = 8,
-                     .data = {0x23, 0x00, 0x20, 4, static_cast<std::uint8_t>(value),
+                     .data = {0x23, 0x00, 0x20, 8, static_cast<std::uint8_t>(value),
                               static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value >> 16),
                               static_cast<std::uint8_t>(value >> 24)}});
   }
@@ -176,16 +179,16 @@ TEST_F(BusFaults, ParametersInPdosAtAKilohertzDoNotStarveTheMainLoop) {
   ASSERT_EQ(state, DriveState::operation_enabled);
   bench.write(0x1402, 1, 0x80000401, 4);
   bench.write(0x1602, 0, 0, 1);
-  bench.write(0x1602, 1, 0x20000420, 4);
-  bench.write(0x1602, 2, 0x28000420, 4);
+  bench.write(0x1602, 1, 0x20000820, 4);
+  bench.write(0x1602, 2, 0x28000820, 4);
   bench.write(0x1602, 0, 2, 1);
   bench.write(0x1402, 1, 0x401, 4);
   bench.nmt(0x01);
   for (int i = 0; i < 1000; ++i) {
     bench.port.send({.identifier = 0x401,
                      .length = 8,
-                     .data = {0, static_cast<std::uint8_t>(i % 2 * 0x80), 0x7A, 0x44, 0,
-                              static_cast<std::uint8_t>(i % 2 * 0x80), 0x7A, 0x44}});
+                     .data = {0, static_cast<std::uint8_t>(i % 2 * 0x80), 0x1A, 0x40, 0,
+                              static_cast<std::uint8_t>(i % 2 * 0x80), 0x1A, 0x40}});
     bench.board->run_for(1e-3);
   }
   EXPECT_TRUE(bench.board->bridge_armed(0)) << firmware::text_of(bench.fault(0)).name;

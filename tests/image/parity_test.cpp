@@ -161,7 +161,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       // What jumps cannot be plausible: watched, but seldom tripped.
       write("device.hand_force", axis, real(world.uniform(0, 1) < 0.1 ? 5.0 : 1000.0));
       const double mode = world.uniform(0, 1);
-      write("drive.mode", axis, mode < 0.25 ? 1 : mode < 0.4 ? 2 : 0);
+      write("drive.mode", axis, mode < 0.25 ? 1 : mode < 0.5 ? 2 : 0);
       write("excitation.kind", axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
       write("excitation.bias", axis, real(world.uniform(-5, 5)));
       write("excitation.alternation", axis, real(world.uniform(-5, 5)));
@@ -190,8 +190,8 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
   expect_equal(companion);
   EXPECT_GT(companion.driven, 100'000u) << "the comparison must see forces";
   EXPECT_GT(companion.excited, 10'000u) << "and excitation";
-  // Fewer: an eighth of the axes is in mode torque, and the random counts trip it within some hundred ticks.
-  EXPECT_GT(companion.commanded, 1'000u) << "and forces that the host asks for";
+  // Fewer: the random counts trip an axis in mode torque within some hundred ticks.
+  EXPECT_GT(companion.commanded, 300u) << "and forces that the host asks for";
 }
 
 TEST(Parity, AContactIsBitIdentical) {

@@ -138,11 +138,15 @@ class BadInput(unittest.TestCase):
         kmax("set", "link.timeout=60", device=self.board.device)
         self.arm()
         try:
-            message = kmax("set", "wall.stiffness=1500", "wall.side=-1", device=self.board.device, check=False).stderr
+            message = kmax("set", "wall.stiffness=900", "wall.side=-1", device=self.board.device, check=False).stderr
             self.assertIn("armed", message)
             self.assertIn("wall.side", message)
-            self.assertNotEqual(self.value("wall.stiffness"), 1500)
-            kmax("set", "wall.stiffness=1600", device=self.board.device)
+            self.assertNotEqual(self.value("wall.stiffness"), 900)
+            kmax("set", "wall.stiffness=900", device=self.board.device)
+            message = kmax("set", "wall.stiffness=1600", device=self.board.device, check=False).stderr
+            for part in ("armed", "can only be lowered from 900 N/m", "wall.stiffness_ceiling (0 N/m)"):
+                self.assertIn(part, message)
+            self.assertEqual(self.value("wall.stiffness"), 900)
         finally:
             kmax("disarm", device=self.board.device)
             kmax("set", "wall.stiffness=1000", "link.timeout=1", device=self.board.device)
@@ -200,7 +204,7 @@ class Stopping(unittest.TestCase):
         with Serve() as board:
             kmax("set", "link.timeout=60", device=board.device)
             with Holding(board.device) as holding:
-                kmax("set", "wall.stiffness=1200", device=board.device)
+                kmax("set", "wall.stiffness=900", device=board.device)
                 kmax("stop", device=board.device)
                 said, code = holding.ended()
             self.assertEqual(code, 1)

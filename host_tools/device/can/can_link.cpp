@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <random>
 
 #include "firmware/canopen/object_places.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
@@ -61,7 +62,8 @@ CanLink::CanLink(const DeviceAddress& address, const Notice& notice, const SdoSe
     : address_(address),
       port_(open_can_port(address.path, options_for(address.node))),
       lock_(address.path, address.node, notice),
-      sdo_(*port_, address.node, settings) {}
+      sdo_(*port_, address.node, settings),
+      number_(static_cast<std::uint16_t>(1 + std::random_device{}() % 0xFFFF)) {}
 
 std::vector<std::uint32_t> CanLink::read(std::span<const std::size_t> slots) {
   std::vector<std::uint32_t> values;
@@ -99,9 +101,10 @@ void CanLink::write(std::span<const SlotValue> values, Repeat repeat,
         i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, values.size());
     if (before_request) before_request();
     try {
+      claim(values[i]);
+      keep_alive();
       sdo_.download(parameter.object(), bytes_of(values[i].raw, parameter.bytes()),
                     repeat == Repeat::if_lost);
-      note_command(values[i]);
     } catch (const SdoAborted& aborted) {
       throw refusal(aborted, "write", name_of(parameter), more);
     } catch (const LinkError& error) {
@@ -163,22 +166,24 @@ std::vector<std::uint32_t> CanLink::read_capture(std::size_t count, const Progre
   return words;
 }
 
-void CanLink::note_command(const SlotValue& written) {
-  last_write_ = Clock::now();
+/// A controlword that is about to be written: whether its axis is this program's from now on.
+void CanLink::claim(const SlotValue& next) {
   for (std::size_t axis = 0; axis < commands_.size(); ++axis) {
-    if (written.slot == Parameter::of<"drive.controlword">(axis).slot())
-      commands_[axis] = (written.raw & firmware::controlword::enable_operation) != 0;
+    if (next.slot != Parameter::of<"drive.controlword">(axis).slot()) continue;
+    commands_[axis] = (next.raw & firmware::controlword::enable_operation) != 0;
+    if (!commands_[axis]) continue;
+    const Parameter commander = Parameter::of<"drive.commander">(axis);
+    sdo_.download(commander.object(), bytes_of(number_, commander.bytes()), true);
   }
 }
 
 void CanLink::keep_alive() {
   constexpr auto interval = std::chrono::milliseconds(100);
   const bool commands = std::find(commands_.begin(), commands_.end(), true) != commands_.end();
-  if (!commands || Clock::now() - last_write_ < interval) return;
+  if (!commands || Clock::now() - last_sign_of_life_ < interval) return;
   constexpr Parameter sign_of_life = Parameter::of<"link.sign_of_life">();
-  ++signs_of_life_;
-  sdo_.download(sign_of_life.object(), bytes_of(signs_of_life_, sign_of_life.bytes()), true);
-  last_write_ = Clock::now();
+  sdo_.download(sign_of_life.object(), bytes_of(number_, sign_of_life.bytes()), true);
+  last_sign_of_life_ = Clock::now();
 }
 
 std::map<std::string, std::string> CanLink::identify() {

@@ -27,9 +27,9 @@ class SdoRefused : public RefusedError {
 /// whole or nothing either; an error says how many were written before it. Device::apply() makes it whole by
 /// a transaction.
 ///
-/// For the device only writing is a sign of life on CAN (link.timeout). From a controlword that enables an
-/// axis on, until one that does not, reading through this link therefore writes link.sign_of_life ten times a
-/// second.
+/// An axis that this program enables is its own (drive.commander): from that controlword on, until one that
+/// does not enable it, whatever is asked through this link also writes this program's link.sign_of_life ten
+/// times a second, and no other program's traffic keeps the axis armed.
 ///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
 class CanLink final : public Link {
@@ -53,7 +53,7 @@ class CanLink final : public Link {
   std::uint32_t read(std::size_t slot);
   std::vector<std::uint32_t> read_words(SdoClient::Object object, std::size_t bytes,
                                         const SdoClient::ReportProgress& progress = {});
-  void note_command(const SlotValue& written);
+  void claim(const SlotValue& next);
   void keep_alive();
 
   using Clock = std::chrono::steady_clock;
@@ -62,8 +62,8 @@ class CanLink final : public Link {
   CanNodeLock lock_;
   SdoClient sdo_;
   std::array<bool, firmware::axis_count> commands_{};  ///< axes that this program has enabled
-  Clock::time_point last_write_{};
-  std::uint16_t signs_of_life_ = 0;
+  Clock::time_point last_sign_of_life_{};
+  std::uint16_t number_;  ///< as a commander; not 0
 };
 
 }  // namespace kmax::link

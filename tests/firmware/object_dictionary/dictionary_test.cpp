@@ -42,6 +42,8 @@ const std::vector<Word> vocabulary = {
     {"wall.adaptive_velocity", "", {"approach", "speed"}},
     {"wall.adaptive_mode", "", {"instant", "latched", "peak_hold"}},
     {"wall.adaptive_hold_time", "s"},
+    {"wall.stiffness_ceiling", "N/m"},
+    {"wall.damping_ceiling", "N s/m"},
     {"interference.mode", "", {"none", "perpendicular", "parallel"}},
     {"interference.force", "N"},
     {"interference.background_force", "N"},
@@ -55,6 +57,7 @@ const std::vector<Word> vocabulary = {
     {"force.limit", "N"},
     {"force.slew_limit", "N/s"},
     {"force.ramp_time", "s"},
+    {"force.ceiling", "N"},
     {"passivity.mode", "", {"off"}},  // 'observe' and 'control' when the firmware has them
     {"guard.mode", "", {"off", "warn", "refuse"}},
     {"guard.damping", "N s/m"},
@@ -363,15 +366,32 @@ TEST(Dictionary, FindsEveryNameAndNoOther) {
 // What would make the force jump or the scale change under the hand must not be writable while armed; what an
 // experiment turns up while the hand holds the handle must be.
 TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
-  for (const std::string_view name :
-       {"wall.law", "wall.position", "wall.side", "interference.mode", "position.resolution",
-        "position.rounding", "velocity.estimator", "velocity.window", "velocity.bandwidth", "haptic.rate",
-        "device.transmission", "encoder.counts_per_turn", "encoder.direction", "encoder.offset",
-        "encoder.kind", "motor.kind", "guard.mode"})
+  for (const std::string_view name : {"wall.law",
+                                      "wall.position",
+                                      "wall.side",
+                                      "interference.mode",
+                                      "position.resolution",
+                                      "position.rounding",
+                                      "velocity.estimator",
+                                      "velocity.window",
+                                      "velocity.bandwidth",
+                                      "haptic.rate",
+                                      "device.transmission",
+                                      "encoder.counts_per_turn",
+                                      "encoder.direction",
+                                      "encoder.offset",
+                                      "encoder.kind",
+                                      "motor.kind",
+                                      "guard.mode",
+                                      "link.timeout",
+                                      "force.ceiling",
+                                      "wall.stiffness_ceiling",
+                                      "wall.damping_ceiling"})
     EXPECT_EQ(named(name).change, Change::disarmed_only) << name;
   for (const std::string_view name :
-       {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit", "link.timeout",
-        "trace.interval", "transaction.control", "drive.controlword"})
+       {"wall.stiffness", "wall.damping", "wall.magnetic_coefficient", "force.limit", "velocity.limit"})
+    EXPECT_EQ(named(name).change, Change::only_lower) << name;
+  for (const std::string_view name : {"trace.interval", "transaction.control", "drive.controlword"})
     EXPECT_EQ(named(name).change, Change::any_time) << name;
 }
 

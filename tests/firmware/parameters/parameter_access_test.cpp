@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "firmware/parameters/armed_change.hpp"
 #include "tests/firmware/parameters/register_access.hpp"
 
 namespace kmax::firmware::parameter_access_test {
@@ -23,10 +24,6 @@ std::string_view partner_of(std::string_view name) {
     if (name == standard) return own;
   }
   return {};
-}
-
-bool is_setpoint(std::string_view name) {
-  return name == "profile.target_torque" || name == "profile.max_torque" || name == "profile.target_force";
 }
 
 struct Written {
@@ -170,7 +167,7 @@ TEST(ParameterAccess, ARangeIsWrittenWholeOrNotAtAllWhicheverValueIsWrong) {
     const double number = e.values.empty() ? e.default_value * 0.5 + e.minimum * 0.5 : e.values[0].value;
     for (const std::uint16_t word : words_for(e.name, number)) good.push_back(word);
   }
-  ASSERT_EQ(good.size(), 27u);
+  ASSERT_EQ(good.size(), 31u);
   for (const std::size_t axis : {0u, 1u}) {
     const std::uint16_t base = address_of("wall.law", axis);
     Written all;
@@ -264,18 +261,25 @@ TEST(ParameterAccess, ArmedRefusesWhatMustNotChangeButTakesTheSameValueAgain) {
     Written w;
     EXPECT_EQ(w.write(e.name, e.default_value, 0, true).refusal, Refusal::none) << e.name;
     EXPECT_EQ(w.registers.changes(), 0u);
-    const bool refused = e.change == Change::disarmed_only;
-    EXPECT_EQ(w.write(e.name, other, 0, true).refusal, refused ? Refusal::while_armed : Refusal::none)
+    const bool restarts = e.change == Change::disarmed_only;
+    const auto wanted = static_cast<float>(other), now = static_cast<float>(e.default_value);
+    const bool loosens =
+        (e.change == Change::only_higher && wanted < now) ||
+        (e.change == Change::only_lower && (wanted > now || (e.unbounded_at_zero && wanted == 0.0f)) &&
+         !(e.unbounded_at_zero && now == 0.0f)) ||
+        (e.change == Change::only_nearer_zero && std::abs(wanted) > std::abs(now));
+    const bool refused = restarts || loosens;
+    EXPECT_EQ(w.write(e.name, other, 0, true).refusal, restarts  ? Refusal::while_armed
+                                                       : loosens ? Refusal::only_tightens
+                                                                 : Refusal::none)
         << e.name;
-    EXPECT_EQ(w.registers.changes(),
-              refused || is_setpoint(e.name) || e.name == "link.sign_of_life" ? 0u : 1u)
-        << e.name;
+    EXPECT_EQ(w.registers.changes(), refused || acts_at_once(slot_of(i, 0)) ? 0u : 1u) << e.name;
     Written disarmed;
     // A rule between two parameters.
     if (e.name == "compensation.limit") other = 50;
     if (e.name == "compensation.limit") disarmed.write("guard.friction", 100);
     EXPECT_EQ(disarmed.write(e.name, other).refusal, Refusal::none) << e.name;
-    EXPECT_EQ(disarmed.registers.restarting_changes(), refused ? 1u : 0u) << e.name;
+    EXPECT_EQ(disarmed.registers.restarting_changes(), restarts ? 1u : 0u) << e.name;
   }
 }
 
@@ -339,6 +343,7 @@ RC_GTEST_PROP(ParameterAccess, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
       }
     }
     const auto before = registers.bits();
+    const ParameterValues values_before = registers.values();
     const auto changes = registers.changes();
     const auto result = registers.write(address, words, armed, now);
     RC_ASSERT(registers.last_refusal().refusal == result.refusal);
@@ -350,11 +355,8 @@ RC_GTEST_PROP(ParameterAccess, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
       if (after[s] == before[s]) continue;
       RC_ASSERT(d.writable);
       RC_ASSERT(check_value(d, after[s]) == Refusal::none);
-      RC_ASSERT(!(armed && d.disarmed_only));
-      const std::string_view name = entry_at(owner_of(s).entry).name;
-      const bool acts_at_once =
-          name == "drive.controlword" || name == "link.sign_of_life" || is_setpoint(name);
-      if (!acts_at_once) RC_ASSERT(registers.changes() == changes + 1);
+      RC_ASSERT(armed_change_refusal(values_before, s, after[s], armed) == Refusal::none);
+      if (!acts_at_once(s)) RC_ASSERT(registers.changes() == changes + 1);
     }
   }
 }

@@ -122,10 +122,11 @@ TEST_F(Transaction, ArmedBetweenStagingAndCommitIsRefusedWhole) {
 
 TEST_F(Transaction, WhileArmedTakesWhatMayChangeAndRefusesTheRestWhenStaged) {
   EXPECT_EQ(control(1, true), Refusal::none);
-  EXPECT_EQ(set("wall.stiffness", 5000, true), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 500, true), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 5000, true), Refusal::only_tightens);
   EXPECT_EQ(set("wall.position", 0.25, true), Refusal::while_armed);
   EXPECT_EQ(control(2, true), Refusal::none);
-  EXPECT_EQ(get("wall.stiffness"), 5000);
+  EXPECT_EQ(get("wall.stiffness"), 500);
   EXPECT_EQ(get("wall.position"), 0);
 }
 

@@ -47,7 +47,8 @@ TEST(SlotDescriptors, SayWhatTheTableSays) {
     EXPECT_EQ(d.type, e.type) << e.name;
     EXPECT_EQ(d.writable, e.access == Access::read_write) << e.name;
     EXPECT_EQ(d.kept, e.access == Access::read_write || e.access == Access::communication) << e.name;
-    EXPECT_EQ(d.disarmed_only, e.change == Change::disarmed_only) << e.name;
+    EXPECT_EQ(d.change(), e.change) << e.name;
+    EXPECT_EQ(d.unbounded_at_zero(), e.unbounded_at_zero) << e.name;
     EXPECT_EQ(d.per_axis, e.scope() == Scope::axis) << e.name;
     EXPECT_EQ(d.persistent, e.persistent) << e.name;
     EXPECT_EQ(d.minimum(), raw_from_number(e.type, e.minimum)) << e.name;

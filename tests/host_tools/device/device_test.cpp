@@ -58,7 +58,7 @@ TEST_F(OpenDevice, OneGroupIsOneRequest) {
   for (const Parameter& parameter : all_parameters()) {
     if (parameter.axis() == 0 && parameter.name().starts_with("wall.")) wall.push_back(parameter);
   }
-  EXPECT_EQ(device.read(wall).size(), 16u);
+  EXPECT_EQ(device.read(wall).size(), 18u);
   EXPECT_EQ(connection.link->requests, 1);
 }
 
@@ -147,12 +147,25 @@ TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
     connection.fake->machines[1].command(word, Refusal::none, false);
   const auto before = connection.fake->settings();
   const auto message = thrown_message<DeviceError>([&] {
-    device.apply(assignments({"wall.damping=7", "wall.law=magnetic"}));
+    device.apply(assignments({"wall.stiffness=7", "wall.law=magnetic"}));
   });
   EXPECT_CONTAINS(message, "wall.law = magnetic");
   EXPECT_CONTAINS(message, "disarm first");
   EXPECT_EQ(connection.fake->settings(), before);
-  device.apply(assignments({"wall.damping=7"}));
+  device.apply(assignments({"wall.stiffness=7"}));
+}
+
+TEST_F(OpenDevice, ABoundThatIsOnlyTightenedWhileArmedIsRefusedWithItsDirectionAndItsCeiling) {
+  for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
+    connection.fake->machines[0].command(word, Refusal::none, false);
+  const auto before = connection.fake->settings();
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.damping=7"})); }),
+                  "it can only be lowered from 0 N s/m, or raised up to wall.damping_ceiling (0 N s/m)");
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"force.ramp_time=0"})); }),
+                  "it can only be raised from 0.2 s");
+  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"interference.force=-1"})); }),
+                  "it can only be brought nearer to 0 from 0 N, or raised up to force.ceiling (0 N)");
+  EXPECT_EQ(connection.fake->settings(), before);
 }
 
 TEST_F(OpenDevice, ATransactionLeftOpenIsWaitedFor) {

@@ -74,6 +74,7 @@ class MotorBench {
         static_cast<double>(report().haptic.position) * firmware::count_length(application().values(), 0);
     EXPECT_EQ(set<"wall.law">(2), firmware::Refusal::none);
     set<"wall.magnetic_coefficient">(0.0);
+    set<"force.ceiling">(100.0);  // set_wall_force() raises it while armed
     set<"wall.position">(at - side * 0.0005);
     set<"wall.side">(side);
     set<"force.ramp_time">(0.0);

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "firmware/drive/armed_axes.hpp"
+#include "firmware/parameters/parameter_values.hpp"
+
+/// What may change while a hand is on a device that makes force: see Change.
+namespace kmax::firmware {
+
+namespace armed_change {
+/// A bound, and the entry up to which it may be loosened while armed.
+struct Ceiling {
+  std::uint16_t of, entry;
+};
+inline constexpr std::size_t ceiling_count = [] {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < entry_count; ++i) count += entry_at(i).ceiling.empty() ? 0U : 1U;
+  return count;
+}();
+inline constexpr auto ceilings = [] {
+  std::array<Ceiling, ceiling_count> all{};
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    if (entry_at(i).ceiling.empty()) continue;
+    all[next++] = {static_cast<std::uint16_t>(i),
+                   static_cast<std::uint16_t>(find_entry(entry_at(i).ceiling))};
+  }
+  return all;
+}();
+
+/// The greater, the less it protects.
+constexpr float looseness(const SlotDescriptor& descriptor, float value) {
+  if (descriptor.unbounded_at_zero() && value == 0.0f) return std::numeric_limits<float>::infinity();
+  if (descriptor.change() == Change::only_higher) return -value;
+  if (descriptor.change() == Change::only_nearer_zero) return value < 0.0f ? -value : value;
+  return value;
+}
+}  // namespace armed_change
+
+/// Why the slot's value may not become `raw` while these axes are armed; none: it may.
+constexpr Refusal armed_change_refusal(const ParameterValues& now, std::size_t slot, std::uint32_t raw,
+                                       const ArmedAxes& armed) {
+  const auto [entry, axis] = owner_of(slot);
+  const SlotDescriptor& descriptor = descriptors[entry];
+  if (!armed.any() || descriptor.change() == Change::any_time || raw == now.raw(slot)) return Refusal::none;
+  // Such a change restarts every axis' estimators.
+  if (descriptor.disarmed_only()) return Refusal::while_armed;
+  if (descriptor.per_axis && !armed.axis[axis]) return Refusal::none;
+  float loosest = armed_change::looseness(descriptor, std::bit_cast<float>(now.raw(slot)));
+  for (const auto& ceiling : armed_change::ceilings) {
+    if (ceiling.of == entry)
+      loosest = std::max(loosest, std::bit_cast<float>(now.raw(slot_of(ceiling.entry, axis))));
+  }
+  return armed_change::looseness(descriptor, std::bit_cast<float>(raw)) <= loosest ? Refusal::none
+                                                                                   : Refusal::only_tightens;
+}
+
+}  // namespace kmax::firmware
