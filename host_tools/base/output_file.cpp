@@ -1,11 +1,44 @@
 #include "host_tools/base/output_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include <filesystem>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
-namespace kmax::cli {
+namespace kmax::base {
+
+namespace {
+/// What went wrong, or 0.
+int write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+/// So that the name outlasts a loss of power too; the text is whole in either case.
+void sync_folder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+[[noreturn]] void fail(const std::filesystem::path& path, int error) {
+  std::error_code ignored;
+  throw std::runtime_error(fmt::format(
+      "{}: cannot be written: {}{}", path.string(), std::strerror(error),
+      std::filesystem::is_regular_file(path, ignored) ? "; what was there before is as it was" : ""));
+}
+}  // namespace
 
 std::runtime_error cannot_write(const std::string& path) {
   return std::runtime_error(
@@ -18,4 +51,34 @@ void check_writable(const std::string& path) {
   if (!was_there) std::filesystem::remove(path);
 }
 
-}  // namespace kmax::cli
+void write_file(const std::filesystem::path& path, std::string_view text) {
+  // A link stays one.
+  std::error_code ignored;
+  std::filesystem::path target = std::filesystem::canonical(path, ignored);
+  if (target.empty() && std::filesystem::is_symlink(path, ignored)) fail(path, ENOENT);
+  if (target.empty()) target = path;
+  struct stat before {};
+  const bool was_there = ::stat(target.c_str(), &before) == 0;
+  if (was_there && !S_ISREG(before.st_mode)) {
+    const int descriptor = ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
+    if (descriptor < 0) fail(path, errno);
+    const int error = write_all(descriptor, text);
+    ::close(descriptor);
+    if (error != 0) fail(path, error);
+    return;
+  }
+  const std::string part = fmt::format("{}.{}.part", target.string(), ::getpid());
+  ::unlink(part.c_str());  // of a process of this number that was killed
+  const int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) fail(path, errno);
+  int error = write_all(descriptor, text);
+  if (error == 0 && was_there && ::fchmod(descriptor, before.st_mode & 07777) != 0) error = errno;
+  if (error == 0 && ::fsync(descriptor) != 0) error = errno;
+  if (::close(descriptor) != 0 && error == 0) error = errno;
+  if (error == 0 && ::rename(part.c_str(), target.c_str()) != 0) error = errno;
+  if (error == 0) return sync_folder(target);
+  ::unlink(part.c_str());
+  fail(path, error);
+}
+
+}  // namespace kmax::base

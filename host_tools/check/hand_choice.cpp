@@ -4,11 +4,12 @@
 #include <toml++/toml.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/toml_text.hpp"
 #include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/simulation/scene.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 
 namespace kmax::check {
@@ -20,19 +21,10 @@ control::Hand<double> hand_of(const simulation::OperatorModel& person) {
 }
 
 simulation::OperatorModel read_person(const std::string& path) {
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path))
-    throw device::ValueError(fmt::format(
-        "--hand {}: no such file can be read; allowed is none, subject_1, or a TOML file with [operator]",
-        path));
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = base::text_of<device::ValueError>(
+      path, "--hand takes none, subject_1, or the path of a TOML file with [operator]");
   const simulation::SceneTables tables(path);
-  toml::table root;
-  try {
-    root = toml::parse(text, path);
-  } catch (const toml::parse_error& error) {
-    tables.fail(error.source(), std::string(error.description()));
-  }
+  const toml::table root = base::parsed_toml<simulation::SceneError>(text, path);
   const toml::table* table = tables.part(root, "", "operator");
   if (table == nullptr)
     tables.fail(root.source(),

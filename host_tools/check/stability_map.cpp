@@ -6,10 +6,10 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/base/output_file.hpp"
 #include "host_tools/check/criterion_text.hpp"
 #include "host_tools/check/parameter_case.hpp"
 #include "host_tools/device/value_text.hpp"
@@ -119,10 +119,7 @@ void write_map_csv(const StabilityMap& map, const std::filesystem::path& path) {
       text += '\n';
     }
   }
-  std::ofstream file(path);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", path.string()));
+  base::write_file(path, text);
 }
 
 }  // namespace kmax::check

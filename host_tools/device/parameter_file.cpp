@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <tuple>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/input_file.hpp"
 #include "host_tools/base/suggestion.hpp"
+#include "host_tools/base/toml_text.hpp"
 
 namespace kmax::device {
 
@@ -64,17 +64,18 @@ const std::vector<std::string>& groups() {
   return names;
 }
 
+constexpr std::string_view dump_begin =
+    "# Parameters of a Kmax device; 'kmax load FILE' sets them, 'kmax diff FILE' compares.\n";
+/// Whoever edits a dump may change all but these two lines.
+constexpr std::string_view dump_end = "# End of the parameters.\n";
+
 class FileReader {
  public:
   explicit FileReader(const std::string& source) : source_(source) {}
 
   std::vector<FileSetting> read(std::string_view text) {
-    toml::table root;
-    try {
-      root = toml::parse(text, source_);
-    } catch (const toml::parse_error& error) {
-      throw ValueError(message({place_of(error.source()), std::string(error.description())}));
-    }
+    refuse_cut_off(text);
+    const toml::table root = base::parsed_toml<ValueError>(text, source_);
     read_table(root, "");
     std::sort(settings_.begin(), settings_.end(),
               [](const Placed& a, const Placed& b) { return a.place < b.place; });
@@ -102,6 +103,16 @@ class FileReader {
     Place place;
     std::string what;
   };
+
+  /// A file that begins as a dump does and lacks a dump's end has lost what was in between.
+  void refuse_cut_off(std::string_view text) const {
+    if (!text.starts_with(dump_begin.substr(0, dump_begin.size() - 1))) return;
+    if (text.find(dump_end.substr(0, dump_end.size() - 1)) != std::string_view::npos) return;
+    throw ValueError(fmt::format(
+        "{}: it was cut off: it begins as a file of 'kmax dump', and the last line of one, '{}', is missing; "
+        "dump it again, or take away its first line if this is all that you want",
+        source_, dump_end.substr(0, dump_end.size() - 1)));
+  }
 
   static Place place_of(const toml::source_region& where) { return {where.begin.line, where.begin.column}; }
 
@@ -190,8 +201,7 @@ std::vector<Parameter> file_parameters() {
 }
 
 std::string parameter_file_text(const FileOrigin& origin, std::span<const Assignment> assignments) {
-  std::string text =
-      "# Parameters of a Kmax device; 'kmax load FILE' sets them, 'kmax diff FILE' compares.\n";
+  std::string text(dump_begin);
   text +=
       fmt::format("# device: {}\n# firmware {}\n", in_comment(origin.device), in_comment(origin.firmware));
   text += "# What is left out here stays as it is on the device. CANopen's own settings are never in here.\n";
@@ -210,7 +220,7 @@ std::string parameter_file_text(const FileOrigin& origin, std::span<const Assign
                           remark.empty() ? "" : "  # " + remark);
     }
   }
-  return text;
+  return text + "\n" + std::string(dump_end);
 }
 
 std::vector<FileSetting> parse_parameter_file(std::string_view text, const std::string& source) {
@@ -218,15 +228,10 @@ std::vector<FileSetting> parse_parameter_file(std::string_view text, const std::
 }
 
 std::vector<FileSetting> read_parameter_file(const std::string& path) {
-  std::error_code ignored;
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path, ignored))
-    throw ValueError(
-        fmt::format("{}: cannot be read; give the path of a file of parameters (TOML), as 'kmax dump FILE' "
-                    "writes it",
-                    path));
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return parse_parameter_file(text, path);
+  return parse_parameter_file(
+      base::text_of<ValueError>(
+          path, "give the path of a file of parameters (TOML), as 'kmax dump FILE' writes it"),
+      path);
 }
 
 }  // namespace kmax::device

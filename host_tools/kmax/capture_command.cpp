@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/interruption.hpp"
@@ -228,14 +228,13 @@ CaptureOptions checked(const CaptureOptions& given, const Context& context) {
 
 int run_capture(Context& context, const CaptureOptions& given) {
   const CaptureOptions options = checked(given, context);
-  if (!options.file.empty()) check_writable(options.file);
+  if (!options.file.empty()) base::check_writable(options.file);
   device::Device device = context.connect();
   const Captured captured = capture(context, device, options);
   if (!options.file.empty()) {
-    std::ofstream file(options.file);
-    write_csv(file, captured);
-    file.close();
-    if (!file) throw cannot_write(options.file);
+    std::ostringstream table;
+    write_csv(table, captured);
+    base::write_file(options.file, table.str());
   }
   if (context.json) {
     context.print(capture_json(captured, options));

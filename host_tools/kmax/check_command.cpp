@@ -171,7 +171,7 @@ int draw_map(Context& context, const CheckOptions& options) {
   if (sides[0].parameter == sides[1].parameter)
     throw UsageError(fmt::format("--map: both sides are {}; name two parameters", sides[0].parameter.name()));
   if (!options.picture.empty()) plot::require_picture_name(options.picture);
-  if (!options.csv.empty()) check_writable(options.csv);
+  if (!options.csv.empty()) base::check_writable(options.csv);
   const check::HandChoice hand = check::choose_hand(options.hand);
   const firmware::ParameterValues values = values_of(context, options, sides);
   const check::StabilityMap map = check::map_stability(values, context.axis(), hand.hand, sides[0], sides[1]);

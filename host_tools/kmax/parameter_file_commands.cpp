@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <fstream>
 
 #include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
@@ -107,17 +106,12 @@ device::FileOrigin origin_of(Device& device) {
 int run_dump(Context& context, const DumpOptions& options) {
   const std::string& file = options.file;
   const bool to_file = file != "-";
-  if (to_file) check_writable(file);  // before a device is asked
+  if (to_file) base::check_writable(file);  // before a device is asked
   Device device = context.connect();
   const auto values = values_of(device);
   const device::FileOrigin origin = origin_of(device);
   const std::string text = parameter_file_text(origin, values);
-  if (to_file) {
-    std::ofstream stream(file, std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw cannot_write(file);
-  }
+  if (to_file) base::write_file(file, text);
   if (context.json) {
     Json all = Json::object();
     for (const Assignment& one : values)

@@ -76,7 +76,7 @@ void write_rows(Context& context, record::RowSource& source, const RecordOptions
   std::ofstream file;
   if (!options.to_standard_output()) {
     file.open(options.file);
-    if (!file) throw cannot_write(options.file);
+    if (!file) throw base::cannot_write(options.file);
   }
   std::ostream& out = options.to_standard_output() ? context.out : file;
   const record::RowCsv csv(context.axes(), source.axes_apart());
@@ -170,7 +170,7 @@ void check(const Context& context, const RecordOptions& options) {
 
 int run_record(Context& context, const RecordOptions& options) {
   check(context, options);
-  if (!options.to_standard_output()) check_writable(options.file);
+  if (!options.to_standard_output()) base::check_writable(options.file);
   const link::DeviceAddress address = link::parse_device_address(context.device_address());
   // From before a node is started to after it has been put back.
   const Interruption interruption;

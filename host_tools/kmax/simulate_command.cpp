@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 
+#include "host_tools/base/output_file.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
@@ -70,19 +70,17 @@ void write_csv(const simulation::Scene& scene, const RunResult& result, const st
       head += fmt::format(",{}{}", second ? "axis1_" : "", column.name);
     }
   }
-  std::ofstream file(path);
-  file << head << '\n';
+  std::string table = head + '\n';
   std::size_t other = 0;
   for (const RunSample& sample : result.samples) {
     while (other + 1 < result.second_samples.size() && result.second_samples[other + 1].time <= sample.time)
       ++other;
-    file << fmt::format("{}", sample.time);
+    table += fmt::format("{}", sample.time);
     for (const Cell& cell : cells)
-      file << fmt::format(",{}", (cell.second ? result.second_samples[other] : sample).*cell.column.member);
-    file << '\n';
+      table += fmt::format(",{}", (cell.second ? result.second_samples[other] : sample).*cell.column.member);
+    table += '\n';
   }
-  file.close();
-  if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", path));
+  base::write_file(path, table);
 }
 
 plot::Series series(const std::vector<RunSample>& samples, double RunSample::*member, double scale,

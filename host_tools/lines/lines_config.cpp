@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <fstream>
 #include <initializer_list>
-#include <iterator>
 #include <sstream>
 #include <utility>
+
+#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/toml_text.hpp"
 
 namespace kmax::lines {
 namespace {
@@ -135,12 +136,7 @@ const LineSettings& LinesConfig::required(LineRole role) const {
 
 LinesConfig parse_lines_config(std::string_view text, const std::string& name) {
   const Reader reader(name);
-  toml::table root;
-  try {
-    root = toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    reader.fail(error.source(), std::string(error.description()));
-  }
+  const toml::table root = base::parsed_toml<LinesConfigError>(text, name);
   LinesConfig config;
   config.file = name;
   for (const auto& [key, node] : root) {
@@ -172,11 +168,8 @@ LinesConfig parse_lines_config(std::string_view text, const std::string& name) {
 }
 
 LinesConfig load_lines_config(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file))
-    throw LinesConfigError(fmt::format("{}: cannot be read", file.string()));
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  return parse_lines_config(text, file.string());
+  return parse_lines_config(base::text_of<LinesConfigError>(file, "give the path of a file of lines (TOML)"),
+                            file.string());
 }
 
 std::filesystem::path default_lines_file() {

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <fstream>
 #include <limits>
+#include <sstream>
 #include <string_view>
 #include <utility>
+
+#include "host_tools/base/input_file.hpp"
 
 namespace kmax::plot {
 
@@ -30,8 +32,7 @@ std::vector<std::string> fields_of(const std::string& line) {
 }  // namespace
 
 CsvTable read_csv(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) throw CsvError(fmt::format("{}: cannot be opened for reading", path.string()));
+  std::istringstream file(base::text_of<CsvError>(path, "give the path of a table (CSV)"));
   CsvTable table;
   std::string line;
   for (std::size_t number = 1; std::getline(file, line); ++number) {

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/toml_text.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 
 namespace kmax::simulation {
@@ -456,11 +458,11 @@ std::uint64_t Scene::seed_of(std::size_t axis) const {
 }
 
 Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check) {
-  return SceneReader(source, check).read(parsed_toml(text, source));
+  return SceneReader(source, check).read(base::parsed_toml<SceneError>(text, source));
 }
 
 Scene load_scene(const std::string& path, const ParameterCheck& check) {
-  return parse_scene(text_of_file(path, "a scene file"), path, check);
+  return parse_scene(base::text_of<SceneError>(path, "give the path of a scene file (TOML)"), path, check);
 }
 
 std::string to_string(const IntegratorConfig& integrator) {

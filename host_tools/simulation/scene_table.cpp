@@ -1,30 +1,12 @@
 #include "host_tools/simulation/scene_table.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::simulation {
-
-toml::table parsed_toml(std::string_view text, std::string_view source) {
-  try {
-    return toml::parse(text, source);
-  } catch (const toml::parse_error& error) {
-    throw SceneError(fmt::format("{}:{}:{}: not valid TOML: {}", source, error.source().begin.line,
-                                 error.source().begin.column, error.description()));
-  }
-}
-
-std::string text_of_file(const std::filesystem::path& path, std::string_view what) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    throw SceneError(fmt::format("{}: cannot be read; give the path of {} (TOML)", path.string(), what));
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::string SceneTables::text_of(const toml::node& node) {
   if (node.is_table()) return "{table}";

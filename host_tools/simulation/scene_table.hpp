@@ -18,12 +18,6 @@
 
 namespace kmax::simulation {
 
-// Throws SceneError that begins with file:line:column. `source` stands for the file name.
-toml::table parsed_toml(std::string_view text, std::string_view source);
-
-// Throws SceneError. `what`: what the file should have been, with its article.
-std::string text_of_file(const std::filesystem::path& path, std::string_view what);
-
 class SceneTables {
  public:
   // `source` stands for the file name in messages.

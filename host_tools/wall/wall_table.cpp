@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/output_file.hpp"
 
 namespace kmax::wall {
 
@@ -16,17 +18,6 @@ namespace {
 constexpr std::string_view position_column = "position_m";
 constexpr std::string_view velocity_column = "velocity_m_per_s";
 constexpr std::size_t absent = static_cast<std::size_t>(-1);
-
-std::string read_whole(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::error_code error;
-  // A folder can be opened; only reading it fails, outside the stream's own error handling.
-  if (!file || std::filesystem::is_directory(path, error))
-    throw TableError(fmt::format("{}: cannot be opened for reading", path.string()));
-  std::string text(std::istreambuf_iterator<char>(file), {});
-  if (file.bad()) throw TableError(fmt::format("{}: reading failed", path.string()));
-  return text;
-}
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
@@ -83,7 +74,8 @@ double read_number(std::string_view field, std::string_view column, const std::s
 
 std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem::path& input,
                            const std::filesystem::path& output) {
-  const std::string text = read_whole(input);
+  const std::string text = base::text_of<TableError>(
+      input, "give the path of a table with the columns position_m,velocity_m_per_s");
   const std::string file = input.string();
   std::string_view rest = text;
   std::size_t line_number = 0, rows = 0;
@@ -124,16 +116,10 @@ std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem
   if (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error))
     throw TableError(
         fmt::format("{}: is not a regular file; give the name of a file to write", output.string()));
-  const std::filesystem::path unfinished = output.string() + ".part";
-  std::ofstream target(unfinished, std::ios::binary | std::ios::trunc);
-  target.write(out.data(), static_cast<std::streamsize>(out.size()));
-  target.close();
-  if (target) std::filesystem::rename(unfinished, output, error);
-  if (!target || error) {
-    std::error_code ignored;
-    std::filesystem::remove(unfinished, ignored);
-    throw TableError(fmt::format("{}: cannot be written: {}", output.string(),
-                                 error ? error.message() : "is the folder there, writable, and not full?"));
+  try {
+    base::write_file(output, std::string_view(out.data(), out.size()));
+  } catch (const std::runtime_error& failure) {
+    throw TableError(failure.what());
   }
   return rows;
 }

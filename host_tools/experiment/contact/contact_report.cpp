@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <fstream>
 
+#include "host_tools/base/output_file.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -57,19 +57,17 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
                                                  const std::string& picture_ending) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path csv = folder / (base_name(result.condition) + ".csv");
-  std::ofstream file(csv);
-  file << "time_s,position_m,force_n,magnetic_coefficient_n\n";
+  std::string table = "time_s,position_m,force_n,magnetic_coefficient_n\n";
   plot::Series distance{"", {}, {}, true}, force{"", {}, {}, true}, coefficient{"", {}, {}, true};
   for (const RigSample& sample : result.samples) {
-    file << fmt::format("{},{},{},{}\n", sample.time, result.position(sample), sample.force,
-                        sample.magnetic_coefficient);
+    table += fmt::format("{},{},{},{}\n", sample.time, result.position(sample), sample.force,
+                         sample.magnetic_coefficient);
     for (plot::Series* series : {&distance, &force, &coefficient}) series->x.push_back(sample.time);
     distance.y.push_back(sample.outside_distance * 1e3);
     force.y.push_back(sample.force);
     coefficient.y.push_back(sample.magnetic_coefficient);
   }
-  file.close();
-  if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", csv.string()));
+  base::write_file(csv, table);
 
   plot::Figure figure;
   figure.title = fmt::format("{}: {}, {:.2f} mm peak to peak", result.condition.name,

@@ -4,11 +4,13 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <set>
 #include <sstream>
 
+#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/toml_text.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/simulation/scene_table.hpp"
@@ -103,11 +105,12 @@ std::string quoted(const std::string& text) {
 }  // namespace
 
 SubjectSet parse_subject_set(std::string_view text, std::string_view source) {
-  return SubjectSetReader(source).read(simulation::parsed_toml(text, source));
+  return SubjectSetReader(source).read(base::parsed_toml<simulation::SceneError>(text, source));
 }
 
 SubjectSet load_subject_set(const std::filesystem::path& path) {
-  return parse_subject_set(simulation::text_of_file(path, "a subject set"), path.string());
+  return parse_subject_set(
+      base::text_of<simulation::SceneError>(path, "give the path of a subject set (TOML)"), path.string());
 }
 
 SubjectSet open_subject_set(const std::string& name_or_path) {
@@ -137,16 +140,7 @@ std::string subject_set_text(const SubjectSet& set) {
 }
 
 void store_subject_set(const SubjectSet& set, const std::filesystem::path& path) {
-  const std::filesystem::path unfinished = path.string() + ".unfinished";
-  {
-    std::ofstream file(unfinished);
-    file << subject_set_text(set);
-    file.close();
-    if (!file)
-      throw std::runtime_error(fmt::format(
-          "{}: cannot be written; does the folder exist, and may you write to it?", path.string()));
-  }
-  std::filesystem::rename(unfinished, path);
+  base::write_file(path, subject_set_text(set));
 }
 
 std::vector<Subject> draw_subjects(std::size_t count, std::uint64_t seed,

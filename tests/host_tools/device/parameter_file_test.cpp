@@ -107,7 +107,7 @@ TEST(ParameterFile, IsGroupedWithUnitsAndChoices) {
       "\n[velocity]\nwindow = 8  # samples\n"
       "\n[node]\nid = 5\n"
       "\n[modbus]\nbaud_rate = 9600  # baud: 9600, 19200, ");
-  EXPECT_TRUE(text.ends_with("\n\n[axis1.wall]\nside = -1  # -1, +1\n")) << text;
+  EXPECT_TRUE(text.ends_with("\n\n[axis1.wall]\nside = -1  # -1, +1\n\n# End of the parameters.\n")) << text;
   std::vector<Assignment> read;
   for (const FileSetting& setting : parse(text)) read.push_back(setting.assignment);
   EXPECT_TRUE(std::is_permutation(read.begin(), read.end(), values.begin(), values.end()));
@@ -241,6 +241,26 @@ TEST(ParameterFile, AFileWithoutParametersIsRefused) {
   for (const char* text :
        {"", "\n", "# wall.stiffness = 1\n", "[wall]\n[axis1]\n[axis0.wall]\n[axis1.wall]\n"})
     EXPECT_CONTAINS(complaint(text), "f.toml: it has no parameters; 'kmax dump FILE' writes a file") << text;
+}
+
+// At every length, as a disk that was full or a copy that was broken off leaves it.
+TEST(ParameterFile, ADumpThatWasCutOffIsRefusedWhereverItEnds) {
+  const firmware::ParameterValues defaults;
+  std::vector<Assignment> all;
+  for (const Parameter& parameter : file_parameters())
+    all.push_back({parameter, defaults.raw(parameter.slot())});
+  const std::string whole = parameter_file_text({"a device", "0.1.0"}, all);
+  EXPECT_EQ(parse_parameter_file(whole, "f").size(), all.size());
+  const std::size_t head = whole.find('\n') + 1;
+  for (std::size_t length = head; length + 2 < whole.size(); length += length < head + 400 ? 1 : 97)
+    EXPECT_THROW(parse_parameter_file(whole.substr(0, length), "f"), ValueError) << length;
+  const std::string half = whole.substr(0, whole.find("\n[", whole.size() / 2));
+  EXPECT_CONTAINS(
+      thrown_message<ValueError>([&] { parse_parameter_file(half, "f"); }),
+      "f: it was cut off: it begins as a file of 'kmax dump', and the last line of one, '# End of the "
+      "parameters.', is missing");
+  EXPECT_GT(parse_parameter_file(half.substr(head), "f").size(), 10U)
+      << "without the first line it is a person's";
 }
 
 TEST(ParameterFile, IsReadFromDisk) {

@@ -25,7 +25,7 @@ TEST_F(Plot, ChosenColumns) {
 
 TEST_F(Plot, BadInput) {
   expect_error({"plot"}, wrong_usage, "table is required");
-  expect_error({"plot", in("none.csv")}, wrong_usage, "cannot be opened");
+  expect_error({"plot", in("none.csv")}, wrong_usage, "cannot be read");
   expect_error({"plot", folder.write("one.csv", "a\n1\n").string()}, failed, "nothing to draw");
   expect_error({"plot", folder.write("run.csv", "a,b\n1,2\n").string(), "--out", in("a.pdf")}, wrong_usage,
                "must end in .svg or .png");

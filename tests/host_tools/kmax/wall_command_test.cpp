@@ -68,7 +68,7 @@ TEST_F(Wall, BadNumbersAndParametersAreWrongUsage) {
 
 TEST_F(Wall, FilesThatCannotBeReadOrWrittenAreNamed) {
   const std::string table = folder.write("in.csv", "position_m\n0\nx\n").string();
-  expect_error({"wall", "--csv", in("none.csv"), "--out", in("o.csv")}, wrong_usage, "cannot be opened");
+  expect_error({"wall", "--csv", in("none.csv"), "--out", in("o.csv")}, wrong_usage, "cannot be read");
   expect_error({"wall", "--csv", table, "--out", in("o.csv")}, wrong_usage, "in.csv:3: position_m is 'x'");
   expect_error({"wall", "--picture", in("p.gif")}, wrong_usage, "must end in .svg or .png");
   expect_error({"wall", "--picture", in("no/p.svg")}, wrong_usage, "does not exist");

@@ -46,9 +46,9 @@ TEST(CsvTable, ErrorsSayWhereAndWhy) {
   EXPECT_CONTAINS(refused("a,b\n"), "no rows");
   EXPECT_CONTAINS(refused("a,b\n1,2\n1\n"), "t.csv:3: 1 fields where the first line names 2");
   EXPECT_CONTAINS(refused("a,b\n1,2,\n"), "t.csv:2: 3 fields where");
-  EXPECT_CONTAINS(thrown_message<CsvError>([] { read_csv("/no/such/file.csv"); }), "cannot be opened");
+  EXPECT_CONTAINS(thrown_message<CsvError>([] { read_csv("/no/such/file.csv"); }), "cannot be read");
   const TemporaryFolder folder;
-  EXPECT_CONTAINS(thrown_message<CsvError>([&] { read_csv(folder.path()); }), "reading failed");
+  EXPECT_CONTAINS(thrown_message<CsvError>([&] { read_csv(folder.path()); }), "it is a folder");
   EXPECT_CONTAINS(thrown_message<CsvError>([] { read("a,b\n1,2\n").column("c"); }),
                   "no column 'c'; the columns are a, b");
 }

@@ -91,10 +91,10 @@ TEST_F(WallTable, HeaderMustNameThePositionOnce) {
 TEST_F(WallTable, MissingFilesAndFoldersAreErrorsOfThisKind) {
   EXPECT_CONTAINS(
       thrown_message<TableError>([&] { evaluate_table(evaluator, folder / "none.csv", folder / "out.csv"); }),
-      "none.csv: cannot be opened");
+      "none.csv: cannot be read");
   EXPECT_CONTAINS(
       thrown_message<TableError>([&] { evaluate_table(evaluator, folder.path(), folder / "out.csv"); }),
-      "cannot be opened");
+      "cannot be read");
   folder.write("in.csv", "position_m\n0\n");
   EXPECT_CONTAINS(thrown_message<TableError>(
                       [&] { evaluate_table(evaluator, folder / "in.csv", folder / "no/out.csv"); }),
