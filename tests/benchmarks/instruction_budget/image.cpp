@@ -82,6 +82,30 @@ void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
   report(name, counts, budget);
 }
 
+/// In contact, with a hand that moves; once asleep; and what a turn adds to it.
+void measure_instability() {
+  static Instability detector;
+  const auto c = Instability::prepare({});
+  Counts awake, asleep, turn;
+  for (int i = 0; i < 60000; ++i) {
+    const bool touched = i / 10000 % 2 == 0;
+    const auto angle = static_cast<std::uint32_t>(i) * 20000000U;
+    const float displacement = 4e-4F * sine_cosine<float>(angle).sine;
+    const float force = touched ? 2.0F - 4000.0F * displacement : 0.0F;
+    const Registers arguments{{&detector, &c}, {displacement, force}};
+    const std::uint32_t counted = count(arguments, &instability_step);
+    // A turn at every 107th sample or so, far above the others; it takes a period to fall asleep.
+    if (touched) {
+      (counted > 70 ? turn : awake).add(counted, true);
+    } else if (i % 10000 > 2000) {
+      asleep.add(counted, true);
+    }
+  }
+  report("instability detector in free space     ", asleep, 20);
+  report("instability detector in contact        ", awake, 60);
+  report("instability detector, a turn           ", turn, 0);
+}
+
 template <typename Counter>
 void measure_position(const char* name,
                       void (*step)(Position<Counter>&, const PositionCoefficients&, PositionOutput&,
@@ -247,6 +271,7 @@ int main() {
   print("Executed instructions, Cortex-M4F       usual  worst budget\n");
   measure_wall("adaptive wall law                      ", kmax::control::WallKind::adaptive, 91);
   measure_wall("magnetic wall law                      ", kmax::control::WallKind::magnetic, 0);
+  measure_instability();
   measure_position("32-bit position, FOAW best fit         ", &position32_step, Kind::foaw, 220);
   measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 220);
   measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 220);

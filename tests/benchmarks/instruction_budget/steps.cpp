@@ -10,6 +10,11 @@ Wall::Output wall_step(Wall& wall, const Wall::Coefficients& c, float distance, 
   return wall.update(c, distance, velocity);
 }
 
+bool instability_step(Instability& detector, const Instability::Coefficients& c, float displacement,
+                      float force) {
+  return detector.update(c, displacement, force);
+}
+
 void position16_step(Position<std::uint16_t>& position, const PositionCoefficients& c, PositionOutput& out,
                      std::uint32_t raw) {
   const auto sample =

@@ -6,6 +6,7 @@
 #include "control/dc_current_controller.hpp"
 #include "control/field_oriented_controller.hpp"
 #include "control/haptic_loop.hpp"
+#include "control/instability_detector.hpp"
 #include "control/motor_transmission.hpp"
 #include "control/resampler.hpp"
 #include "control/velocity_estimator.hpp"
@@ -18,6 +19,7 @@
 namespace kmax::instruction_budget {
 
 using Wall = control::WallLaw<float>;
+using Instability = control::InstabilityDetector<float>;
 using Velocity = control::VelocityEstimator<float>;
 using Dc = control::DcCurrentController<float>;
 using FieldOriented = control::FieldOrientedController<float>;
@@ -48,6 +50,8 @@ struct PositionOutput {
 extern "C" {
 void nothing_step();
 Wall::Output wall_step(Wall& wall, const Wall::Coefficients& c, float distance, float velocity);
+bool instability_step(Instability& detector, const Instability::Coefficients& c, float displacement,
+                      float force);
 void position16_step(Position<std::uint16_t>& position, const PositionCoefficients& c, PositionOutput& out,
                      std::uint32_t raw);
 void position32_step(Position<std::uint32_t>& position, const PositionCoefficients& c, PositionOutput& out,
