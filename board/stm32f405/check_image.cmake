@@ -20,6 +20,10 @@ foreach(line IN LISTS lines)
      OR name MATCHES "^(abort|exit|atexit|_exit|__register_exitproc|printf|_printf_r|snprintf|_vfprintf_r)$")
     string(APPEND problems "  ${name}: heap, exception or process support\n")
   endif()
+  # Tables of virtual functions and types: calls in the interrupt path are resolved when compiled.
+  if(name MATCHES "^_ZT[VTCIS]")
+    string(APPEND problems "  ${name}: virtual function table or type information\n")
+  endif()
   # libm. The firmware computes with + - * / and the hardware square root only.
   if(name MATCHES "^(__ieee754_|__kernel_)?(sin|cos|tan|sincos|asin|acos|atan|atan2|exp|exp2|expm1|log|log2|log10|pow|sqrt|cbrt|hypot|fmod|rem_pio2)f?$")
     string(APPEND problems "  ${name}: libm\n")
