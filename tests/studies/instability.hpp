@@ -84,7 +84,8 @@ struct StableResult {
   std::size_t alarms = 0;
   double simulated_time = 0.0;  ///< s
 };
-/// `walls`: of a seed each, with `touches` each; no stiffer than `margin` of what is stable under that hand.
+/// `walls`: of a seed each, with `touches` each; neither wall nor field is steeper than `margin` of the plain
+/// wall that is stable under that hand in that loop.
 StableResult watch_stable(const std::vector<experiment::SubjectSet>& sets, std::size_t walls,
                           std::size_t touches, double margin, std::size_t threads);
 
