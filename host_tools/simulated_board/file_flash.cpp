@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "firmware/parameters/parameter_record.hpp"
+
 namespace kmax::simulated_board {
 
 namespace {
@@ -63,6 +65,22 @@ void FileFlash::fill_or_read(const std::string& path) {
     for (std::size_t byte = 0; byte < 4; ++byte) word |= std::uint32_t{bytes[4 * i + byte]} << (8 * byte);
     image_.program(i / words_per_sector, i % words_per_sector, word);
   }
+  if (!is_erased_or_ours())
+    fail(path,
+         "is as long as a parameter store and holds no record of one; name another file, or delete this one");
+}
+
+/// The first word of a record is written first, so even one that was cut short is known by it.
+bool FileFlash::is_erased_or_ours() const {
+  bool erased = true;
+  for (std::size_t sector = 0; sector < sector_count; ++sector) {
+    for (std::size_t word = 0; word < words_per_sector; ++word) {
+      const std::uint32_t value = image_.read(sector, word);
+      if (value == firmware::record::magic && word % firmware::record::alignment == 0) return true;
+      erased = erased && value == firmware::record::erased;
+    }
+  }
+  return erased;
 }
 
 bool FileFlash::erase(std::size_t sector) {

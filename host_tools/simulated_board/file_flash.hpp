@@ -45,7 +45,7 @@ class FileFlash {
   static constexpr std::size_t file_size = sector_count * words_per_sector * 4;
 
   /// A file that does not exist or is empty becomes an erased memory. Throws std::runtime_error for one that
-  /// cannot be used, has another size, or is in use.
+  /// cannot be used, has another size, holds something else, or is in use; nothing is written then.
   explicit FileFlash(const std::string& path);
   ~FileFlash();
   FileFlash(const FileFlash&) = delete;
@@ -58,6 +58,7 @@ class FileFlash {
 
  private:
   void fill_or_read(const std::string& path);
+  bool is_erased_or_ours() const;
   bool write_through(std::size_t sector, std::size_t first_word, std::size_t count);
 
   MemoryFlash image_;

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "firmware/parameters/parameter_record.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -46,6 +47,7 @@ TEST_F(FileFlashTest, ErasingIsOfOneSectorAndWhatWasWrittenIsReadAgain) {
   {
     FileFlash flash(path());
     flash.program(0, 4095, 1);
+    flash.program(1, 16, firmware::record::magic);
     flash.program(1, 0, 2);
     EXPECT_TRUE(flash.erase(0));
   }
@@ -65,6 +67,23 @@ TEST_F(FileFlashTest, WhatIsNoStoreIsRefusedAndLeftAlone) {
   EXPECT_CONTAINS(
       thrown_message<std::runtime_error>([&] { FileFlash flash((folder / "no/store").string()); }),
       "No such file");
+}
+
+TEST_F(FileFlashTest, AFileOfTheSameLengthThatIsSomethingElseIsRefusedAndLeftAlone) {
+  const auto refusal = [&](const std::string& bytes) {
+    folder.write("store", bytes);
+    const std::string message = thrown_message<std::runtime_error>([&] { FileFlash flash(path()); });
+    EXPECT_EQ(folder.read("store"), bytes);
+    return message;
+  };
+  EXPECT_CONTAINS(refusal(std::string(FileFlash::file_size, '\0')), "holds no record of one");
+  EXPECT_CONTAINS(refusal(std::string(FileFlash::file_size - 1, '\xFF') + 'x'), "holds no record of one");
+  // The mark of a record where none can begin.
+  std::string misplaced(FileFlash::file_size, '\xFF');
+  misplaced.replace(4, 4, "2PMK");
+  EXPECT_CONTAINS(refusal(misplaced), "holds no record of one");
+  folder.write("store", std::string(FileFlash::file_size, '\xFF'));
+  EXPECT_NO_THROW(FileFlash flash(path()));
 }
 
 TEST_F(FileFlashTest, OneProcessAtATime) {
