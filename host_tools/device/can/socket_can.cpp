@@ -171,6 +171,8 @@ bool SocketCan::fetch(can_frame& frame, nanoseconds& time) {
     if (errno == EAGAIN || errno == EINTR) return false;
     fail("cannot receive", errno);
   }
+  // No frame is empty: the socket has come to its end, and would give nothing for ever.
+  if (got == 0) fail("cannot receive", ENODEV);
   time = std::chrono::system_clock::now().time_since_epoch();
   for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr; header = CMSG_NXTHDR(&message, header)) {
     if (header->cmsg_level != SOL_SOCKET) continue;
@@ -194,16 +196,17 @@ std::optional<Received> SocketCan::receive(microseconds wait) {
     can_frame kernel{};
     Received received;
     while (fetch(kernel, received.time)) {
-      if ((kernel.can_id & CAN_ERR_FLAG) != 0) {
+      const bool error = (kernel.can_id & CAN_ERR_FLAG) != 0;
+      const auto frame = error ? std::nullopt : from_kernel(kernel);
+      if (error) {
         ++counters_.error_frames;
         faults_.take(kernel);
+      } else if (!frame) {
+        ++counters_.malformed;
+      }
+      if (!frame) {
         // A disturbed bus must not hold the caller.
         if (wait > microseconds(0) && Clock::now() >= deadline) return std::nullopt;
-        continue;
-      }
-      const auto frame = from_kernel(kernel);
-      if (!frame) {
-        ++counters_.malformed;
         continue;
       }
       faults_.frame_received();
