@@ -111,7 +111,7 @@ class NativeBoard {
   };
 
   std::uint64_t character_us() const {
-    return firmware::modbus::rtu_timing(application_->serial_settings().baud_rate, {}).character_us;
+    return firmware::modbus::rtu_timing(application_->serial().settings().baud_rate, {}).character_us;
   }
 
   firmware::AxisInput sample(std::size_t axis) {
@@ -139,19 +139,19 @@ class NativeBoard {
     for (const drivers::CanFrame& frame : can_incoming_) {
       if (frame.extended || frame.remote) continue;  // as the controller's filters
       ++can_.received;
-      application_->ISR_can_frame(frame);
+      application_->can().ISR_frame(frame);
     }
     can_incoming_.clear();
-    application_->set_can(can_);
+    application_->can().set_readings(can_);
   }
 
   void send_can() {
     drivers::CanFrame frame;
     while (can_.state == firmware::CanState::active && can_free_us_ <= now_us_ &&
-           application_->next_can_frame(frame)) {
+           application_->can().next_frame(frame)) {
       // 47 bits around the data, and a stuff bit for every ten or so.
       const std::uint64_t bits = (47U + 8U * frame.length) * 11U / 10U;
-      can_free_us_ = now_us_ + bits * 1'000'000U / application_->can_settings().bit_rate;
+      can_free_us_ = now_us_ + bits * 1'000'000U / application_->can().settings().bit_rate;
       ++can_.sent;
       can_outgoing_.push_back(frame);
     }
@@ -171,15 +171,15 @@ class NativeBoard {
 
     const auto now = static_cast<std::uint32_t>(now_us_);
     while (!incoming_.empty() && incoming_.front().time_us <= now_us_) {
-      application_->ISR_serial_byte(incoming_.front().byte, false,
-                                    static_cast<std::uint32_t>(incoming_.front().time_us));
+      application_->serial().ISR_byte(incoming_.front().byte, false,
+                                      static_cast<std::uint32_t>(incoming_.front().time_us));
       incoming_.pop_front();
     }
     if constexpr (PoweredDevice<Device>) application_->set_readings(device_.readings());
     exchange_can();
     application_->poll(now);
     send_can();
-    if (application_->restart_wanted()) {
+    if (application_->can().restart_wanted()) {
       sending_until_us_ = 0;
       start(firmware::ResetCause::native);
     }
@@ -187,10 +187,10 @@ class NativeBoard {
     if (sending_until_us_ != 0) {
       if (now_us_ < sending_until_us_) return;
       outgoing_.insert(outgoing_.end(), reply_.begin(), reply_.end());
-      application_->serial_reply_sent(static_cast<std::uint32_t>(sending_until_us_));
+      application_->serial().reply_sent(static_cast<std::uint32_t>(sending_until_us_));
       sending_until_us_ = 0;
     }
-    const auto reply = application_->serial_reply_due(now);
+    const auto reply = application_->serial().reply_due(now);
     if (reply.empty()) return;
     reply_.assign(reply.begin(), reply.end());
     sending_until_us_ = now_us_ + reply.size() * character_us();

@@ -10,13 +10,13 @@
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
-#include "firmware/application.hpp"
+#include "firmware/canopen_edge.hpp"
 
 namespace kmax::board::odrive_v3 {
 
-/// CAN1 on connector J2, between its interrupts and the application.
+/// CAN1 on connector J2, between its interrupts and the link behind it.
 ///
-/// Follows the application's wish for a bit rate and for the identifiers to receive. All CAN interrupts have
+/// Follows the link's wish for a bit rate and for the identifiers to receive. All CAN interrupts have
 /// the serial line's priority: they and the main loop never wait for each other.
 class CanLine {
  public:
@@ -27,8 +27,8 @@ class CanLine {
     for (const auto interrupt : all_interrupts) interrupts.set_priority(interrupt, priority::serial);
   }
 
-  /// Main loop, before the application's poll().
-  void poll(firmware::Application& application, std::uint32_t now_us) {
+  /// Main loop, before the link's poll().
+  void poll(firmware::CanopenEdge& link, std::uint32_t now_us) {
     if (now_us - looked_us_ >= status_interval_us) {
       looked_us_ = now_us;
       static_cast<void>(can_.poll(now_us));
@@ -42,30 +42,30 @@ class CanLine {
     readings_.sent = can_.transmit_counters().sent;
     readings_.discarded = can_.transmit_counters().discarded;
     readings_.bus_offs = can_.bus_off_counters().bus_offs;
-    application.set_can(readings_);
+    link.set_readings(readings_);
   }
 
-  /// Main loop, after the application's poll().
-  void send(firmware::Application& application) {
-    const firmware::CanSettings wanted = application.can_settings();
+  /// Main loop, after the link's poll().
+  void send(firmware::CanopenEdge& link) {
+    const firmware::CanSettings wanted = link.settings();
     const bool again = !configured_ && looked_us_ - tried_us_ >= retry_interval_us;
     if (!(wanted == settings_) || again) {
       tried_us_ = looked_us_;
       configure(wanted);
     }
     if (!configured_) return;
-    // As many as there is room for; a frame that is taken out of the application is on its way.
+    // As many as there is room for; a frame that is taken out of the link is on its way.
     drivers::CanFrame frame;
-    while (can_.has_room() && application.next_can_frame(frame)) static_cast<void>(can_.send(frame));
+    while (can_.has_room() && link.next_frame(frame)) static_cast<void>(can_.send(frame));
   }
 
   void ISR_serve_transmit() {
     can_.ISR_serve_transmit();
     poll_due_.store(true, std::memory_order_relaxed);
   }
-  void ISR_receive(unsigned fifo, firmware::Application& application) {
+  void ISR_receive(unsigned fifo, firmware::CanopenEdge& link) {
     can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) {
-      application.ISR_can_frame(frame);
+      link.ISR_frame(frame);
       poll_due_.store(true, std::memory_order_relaxed);
     });
   }

@@ -175,7 +175,7 @@ void poll_power(std::uint32_t now_us) {
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
   apply(serial_pins);
   serial.emplace(interrupts, clocks.apb1_hz);
-  serial->start(*application);
+  serial->start(application->serial());
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Can1::mask);
   apply(can_pins);
   can_line.emplace(interrupts, clocks.apb1_hz);
@@ -196,11 +196,11 @@ void poll_power(std::uint32_t now_us) {
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
         application->set_readings(readings);
       }
-      can_line->poll(*application, now);
+      can_line->poll(application->can(), now);
       application->poll(now);
-      serial->poll(*application, now);
-      can_line->send(*application);
-      if (application->restart_wanted()) restart();
+      serial->poll(application->serial(), now);
+      can_line->send(application->can());
+      if (application->can().restart_wanted()) restart();
       if (power_runs) poll_power(now);
     }
     // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
@@ -261,7 +261,7 @@ void ISR_can1_tx() {
 
 void ISR_can1_rx0() {
   using namespace kmax::board;
-  can_line->ISR_receive(0, *application);
+  can_line->ISR_receive(0, application->can());
 }
 
 void ISR_can1_sce() {
@@ -270,7 +270,7 @@ void ISR_can1_sce() {
 
 void ISR_usart2() {
   using namespace kmax::board;
-  serial->ISR_serve(*application, system_tick);
+  serial->ISR_serve(application->serial(), system_tick);
 }
 
 int main() {

@@ -10,13 +10,13 @@
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/usart.hpp"
-#include "firmware/application.hpp"
+#include "firmware/modbus_edge.hpp"
 
 namespace kmax::board::odrive_v3 {
 
-/// USART2 on GPIO3 and GPIO4, between its interrupt and the application.
+/// USART2 on GPIO3 and GPIO4, between its interrupt and the link behind it.
 ///
-/// Follows the application's wish for a baud rate, but not in the middle of a reply. A rate that this clock
+/// Follows the link's wish for a baud rate, but not in the middle of a reply. A rate that this clock
 /// cannot make leaves the line as it was.
 class SerialLine {
  public:
@@ -24,22 +24,22 @@ class SerialLine {
       : interrupts_(interrupts), kernel_clock_hz_(kernel_clock_hz) {}
 
   /// Pins and clock are on.
-  void start(const firmware::Application& application) {
+  void start(const firmware::ModbusEdge& link) {
     interrupts_.set_priority(drivers::stm32f4::Interrupt::usart2, priority::serial);
-    settings_ = application.serial_settings();
+    settings_ = link.settings();
     if (!configure()) {
       settings_ = {115'200};
       static_cast<void>(configure());
     }
   }
 
-  /// Main loop, after the application's poll().
-  void poll(firmware::Application& application, std::uint32_t now_us) {
-    if (reply_sent_.exchange(false)) application.serial_reply_sent(reply_sent_us_);
+  /// Main loop, after the link's poll().
+  void poll(firmware::ModbusEdge& link, std::uint32_t now_us) {
+    if (reply_sent_.exchange(false)) link.reply_sent(reply_sent_us_);
     if (usart_.transmitting()) return;
-    const std::span<const std::uint8_t> reply = application.serial_reply_due(now_us);
+    const std::span<const std::uint8_t> reply = link.reply_due(now_us);
     if (usart_.transmit(reply)) return;
-    const firmware::SerialSettings wanted = application.serial_settings();
+    const firmware::SerialSettings wanted = link.settings();
     if (wanted == settings_) return;
     settings_ = wanted;
     static_cast<void>(configure());
@@ -47,11 +47,11 @@ class SerialLine {
 
   /// The USART's interrupt.
   template <typename Clock>
-  void ISR_serve(firmware::Application& application, const Clock& clock) {
+  void ISR_serve(firmware::ModbusEdge& link, const Clock& clock) {
     const drivers::stm32f4::UsartEvent event = usart_.ISR_serve();
     if (!event.received && !event.line_error && !event.transmission_complete) return;
     const std::uint32_t now = clock.now_us();
-    if (event.received || event.line_error) application.ISR_serial_byte(event.byte, event.line_error, now);
+    if (event.received || event.line_error) link.ISR_byte(event.byte, event.line_error, now);
     if (event.transmission_complete) {
       reply_sent_us_ = now;
       reply_sent_.store(true);

@@ -5,6 +5,7 @@
 
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
+#include "firmware/application.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/fault_handler.hpp"
@@ -30,14 +31,14 @@ std::optional<odrive_v3::SerialLine> serial;
   interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, odrive_v3::priority::clock);
   if (!system_tick.start(clocks.core_hz, 1'000)) drivers::cortex_m::stop_on_unexpected_interrupt();
   serial.emplace(interrupts, clocks.apb1_hz);
-  serial->start(*application);
+  serial->start(application->serial());
   for (;;) {
     const std::uint32_t now = system_tick.now_us();
     application->poll(now);
-    serial->poll(*application, now);
+    serial->poll(application->serial(), now);
     // QEMU's USART never asks for the interrupt when it has sent.
     if (serial->transmitting()) interrupts.pend(drivers::stm32f4::Interrupt::usart2);
-    if (application->restart_wanted()) drivers::cortex_m::reset_core();
+    if (application->can().restart_wanted()) drivers::cortex_m::reset_core();
     drivers::cortex_m::wait_for_interrupt();
   }
 }
@@ -57,7 +58,7 @@ void ISR_system_tick() {
 
 void ISR_usart2() {
   using namespace kmax::board;
-  serial->ISR_serve(*application, system_tick);
+  serial->ISR_serve(application->serial(), system_tick);
 }
 
 int main() {

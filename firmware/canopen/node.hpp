@@ -36,6 +36,7 @@ struct NodeEvents {
   bool reset_communication = false;  ///< put the settings back, then call start()
   bool start_node = false;           ///< the first node ID has been given: call start()
   bool store_identity = false;       ///< keep the pending node ID and bit rate, then call lss().finish()
+  bool heartbeat = false;            ///< of a watched node
   bool heartbeat_lost = false;       ///< of a watched node
   bool pdos_ended = false;           ///< operational was left: what PDOs asked for is no longer wanted
 };
@@ -127,7 +128,7 @@ class Node {
     } else if (nmt_.configured() && only_ours(id)) {
       ++identity_conflicts_;
     } else {
-      receive_data(frame, now_us);
+      receive_data(frame, now_us, events);
     }
     return events;
   }
@@ -177,10 +178,6 @@ class Node {
   /// 1 to 127, or 255 while there is none.
   std::uint8_t node_id() const { return nmt_.node_id(); }
   const CanSettings& settings() const { return settings_; }
-  /// When a host last commanded this node: wrote a value by a transfer or a PDO, or a watched heartbeat came.
-  /// Reading is not commanding: a second program that only looks must not keep a dead one's force alive.
-  std::optional<std::uint32_t> heard_us() const { return heard_us_; }
-  void set_heard(std::optional<std::uint32_t> at_us) { heard_us_ = at_us; }
   bool any_heartbeat_lost() const { return heartbeats_.any_lost(); }
 
   const SdoCounters& sdo_counters() const { return sdo_.counters(); }
@@ -202,12 +199,12 @@ class Node {
     return id == cob_id::heartbeat + node_id() || id == cob_id::sdo_response + node_id();
   }
 
-  void receive_data(const drivers::CanFrame& frame, std::uint32_t now_us) {
+  void receive_data(const drivers::CanFrame& frame, std::uint32_t now_us, NodeEvents& events) {
     const auto write = [this](std::size_t slot, std::uint32_t raw) { return objects_.take(slot, raw); };
     if (frame.identifier > cob_id::heartbeat && frame.identifier <= cob_id::heartbeat + highest_node_id) {
       const std::uint32_t before = heartbeats_.counters().heartbeats;
       if (const auto back = heartbeats_.receive(frame, now_us)) emergency_.clear(0x8130, source_of(*back));
-      if (heartbeats_.counters().heartbeats != before) heard_us_ = now_us;
+      events.heartbeat = heartbeats_.counters().heartbeats != before;
     } else if (speaks() && sync_.receive(frame)) {
       if (nmt_.state() != NmtState::operational) return;
       rpdos_.on_sync(write, now_us);
@@ -341,7 +338,6 @@ class Node {
   Rpdos rpdos_;
   CanSettings settings_;
   NodeSettings wanted_;  ///< as last taken over: node ID and bit rate at a start, all else at a configure()
-  std::optional<std::uint32_t> heard_us_;
   std::uint32_t identity_conflicts_ = 0;
   bool sdo_silent_ = false;
 };

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
 #include "firmware/capture.hpp"
 #include "firmware/double_buffer.hpp"
@@ -37,6 +38,9 @@ class AxesTick {
   using Settings = std::array<AxisSetting, axes>;
   using Inputs = std::array<Axis::Input, axes>;
   static constexpr bool needs_all_positions = Law::needs_all_positions;
+  /// What one axis' tick needs: its own sample, or, for a law that needs all positions, all counters as they
+  /// are in this slot. Of the others, only count, validity and reference are looked at.
+  using SlotInput = std::conditional_t<needs_all_positions, Inputs, Axis::Input>;
 
   /// Every so many ticks each axis reports, besides at once when something has changed.
   static constexpr std::uint32_t round_ticks = 4;
@@ -74,13 +78,20 @@ class AxesTick {
   // Interrupt.
 
   /// One axis' tick. The result is valid until the axis' next one.
-  const Axis::Output& ISR_tick(std::size_t axis, const Axis::Input& input) requires(!needs_all_positions) {
-    return ISR_tick_at(axis, input, {});
+  const Axis::Output& ISR_tick(std::size_t axis, const SlotInput& input) {
+    if constexpr (needs_all_positions) {
+      return ISR_tick_at(axis, input[axis], ISR_positions(input));
+    } else {
+      return ISR_tick_at(axis, input, {});
+    }
   }
-  /// The same for a law that needs all positions: all counters as they are in this slot. Of the others, only
-  /// count, validity and reference are looked at.
-  const Axis::Output& ISR_tick(std::size_t axis, const Inputs& inputs) {
-    return ISR_tick_at(axis, inputs[axis], ISR_positions(inputs));
+  /// What the slot of `axis` needs of samples that were all taken at the same time.
+  static const SlotInput& ISR_slot_input(const Inputs& inputs, std::size_t axis) {
+    if constexpr (needs_all_positions) {
+      return inputs;
+    } else {
+      return inputs[axis];
+    }
   }
   /// Between two ticks: the last one began a round, in which all axes report. Behind the last axis' tick the
   /// main loop should be woken: what it reads then is of this tick.

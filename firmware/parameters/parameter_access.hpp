@@ -26,7 +26,7 @@ struct SlotValue {
 };
 
 /// The one way to write a parameter, whichever link a host uses: checks, rules, and transactions. Modbus
-/// registers (modbus/parameter_registers.hpp) and CANopen objects (application_objects.hpp) are edges of it.
+/// registers (modbus/parameter_registers.hpp) and CANopen objects (canopen_objects.hpp) are edges of it.
 ///
 /// A write is whole or nothing: every value is checked, then the rules between parameters and, for an axis
 /// that is armed, that its bounds are only tightened (armed_change.hpp) and the stability guard's, and only

@@ -262,7 +262,7 @@ TEST_F(LssOnCan, PdosGoNoFasterThanANewBitRateAllows) {
 }
 
 TEST_F(LssOnCan, TheBitRateStaysWhileAnAxisIsArmed) {
-  const auto rate = [this] { return bench.application().can_settings().bit_rate; };
+  const auto rate = [this] { return bench.application().can().settings().bit_rate; };
   arm_torque(0);
   activate_bit_rate(2);
   EXPECT_EQ(rate(), 1'000'000U);
@@ -283,7 +283,7 @@ TEST_F(LssOnCan, AChangeThatHasBegunIsGivenUpWhenAnAxisIsArmed) {
     run_ms(100);
   }
   EXPECT_TRUE(armed());
-  EXPECT_EQ(bench.application().can_settings().bit_rate, 1'000'000U);
+  EXPECT_EQ(bench.application().can().settings().bit_rate, 1'000'000U);
 }
 
 TEST_F(OnCan, TheFirstWordOverCanDoesNotTripWhatSerialHasArmed) {

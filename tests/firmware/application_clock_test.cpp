@@ -39,7 +39,7 @@ class BareBoard {
   }
   // Characters on the line, without a poll; the line is silent long enough after them to end the frame.
   void hear(const Bytes& frame) {
-    for (const std::uint8_t byte : frame) application->ISR_serial_byte(byte, false, now += 96);
+    for (const std::uint8_t byte : frame) application->serial().ISR_byte(byte, false, now += 96);
     now += 2000;
   }
   void hear_command(unsigned word) {
@@ -62,9 +62,9 @@ class BareBoard {
     hear(modbus::adu(1,
                      {4, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address), 0, 2}));
     application->poll(now);
-    const auto reply = application->serial_reply_due(now);
+    const auto reply = application->serial().reply_due(now);
     const Bytes bytes(reply.begin(), reply.end());
-    application->serial_reply_sent(now);
+    application->serial().reply_sent(now);
     now += 200;  // the echo's time
     if (bytes.size() != 9) return -12345;
     return number_in(name, {static_cast<std::uint16_t>(bytes[3] << 8 | bytes[4]),
@@ -252,10 +252,10 @@ TEST(LatePoll, SettingsTakenByATickInTheMiddleOfAPollAreNotJudgedByTheReportBefo
                       static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
                       static_cast<std::uint8_t>(position[1])}));
   board.hear_command(0x0F);
-  board.hear(modbus::adu(1, {6, 0x20, 0x40, 0, 0}));     // a third request, whose end is seen only below
-  board.application->poll(board.now - 2000);             // the wall moves; the command waits for the tick
-  board.tick();                                          // takes the settings
-  (void)board.application->serial_reply_due(board.now);  // the third request, with the report from before
+  board.hear(modbus::adu(1, {6, 0x20, 0x40, 0, 0}));       // a third request, whose end is seen only below
+  board.application->poll(board.now - 2000);               // the wall moves; the command waits for the tick
+  board.tick();                                            // takes the settings
+  (void)board.application->serial().reply_due(board.now);  // the third request, with the report from before
   EXPECT_NE(board.application->state(0), DriveState::operation_enabled);
   board.tick();
   EXPECT_FALSE(board.output.axis[0].enabled);
@@ -284,20 +284,20 @@ TEST(LatePoll, ATripThatTheMainLoopHasNotSeenYetIsNotWipedOutByDisarmingAndArmin
 }
 
 TEST(LatePoll, RequestHeardAfterTheClockWasReadIsNoSilence) {
-  // serial_reply_due() polls the line with a newer clock than poll() had.
+  // reply_due() polls the line with a newer clock than poll() had.
   BareBoard board(0xFFFFFF00u);
   board.preset("link.timeout", 0.5);
   ASSERT_TRUE(board.arm());
   const std::uint32_t earlier = board.now;
   board.hear_command(0x0F);
   board.application->poll(earlier);
-  (void)board.application->serial_reply_due(board.now + 1000);
+  (void)board.application->serial().reply_due(board.now + 1000);
   EXPECT_EQ(board.application->state(0), DriveState::operation_enabled);
 }
 
 TEST(SerialQueue, BytesLostBetweenInterruptAndMainLoopAreCounted) {
   BareBoard board(0);
-  for (int i = 0; i < 600; ++i) board.application->ISR_serial_byte(0x55, false, board.now += 96);
+  for (int i = 0; i < 600; ++i) board.application->serial().ISR_byte(0x55, false, board.now += 96);
   board.now += 5000;
   board.application->poll(board.now);
   board.step();

@@ -121,8 +121,8 @@ RC_GTEST_PROP(Safety, NoiseOnTheLineNeitherArmsNorDeafens, ()) {
   const auto bursts = *rc::gen::inRange(1, 12);
   for (int i = 0; i < bursts; ++i) {
     for (const auto byte : *rc::gen::container<Bytes>(rc::gen::arbitrary<std::uint8_t>()))
-      bench.application().ISR_serial_byte(byte, *rc::gen::inRange(0, 20) == 0,
-                                          static_cast<std::uint32_t>(bench.board().now_us()));
+      bench.application().serial().ISR_byte(byte, *rc::gen::inRange(0, 20) == 0,
+                                            static_cast<std::uint32_t>(bench.board().now_us()));
     bench.run_ticks(*rc::gen::inRange<std::uint64_t>(0, 60));
     RC_ASSERT(bench.force() == 0.0f);
   }

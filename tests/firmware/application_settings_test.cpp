@@ -123,8 +123,8 @@ TEST_F(Settings, ScaleAndOriginChangesAreNeverTakenForMotion) {
     send_write(name, number);
     for (int i = 0; i < 400; ++i) {
       bench.run_ticks(1);
-      bench.application().ISR_serial_byte(0, true,
-                                          static_cast<std::uint32_t>(bench.board().now_us()));  // noise
+      bench.application().serial().ISR_byte(0, true,
+                                            static_cast<std::uint32_t>(bench.board().now_us()));  // noise
     }
     bench.run_ms(5);
     EXPECT_EQ(bench.get("measured.velocity"), 0.0) << name;
@@ -273,7 +273,7 @@ TEST_F(Settings, UnitAndBaudRateChangeAfterTheReply) {
   const Bytes reply = bench.request({16, 0x20, 0x31, 0, 2, 4, 0, 0, 0x25, 0x80}, 17);  // 9600
   EXPECT_EQ(reply, (Bytes{16, 0x20, 0x31, 0, 2}));
   bench.run_ticks(1);
-  EXPECT_EQ(bench.application().serial_settings().baud_rate, 9600u);
+  EXPECT_EQ(bench.application().serial().settings().baud_rate, 9600u);
   const auto start = bench.board().now_us();
   EXPECT_FALSE(bench.request({3, 0, 0, 0, 1}, 17).empty());
   EXPECT_GT(bench.board().now_us() - start, 15u * 1146u) << "at the new rate";

@@ -73,7 +73,7 @@ class Device {
     return firmware::number_in(name, words);
   }
   void reset_communication() {
-    application_->ISR_can_frame({.identifier = 0, .length = 2, .data = {0x82, 1}});
+    application_->can().ISR_frame({.identifier = 0, .length = 2, .data = {0x82, 1}});
     wait_us(5'000);
     (void)can_answer();
   }
@@ -94,24 +94,24 @@ class Device {
     return number;
   }
   std::uint32_t request(const modbus::Bytes& pdu) {
-    for (const std::uint8_t byte : modbus::adu(1, pdu)) application_->ISR_serial_byte(byte, false, now_);
+    for (const std::uint8_t byte : modbus::adu(1, pdu)) application_->serial().ISR_byte(byte, false, now_);
     wait_us(5'000);
-    const auto reply = application_->serial_reply_due(now_);
+    const auto reply = application_->serial().reply_due(now_);
     reply_.assign(reply.begin(), reply.end());
-    application_->serial_reply_sent(now_);
+    application_->serial().reply_sent(now_);
     wait_us(5'000);
     if (reply_.size() < 5) throw std::runtime_error("no reply");
     return (reply_[1] & 0x80) != 0 ? reply_[2] : 0;
   }
   std::array<std::uint8_t, 8> transfer(const std::array<std::uint8_t, 8>& sent) {
-    application_->ISR_can_frame({.identifier = 0x601, .length = 8, .data = sent});
+    application_->can().ISR_frame({.identifier = 0x601, .length = 8, .data = sent});
     wait_us(1'000);
     return can_answer().value();
   }
   std::optional<std::array<std::uint8_t, 8>> can_answer() {
     std::optional<std::array<std::uint8_t, 8>> answer;
     drivers::CanFrame frame;
-    while (application_->next_can_frame(frame)) {
+    while (application_->can().next_frame(frame)) {
       if (frame.identifier == 0x581) answer = frame.data;
     }
     return answer;

@@ -114,7 +114,7 @@ TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
     application.poll(static_cast<std::uint32_t>(tick) * 50);
     power.poll(application, static_cast<std::uint32_t>(tick) * 50);
   }
-  EXPECT_NEAR(due, ticks / static_cast<int>(firmware::Application::round_ticks), 1);
+  EXPECT_NEAR(due, ticks / static_cast<int>(firmware::Axes::round_ticks), 1);
   EXPECT_TRUE(power.ready());
   EXPECT_EQ(power.condition(), Fault::none);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {

@@ -1,10 +1,11 @@
-#include "firmware/application_objects.hpp"
+#include "firmware/canopen_objects.hpp"
 
 #include <algorithm>
 
-#include "firmware/application.hpp"
+#include "firmware/board_identity.hpp"
 #include "firmware/canopen/communication_rules.hpp"
 #include "firmware/canopen/copy_bytes.hpp"
+#include "firmware/canopen/node.hpp"
 
 namespace kmax::firmware {
 
@@ -77,8 +78,8 @@ void put_words(std::uint32_t offset, std::span<std::uint8_t> out, Word word) {
 
 }  // namespace
 
-Abort ApplicationObjects::find(ObjectAddress address, std::optional<std::size_t>& slot,
-                               const canopen::SpecialPlace*& special) const {
+Abort CanopenObjects::find(ObjectAddress address, std::optional<std::size_t>& slot,
+                           const canopen::SpecialPlace*& special) const {
   slot = canopen::slot_at(address);
   special = slot ? nullptr : canopen::special_at(address);
   if (slot || special != nullptr) return Abort::none;
@@ -88,8 +89,8 @@ Abort ApplicationObjects::find(ObjectAddress address, std::optional<std::size_t>
   return address.subindex == 0 && *highest != 0 ? Abort::none : Abort::no_subindex;
 }
 
-Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::uint8_t subindex,
-                                       std::uint32_t& size) const {
+Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint8_t subindex,
+                                   std::uint32_t& size) const {
   switch (place.what) {
     case SpecialObject::error_register:
     case SpecialObject::error_history_count:
@@ -112,8 +113,8 @@ Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::
       size = trace_object_bytes;
       return Abort::none;
     case SpecialObject::capture_samples: {
-      if (!of_.tick.capture().readable()) return Abort::device_state;
-      const CaptureReadings readings = of_.tick.capture().readings();
+      if (!of_.axes.tick().capture().readable()) return Abort::device_state;
+      const CaptureReadings readings = of_.axes.tick().capture().readings();
       size = 4 * readings.taken * readings.channels;
       return Abort::none;
     }
@@ -124,7 +125,7 @@ Abort ApplicationObjects::special_size(const canopen::SpecialPlace& place, std::
   return Abort::general;
 }
 
-Abort ApplicationObjects::read_begin(ObjectAddress address, std::uint32_t& size) {
+Abort CanopenObjects::read_begin(ObjectAddress address, std::uint32_t& size) {
   std::optional<std::size_t> slot;
   const canopen::SpecialPlace* special = nullptr;
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
@@ -133,7 +134,7 @@ Abort ApplicationObjects::read_begin(ObjectAddress address, std::uint32_t& size)
   return Abort::none;
 }
 
-std::uint32_t ApplicationObjects::number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const {
+std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const {
   const auto& emergency = of_.node.emergency();
   switch (place.what) {
     case SpecialObject::device_type:
@@ -149,15 +150,15 @@ std::uint32_t ApplicationObjects::number_of(const canopen::SpecialPlace& place, 
   }
 }
 
-std::span<const char> ApplicationObjects::text_of(SpecialObject what) const {
+std::span<const char> CanopenObjects::text_of(SpecialObject what) const {
   constexpr std::string_view name = "Kmax haptic device controller";
   if (what == SpecialObject::device_name) return name;
   if (what == SpecialObject::hardware_version) return of_.board_name;
   return firmware_version_text;
 }
 
-Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::uint8_t subindex,
-                                       std::uint32_t offset, std::span<std::uint8_t> out) const {
+Abort CanopenObjects::read_special(const canopen::SpecialPlace& place, std::uint8_t subindex,
+                                   std::uint32_t offset, std::span<std::uint8_t> out) const {
   switch (place.what) {
     case SpecialObject::device_name:
     case SpecialObject::hardware_version:
@@ -171,14 +172,14 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
       const auto first = trace_window + (subindex - 1U) * (trace_object_bytes / 2);
       put_words(offset, out, [&](std::uint32_t word) {
         const auto high = static_cast<std::uint16_t>(first + 2 * word);
-        return std::uint32_t{of_.tick.trace().word_at(high)} << 16 |
-               of_.tick.trace().word_at(static_cast<std::uint16_t>(high + 1));
+        return std::uint32_t{of_.axes.tick().trace().word_at(high)} << 16 |
+               of_.axes.tick().trace().word_at(static_cast<std::uint16_t>(high + 1));
       });
       return Abort::none;
     }
     case SpecialObject::capture_samples:
-      if (!of_.tick.capture().readable()) return Abort::device_state;  // another capture has begun
-      put_words(offset, out, [&](std::uint32_t word) { return of_.tick.capture().value_at(word); });
+      if (!of_.axes.tick().capture().readable()) return Abort::device_state;  // another capture has begun
+      put_words(offset, out, [&](std::uint32_t word) { return of_.axes.tick().capture().value_at(word); });
       return Abort::none;
     case SpecialObject::scratch:
       canopen::copy_bytes(std::span(scratch_).subspan(offset, out.size()), out);
@@ -189,7 +190,7 @@ Abort ApplicationObjects::read_special(const canopen::SpecialPlace& place, std::
   }
 }
 
-Abort ApplicationObjects::read(ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out) {
+Abort CanopenObjects::read(ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out) {
   std::optional<std::size_t> slot;
   const canopen::SpecialPlace* special = nullptr;
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
@@ -198,12 +199,12 @@ Abort ApplicationObjects::read(ObjectAddress address, std::uint32_t offset, std:
     put_bytes(canopen::highest_subindex(address.index).value_or(0), offset, out);
     return Abort::none;
   }
-  if (!descriptors[owner_of(*slot).entry].kept) of_.application.refresh_reading(*slot);
+  if (!descriptors[owner_of(*slot).entry].kept) of_.readings.refresh(*slot);
   put_bytes(value(*slot), offset, out);
   return Abort::none;
 }
 
-Abort ApplicationObjects::write_begin(ObjectAddress address, canopen::WriteBounds& bounds) {
+Abort CanopenObjects::write_begin(ObjectAddress address, canopen::WriteBounds& bounds) {
   std::optional<std::size_t> slot;
   const canopen::SpecialPlace* special = nullptr;
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
@@ -220,7 +221,7 @@ Abort ApplicationObjects::write_begin(ObjectAddress address, canopen::WriteBound
   return Abort::none;
 }
 
-Abort ApplicationObjects::write(ObjectAddress address, std::span<const std::uint8_t> in) {
+Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t> in) {
   std::optional<std::size_t> slot;
   const canopen::SpecialPlace* special = nullptr;
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
@@ -230,8 +231,7 @@ Abort ApplicationObjects::write(ObjectAddress address, std::span<const std::uint
   return write_slot(*slot, raw, acts_at_once(*slot));
 }
 
-Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
-                                        std::span<const std::uint8_t> in) {
+Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in) {
   switch (place.what) {
     case SpecialObject::error_history_count:
       if (in[0] != 0) return Abort::value_range;
@@ -239,10 +239,10 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
       return Abort::none;
     case SpecialObject::store_parameters:
       if (little_endian(in) != signature_save) return Abort::not_transferred;
-      return abort_for(of_.store.save(of_.application.any_armed()).refusal, {}, 0);
+      return abort_for(of_.store.save(of_.axes.any_armed()).refusal, {}, 0);
     case SpecialObject::restore_defaults:
       if (little_endian(in) != signature_load) return Abort::not_transferred;
-      return abort_for(of_.store.save_defaults(of_.application.any_armed()).refusal, {}, 0);
+      return abort_for(of_.store.save_defaults(of_.axes.any_armed()).refusal, {}, 0);
     case SpecialObject::scratch:
       canopen::copy_bytes(in, scratch_);
       scratch_size_ = static_cast<std::uint32_t>(in.size());
@@ -254,16 +254,16 @@ Abort ApplicationObjects::write_special(const canopen::SpecialPlace& place,
 
 /// A PDO and a command are signs of life of whoever commands, if they are taken; before they act, since the
 /// command to arm needs it. A setting is not: any tool on the bus may write one by SDO.
-Abort ApplicationObjects::write_slot(std::size_t slot, std::uint32_t raw, bool is_sign_of_life) {
+Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, bool is_sign_of_life) {
   if (!is_sign_of_life) return set_slot(slot, raw);
-  const auto before = of_.node.heard_us();
-  of_.node.set_heard(of_.application.now_us());
+  const auto before = of_.state.heard_us;
+  of_.state.heard_us = of_.axes.now_us();
   const Abort abort = set_slot(slot, raw);
-  if (abort != Abort::none) of_.node.set_heard(before);
+  if (abort != Abort::none) of_.state.heard_us = before;
   return abort;
 }
 
-Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
+Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
     const std::uint8_t node_id = of_.node.node_id();
@@ -273,19 +273,19 @@ Abort ApplicationObjects::set_slot(std::size_t slot, std::uint32_t raw) {
     return Abort::none;
   }
   const SlotValue one{static_cast<std::uint16_t>(slot), raw};
-  return abort_for(of_.application.write({&one, 1}, Link::can).refusal, descriptor, raw);
+  return abort_for(of_.writes.write({&one, 1}, Link::can).refusal, descriptor, raw);
 }
 
-void ApplicationObjects::refresh() {
-  of_.application.refresh_readings();
+void CanopenObjects::refresh() {
+  of_.readings.refresh();
 }
 
-std::uint32_t ApplicationObjects::value(std::size_t slot) const {
+std::uint32_t CanopenObjects::value(std::size_t slot) const {
   const std::uint32_t raw = of_.parameters.values().raw(slot);
   return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, of_.node.node_id()) : raw;
 }
 
-bool ApplicationObjects::take(std::size_t slot, std::uint32_t raw) {
+bool CanopenObjects::take(std::size_t slot, std::uint32_t raw) {
   return write_slot(slot, raw, true) == Abort::none;
 }
 

@@ -5,39 +5,43 @@
 #include <span>
 #include <string_view>
 
+#include "firmware/axes.hpp"
 #include "firmware/canopen/object_places.hpp"
-#include "firmware/drive/axes_tick.hpp"
+#include "firmware/host_writes.hpp"
+#include "firmware/link_states.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "firmware/parameters/parameter_access.hpp"
 #include "firmware/parameters/store_commands.hpp"
+#include "firmware/readings.hpp"
 
 namespace kmax::firmware {
 
-class Application;
 namespace canopen {
 template <typename Objects>
 class Node;
 }  // namespace canopen
 
-/// The application as CANopen sees it: what SDO reads and writes (canopen::ObjectAccess), where PDOs take
+/// The device as CANopen sees it: what SDO reads and writes (canopen::ObjectAccess), where PDOs take
 /// their values from and bring them to (canopen::PdoSource).
 ///
 /// Everything a host can reach is the dictionary's: values go through the same checks, rules and transactions
 /// as Modbus registers, and refusal.reason says why one was refused on either link. Main loop only.
-class ApplicationObjects {
+class CanopenObjects {
  public:
-  /// What the objects stand for. Node and tick are used from the first request on, not before.
+  /// What the objects stand for. The node is used from the first request on, not before.
   struct Sources {
-    Application& application;  ///< takes writes, brings readings up to date
     ParameterAccess& parameters;
     StoreCommands& store;
-    AxesTick<axis_count>& tick;  ///< its trace and captures
-    canopen::Node<ApplicationObjects>& node;
+    HostWrites& writes;
+    Readings& readings;
+    Axes& axes;  ///< their trace and captures
+    LinkState& state;
+    canopen::Node<CanopenObjects>& node;
     std::string_view board_name;
   };
-  explicit ApplicationObjects(const Sources& sources) : of_(sources) {}
-  ApplicationObjects(const ApplicationObjects&) = delete;
-  ApplicationObjects& operator=(const ApplicationObjects&) = delete;
+  explicit CanopenObjects(const Sources& sources) : of_(sources) {}
+  CanopenObjects(const CanopenObjects&) = delete;
+  CanopenObjects& operator=(const CanopenObjects&) = delete;
 
   canopen::Abort read_begin(canopen::ObjectAddress address, std::uint32_t& size);
   canopen::Abort read(canopen::ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out);

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "firmware/object_dictionary/entry.hpp"
+
+namespace kmax::firmware {
+
+/// What a board measures slowly and counts, for a host to read and for the main loop's trips.
+struct BoardReadings {
+  std::array<float, axis_count> power_stage_temperature = [] {
+    std::array<float, axis_count> at_room_temperature{};
+    at_room_temperature.fill(25.0f);
+    return at_room_temperature;
+  }();                          ///< degC
+  float supply_voltage = 0.0f;  ///< V; 0: not measured
+  std::uint32_t missed_ticks = 0;
+  bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
+  bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
+};
+
+}  // namespace kmax::firmware
