@@ -26,8 +26,8 @@ struct AxesPositions {
 ///   needs_all_positions              true: the board reads the counters of all axes in each slot, and `at`
 ///                                    holds them. False: `at` is not filled, and costs nothing.
 ///
-/// Which law it is, is chosen when AxesTick is compiled: a device whose axes have nothing to do with each
-/// other pays nothing for the place.
+/// Which law it is, is chosen when the firmware is compiled (device_law.hpp): a device whose axes have
+/// nothing to do with each other pays nothing for the place.
 template <typename Law, std::size_t axes>
 concept AxesLaw = requires(Law law, std::size_t axis, const AxesPositions<axes>& at,
                            const control::HapticLoop<float>::Output& loop, bool driven) {

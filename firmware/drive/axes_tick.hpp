@@ -11,6 +11,7 @@
 #include "firmware/double_buffer.hpp"
 #include "firmware/drive/axes_law.hpp"
 #include "firmware/drive/axis.hpp"
+#include "firmware/drive/device_law.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 #include "firmware/seqlock.hpp"
 #include "firmware/trace.hpp"
@@ -31,7 +32,7 @@ namespace kmax::firmware {
 ///
 /// The main loop is what hears the host and the faults: when it has not said for 0.1 s that it runs, every
 /// enabled axis trips.
-template <std::size_t axes, typename Law = TangentialInterference<axes>>
+template <std::size_t axes, typename Law = DeviceLaw<axes>>
 requires AxesLaw<Law, axes>
 class AxesTick {
  public:

@@ -80,6 +80,25 @@ TEST_F(MadeUpBoard, ParametersOfTheThirdAxisAreReachedOverBothBuses) {
     EXPECT_EQ(bench.get("wall.stiffness", axis), 100.0 * static_cast<double>(axis + 1) + 7.0) << "and back";
 }
 
+TEST_F(MadeUpBoard, ALawOverAllPositionsRunsInTheWholeFirmware) {
+  using Law = firmware::DeviceLaw<firmware::axis_count>;
+  arm_all();
+  constexpr int before_the_stop = Law::stop - 2 * 1000;
+  bench.device.stand_at(before_the_stop, 1);
+  bench.run_ms(20);
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) EXPECT_EQ(bench.force(axis), 0.0f) << axis;
+  bench.device.stand_at(before_the_stop + 512, 1);
+  bench.run_ms(20);
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    EXPECT_NEAR(bench.force(axis), -0.5f, 0.001f) << axis << ": the stop that all share";
+    EXPECT_NEAR(made(axis), -0.5, 0.02) << axis;
+  }
+  bench.disarm(1);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.force(1), 0.0f);
+  EXPECT_NEAR(bench.force(2), -0.5f, 0.001f) << "a position counts whether its axis is driven or not";
+}
+
 TEST_F(MadeUpBoard, TicksOfAllThreeAreCountedAndMissed) {
   auto& drives = bench.device.power.drives();
   bench.run_ticks(1);
