@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <span>
 
-#include "board/odrive_v3/priorities.hpp"
 #include "drivers/cortex_m/interrupt_controller.hpp"
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
@@ -23,9 +22,7 @@ class CanLine {
   CanLine(drivers::cortex_m::InterruptController<>& interrupts, std::uint32_t peripheral_clock_hz)
       : interrupts_(interrupts),
         peripheral_clock_hz_(peripheral_clock_hz),
-        can_(drivers::stm32f4::can1(), PendTransmit{interrupts}) {
-    for (const auto interrupt : all_interrupts) interrupts.set_priority(interrupt, priority::serial);
-  }
+        can_(drivers::stm32f4::can1(), PendTransmit{interrupts}) {}
 
   /// Main loop, before the link's poll().
   void poll(firmware::CanopenEdge& link, std::uint32_t now_us) {

@@ -108,10 +108,8 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
 void start_line_interrupts() {
   static_cast<void>(line_interrupts.configure(pins::gate_driver_fault, stm32::Edge::falling));
   static_cast<void>(line_interrupts.configure(pins::emergency_stop, stm32::Edge::rising));
-  for (const auto interrupt : {stm32::Interrupt::exti2, stm32::Interrupt::exti4}) {
-    interrupts.set_priority(interrupt, priority::lines);
-    interrupts.enable(interrupt);
-  }
+  interrupts.enable(stm32::Interrupt::exti2);
+  interrupts.enable(stm32::Interrupt::exti4);
   line_interrupts.enable(pins::gate_driver_fault.number);
   line_interrupts.enable(pins::emergency_stop.number);
 }
@@ -140,7 +138,6 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
   power->take_parameters(*application);
   power_runs = true;
   start_line_interrupts();
-  interrupts.set_priority(stm32::Interrupt::adc, priority::tick);
   interrupts.enable(stm32::Interrupt::adc);
   while (system_tick.now_us() - converters_on_us <= stm32::adc_stabilization_us) {
   }
@@ -169,7 +166,7 @@ void poll_power(std::uint32_t now_us) {
   application.emplace(identity(clocks), capture_memory);
   application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
-  interrupts.set_priority(cortex::SystemException::system_tick, priority::clock);
+  priority::set_all(interrupts);
   // Each core clock of the clock tree is a whole number of MHz and of periods.
   if (!system_tick.start(clocks.core_hz, clock_rate_hz)) cortex::stop_on_unexpected_interrupt();
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);

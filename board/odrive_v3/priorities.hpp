@@ -2,6 +2,9 @@
 
 #include <cstdint>
 
+#include "drivers/cortex_m/interrupt_controller.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
+
 // Who may interrupt whom, for the whole board: 0 is the most urgent, 15 the least.
 //
 //   0  lines     nFAULT and emergency stop: clear MOE of both bridges and leave a flag. They may interrupt a
@@ -21,5 +24,23 @@ inline constexpr std::uint8_t clock = 4;
 inline constexpr std::uint8_t serial = 8;
 
 static_assert(lines < tick && tick < clock && clock < serial);
+
+struct OfInterrupt {
+  drivers::stm32f4::Interrupt interrupt;
+  std::uint8_t priority;
+};
+using drivers::stm32f4::Interrupt;
+/// All that the board enables, SysTick aside. Read by tests/architecture/stack_depth.py as well, which adds
+/// up what the interrupts need of the stack when each interrupts the next.
+inline constexpr OfInterrupt all[] = {{Interrupt::exti2, lines},     {Interrupt::exti4, lines},
+                                      {Interrupt::adc, tick},        {Interrupt::usart2, serial},
+                                      {Interrupt::can1_tx, serial},  {Interrupt::can1_rx0, serial},
+                                      {Interrupt::can1_rx1, serial}, {Interrupt::can1_sce, serial}};
+
+/// Once, before any of them is enabled.
+inline void set_all(drivers::cortex_m::InterruptController<>& interrupts) {
+  interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, clock);
+  for (const auto& [interrupt, priority] : all) interrupts.set_priority(interrupt, priority);
+}
 
 }  // namespace kmax::board::odrive_v3::priority

@@ -5,7 +5,6 @@
 #include <span>
 
 #include "board/odrive_v3/pins.hpp"
-#include "board/odrive_v3/priorities.hpp"
 #include "drivers/cortex_m/interrupt_controller.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
@@ -23,9 +22,8 @@ class SerialLine {
   SerialLine(drivers::cortex_m::InterruptController<>& interrupts, std::uint32_t kernel_clock_hz)
       : interrupts_(interrupts), kernel_clock_hz_(kernel_clock_hz) {}
 
-  /// Pins and clock are on.
+  /// Pins and clock are on, the interrupt has its priority.
   void start(const firmware::ModbusEdge& link) {
-    interrupts_.set_priority(drivers::stm32f4::Interrupt::usart2, priority::serial);
     settings_ = link.settings();
     if (!configure()) {
       settings_ = {115'200};

@@ -28,7 +28,7 @@ std::optional<odrive_v3::SerialLine> serial;
   application.emplace(firmware::BoardIdentity{.board_name = "qemu",
                                               .core_clock_hz = clocks.core_hz,
                                               .clock_source = static_cast<std::uint8_t>(clocks.source)});
-  interrupts.set_priority(drivers::cortex_m::SystemException::system_tick, odrive_v3::priority::clock);
+  odrive_v3::priority::set_all(interrupts);
   if (!system_tick.start(clocks.core_hz, 1'000)) drivers::cortex_m::stop_on_unexpected_interrupt();
   serial.emplace(interrupts, clocks.apb1_hz);
   serial->start(application->serial());
