@@ -8,26 +8,18 @@ among other callers, another file's copy may be slower: then the tick's speed wo
 """
 
 import re
-import subprocess
 import sys
 from pathlib import Path
+
+from machine_code import demangled, disassembled
 
 ROOT_FUNCTION = "board::odrive_v3::ISR_tick"
 
 
-def disassembly(*arguments):
-    """(name, its instructions without their addresses) of each function."""
-    text = subprocess.run(["arm-none-eabi-objdump", "--no-show-raw-insn", *arguments], check=True, capture_output=True,
-                          text=True).stdout
-    for part in text.split("\n\n"):
-        heading, *lines = part.strip("\n").split("\n")
-        if name := re.fullmatch(r"[0-9a-f]+ <(.+)>:", heading):
-            yield name[1], [line.split(":", 1)[-1].strip() for line in lines]
-
-
 def place_free(lines):
-    """Without the names that objdump gives to where a branch leads before it is linked; the relocation says where."""
-    return [re.sub(r"<[^>]*>", "", line) for line in lines]
+    """Without addresses and the names that objdump gives to where a branch leads before it is linked; the relocation says
+    where."""
+    return [re.sub(r"<[^>]*>", "", line.split(":", 1)[-1].strip()) for line in lines]
 
 
 def called_from(calls, root):
@@ -42,16 +34,15 @@ def called_from(calls, root):
 
 def main(elf):
     calls = {name: {target[1] for line in lines if (target := re.search(r"\bb\S*\s+[0-9a-f]+ <([^>+]+)>", line))}
-             for name, lines in disassembly("-d", str(elf))}
-    plain = subprocess.run(["arm-none-eabi-c++filt", *calls], check=True, capture_output=True, text=True).stdout
-    plain = dict(zip(calls, plain.splitlines()))
+             for name, lines in disassembled("-d", str(elf))}
+    plain = demangled(calls)
     roots = [name for name, known_as in plain.items() if ROOT_FUNCTION in known_as]
     assert len(roots) == 1, f"{ROOT_FUNCTION}: {roots}"
     reached = called_from(calls, roots[0])
     copies = {}
     linked = re.findall(r"^LOAD (\S+)$", elf.with_suffix(".map").read_text(), re.M)
     for path in {elf.parent / name for name in linked if not name.startswith("/")}:
-        for name, lines in disassembly("-dr", str(path)):
+        for name, lines in disassembled("-dr", str(path)):
             # Not the start-up code's own section, nor what a file keeps to itself: a symbol that is mangled, and whole.
             if name in reached and name.startswith("_Z") and "." not in name:
                 copies.setdefault(name, []).append(place_free(lines))
