@@ -14,18 +14,22 @@ foreach(line IN LISTS lines)
   endif()
   set(kind ${CMAKE_MATCH_1})
   set(name ${CMAKE_MATCH_2})
-  # Heap, C++ run-time support for exceptions, statics and abstract classes, process exit.
-  if(name MATCHES "^_?(malloc|free|calloc|realloc|_malloc_r|_free_r|_calloc_r|_realloc_r|sbrk|_sbrk|_sbrk_r)(_r)?$"
-     OR name MATCHES "^(_Zn[wa]|_Zd[la])" OR name MATCHES "^__cxa_|^_Unwind_|^__gxx_personality"
-     OR name MATCHES "^(abort|exit|atexit|_exit|__register_exitproc|printf|_printf_r|snprintf|_vfprintf_r)$")
+  # Heap, C++ run-time support for exceptions, statics and abstract classes, process exit and its output.
+  if(name MATCHES "^_*(malloc|free|calloc|realloc|reallocf|memalign|aligned_alloc|posix_memalign|strdup|strndup|sbrk)(_r)?$"
+     OR name MATCHES "^_Z(n[wa]|d[la])"
+     OR name MATCHES "^__cxa_|^__?(gnu_)?[Uu]nwind_|^__gxx_personality|^__aeabi_(unwind|atexit)"
+     OR name MATCHES "^_ZSt[0-9]+(__throw_|terminate|set_terminate|unexpected|set_unexpected|uncaught_|rethrow_)"
+     OR name MATCHES "^_ZN10__cxxabiv1[0-9]+__(terminate|unexpected)|^_ZN9__gnu_cxx27__verbose_terminate"
+     OR name MATCHES "^(abort|exit|_exit|_Exit|quick_exit|atexit|__register_exitproc|raise|__assert_func)$"
+     OR name MATCHES "^_*[a-z]*printf(_r)?$|^_?(puts|putchar|fwrite)(_r)?$")
     string(APPEND problems "  ${name}: heap, exception or process support\n")
   endif()
   # Tables of virtual functions and types: calls in the interrupt path are resolved when compiled.
-  if(name MATCHES "^_ZT[VTCIS]")
+  if(name MATCHES "^_ZT[VTCIS]|^__dynamic_cast$|^_ZN10__cxxabiv1[0-9]+__[a-z_]*type_info")
     string(APPEND problems "  ${name}: virtual function table or type information\n")
   endif()
   # libm. The firmware computes with + - * / and the hardware square root only.
-  if(name MATCHES "^(__ieee754_|__kernel_)?(sin|cos|tan|sincos|asin|acos|atan|atan2|exp|exp2|expm1|log|log2|log10|pow|sqrt|cbrt|hypot|fmod|rem_pio2)f?$")
+  if(name MATCHES "^(__ieee754_|__kernel_)?(sin|cos|tan|sincos|asin|acos|atan|atan2|sinh|cosh|tanh|exp|exp2|expm1|log|log1p|log2|log10|pow|sqrt|cbrt|hypot|fmod|remainder|rem_pio2|floor|ceil|trunc|round|lround|rint|lrint|nearbyint|modf|frexp|ldexp|scalbn|fma)f?$")
     string(APPEND problems "  ${name}: libm\n")
   endif()
   if(kind STREQUAL "T")
@@ -82,6 +86,15 @@ while(open)
     endif()
   endforeach()
 endwhile()
+
+# linker.ld throws away the tables by which exceptions unwind the stack; this is in case it does not.
+execute_process(COMMAND ${READELF} -SW ${ELF} OUTPUT_VARIABLE sections COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX MATCHALL " \\.(ARM\\.ex[a-z]+|eh_frame|gcc_except_table)[^ ]* " tables "${sections}")
+foreach(table IN LISTS tables)
+  string(STRIP ${table} table)
+  string(APPEND problems "  ${table}: table for unwinding the stack\n")
+endforeach()
+
 execute_process(COMMAND ${READELF} -lW ${ELF} OUTPUT_VARIABLE segments COMMAND_ERROR_IS_FATAL ANY)
 string(REGEX MATCHALL "LOAD +0x[0-9a-f]+ 0x[0-9a-f]+ 0x[0-9a-f]+ 0x[0-9a-f]+" loads "${segments}")
 if(NOT loads)
