@@ -2,29 +2,6 @@
 
 namespace kmax::firmware {
 
-namespace {
-
-constexpr int frames_per_poll = 16;
-
-canopen::NodeSettings node_settings(const ParameterValues& values) {
-  const auto number = [&values](std::size_t entry) { return values.raw(slot_of(entry, 0)); };
-  canopen::NodeSettings settings{
-      .node_id = static_cast<std::uint8_t>(number(entry_of<"node.id">())),
-      .bit_rate = number(entry_of<"can.bit_rate">()),
-      .sync_cob_id = number(entry_of<"canopen.sync_cob_id">()),
-      .emergency_cob_id = number(entry_of<"canopen.emergency_cob_id">()),
-      .emergency_inhibit_time =
-          static_cast<std::uint16_t>(number(entry_of<"canopen.emergency_inhibit_time">())),
-      .heartbeat_ms = static_cast<std::uint16_t>(number(entry_of<"canopen.heartbeat_time">())),
-      .error_behaviour = static_cast<std::uint8_t>(number(entry_of<"canopen.error_behaviour">())),
-      .watched = {}};
-  for (std::size_t i = 0; i < settings.watched.size(); ++i)
-    settings.watched[i] = number(entry_of<"heartbeat_consumer.node_1">() + i);
-  return settings;
-}
-
-}  // namespace
-
 CanopenEdge::CanopenEdge(const Sources& sources)
     : parameters_(sources.parameters),
       store_(sources.store),
@@ -52,7 +29,7 @@ CanopenEdge::CanopenEdge(const Sources& sources)
 void CanopenEdge::power_on() {
   store_.power_on_communication().take(parameters_.values());
   configured_communication_ = parameters_.communication_changes();
-  node_.power_on(node_settings(parameters_.values()), parameters_.values(), axes_.now_us());
+  node_.power_on(parameters_.values(), axes_.now_us());
 }
 
 /// A host resets the communication, which then has the settings of the last start again.
@@ -64,7 +41,7 @@ void CanopenEdge::reset_communication() {
 }
 
 void CanopenEdge::start_node() {
-  node_.start(node_settings(parameters_.values()), parameters_.values(), axes_.now_us());
+  node_.start(parameters_.values(), axes_.now_us());
 }
 
 void CanopenEdge::set_readings(const CanReadings& readings) {
@@ -75,6 +52,7 @@ void CanopenEdge::set_readings(const CanReadings& readings) {
 
 void CanopenEdge::poll() {
   const std::uint32_t now_us = axes_.now_us();
+  constexpr int frames_per_poll = 16;
   // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
   for (int i = 0; i < frames_per_poll && queue_.pop(frame); ++i) {
@@ -84,7 +62,7 @@ void CanopenEdge::poll() {
   node_.lss().hold_bit_rate(axes_.any_armed());
   if (parameters_.communication_changes() != configured_communication_) {
     configured_communication_ = parameters_.communication_changes();
-    node_.configure(node_settings(parameters_.values()), parameters_.values(), now_us);
+    node_.configure(parameters_.values(), now_us);
   }
   act_on(node_.poll(parameters_.values(), now_us));
   if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us);

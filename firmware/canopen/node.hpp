@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -16,18 +17,6 @@
 #include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware::canopen {
-
-/// What a node is set to, apart from its PDOs; COB-IDs as they are stored, without the node ID where they are
-/// the predefined ones.
-struct NodeSettings {
-  std::uint8_t node_id = 1;
-  std::uint32_t bit_rate = 1'000'000;
-  std::uint32_t sync_cob_id = cob_id::sync, emergency_cob_id = cob_id::emergency;
-  std::uint16_t emergency_inhibit_time = 0;  ///< 100 us
-  std::uint16_t heartbeat_ms = 0;
-  std::uint8_t error_behaviour = 0;                         ///< object 0x1029
-  std::array<std::uint32_t, watched_node_count> watched{};  ///< object 0x1016
-};
 
 /// What the owner of a node has to do; several at a time.
 struct NodeEvents {
@@ -64,28 +53,27 @@ class Node {
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
-  /// Power-on and after a reset of the node: node ID and bit rate are those of the settings. `pdos` here and
-  /// below: the values among which are those of the objects 0x1400 to 0x1BFF.
-  void power_on(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
-    lss_.start(settings.node_id, settings.bit_rate);
-    wanted_.node_id = settings.node_id;
-    wanted_.bit_rate = settings.bit_rate;
-    start(settings, pdos, now_us);
+  /// Power-on and after a reset of the node: node ID and bit rate are those of the settings. `values` here
+  /// and below: those among which are CANopen's own settings.
+  void power_on(const ParameterValues& values, std::uint32_t now_us) {
+    identity_ = identity_in(values);
+    lss_.start(identity_.node_id, identity_.bit_rate);
+    start(values, now_us);
   }
 
   /// NMT's initialising: ends with the boot-up message. Node ID and bit rate are those that LSS was told, or
   /// those of the settings if these have changed since.
-  void start(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
-    if (settings.node_id != wanted_.node_id || settings.bit_rate != wanted_.bit_rate)
-      lss_.start(settings.node_id, settings.bit_rate);
+  void start(const ParameterValues& values, std::uint32_t now_us) {
+    const Identity now = identity_in(values);
+    if (now != identity_) lss_.start(now.node_id, now.bit_rate);
+    identity_ = now;
     lss_.reset_communication();
-    wanted_.heartbeat_ms = settings.heartbeat_ms;
-    nmt_.start(lss_.active_node_id(), settings.heartbeat_ms, now_us);
+    heartbeat_ms_ = heartbeat_time_in(values);
+    nmt_.start(lss_.active_node_id(), heartbeat_ms_, now_us);
     emergency_.start();
     heartbeats_.start();
     stop_pdos();
-    configure(settings, pdos, now_us);
-    wanted_ = settings;
+    configure(values, now_us);
     sdo_silent_ = !nmt_.configured();
     if (sdo_silent_) {
       sdo_.stop();
@@ -95,34 +83,36 @@ class Node {
   }
 
   /// CANopen's own settings have changed.
-  void configure(const NodeSettings& settings, const ParameterValues& pdos, std::uint32_t now_us) {
+  void configure(const ParameterValues& values, std::uint32_t now_us) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    sync_.configure(settings.sync_cob_id);
-    emergency_.configure(resolved_cob_id(settings.emergency_cob_id, cob_id::emergency, id),
-                         settings.emergency_inhibit_time);
-    if (settings.heartbeat_ms != wanted_.heartbeat_ms) nmt_.set_heartbeat(settings.heartbeat_ms, now_us);
-    wanted_.heartbeat_ms = settings.heartbeat_ms;
+    sync_.configure(stored<"canopen.sync_cob_id">(values));
+    emergency_.configure(resolved_cob_id(stored<"canopen.emergency_cob_id">(values), cob_id::emergency, id),
+                         static_cast<std::uint16_t>(stored<"canopen.emergency_inhibit_time">(values)));
+    const std::uint16_t heartbeat_ms = heartbeat_time_in(values);
+    if (heartbeat_ms != heartbeat_ms_) nmt_.set_heartbeat(heartbeat_ms, now_us);
+    heartbeat_ms_ = heartbeat_ms;
     for (std::size_t i = 0; i < watched_node_count; ++i) {
-      if (settings.watched[i] == wanted_.watched[i]) continue;
-      if (const auto forgotten = heartbeats_.configure(i, settings.watched[i]))
+      const std::uint32_t watched = values.raw(slot_of(entry_of<"heartbeat_consumer.node_1">() + i, 0));
+      if (watched == watched_[i]) continue;
+      watched_[i] = watched;
+      if (const auto forgotten = heartbeats_.configure(i, watched))
         emergency_.clear(0x8130, source_of(*forgotten));
     }
-    wanted_.watched = settings.watched;
-    wanted_.error_behaviour = settings.error_behaviour;
-    rpdos_.configure(pdos, id);
-    if (nmt_.state() == NmtState::operational) configure_tpdos(pdos);
+    error_behaviour_ = stored<"canopen.error_behaviour">(values);
+    rpdos_.configure(values, id);
+    if (nmt_.state() == NmtState::operational) configure_tpdos(values);
     list_identifiers(id);
   }
 
-  [[nodiscard]] NodeEvents receive(const drivers::CanFrame& frame, const ParameterValues& pdos,
+  [[nodiscard]] NodeEvents receive(const drivers::CanFrame& frame, const ParameterValues& values,
                                    std::uint32_t now_us) {
     NodeEvents events;
     if (frame.extended || frame.remote) return events;
     const std::uint32_t id = frame.identifier;
     if (id == cob_id::nmt) {
-      follow(nmt_.receive(frame), pdos, events);
+      follow(nmt_.receive(frame), values, events);
     } else if (id == cob_id::lss_request) {
-      act_on(lss_.receive(frame, now_us), pdos, events);
+      act_on(lss_.receive(frame, now_us), values, events);
     } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
       if (speaks()) sdo_.receive(frame, now_us);
     } else if (nmt_.configured() && only_ours(id)) {
@@ -133,14 +123,14 @@ class Node {
     return events;
   }
 
-  [[nodiscard]] NodeEvents poll(const ParameterValues& pdos, std::uint32_t now_us) {
+  [[nodiscard]] NodeEvents poll(const ParameterValues& values, std::uint32_t now_us) {
     NodeEvents events;
     while (const auto lost = heartbeats_.poll(now_us)) {
       emergency_.raise({0x8130, error_register::communication, {source_of(*lost)}});
       events.heartbeat_lost = true;
     }
     if (events.heartbeat_lost) communication_error(events);
-    act_on(lss_.poll(now_us), pdos, events);
+    act_on(lss_.poll(now_us), values, events);
     sdo_.poll(now_us);
     return events;
   }
@@ -187,6 +177,24 @@ class Node {
   std::uint32_t identity_conflicts() const { return identity_conflicts_; }
 
  private:
+  /// As it was stored when the node last started: what LSS has given since may differ.
+  struct Identity {
+    std::uint8_t node_id = 1;
+    std::uint32_t bit_rate = 1'000'000;
+    friend constexpr bool operator==(const Identity&, const Identity&) = default;
+  };
+
+  /// A COB-ID without the node ID where it is the predefined one.
+  template <FixedName name>
+  static std::uint32_t stored(const ParameterValues& values) {
+    return values.raw(slot_of(entry_of<name>(), 0));
+  }
+  static Identity identity_in(const ParameterValues& values) {
+    return {static_cast<std::uint8_t>(stored<"node.id">(values)), stored<"can.bit_rate">(values)};
+  }
+  static std::uint16_t heartbeat_time_in(const ParameterValues& values) {
+    return static_cast<std::uint16_t>(stored<"canopen.heartbeat_time">(values));
+  }
   static constexpr std::uint8_t source_of(std::uint8_t other_node) {
     return static_cast<std::uint8_t>(watched_source + other_node);
   }
@@ -229,14 +237,14 @@ class Node {
     }
   }
 
-  void follow(NmtEvent event, const ParameterValues& pdos, NodeEvents& events) {
+  void follow(NmtEvent event, const ParameterValues& values, NodeEvents& events) {
     switch (event) {
       case NmtEvent::none:
         break;
       case NmtEvent::entered_operational:
         sdo_start_if_silent();
-        rpdos_.configure(pdos, node_id());
-        configure_tpdos(pdos);
+        rpdos_.configure(values, node_id());
+        configure_tpdos(values);
         break;
       case NmtEvent::entered_pre_operational:
         sdo_start_if_silent();
@@ -265,9 +273,9 @@ class Node {
 
   // Those that start do so at the next call of poll_pdos() but one: to start them takes so long that the next
   // may be late.
-  void configure_tpdos(const ParameterValues& pdos) {
+  void configure_tpdos(const ParameterValues& values) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    tpdos_.configure(pdos, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
+    tpdos_.configure(values, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
   }
 
   void sdo_start_if_silent() {
@@ -275,11 +283,11 @@ class Node {
     sdo_silent_ = false;
   }
 
-  void act_on(LssAction action, const ParameterValues& pdos, NodeEvents& events) {
+  void act_on(LssAction action, const ParameterValues& values, NodeEvents& events) {
     if (action == LssAction::switch_bit_rate) {
       settings_.bit_rate = lss_.active_bit_rate();
       // What went often enough at the rate before may fill the bus at this one.
-      if (nmt_.state() == NmtState::operational) configure_tpdos(pdos);
+      if (nmt_.state() == NmtState::operational) configure_tpdos(values);
     }
     if (action == LssAction::store) events.store_identity = true;
     if (action == LssAction::start_node) events.start_node = true;
@@ -287,12 +295,12 @@ class Node {
 
   /// Object 0x1029.
   void communication_error(NodeEvents& events) {
-    if (wanted_.error_behaviour == 0 && nmt_.state() == NmtState::operational) {
+    if (error_behaviour_ == 0 && nmt_.state() == NmtState::operational) {
       if (nmt_.enter(NmtState::pre_operational) != NmtEvent::none) {
         stop_pdos();
         events.pdos_ended = true;
       }
-    } else if (wanted_.error_behaviour == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
+    } else if (error_behaviour_ == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
       stop_pdos();
       sdo_.stop();
       sdo_silent_ = true;
@@ -318,7 +326,7 @@ class Node {
       for (std::size_t i = 0; i < pdo_count; ++i) {
         if (const auto identifier = rpdos_.identifier(i)) listen(*identifier);
       }
-      for (const std::uint32_t watched : wanted_.watched) {
+      for (const std::uint32_t watched : watched_) {
         const std::uint32_t node = watched >> 16 & 0x7F;
         if (node != 0 && (watched & 0xFFFF) != 0) listen(cob_id::heartbeat + node);
       }
@@ -337,7 +345,11 @@ class Node {
   Tpdos tpdos_;
   Rpdos rpdos_;
   CanSettings settings_;
-  NodeSettings wanted_;  ///< as last taken over: node ID and bit rate at a start, all else at a configure()
+  // As last taken over.
+  Identity identity_;
+  std::uint16_t heartbeat_ms_ = 0;
+  std::array<std::uint32_t, watched_node_count> watched_{};  ///< object 0x1016
+  std::uint32_t error_behaviour_ = 0;                        ///< object 0x1029
   std::uint32_t identity_conflicts_ = 0;
   bool sdo_silent_ = false;
 };
