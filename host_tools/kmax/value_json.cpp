@@ -44,6 +44,30 @@ std::string_view access_name(firmware::Access access) {
   }
   return "rw";
 }
+
+/// How it may change while its axis is armed.
+std::string_view change_name(firmware::Change change) {
+  switch (change) {
+    case firmware::Change::any_time:
+      return "any";
+    case firmware::Change::disarmed_only:
+      return "none";
+    case firmware::Change::only_lower:
+      return "lower";
+    case firmware::Change::only_higher:
+      return "higher";
+    case firmware::Change::only_nearer_zero:
+      return "nearer to 0";
+  }
+  return "unknown";
+}
+
+/// Of the parameter's own axis; null: it has none.
+Json ceiling_json(const device::Parameter& parameter) {
+  const std::string_view name = parameter.definition().ceiling;
+  if (name.empty()) return nullptr;
+  return device::Parameter(firmware::find_entry(name), parameter.axis()).name();
+}
 }  // namespace
 
 Json number_json(double number) {
@@ -79,6 +103,9 @@ Json description_json(const device::Parameter& parameter) {
       {"default", value_json(parameter, parameter.default_raw())},
       {"values", names},
       {"persistent", entry.persistent},
+      {"change_while_armed",
+       entry.access == firmware::Access::read_only ? Json(nullptr) : Json(change_name(entry.change))},
+      {"ceiling", ceiling_json(parameter)},
       {"modbus",
        {{"table", parameter.table() == device::Table::holding ? "holding" : "input"},
         {"address", parameter.address()},

@@ -21,6 +21,19 @@ TYPES = {"integer8": 0x2, "integer16": 0x3, "integer32": 0x4, "unsigned8": 0x5, 
          "unsigned32": 0x7, "float32": 0x8}
 
 
+class Json(unittest.TestCase):
+    def test_it_says_what_an_armed_axis_lets_change(self):
+        objects = {entry["name"]: entry for entry in kmax_json("describe")["objects"]}
+        for name, change, ceiling in (
+                ("force.limit", "lower", "force.ceiling"), ("axis1.force.limit", "lower", "axis1.force.ceiling"),
+                ("force.ceiling", "none", None), ("supply.voltage_min", "higher", None),
+                ("interference.background_force", "nearer to 0", "force.ceiling"), ("wall.position", "none", None),
+                ("interference.onset_time", "any", None),
+                ("measured.force", None, None)):
+            with self.subTest(name):
+                self.assertEqual((change, ceiling), (objects[name]["change_while_armed"], objects[name]["ceiling"]))
+
+
 class Eds(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
