@@ -5,12 +5,25 @@
 
 #include "control/finite.hpp"
 #include "control/force_limiter.hpp"
+#include "control/instability_detector.hpp"
 #include "control/interference.hpp"
 #include "control/resampler.hpp"
 #include "control/velocity_estimator.hpp"
 #include "control/wall_law.hpp"
+#include "control/wall_softening.hpp"
 
 namespace kmax::control {
+
+/// What is done about a wall that oscillates under the hand; each does what the one before it does and more.
+/// The numbers are those of instability.action.
+enum class InstabilityAction : std::uint8_t {
+  off = 0,     ///< it is not looked for
+  warn = 1,    ///< it is said
+  soften = 2,  ///< the wall's force comes down until it ends, and stays down
+  trip = 3,    ///< no force, and a fault
+};
+
+enum class HapticFault : std::uint8_t { none, not_finite, over_speed, unstable };
 
 /// All that one axis' haptic rendering is set by, in SI units. Positions are double: this struct is made
 /// and read outside the interrupt only, and a surface 10 m away must keep its place to the count.
@@ -26,13 +39,17 @@ struct HapticLoopConfig {
   InterferenceConfig<Scalar> interference;
   ForceLimiterConfig<Scalar> force;
   Scalar velocity_limit = Scalar(0);  ///< m/s, trip level; 0: none
-  double tick_rate = 20000.0;         ///< Hz, calls of tick() per second
-  std::uint32_t divider = 1;          ///< ticks per haptic sample, >= 1
+  InstabilityAction instability_action = InstabilityAction::off;
+  InstabilityDetectorConfig<Scalar> instability;  ///< but for its rate
+  WallSofteningConfig<Scalar> softening;
+  double tick_rate = 20000.0;  ///< Hz, calls of tick() per second
+  std::uint32_t divider = 1;   ///< ticks per haptic sample, >= 1
 };
 
 /// From encoder count to force: the heart of the house, one axis.
 ///
-///   count -> Resampler -> position, VelocityEstimator -> WallLaw + Interference -> ForceLimiter -> force
+///   count -> Resampler -> position, VelocityEstimator -> WallLaw + Interference -> WallSoftening
+///         -> ForceLimiter -> force;    count, force -> InstabilityDetector -> WallSoftening
 ///
 /// Called at every tick; the haptic part runs on every divider-th one and its force is held in between
 /// (a zero-order hold, as in both papers). The position stays an integer until the distance to the wall
@@ -44,9 +61,15 @@ struct HapticLoopConfig {
 /// tick to tick. Limits, soft start and faults are the same.
 ///
 /// A value that is not finite anywhere gives zero force and `not_finite`; a velocity beyond the limit
-/// gives zero force and `over_speed`. Both are reported on every tick until the next haptic sample; to
-/// latch them is the axis' business. While not enabled, everything is still estimated and evaluated, so
-/// that arming starts from a settled estimator, but the force is zero and the soft start is wound back.
+/// gives zero force and `over_speed`; an oscillation, where the action is `trip`, gives zero force and
+/// `unstable`. Faults are reported on every tick until the next haptic sample; to latch them is the axis'
+/// business. While not enabled, everything is still estimated and evaluated, so that arming starts from a
+/// settled estimator, but the force is zero and the soft start is wound back.
+///
+/// The detector sees the encoder's own counts from where the loop was enabled, since a coarser resolution is
+/// the wall's and not the handle's motion, and a wall that is moved moves no handle; and the force after all
+/// limits. It looks on in tick() only, while enabled. What has been softened stays so until the loop is not
+/// enabled, or reset; alarms are counted until they are forgotten.
 ///
 /// No heap, no libm, no virtual call, no loop beyond the velocity estimator's window.
 template <typename Scalar>
@@ -66,6 +89,9 @@ class HapticLoop {
     typename WallLaw<Scalar>::Coefficients wall{};
     typename Interference<Scalar>::Coefficients interference{};
     typename ForceLimiter<Scalar>::Coefficients force{};
+    InstabilityAction instability_action = InstabilityAction::off;
+    typename InstabilityDetector<Scalar>::Coefficients instability{};
+    typename WallSoftening<Scalar>::Coefficients softening{};
   };
 
   struct Output {
@@ -74,14 +100,14 @@ class HapticLoop {
     std::int64_t position{};    ///< counts, re-sampled
     Scalar outside_distance{};  ///< m, > 0 in free space
     Scalar velocity{};          ///< m/s along +x
-    Scalar magnetic_force{};    ///< N, outwards
+    Scalar magnetic_force{};    ///< N, outwards, before softening
     Scalar magnetic_coefficient{};  ///< N
     bool inside = false;
     bool limited = false;  ///< force.limit took something away
     bool slew_limited = false;
-    bool ramping = false;     ///< soft start under way
-    bool not_finite = false;  ///< fault
-    bool over_speed = false;  ///< fault
+    bool ramping = false;   ///< soft start under way
+    bool unstable = false;  ///< the wall oscillates under the hand
+    HapticFault fault = HapticFault::none;
     bool new_sample = false;  ///< this tick computed; false: the previous sample is held
   };
 
@@ -96,6 +122,8 @@ class HapticLoop {
     wall_.reset();
     interference_.reset();
     limiter_.reset();
+    detector_.reset();
+    softening_.reset();
     ticks_until_sample_ = 0;
     held_ = Output{};
   }
@@ -108,11 +136,14 @@ class HapticLoop {
   [[gnu::noinline, gnu::flatten]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
                                                      Scalar added = Scalar(0)) {
     if (!sample_is_due(c)) return hold(enabled);
+    counted_ = static_cast<std::uint32_t>(count);
     const Motion motion = observe(c, count);
     const auto wall = wall_.update(c.wall, motion.outside_distance, c.side * motion.velocity);
     const auto disturbance = interference_.update(c.interference, wall.inside);
     show(wall, disturbance);
-    return limit(c, motion, along_axis(c, wall.force + disturbance.normal, added), enabled);
+    const Scalar outward = softening_.factor() * (wall.force + disturbance.normal);
+    const bool forced = limit(c, motion, along_axis(c, outward, added), enabled);
+    return forced && c.instability_action != InstabilityAction::off ? watch(c) : held_;
   }
 
   /// One tick without a wall: `force` (N along +x) is what is asked for.
@@ -121,18 +152,26 @@ class HapticLoop {
     if (!sample_is_due(c)) return hold(enabled);
     const Motion motion = observe(c, count);
     show({.inside = !(motion.outside_distance > Scalar(0))}, {});
-    return limit(c, motion, force, enabled);
+    detector_.reset();
+    limit(c, motion, force, enabled);
+    return held_;
   }
 
   /// 0 to 1: the share of the force that the soft start lets pass; 0 while not enabled.
   Scalar ramp() const { return limiter_.ramp(); }
 
   /// N, outwards: what papers call the background force, the field's force and the interference's F_B, in the
-  /// last haptic sample of tick(), before soft start and limits. Nothing but a simulated person asks for it,
-  /// so it is worked out only then.
+  /// last haptic sample of tick(), softened, before soft start and limits. Nothing but a simulated person
+  /// asks for it, so it is worked out only then.
   Scalar background_force(const Coefficients& c) const {
-    return held_.magnetic_force + interference_.background(c.interference);
+    return softening_.factor() * (held_.magnetic_force + interference_.background(c.interference));
   }
+
+  /// 0 to 1: the factor on all of the wall's force; 1 while not enabled.
+  Scalar softening() const { return softening_.factor(); }
+
+  const InstabilityDetector<Scalar>& detector() const { return detector_; }
+  void forget_alarms() { detector_.forget_alarms(); }
 
   /// What the last tick() or follow() gave.
   const Output& output() const { return held_; }
@@ -198,35 +237,60 @@ class HapticLoop {
     return saturate(c.side * saturate(outward) + added);
   }
 
-  /// From what is asked for to what the device gets, with what must keep it from getting anything.
-  const Output& limit(const Coefficients& c, const Motion& motion, Scalar requested, bool enabled) {
+  /// From what is asked for to what the device gets, with what must keep it from getting anything. False: it
+  /// gets nothing.
+  bool limit(const Coefficients& c, const Motion& motion, Scalar requested, bool enabled) {
     // A velocity within the limit is finite, since the limit is.
     const bool sound = magnitude(motion.velocity) <= c.velocity_limit && is_finite(motion.outside_distance) &&
                        is_finite(requested);
-    held_.over_speed = held_.not_finite = false;
+    held_.unstable = false;
+    held_.fault = HapticFault::none;
     if (!sound) [[unlikely]]
-      name_fault(c, requested);
+      name_fault(requested);
     if (!enabled || !sound) [[unlikely]] {
       release();
-      return held_;
+      return false;
     }
     const auto limited = limiter_.update(c.force, requested);
     held_.force = limited.force;
     held_.limited = limited.limited;
     held_.slew_limited = limited.slew_limited;
     held_.ramping = limited.ramping;
+    return true;
+  }
+
+  [[gnu::noinline, gnu::cold]] void name_fault(Scalar requested) {
+    const bool finite =
+        is_finite(held_.velocity) && is_finite(held_.outside_distance) && is_finite(requested);
+    held_.fault = finite ? HapticFault::over_speed : HapticFault::not_finite;
+  }
+
+  /// Whether the wall oscillates under the hand, with what is to be done about it. A function of its own: it
+  /// would take registers from the velocity estimator.
+  [[gnu::noinline]] const Output& watch(const Coefficients& c) {
+    const auto moved = static_cast<std::int32_t>(counted_ - watched_from_);
+    if (detector_.update(c.instability, static_cast<Scalar>(moved) * c.count_length, held_.force))
+        [[unlikely]]
+      act_on_instability(c);
     return held_;
   }
 
-  [[gnu::noinline, gnu::cold]] void name_fault(const Coefficients& c, Scalar requested) {
-    Output& out = held_;
-    out.over_speed = out.velocity > c.velocity_limit || out.velocity < -c.velocity_limit;
-    out.not_finite = !(is_finite(out.velocity) && is_finite(out.outside_distance) && is_finite(requested));
+  [[gnu::noinline, gnu::cold]] void act_on_instability(const Coefficients& c) {
+    if (c.instability_action == InstabilityAction::soften) softening_.update(c.softening, true);
+    if (c.instability_action == InstabilityAction::trip) {
+      release();
+      held_.fault = HapticFault::unstable;
+    }
+    held_.unstable = true;
   }
 
   /// No force, and the soft start is wound back.
   void release() {
     limiter_.reset();
+    softening_.reset();
+    detector_.reset();
+    watched_from_ = counted_;
+    held_.unstable = false;
     held_.force = Scalar(0);
     held_.tangential_force = Scalar(0);
     held_.limited = held_.slew_limited = held_.ramping = false;
@@ -237,6 +301,10 @@ class HapticLoop {
   WallLaw<Scalar> wall_;
   Interference<Scalar> interference_;
   ForceLimiter<Scalar> limiter_;
+  WallSoftening<Scalar> softening_;
+  InstabilityDetector<Scalar> detector_;
+  // Low words of counts: the last one, kept here so that it takes no registers, and the detector's origin.
+  std::uint32_t counted_ = 0, watched_from_ = 0;
   std::uint32_t ticks_until_sample_ = 0;
   bool settled_ = false;  // the velocity estimator has seen a position
   Output held_;
@@ -264,6 +332,11 @@ typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const Hapt
   c.wall = WallLaw<Scalar>::prepare(config.wall, period);
   c.interference = Interference<Scalar>::prepare(config.interference, period);
   c.force = ForceLimiter<Scalar>::prepare(config.force, period);
+  c.instability_action = config.instability_action;
+  auto instability = config.instability;
+  instability.rate = Scalar(1) / period;
+  c.instability = InstabilityDetector<Scalar>::prepare(instability);
+  c.softening = WallSoftening<Scalar>::prepare(config.softening, period);
   return c;
 }
 

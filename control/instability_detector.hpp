@@ -30,7 +30,8 @@ struct InstabilityDetectorConfig {
 /// After the first cycle the verdict takes two spans, or three; a span ends with a turn. It is passed again
 /// after every span: it falls when the oscillation dies down, and at the latest a period of lowest_frequency
 /// after the last turn. Amplitudes are those of the last cycle: half of the way between two turns, the mean
-/// of there and back, which leaves slow motion out; both are 0 where nothing oscillates.
+/// of there and back, which leaves slow motion out; both are 0 where nothing oscillates. Of an alarm those of
+/// its strongest span are kept, by the force.
 ///
 /// For certain: no signal whose displacement or whose force stays within twice its threshold, peak to peak,
 /// is ever called unstable, and neither is one slower than lowest_frequency. A steady sine from
@@ -60,6 +61,14 @@ class InstabilityDetector {
     Scalar waking_force{};     ///< N
     std::uint32_t longest{};   ///< samples of the longest period
     std::uint32_t settling{};  ///< samples
+    Scalar rate{};             ///< samples per second
+  };
+
+  /// From the verdict "unstable" until it falls.
+  struct Alarm {
+    Scalar force{};         ///< N, amplitude
+    Scalar displacement{};  ///< m, amplitude
+    Scalar frequency{};     ///< Hz
   };
 
   /// Outside the interrupt.
@@ -71,11 +80,17 @@ class InstabilityDetector {
     // A period may begin and end anywhere within a sample.
     c.longest = samples(config.rate / config.lowest_frequency) + 1;
     c.settling = samples(config.settling_time * config.rate);
+    c.rate = config.rate;
     return c;
   }
 
-  /// As if nothing had been touched yet. Needed when the displacement has another origin or scale.
-  void reset() { *this = {}; }
+  /// As if nothing had been touched yet, but for the alarms that were. Needed when the displacement has
+  /// another origin or scale.
+  void reset() {
+    if (awake_ == 0) return;
+    awake_ = 0;
+    calm_down();
+  }
 
   /// One haptic sample. `displacement`: m from the surface, or from any other fixed place near it. `force`: N
   /// that the wall asks for, with the sign that pushes the displacement up where the wall pushes out. True:
@@ -108,6 +123,12 @@ class InstabilityDetector {
   bool unstable() const { return unstable_; }                                ///< as the last update() gave it
   Scalar displacement_amplitude() const { return displacement_amplitude_; }  ///< m
   Scalar force_amplitude() const { return force_amplitude_; }                ///< N
+  std::uint32_t alarms() const { return alarms_; }                           ///< since forget_alarms()
+  const Alarm& last_alarm() const { return last_alarm_; }  ///< likewise; all 0: there was none
+  void forget_alarms() {
+    alarms_ = 0;
+    last_alarm_ = {};
+  }
 
  private:
   static constexpr Scalar kept = Scalar(0.75);
@@ -170,7 +191,13 @@ class InstabilityDetector {
     span_ += since_turn_;
     if (span_ < c.settling) return;
     const Scalar energy = saturate(energy_) / static_cast<Scalar>(span_);
+    const bool was_unstable = unstable_;
     unstable_ = energy_before_ > Scalar(0) && energy >= kept * energy_before_;
+    if (unstable_ && !was_unstable) ++alarms_;
+    if (unstable_ && (!was_unstable || force_amplitude_ > last_alarm_.force)) {
+      last_alarm_ = {force_amplitude_, displacement_amplitude_,
+                     c.rate / static_cast<Scalar>(since_turn_ + half_period_before_)};
+    }
     energy_before_ = energy;
     energy_ = Scalar(0);
     span_ = 0;
@@ -186,6 +213,8 @@ class InstabilityDetector {
   std::uint32_t span_ = 0;             // samples
   Scalar displacement_amplitude_{}, force_amplitude_{};
   bool unstable_ = false;
+  std::uint32_t alarms_ = 0;
+  Alarm last_alarm_{};
 };
 
 }  // namespace kmax::control

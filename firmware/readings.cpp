@@ -42,7 +42,8 @@ std::uint32_t Readings::flags_of(std::size_t axis) const {
   const auto& haptic = of_.axes.report(axis).haptic;
   return (haptic.inside ? 1u : 0u) | (haptic.limited ? 2u : 0u) | (haptic.slew_limited ? 4u : 0u) |
          (haptic.ramping ? 8u : 0u) | (of_.axes.supervisor(axis).armed() ? 16u : 0u) |
-         (saturated(axis) ? 32u : 0u);
+         (saturated(axis) ? 32u : 0u) | (haptic.unstable ? 64u : 0u) |
+         (of_.axes.report(axis).softening < 1.0f ? 128u : 0u);
 }
 
 void Readings::refresh_axis(std::size_t axis) {
@@ -57,15 +58,16 @@ void Readings::refresh_axis(std::size_t axis) {
   const ThermalSupervisor& thermal = of_.axes.thermal(axis);
   const bool supply_fault =
       report.condition == Fault::under_voltage || report.condition == Fault::over_voltage;
-  const DriveStatus status{.state = machine.state(),
-                           .mode = v.choice<DriveMode, "drive.mode">(axis),
-                           .supplied = !supply_fault,
-                           .power_stage_on = machine.armed(),
-                           .warning = thermal.allowance() < 1.0f || guard_warns,
-                           .limited = haptic.limited || haptic.slew_limited || saturated(axis),
-                           .halted = supervisor.is_halted(),
-                           .force_is_zero = report.force == 0.0f,
-                           .excitation_finished = report.motor.excitation_finished};
+  const DriveStatus status{
+      .state = machine.state(),
+      .mode = v.choice<DriveMode, "drive.mode">(axis),
+      .supplied = !supply_fault,
+      .power_stage_on = machine.armed(),
+      .warning = thermal.allowance() < 1.0f || guard_warns || haptic.unstable || report.softening < 1.0f,
+      .limited = haptic.limited || haptic.slew_limited || saturated(axis),
+      .halted = supervisor.is_halted(),
+      .force_is_zero = report.force == 0.0f,
+      .excitation_finished = report.motor.excitation_finished};
   v.set_whole<"drive.statusword">(statusword_of(status), axis);
   v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
   v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
@@ -116,6 +118,12 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_whole<"guard.criterion">(static_cast<std::uint32_t>(guard.criterion), axis);
   v.set_real<"guard.value">(guard.value, axis);
   v.set_real<"guard.bound">(guard.bound, axis);
+
+  v.set_whole<"instability.alarms">(report.alarms, axis);
+  v.set_real<"instability.last_force">(report.last_alarm.force, axis);
+  v.set_real<"instability.last_amplitude">(report.last_alarm.displacement, axis);
+  v.set_real<"instability.last_frequency">(report.last_alarm.frequency, axis);
+  v.set_real<"instability.softening">(report.softening, axis);
 }
 
 void Readings::publish_crash() {

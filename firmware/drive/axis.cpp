@@ -27,11 +27,6 @@ float velocity_of_tick(const AxisSetting& setting, std::int32_t moved) {
               __builtin_assume_aligned(from, alignof(std::uint32_t)), size);
 }
 
-/// `a` or `b`, without a branch: asked one after the other, both answers would be kept in registers.
-constexpr bool either(bool a, bool b) {
-  return static_cast<bool>(static_cast<int>(a) | static_cast<int>(b));
-}
-
 /// low <= value <= high for bounds >= 0, with comparisons of whole numbers, which are shorter: from 0 up,
 /// numbers are ordered as their bits are, and what is negative or not a number lies above all of them.
 constexpr bool is_within(float value, float low, float high) {
@@ -70,7 +65,7 @@ constexpr bool is_positive(float value) {
   const auto& out = setting.mode == DriveMode::torque
                         ? loop_.follow(setting.haptic, position, by_force, demand.from_host)
                         : loop_.tick(setting.haptic, position, by_force, demand.from_axes);
-  if (by_force && !either(out.not_finite, out.over_speed)) [[likely]] {
+  if (by_force && out.fault == control::HapticFault::none) [[likely]] {
     output_.enabled = drive(setting, input, low_word(position), moved);
   } else {
     output_.enabled = excite_or_release(setting, input, state, moved);
@@ -79,7 +74,10 @@ constexpr bool is_positive(float value) {
     state |= static_cast<std::uint32_t>(trip_);
   changes_ = state ^ state_;
   if (changes_ != 0) [[unlikely]] {
-    if (enable && (state_ & enabled_bit) == 0) armed_samples_ = limited_samples_ = 0;
+    if (enable && (state_ & enabled_bit) == 0) {
+      armed_samples_ = limited_samples_ = 0;
+      loop_.forget_alarms();
+    }
     state_ = state;
   }
   if (enable && out.new_sample) [[likely]] {
@@ -133,10 +131,12 @@ void Axis::find_trips(const AxisSetting& setting, const Input& input, Fault cond
     trip(condition, of_supply ? supply_ : 0.0f, here);
   } else if (!input.count_valid) {
     trip(Fault::encoder, 0.0f, here);
-  } else if (out.not_finite) {
+  } else if (out.fault == control::HapticFault::not_finite) {
     trip(Fault::not_finite, out.velocity, here);
-  } else if (out.over_speed) {
+  } else if (out.fault == control::HapticFault::over_speed) {
     trip(Fault::over_speed, out.velocity, here);
+  } else if (out.fault == control::HapticFault::unstable) {
+    trip(Fault::unstable_wall, loop_.detector().last_alarm().force, here);
   } else if (setting.mode == DriveMode::excitation) {
     const std::int64_t moved = extender_.count() - armed_at_;
     if (static_cast<std::uint64_t>(moved < 0 ? -moved : moved) > setting.excitation.travel_counts)
@@ -249,6 +249,9 @@ void Axis::ISR_fill(AxisReport& report) const {
   report.enabled = (state_ & enabled_bit) != 0;
   report.count_valid = (state_ & count_valid_bit) != 0;
   report.referenced = (state_ & referenced_bit) != 0;
+  report.alarms = loop_.detector().alarms();
+  report.last_alarm = loop_.detector().last_alarm();
+  report.softening = loop_.softening();
   if (trip_ != Fault::none) [[unlikely]] {
     report.trip = record_;
     report.fault_value = record_.value;

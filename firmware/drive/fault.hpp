@@ -30,6 +30,7 @@ enum class Fault : std::uint8_t {
   excitation_travel,
   bus_off,
   heartbeat_lost,
+  unstable_wall,
 };
 
 struct FaultText {
@@ -95,6 +96,9 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::heartbeat_lost, 0xFF06, "heartbeat_lost", "",
      "the heartbeat of a node that is watched (heartbeat_consumer.*) stayed away",
      "check the program or node that sends it, and the time it is given"},
+    {Fault::unstable_wall, 0xFF07, "unstable_wall", "N",
+     "the wall oscillated under the hand, and instability.action is trip: force amplitude",
+     "lower wall.stiffness, or add a field or damping; 'kmax check' tells what is stable"},
 });
 
 constexpr const FaultText& text_of(Fault fault) {

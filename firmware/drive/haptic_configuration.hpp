@@ -59,6 +59,9 @@ constexpr control::HapticLoopConfig<float> haptic_configuration(const ParameterV
   config.force.limit = v.real<"force.limit">(axis);
   config.force.slew_limit = v.real<"force.slew_limit">(axis);
   config.force.ramp_time = v.real<"force.ramp_time">(axis);
+  config.instability_action = v.choice<control::InstabilityAction, "instability.action">(axis);
+  config.instability.force_threshold = v.real<"instability.force">(axis);
+  config.instability.displacement_threshold = v.real<"instability.amplitude">(axis);
   config.tick_rate = static_cast<double>(tick_rate_hz);
   config.divider =
       static_cast<std::uint32_t>(static_cast<float>(tick_rate_hz) / v.real<"haptic.rate">(axis) + 0.5f);

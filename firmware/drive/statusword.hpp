@@ -13,7 +13,8 @@ struct DriveStatus {
   DriveMode mode = DriveMode::haptic;
   bool supplied = false;             ///< the power stage's supply is within its bounds, or it needs none
   bool power_stage_on = false;       ///< the bridge is driven
-  bool warning = false;              ///< no fault, but to be looked at: derating, a failed stability check
+  bool warning = false;              ///< no fault, but to be looked at: derating, a failed stability check,
+                                     ///< a wall that oscillates or has been softened
   bool limited = false;              ///< less force than asked for
   bool halted = false;               ///< controlword bit 8
   bool force_is_zero = false;        ///< none is asked of the device

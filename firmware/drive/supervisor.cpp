@@ -44,6 +44,8 @@ float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) 
       return plausibility_configuration(values, axis).tolerance;
     case Fault::excitation_travel:
       return values.real<"excitation.travel">(axis);
+    case Fault::unstable_wall:
+      return values.real<"instability.force">(axis);
     default:
       return 0.0f;
   }

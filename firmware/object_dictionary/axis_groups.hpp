@@ -20,6 +20,7 @@ inline constexpr Group motor{"motor", 0x2009, Scope::axis, 0x00E0};
 inline constexpr Group current{"current", 0x200A, Scope::axis, 0x0100};
 inline constexpr Group encoder{"encoder", 0x200B, Scope::axis, 0x0110};
 inline constexpr Group temperature{"temperature", 0x200C, Scope::axis, 0x0130};
+inline constexpr Group instability{"instability", 0x200D, Scope::axis, 0x0150};
 inline constexpr Group drive{"drive", 0x2010, Scope::axis, 0x0200};
 /// Apart from the controlword, so that no write covers both.
 inline constexpr Group drive_mode{"drive", 0x2016, Scope::axis, 0x0208};
@@ -32,6 +33,7 @@ inline constexpr Group profile{"profile", 0x2017, Scope::axis, 0x0280};
 inline constexpr Group profile_actual{"profile", 0x2018, Scope::axis, 0x00C0};
 inline constexpr Group telemetry{"telemetry", 0x2019, Scope::axis, 0x00E0};
 inline constexpr Group guard_status{"guard", 0x201A, Scope::axis, 0x0100};
+inline constexpr Group instability_status{"instability", 0x201B, Scope::axis, 0x0110};
 }  // namespace group
 
 /// What each choice is called; the numbers are the enumerations' own.
@@ -74,6 +76,9 @@ inline constexpr NamedValue guard_criterion[] = {
     {"colgate", 0},          {"gil", 1},         {"sampled_eigenvalues", 2},
     {"abbott_okamura", 3},   {"diolaiti", 4},    {"resolution", 5},
     {"resolution_speed", 6}, {"field_slope", 7}, {"saturation_depth", 8}};
+inline constexpr NamedValue instability_action[] = {
+    named("off", InstabilityAction::off), named("warn", InstabilityAction::warn),
+    named("soften", InstabilityAction::soften), named("trip", InstabilityAction::trip)};
 inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
 inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
 inline constexpr NamedValue encoder_start[] = {{"anywhere", 0}, {"at_rest", 1}};

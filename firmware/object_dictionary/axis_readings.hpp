@@ -29,13 +29,13 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
     reading("measured.distance", group::measured, 5, float32, "m",
             "Distance outside the wall; negative inside."),
     reading("measured.magnetic_force", group::measured, 6, float32, "N",
-            "Force of the magnetic field, outwards."),
+            "Force of the magnetic field, outwards, before instability.softening."),
     reading("measured.magnetic_coefficient", group::measured, 7, float32, "N", "F_MC at work."),
     reading("measured.count", group::measured, 8, integer32, "counts", "Position, re-sampled (low 32 bits).")
         .at_standard_index(0x6064),
     reading("measured.flags", group::measured, 9, unsigned16, "",
             "Bit 0 inside the wall, 1 force limited, 2 slew limited, 3 soft start, 4 armed, 5 motor "
-            "saturated: less force than asked for."),
+            "saturated: less force than asked for, 6 wall unstable, 7 wall softened."),
     reading("measured.count_length", group::measured, 10, float32, "m", "Handle travel per encoder count."),
     reading("measured.resolution", group::measured, 11, float32, "m", "Position step that is really in use."),
     reading("measured.limited_samples", group::measured, 12, unsigned32, "samples",
@@ -109,6 +109,17 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
             "What this criterion judges: a stiffness, N/m; for resolution a force, N; for resolution_speed a "
             "speed, m/s."),
     reading("guard.bound", group::guard_status, 5, float32, "", "Its bound, in the same unit."),
+
+    reading("instability.alarms", group::instability_status, 1, unsigned32, "",
+            "How often the wall has been called unstable since arming."),
+    reading("instability.last_force", group::instability_status, 2, float32, "N",
+            "Amplitude of the force in the last alarm, at its strongest."),
+    reading("instability.last_amplitude", group::instability_status, 3, float32, "m",
+            "Amplitude of the handle then."),
+    reading("instability.last_frequency", group::instability_status, 4, float32, "Hz",
+            "Frequency of the oscillation then."),
+    reading("instability.softening", group::instability_status, 5, float32, "",
+            "Factor on all of the wall's force; 1 unless instability.action 'soften' has brought it down."),
 });
 
 }  // namespace kmax::firmware

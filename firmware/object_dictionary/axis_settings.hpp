@@ -144,6 +144,18 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
          "current.bandwidth and 0.65 ticks).")
         .only_higher(),
 
+    choice("instability.action", group::instability, 1, names::instability_action, 1,
+           "What is done about a wall that oscillates under the hand (faster than 15 Hz, not dying down): "
+           "nothing; warn; soften, the wall's force is halved for every 0.1 s until it is still, and stays "
+           "so until disarmed; or trip, no force and the fault unstable_wall.")
+        .only_higher(),
+    real("instability.force", group::instability, 2, "N", 0.01, 1000, 0.3,
+         "How far the force must swing to either side to be called an oscillation.")
+        .only_lower(),
+    real("instability.amplitude", group::instability, 3, "m", 1e-6, 1, 8e-5,
+         "How far the handle must swing to either side to be called an oscillation.")
+        .only_lower(),
+
     real("device.transmission", group::device, 1, "m/rad", 1e-6, 10, 0.05,
          "Handle travel per radian of the motor shaft.")
         .disarmed_only(),

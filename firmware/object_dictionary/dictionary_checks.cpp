@@ -48,13 +48,13 @@ constexpr bool defaults_are_allowed() {
   return true;
 }
 
-/// Bounds that may only be tightened while armed are compared as reals; a ceiling must be of the same place
-/// and unit, and itself out of reach then.
+/// Bounds that may only be tightened while armed are compared as reals, choices by their numbers; a ceiling
+/// must be of the same place and unit, and itself out of reach then.
 constexpr bool bounds_can_be_compared() {
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& entry = entry_at(i);
     const bool tightens = entry.change != Change::any_time && entry.change != Change::disarmed_only;
-    if (tightens && entry.type != Type::float32) return false;
+    if (tightens && entry.type != Type::float32 && entry.type != Type::unsigned8) return false;
     if (!tightens && (entry.unbounded_at_zero || !entry.ceiling.empty())) return false;
     if (entry.ceiling.empty()) continue;
     const std::size_t at = find_entry(entry.ceiling);

@@ -31,7 +31,8 @@ inline constexpr auto ceilings = [] {
 }();
 
 /// The greater, the less it protects.
-constexpr float looseness(const SlotDescriptor& descriptor, float value) {
+constexpr float looseness(const SlotDescriptor& descriptor, std::uint32_t raw) {
+  const float value = descriptor.type == Type::float32 ? std::bit_cast<float>(raw) : static_cast<float>(raw);
   if (descriptor.unbounded_at_zero() && value == 0.0f) return std::numeric_limits<float>::infinity();
   if (descriptor.change() == Change::only_higher) return -value;
   if (descriptor.change() == Change::only_nearer_zero) return value < 0.0f ? -value : value;
@@ -48,13 +49,12 @@ constexpr Refusal armed_change_refusal(const ParameterValues& now, std::size_t s
   // Such a change restarts every axis' estimators.
   if (descriptor.disarmed_only()) return Refusal::while_armed;
   if (descriptor.per_axis && !armed.axis[axis]) return Refusal::none;
-  float loosest = armed_change::looseness(descriptor, std::bit_cast<float>(now.raw(slot)));
+  float loosest = armed_change::looseness(descriptor, now.raw(slot));
   for (const auto& ceiling : armed_change::ceilings) {
     if (ceiling.of == entry)
       loosest = std::max(loosest, std::bit_cast<float>(now.raw(slot_of(ceiling.entry, axis))));
   }
-  return armed_change::looseness(descriptor, std::bit_cast<float>(raw)) <= loosest ? Refusal::none
-                                                                                   : Refusal::only_tightens;
+  return armed_change::looseness(descriptor, raw) <= loosest ? Refusal::none : Refusal::only_tightens;
 }
 
 }  // namespace kmax::firmware

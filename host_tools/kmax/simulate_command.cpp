@@ -153,6 +153,8 @@ Json result_json(const simulation::Scene& scene, const RunResult& result) {
           {"fault", std::string(firmware::text_of(result.fault).name)},
           {"samples", result.samples.size()},
           {"contact", contact},
+          {"alarms", result.alarms},
+          {"first_alarm_s", result.first_alarm ? Json(*result.first_alarm) : Json(nullptr)},
           {"limited_share", result.limited_share},
           {"clipped_share", result.clipped_share},
           {"lost_edges", result.lost_edges},
@@ -184,6 +186,9 @@ int run_simulate(Context& context, const SimulateOptions& options) {
             "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm\n",
             experiment::to_string(result.contact->verdict), result.contact->peak_to_peak * 1e3,
             result.judged_from, result.judged_to, result.contact->deepest * 1e3);
+    if (result.first_alarm)
+      print(context.out, "  the device called the wall unstable {} time{}, first at {:.2f} s\n",
+            result.alarms, result.alarms == 1 ? "" : "s", *result.first_alarm);
     print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
           result.limited_share * 100, result.clipped_share * 100);
     if (result.lost_edges > 0) print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);

@@ -38,7 +38,8 @@ std::string in_column(const std::string& text) {
 
 std::vector<std::string> flag_words(std::uint16_t flags) {
   static constexpr std::array words = {"inside the wall", "force limited", "slew limited",
-                                       "soft start",      "armed",         "motor saturated"};
+                                       "soft start",      "armed",         "motor saturated",
+                                       "wall unstable",   "wall softened"};
   std::vector<std::string> found;
   for (std::size_t bit = 0; bit < words.size(); ++bit) {
     if ((flags >> bit & 1) != 0) found.emplace_back(words[bit]);

@@ -89,6 +89,7 @@ RunResult run_scene(const simulation::Scene& scene) {
       const auto& haptic = application.ISR_report(axis).haptic;
       if (!haptic.new_sample) continue;
       add_report(samples[axis], haptic, lengths[axis]);
+      if (axis == 0 && haptic.unstable && !result.first_alarm) result.first_alarm = time;
       samples[axis].applied_force = simulation.device().handle(axis).applied_force();
       (axis == 0 ? result.samples : result.second_samples).push_back(samples[axis]);
     }
@@ -99,6 +100,7 @@ RunResult run_scene(const simulation::Scene& scene) {
   result.fault = application.fault(result.axis);
   result.limited_share =
       report.armed_samples == 0 ? 0.0 : static_cast<double>(report.limited_samples) / report.armed_samples;
+  result.alarms = report.alarms;
   result.clipped_share = handle.clipped_share();
   result.lost_edges = simulation.device().lost_edges(0);
   if (handle.has_operator() && handle.motion().hold_end()) {

@@ -34,6 +34,8 @@ struct RunResult {
   // What follows is axis 0's.
   std::optional<simulation::ContactMeasure> contact;  ///< if there is a person whose hold was long enough
   double judged_from = 0, judged_to = 0;              ///< s
+  std::uint32_t alarms = 0;                           ///< so often the device called the wall unstable
+  std::optional<double> first_alarm;                  ///< s
   double limited_share = 0;                           ///< of the haptic samples, by force.limit
   double clipped_share = 0;                           ///< of the ticks, by the device
   std::int64_t lost_edges = 0;                        ///< by an encoder without a motor that loses some

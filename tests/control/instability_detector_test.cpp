@@ -271,6 +271,35 @@ TEST(InstabilityDetector, ResetForgets) {
   EXPECT_EQ(found_after(detector, c, rate, signal), first);
 }
 
+TEST(InstabilityDetector, KeepsTheLastAlarmAtItsStrongestAndCountsThem) {
+  const double rate = 5000.0;
+  const auto c = at_rate(rate);
+  Detector detector;
+  EXPECT_EQ(detector.alarms(), 0U);
+  EXPECT_EQ(detector.last_alarm().force, 0.0F);
+  // Grows to ten times the thresholds and dies down; then one that is weaker and slower.
+  auto signal = sine(rate, 50.0, 0.0, 2.5, 2.5, 0.5, -2.0 * std::log(2.0));
+  const auto fading = sine(rate, 50.0, 0.0, 5.0, 5.0, 0.5, 10.0);
+  signal.insert(signal.end(), fading.begin(), fading.end());
+  found_after(detector, c, rate, signal);
+  for (const Sample& sample : signal) detector.update(c, sample.displacement, sample.force);
+  EXPECT_FALSE(detector.unstable());
+  ASSERT_GE(detector.alarms(), 1U);
+  const auto strongest = detector.last_alarm();
+  EXPECT_NEAR(static_cast<double>(strongest.force), 5.0 * force_threshold, 0.1 * 5.0 * force_threshold);
+  EXPECT_NEAR(static_cast<double>(strongest.displacement), 5.0 * displacement_threshold,
+              0.1 * 5.0 * displacement_threshold);
+  EXPECT_NEAR(static_cast<double>(strongest.frequency), 50.0, 2.5);
+  const auto before = detector.alarms();
+  detector.reset();
+  EXPECT_EQ(detector.alarms(), before) << "they have been";
+  ASSERT_GE(found_after(detector, c, rate, sine(rate, 30.0, 0.0, 1.5, 1.5, 1.0)), 0.0);
+  EXPECT_EQ(detector.alarms(), before + 1);
+  EXPECT_NEAR(static_cast<double>(detector.last_alarm().force), 1.5 * force_threshold,
+              0.1 * 1.5 * force_threshold);
+  EXPECT_NEAR(static_cast<double>(detector.last_alarm().frequency), 30.0, 1.5);
+}
+
 TEST(InstabilityDetector, TakesAnyConfiguration) {
   for (const float odd : {0.0F, -1.0F, std::numeric_limits<float>::quiet_NaN(),
                           std::numeric_limits<float>::infinity(), 1e-30F}) {

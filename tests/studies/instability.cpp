@@ -426,7 +426,7 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
            "12 Hz.",
            1e3 * static_cast<double>(defaults.displacement_threshold), defaults.force_threshold,
            defaults.lowest_frequency, 1e3 * static_cast<double>(defaults.settling_time)),
-       "Everything here is simulated; the firmware does not run the detector yet. Made by "
+       "Everything here is simulated. Made by "
        "build/native/tests/studies/kmax-instability-study --out docs."},
       {},
       {}};

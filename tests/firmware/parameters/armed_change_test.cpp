@@ -58,6 +58,9 @@ TEST_F(WhileArmed, NothingThatProtectsIsTakenAwayOverAnyLink) {
                  {"guard.damping", 1000},
                  {"guard.friction", 100},
                  {"excitation.travel", 1},
+                 {"instability.action", 0},
+                 {"instability.force", 1000},
+                 {"instability.amplitude", 1},
                  {"link.timeout", 0, Refusal::while_armed},
                  {"link.timeout", 0.5, Refusal::while_armed},
                  {"supply.brake_voltage", 50, Refusal::while_armed},
@@ -85,6 +88,21 @@ TEST_F(WhileArmed, ABoundThatIsOffCanBeSwitchedOnAndNotOffAgain) {
   EXPECT_EQ(set_armed("force.slew_limit", 1e9), Refusal::none) << "0 is no limit";
   EXPECT_EQ(set_armed("force.slew_limit", 0), Refusal::only_tightens);
   EXPECT_EQ(set_armed("force.limit", 0), Refusal::none) << "this 0 is the tightest";
+}
+
+TEST_F(WhileArmed, ADeviceMayBeMadeToDoMoreAboutAnOscillation) {
+  for (const int action : {0, 1, 2, 3}) {
+    for (const int wanted : {0, 1, 2, 3}) {
+      ASSERT_EQ(set("instability.action", action), Refusal::none);
+      EXPECT_EQ(set_armed("instability.action", wanted),
+                wanted < action ? Refusal::only_tightens : Refusal::none)
+          << action << " to " << wanted;
+    }
+  }
+  EXPECT_EQ(set_armed("instability.force", 0.2), Refusal::none);
+  EXPECT_EQ(set_armed("instability.force", 0.3), Refusal::only_tightens);
+  EXPECT_EQ(set_armed("instability.amplitude", 5e-5), Refusal::none);
+  EXPECT_EQ(set_armed("instability.amplitude", 8e-5), Refusal::only_tightens);
 }
 
 TEST_F(WhileArmed, ACeilingThatWasSetBeforeLeavesRoom) {

@@ -18,9 +18,10 @@ TEST_F(Simulate, DocumentTableAndPicture) {
   EXPECT_EQ(kmax({"simulate", scene("haptic.rate = 500\n"), "--csv", in("r.csv"), "--picture", in("r.svg"),
                   "--json"}),
             done);
-  EXPECT_EQ(keys(), (std::vector<std::string>{"scene", "integrator", "parts", "state", "fault", "samples",
-                                              "contact", "limited_share", "clipped_share", "lost_edges",
-                                              "simulated_s", "simulated_per_real_s"}));
+  EXPECT_EQ(keys(),
+            (std::vector<std::string>{"scene", "integrator", "parts", "state", "fault", "samples", "contact",
+                                      "alarms", "first_alarm_s", "limited_share", "clipped_share",
+                                      "lost_edges", "simulated_s", "simulated_per_real_s"}));
   EXPECT_EQ(document()["integrator"], "exact");
   EXPECT_EQ(document()["parts"], Json::parse(R"([["device"]])"));
   EXPECT_EQ(document()["scene"], "scene");
