@@ -24,13 +24,12 @@ constexpr std::uint32_t function_code = 0x780, node_part = 0x7F;
 
 class Search {
  public:
-  Search(const std::string& bus, const CanDiscoverySettings& settings) : bus_(bus), settings_(settings) {
-    CanPortOptions options;
-    options.filters = {{cob_id::sdo_response, function_code},
-                       {cob_id::sdo_request, function_code},
-                       {cob_id::heartbeat, function_code}};
-    port_ = open_can_port(bus, options);
-  }
+  Search(const std::string& bus, const CanDiscoverySettings& settings)
+      : bus_(bus),
+        settings_(settings),
+        port_(open_can_port(bus, {.filters = {{cob_id::sdo_response, function_code},
+                                              {cob_id::sdo_request, function_code},
+                                              {cob_id::heartbeat, function_code}}})) {}
 
   std::vector<FoundNode> run() {
     const auto end = Clock::now() + settings_.listening;

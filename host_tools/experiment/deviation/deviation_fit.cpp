@@ -25,7 +25,6 @@ constexpr std::array scales{100.0, 1.0, 0.3, 0.3};
 class Problem {
  public:
   Problem(std::span<const paper::DeviationCell> cells, const FitKind& kind) : cells_(cells) {
-    fitted_ = {0, 1};
     if (kind.stiffening) fitted_.push_back(2);
     if (kind.threshold_rise) fitted_.push_back(3);
   }
@@ -72,7 +71,7 @@ class Problem {
 
  private:
   std::span<const paper::DeviationCell> cells_;
-  std::vector<std::size_t> fitted_;
+  std::vector<std::size_t> fitted_{0, 1};
 };
 
 Eigen::VectorXd descend(const Problem& problem, Eigen::VectorXd at) {
