@@ -50,7 +50,7 @@ struct TickOutput {
 ///
 /// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
 /// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
-/// or a counter, all of which a host can read. Memory: about 36 KiB on the target, no heap.
+/// or a counter, all of which a host can read. Memory: about 37 KiB on the target, no heap.
 class Application {
  public:
   using Tick = AxesTick<axis_count>;
