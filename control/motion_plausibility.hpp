@@ -39,12 +39,11 @@ struct MotionPlausibilityConfig {
 /// handle that nobody holds gains (|F| (1 - cos d) - friction - hand_force) J/m that are not explained. It
 /// trips at most 3 x smoothing after it has run, since the fault, the way (m)
 ///     w = (17/16 tolerance + 5/4 kinetic energy of late) / (|F| (1 - cos d) - friction - hand_force)
-/// which takes from rest
-/// sqrt(2 w mass / (|F cos d| - friction)). F = 3.3 N reversed, 0.05 kg, no friction, the defaults: 13 mm,
-/// 20 ms + 6 ms, 520 ticks at 20 kHz. If hand_force >= 2 |F| any such motion could be a hand's, and none
-/// trips: set it below. At d = 90 degrees no torque is made: such a handle does not run away, and it trips
-/// only if it is moved against the force, and only with |F| > hand_force. A handle at rest never trips: a
-/// hand or a stop may hold it.
+/// which from rest takes sqrt(2 w mass / (|F cos d| - friction)). F = 3.3 N reversed, 0.05 kg, no friction,
+/// the defaults: 13 mm, 20 ms + 6 ms, 520 ticks at 20 kHz. If hand_force >= 2 |F| any such motion could be a
+/// hand's, and none trips: set it below. At d = 90 degrees no torque is made: such a handle does not run
+/// away, and it trips only if it is moved against the force, and only with |F| > hand_force. A handle at rest
+/// never trips: a hand or a stop may hold it.
 ///
 /// Does not trip for anything within hand_force up to 3 m/s, rubber stops that give back 64 % of the energy
 /// (or one lossless impact), a wall that oscillates, or an encoder that chatters: the property tests.

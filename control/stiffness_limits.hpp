@@ -119,10 +119,9 @@ constexpr Scalar steepest_field_slope(Scalar magnetic_coefficient, Scalar magnet
   return saturated_quotient(magnetic_coefficient, magnetic_length * Scalar(0.5));
 }
 
-/// What that slope must stay below, N/m: Colgate's bound, and the position's step
-/// held by friction, 2 (f_c/Delta - |B|/T), since the field steps by up to its
-/// slope times Delta: 2 N over 0.2 mm by 1.1 N at 0.055 mm. B acts inside only, but sets in at the surface,
-/// where the slope is.
+/// What that slope must stay below, N/m: Colgate's bound, and the position's step held by friction,
+/// 2 (f_c/Delta - |B|/T), since the field steps by up to its slope times Delta: 2 N over 0.2 mm by 1.1 N at
+/// 0.055 mm. B acts inside only, but sets in at the surface, where the slope is.
 template <typename Scalar>
 constexpr Scalar field_slope_limit(Scalar damping, Scalar wall_damping, Scalar friction, Scalar period,
                                    Scalar delay, Scalar quantum) {

@@ -5,11 +5,11 @@
 
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
-#include "firmware/application.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
+#include "firmware/application.hpp"
 
 namespace kmax::board {
 

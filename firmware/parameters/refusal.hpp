@@ -65,8 +65,7 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::supply_interval_empty, "supply.voltage_min must be below supply.voltage_max"},
     {Refusal::transaction_open,
      "a transaction is open, of another link or program; try again when it has ended, at the latest 2 s "
-     "after "
-     "its last write"},
+     "after its last write"},
     {Refusal::no_transaction,
      "no transaction is open (one that was left open has been dropped; write 0 to transaction.control, or "
      "wait 30 s)"},

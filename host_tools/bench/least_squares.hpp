@@ -1,9 +1,8 @@
 #pragma once
 // Small dense least squares with standard errors, for the fits of this folder.
 //
-// LinearFit: minimises sum (y - x b)^2, by a column-scaled QR
-// decomposition; covariance = s^2 (X^T X)^-1 with s^2 = residual variance. A column that the data do not
-// determine gets an infinite standard error.
+// LinearFit: minimises sum (y - x b)^2, by a column-scaled QR decomposition; covariance = s^2 (X^T X)^-1 with
+// s^2 = residual variance. A column that the data do not determine gets an infinite standard error.
 //
 // minimise(): Gauss-Newton with Levenberg-Marquardt damping on residuals that are given as a function,
 // Jacobian by one-sided differences of 1e-6 of `scale`. At most 60 iterations; ends when the sum of squares

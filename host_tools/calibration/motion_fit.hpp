@@ -21,8 +21,7 @@
 // Cogging that is not fitted along (`cogging_periods`) averages out over strokes of many of its periods and
 // else lands in all four.
 //
-// Found on five simulated motors, worst of 20 seeds: mass 2.3 %,
-// friction 8 %. Cost: 20 ms per 6000 samples.
+// Found on five simulated motors, worst of 20 seeds: mass 2.3 %, friction 8 %. Cost: 20 ms per 6000 samples.
 
 #include <span>
 

@@ -316,8 +316,7 @@ void integrate_adaptive(const ChainDynamics& dynamics, ChainState& state, const 
     } catch (const odeint::odeint_error&) {
       throw std::runtime_error(
           fmt::format("the adaptive integrator cannot meet a tolerance of {} (rounding is larger, or the "
-                      "chain is extreme): "
-                      "choose a larger one",
+                      "chain is extreme): choose a larger one",
                       tolerance));
     }
     equations.store(s, state);

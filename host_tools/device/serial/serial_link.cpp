@@ -111,8 +111,7 @@ void SerialLink::fail_unanswered(std::span<const std::uint8_t> request, const Un
   if (what.knows_no_tags())
     throw LinkError(
         fmt::format("{}: the device does not know function {}: its firmware is older than this program; "
-                    "flash the firmware "
-                    "that belongs to it ('kmax flash')",
+                    "flash the firmware that belongs to it ('kmax flash')",
                     address_.path, static_cast<int>(firmware::modbus::Function::tagged_request)));
   const auto word = [&](std::size_t at) { return request[at] * 256 + request[at + 1]; };
   const std::string asked = request[1] == identification::function

@@ -29,8 +29,7 @@ fs::path find_chip(const std::string& chip) {
   }
   throw std::runtime_error(
       fmt::format("--gpio {}: there is no simulated GPIO chip of this name (kernel module gpio-sim); "
-                  "'scripts/linux_guest' "
-                  "starts a Linux that has one",
+                  "'scripts/linux_guest' starts a Linux that has one",
                   chip));
 }
 
