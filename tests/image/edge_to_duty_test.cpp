@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <random>
 
@@ -82,7 +83,8 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
     ++answered;
   };
   const auto request = busy_request();
-  const BoardTime end = board.now() + ticks(1e6);
+  // Each of the thousand phases four times over.
+  const BoardTime end = board.now() + ticks(std::getenv("KMAX_SOAK") != nullptr ? 1e6 : 2.5e5);
   while (board.now() < end) {
     const double phase = static_cast<double>(random() % 1000) / 1000.0;
     board.run_until(board.now() + ticks(60.0 + phase));
@@ -106,7 +108,7 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
         << master.read_input(firmware::register_address(firmware::entry_of<"drive.error_code">(), axis),
                              1)[0];
   }
-  EXPECT_GT(edges, 16'000u);
+  EXPECT_GT(edges, 4'000u);
   EXPECT_GE(answered + 1, edges);
   // Up to one tick until the next sample, then half a tick from the sample to the update: never a tick more.
   EXPECT_LE(worst_ticks, 1.55);
