@@ -13,12 +13,12 @@ namespace kmax::calibration {
 namespace {
 
 constexpr std::size_t fewest_windows = 30;
-constexpr double fewest_counts = 1.0;  // rms per window
-constexpr double safe_counts = 2.0;    // rms per window, so that the correction for rounding is small
+constexpr double fewest_counts_per_window = 1.0;  // rms per window
+constexpr double safe_counts = 2.0;  // rms per window, so that the correction for rounding is small
 constexpr std::array<std::size_t, 5> windows_to_try{10, 20, 40, 80, 160};  // ticks
-constexpr double rounding = 1.0 / 6.0;  // count^2, of the difference of two counts
-constexpr double resolved = 0.2;        // relative standard error
-constexpr double noticeable = 4.0;      // standard errors
+constexpr double rounding_variance = 1.0 / 6.0;   // count^2, of the difference of two counts
+constexpr double torque_constant_resolved = 0.2;  // relative standard error
+constexpr double noticeable_voltage = 4.0;        // standard errors
 
 struct Window {
   double volts = 0.0;    // V, mean, less L di/dt
@@ -134,8 +134,8 @@ BackEmfFit fit_with(std::span<const BackEmfRecord> records, const BackEmfConfig&
     return fit;
   }
   const double counts = counts_per_window(records, config, length);
-  if (!(counts >= fewest_counts)) {
-    fit.finding = {BackEmfCause::no_motion, counts, fewest_counts, "counts per window"};
+  if (!(counts >= fewest_counts_per_window)) {
+    fit.finding = {BackEmfCause::no_motion, counts, fewest_counts_per_window, "counts per window"};
     return fit;
   }
   fit.speed_current_correlation = correlation_of(windows);
@@ -157,7 +157,7 @@ BackEmfFit fit_with(std::span<const BackEmfRecord> records, const BackEmfConfig&
   }
   const bench::LinearFit plain = bench::solve_least_squares(columns, right);
   // Rounding of the counts inflates the speed's square sum, and would make k too small by that share.
-  const double share = rounding / (counts * counts);
+  const double share = rounding_variance / (counts * counts);
   Eigen::MatrixXd normal = columns.transpose() * columns;
   Eigen::VectorXd projected = columns.transpose() * right;
   normal(0, 0) *= 1.0 - std::min(share, 0.5);
@@ -185,13 +185,15 @@ BackEmfFit fit_with(std::span<const BackEmfRecord> records, const BackEmfConfig&
       std::abs(value[0]) * std::sqrt(columns.col(0).squaredNorm() / static_cast<double>(rows));
 
   const double error = fit.torque_constant.standard_error;
-  if (!(std::abs(value[0]) > noticeable * error)) {
+  if (!(std::abs(value[0]) > noticeable_voltage * error)) {
     fit.finding = {BackEmfCause::no_voltage, fit.induced_voltage,
-                   fit.induced_voltage * noticeable * error / std::max(std::abs(value[0]), 1e-300), "V"};
+                   fit.induced_voltage * noticeable_voltage * error / std::max(std::abs(value[0]), 1e-300),
+                   "V"};
   } else if (value[0] < 0.0) {
     fit.finding = {BackEmfCause::reversed, value[0], 0.0, "N m/A"};
-  } else if (!(fit.torque_constant.relative_error() <= resolved)) {
-    fit.finding = {BackEmfCause::not_resolved, fit.torque_constant.relative_error(), resolved, "(relative)"};
+  } else if (!(fit.torque_constant.relative_error() <= torque_constant_resolved)) {
+    fit.finding = {BackEmfCause::not_resolved, fit.torque_constant.relative_error(), torque_constant_resolved,
+                   "(relative)"};
   }
   return fit;
 }

@@ -11,7 +11,7 @@
 namespace kmax::calibration {
 namespace {
 
-constexpr double turn = 2.0 * std::numbers::pi;
+constexpr double mechanical_turn = 2.0 * std::numbers::pi;
 constexpr double bins_per_turn = 6000.0;
 constexpr double trimmed = 0.03;                 // of a sweep's range, at both ends: starting and stopping
 constexpr double slowest = 0.25, fastest = 4.0;  // of the sweep's median speed
@@ -97,7 +97,7 @@ std::vector<Row> binned(const std::vector<Swept>& sweeps, double& range) {
     }
   }
   const double first = std::max(low[0], low[1]), last = std::min(high[0], high[1]);
-  range = std::max(0.0, (last - first) / turn);
+  range = std::max(0.0, (last - first) / mechanical_turn);
   std::vector<Row> rows;
   if (!(range > 0.0)) return rows;
   const std::size_t bins = std::max<std::size_t>(8, static_cast<std::size_t>(range * bins_per_turn));
@@ -230,8 +230,8 @@ CoggingFit fit_cogging(std::span<const CoggingSweep> sweeps, const CoggingFitCon
   double widest = 0.0, forwards = 0.0, backwards = 0.0, left_out = 0.0, in_range = 0.0;
   for (const CoggingSweep& sweep : sweeps) {
     const auto [low, high] = std::minmax_element(sweep.shaft_angle.begin(), sweep.shaft_angle.end());
-    widest = std::max(widest, (*high - *low) / turn);
-    moving.push_back(moving_part(sweep, turn / config.counts_per_turn));
+    widest = std::max(widest, (*high - *low) / mechanical_turn);
+    moving.push_back(moving_part(sweep, mechanical_turn / config.counts_per_turn));
     (moving.back().direction > 0.0 ? forwards : backwards) += 1.0;
     left_out += moving.back().left_out;
     const double speed = moving.back().speed / config.interval;

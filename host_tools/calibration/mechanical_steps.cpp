@@ -198,7 +198,7 @@ constexpr double stiffness = 6000.0;   // N/m
 constexpr double sweep_share = 0.7;    // of the travel, to each side
 constexpr std::size_t sweep_samples = 4000;
 
-struct Sweep {
+struct RecordedSweep {
   std::vector<double> force, angle;
   double interval = 0.0;
 };
@@ -224,7 +224,7 @@ void go_back(Bench& bench, const MotorKnowledge& known, double displacement) {
 }
 
 // `from`: m, where the handle stands.
-Sweep sweep(Bench& bench, const MotorKnowledge& known, double from, double stroke) {
+RecordedSweep sweep(Bench& bench, const MotorKnowledge& known, double from, double stroke) {
   const double time = std::abs(stroke) / sweep_speed;
   const int interval = std::max(1, static_cast<int>(time / known.tick / static_cast<double>(sweep_samples)));
   bool cut_off = false;
@@ -233,7 +233,7 @@ Sweep sweep(Bench& bench, const MotorKnowledge& known, double from, double strok
     return bench.record(moved_by(stroke, known), {{"current", "count"}, sweep_samples, interval, 0.0});
   });
   require_no_trip(seen);
-  Sweep result;
+  RecordedSweep result;
   result.interval = seen.interval;
   for (const double current : seen.of("current")) result.force.push_back(known.force_per_ampere() * current);
   for (const double count : seen.of("count"))
@@ -252,7 +252,7 @@ void map_compensation(Calibration& run) {
   bench.progress("compensation: moving to one side");
   const double middle = bench.displacement();
   sweep(bench, known, middle, -reach - middle);
-  std::vector<Sweep> sweeps;
+  std::vector<RecordedSweep> sweeps;
   for (int i = 0; i < run.settings.repetitions; ++i) {
     for (const double from : {-reach, reach}) {
       bench.progress(
@@ -263,7 +263,7 @@ void map_compensation(Calibration& run) {
   const double end = bench.displacement();
   sweep(bench, known, end, -end);
   std::vector<CoggingSweep> views;
-  for (const Sweep& one : sweeps) views.push_back({one.force, one.angle});
+  for (const RecordedSweep& one : sweeps) views.push_back({one.force, one.angle});
   CoggingFitConfig config;
   config.interval = sweeps.front().interval;
   config.counts_per_turn = known.counts_per_turn;

@@ -20,7 +20,7 @@ constexpr int bumps_per_width = 8;
 constexpr double correlated = 2.0;      // sqrt(8 x 1/2): what neighbouring bumps share
 constexpr double advance_counts = 2.0;  // by which a moving handle must advance
 constexpr double least_stroke = 8.0;    // counts
-constexpr double resolved = 0.2;        // relative standard error of the mass
+constexpr double mass_resolved = 0.2;   // relative standard error of the mass
 constexpr double least_force = 1e-3;    // N
 constexpr double noticeable = 4.0;      // standard errors
 
@@ -225,8 +225,8 @@ MotionFit fit_motion(std::span<const MotionRecord> records, const MotionFitConfi
   fit.bias = estimate(3, "N");
   fit.residual = solved.residual;
 
-  if (!(fit.mass.relative_error() <= resolved)) {
-    fit.finding = {MotionCause::not_resolved, fit.mass.relative_error(), resolved, "(relative)"};
+  if (!(fit.mass.relative_error() <= mass_resolved)) {
+    fit.finding = {MotionCause::not_resolved, fit.mass.relative_error(), mass_resolved, "(relative)"};
   } else if (fit.mass.value < 0.0) {
     fit.finding = {MotionCause::reversed, fit.mass.value, 0.0, "kg"};
   } else if (fit.friction.value < -noticeable * fit.friction.standard_error) {

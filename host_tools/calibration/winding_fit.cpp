@@ -18,8 +18,8 @@ constexpr double shortest_tau = 0.1, longest_tau = 1000.0;  // ticks
 constexpr int tau_steps = 40;
 constexpr double follows = 0.3;      // correlation from which a current follows the voltage
 constexpr double sign_share = 0.02;  // of the samples on the rarer side of zero, from which V_dt is fitted
-constexpr double resolved = 0.25;    // relative standard error
-constexpr double bad_share = 0.2;    // residual / deviation of the current
+constexpr double winding_resolved = 0.25;   // relative standard error
+constexpr double bad_share = 0.2;           // residual / deviation of the current
 constexpr double least_alternation = 1e-3;  // V
 
 struct Prepared {
@@ -325,8 +325,8 @@ WindingFit fit_winding(std::span<const WindingRecord> records, const WindingFitC
   report(refined, terms, fit);
   const double error = std::max(fit.resistance.relative_error(), fit.inductance.relative_error());
   const double bad = std::max(3.0 * config.noise_hint, bad_share * 0.5 * fit.current_span);
-  if (!(error <= resolved)) {
-    fit.finding = {WindingCause::not_resolved, error, resolved, "(relative)"};
+  if (!(error <= winding_resolved)) {
+    fit.finding = {WindingCause::not_resolved, error, winding_resolved, "(relative)"};
   } else if (!(fit.residual <= bad)) {
     fit.finding = {WindingCause::bad_fit, fit.residual, bad, "A"};
   }

@@ -9,7 +9,7 @@ constexpr std::uint8_t refill = 2;
 constexpr std::uint8_t division = 7;
 constexpr std::uint8_t fp_division = 14;
 constexpr std::uint8_t sp = 13;
-constexpr std::uint8_t pc = 15;
+constexpr std::uint8_t program_counter = 15;
 
 constexpr std::uint32_t bits(std::uint32_t word, unsigned position, unsigned width) {
   return word >> position & ((1U << width) - 1U);
@@ -128,8 +128,8 @@ Instruction decode_dual_or_exclusive(std::uint32_t first, std::uint32_t second, 
       return load_or_store(wide(2), based(store, rn, 4 * bits(second, 0, 8), 4));
     const std::uint32_t kind = bits(second, 4, 4);
     if ((first & 0xFFF0) == 0xE8D0 && kind < 2) {  // TBB, TBH
-      MemoryOperand operand = based(false, rn, rn == pc ? address + 4 : 0, kind + 1);
-      if (rn == pc) operand.base = MemoryOperand::no_register;
+      MemoryOperand operand = based(false, rn, rn == program_counter ? address + 4 : 0, kind + 1);
+      if (rn == program_counter) operand.base = MemoryOperand::no_register;
       operand.index = static_cast<std::uint8_t>(bits(second, 0, 4));
       operand.shift = static_cast<std::uint8_t>(kind);
       Instruction branch = load_or_store(wide(2), operand);
@@ -141,7 +141,7 @@ Instruction decode_dual_or_exclusive(std::uint32_t first, std::uint32_t second, 
   const std::uint32_t distance = 4 * bits(second, 0, 8);
   const std::uint32_t offset = !pre_indexed ? 0 : bits(first, 7, 1) != 0 ? distance : 0U - distance;
   Instruction dual = wide(3);
-  dual.memory = rn == pc ? literal(address, offset, 8) : based(store, rn, offset, 8);
+  dual.memory = rn == program_counter ? literal(address, offset, 8) : based(store, rn, offset, 8);
   return dual;
 }
 
@@ -151,9 +151,9 @@ Instruction decode_single(std::uint32_t first, std::uint32_t second, std::uint32
   const std::uint32_t rt = bits(second, 12, 4);
   const bool store = bits(first, 4, 1) == 0;
   const std::uint32_t span = 1U << bits(first, 5, 2);
-  if (!store && rt == pc && span != 4) return wide(1);  // PLD, PLI
+  if (!store && rt == program_counter && span != 4) return wide(1);  // PLD, PLI
   MemoryOperand operand;
-  if (rn == pc && !store) {
+  if (rn == program_counter && !store) {
     const std::uint32_t distance = bits(second, 0, 12);
     operand =
         literal(address, bits(first, 7, 1) != 0 ? distance : 0U - distance, static_cast<std::uint8_t>(span));
@@ -169,7 +169,7 @@ Instruction decode_single(std::uint32_t first, std::uint32_t second, std::uint32
     operand.shift = static_cast<std::uint8_t>(bits(second, 4, 2));
   }
   Instruction single = load_or_store(wide(2), operand);
-  if (!store && rt == pc) single.cycles += refill;
+  if (!store && rt == program_counter) single.cycles += refill;
   return single;
 }
 
@@ -198,8 +198,8 @@ Instruction decode_floating_point(std::uint32_t first, std::uint32_t second, std
       const std::uint32_t span = bits(second, 8, 1) != 0 ? 8 : 4;
       const std::uint32_t offset = bits(first, 7, 1) != 0 ? 4 * imm8 : 0U - 4 * imm8;
       instruction.cycles = static_cast<std::uint8_t>(1 + span / 4);
-      instruction.memory = rn == pc ? literal(address, offset, static_cast<std::uint8_t>(span))
-                                    : based(store, rn, offset, span);
+      instruction.memory = rn == program_counter ? literal(address, offset, static_cast<std::uint8_t>(span))
+                                                 : based(store, rn, offset, span);
       return instruction;
     }
     return multiple(instruction, store, rn, static_cast<std::uint8_t>(imm8), pre_indexed);

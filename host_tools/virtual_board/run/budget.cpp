@@ -84,7 +84,7 @@ std::string step_of(const std::vector<std::string>& frames) {
   return other_step;
 }
 
-std::uint16_t half_word(Bus& bus, std::uint32_t address) {
+std::uint16_t half_word_at(Bus& bus, std::uint32_t address) {
   const auto bytes = bus.memory(address, 2);
   return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
 }
@@ -124,7 +124,7 @@ class Recorder {
     if (address == application_) tick.axis = board_.processor().core_register(1);
     for (std::uint32_t at = address; at < address + size;) {
       tick.addresses.push_back(at);
-      at += is_wide(half_word(board_.bus(), at)) ? 4 : 2;
+      at += is_wide(half_word_at(board_.bus(), at)) ? 4 : 2;
     }
   }
 
@@ -247,8 +247,8 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   };
   std::map<std::uint32_t, Place> places;
   for (const std::uint32_t address : unique) {
-    places[address] = {step_of(frames.at(address)),
-                       decode(half_word(board.bus(), address), half_word(board.bus(), address + 2), address)};
+    places[address] = {step_of(frames.at(address)), decode(half_word_at(board.bus(), address),
+                                                           half_word_at(board.bus(), address + 2), address)};
   }
 
   std::map<std::string, StepSum> sums;

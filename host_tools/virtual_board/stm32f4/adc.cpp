@@ -27,7 +27,7 @@ using drivers::stm32f4::adc_sampling_position;
 using drivers::stm32f4::adc_stabilization_us;
 using drivers::stm32f4::adc_stride;
 using Common = drivers::stm32f4::AdcCommonRegisters;
-using Layout = drivers::stm32f4::AdcRegisters;
+using AdcLayout = drivers::stm32f4::AdcRegisters;
 
 constexpr const char* common_name = "ADC common registers";
 constexpr std::uint32_t common_offset = 3 * adc_stride;
@@ -53,21 +53,21 @@ const RegisterTable<AdcModel::Converter>& AdcModel::Converter::registers() {
   // A sampling time has three bits: channels 10 to 18 in SMPR1, 0 to 9 in SMPR2.
   constexpr std::uint32_t nine_times = (1U << 27) - 1U, ten_times = (1U << 30) - 1U;
   static const RegisterTable<Converter> table{
-      {offsetof(Layout, sr), "SR", Row::shows<&Model::sr>, adc_sr::all, Row::clears_by_zeros<&Model::sr>},
-      Row::word<&Model::cr1_>(offsetof(Layout, cr1), "CR1", cr1_modelled),
-      {offsetof(Layout, cr2), "CR2", Row::shows<&Model::cr2>, cr2_modelled, Row::takes<&Model::write_cr2>},
-      {offsetof(Layout, smpr1), "SMPR1", Row::shows<&Model::smpr1_>, nine_times,
+      {offsetof(AdcLayout, sr), "SR", Row::shows<&Model::sr>, adc_sr::all, Row::clears_by_zeros<&Model::sr>},
+      Row::word<&Model::cr1_>(offsetof(AdcLayout, cr1), "CR1", cr1_modelled),
+      {offsetof(AdcLayout, cr2), "CR2", Row::shows<&Model::cr2>, cr2_modelled, Row::takes<&Model::write_cr2>},
+      {offsetof(AdcLayout, smpr1), "SMPR1", Row::shows<&Model::smpr1_>, nine_times,
        Row::takes<&Model::write_sampling<&Model::smpr1_>>},
-      {offsetof(Layout, smpr2), "SMPR2", Row::shows<&Model::smpr2_>, ten_times,
+      {offsetof(AdcLayout, smpr2), "SMPR2", Row::shows<&Model::smpr2_>, ten_times,
        Row::takes<&Model::write_sampling<&Model::smpr2_>>},
-      Row::reserved(offsetof(Layout, sqr1), "SQR1"),
-      Row::reserved(offsetof(Layout, sqr3), "SQR3"),
-      {offsetof(Layout, jsqr), "JSQR", Row::shows<&Model::jsqr_>,
+      Row::reserved(offsetof(AdcLayout, sqr1), "SQR1"),
+      Row::reserved(offsetof(AdcLayout, sqr3), "SQR3"),
+      {offsetof(AdcLayout, jsqr), "JSQR", Row::shows<&Model::jsqr_>,
        adc_jsqr::LastIndex::mask | adc_jsqr::Channels::mask, Row::takes<&Model::write_list>},
-      {offsetof(Layout, jdr[0]), "JDR1", Row::shows<&Model::jdr_, 0>},
-      {offsetof(Layout, jdr[1]), "JDR2", Row::shows<&Model::jdr_, 1>},
-      {offsetof(Layout, jdr[2]), "JDR3", Row::shows<&Model::jdr_, 2>},
-      {offsetof(Layout, jdr[3]), "JDR4", Row::shows<&Model::jdr_, 3>}};
+      {offsetof(AdcLayout, jdr[0]), "JDR1", Row::shows<&Model::jdr_, 0>},
+      {offsetof(AdcLayout, jdr[1]), "JDR2", Row::shows<&Model::jdr_, 1>},
+      {offsetof(AdcLayout, jdr[2]), "JDR3", Row::shows<&Model::jdr_, 2>},
+      {offsetof(AdcLayout, jdr[3]), "JDR4", Row::shows<&Model::jdr_, 3>}};
   return table;
 }
 

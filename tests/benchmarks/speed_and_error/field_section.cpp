@@ -56,7 +56,7 @@ auto by_power(float length) {
   };
 }
 
-struct Result {
+struct FieldResult {
   ErrorStatistics relative;
   double largest_force = 0.0;  // N, absolute error
   double nanoseconds = 0.0;
@@ -64,8 +64,8 @@ struct Result {
 };
 
 template <typename Scalar, typename Function>
-Result measure(const std::vector<float>& values, float length, Function function) {
-  Result result;
+FieldResult measure(const std::vector<float>& values, float length, Function function) {
+  FieldResult result;
   double in_bin = 0.0;
   for (std::size_t n = 0; n < values.size(); ++n) {
     const long double truth = exact(values[n], length);
@@ -112,13 +112,13 @@ report::Section field_section(const std::filesystem::path& pictures) {
   const std::vector<float> values = distances();
   for (const float length : {10e-6F, 100e-6F, 1e-3F, 10e-3F}) {
     const std::string millimetres = fmt::format("{:g}", 1e3F * length);
-    const auto add = [&](const char* name, const Result& r) {
+    const auto add = [&](const char* name, const FieldResult& r) {
       table.rows.push_back({millimetres, name, fmt::format("{:.2g}", r.relative.largest()),
                             fmt::format("{:.2g}", r.relative.root_mean_square()),
                             fmt::format("{:.2g}", r.largest_force), fmt::format("{:.1f}", r.nanoseconds)});
     };
-    Result in_float = measure<float>(values, length, wall_law<float>(length));
-    Result in_double = measure<double>(values, length, wall_law<double>(length));
+    FieldResult in_float = measure<float>(values, length, wall_law<float>(length));
+    FieldResult in_double = measure<double>(values, length, wall_law<double>(length));
     add("wall law, float", in_float);
     add("wall law, double", in_double);
     add("std::pow, float", measure<float>(values, length, by_power<float>(length)));

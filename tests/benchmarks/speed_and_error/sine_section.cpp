@@ -54,15 +54,15 @@ TurnFraction nth_angle(std::uint32_t n) {
   return n * 2654435769U;
 }
 
-struct Result {
+struct SineResult {
   ErrorStatistics errors;    // absolute
   double ulps = 0.0;         // largest, in units in the last place of the true value
   double nanoseconds = 0.0;  // for both
 };
 
 template <typename Scalar, typename Function>
-Result measure(Function function) {
-  Result result;
+SineResult measure(Function function) {
+  SineResult result;
   for (std::uint32_t n = 0; n < 1'000'000; ++n) {
     const TurnFraction angle = nth_angle(n);
     const SineCosine<long double> truth = exact(angle);
@@ -105,19 +105,19 @@ report::Section sine_section(const std::filesystem::path& pictures) {
       "functions together, calls that do not wait for each other, on this computer; current_control.md "
       "counts instructions of the target. The firmware does not use the C library's: its bits differ from "
       "one library to the next."};
-  struct Method {
+  struct SineMethod {
     const char* name;
     bool is_double;
-    Result result;
+    SineResult result;
   };
   using control::sine_cosine;
   using control::sine_cosine_first_order;
   const std::array methods{
-      Method{"sine_cosine, float", false, measure<float>(sine_cosine<float>)},
-      Method{"sine_cosine_first_order, float", false, measure<float>(sine_cosine_first_order<float>)},
-      Method{"std::sin and std::cos, float", false, measure<float>(by_library<float>)},
-      Method{"sine_cosine, double", true, measure<double>(sine_cosine<double>)},
-      Method{"std::sin and std::cos, double", true, measure<double>(by_library<double>)}};
+      SineMethod{"sine_cosine, float", false, measure<float>(sine_cosine<float>)},
+      SineMethod{"sine_cosine_first_order, float", false, measure<float>(sine_cosine_first_order<float>)},
+      SineMethod{"std::sin and std::cos, float", false, measure<float>(by_library<float>)},
+      SineMethod{"sine_cosine, double", true, measure<double>(sine_cosine<double>)},
+      SineMethod{"std::sin and std::cos, double", true, measure<double>(by_library<double>)}};
   report::Table table{"",
                       {"function", "largest error", "RMS error", "largest (units of 1/2 to 1)",
                        "RMS (units of 1/2 to 1)", "largest (units of the value)", "time (ns)"},
@@ -127,9 +127,9 @@ report::Section sine_section(const std::filesystem::path& pictures) {
   figure.x_label = "time for both (ns)";
   figure.legend_beside = true;
   figure.panels = {{"largest error", {}, {}, std::nullopt, true}};
-  for (const Method& method : methods) {
+  for (const SineMethod& method : methods) {
     const double unit = method.is_double ? 0x1p-53 : 0x1p-24;
-    const Result& r = method.result;
+    const SineResult& r = method.result;
     table.rows.push_back({method.name, fmt::format("{:.2g}", r.errors.largest()),
                           fmt::format("{:.2g}", r.errors.root_mean_square()),
                           fmt::format("{:.3g}", r.errors.largest() / unit),

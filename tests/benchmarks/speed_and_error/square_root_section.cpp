@@ -31,14 +31,14 @@ std::vector<float> arguments() {
   return values;
 }
 
-struct Result {
+struct RootResult {
   double largest = 0.0, root_mean_square = 0.0;  // relative
   double ulps = 0.0;                             // largest
   double nanoseconds = 0.0;                      // one after the other
 };
 
 template <typename Scalar, typename Function>
-Result measure(const std::vector<float>& values, Function function) {
+RootResult measure(const std::vector<float>& values, Function function) {
   ErrorStatistics relative, ulps;
   for (const float value : values) {
     const long double truth = std::sqrt(static_cast<long double>(value));
@@ -68,18 +68,18 @@ report::Section square_root_section(const std::filesystem::path& pictures) {
       "Newton's method, for processors without one. Against: the root in long double; 100,000 arguments from "
       "1e-6 to 1e6, spread evenly over the logarithm. Time: each root waits for the one before, one addition "
       "and multiplication included."};
-  struct Method {
+  struct RootMethod {
     const char* name;
-    Result result;
+    RootResult result;
   };
   const std::vector<float> values = arguments();
   const std::array methods{
-      Method{"processor's, float", measure<float>(values, [](float x) { return __builtin_sqrtf(x); })},
-      Method{"processor's, double", measure<double>(values, [](double x) { return __builtin_sqrt(x); })},
-      Method{"bits, 0 steps", measure<float>(values, by_bits<0>)},
-      Method{"bits, 1 step", measure<float>(values, by_bits<1>)},
-      Method{"bits, 2 steps", measure<float>(values, by_bits<2>)},
-      Method{"bits, 3 steps", measure<float>(values, by_bits<3>)}};
+      RootMethod{"processor's, float", measure<float>(values, [](float x) { return __builtin_sqrtf(x); })},
+      RootMethod{"processor's, double", measure<double>(values, [](double x) { return __builtin_sqrt(x); })},
+      RootMethod{"bits, 0 steps", measure<float>(values, by_bits<0>)},
+      RootMethod{"bits, 1 step", measure<float>(values, by_bits<1>)},
+      RootMethod{"bits, 2 steps", measure<float>(values, by_bits<2>)},
+      RootMethod{"bits, 3 steps", measure<float>(values, by_bits<3>)}};
   report::Table table{"",
                       {"method", "largest relative error", "RMS relative error",
                        "largest (units in the last place)", "time (ns)"},
@@ -89,8 +89,8 @@ report::Section square_root_section(const std::filesystem::path& pictures) {
   figure.x_label = "time for one root after the other (ns)";
   figure.legend_beside = true;
   figure.panels = {{"largest relative error", {}, {}, std::nullopt, true}};
-  for (const Method& method : methods) {
-    const Result& r = method.result;
+  for (const RootMethod& method : methods) {
+    const RootResult& r = method.result;
     table.rows.push_back({method.name, fmt::format("{:.2g}", r.largest),
                           fmt::format("{:.2g}", r.root_mean_square), fmt::format("{:.2g}", r.ulps),
                           fmt::format("{:.1f}", r.nanoseconds)});
