@@ -1,6 +1,7 @@
 #include "firmware/axes.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "firmware/drive/cyclic_torque.hpp"
 #include "firmware/drive/haptic_configuration.hpp"
@@ -22,7 +23,10 @@ Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreComma
 
 ArmedAxes Axes::armed() const {
   ArmedAxes armed;
-  for (std::size_t axis = 0; axis < axis_count; ++axis) armed.axis[axis] = supervisors_[axis].armed();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    armed.axis[axis] = supervisors_[axis].armed();
+    armed.commander[axis] = supervisors_[axis].commander();
+  }
   return armed;
 }
 
@@ -99,6 +103,21 @@ bool Axes::settled(std::size_t of_axis) const {
                              [this](const AxisReport& axis) { return axis.generation == generation_; });
 }
 
+/// What the hand does on this axis would be felt on one that another link has armed.
+bool Axes::pushes_anothers_axis(std::size_t axis) const {
+  constexpr bool always_coupled = !std::is_same_v<DeviceLaw<axis_count>, TangentialInterference<axis_count>>;
+  const auto parallel = [this](std::size_t one) {
+    return parameters_.values().choice<control::InterferenceMode, "interference.mode">(one) ==
+           control::InterferenceMode::parallel;
+  };
+  const ArmedAxes now = armed();
+  for (std::size_t other = 0; other < axis_count; ++other) {
+    const bool coupled = other != axis && (always_coupled || parallel(axis) || parallel(other));
+    if (coupled && now.is_anothers(other, supervisors_[axis].commander())) return true;
+  }
+  return false;
+}
+
 Axes::Circumstances Axes::circumstances_of(std::size_t axis) const {
   return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis)};
 }
@@ -138,6 +157,7 @@ Supervisor::Situation Axes::situation(std::size_t axis) {
           .guard_failed = guard_[axis].verdict == GuardFinding::Verdict::fail,
           .store_busy = store_.keeper().busy(),
           .restarting = can.restart_asked,
+          .pushes_anothers_axis = pushes_anothers_axis(axis),
           .off_the_bus = can.is_off,
           .heartbeat_lost = can.heartbeat_lost};
 }
@@ -157,8 +177,8 @@ void Axes::act() {
   judge_if_changed();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     Supervisor& supervisor = supervisors_[axis];
-    std::uint16_t word = 0;
-    if (parameters_.fetch_controlword(axis, word)) supervisor.request(word);
+    if (const auto controlword = parameters_.fetch_controlword(axis))
+      supervisor.request(*controlword, now_us_);
     supervisor.poll(situation(axis), axis);
     tick_.enable(axis, supervisor.armed());
     supervisor.reaction_done();
@@ -191,20 +211,11 @@ void Axes::trip_all_of(Link link, Fault fault) {
   }
 }
 
-bool Axes::commands_anothers_axis(const SlotValue& one, Link by) const {
-  const auto [entry, axis] = owner_of(one.slot);
-  const bool command =
-      is_target(entry) || (entry == entry_of<"drive.controlword">() && asks_for_operation(one.raw & 0xFFFFU));
-  return command && supervisors_[axis].armed() && supervisors_[axis].commander() != by;
-}
-
 void Axes::note_commander(std::span<const SlotValue> written, Link by) {
   const auto number_of = [](std::uint32_t raw) { return static_cast<std::uint16_t>(raw); };
   for (const SlotValue& one : written) {
     const auto [entry, axis] = owner_of(one.slot);
-    if (entry == entry_of<"drive.controlword">())
-      supervisors_[axis].set_commander(by, number_of(parameters_.values().whole<"drive.commander">(axis)),
-                                       now_us_);
+    if (entry == entry_of<"drive.commander">()) supervisors_[axis].set_next_number(by, number_of(one.raw));
     if (entry == entry_of<"link.sign_of_life">()) {
       for (Supervisor& supervisor : supervisors_)
         supervisor.take_sign_of_life(by, number_of(one.raw), now_us_);

@@ -51,9 +51,7 @@ class Axes {
   /// Of those that `link` commands.
   void trip_all_of(Link link, Fault fault);
 
-  /// Whether it would keep another link's armed axis under force, or say how much.
-  bool commands_anothers_axis(const SlotValue& one, Link by) const;
-  /// What was written just now makes `by` the commander, or is its sign of life.
+  /// What was written just now names `by` as the next commander, or is its sign of life.
   void note_commander(std::span<const SlotValue> written, Link by);
 
   std::uint32_t now_us() const { return now_us_; }
@@ -93,6 +91,7 @@ class Axes {
   void configure_thermal();
   void judge_if_changed();
   bool settled(std::size_t axis) const;
+  bool pushes_anothers_axis(std::size_t axis) const;
   Circumstances circumstances_of(std::size_t axis) const;
   Supervisor::Situation situation(std::size_t axis);
 

@@ -228,7 +228,7 @@ Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t>
   if (special != nullptr) return write_special(*special, in);
   if (!slot) return Abort::read_only;
   const std::uint32_t raw = extended(descriptors[owner_of(*slot).entry].type, little_endian(in));
-  return write_slot(*slot, raw, acts_at_once(*slot));
+  return write_slot(*slot, raw);
 }
 
 Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in) {
@@ -252,10 +252,10 @@ Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::spa
   }
 }
 
-/// A PDO and a command are signs of life of whoever commands, if they are taken; before they act, since the
-/// command to arm needs it. A setting is not: any tool on the bus may write one by SDO.
-Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, bool is_sign_of_life) {
-  if (!is_sign_of_life) return set_slot(slot, raw);
+/// A command is a sign of life of whoever commands, if it is taken; before it acts, since the command to arm
+/// needs it. A setting is none, in a PDO or not: any tool on the bus may write one.
+Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw) {
+  if (!acts_at_once(slot)) return set_slot(slot, raw);
   const auto before = of_.state.heard_us;
   of_.state.heard_us = of_.axes.now_us();
   const Abort abort = set_slot(slot, raw);
@@ -269,8 +269,9 @@ Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw) {
     const std::uint8_t node_id = of_.node.node_id();
     const Abort abort = canopen::check_communication(of_.parameters.values(), slot, raw, node_id);
     if (abort != Abort::none) return abort;
-    of_.parameters.write_communication(slot, canopen::stored_communication(slot, raw, node_id));
-    return Abort::none;
+    const std::uint32_t stored = canopen::stored_communication(slot, raw, node_id);
+    return abort_for(of_.parameters.write_communication(slot, stored, of_.axes.armed()).refusal, descriptor,
+                     raw);
   }
   const SlotValue one{static_cast<std::uint16_t>(slot), raw};
   return abort_for(of_.writes.write({&one, 1}, Link::can).refusal, descriptor, raw);
@@ -286,7 +287,7 @@ std::uint32_t CanopenObjects::value(std::size_t slot) const {
 }
 
 bool CanopenObjects::take(std::size_t slot, std::uint32_t raw) {
-  return write_slot(slot, raw, true) == Abort::none;
+  return write_slot(slot, raw) == Abort::none;
 }
 
 }  // namespace kmax::firmware

@@ -61,7 +61,7 @@ class CanopenObjects {
   canopen::Abort read_special(const canopen::SpecialPlace& place, std::uint8_t subindex, std::uint32_t offset,
                               std::span<std::uint8_t> out) const;
   canopen::Abort write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in);
-  canopen::Abort write_slot(std::size_t slot, std::uint32_t raw, bool is_sign_of_life);
+  canopen::Abort write_slot(std::size_t slot, std::uint32_t raw);
   canopen::Abort set_slot(std::size_t slot, std::uint32_t raw);
   std::uint32_t number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const;
   std::span<const char> text_of(SpecialObject what) const;

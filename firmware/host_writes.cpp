@@ -6,10 +6,6 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
   const std::size_t entry = owner_of(wanted[0].slot).entry;
   if (entry == entry_of<"store.command">()) return store_.command(wanted[0].raw, axes_.any_armed());
   if (entry == entry_of<"capture.command">()) return command_capture(wanted[0].raw);
-  for (const SlotValue& one : wanted) {
-    if (axes_.commands_anothers_axis(one, by))
-      return parameters_.refuse_slot(Refusal::other_commander, one.slot);
-  }
   const auto result = parameters_.write(wanted, by, axes_.armed(), axes_.now_us());
   if (result.refusal == Refusal::none) axes_.note_commander(wanted, by);
   // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come

@@ -11,7 +11,7 @@ namespace kmax::firmware {
 /// What the supervisors have to know of one link. Each link writes its own, in the main loop, before it
 /// writes what a host commands: the command to arm needs a sign of life.
 struct LinkState {
-  /// When its host was last heard: over serial any valid request; over CAN a command, a PDO or a watched
+  /// When its host was last heard: over serial any valid request; over CAN a command or a watched
   /// heartbeat. Nothing: never.
   std::optional<std::uint32_t> heard_us;
   bool is_off = false;          ///< off the bus, or never on it again after a bit rate that failed

@@ -1,14 +1,21 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::firmware {
 
-/// Which axes make force.
+/// From where a host reaches the parameters; `local`: the board or the scene that holds the application.
+/// Clients behind one link cannot be told apart: the device has one Modbus unit and one SDO server.
+enum class Link : std::uint8_t { serial, can, local };
+inline constexpr std::size_t link_count = 3;
+
+/// Which axes make force, and which link commands each of those.
 struct ArmedAxes {
   std::array<bool, axis_count> axis{};
+  std::array<Link, axis_count> commander{};
 
   constexpr ArmedAxes() = default;
   /// All or none.
@@ -19,6 +26,8 @@ struct ArmedAxes {
     for (const bool one : axis) some = some || one;
     return some;
   }
+  /// Somebody else's hand is on it.
+  constexpr bool is_anothers(std::size_t one, Link by) const { return axis[one] && commander[one] != by; }
 };
 
 }  // namespace kmax::firmware

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
+#include "firmware/drive/armed_axes.hpp"
 #include "firmware/drive/fault.hpp"
 #include "firmware/parameters/refusal.hpp"
 
@@ -97,7 +99,9 @@ struct DriveOptions {
 /// Decisions where the standard leaves a choice, each on the side of the hand on the device:
 /// - Operation is enabled only by a rising edge of controlword bit 3. After a refusal (handle inside the
 ///   wall, say) a repeated 0x0F does nothing; the host must show a word without bit 3 first. So a held
-///   controlword never makes force appear later, when the handle happens to leave the wall.
+///   controlword never makes force appear later, when the handle happens to leave the wall. Edges are those
+///   of one link's words: another link's 0x06 disarms, and does not make an edge of the next 0x0F that the
+///   commander goes on sending.
 /// - Fault reset is a rising edge of bit 7, and is refused while the cause remains.
 /// - Quick stop removes the force. As DriveOptions says, it stays in "quick stop active" until the voltage is
 ///   disabled, or leads on to "switch on disabled" (transitions 11 and 12 in one). Operation cannot be
@@ -112,9 +116,10 @@ class AxisStateMachine {
 
   /// True if this word would ask for operation to be enabled; its conditions must then be looked up for
   /// command(). Has no effect.
-  bool asks_to_enable(std::uint16_t word) const {
+  bool asks_to_enable(std::uint16_t word, Link by) const {
     const bool from = state_ == DriveState::switched_on || state_ == DriveState::ready_to_switch_on;
-    return from && decode(word) == Command::enable_operation && rising(word, controlword::enable_operation);
+    return from && decode(word) == Command::enable_operation &&
+           rising(word, by, controlword::enable_operation);
   }
 
   /// Self-test done: leaves "not ready to switch on" (transition 1).
@@ -122,13 +127,17 @@ class AxisStateMachine {
     if (state_ == DriveState::not_ready_to_switch_on) state_ = DriveState::switch_on_disabled;
   }
 
-  /// A controlword was written. `obstacle`: why operation cannot be enabled now (none: it can).
+  /// A controlword came and was superseded before it could act.
+  void pass_over(std::uint16_t word, Link by) { previous_word_[static_cast<std::size_t>(by)] = word; }
+
+  /// A controlword was written, by that link. `obstacle`: why operation cannot be enabled now (none: it can).
   /// `cause_remains`: the present fault's cause is still there. `options`: as they are now; one that changes
   /// in "quick stop active" does not move the state.
-  void command(std::uint16_t word, Refusal obstacle, bool cause_remains, const DriveOptions& options = {}) {
-    const bool reset_edge = rising(word, controlword::fault_reset);
-    const bool enable_edge = rising(word, controlword::enable_operation);
-    previous_word_ = word;
+  void command(std::uint16_t word, Link by, Refusal obstacle, bool cause_remains,
+               const DriveOptions& options = {}) {
+    const bool reset_edge = rising(word, by, controlword::fault_reset);
+    const bool enable_edge = rising(word, by, controlword::enable_operation);
+    pass_over(word, by);
     if (state_ == DriveState::fault) {
       if (!reset_edge) return;
       refusal_ = cause_remains ? Refusal::fault_present : Refusal::none;
@@ -209,8 +218,8 @@ class AxisStateMachine {
     return (word & enable_operation) != 0 ? Command::enable_operation : Command::switch_on;
   }
 
-  bool rising(std::uint16_t word, std::uint16_t bit) const {
-    return (word & bit) != 0 && (previous_word_ & bit) == 0;
+  bool rising(std::uint16_t word, Link by, std::uint16_t bit) const {
+    return (word & bit) != 0 && (previous_word_[static_cast<std::size_t>(by)] & bit) == 0;
   }
 
   void enable(Refusal obstacle) {
@@ -230,7 +239,7 @@ class AxisStateMachine {
   DriveState state_ = DriveState::not_ready_to_switch_on;
   Fault fault_ = Fault::none;
   Refusal refusal_ = Refusal::none;
-  std::uint16_t previous_word_ = 0;
+  std::array<std::uint16_t, link_count> previous_word_{};
 };
 
 }  // namespace kmax::firmware

@@ -55,6 +55,7 @@ float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) 
 Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) const {
   if (now.store_busy) return Refusal::store_busy;  // an erase stops the tick
   if (now.restarting) return Refusal::restarting;
+  if (now.pushes_anothers_axis) return Refusal::other_commander;
   if (commander_ == Link::can && now.heartbeat_lost) return Refusal::heartbeat_missing;
   if (now.report.condition != Fault::none) return refusal_for(now.report.condition);
   if (now.thermal.power_stage_too_hot()) return Refusal::too_hot;
@@ -139,12 +140,13 @@ bool Supervisor::cause_remains(const Situation& now) const {
 }
 
 void Supervisor::obey(const Situation& now, std::size_t axis) {
-  const bool arms = machine_.asks_to_enable(*waiting_);
+  const auto [word, by] = *waiting_;
+  const bool arms = machine_.asks_to_enable(word, by);
   if (arms && !now.settled) return;
   const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
-  machine_.command(*waiting_, obstacle_to_arming(now, axis), cause_remains(now),
+  halted_ = halted(word) || (halted_ && armed() && by != commander_);
+  machine_.command(word, by, obstacle_to_arming(now, axis), cause_remains(now),
                    {.stay_in_quick_stop = stays});
-  halted_ = halted(*waiting_);
   waiting_.reset();
   if (arms) claimed_ = true;
 }
@@ -156,6 +158,7 @@ void Supervisor::poll(const Situation& now, std::size_t axis) {
   if (claimed_ && !armed()) {
     claimed_ = false;
     number_ = 0;
+    set_next_number(commander_, 0);
     now.values.set_whole<"drive.commander">(0, axis);
   }
 }

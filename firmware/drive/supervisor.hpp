@@ -16,8 +16,9 @@ namespace kmax::firmware {
 /// obeys. No failure; what goes wrong becomes a fault or a refusal.
 ///
 /// An armed axis belongs to its commander: the link whose controlword armed it, and on that link, if
-/// drive.commander was not 0 then, whoever knows that number. Only the commander's silence, bus-off or NMT
-/// stop counts, and nobody else's signs of life keep the axis armed. Others can disarm it and no more.
+/// that link had written a drive.commander other than 0 for it, whoever knows that number. Only the
+/// commander's silence, bus-off or NMT stop counts, and nobody else's signs of life keep the axis armed.
+/// Others can disarm it, halt it, and tighten its bounds (armed_change.hpp).
 class Supervisor {
  public:
   /// All that it judges by, of one moment.
@@ -33,6 +34,7 @@ class Supervisor {
     bool enabled;                            ///< for the tick
     bool settled;  ///< the tick works by the present settings, and knows of the axis' last disarming
     bool ticks_have_stopped, commutation_known, guard_failed, store_busy, restarting;
+    bool pushes_anothers_axis;         ///< if it were armed: of one that another link has armed
     bool off_the_bus, heartbeat_lost;  ///< of CAN, whoever commands
   };
   /// The last trip, and the temperatures then.
@@ -44,14 +46,19 @@ class Supervisor {
 
   Supervisor() { machine_.initialised(); }
 
-  /// A controlword; it supersedes one that still waits.
-  void request(std::uint16_t controlword) { waiting_ = controlword; }
-  /// Who wrote that controlword, and drive.commander then. An armed axis keeps its commander.
-  void set_commander(Link link, std::uint16_t number, std::uint32_t now_us) {
+  /// A controlword; it supersedes one that still waits. Whoever wrote it commands, unless the axis is armed:
+  /// then it keeps its commander.
+  void request(const Controlword& controlword, std::uint32_t now_us) {
+    if (waiting_) machine_.pass_over(waiting_->word, waiting_->by);
+    waiting_ = controlword;
     if (armed()) return;
-    commander_ = link;
-    number_ = number;
+    commander_ = controlword.by;
+    number_ = next_number_[static_cast<std::size_t>(controlword.by)];
     signed_us_ = now_us;
+  }
+  /// drive.commander was written: the number of that link's next attempt to arm.
+  void set_next_number(Link link, std::uint16_t number) {
+    next_number_[static_cast<std::size_t>(link)] = number;
   }
   Link commander() const { return commander_; }
   /// link.sign_of_life was written.
@@ -89,13 +96,14 @@ class Supervisor {
   [[gnu::cold]] bool cause_remains(const Situation& now) const;
 
   AxisStateMachine machine_;
-  std::optional<std::uint16_t> waiting_;  ///< until the settings have arrived, if it asks to enable
+  std::optional<Controlword> waiting_;  ///< until the settings have arrived, if it asks to enable
   Trip trip_;
   Link commander_ = Link::serial;
   std::uint16_t number_ = 0;  ///< of the commander
+  std::array<std::uint16_t, link_count> next_number_{};
   std::uint32_t signed_us_ = 0;
   bool claimed_ = false;  ///< somebody has armed it, or tried to: the next one's number is another
-  bool halted_ = false;
+  bool halted_ = false;   ///< who does not command may begin a halt and not end it
 };
 
 }  // namespace kmax::firmware

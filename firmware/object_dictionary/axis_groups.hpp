@@ -7,8 +7,8 @@ namespace kmax::firmware {
 
 /// Records that exist once per axis. Holding registers for what is set, input registers for what is read.
 namespace group {
-inline constexpr Group wall{"wall", 0x2000, Scope::axis, 0x0000};
-inline constexpr Group interference{"interference", 0x2001, Scope::axis, 0x0040};
+inline constexpr Group wall{"wall", 0x2000, Scope::axis, 0x0000, true};
+inline constexpr Group interference{"interference", 0x2001, Scope::axis, 0x0040, true};
 inline constexpr Group position{"position", 0x2002, Scope::axis, 0x0060};
 inline constexpr Group velocity{"velocity", 0x2003, Scope::axis, 0x0070};
 inline constexpr Group haptic{"haptic", 0x2004, Scope::axis, 0x0080};
@@ -23,13 +23,13 @@ inline constexpr Group temperature{"temperature", 0x200C, Scope::axis, 0x0130};
 inline constexpr Group instability{"instability", 0x200D, Scope::axis, 0x0150};
 inline constexpr Group drive{"drive", 0x2010, Scope::axis, 0x0200};
 /// Apart from the controlword, so that no write covers both.
-inline constexpr Group drive_mode{"drive", 0x2016, Scope::axis, 0x0208};
+inline constexpr Group drive_mode{"drive", 0x2016, Scope::axis, 0x0208, true};
 inline constexpr Group drive_status{"drive", 0x2011, Scope::axis, 0x0000};
 inline constexpr Group measured{"measured", 0x2012, Scope::axis, 0x0020};
-inline constexpr Group excitation{"excitation", 0x2013, Scope::axis, 0x0210};
+inline constexpr Group excitation{"excitation", 0x2013, Scope::axis, 0x0210, true};
 inline constexpr Group compensation{"compensation", 0x2014, Scope::axis, 0x0240};
 inline constexpr Group trip{"trip", 0x2015, Scope::axis, 0x0080};
-inline constexpr Group profile{"profile", 0x2017, Scope::axis, 0x0280};
+inline constexpr Group profile{"profile", 0x2017, Scope::axis, 0x0280, true};
 inline constexpr Group profile_actual{"profile", 0x2018, Scope::axis, 0x00C0};
 inline constexpr Group telemetry{"telemetry", 0x2019, Scope::axis, 0x00E0};
 inline constexpr Group guard_status{"guard", 0x201A, Scope::axis, 0x0100};

@@ -38,7 +38,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .only_lower("force.ceiling"),
     real("wall.magnetic_length", group::wall, 7, "m", 1e-6, 1, 0.001,
          "Length x_0 over which the field decays outside: a quarter of F_MC is left at x_0.")
-        .only_higher(),
+        .disarmed_only(),
     real("wall.adaptive_gain", group::wall, 8, "N", 0, 100, 2.4, "Gain of eq. 7, F_MC = gain V_k + offset."),
     real("wall.adaptive_offset", group::wall, 9, "N", 0, 100, 0.8, "Offset of eq. 7."),
     real("wall.adaptive_velocity_max", group::wall, 10, "m/s", 0.001, 100, 2.4,
@@ -46,7 +46,8 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     choice("wall.adaptive_relation", group::wall, 11, names::adaptive_relation, 0,
            "Relation between V_k and F_MC: V_k itself, its square, or its square root."),
     real("wall.adaptive_force_min", group::wall, 12, "N", 0, 100, 0.8,
-         "Lower bound of the adaptive F_MC; must not exceed wall.adaptive_force_max."),
+         "Lower bound of the adaptive F_MC; must not exceed wall.adaptive_force_max.")
+        .only_lower(),
     real("wall.adaptive_force_max", group::wall, 13, "N", 0, 100, 2,
          "Upper bound of the adaptive F_MC. A wide interval gives eq. 7 to the letter (3.2 N at V_max).")
         .only_lower("force.ceiling"),
@@ -74,7 +75,8 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
          "Background force F_B along the normal, outwards positive.")
         .only_nearer_zero("force.ceiling"),
     real("interference.onset_time", group::interference, 4, "s", 0, 3600, 0,
-         "Time t_0 after contact at which F_B sets in; parallel mode only."),
+         "Time t_0 after contact at which F_B sets in; parallel mode only.")
+        .only_higher(),
 
     real("position.resolution", group::position, 1, "m", 0, 1, 0,
          "Step to which the position is re-quantized (paper 2); 0 keeps the encoder's own. Rounded to a "
@@ -241,13 +243,13 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .only_higher(),
     real("temperature.winding_capacity", group::temperature, 5, "J/K", 0.01, 1e5, 15,
          "Heat capacity of the winding.")
-        .only_lower(),
+        .disarmed_only(),
     real("temperature.winding_resistance", group::temperature, 6, "K/W", 0.01, 1000, 3,
          "Thermal resistance from winding to case.")
         .only_higher(),
     real("temperature.case_capacity", group::temperature, 7, "J/K", 0.01, 1e6, 150,
          "Heat capacity of the motor's case.")
-        .only_lower(),
+        .disarmed_only(),
     real("temperature.case_resistance", group::temperature, 8, "K/W", 0.01, 1000, 8,
          "Thermal resistance from case to ambient.")
         .only_higher(),

@@ -64,7 +64,7 @@ inline constexpr auto pdo_names = [] {
   return names;
 }();
 
-constexpr Entry pdo_entry(std::size_t pdo, std::size_t value) {
+constexpr Entry pdo_value(std::size_t pdo, std::size_t value) {
   const std::size_t number = pdo % canopen::pdo_count;
   const bool sent = pdo >= canopen::pdo_count;
   const std::string_view name(pdo_names[pdo * pdo_values.size() + value].data());
@@ -106,9 +106,16 @@ constexpr Entry pdo_entry(std::size_t pdo, std::size_t value) {
   }
 }
 
+/// What a PDO tells this device stays as it was when an axis was armed: its commander's targets go by it.
+constexpr Entry pdo_entry(std::size_t pdo, std::size_t value) {
+  const Entry entry = pdo_value(pdo, value);
+  return pdo < canopen::pdo_count ? entry.disarmed_only() : entry;
+}
+
 inline constexpr std::array node_entries = std::to_array<Entry>({
     communication("canopen.sync_cob_id", group::communication, 1, Type::unsigned32, "", 4294967295.0,
                   canopen::cob_id::sync, "Identifier of SYNC.")
+        .disarmed_only()
         .at_standard_index(0x1005),
     cob_id("canopen.emergency_cob_id", group::communication, 2, canopen::cob_id::emergency,
            "Identifier of the emergency message; bit 31: none is sent.")
@@ -126,13 +133,17 @@ inline constexpr std::array node_entries = std::to_array<Entry>({
         .at_standard_index(0x1029, 1),
 
     communication("heartbeat_consumer.node_1", group::heartbeat_consumer, 1, Type::unsigned32, "", 8388607, 0,
-                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none."),
+                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none.")
+        .disarmed_only(),
     communication("heartbeat_consumer.node_2", group::heartbeat_consumer, 2, Type::unsigned32, "", 8388607, 0,
-                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none."),
+                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none.")
+        .disarmed_only(),
     communication("heartbeat_consumer.node_3", group::heartbeat_consumer, 3, Type::unsigned32, "", 8388607, 0,
-                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none."),
+                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none.")
+        .disarmed_only(),
     communication("heartbeat_consumer.node_4", group::heartbeat_consumer, 4, Type::unsigned32, "", 8388607, 0,
-                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none."),
+                  "Node whose heartbeat is watched: node ID x 65536 + time in ms; 0: none.")
+        .disarmed_only(),
 });
 
 inline constexpr auto communication_entries = [] {

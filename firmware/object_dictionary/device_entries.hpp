@@ -71,11 +71,12 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
          "Supply voltage from which the brake resistor is switched on; 0: none is fitted.")
         .disarmed_only(),
 
-    real("link.timeout", group::link, 1, "s", 0, 60, 1,
-         "Silence of whoever armed it after which an axis loses its force with a fault; 0 turns it off. Only "
-         "the link that armed it counts: on the serial line any request is a sign of life; on CAN what "
-         "commands: controlword, target or link.sign_of_life written, a PDO taken, a watched heartbeat. See "
-         "drive.commander.")
+    real(
+        "link.timeout", group::link, 1, "s", 0, 60, 1,
+        "Silence of whoever armed it after which an axis loses its force with a fault; 0 turns it off. Only "
+        "the link that armed it counts: on the serial line any request is a sign of life; on CAN what "
+        "commands: controlword, target or link.sign_of_life written, by SDO or PDO, and a watched heartbeat. "
+        "See drive.commander.")
         .disarmed_only(),
     whole("link.sign_of_life", group::link, 2, Type::unsigned16, "", 0, 65535, 0,
           "Written by a host that commands and has nothing else to write: the number in drive.commander.")
@@ -86,9 +87,11 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     rate_choice("can.bit_rate", group::can, 1, "bit/s", names::can_bit_rate, 1000000,
                 "CAN bit rate; takes effect at the next start or NMT reset of the communication."),
     whole("modbus.unit", group::modbus, 1, Type::unsigned8, "", 1, 247, 1,
-          "Modbus unit; takes effect after the reply to the request that set it."),
+          "Modbus unit; takes effect after the reply to the request that set it.")
+        .disarmed_only(),
     rate_choice("modbus.baud_rate", group::modbus, 2, "baud", names::baud_rate, 115200,
-                "Serial baud rate, 8 data bits, even parity, 1 stop bit; takes effect after the reply."),
+                "Serial baud rate, 8 data bits, even parity, 1 stop bit; takes effect after the reply.")
+        .disarmed_only(),
 
     whole("trace.axis", group::trace, 1, Type::unsigned8, "", 0, axis_count - 1, 0, "Axis that is traced.")
         .volatile_value(),

@@ -41,10 +41,10 @@ enum class Type : std::uint8_t {
 /// 301 asks for.
 enum class Access : std::uint8_t { read_only, read_write, communication };
 
-/// When and how a value may be changed. disarmed_only ones would make the force jump or the scale change
-/// under the hand. The others bound what a hand may feel, and one direction of theirs is safe: while the axis
-/// is armed they go only there (a device entry: while any axis is), or the other way as far as a ceiling that
-/// was set before arming.
+/// When and how a value may be changed; by whom, Group::of_commander says. disarmed_only ones would make the
+/// force jump or the scale change under the hand, or cut a commander off. The others bound what a hand may
+/// feel, and one direction of theirs is safe: while the axis is armed they go only there (a device entry:
+/// while any axis is), or the other way as far as a ceiling that was set before arming.
 enum class Change : std::uint8_t {
   any_time,
   disarmed_only,
@@ -63,12 +63,15 @@ struct NamedValue {
 
 /// A record of the dictionary: its entries are sub-indices 1, 2, ... of one index and follow each other
 /// without a gap in the Modbus table from `modbus_base` on. Entries are only ever appended, so addresses
-/// stay. `record` false: each entry is an object of its own at sub-index 0 (CiA 402 objects).
+/// stay. `of_commander`: what a commander asks of its axis and what the hand there feels; while the axis is
+/// armed nobody else changes it, not even where a bound might be tightened: less damping, or less of a
+/// background force, can set a hand shaking.
 struct Group {
   std::string_view name;
   std::uint16_t index;
   Scope scope;
   std::uint16_t modbus_base;
+  bool of_commander = false;
 };
 
 /// One row of the object dictionary: the only place where a parameter is defined.

@@ -49,11 +49,11 @@ void ParameterAccess::drop(Link owner, std::uint32_t now_us) {
   dropped_us_[static_cast<std::size_t>(owner)] = now_us;
 }
 
-ParameterAccess::Result ParameterAccess::check(const SlotValue& one, const ArmedAxes& armed) {
+ParameterAccess::Result ParameterAccess::check(const SlotValue& one, Link by, const ArmedAxes& armed) {
   const std::size_t entry = owner_of(one.slot).entry;
   const SlotDescriptor& descriptor = descriptors[entry];
   Refusal refusal = descriptor.writable ? check_value(descriptor, one.raw) : Refusal::read_only;
-  if (refusal == Refusal::none) refusal = armed_change_refusal(values_, one.slot, one.raw, armed);
+  if (refusal == Refusal::none) refusal = armed_change_refusal(values_, one, by, armed);
   // A command and no value; the application takes it before it comes here, if it has a store.
   if (refusal == Refusal::none && entry == store_entry) refusal = Refusal::store_missing;
   return refusal == Refusal::none ? Result{} : refuse_slot(refusal, one.slot);
@@ -76,17 +76,18 @@ void ParameterAccess::exchange() {
 }
 
 /// What was put aside, if the rules allow it.
-ParameterAccess::Result ParameterAccess::apply(const ArmedAxes& armed) {
+ParameterAccess::Result ParameterAccess::apply(Link by, const ArmedAxes& armed) {
   BrokenRule refused;
   bool changed = false, restarts = false, communication_changed = false;
   for_each_written([&](std::size_t slot) {
     const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
     if (staged_.raw(slot) == values_.raw(slot)) return;
     // An axis may have been armed since the value was put aside.
-    const Refusal refusal = armed_change_refusal(values_, slot, staged_.raw(slot), armed);
+    const SlotValue wanted{static_cast<std::uint16_t>(slot), staged_.raw(slot)};
+    const Refusal refusal = armed_change_refusal(values_, wanted, by, armed);
     if (refusal != Refusal::none && refused.refusal == Refusal::none) refused = {refusal, slot};
     (descriptor.writable ? changed : communication_changed) = true;
-    restarts = restarts || descriptor.disarmed_only();
+    restarts = restarts || (descriptor.writable && descriptor.disarmed_only());
   });
   exchange();
   BrokenRule broken = check_rules(values_);
@@ -117,13 +118,16 @@ ParameterAccess::Result ParameterAccess::set_all(const ParameterValues& wanted, 
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     if (descriptors[owner_of(slot).entry].kept && !acts_at_once(slot)) mark(slot);
   }
-  return apply(armed);
+  return apply(Link::local, armed);
 }
 
-ParameterAccess::Result ParameterAccess::write_communication(std::size_t slot, std::uint32_t raw) {
+ParameterAccess::Result ParameterAccess::write_communication(std::size_t slot, std::uint32_t raw,
+                                                             const ArmedAxes& armed) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
-  const Refusal refusal =
+  Refusal refusal =
       descriptor.kept && !descriptor.writable ? check_value(descriptor, raw) : Refusal::read_only;
+  if (refusal == Refusal::none)
+    refusal = armed_change_refusal(values_, {static_cast<std::uint16_t>(slot), raw}, Link::can, armed);
   if (refusal != Refusal::none) return refuse_slot(refusal, slot);
   if (values_.raw(slot) != raw) ++communication_changes_;
   values_.set_raw(slot, raw);
@@ -139,7 +143,7 @@ ParameterAccess::Result ParameterAccess::control_transaction(std::uint32_t reque
     return refuse_slot(owner_ ? Refusal::transaction_open : Refusal::no_transaction, transaction_slot);
   if (!commits) dropped_us_[static_cast<std::size_t>(by)].reset();
   owner_.reset();
-  if (commits) return apply(armed);
+  if (commits) return apply(by, armed);
   if (begins) {
     owner_ = by;
     written_ = {};
@@ -159,7 +163,7 @@ ParameterAccess::Result ParameterAccess::write(std::span<const SlotValue> wanted
   if (settings && dropped_us_[static_cast<std::size_t>(by)])
     return refuse_slot(Refusal::no_transaction, wanted[0].slot);
   for (const SlotValue& one : wanted) {
-    if (const Result checked = check(one, armed); checked.refusal != Refusal::none) return checked;
+    if (const Result checked = check(one, by, armed); checked.refusal != Refusal::none) return checked;
   }
   if (settings) {
     if (!owner_) written_ = {};
@@ -168,14 +172,14 @@ ParameterAccess::Result ParameterAccess::write(std::span<const SlotValue> wanted
     }
     last_staged_us_ = now_us;
     if (!owner_) {
-      if (const Result applied = apply(armed); applied.refusal != Refusal::none) return applied;
+      if (const Result applied = apply(by, armed); applied.refusal != Refusal::none) return applied;
     }
   }
   for (const SlotValue& one : wanted) {
     if (is_setting(one)) continue;
     values_.set_raw(one.slot, one.raw);
     const auto [entry, axis] = owner_of(one.slot);
-    if (entry == controlword_entry) commanded_[axis] = true;
+    if (entry == controlword_entry) commanded_by_[axis] = by;
   }
   return last_ = {};
 }

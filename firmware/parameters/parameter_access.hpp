@@ -5,17 +5,13 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "firmware/drive/armed_axes.hpp"
 #include "firmware/parameters/parameter_rules.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware {
-
-/// From where a host reaches the parameters; `local`: the board or the scene that holds the application.
-/// Clients behind one link cannot be told apart: the device has one Modbus unit and one SDO server.
-enum class Link : std::uint8_t { serial, can, local };
-inline constexpr std::size_t link_count = 3;
 
 /// Whether what is written there acts at once, as a command does, and is no part of a set of parameters.
 bool acts_at_once(std::size_t slot);
@@ -25,16 +21,23 @@ struct SlotValue {
   std::uint32_t raw;
 };
 
+/// A controlword, and who wrote it.
+struct Controlword {
+  std::uint16_t word;
+  Link by;
+};
+
 /// The one way to write a parameter, whichever link a host uses: checks, rules, and transactions. Modbus
 /// registers (modbus/parameter_registers.hpp) and CANopen objects (canopen_objects.hpp) are edges of it.
 ///
 /// A write is whole or nothing: every value is checked, then the rules between parameters and, for an axis
-/// that is armed, that its bounds are only tightened (armed_change.hpp) and the stability guard's, and only
-/// if all hold it stays. Outside a transaction it is in force at once; inside (transaction.control = 1)
-/// values are kept aside and take effect together with transaction.control = 2, which checks the rules over
-/// the whole set. A transaction changes what was written in it and nothing else: a value that the device
-/// changes meanwhile keeps that. Reading always gives the values in force, not those put aside. Why a write
-/// was refused stays in refusal.reason and refusal.register.
+/// that is armed, that its bounds are only tightened, that what its commander asks of it is changed by nobody
+/// else (armed_change.hpp), and the stability guard's, and only if all hold it stays. Outside a transaction
+/// it is in force at once; inside (transaction.control = 1) values are kept aside and take effect together
+/// with transaction.control = 2, which checks the rules over the whole set. A transaction changes what was
+/// written in it and nothing else: a value that the device changes meanwhile keeps that. Reading always gives
+/// the values in force, not those put aside. Why a write was refused stays in refusal.reason and
+/// refusal.register.
 ///
 /// A transaction belongs to the link that began it. Until it ends, every other link's settings, and its
 /// transaction.control whatever it asks for, are refused with transaction_open. It ends when its owner
@@ -89,7 +92,7 @@ class ParameterAccess {
 
   /// One of CANopen's own settings, at once; read_only for any other slot. Rules of CANopen between them are
   /// the caller's.
-  Result write_communication(std::size_t slot, std::uint32_t raw);
+  Result write_communication(std::size_t slot, std::uint32_t raw, const ArmedAxes& armed);
 
   /// What a request that others carry out came to; last_refusal() says so from now on.
   Result refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
@@ -99,24 +102,23 @@ class ParameterAccess {
 
   bool controlword_waits() const {
     bool some = false;
-    for (const bool one : commanded_) some = some || one;
+    for (const auto& one : commanded_by_) some = some || one;
     return some;
   }
-  /// Controlwords written since they were last fetched, per axis.
-  bool fetch_controlword(std::size_t axis, std::uint16_t& word) {
-    if (!commanded_[axis]) return false;
-    commanded_[axis] = false;
-    word = static_cast<std::uint16_t>(values_.whole<"drive.controlword">(axis));
-    return true;
+  /// The axis' controlword, if one was written since it was last fetched.
+  std::optional<Controlword> fetch_controlword(std::size_t axis) {
+    if (!commanded_by_[axis]) return std::nullopt;
+    const auto word = static_cast<std::uint16_t>(values_.whole<"drive.controlword">(axis));
+    return Controlword{word, *std::exchange(commanded_by_[axis], std::nullopt)};
   }
 
  private:
   static constexpr std::size_t words_of_slots = (slot_count + 31) / 32;
 
-  Result check(const SlotValue& one, const ArmedAxes& armed);
+  Result check(const SlotValue& one, Link by, const ArmedAxes& armed);
   void put_aside(const SlotValue& one);
   Result control_transaction(std::uint32_t request, Link by, const ArmedAxes& armed, std::uint32_t now_us);
-  Result apply(const ArmedAxes& armed);
+  Result apply(Link by, const ArmedAxes& armed);
   void exchange();
 
   void mark(std::size_t slot) { written_[slot / 32] |= 1U << slot % 32; }
@@ -138,7 +140,7 @@ class ParameterAccess {
   std::optional<Link> owner_;
   std::uint32_t last_staged_us_ = 0;
   std::array<std::optional<std::uint32_t>, link_count> dropped_us_;  ///< by link: without its doing
-  std::array<bool, axis_count> commanded_{};
+  std::array<std::optional<Link>, axis_count> commanded_by_;
 };
 
 }  // namespace kmax::firmware

@@ -99,7 +99,8 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
      "while its axis is armed this bound can only be tightened, or loosened as far as a ceiling that was set "
      "before; disarm first"},
     {Refusal::other_commander,
-     "the axis is armed and belongs to the link that armed it; over another one it can only be disarmed"},
+     "another link has armed this axis, or one that it would push: over this link it can be disarmed or "
+     "halted, and its protective bounds tightened; all else after it is disarmed"},
     {Refusal::armed_by_broadcast, "a broadcast arms no axis; write the controlword to each unit"},
 });
 

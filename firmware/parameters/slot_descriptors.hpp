@@ -10,7 +10,7 @@
 
 // What the device needs of the dictionary at run time; names, units and texts stay on the host.
 //
-// Bounds, defaults and lists of choices repeat themselves a lot: 359 entries have 112 different patterns and
+// Bounds, defaults and lists of choices repeat themselves a lot: 372 entries have 112 different patterns and
 // 16 different lists. Each is stored once and a descriptor, 8 bytes, says where. Axis 1's places are axis 0's
 // plus an offset and are not stored.
 
@@ -110,8 +110,9 @@ struct SlotDescriptor {
   bool writable : 1;  ///< through Modbus
   bool kept : 1;      ///< a setting, whoever may write it: part of a set of parameters
   bool per_axis : 1;
-  bool persistent : 1;  ///< part of what save keeps
-  std::uint8_t group;   ///< the same number for all entries of a group
+  bool persistent : 1;    ///< part of what save keeps
+  bool of_commander : 1;  ///< while its axis is armed only the link that armed it changes it
+  std::uint8_t group;     ///< the same number for all entries of a group
   std::uint8_t rule_at;
 
   /// The values that are allowed if it is a choice; otherwise none, and any value in range is.
@@ -142,6 +143,7 @@ inline constexpr auto descriptors = [] {
                             e.access != Access::read_only,
                             e.scope() == Scope::axis,
                             e.persistent,
+                            e.group.of_commander,
                             static_cast<std::uint8_t>(slot_descriptors::layout.group_at[i]),
                             static_cast<std::uint8_t>(slot_descriptors::layout.rule_at[i])};
   }

@@ -105,6 +105,7 @@ Json description_json(const device::Parameter& parameter) {
       {"persistent", entry.persistent},
       {"change_while_armed",
        entry.access == firmware::Access::read_only ? Json(nullptr) : Json(change_name(entry.change))},
+      {"only_commander", entry.group.of_commander},
       {"ceiling", ceiling_json(parameter)},
       {"modbus",
        {{"table", parameter.table() == device::Table::holding ? "holding" : "input"},

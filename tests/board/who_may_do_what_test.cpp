@@ -106,6 +106,12 @@ constexpr Attempt attempts[] = {{"force.limit", 1000},
                                 {"drive.controlword", 0x0F},
                                 {"drive.controlword", 0x06},
                                 {"profile.target_force", 100},
+                                {"profile.max_torque", 32767},
+                                {"excitation.run", 1},
+                                {"wall.magnetic_length", 1},
+                                {"wall.adaptive_gain", 100},
+                                {"temperature.winding_capacity", 0.01},
+                                {"modbus.unit", 9},
                                 {"can.bit_rate", 250000}};
 
 std::string table() {

@@ -41,10 +41,12 @@ class FakeDevice {
       return reason <= 3 ? Exception::illegal_data_address : Exception::illegal_data_value;
     }
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-      std::uint16_t word = 0;
-      if (deaf_to_commands || !registers.fetch_controlword(axis, word)) continue;
+      if (deaf_to_commands) continue;
+      const auto controlword = registers.fetch_controlword(axis);
+      if (!controlword) continue;
+      const std::uint16_t word = controlword->word;
       controlwords.push_back(word);
-      const bool enables = machines[axis].asks_to_enable(word);
+      const bool enables = machines[axis].asks_to_enable(word, firmware::Link::serial);
       pending_.push_back({axis, word, now_us + (enables ? judgement_us : 0)});
       carry_out_due();
     }
@@ -112,7 +114,8 @@ class FakeDevice {
     while (!pending_.empty() && pending_.front().due_us <= now_us) {
       const PendingCommand command = pending_.front();
       pending_.erase(pending_.begin());
-      machines[command.axis].command(command.word, obstacle[command.axis], cause_remains[command.axis]);
+      machines[command.axis].command(command.word, firmware::Link::serial, obstacle[command.axis],
+                                     cause_remains[command.axis]);
     }
   }
 

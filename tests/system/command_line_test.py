@@ -25,7 +25,7 @@ class Contract(unittest.TestCase):
         self.assertGreater(len(objects), 100)
         for entry in objects:
             self.assertEqual({"name", "index", "subindex", "type", "unit", "access", "min", "max", "default", "values",
-                              "persistent", "change_while_armed", "ceiling", "modbus", "help"} - set(entry), set())
+                              "persistent", "change_while_armed", "only_commander", "ceiling", "modbus", "help"} - set(entry), set())
             self.assertIn(entry["modbus"]["table"], ("holding", "input"))
             self.assertIn(entry["modbus"]["words"], (1, 2))
 

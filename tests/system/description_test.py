@@ -28,10 +28,15 @@ class Json(unittest.TestCase):
                 ("force.limit", "lower", "force.ceiling"), ("axis1.force.limit", "lower", "axis1.force.ceiling"),
                 ("force.ceiling", "none", None), ("supply.voltage_min", "higher", None),
                 ("interference.background_force", "nearer to 0", "force.ceiling"), ("wall.position", "none", None),
-                ("interference.onset_time", "any", None),
+                ("interference.onset_time", "higher", None), ("excitation.bias", "any", None),
+                ("wall.magnetic_length", "none", None), ("rpdo1.cob_id", "none", None), ("tpdo1.cob_id", "any", None),
                 ("measured.force", None, None)):
             with self.subTest(name):
                 self.assertEqual((change, ceiling), (objects[name]["change_while_armed"], objects[name]["ceiling"]))
+        for name, only_commander in (("wall.stiffness", True), ("axis1.excitation.run", True), ("force.limit", False),
+                                     ("trace.axis", False)):
+            with self.subTest(name):
+                self.assertEqual(only_commander, objects[name]["only_commander"])
 
 
 class Eds(unittest.TestCase):

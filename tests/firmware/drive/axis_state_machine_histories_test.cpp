@@ -45,7 +45,7 @@ RC_GTEST_PROP(AxisStateMachine, RandomHistoriesAgreeWithTheTables, ()) {
       const auto obstacle = *rc::gen::element(Refusal::none, Refusal::none, Refusal::handle_inside_wall);
       const bool cause_remains = *rc::gen::arbitrary<bool>(), stays = *rc::gen::arbitrary<bool>();
       const bool rises = (word & 0x08) != 0 && (model.previous & 0x08) == 0;
-      machine.command(word, obstacle, cause_remains, {.stay_in_quick_stop = stays});
+      machine.command(word, Link::serial, obstacle, cause_remains, {.stay_in_quick_stop = stays});
       model.command(word, obstacle, cause_remains, stays);
       if (before != operation_enabled) fresh_edge = rises && obstacle == Refusal::none;
       if (machine.armed()) RC_ASSERT(fresh_edge);
@@ -65,19 +65,19 @@ RC_GTEST_PROP(AxisStateMachine, BitsThatAreHeldNeverActAgain, ()) {
   AxisStateMachine machine;
   machine.initialised();
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{0x06, 0x07, 0x0F})
-    machine.command(word, Refusal::none, false);
+    machine.command(word, Link::serial, Refusal::none, false);
   RC_ASSERT(machine.armed());
-  machine.command(held, Refusal::none, false);
+  machine.command(held, Link::serial, Refusal::none, false);
   machine.trip(Fault::encoder);
   machine.reaction_done();
   const bool holds_reset = (held & 0x80) != 0;
   if (!holds_reset) {
-    machine.command(static_cast<std::uint16_t>(0x80 | held), Refusal::none, false);
+    machine.command(static_cast<std::uint16_t>(0x80 | held), Link::serial, Refusal::none, false);
     RC_ASSERT(machine.state() == switch_on_disabled);
   }
   const auto steps = *rc::gen::inRange(1, 40);
   for (int i = 0; i < steps; ++i) {
-    machine.command(static_cast<std::uint16_t>(*some_word() | held), Refusal::none, false,
+    machine.command(static_cast<std::uint16_t>(*some_word() | held), Link::serial, Refusal::none, false,
                     {.stay_in_quick_stop = *rc::gen::arbitrary<bool>()});
     RC_ASSERT(!machine.armed());
     if (holds_reset) RC_ASSERT(machine.state() == fault);
@@ -116,7 +116,7 @@ TEST(AxisStateMachine, EveryStateIsReachedAndOnlyAsTheStandardDraws) {
     for (unsigned word = 0; word < 0x200; ++word) {
       for (unsigned conditions = 0; conditions < 8; ++conditions) {
         next = node.machine;
-        next.command(static_cast<std::uint16_t>(word),
+        next.command(static_cast<std::uint16_t>(word), Link::serial,
                      (conditions & 1) != 0 ? Refusal::handle_inside_wall : Refusal::none,
                      (conditions & 2) != 0, {.stay_in_quick_stop = (conditions & 4) != 0});
         visit(node, next, word);

@@ -22,7 +22,7 @@ constexpr std::array all_states = {
 std::optional<AxisStateMachine> machine_in(DriveState state, std::uint16_t previous) {
   AxisStateMachine m;
   const auto say = [&m](std::uint16_t word, Refusal obstacle = Refusal::none) {
-    m.command(word, obstacle, true);
+    m.command(word, Link::serial, obstacle, true);
   };
   if (state != not_ready_to_switch_on) m.initialised();
   switch (state) {
@@ -71,8 +71,8 @@ TEST(AxisStateMachine, EveryStateWithEveryControlwordFollowsTheStandardsTables) 
           const bool cause_remains = (conditions & 2) != 0, stays = (conditions & 4) != 0;
           AxisStateMachine machine = *start;
           DriveModel model{state, previous, machine.refusal()};
-          const bool asks = machine.asks_to_enable(static_cast<std::uint16_t>(word));
-          machine.command(static_cast<std::uint16_t>(word), obstacle, cause_remains,
+          const bool asks = machine.asks_to_enable(static_cast<std::uint16_t>(word), Link::serial);
+          machine.command(static_cast<std::uint16_t>(word), Link::serial, obstacle, cause_remains,
                           {.stay_in_quick_stop = stays});
           model.command(word, obstacle, cause_remains, stays);
           const bool became_enabled = state != operation_enabled && model.state == operation_enabled;
@@ -108,20 +108,21 @@ TEST(AxisStateMachine, EveryStateWithEveryControlwordFollowsTheStandardsTables) 
 TEST(AxisStateMachine, QuickStopStaysUnlessTheOptionSaysOtherwiseAndALaterOptionMovesNothing) {
   auto m = *machine_in(operation_enabled, 0x0F);
   auto other = m;
-  m.command(0x02, Refusal::none, false);
+  m.command(0x02, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), quick_stop_active);
   EXPECT_FALSE(m.armed());
   for (const unsigned word : {0x02u, 0x06u, 0x07u, 0x0Fu, 0x82u}) {
-    m.command(static_cast<std::uint16_t>(word), Refusal::none, false, {.stay_in_quick_stop = false});
+    m.command(static_cast<std::uint16_t>(word), Link::serial, Refusal::none, false,
+              {.stay_in_quick_stop = false});
     EXPECT_EQ(m.state(), quick_stop_active) << word;
   }
-  m.command(0x00, Refusal::none, false);
+  m.command(0x00, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), switch_on_disabled);
 
-  other.command(0x02, Refusal::none, false, {.stay_in_quick_stop = false});
+  other.command(0x02, Link::serial, Refusal::none, false, {.stay_in_quick_stop = false});
   EXPECT_EQ(other.state(), switch_on_disabled);
   EXPECT_FALSE(other.armed());
-  other.command(0x0F, Refusal::none, false);
+  other.command(0x0F, Link::serial, Refusal::none, false);
   EXPECT_EQ(other.state(), switch_on_disabled);
 }
 
@@ -135,30 +136,30 @@ TEST(AxisStateMachine, EnablingStraightFromSwitchOnDisabledDoesNothing) {
   AxisStateMachine m;
   m.initialised();
   for (int i = 0; i < 3; ++i) {
-    m.command(0x0F, Refusal::none, false);
+    m.command(0x0F, Link::serial, Refusal::none, false);
     EXPECT_EQ(m.state(), switch_on_disabled);
     EXPECT_EQ(m.refusal(), Refusal::none);
   }
   // Neither does it count as the edge of a later one: after shutdown a fresh edge is there again.
-  m.command(0x06, Refusal::none, false);
-  m.command(0x0F, Refusal::none, false);
+  m.command(0x06, Link::serial, Refusal::none, false);
+  m.command(0x0F, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), operation_enabled);
 }
 
 TEST(AxisStateMachine, HeldWordAfterARefusalNeverArms) {
   for (const DriveState from : {ready_to_switch_on, switched_on}) {
     auto m = *machine_in(from, from == switched_on ? 0x07 : 0x06);
-    m.command(0x0F, Refusal::handle_inside_wall, false);
+    m.command(0x0F, Link::serial, Refusal::handle_inside_wall, false);
     EXPECT_EQ(m.state(), switched_on);
     EXPECT_EQ(m.refusal(), Refusal::handle_inside_wall);
     // With the bits that do not matter changing, and through words that are no command.
     for (const unsigned word : {0x0Fu, 0x1Fu, 0xFF7Fu, 0x0Fu, 0x8Fu, 0x0Fu}) {
-      m.command(static_cast<std::uint16_t>(word), Refusal::none, false);
+      m.command(static_cast<std::uint16_t>(word), Link::serial, Refusal::none, false);
       EXPECT_EQ(m.state(), switched_on) << word;
       EXPECT_EQ(m.refusal(), Refusal::handle_inside_wall);
     }
-    m.command(0x07, Refusal::none, false);
-    m.command(0x0F, Refusal::none, false);
+    m.command(0x07, Link::serial, Refusal::none, false);
+    m.command(0x0F, Link::serial, Refusal::none, false);
     EXPECT_EQ(m.state(), operation_enabled);
     EXPECT_EQ(m.refusal(), Refusal::none);
   }
@@ -166,23 +167,23 @@ TEST(AxisStateMachine, HeldWordAfterARefusalNeverArms) {
 
 TEST(AxisStateMachine, FaultResetIsAnEdgeAndAHeldBitNeverResetsAgain) {
   auto m = *machine_in(operation_enabled, 0x0F);
-  m.command(0x8F, Refusal::none, false);  // bit 7 was already up when the fault came
+  m.command(0x8F, Link::serial, Refusal::none, false);  // bit 7 was already up when the fault came
   m.trip(Fault::encoder);
   m.reaction_done();
   for (int i = 0; i < 3; ++i) {
-    m.command(0x80, Refusal::none, false);
+    m.command(0x80, Link::serial, Refusal::none, false);
     EXPECT_EQ(m.state(), fault);
   }
-  m.command(0x00, Refusal::none, false);
+  m.command(0x00, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), fault);
-  m.command(0x80, Refusal::none, true);
+  m.command(0x80, Link::serial, Refusal::none, true);
   EXPECT_EQ(m.state(), fault) << "the cause remains";
   EXPECT_EQ(m.refusal(), Refusal::fault_present);
   EXPECT_EQ(m.fault(), Fault::encoder);
-  m.command(0x80, Refusal::none, false);
+  m.command(0x80, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), fault) << "held, no edge";
-  m.command(0x00, Refusal::none, false);
-  m.command(0x80, Refusal::none, false);
+  m.command(0x00, Link::serial, Refusal::none, false);
+  m.command(0x80, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), switch_on_disabled);
   EXPECT_EQ(m.fault(), Fault::none);
   EXPECT_EQ(m.refusal(), Refusal::none);
@@ -190,10 +191,10 @@ TEST(AxisStateMachine, FaultResetIsAnEdgeAndAHeldBitNeverResetsAgain) {
 
 TEST(AxisStateMachine, ResetEdgeDuringTheReactionIsNotKeptForLater) {
   auto m = *machine_in(fault_reaction_active, 0x00);
-  m.command(0x80, Refusal::none, false);
+  m.command(0x80, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), fault_reaction_active);
   m.reaction_done();
-  m.command(0x80, Refusal::none, false);
+  m.command(0x80, Link::serial, Refusal::none, false);
   EXPECT_EQ(m.state(), fault);
 }
 

@@ -302,7 +302,6 @@ TEST(Dictionary, CommunicationSettingsAreKeptReadAndNeverWrittenThroughModbus) {
     ++count;
     EXPECT_TRUE(entry.persistent) << entry.name;
     EXPECT_EQ(entry.scope(), Scope::device) << entry.name;
-    EXPECT_EQ(entry.change, Change::any_time) << entry.name;
     EXPECT_GE(entry.index(), 0x1000) << entry.name;
     EXPECT_LT(entry.index(), 0x1C00) << entry.name;
     EXPECT_GE(modbus_address(i, 0), 0x2800) << entry.name;

@@ -145,13 +145,14 @@ TEST_F(Communication, SettingsAreSetOneByOneWithinTheirRangeAndCountedApart) {
     const std::uint32_t counted = registers.communication_changes();
     const std::size_t place = slot_of(i, 0);
     const std::uint32_t value = e.default_value == e.maximum ? 0 : raw_from_number(e.type, e.maximum);
-    EXPECT_EQ(registers.write_communication(place, value).refusal, Refusal::none) << e.name;
+    EXPECT_EQ(registers.write_communication(place, value, false).refusal, Refusal::none) << e.name;
     EXPECT_EQ(registers.values().raw(place), value) << e.name;
     EXPECT_EQ(registers.communication_changes(), counted + 1) << e.name;
-    EXPECT_EQ(registers.write_communication(place, value).refusal, Refusal::none) << e.name;
+    EXPECT_EQ(registers.write_communication(place, value, false).refusal, Refusal::none) << e.name;
     EXPECT_EQ(registers.communication_changes(), counted + 1) << e.name << ": no change";
     if (e.maximum < 4294967295.0) {
-      const auto result = registers.write_communication(place, static_cast<std::uint32_t>(e.maximum) + 1);
+      const auto result =
+          registers.write_communication(place, static_cast<std::uint32_t>(e.maximum) + 1, false);
       EXPECT_EQ(result.refusal, Refusal::out_of_range) << e.name;
       EXPECT_EQ(result.address, modbus_address(i, 0));
       EXPECT_EQ(registers.last_refusal().refusal, Refusal::out_of_range);
@@ -177,7 +178,7 @@ TEST_F(Communication, IsNotWrittenAsARegisterAndNothingElseIsWrittenAsIt) {
                 Refusal::unknown_register)
           << e.name;
     } else {
-      const auto result = registers.write_communication(place, 1);
+      const auto result = registers.write_communication(place, 1, false);
       EXPECT_EQ(result.refusal, Refusal::read_only) << e.name;
       EXPECT_EQ(result.address, modbus_address(entry, axis)) << e.name;
     }
@@ -214,8 +215,9 @@ TEST_F(Communication, OfASetIsTakenWithItAndCountedOnce) {
 TEST_F(Communication, SetDuringATransactionStaysAtItsCommit) {
   ASSERT_EQ(control(1), Refusal::none);
   ASSERT_EQ(write("wall.stiffness", words_for("wall.stiffness", 5000)), Refusal::none);
-  ASSERT_EQ(registers.write_communication(slot_of(entry_of<"canopen.heartbeat_time">(), 0), 100).refusal,
-            Refusal::none);
+  ASSERT_EQ(
+      registers.write_communication(slot_of(entry_of<"canopen.heartbeat_time">(), 0), 100, false).refusal,
+      Refusal::none);
   ASSERT_EQ(control(2), Refusal::none);
   EXPECT_EQ(get("canopen.heartbeat_time"), 100);
   EXPECT_EQ(get("wall.stiffness"), 5000);

@@ -211,8 +211,7 @@ TEST(ParameterAccess, GapsEndsAndReadOnlyPlacesAreNotWritable) {
   EXPECT_EQ(w.write(address_of("drive.controlword"), {0x06, 0}).refusal, Refusal::unknown_register);
   EXPECT_EQ(w.write(address_of("transaction.control"), {1, 0}).refusal, Refusal::unknown_register);
   EXPECT_FALSE(w.registers.transaction_open());
-  std::uint16_t word = 0;
-  EXPECT_FALSE(w.registers.fetch_controlword(0, word));
+  EXPECT_FALSE(w.registers.fetch_controlword(0));
   EXPECT_EQ(w.registers.bits(), before);
 }
 
@@ -303,14 +302,15 @@ TEST(ParameterAccess, StoreCommandsAreForTheApplicationAndNeverAValue) {
 TEST(ParameterAccess, ControlwordsAreFetchedOncePerAxisAndAreNoParameterChange) {
   Written w;
   EXPECT_EQ(w.write(address_of("drive.controlword", 1), {0xABCD}, true).refusal, Refusal::none);
-  std::uint16_t word = 0;
-  EXPECT_FALSE(w.registers.fetch_controlword(0, word));
-  ASSERT_TRUE(w.registers.fetch_controlword(1, word));
-  EXPECT_EQ(word, 0xABCD);
-  EXPECT_FALSE(w.registers.fetch_controlword(1, word));
+  EXPECT_FALSE(w.registers.fetch_controlword(0));
+  const auto controlword = w.registers.fetch_controlword(1);
+  ASSERT_TRUE(controlword);
+  EXPECT_EQ(controlword->word, 0xABCD);
+  EXPECT_EQ(controlword->by, Link::serial);
+  EXPECT_FALSE(w.registers.fetch_controlword(1));
   // The same word again is a command again.
   w.write(address_of("drive.controlword", 1), {0xABCD}, true);
-  EXPECT_TRUE(w.registers.fetch_controlword(1, word));
+  EXPECT_TRUE(w.registers.fetch_controlword(1));
   EXPECT_EQ(w.registers.changes(), 0u);
 }
 
@@ -355,7 +355,8 @@ RC_GTEST_PROP(ParameterAccess, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
       if (after[s] == before[s]) continue;
       RC_ASSERT(d.writable);
       RC_ASSERT(check_value(d, after[s]) == Refusal::none);
-      RC_ASSERT(armed_change_refusal(values_before, s, after[s], armed) == Refusal::none);
+      RC_ASSERT(armed_change_refusal(values_before, {static_cast<std::uint16_t>(s), after[s]}, Link::serial,
+                                     armed) == Refusal::none);
       if (!acts_at_once(s)) RC_ASSERT(registers.changes() == changes + 1);
     }
   }

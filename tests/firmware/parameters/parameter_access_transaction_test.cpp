@@ -133,13 +133,13 @@ TEST_F(Transaction, WhileArmedTakesWhatMayChangeAndRefusesTheRestWhenStaged) {
 TEST_F(Transaction, ControlwordsActAtOnceAndAreNotUndoneByTheCommit) {
   EXPECT_EQ(control(1), Refusal::none);
   EXPECT_EQ(registers.write(address_of("drive.controlword"), Words{0x0F}, false, now).refusal, Refusal::none);
-  std::uint16_t word = 0;
-  ASSERT_TRUE(registers.fetch_controlword(0, word));
-  EXPECT_EQ(word, 0x0F);
+  const auto controlword = registers.fetch_controlword(0);
+  ASSERT_TRUE(controlword);
+  EXPECT_EQ(controlword->word, 0x0F);
   EXPECT_EQ(set("wall.stiffness", 5000), Refusal::none);
   EXPECT_EQ(control(2), Refusal::none);
   EXPECT_EQ(get("drive.controlword"), 0x0F);
-  EXPECT_FALSE(registers.fetch_controlword(0, word));
+  EXPECT_FALSE(registers.fetch_controlword(0));
 }
 
 TEST_F(Transaction, AnEmptyOneChangesNothing) {

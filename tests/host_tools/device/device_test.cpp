@@ -144,7 +144,7 @@ TEST(Device, EveryRefusalIsExplainedAndChangesNothing) {
 
 TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
-    connection.fake->machines[1].command(word, Refusal::none, false);
+    connection.fake->machines[1].command(word, firmware::Link::serial, Refusal::none, false);
   const auto before = connection.fake->settings();
   const auto message = thrown_message<DeviceError>([&] {
     device.apply(assignments({"wall.stiffness=7", "wall.law=magnetic"}));
@@ -157,7 +157,7 @@ TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
 
 TEST_F(OpenDevice, ABoundThatIsOnlyTightenedWhileArmedIsRefusedWithItsDirectionAndItsCeiling) {
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
-    connection.fake->machines[0].command(word, Refusal::none, false);
+    connection.fake->machines[0].command(word, firmware::Link::serial, Refusal::none, false);
   const auto before = connection.fake->settings();
   EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.damping=7"})); }),
                   "it can only be lowered from 0 N s/m, or raised up to wall.damping_ceiling (0 N s/m)");

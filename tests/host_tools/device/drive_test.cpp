@@ -44,7 +44,8 @@ TEST_F(DriveTest, ArmingWhatIsArmedSendsNothing) {
 TEST_F(DriveTest, ArmsFromEveryStateWithoutAFault) {
   for (const std::vector<std::uint16_t>& way :
        std::vector<std::vector<std::uint16_t>>{{}, {6}, {6, 7}, {6, 7, 15, 2}, {6, 7, 15, 7}}) {
-    for (const std::uint16_t word : way) fake->machines[1].command(word, Refusal::none, false);
+    for (const std::uint16_t word : way)
+      fake->machines[1].command(word, firmware::Link::serial, Refusal::none, false);
     drive.arm();
     EXPECT_EQ(state(), DriveState::operation_enabled);
     drive.disarm();
@@ -132,7 +133,8 @@ TEST_F(DriveTest, AnUnknownErrorCodeIsShownAsANumber) {
 TEST_F(DriveTest, ClearsAFaultWhoseCauseIsGone) {
   EXPECT_FALSE(drive.clear());
   fake->trip(1, Fault::encoder, 0, 0);
-  fake->machines[1].command(128, Refusal::none, true);  // a reset bit that is held is no edge
+  fake->machines[1].command(128, firmware::Link::serial, Refusal::none,
+                            true);  // a reset bit that is held is no edge
   ASSERT_EQ(state(), DriveState::fault);
   EXPECT_TRUE(drive.clear());
   EXPECT_EQ(state(), DriveState::switch_on_disabled);

@@ -160,9 +160,10 @@ TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
   EXPECT_EQ(opened, "");
   const Json objects = document()["objects"];
   ASSERT_EQ(objects.size(), firmware::slot_count);
-  const std::vector<std::string> keys = {
-      "name",   "index",      "subindex",           "type",    "unit",   "access", "min", "max", "default",
-      "values", "persistent", "change_while_armed", "ceiling", "modbus", "help"};
+  const std::vector<std::string> keys = {"name",           "index",   "subindex",   "type",
+                                         "unit",           "access",  "min",        "max",
+                                         "default",        "values",  "persistent", "change_while_armed",
+                                         "only_commander", "ceiling", "modbus",     "help"};
   for (const Json& object : objects) {
     std::vector<std::string> found;
     for (const auto& item : object.items()) found.push_back(item.key());
@@ -184,7 +185,7 @@ TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
   EXPECT_EQ(objects[3],
             Json::parse(R"({"name": "wall.stiffness", "index": 8192, "subindex": 4, "type": "float32",
       "unit": "N/m", "access": "rw", "min": 0, "max": 1000000, "default": 1000, "values": null, "persistent": true,
-      "change_while_armed": "lower", "ceiling": "wall.stiffness_ceiling",
+      "change_while_armed": "lower", "only_commander": true, "ceiling": "wall.stiffness_ceiling",
       "modbus": {"table": "holding", "address": 4, "words": 2}, "help": "Stiffness K inside the wall."})"));
 }
 

@@ -134,13 +134,13 @@ TEST_F(FlashCommand, RefusedWhileAnAxisIsArmed) {
   plug_in("0483", "3748");
   device = std::make_shared<host_tools_test::FakeDevice>();
   for (const std::uint16_t word : {std::uint16_t{0x6}, std::uint16_t{0x7}, std::uint16_t{0xF}})
-    device->machines[1].command(word, firmware::Refusal::none, false);
+    device->machines[1].command(word, firmware::Link::serial, firmware::Refusal::none, false);
   ASSERT_TRUE(device->armed());
   EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/fake"}), failed);
   EXPECT_CONTAINS(said, "axis 1 is armed");
   EXPECT_CONTAINS(said, "Nothing was changed");
   EXPECT_TRUE(board.calls().empty());
-  device->machines[1].command(0, firmware::Refusal::none, false);
+  device->machines[1].command(0, firmware::Link::serial, firmware::Refusal::none, false);
   EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/fake"}), done) << said;
   EXPECT_EQ(said.find("not asked"), std::string::npos);
 }
