@@ -24,7 +24,7 @@ Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreComma
 ArmedAxes Axes::armed() const {
   ArmedAxes armed;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    armed.axis[axis] = supervisors_[axis].armed();
+    armed.axis[axis] = supervisors_[axis].makes_force();
     armed.commander[axis] = supervisors_[axis].commander();
   }
   return armed;
@@ -180,8 +180,9 @@ void Axes::act() {
     if (const auto controlword = parameters_.fetch_controlword(axis))
       supervisor.request(*controlword, now_us_);
     supervisor.poll(situation(axis), axis);
-    tick_.enable(axis, supervisor.armed());
-    supervisor.reaction_done();
+    tick_.leave_share(axis, supervisor.force_share());
+    tick_.enable(axis, supervisor.makes_force());
+    supervisor.finish_reaction();
   }
   command_forces();
 }
@@ -189,7 +190,7 @@ void Axes::act() {
 void Axes::command_forces() {
   ParameterValues& values = parameters_.values();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const bool armed = supervisors_[axis].armed();
+    const bool armed = supervisors_[axis].makes_force();
     // What was asked for while nothing could follow must not act later.
     if (!armed) {
       values.set_whole<"profile.target_torque">(0, axis);
@@ -201,7 +202,7 @@ void Axes::command_forces() {
 
 void Axes::disarm(std::size_t axis) {
   supervisors_[axis].disarm();
-  tick_.enable(axis, supervisors_[axis].armed());
+  tick_.enable(axis, supervisors_[axis].makes_force());
 }
 
 void Axes::trip_all_of(Link link, Fault fault) {

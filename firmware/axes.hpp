@@ -55,6 +55,7 @@ class Axes {
   void note_commander(std::span<const SlotValue> written, Link by);
 
   std::uint32_t now_us() const { return now_us_; }
+  /// Those that make force, also while it fades or brakes.
   ArmedAxes armed() const;
   bool any_armed() const { return armed().any(); }
   const Supervisor& supervisor(std::size_t axis) const { return supervisors_[axis]; }

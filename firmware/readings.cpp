@@ -62,7 +62,7 @@ void Readings::refresh_axis(std::size_t axis) {
       .state = machine.state(),
       .mode = v.choice<DriveMode, "drive.mode">(axis),
       .supplied = !supply_fault,
-      .power_stage_on = machine.armed(),
+      .power_stage_on = of_.axes.supervisor(axis).makes_force(),
       .warning = thermal.allowance() < 1.0f || guard_warns || haptic.unstable || report.softening < 1.0f,
       .limited = haptic.limited || haptic.slew_limited || saturated(axis),
       .halted = supervisor.is_halted(),

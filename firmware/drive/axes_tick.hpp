@@ -48,7 +48,9 @@ class AxesTick {
 
   /// `capture_memory`: for captures, up to capture_words; it outlives this object.
   explicit AxesTick(const Settings& initial, std::span<std::uint32_t> capture_memory = {}, Law law = {})
-      : settings_(initial), capture_(capture_memory), law_(law) {}
+      : settings_(initial), capture_(capture_memory), law_(law) {
+    for (std::size_t axis = 0; axis < axes; ++axis) leave_share(axis, 1.0f);
+  }
   AxesTick(const AxesTick&) = delete;
   AxesTick& operator=(const AxesTick&) = delete;
 
@@ -62,6 +64,10 @@ class AxesTick {
   /// N at the handle, along +x, finite: what mode torque makes.
   void command_force(std::size_t axis, float force) {
     commanded_force_[axis].store(force, std::memory_order_relaxed);
+  }
+  /// What is left of an enabled axis' force, see Axis::Demand::share.
+  void leave_share(std::size_t axis, float share) {
+    force_share_[axis].store(share, std::memory_order_relaxed);
   }
   /// The main loop runs.
   void keep_alive() {
@@ -117,6 +123,7 @@ class AxesTick {
   Capture capture_;
   std::array<std::atomic<bool>, axes> enabled_{};
   std::array<std::atomic<float>, axes> commanded_force_{};
+  std::array<std::atomic<float>, axes> force_share_{};
   std::atomic<std::uint32_t> rounds_alive_{0};
   std::atomic<std::uint8_t> trace_axis_{0};
   std::atomic<std::uint32_t> trace_interval_{0};
@@ -142,7 +149,8 @@ const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axi
   Axis& ticked = axes_[axis];
   const bool enable = enabled_[axis].load(std::memory_order_relaxed);
   if (main_loop_stands_ && enable) ticked.ISR_trip(Fault::main_loop);
-  const Axis::Demand demand{law_.ISR_force(axis, at), commanded_force_[axis].load(std::memory_order_relaxed)};
+  const Axis::Demand demand{law_.ISR_force(axis, at), commanded_force_[axis].load(std::memory_order_relaxed),
+                            force_share_[axis].load(std::memory_order_relaxed)};
   const Axis::Output& output = ticked.ISR_tick(settings[axis], input, enable, demand, ticks_);
   law_.ISR_rendered(axis, ticked.ISR_haptic(), output.enabled);
   if (ticked.ISR_changed() || ISR_round_begins())

@@ -61,14 +61,15 @@ constexpr bool is_positive(float value) {
   const std::int64_t position = position_of(extender_.count(), setting);
   std::uint32_t state = state_word(trip_, condition_of(setting, input), enable, input);
   const bool sound = (state & ~referenced_bit) == (enabled_bit | count_valid_bit);
-  const bool by_force = sound && setting.mode != DriveMode::excitation;
+  const bool brakes = demand.share < 0.0f;
+  const bool by_force = sound && setting.mode != DriveMode::excitation && !brakes;
   const auto& out = setting.mode == DriveMode::torque
                         ? loop_.follow(setting.haptic, position, by_force, demand.from_host)
                         : loop_.tick(setting.haptic, position, by_force, demand.from_axes);
   if (by_force && out.fault == control::HapticFault::none) [[likely]] {
-    output_.enabled = drive(setting, input, low_word(position), moved);
+    output_.enabled = drive(setting, input, low_word(position), moved, demand.share);
   } else {
-    output_.enabled = excite_or_release(setting, input, state, moved);
+    output_.enabled = excite_or_release(setting, input, state, moved, brakes);
   }
   if (!output_.enabled) [[unlikely]]
     state |= static_cast<std::uint32_t>(trip_);
@@ -145,10 +146,12 @@ void Axis::find_trips(const AxisSetting& setting, const Input& input, Fault cond
 }
 
 /// From the loop's force to duty. False: it has tripped, and there is neither.
-bool Axis::drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved) {
+bool Axis::drive(const AxisSetting& setting, const Input& input, std::uint32_t position, std::int32_t moved,
+                 float share) {
   const auto& out = loop_.output();
   float force = out.force;
   if (is_positive(setting.compensation.limit)) force = compensated(setting, position);
+  force = share * force;
   output_.force = force;
   motor_.update(setting.motor, input.motor, force, position, out.velocity, true, output_.motor);
   if (output_.motor.fault != Fault::none) [[unlikely]]
@@ -162,9 +165,9 @@ bool Axis::drive(const AxisSetting& setting, const Input& input, std::uint32_t p
   return true;
 }
 
-/// Excitation, a trip, or nothing at all. True: the axis is driven.
+/// Excitation, braking, a trip, or nothing at all. True: the axis is driven.
 bool Axis::excite_or_release(const AxisSetting& setting, const Input& input, std::uint32_t state,
-                             std::int32_t moved) {
+                             std::int32_t moved, bool brakes) {
   const bool enable = (state & enabled_bit) != 0;
   plausibility_.follow(setting.plausibility, velocity_of_tick(setting, moved));
   if (enable && (state_ & enabled_bit) == 0) {
@@ -174,7 +177,8 @@ bool Axis::excite_or_release(const AxisSetting& setting, const Input& input, std
   if (enable && trip_ == Fault::none) {
     find_trips(setting, input, condition_in(state));
     if (trip_ == Fault::none) {
-      output_.force = excite(setting, input);
+      output_.force =
+          brakes ? motor_.brake(setting.motor, input.motor, output_.motor) : excite(setting, input);
       return output_.motor.fault == Fault::none ||
              trip_in_drive(output_.motor.fault, output_.motor.fault_value, setting);
     }

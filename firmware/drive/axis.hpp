@@ -102,6 +102,10 @@ class Axis {
   struct Demand {
     float from_axes = 0.0f;  ///< mode haptic: what a law over several axes adds to the wall
     float from_host = 0.0f;  ///< mode torque: all of the force
+    /// What is left of the force, 0 to 1, while it fades after its commander was lost; less than 0: none, and
+    /// the motor brakes, see MotorControl::brake().
+    float share = 1.0f;
+    static constexpr float brakes = -1.0f;
   };
 
   /// Defined apart, so that it is one function in the image whose arguments and result a test can follow.
@@ -168,13 +172,13 @@ class Axis {
   [[gnu::noinline, gnu::cold]] void trip(Fault fault, float value, std::int64_t position);
   [[gnu::noinline, gnu::cold]] bool trip_in_drive(Fault fault, float value, const AxisSetting& setting);
   [[gnu::noinline]] bool excite_or_release(const AxisSetting& setting, const Input& input,
-                                           std::uint32_t state, std::int32_t moved);
+                                           std::uint32_t state, std::int32_t moved, bool brakes);
   void find_trips(const AxisSetting& setting, const Input& input, Fault condition);
   [[gnu::cold]] float excite(const AxisSetting& setting, const Input& input);
   [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
   static Fault condition_of(const AxisSetting& setting, const Input& input);
   [[gnu::always_inline]] inline bool drive(const AxisSetting& setting, const Input& input,
-                                           std::uint32_t position, std::int32_t moved);
+                                           std::uint32_t position, std::int32_t moved, float share);
 
   control::CountExtender<std::uint32_t> extender_;
   control::HapticLoop<float> loop_;

@@ -116,6 +116,17 @@ class MotorControl {
 
   /// Instead of update(), in a tick in which an excited axis is driven. Gives the force asked for, N at the
   /// handle, as far as it is known: 0 for a voltage, and for a current in the stator's frame.
+  /// Instead of update(): no voltage between the phases, so that the bridge shorts the motor. Its back-EMF
+  /// then drives a current that brakes it, with torque_constant^2 / resistance per shaft speed: passive
+  /// whatever the encoder says, and without a joule from or to the supply. What the winding makes of that is
+  /// watched for over-current as ever. Gives 0: no force is asked for. Without measured currents nothing
+  /// brakes.
+  [[gnu::cold]] float brake(const Coefficients& c, const Measured& measured, Output& out) {
+    Excitation::Output shorted{};
+    shorted.kind = ExcitationKind::voltage;
+    return excite(c, measured, shorted, 0, 0.0f, out);
+  }
+
   [[gnu::cold]] float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
                              std::uint32_t position, float velocity, Output& out);
 

@@ -50,6 +50,16 @@ float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) 
       return 0.0f;
   }
 }
+
+constexpr bool is_loss_of_commander(Fault fault) {
+  return fault == Fault::link_silent || fault == Fault::bus_off || fault == Fault::heartbeat_lost;
+}
+
+// The power stage is off then in any case.
+constexpr std::uint32_t longest_reaction = 2 * tick_rate_hz;
+// The handle stands: for so long it has not been faster than this.
+constexpr float standstill = 1e-3f;  // m/s
+constexpr std::uint32_t standing = tick_rate_hz / 20;
 }  // namespace
 
 Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) const {
@@ -76,6 +86,7 @@ Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) c
 void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float value, float bound) {
   machine_.trip(fault);
   if (machine_.fault() != fault || machine_.state() != DriveState::fault_reaction_active) return;
+  if (is_loss_of_commander(fault)) begin_reaction(now, axis);
   // Counts were lost, and with them the rotor's angle.
   if (fault == Fault::encoder || fault == Fault::spin_out) now.commutation.forget(now.values, axis);
   const AxisReport& report = now.report;
@@ -95,6 +106,31 @@ void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float
                   .supply = now.supply_voltage,
                   .value = value,
                   .fault = fault};
+}
+
+void Supervisor::begin_reaction(const Situation& now, std::size_t axis) {
+  const auto kind = now.values.choice<LinkLoss, "link.loss">();
+  if (kind == LinkLoss::limp || mode_of(now.values, axis) == DriveMode::excitation) return;
+  reaction_ = Reaction{kind, now.report.tick, now.report.tick, 1.0f};
+  go_on_with_reaction(now, axis);
+}
+
+void Supervisor::go_on_with_reaction(const Situation& now, std::size_t axis) {
+  Reaction& reaction = *reaction_;
+  const std::uint32_t now_tick = now.report.tick, elapsed = now_tick - reaction.began;
+  bool over = now.report.fault != Fault::none || now.ticks_have_stopped || elapsed > longest_reaction;
+  if (reaction.kind == LinkLoss::ramp) {
+    const float ramp = now.values.real<"force.ramp_time">(axis) * static_cast<float>(tick_rate_hz);
+    const auto gone = static_cast<float>(elapsed);
+    over = over || !(gone < ramp);
+    reaction.share = over ? 0.0f : 1.0f - gone / ramp;
+  } else {
+    const float velocity = now.report.haptic.velocity;
+    if (!(velocity < standstill && velocity > -standstill)) reaction.moved_last = now_tick;
+    over = over || now_tick - reaction.moved_last > standing;
+    reaction.share = Axis::Demand::brakes;
+  }
+  if (over) reaction_.reset();
 }
 
 void Supervisor::watch(const Situation& now, std::size_t axis) {
@@ -141,10 +177,11 @@ bool Supervisor::cause_remains(const Situation& now) const {
 
 void Supervisor::obey(const Situation& now, std::size_t axis) {
   const auto [word, by] = *waiting_;
+  if (!asks_for_operation(word)) reaction_.reset();
   const bool arms = machine_.asks_to_enable(word, by);
   if (arms && !now.settled) return;
   const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
-  halted_ = halted(word) || (halted_ && armed() && by != commander_);
+  halted_ = halted(word) || (halted_ && makes_force() && by != commander_);
   machine_.command(word, by, obstacle_to_arming(now, axis), cause_remains(now),
                    {.stay_in_quick_stop = stays});
   waiting_.reset();
@@ -153,9 +190,12 @@ void Supervisor::obey(const Situation& now, std::size_t axis) {
 
 void Supervisor::poll(const Situation& now, std::size_t axis) {
   // Before the commands: a fault is reported even if the host disarms in the same moment.
-  if (armed()) watch(now, axis);
+  if (armed())
+    watch(now, axis);
+  else if (reaction_)
+    go_on_with_reaction(now, axis);
   if (waiting_) obey(now, axis);
-  if (claimed_ && !armed()) {
+  if (claimed_ && !makes_force()) {
     claimed_ = false;
     number_ = 0;
     set_next_number(commander_, 0);

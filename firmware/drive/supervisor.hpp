@@ -12,6 +12,13 @@
 
 namespace kmax::firmware {
 
+/// How an axis loses its force when its commander is lost; the numbers are those of link.loss.
+enum class LinkLoss : std::uint8_t {
+  limp = 0,  ///< at once
+  ramp = 1,  ///< evenly within force.ramp_time
+  damp = 2,  ///< at once, and the motor's shorted winding brakes the handle until it stands
+};
+
 /// The main loop's judgement of one axis: what trips it, whether it may be armed, and which commands it
 /// obeys. No failure; what goes wrong becomes a fault or a refusal.
 ///
@@ -19,6 +26,11 @@ namespace kmax::firmware {
 /// that link had written a drive.commander other than 0 for it, whoever knows that number. Only the
 /// commander's silence, bus-off or NMT stop counts, and nobody else's signs of life keep the axis armed.
 /// Others can disarm it, halt it, and tighten its bounds (armed_change.hpp).
+///
+/// When the commander is lost (link_silent, bus_off, heartbeat_lost), link.loss says how the force goes;
+/// until it is gone the axis is in "fault reaction active" and counts as armed for all that may not change
+/// then. Any other fault, a controlword that does not ask for operation, whoever writes it, NMT stop and
+/// reset, and two seconds end it at once. Mode excitation always loses its force at once.
 class Supervisor {
  public:
   /// All that it judges by, of one moment.
@@ -51,7 +63,7 @@ class Supervisor {
   void request(const Controlword& controlword, std::uint32_t now_us) {
     if (waiting_) machine_.pass_over(waiting_->word, waiting_->by);
     waiting_ = controlword;
-    if (armed()) return;
+    if (makes_force()) return;
     commander_ = controlword.by;
     number_ = next_number_[static_cast<std::size_t>(controlword.by)];
     signed_us_ = now_us;
@@ -74,16 +86,23 @@ class Supervisor {
   /// In every poll, and after every controlword.
   void poll(const Situation& now, std::size_t axis);
   [[gnu::cold]] void trip(const Situation& now, std::size_t axis, Fault fault, float value, float bound);
-  /// After poll(), when the tick knows whether the axis is armed.
-  void reaction_done() { machine_.reaction_done(); }
+  /// After poll(), when the tick knows whether the axis makes force.
+  void finish_reaction() {
+    if (!reaction_) machine_.reaction_done();
+  }
   /// At once, and without a controlword.
   void disarm() {
     waiting_.reset();
+    reaction_.reset();
     machine_.disable();
   }
 
   const AxisStateMachine& machine() const { return machine_; }
   bool armed() const { return machine_.armed(); }
+  /// Armed, or its force is fading.
+  bool makes_force() const { return armed() || reaction_.has_value(); }
+  /// See Axis::Demand::share.
+  float force_share() const { return reaction_ ? reaction_->share : 1.0f; }
   const Trip& last_trip() const { return trip_; }
   /// Halt, as the last controlword that was obeyed says.
   bool is_halted() const { return halted_; }
@@ -91,11 +110,21 @@ class Supervisor {
  private:
   void watch(const Situation& now, std::size_t axis);
   void obey(const Situation& now, std::size_t axis);
+  [[gnu::cold]] void begin_reaction(const Situation& now, std::size_t axis);
+  [[gnu::cold]] void go_on_with_reaction(const Situation& now, std::size_t axis);
   // Rare: small code rather than fast code.
   [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, std::size_t axis) const;
   [[gnu::cold]] bool cause_remains(const Situation& now) const;
 
+  /// The way from a lost commander to no force. Times are the tick's.
+  struct Reaction {
+    LinkLoss kind;
+    std::uint32_t began, moved_last;
+    float share;
+  };
+
   AxisStateMachine machine_;
+  std::optional<Reaction> reaction_;
   std::optional<Controlword> waiting_;  ///< until the settings have arrived, if it asks to enable
   Trip trip_;
   Link commander_ = Link::serial;

@@ -396,6 +396,8 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
          "Force asked for in mode torque at the handle, along +x; added to what profile.target_torque makes "
          "there, and force.limit bounds the sum. 0 whenever the axis is not armed.")
         .volatile_value(),
+    stop_option("profile.abort_connection_option", 11, names::abort_connection_option, 1, 0x6007,
+                "1: losing its commander is a fault of the axis; link.loss says how its force goes."),
 });
 
 }  // namespace kmax::firmware

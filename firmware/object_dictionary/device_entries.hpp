@@ -45,6 +45,7 @@ inline constexpr NamedValue can_state[] = {{"absent", 0}, {"stopped", 1},       
 inline constexpr NamedValue store_state[] = {{"idle", 0},     {"busy", 1},    {"saved", 2},
                                              {"failed", 3},   {"refused", 4}, {"defaults_set", 5},
                                              {"no_memory", 6}};
+inline constexpr NamedValue link_loss[] = {{"limp", 0}, {"ramp", 1}, {"damp", 2}};
 inline constexpr NamedValue baud_rate[] = {{"9600", 9600},     {"19200", 19200},   {"38400", 38400},
                                            {"57600", 57600},   {"115200", 115200}, {"230400", 230400},
                                            {"460800", 460800}, {"921600", 921600}};
@@ -81,6 +82,11 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     whole("link.sign_of_life", group::link, 2, Type::unsigned16, "", 0, 65535, 0,
           "Written by a host that commands and has nothing else to write: the number in drive.commander.")
         .volatile_value(),
+    choice("link.loss", group::link, 3, names::link_loss, 0,
+           "How an axis loses its force when its commander is lost (link.timeout, bus-off, a watched "
+           "heartbeat): limp at once; ramp evenly within force.ramp_time; damp at once, while the shorted "
+           "motor brakes the handle until it stands, at most 2 s. Mode excitation always goes limp.")
+        .disarmed_only(),
 
     whole("node.id", group::node, 1, Type::unsigned8, "", 1, 127, 1,
           "CANopen node ID; takes effect at the next start or NMT reset."),

@@ -1,7 +1,9 @@
 // The image on the virtual board, in the loop with motors, handles and persons.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <string>
 
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/image/image_bench.hpp"
@@ -115,6 +117,62 @@ TEST_F(ClosedLoop, TheEmergencyStopTakesTheForceAtOnce) {
   bench.board->run_for(0.001);
   EXPECT_EQ(bench.fault(0), Fault::emergency_stop);
   EXPECT_FALSE(bench.board->healthy());
+}
+
+/// What a hand that presses on meets when the link is lost, until the bridge is off.
+struct LostLink {
+  double fastest = 0.0;  ///< m/s
+  double given = 0.0;    ///< J, the largest that the motor has given to the handle since
+  double lasted = 0.0;   ///< s
+};
+
+std::array<LostLink, 2> lose_link(const std::string& loss) {
+  auto parameters = stiff_walls();
+  parameters.emplace_back("link.timeout", 0.3);
+  parameters.emplace_back("link.loss", loss);
+  ImageBench bench{parameters, 2.0};
+  bench.start();
+  for (std::size_t axis = 0; axis < 2; ++axis) bench.master->arm(axis);
+  for (int i = 0; i < 15; ++i) {
+    bench.board->run_for(0.1);
+    bench.fault(0);  // a sign of life
+  }
+  std::array<LostLink, 2> seen{};
+  std::array<double, 2> work{};
+  const double begin = virtual_board::seconds(bench.board->now());
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    EXPECT_TRUE(bench.board->bridge_armed(axis));
+    EXPECT_GT(bench.world.drive(axis).force(), 1.0) << axis << ": pressed";
+  }
+  while (virtual_board::seconds(bench.board->now()) < begin + 0.5) {
+    bench.board->run_until(bench.board->now() + ticks(1));
+    const double now = virtual_board::seconds(bench.board->now()) - begin;
+    if (now < 0.305) continue;  // still armed: found within a few polls
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto& drive = bench.world.drive(axis);
+      work[axis] += drive.force() * drive.handle().velocity() * tick_s;
+      seen[axis].given = std::max(seen[axis].given, work[axis]);
+      seen[axis].fastest = std::max(seen[axis].fastest, std::abs(drive.handle().velocity()));
+      if (bench.board->bridge_armed(axis)) seen[axis].lasted = now - 0.3;
+    }
+  }
+  for (std::size_t axis = 0; axis < 2; ++axis) EXPECT_EQ(bench.fault(axis), Fault::link_silent) << axis;
+  return seen;
+}
+
+// Two newtons go on pressing where the wall was.
+TEST(ClosedLoopOfALostLink, TheShortedMotorBrakesAndGivesTheHandNothing) {
+  const auto limp = lose_link("limp"), damp = lose_link("damp"), ramp = lose_link("ramp");
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    std::printf("axis %zu: fastest %.3f limp, %.3f damp, %.3f m/s ramp; given %.1e, %.1e, %.1e J\n", axis,
+                limp[axis].fastest, damp[axis].fastest, ramp[axis].fastest, limp[axis].given,
+                damp[axis].given, ramp[axis].given);
+    EXPECT_LT(limp[axis].lasted, 0.002) << axis;
+    EXPECT_GT(damp[axis].lasted, 0.1) << axis << ": as long as the handle moves";
+    EXPECT_LT(damp[axis].fastest, 0.6 * limp[axis].fastest) << axis;
+    EXPECT_LT(damp[axis].given, 1e-4) << axis;
+    EXPECT_NEAR(ramp[axis].lasted, 0.2, 0.02) << axis << ": force.ramp_time";
+  }
 }
 
 // Legs B and C carry the DC motor of axis 0; the synchronous motor of axis 1 has three.
