@@ -1,0 +1,323 @@
+// Rules of safety, written once, for tests that feed an application with anything at all. The oracle sees
+// what goes in (bytes, frames) and what a host could see (states, parameters, forces), and works out by
+// itself what may be: it shares the dictionary with the firmware, which says what and where things are, and
+// no code that decides anything.
+//
+// 1. An axis is armed only after controlwords that shut down and then enable operation, in this order, since
+// it was last in a state that CiA 402 leads out of in no other way. No enabling one came by a broadcast.
+//
+// 2. Once armed it stays so no longer than link.timeout, and one poll, after the last message of the link
+// that armed it that could be a sign of life.
+//
+// 3. Force is finite, within force.limit, and none at all unless the axis is armed and its inputs are sound.
+//
+// 4. Every setting is finite and within its bounds, at all times.
+//
+// 5. While an axis is armed, its bounds only get tighter, or looser as far as a ceiling that was set before.
+//
+// Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
+// allows what they could mean at most: it never complains of what is right.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can_frame.hpp"
+#include "firmware/drive/axis.hpp"
+#include "firmware/drive/axis_state_machine.hpp"
+#include "firmware/parameters/parameter_values.hpp"
+
+namespace kmax::firmware {
+
+class SafetyOracle {
+ public:
+  using States = std::array<DriveState, axis_count>;
+
+  /// A start or a restart, with the parameters that it begins with.
+  explicit SafetyOracle(const ParameterValues& values) : values_(values) {
+    states_.fill(DriveState::switch_on_disabled);
+    for (std::size_t slot = 0; slot < slot_count; ++slot) judge_value(slot, values.raw(slot));
+  }
+
+  /// A character whose last stop bit ended at `end_us`, on a line of `baud_rate`.
+  void take_byte(std::uint8_t byte, std::uint64_t end_us, std::uint32_t baud_rate) {
+    const double character_us = 11e6 / baud_rate;
+    const double longest_gap_us = baud_rate > 19200 ? 750.0 : 1.5 * character_us;
+    if (static_cast<double>(end_us - byte_us_) > character_us + longest_gap_us + 2.0) frame_.clear();
+    byte_us_ = end_us;
+    frame_.push_back(byte);
+    if (frame_.size() >= 4 && crc_of(frame_) == 0) take_request(std::span(frame_).first(frame_.size() - 2));
+  }
+
+  /// A data frame, which is looked at in the next poll, 16 of them in each.
+  void take_frame(const drivers::CanFrame& frame) {
+    const auto data = std::span(frame.data).first(std::min<std::size_t>(frame.length, frame.data.size()));
+    ++frames_waiting_;
+    const std::uint32_t id = frame.identifier;
+    if (id == 0 || id == 0x7E5 || (id > 0x700 && !heartbeat_watched())) return;  // NMT, LSS, heartbeats
+    if (id > 0x600 && id <= 0x67F) {
+      take_sdo(data);
+      return;
+    }
+    const bool is_sync = id == 0x80;
+    if (is_sync && !pdo_since_sync_) return;
+    // A PDO, which may act at the next SYNC, whatever that is.
+    pdo_since_sync_ = !is_sync;
+    life_waits_ = true;
+    for (std::size_t i = 0; i + 1 < data.size(); ++i) {
+      const auto word = static_cast<std::uint16_t>(data[i] | data[i + 1] << 8);
+      pdo_shuts_down_ = pdo_shuts_down_ || shuts_down(word);
+      pdo_enables_ = pdo_enables_ || asks_to_enable(word);
+    }
+    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_);
+    if (is_sync) pdo_shuts_down_ = pdo_enables_ = false;
+  }
+
+  /// Of `axis`, after a tick.
+  void take_tick(std::size_t axis, const Axis::Input& input, const Axis::Output& output) {
+    const bool armed = states_[axis] == DriveState::operation_enabled;
+    if (output.enabled && !armed) complain("driven, and not armed", axis);
+    if (!output.enabled && output.force != 0.0f) complain("force without being driven", axis);
+    if (output.enabled && (input.condition != Fault::none || !input.count_valid))
+      complain("driven, and its inputs are not sound", axis);
+    if (!std::isfinite(output.force)) complain("force that is not finite", axis);
+    const bool excites = values_.whole<"drive.mode">(axis) == 1;
+    if (!excites && std::abs(output.force) > values_.real<"force.limit">(axis))
+      complain("force beyond force.limit", axis);
+  }
+
+  /// After a poll at `now_us`, of a clock that does not wrap.
+  void take_poll(std::uint64_t now_us, const ParameterValues& values, const States& states) {
+    ++polls_;
+    now_us_ = now_us;
+    if (frames_waiting_ > 0 && life_waits_) life_us_[1] = now_us;
+    frames_waiting_ -= std::min<std::size_t>(frames_waiting_, 16);
+    if (frames_waiting_ == 0) life_waits_ = false;
+    const States before = states_;
+    states_ = states;
+    for (std::size_t axis = 0; axis < axis_count; ++axis) judge_state(axis, before[axis]);
+    for (std::size_t slot = 0; slot < slot_count; ++slot) {
+      if (values.raw(slot) != values_.raw(slot)) judge_change(slot, values.raw(slot), before);
+    }
+    values_ = values;
+  }
+
+  /// The first thing that was wrong; empty: nothing was.
+  const std::string& complaint() const { return complaint_; }
+
+ private:
+  /// What a message could have meant as a controlword of an axis.
+  struct Word {
+    std::uint64_t poll, time_us;
+    std::size_t link;  ///< 0 serial, 1 CAN
+    bool shuts_down, enables;
+  };
+
+  // By the standard's command table.
+  static constexpr bool shuts_down(std::uint16_t word) { return (word & 0x87) == 0x06; }
+  static constexpr bool asks_to_enable(std::uint16_t word) { return (word & 0x8F) == 0x0F; }
+
+  /// States that only a shutdown leads out of, perhaps after other words.
+  static constexpr bool must_start_anew(DriveState state) {
+    return state != DriveState::ready_to_switch_on && state != DriveState::switched_on &&
+           state != DriveState::operation_enabled;
+  }
+
+  static std::uint16_t crc_of(std::span<const std::uint8_t> bytes) {
+    unsigned crc = 0xFFFF;
+    for (const std::uint8_t byte : bytes) {
+      crc ^= byte;
+      for (int bit = 0; bit < 8; ++bit) crc = crc / 2 ^ (crc % 2 != 0 ? 0xA001U : 0U);
+    }
+    return static_cast<std::uint16_t>(crc);
+  }
+
+  void complain(const char* what, std::size_t axis, std::string_view name = {}) {
+    if (!complaint_.empty()) return;
+    complaint_ = std::string(what) + (name.empty() ? "" : ": ") + std::string(name) + ", axis " +
+                 std::to_string(axis) + ", at " + std::to_string(now_us_) + " us";
+  }
+
+  void note_word(std::size_t axis, std::size_t link, bool shuts_down, bool enables) {
+    if (shuts_down || enables) words_[axis].push_back({polls_, now_us_, link, shuts_down, enables});
+  }
+
+  static std::uint16_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
+  }
+
+  /// A frame of the serial line with a good CRC, without it.
+  void take_request(std::span<const std::uint8_t> frame) {
+    const std::uint8_t unit = frame[0];
+    const auto own = static_cast<std::uint8_t>(values_.whole<"modbus.unit">());
+    if (unit != 0 && unit != own && unit != unit_before_) return;
+    life_us_[0] = byte_us_;
+    auto pdu = frame.subspan(1);
+    if (pdu.size() > 3 && pdu[0] == 65) pdu = pdu.subspan(3);
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      const std::size_t place = modbus_address(entry_of<"drive.controlword">(), axis);
+      std::optional<std::uint16_t> word;
+      if (pdu[0] == 6 && pdu.size() == 5) word = word_in(pdu, 1, 3, place);
+      if (pdu[0] == 16 && pdu.size() > 6) word = word_in(pdu, 1, 6, place);
+      if (pdu[0] == 23 && pdu.size() > 10) word = word_in(pdu, 5, 10, place);
+      if (word) note_word(axis, 0, shuts_down(*word), unit != 0 && asks_to_enable(*word));
+      // A mask makes it from what was there before.
+      if (pdu[0] == 22 && pdu.size() == 7 && big_endian(pdu, 1) == place) note_word(axis, 0, true, unit != 0);
+    }
+  }
+  /// The register `place` of those that are written from `data` on, the first of them as the word at `first`
+  /// says.
+  static std::optional<std::uint16_t> word_in(std::span<const std::uint8_t> pdu, std::size_t first,
+                                              std::size_t data, std::size_t place) {
+    const std::size_t begin = big_endian(pdu, first);
+    if (place < begin || data + 2 * (place - begin) + 1 >= pdu.size()) return std::nullopt;
+    return big_endian(pdu, data + 2 * (place - begin));
+  }
+
+  void take_sdo(std::span<const std::uint8_t> data) {
+    if (data.empty()) return;
+    const unsigned command = data[0] >> 5;
+    const bool expedited = command == 1 && (data[0] & 2) != 0;
+    if (command == 6) sdo_in_blocks_ = true;
+    if (data.size() == 8 && (command == 1 || command == 6)) {
+      sdo_index_ = data[1] | unsigned{data[2]} << 8;
+      sdo_subindex_ = data[3];
+    }
+    // Uploads and aborts say nothing, unless they are a block's contents.
+    if (!sdo_in_blocks_ && command != 0 && command != 1) return;
+    if (sdo_in_blocks_ || is_command()) life_waits_ = true;
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      if (sdo_index_ != 0x6040U + 0x800U * axis) continue;
+      const bool known = expedited && !sdo_in_blocks_ && data.size() == 8;
+      const auto word = known ? static_cast<std::uint16_t>(data[4] | data[5] << 8) : std::uint16_t{0};
+      note_word(axis, 1, !known || shuts_down(word), !known || asks_to_enable(word));
+    }
+  }
+  /// Whether the object that is being written commands; a mere setting is no sign of life.
+  bool is_command() const {
+    static constexpr std::array commands{
+        entry_of<"drive.controlword">(),     entry_of<"drive.commander">(),
+        entry_of<"profile.target_torque">(), entry_of<"profile.max_torque">(),
+        entry_of<"profile.target_force">(),  entry_of<"link.sign_of_life">()};
+    return std::ranges::any_of(commands, [this](std::size_t entry) {
+      const Entry& e = entry_at(entry);
+      const unsigned apart = e.scope() == Scope::axis ? sdo_index_ - e.index() : 0;
+      const bool found = e.scope() == Scope::axis ? apart % 0x800 == 0 && apart / 0x800 < axis_count
+                                                  : sdo_index_ == e.index();
+      return found && sdo_subindex_ == e.object_subindex();
+    });
+  }
+  bool heartbeat_watched() const {
+    return values_.whole<"heartbeat_consumer.node_1">() != 0 ||
+           values_.whole<"heartbeat_consumer.node_2">() != 0 ||
+           values_.whole<"heartbeat_consumer.node_3">() != 0 ||
+           values_.whole<"heartbeat_consumer.node_4">() != 0;
+  }
+
+  void judge_state(std::size_t axis, DriveState before) {
+    auto& words = words_[axis];
+    const bool armed = states_[axis] == DriveState::operation_enabled;
+    const bool was_armed = before == DriveState::operation_enabled;
+    // A word may have been sent, and not yet read: behind other frames, or in a frame whose end is a silence.
+    const auto settled = [this](const Word& word) {
+      return polls_ - word.poll > 8 && now_us_ - word.time_us > 12'000;
+    };
+    if (armed && !was_armed) {
+      bool shut_down = shut_down_[axis], in_order = false;
+      armed_by_[axis] = {};
+      for (const Word& word : words) {
+        shut_down = shut_down || word.shuts_down;
+        if (!word.enables || !shut_down) continue;
+        in_order = true;
+        armed_by_[axis][word.link] = true;
+      }
+      if (!in_order) complain("armed without the controlwords for it", axis);
+      shut_down_[axis] = shut_down;
+    }
+    if (must_start_anew(states_[axis])) shut_down_[axis] = false;
+    if (armed || must_start_anew(states_[axis])) std::erase_if(words, settled);
+    if (!armed || !was_armed) return;
+    const float timeout = values_.real<"link.timeout">();
+    std::uint64_t life_us = 0;
+    for (std::size_t link = 0; link < 2; ++link) {
+      if (armed_by_[axis][link]) life_us = std::max(life_us, life_us_[link]);
+    }
+    // Half a millisecond for the float that it is compared in.
+    if (timeout > 0.0f && now_us_ > life_us &&
+        static_cast<double>(now_us_ - life_us) > static_cast<double>(timeout) * 1e6 + 500.0)
+      complain("armed for longer than link.timeout without a sign of life", axis);
+  }
+
+  void judge_value(std::size_t slot, std::uint32_t raw) {
+    const auto [entry, axis] = owner_of(slot);
+    const Entry& e = entry_at(entry);
+    if (e.access == Access::read_only) return;
+    const double value = number_from_raw(e.type, raw);
+    const auto rounded = [&e](double bound) {
+      return e.type == Type::float32 ? static_cast<double>(static_cast<float>(bound)) : bound;
+    };
+    if (!(rounded(e.minimum) <= value && value <= rounded(e.maximum))) complain("out of range", axis, e.name);
+    const auto is_value = [value](const NamedValue& one) { return one.value == value; };
+    if (!e.values.empty() && std::ranges::none_of(e.values, is_value)) complain("not a choice", axis, e.name);
+  }
+
+  /// The greater, the less it protects.
+  static double looseness(const Entry& e, double value) {
+    if (e.unbounded_at_zero && value == 0.0) return std::numeric_limits<double>::infinity();
+    if (e.change == Change::only_higher) return -value;
+    return e.change == Change::only_nearer_zero ? std::abs(value) : value;
+  }
+
+  void judge_change(std::size_t slot, std::uint32_t raw, const States& before) {
+    judge_value(slot, raw);
+    const auto [entry, of_axis] = owner_of(slot);
+    const Entry& e = entry_at(entry);
+    if (entry == entry_of<"modbus.unit">()) unit_before_ = static_cast<std::uint8_t>(values_.raw(slot));
+    bool any_armed = false, armed = false;
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      const bool stayed = before[axis] == DriveState::operation_enabled && states_[axis] == before[axis];
+      any_armed = any_armed || stayed;
+      armed = armed || (stayed && (e.scope() == Scope::device || axis == of_axis));
+    }
+    if (e.access != Access::read_write || e.change == Change::any_time) return;
+    if (e.change == Change::disarmed_only) {
+      if (any_armed) complain("changed while armed", of_axis, e.name);
+      return;
+    }
+    if (!armed) return;
+    double loosest = looseness(e, number_from_raw(e.type, values_.raw(slot)));
+    if (!e.ceiling.empty()) {
+      const std::size_t ceiling = slot_of(find_entry(e.ceiling), of_axis);
+      loosest = std::max(loosest, number_from_raw(Type::float32, values_.raw(ceiling)));
+    }
+    if (looseness(e, number_from_raw(e.type, raw)) > loosest)
+      complain("loosened while armed", of_axis, e.name);
+  }
+
+  ParameterValues values_;  ///< of the last poll
+  States states_{};
+  std::array<std::vector<Word>, axis_count> words_;
+  std::array<bool, axis_count> shut_down_{};
+  std::array<std::array<bool, 2>, axis_count> armed_by_{};  ///< links that may have
+  std::array<std::uint64_t, 2> life_us_{};
+  std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0;
+  std::vector<std::uint8_t> frame_;
+  std::uint8_t unit_before_ = 0;
+  std::size_t frames_waiting_ = 0;
+  bool life_waits_ = false;  ///< among the frames that wait
+  bool pdo_since_sync_ = false, pdo_shuts_down_ = false, pdo_enables_ = false;
+  bool sdo_in_blocks_ = false;  ///< anything may have been a block's contents
+  unsigned sdo_index_ = 0;
+  std::uint8_t sdo_subindex_ = 0;
+  std::string complaint_;
+};
+
+}  // namespace kmax::firmware

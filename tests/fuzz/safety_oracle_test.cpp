@@ -1,0 +1,248 @@
+// Each rule of the oracle is broken once, by a device that does not exist, and kept once.
+#include "tests/fuzz/safety_oracle.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/firmware/modbus/rtu_line.hpp"
+
+namespace kmax::firmware::safety_oracle_test {
+namespace {
+
+using testing::Test;
+
+/// What a host sends, and what a device that need not be sound makes of it.
+class SafetyOracleRule : public Test {
+ protected:
+  void serial_controlword(std::uint16_t word, std::uint8_t unit = 1) {
+    const std::uint16_t place = modbus_address(entry_of<"drive.controlword">(), 0);
+    now_us_ += 10'000;
+    for (const std::uint8_t byte :
+         modbus::adu(unit, {6, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place),
+                            static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)})) {
+      now_us_ += 100;
+      oracle_.take_byte(byte, now_us_, 115200);
+    }
+  }
+  void can_controlword(std::uint16_t word) {
+    oracle_.take_frame({.identifier = 0x601,
+                        .length = 8,
+                        .data = {0x2B, 0x40, 0x60, 0, static_cast<std::uint8_t>(word),
+                                 static_cast<std::uint8_t>(word >> 8), 0, 0}});
+  }
+  /// The first axis is in `state` from here on; the other one never does anything.
+  void poll(DriveState state, std::uint64_t later_us = 2'000) {
+    now_us_ += later_us;
+    states_[0] = state;
+    oracle_.take_poll(now_us_, values_, states_);
+  }
+  void poll() { poll(states_[0]); }
+  void arm() {
+    serial_controlword(0x06);
+    poll(DriveState::ready_to_switch_on);
+    serial_controlword(0x0F);
+    poll(DriveState::operation_enabled);
+    ASSERT_EQ(oracle_.complaint(), "");
+  }
+  template <FixedName name>
+  void set(double number) {
+    constexpr std::size_t entry = entry_of<name>();
+    values_.set_raw(slot_of(entry, 0), raw_from_number(entry_at(entry).type, number));
+  }
+  /// The settings of a start are those that were set until here.
+  void start() { oracle_ = SafetyOracle(values_); }
+  void tick(float force, bool enabled = true, bool count_valid = true, Fault condition = Fault::none) {
+    oracle_.take_tick(0, {.count = 0, .count_valid = count_valid, .condition = condition},
+                      {.force = force, .enabled = enabled});
+  }
+  void expect_complaint(const std::string& what) {
+    EXPECT_EQ(oracle_.complaint().substr(0, what.size()), what) << oracle_.complaint();
+  }
+
+  ParameterValues values_;
+  SafetyOracle oracle_{values_};
+  SafetyOracle::States states_ = [] {
+    SafetyOracle::States states;
+    states.fill(DriveState::switch_on_disabled);
+    return states;
+  }();
+  std::uint64_t now_us_ = 1'000'000;
+};
+
+constexpr auto without_words = "armed without the controlwords for it, axis 0";
+
+TEST_F(SafetyOracleRule, ArmedInOrderIsRight) {
+  arm();
+}
+TEST_F(SafetyOracleRule, ArmedInOrderOverCanIsRight) {
+  can_controlword(0x06);
+  poll(DriveState::ready_to_switch_on);
+  can_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, ArmedWithoutAnyWord) {
+  poll(DriveState::operation_enabled);
+  expect_complaint(without_words);
+}
+TEST_F(SafetyOracleRule, ArmedWithoutShutdown) {
+  serial_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  expect_complaint(without_words);
+}
+TEST_F(SafetyOracleRule, ArmedInTheWrongOrder) {
+  can_controlword(0x0F);
+  can_controlword(0x06);
+  poll(DriveState::operation_enabled);
+  expect_complaint(without_words);
+}
+TEST_F(SafetyOracleRule, ArmedByAWordForTheOtherAxis) {
+  serial_controlword(0x06);
+  serial_controlword(0x0F);
+  states_[axis_count - 1] = DriveState::operation_enabled;
+  poll();
+  expect_complaint("armed without the controlwords for it, axis 1");
+}
+TEST_F(SafetyOracleRule, ArmedByABroadcast) {
+  serial_controlword(0x06);
+  poll(DriveState::ready_to_switch_on);
+  serial_controlword(0x0F, 0);
+  poll(DriveState::operation_enabled);
+  expect_complaint(without_words);
+}
+TEST_F(SafetyOracleRule, ArmedAgainWithoutANewShutdown) {
+  arm();
+  poll(DriveState::fault);
+  for (int i = 0; i < 10; ++i) poll();
+  serial_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  expect_complaint(without_words);
+}
+
+TEST_F(SafetyOracleRule, ArmedBeyondTheTimeOut) {
+  arm();
+  poll(DriveState::operation_enabled, 990'000);
+  EXPECT_EQ(oracle_.complaint(), "");
+  poll(DriveState::operation_enabled, 20'000);
+  expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
+}
+TEST_F(SafetyOracleRule, AnotherLinkIsNoSignOfLife) {
+  arm();
+  poll(DriveState::operation_enabled, 990'000);
+  can_controlword(0x0F);
+  poll(DriveState::operation_enabled, 20'000);
+  expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
+}
+TEST_F(SafetyOracleRule, WithoutATimeOutNothingIsLate) {
+  set<"link.timeout">(0);
+  start();
+  arm();
+  poll(DriveState::operation_enabled, 100'000'000);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+
+TEST_F(SafetyOracleRule, ForceWithinItsLimitIsRight) {
+  arm();
+  tick(3.3f);
+  tick(-3.3f);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, ForceBeyondItsLimit) {
+  arm();
+  tick(-3.31f);
+  expect_complaint("force beyond force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, ForceThatIsNotFinite) {
+  arm();
+  tick(std::numeric_limits<float>::quiet_NaN());
+  expect_complaint("force that is not finite, axis 0");
+}
+TEST_F(SafetyOracleRule, DrivenWhileDisarmed) {
+  tick(0.0f);
+  expect_complaint("driven, and not armed, axis 0");
+}
+TEST_F(SafetyOracleRule, ForceWithoutBeingDriven) {
+  tick(0.1f, false);
+  expect_complaint("force without being driven, axis 0");
+}
+TEST_F(SafetyOracleRule, DrivenWithoutAnEncoder) {
+  arm();
+  tick(0.0f, true, false);
+  expect_complaint("driven, and its inputs are not sound, axis 0");
+}
+TEST_F(SafetyOracleRule, DrivenWithAFaultOfTheBoard) {
+  arm();
+  tick(0.0f, true, true, Fault::over_current);
+  expect_complaint("driven, and its inputs are not sound, axis 0");
+}
+
+TEST_F(SafetyOracleRule, OutOfRangeIsStored) {
+  set<"force.limit">(1000.5);
+  poll();
+  expect_complaint("out of range: force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, OutOfRangeAtAStart) {
+  set<"force.limit">(-1);
+  start();
+  expect_complaint("out of range: force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, NotANumberIsStored) {
+  values_.set_real<"wall.stiffness">(std::numeric_limits<float>::quiet_NaN());
+  poll();
+  expect_complaint("out of range: wall.stiffness, axis 0");
+}
+TEST_F(SafetyOracleRule, NoChoiceIsStored) {
+  set<"can.bit_rate">(999'999);
+  poll();
+  expect_complaint("not a choice: can.bit_rate, axis 0");
+}
+
+TEST_F(SafetyOracleRule, TightenedWhileArmedIsRight) {
+  arm();
+  set<"force.limit">(1);
+  poll();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, LoosenedWhileArmed) {
+  arm();
+  set<"force.limit">(3.4);
+  poll();
+  expect_complaint("loosened while armed: force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, LoosenedWhileArmedBySwitchingALimitOff) {
+  arm();
+  set<"velocity.limit">(0);
+  poll();
+  expect_complaint("loosened while armed: velocity.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, LoosenedWhileArmedByWhatIsOnlyToRise) {
+  arm();
+  set<"force.ramp_time">(0);
+  poll();
+  expect_complaint("loosened while armed: force.ramp_time, axis 0");
+}
+TEST_F(SafetyOracleRule, LoosenedAsFarAsACeiling) {
+  set<"force.ceiling">(5);
+  start();
+  arm();
+  set<"force.limit">(5);
+  poll();
+  EXPECT_EQ(oracle_.complaint(), "");
+  set<"force.limit">(5.1);
+  poll();
+  expect_complaint("loosened while armed: force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, ChangedWhileArmed) {
+  arm();
+  set<"link.timeout">(2);
+  poll();
+  expect_complaint("changed while armed: link.timeout, axis 0");
+}
+TEST_F(SafetyOracleRule, ChangedWhileDisarmedIsRight) {
+  set<"link.timeout">(2);
+  set<"force.limit">(5);
+  poll();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+
+}  // namespace
+}  // namespace kmax::firmware::safety_oracle_test
