@@ -15,6 +15,7 @@
 #include "board/odrive_v3/serial_line.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "board/stm32f405/crash_record.hpp"
+#include "board/stm32f405/memory_rights.hpp"
 #include "board/stm32f405/unique_id.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
@@ -161,6 +162,7 @@ void poll_power(std::uint32_t now_us) {
 }
 
 [[noreturn]] void run() {
+  cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
   application.emplace(identity(clocks), capture_memory);

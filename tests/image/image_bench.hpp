@@ -36,8 +36,8 @@ inline virtual_board::BoardTime ticks(double count) {
 }
 
 /// The variant of the board for 24 V.
-inline std::unique_ptr<virtual_board::VirtualBoard> board_for_24_v(virtual_board::BoardWorld* world) {
-  virtual_board::VirtualBoardConfig config;
+inline std::unique_ptr<virtual_board::VirtualBoard> board_for_24_v(
+    virtual_board::BoardWorld* world, virtual_board::VirtualBoardConfig config = {}) {
   config.identity.volts = 24;
   return std::make_unique<virtual_board::VirtualBoard>(image(), world, config);
 }
@@ -49,9 +49,10 @@ class ImageBench {
 
   /// `push`: N, how hard the persons press; 0: as the scene says.
   explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
-                      const std::string& scene_name = "motor_axes")
+                      const std::string& scene_name = "motor_axes",
+                      const virtual_board::VirtualBoardConfig& config = {})
       : scene(with(simulated_board::open_scene(scene_name), parameters, push)), world(scene) {
-    board = board_for_24_v(&world);
+    board = board_for_24_v(&world, config);
     virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
     master = std::make_unique<virtual_board::BoardLink>(*board);
   }

@@ -98,10 +98,35 @@ void MemoryProtection::reset(BoardTime /*now*/) {
   regions_ = {};
   ctrl_ = 0;
   selected_ = 0;
+  ++version_;
 }
 
 bool MemoryProtection::enabled() const {
   return mpu_ctrl::Enable::of(ctrl_) != 0;
+}
+
+bool MemoryProtection::in_fault_handlers() const {
+  return mpu_ctrl::InFaultHandlers::of(ctrl_) != 0;
+}
+
+bool MemoryProtection::allows(std::uint32_t address, Use use) const {
+  if (address >= 0xE000'0000 && address < 0xE010'0000) return use != Use::fetch;
+  for (unsigned number = mpu_region_count; number-- > 0;) {
+    const auto [base, attributes] = regions_[number];
+    if (mpu_rasr::Enable::of(attributes) == 0) continue;
+    const std::uint32_t last_bit = mpu_rasr::Size::of(attributes);
+    const std::uint32_t offset = address - base;
+    if (std::uint64_t{offset} >> (last_bit + 1) != 0) continue;
+    const std::uint32_t eighth = offset >> (last_bit - 2);
+    if ((mpu_rasr::SubregionDisable::of(attributes) >> eighth & 1U) != 0) continue;
+    const std::uint32_t permission = mpu_rasr::Permission::of(attributes);
+    if (permission == 0) return false;
+    if (use == Use::store) return permission <= 3;
+    return use == Use::load || mpu_rasr::ExecuteNever::of(attributes) == 0;
+  }
+  if (mpu_ctrl::PrivilegedDefault::of(ctrl_) == 0) return false;
+  const bool peripherals = address >= 0x4000'0000 && address < 0x6000'0000;
+  return use != Use::fetch || (!peripherals && address < 0xA000'0000);
 }
 
 const RegisterTable<MemoryProtection>& MemoryProtection::registers() {
@@ -138,6 +163,7 @@ const RegisterTable<MemoryProtection>& MemoryProtection::registers() {
 void MemoryProtection::write_control(const Access& access, std::uint32_t value) {
   refuse_if(mpu_ctrl::Enable::of(value) == 0 && mpu_ctrl::InFaultHandlers::of(value) != 0, access,
             "HFNMIENA without ENABLE is unpredictable");
+  if (mpu_ctrl::Enable::of(value) != 0) refuse_fine_borders(access);
   ctrl_ = value;
 }
 
@@ -164,8 +190,28 @@ void MemoryProtection::write_attributes(const Access& access, std::uint32_t valu
     const std::uint32_t address = regions_[selected_].address;
     refuse_if((address & below) != 0, access, "region {} at 0x{:08X} is not aligned to its size", selected_,
               address);
+    constexpr std::uint32_t reserved = 4;
+    refuse_if(mpu_rasr::Permission::of(value) == reserved, access, "AP = {} is reserved", reserved);
+    constexpr std::uint32_t smallest_with_eighths = 7;  // 256 bytes
+    refuse_if(mpu_rasr::SubregionDisable::of(value) != 0 && size_code < smallest_with_eighths, access,
+              "sub-regions of a region of 2^{} bytes", size_code + 1);
   }
   regions_[selected_].attributes = value;
+  if (enabled()) refuse_fine_borders(access);
+}
+
+void MemoryProtection::refuse_fine_borders(const Access& access) const {
+  for (const Region& region : regions_) {
+    if (mpu_rasr::Enable::of(region.attributes) == 0) continue;
+    constexpr std::uint32_t page = 9, page_in_eighths = 12;
+    const std::uint32_t coarse =
+        mpu_rasr::SubregionDisable::of(region.attributes) != 0 ? page_in_eighths : page;
+    const bool memory = memory_map::flash.contains(region.address) ||
+                        memory_map::sram.contains(region.address) || memory_map::ccm.contains(region.address);
+    refuse_if(memory && mpu_rasr::Size::of(region.attributes) < coarse, access,
+              "region at 0x{:08X}: borders in memory are modelled at multiples of 1 KiB only",
+              region.address);
+  }
 }
 
 }  // namespace kmax::virtual_board

@@ -94,10 +94,11 @@ class FloatingPointControl final : public RegisterBlock<FloatingPointControl> {
   bool lazy_active_ = false;
 };
 
-/// Memory protection unit, PM0214: eight regions, kept and checked for being well-formed. Enabling it is
-/// accepted, but NOTHING IS PROTECTED: an access that a region forbids goes through. What the memory map
-/// itself forbids (no code from CCM, no store to flash, nothing where there is nothing) holds with and
-/// without it.
+/// Memory protection unit, PM0214: eight regions with sub-regions, for privileged code. The processor
+/// enforces what allows() says. Refused: the reserved permission, sub-regions of less than 32 bytes, and,
+/// once it is enabled, borders inside flash, SRAM or CCM that are no multiples of 1 KiB, the emulator's page.
+/// What the memory map itself forbids (no code from CCM, no store to flash, nothing where there is nothing)
+/// holds with and without it.
 class MemoryProtection final : public RegisterBlock<MemoryProtection> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::cortex_m::MpuRegisters);
@@ -111,7 +112,16 @@ class MemoryProtection final : public RegisterBlock<MemoryProtection> {
   void reset(BoardTime now) override;
 
   bool enabled() const;
+  /// HFNMIENA: also in handlers of HardFault and NMI.
+  bool in_fault_handlers() const;
   const Region& region(unsigned number) const { return regions_[number]; }
+
+  enum class Use : std::uint8_t { load, store, fetch };
+  /// What the regions, and the default map where it shows through, permit; whether enabled or not. The core's
+  /// own peripherals are always open.
+  bool allows(std::uint32_t address, Use use) const;
+  /// Another number after each change; never 0.
+  std::uint32_t version() const { return version_; }
 
  private:
   static const RegisterTable<MemoryProtection>& registers();
@@ -121,10 +131,13 @@ class MemoryProtection final : public RegisterBlock<MemoryProtection> {
   void write_address(const Access& access, std::uint32_t value);
   std::uint32_t read_attributes() const { return regions_[selected_].attributes; }
   void write_attributes(const Access& access, std::uint32_t value);
+  void refuse_fine_borders(const Access& access) const;
+  void after_write() override { ++version_; }
 
   std::array<Region, drivers::cortex_m::mpu_region_count> regions_{};
   std::uint32_t ctrl_ = 0;
   std::uint32_t selected_ = 0;
+  std::uint32_t version_ = 1;
 };
 
 /// What the Cortex-M4 keeps at 0xE000E000: all blocks of the system control space, on the bus. PM0214, core

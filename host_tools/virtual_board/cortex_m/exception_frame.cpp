@@ -10,6 +10,8 @@
 namespace kmax::virtual_board {
 namespace {
 
+namespace scb_cfsr = drivers::cortex_m::scb_cfsr;
+
 constexpr std::uint32_t basic_words = 8;
 constexpr std::uint32_t extended_words = 26;
 
@@ -46,7 +48,8 @@ constexpr auto floating_point = identifiers(floating_point_registers);
 
 }  // namespace
 
-std::optional<ExceptionFrame> ExceptionStack::push(unsigned exception, std::uint32_t return_address) {
+std::optional<ExceptionFrame> ExceptionStack::push(unsigned exception, std::uint32_t return_address,
+                                                   const MemoryProtection* protection) {
   std::array<std::uint64_t, saved.size()> values{};
   engine_.get(saved, values);
   const auto xpsr = static_cast<std::uint32_t>(values[6]);
@@ -59,11 +62,22 @@ std::optional<ExceptionFrame> ExceptionStack::push(unsigned exception, std::uint
   const bool extended = (control & control_fp_active) != 0;
   const std::uint32_t size = 4 * (extended ? extended_words : basic_words);
   const std::uint32_t frame = (sp - size) & ~7U;
+  const bool nested = (xpsr & xpsr_exception) != 0;
+  std::uint32_t kind = nested                                   ? ExceptionReturn::handler
+                       : (control & control_process_stack) != 0 ? ExceptionReturn::thread_process_stack
+                                                                : ExceptionReturn::thread_main_stack;
+  if (extended) kind &= ~ExceptionReturn::basic_frame;
   const auto bytes = bus_.memory(frame, size);
-  if (bytes.empty() || memory_map::flash.contains(frame)) {
+  const bool outside = bytes.empty() || memory_map::flash.contains(frame);
+  constexpr auto store = MemoryProtection::Use::store;
+  const bool forbidden = protection != nullptr &&
+                         !(protection->allows(frame, store) && protection->allows(frame + size - 4, store));
+  if (outside || forbidden) {
     problem_ =
-        fmt::format("exception {}: its frame of {} bytes below the stack pointer 0x{:08X} lies outside RAM",
-                    exception, size, sp);
+        fmt::format("exception {}: its frame of {} bytes below the stack pointer 0x{:08X} lies {}", exception,
+                    size, sp, outside ? "outside RAM" : "where the memory protection forbids stores");
+    fault_ = {forbidden ? scb_cfsr::MemoryFaultStacking::mask : scb_cfsr::BusFaultStacking::mask, {kind}};
+    engine_.set(UC_ARM_REG_SP, frame);
     return std::nullopt;
   }
 
@@ -79,11 +93,6 @@ std::optional<ExceptionFrame> ExceptionStack::push(unsigned exception, std::uint
   }
   std::memcpy(bytes.data(), words.data(), size);
 
-  const bool nested = (xpsr & xpsr_exception) != 0;
-  std::uint32_t kind = nested                                   ? ExceptionReturn::handler
-                       : (control & control_process_stack) != 0 ? ExceptionReturn::thread_process_stack
-                                                                : ExceptionReturn::thread_main_stack;
-  if (extended) kind &= ~ExceptionReturn::basic_frame;
   engine_.set(UC_ARM_REG_SP, frame);
   enter_handler(exception, {kind});
   return ExceptionFrame{{kind}, extended ? frame + 4 * basic_words : 0};

@@ -6,6 +6,7 @@
 
 #include "host_tools/virtual_board/bus.hpp"
 #include "host_tools/virtual_board/cortex_m/core_engine.hpp"
+#include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 
 // What exception entry and return do to registers and stack: PM0214, exception entry and return; ARMv7-M
 // architecture reference manual, B1.5.6 to B1.5.8.
@@ -42,8 +43,18 @@ class ExceptionStack {
   ExceptionStack(CoreEngine& engine, Bus& bus) : engine_(engine), bus_(bus) {}
 
   /// Saves the interrupted code, which would go on at `return_address`, and puts the core into the handler's
-  /// mode. None, and nothing changed, when the frame would not lie in memory: problem() says why.
-  std::optional<ExceptionFrame> push(unsigned exception, std::uint32_t return_address);
+  /// mode. None when the frame would not lie in memory, or where `protection` forbids it (null: it is off):
+  /// problem() says why, the stack pointer is where the frame should have been, fault() says what the chip
+  /// makes of it.
+  std::optional<ExceptionFrame> push(unsigned exception, std::uint32_t return_address,
+                                     const MemoryProtection* protection);
+
+  /// The bit of CFSR for a frame that could not be saved; 0: not a fault of the chip but of this model.
+  struct StackingFault {
+    std::uint32_t status = 0;
+    ExceptionReturn exception_return{};
+  };
+  const StackingFault& fault() const { return fault_; }
 
   /// Switches from one handler to the next without touching the frame (tail-chaining).
   void chain(unsigned exception, ExceptionReturn exception_return);
@@ -59,6 +70,7 @@ class ExceptionStack {
   CoreEngine& engine_;
   Bus& bus_;
   std::string problem_;
+  StackingFault fault_;
 };
 
 }  // namespace kmax::virtual_board

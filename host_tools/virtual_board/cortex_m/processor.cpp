@@ -42,6 +42,9 @@ float Processor::fp_register(unsigned number) const {
 
 void Processor::set_core_register(unsigned number, std::uint32_t value) {
   engine_.set(core_registers.at(number), value);
+  if (core_registers.at(number) != UC_ARM_REG_PC) return;
+  pc_ = value & ~1U;
+  sleeping_ = false;
 }
 
 ExceptionMasks Processor::masks() const {
@@ -126,6 +129,7 @@ void Processor::sleep_until(BoardTime time) {
 
 void Processor::execute() {
   started_ = true;
+  if (protection_in_force() != applied_protection_) apply_protection();
   event_ = Event::none;
   attention_ = true;
   const uc_err error = uc_emu_start(engine_.handle(), pc_ | 1U, 0, 0, 0);
@@ -135,8 +139,11 @@ void Processor::execute() {
 
 void Processor::after_execution(int error) {
   if (bad_access_pending_) {
+    const bool precise = bad_access_.precise;
+    if (precise) pc_ = bad_access_.pc;
     report_bad_access();
     breakpoint_ = -1;  // not reached on a chip that faults before it
+    if (precise) return;
   }
   if (faulted_) return;
   switch (event_) {
@@ -193,6 +200,7 @@ void Processor::note_bad_fetch() {
                  .bytes = 2,
                  .fetch = true,
                  .precise = true,
+                 .forbidden = forbidden(pc_, MemoryProtection::Use::fetch),
                  .pc = pc_,
                  .why = "no code can be there (a call through a null pointer?)"};
 }
@@ -234,6 +242,10 @@ void Processor::report_bad_access() {
   if (bad.fetch) {
     status = scb_cfsr::FetchViolation::mask;
     exception = exception_number::memory_fault;
+  } else if (bad.forbidden) {
+    status = scb_cfsr::DataViolation::mask | scb_cfsr::MemoryFaultAddressValid::mask;
+    exception = exception_number::memory_fault;
+    core_.system_control.set_memory_fault_address(bad.address);
   } else if (bad.precise) {
     status = scb_cfsr::PreciseBusFault::mask | scb_cfsr::BusFaultAddressValid::mask;
     core_.system_control.set_bus_fault_address(bad.address);
@@ -247,9 +259,23 @@ void Processor::report_bad_access() {
 void Processor::enter(unsigned exception, bool tail_chained) {
   ExceptionStack stack(engine_, bus_);
   if (!tail_chained) {
-    const auto frame = stack.push(exception, pc_);
-    if (!frame) return fail(fmt::format("{} (at {})", stack.problem(), place(pc_)));
+    const auto frame =
+        stack.push(exception, pc_, protection_in_force() != 0 ? &core_.memory_protection : nullptr);
     charge(entry_cycles);
+    if (!frame) {
+      // Without a frame the core still enters a handler: the fault's, which as a rule is the HardFault, or
+      // the one that it was about to enter when that is more urgent.
+      const auto [status, exception_return] = stack.fault();
+      const unsigned fault = status == drivers::cortex_m::scb_cfsr::MemoryFaultStacking::mask
+                                 ? exception_number::memory_fault
+                                 : exception_number::bus_fault;
+      if (status == 0 || !config_.faults_to_firmware ||
+          !core_.system_control.raise_fault(fault, status, core_.exceptions.execution_level(masks())))
+        return fail(fmt::format("{} (at {})", stack.problem(), place(pc_)));
+      exception = core_.exceptions.candidate();
+      stack.chain(exception, exception_return);
+      return enter(exception, true);
+    }
     if (frame->floating_point_address != 0) {
       if (core_.floating_point.lazy()) {
         core_.floating_point.begin_lazy_frame(frame->floating_point_address);

@@ -31,8 +31,13 @@
 // the peripheral buses. Exceptions cost 12 cycles in, 12 out, 6 from one to the next, 17 more where FP
 // registers reach or leave the stack (with lazy preservation only when the handler uses the FPU).
 //
-// Not modelled: unprivileged code, WFE's event register (WFE does not wait), debugging, MPU violations (see
-// core_peripherals.hpp), semihosting, bit-band aliases.
+// Memory protection holds from the block after the one that switches it on. It costs nothing in memory, where
+// the emulator's own page rights are set, and a look at the regions for each register access. A violation is
+// precise; the rest of the block of a forbidden register access still runs, but its PC is that access'.
+// Frames that are restored are not checked, nor does FAULTMASK switch the unit off.
+//
+// Not modelled: unprivileged code, WFE's event register (WFE does not wait), debugging, semihosting, bit-band
+// aliases.
 
 namespace kmax::virtual_board {
 
@@ -48,8 +53,9 @@ struct ProcessorConfig {
   /// 0: an instruction takes its modelled cycles. Otherwise every instruction takes exactly this, and
   /// exceptions take nothing: comparable with an emulator that counts instructions.
   BoardTime units_per_instruction = 0;
-  /// Accesses that the bus refuses become BusFault or HardFault, as on the chip, instead of RunEnd::fault.
-  /// FP instructions with the FPU off, broken exception frames and an SVC that cannot be taken always stop.
+  /// What the bus or the memory protection refuses becomes MemManage, BusFault or HardFault, as on the chip,
+  /// instead of RunEnd::fault: accesses, and frames that find no room. FP instructions with the FPU off,
+  /// exception returns that do not fit and an SVC that cannot be taken always stop.
   bool faults_to_firmware = false;
 };
 
@@ -109,7 +115,7 @@ class Processor {
   int breakpoint() const { return breakpoint_; }
   /// Address of the next instruction.
   std::uint32_t program_counter() const { return pc_; }
-  /// r0 to r12, sp, lr (0 to 14), for tools and tests.
+  /// r0 to r12, sp, lr (0 to 14), for tools and tests. pc (15) can be set, which also ends a WFI.
   std::uint32_t core_register(unsigned number) const;
   /// s0 to s31.
   float fp_register(unsigned number) const;
@@ -132,7 +138,8 @@ class Processor {
     std::uint32_t value = 0;
     bool store = false;
     bool fetch = false;
-    bool precise = false;  ///< the instruction did not complete
+    bool precise = false;    ///< the instruction did not complete
+    bool forbidden = false;  ///< by the memory protection
     std::uint32_t pc = 0;
     std::string why;
   };
@@ -147,6 +154,11 @@ class Processor {
   void begin_access(std::uint32_t address, unsigned bytes, bool store);
   void end_access();
   bool ignores_accesses() const;
+  std::uint32_t protection_in_force() const;
+  void apply_protection();
+  bool forbidden(std::uint32_t address, MemoryProtection::Use use) const {
+    return applied_protection_ != 0 && !core_.memory_protection.allows(address, use);
+  }
   void refuse_access(std::uint32_t address, unsigned bytes, std::uint32_t value, bool store, std::string why);
   void interrupted(std::uint32_t number);
   bool invalid_memory(int type, std::uint32_t address, unsigned bytes, std::uint32_t value);
@@ -197,7 +209,8 @@ class Processor {
   bool started_ = false;
   std::atomic<bool> stop_requested_{false};
   int breakpoint_ = -1;
-  std::uint32_t access_pc_ = 0;  ///< instruction of the latest register access
+  std::uint32_t applied_protection_ = 0;  ///< version of it that the engine's pages follow; 0: none
+  std::uint32_t access_pc_ = 0;           ///< instruction of the latest register access
   BadAccess bad_access_;
   bool bad_access_pending_ = false;
   std::string fault_;

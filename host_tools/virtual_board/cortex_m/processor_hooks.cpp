@@ -23,6 +23,7 @@ constexpr std::uint32_t breakpoint_trap = 7;
 constexpr std::uint32_t exception_return_trap = 8;
 
 constexpr std::uint64_t lazy_frame_cycles = 17;
+constexpr const char* forbidden_words = "the memory protection forbids it";
 
 }  // namespace
 
@@ -75,6 +76,43 @@ void Processor::map_memory() {
   ProcessorHooks::map_registers<register_areas[2]>(engine, this);
   ProcessorHooks::map_registers<register_areas[3]>(engine, this);
   static_assert(register_areas.size() == 4);
+}
+
+std::uint32_t Processor::protection_in_force() const {
+  const MemoryProtection& unit = core_.memory_protection;
+  const bool in_fault_handler = core_.exceptions.active(exception_number::hard_fault) ||
+                                core_.exceptions.active(exception_number::non_maskable);
+  return unit.enabled() && (unit.in_fault_handlers() || !in_fault_handler) ? unit.version() : 0;
+}
+
+/// Gives each page of memory the rights that the memory map and the protection both grant. Registers and the
+/// parameter sectors are asked for at each access.
+void Processor::apply_protection() {
+  applied_protection_ = protection_in_force();
+  using namespace memory_map;
+  constexpr std::uint32_t page = 1024, behind_parameters = parameters.base + parameters.size;
+  constexpr std::array<std::pair<AddressRange, std::uint32_t>, 4> memories{
+      {{{flash.base, parameters.base - flash.base}, UC_PROT_READ | UC_PROT_EXEC},
+       {{behind_parameters, flash.base + flash.size - behind_parameters}, UC_PROT_READ | UC_PROT_EXEC},
+       {sram, UC_PROT_ALL},
+       {ccm, UC_PROT_READ | UC_PROT_WRITE}}};
+  const auto granted = [this](std::uint32_t address, std::uint32_t rights) {
+    using enum MemoryProtection::Use;
+    if (forbidden(address, load)) rights &= ~std::uint32_t{UC_PROT_READ};
+    if (forbidden(address, store)) rights &= ~std::uint32_t{UC_PROT_WRITE};
+    if (forbidden(address, fetch)) rights &= ~std::uint32_t{UC_PROT_EXEC};
+    return rights;
+  };
+  for (const auto& [range, rights] : memories) {
+    std::uint32_t begin = 0;
+    for (std::uint32_t end = page; end <= range.size; end += page) {
+      const std::uint32_t now = granted(range.base + begin, rights);
+      if (end != range.size && granted(range.base + end, rights) == now) continue;
+      CoreEngine::check(uc_mem_protect(engine_.handle(), range.base + begin, end - begin, now),
+                        "protecting memory");
+      begin = end;
+    }
+  }
 }
 
 void Processor::add_hooks() {
@@ -141,7 +179,9 @@ bool Processor::must_stop() {
   if (attention_) {
     attention_ = false;
     if (schedule_.next_event) limit_ = std::min(run_limit_, schedule_.next_event());
-    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested()) return true;
+    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested() ||
+        protection_in_force() != applied_protection_)
+      return true;
   }
   if (stop_requested_.load(std::memory_order_relaxed) || now_ >= limit_) return true;
   return core_.exceptions.preempting() && core_.exceptions.deliverable(masks());
@@ -175,10 +215,14 @@ void Processor::end_access() {
 void Processor::refuse_access(std::uint32_t address, unsigned bytes, std::uint32_t value, bool store,
                               std::string why) {
   if (bad_access_pending_) return;  // the first one counts
+  using Use = MemoryProtection::Use;
+  const bool is_forbidden = forbidden(address, store ? Use::store : Use::load);
   bad_access_ = {.address = address,
                  .bytes = bytes,
                  .value = value,
                  .store = store,
+                 .precise = is_forbidden,
+                 .forbidden = is_forbidden,
                  .pc = access_pc_,
                  .why = std::move(why)};
   bad_access_pending_ = true;
@@ -186,7 +230,7 @@ void Processor::refuse_access(std::uint32_t address, unsigned bytes, std::uint32
 
 /// After a refused access the rest of the block still runs, but reaches no register any more.
 bool Processor::ignores_accesses() const {
-  return bad_access_pending_ && !config_.faults_to_firmware;
+  return bad_access_pending_ && (bad_access_.precise || !config_.faults_to_firmware);
 }
 
 std::uint32_t Processor::read_register(std::uint32_t address, unsigned bytes) {
@@ -194,6 +238,7 @@ std::uint32_t Processor::read_register(std::uint32_t address, unsigned bytes) {
   std::uint32_t value = 0;
   try {
     begin_access(address, bytes, false);
+    if (forbidden(address, MemoryProtection::Use::load)) throw RefusedAccess(forbidden_words);
     value = bus_.read(address, bytes, now());
   } catch (const std::exception& error) {
     refuse_access(address, bytes, 0, false, error.what());
@@ -206,6 +251,7 @@ void Processor::write_register(std::uint32_t address, unsigned bytes, std::uint3
   if (ignores_accesses()) return;
   try {
     begin_access(address, bytes, true);
+    if (forbidden(address, MemoryProtection::Use::store)) throw RefusedAccess(forbidden_words);
     bus_.write(address, bytes, value, now());
   } catch (const std::exception& error) {
     refuse_access(address, bytes, value, true, error.what());
@@ -239,6 +285,7 @@ void Processor::interrupted(std::uint32_t number) {
 }
 
 bool Processor::invalid_memory(int type, std::uint32_t address, unsigned bytes, std::uint32_t value) {
+  if (bad_access_pending_ && bad_access_.precise) return false;  // on the chip this would not have run
   const bool store = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
   const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
   std::uint32_t pc = address;
@@ -261,7 +308,10 @@ bool Processor::invalid_memory(int type, std::uint32_t address, unsigned bytes, 
   if (store && memory_map::flash.contains(address)) {
     why = "flash is programmed through its controller, and only in the parameter sectors";
   }
-  bad_access_ = {address, bytes, value, store, fetch, true, pc, std::move(why)};
+  using Use = MemoryProtection::Use;
+  const bool is_forbidden = forbidden(address, fetch ? Use::fetch : store ? Use::store : Use::load);
+  if (is_forbidden) why = forbidden_words;
+  bad_access_ = {address, bytes, value, store, fetch, true, is_forbidden, pc, std::move(why)};
   event_ = Event::bad_access;
   return false;
 }

@@ -48,6 +48,7 @@ class SystemControl final : public RegisterBlock<SystemControl> {
   /// was running already, the core locks up.
   [[nodiscard]] bool raise_fault(unsigned exception, std::uint32_t status_bits, int execution_level);
   void set_bus_fault_address(std::uint32_t address) { bfar_ = address; }
+  void set_memory_fault_address(std::uint32_t address) { mmfar_ = address; }
 
  private:
   static const RegisterTable<SystemControl>& registers();

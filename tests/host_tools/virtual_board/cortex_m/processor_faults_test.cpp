@@ -235,5 +235,166 @@ TEST(ProcessorFault, LocksUpOnAFaultInTheHardFaultHandler_Lockup) {
   expect_fault(board, {"lock-up", "0x20020004"});
 }
 
+/// A core whose unit lets privileged code do all but what the regions say.
+struct Guarded : ProgramOnCore {
+  Guarded(const Program& program, const std::vector<MemoryProtection::Region>& regions,
+          ProcessorConfig config = as_on_the_chip)
+      : ProgramOnCore(program, config) {
+    handler(exception_number::hard_fault, {0xBE09});
+    using namespace drivers::cortex_m;
+    for (std::uint32_t number = 0; number < regions.size(); ++number) {
+      unit(offsetof(MpuRegisters, rnr), number);
+      unit(offsetof(MpuRegisters, rbar), regions[number].address);
+      unit(offsetof(MpuRegisters, rasr), regions[number].attributes | mpu_rasr::Enable::mask);
+    }
+    unit(offsetof(MpuRegisters, ctrl), mpu_ctrl::Enable::mask | mpu_ctrl::PrivilegedDefault::mask);
+  }
+  void unit(std::size_t offset, std::uint32_t value) {
+    core.memory_protection.write({static_cast<std::uint32_t>(offset), 4, 0}, value);
+  }
+  /// Ends in the HardFault handler, with this in CFSR, at `pc` by the frame.
+  void expect_violation(std::uint32_t status, std::uint32_t address, std::uint32_t pc) {
+    ASSERT_EQ(run(), RunEnd::stopped) << processor.fault();
+    EXPECT_EQ(processor.breakpoint(), 9);
+    EXPECT_EQ(scb(*this, offsetof(drivers::cortex_m::ScbRegisters, cfsr)), status);
+    if (address != 0) {
+      EXPECT_EQ(scb(*this, offsetof(drivers::cortex_m::ScbRegisters, mmfar)), address);
+    }
+    EXPECT_EQ(bus.load(get(13) + 24), pc);
+  }
+};
+
+constexpr std::uint32_t of_size(unsigned log2, std::uint32_t permission, bool code = true) {
+  using namespace drivers::cortex_m;
+  return mpu_rasr::Size::bits(log2 - 1) | mpu_rasr::Permission::bits(permission) |
+         (code ? 0U : mpu_rasr::ExecuteNever::mask);
+}
+constexpr std::uint32_t data_violation = drivers::cortex_m::scb_cfsr::DataViolation::mask |
+                                         drivers::cortex_m::scb_cfsr::MemoryFaultAddressValid::mask;
+
+TEST(MemoryProtectionInForce, ForbidsLoadsAndStoresInMemory_DaccViol) {
+  constexpr std::uint32_t page = 0x2000'4000;
+  Guarded loading(load, {{page, of_size(10, 0)}});
+  loading.set(0, page).set(2, 0);
+  loading.expect_violation(data_violation, page + 4, ProgramOnCore::program_base + 2);
+  EXPECT_EQ(loading.get(2), 0U);
+
+  Guarded storing(store, {{page, of_size(10, 5)}});
+  storing.set(0, page).set(1, 0xABCD).set(2, 0);
+  const auto before = storing.bus.load(page + 4);
+  storing.expect_violation(data_violation, page + 4, ProgramOnCore::program_base + 2);
+  EXPECT_EQ(storing.bus.load(page + 4), before);
+
+  Guarded reading(load, {{page, of_size(10, 5)}});
+  reading.set(0, page);
+  ASSERT_EQ(reading.run(), RunEnd::stopped);
+  EXPECT_EQ(reading.processor.breakpoint(), 1) << "read-only may be read";
+  Guarded beside(store, {{page, of_size(10, 0)}});
+  beside.set(0, page - 8).set(1, 0xABCD);
+  ASSERT_EQ(beside.run(), RunEnd::stopped);
+  EXPECT_EQ(beside.processor.breakpoint(), 1) << "the word in front of the region";
+  EXPECT_EQ(beside.bus.load(page - 4), 0xABCDU);
+}
+
+TEST(MemoryProtectionInForce, ForbidsRegistersAndLetsNothingOfTheBlockReachThem_DaccViol) {
+  Guarded board({0xBF00,   // nop
+                 0x6041,   // str r1, [r0, #4]
+                 0x6081,   // str r1, [r0, #8]
+                 0xBE01},  // bkpt 1
+                {{ProgramOnCore::block_base, of_size(10, 5)}});
+  board.set(0, ProgramOnCore::block_base).set(1, 7);
+  board.expect_violation(data_violation, ProgramOnCore::block_base + 4, ProgramOnCore::program_base + 2);
+  EXPECT_TRUE(board.block.records.empty());
+}
+
+TEST(MemoryProtectionInForce, ForbidsWhereThereIsNothing_DaccViol) {
+  Guarded board(load, {{0, of_size(27, 0)}});
+  board.set(0, 0);
+  board.expect_violation(data_violation, 4, ProgramOnCore::program_base + 2);
+}
+
+TEST(MemoryProtectionInForce, ForbidsCodeAlsoWhereItHasRunBefore_IaccViol) {
+  constexpr std::uint32_t code = 0x2000'4000;
+  Guarded board({0x4780,          // blx r0
+                 0x6011,          // str r1, [r2]: switches the unit on
+                 0xF3BF, 0x8F6F,  // isb
+                 0x4780,          // blx r0
+                 0xBE01},
+                {{code, of_size(10, 3, false)}});
+  using namespace drivers::cortex_m;
+  board.unit(offsetof(MpuRegisters, ctrl), 0);
+  board.place(code, {0x3301, 0x4770});  // adds r3, #1; bx lr
+  board.set(0, code | 1).set(2, mpu_base + 4).set(3, 0);
+  board.set(1, mpu_ctrl::Enable::mask | mpu_ctrl::PrivilegedDefault::mask);
+  board.expect_violation(scb_cfsr::FetchViolation::mask, 0, code);
+  EXPECT_EQ(board.get(3), 1U) << "the first call, before the unit was on";
+}
+
+TEST(MemoryProtectionInForce, TheLaterRegionHoldsAndEighthsCanBeLeftOut_Srd) {
+  constexpr std::uint32_t base = 0x2000'8000;
+  using namespace drivers::cortex_m;
+  const std::vector<MemoryProtection::Region> regions{
+      {base, of_size(13, 0)}, {base, of_size(13, 3) | mpu_rasr::SubregionDisable::bits(0b1111'1101)}};
+  Guarded second(load, regions);
+  second.set(0, base + 0x400);
+  ASSERT_EQ(second.run(), RunEnd::stopped);
+  EXPECT_EQ(second.processor.breakpoint(), 1);
+  Guarded first(load, regions);
+  first.set(0, base);
+  first.expect_violation(data_violation, base + 4, ProgramOnCore::program_base + 2);
+}
+
+TEST(MemoryProtectionInForce, EntersTheFaultHandlerWithoutAFrame_MstkErr) {
+  constexpr std::uint32_t page = 0x2000'4000;
+  Guarded board({0xBF30, 0xBE01}, {{page, of_size(10, 0)}});
+  board.core.exceptions.set_enabled(tim2, true);
+  board.handler(tim2, {0xBE07});
+  board.set(13, page + 0x410);
+  board.core.exceptions.pend(tim2);
+  ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  EXPECT_EQ(board.processor.breakpoint(), 9);
+  EXPECT_EQ(scb(board, offsetof(drivers::cortex_m::ScbRegisters, cfsr)),
+            drivers::cortex_m::scb_cfsr::MemoryFaultStacking::mask);
+  EXPECT_EQ(board.get(13), page + 0x3F0);
+  EXPECT_TRUE(board.core.exceptions.pending(tim2));
+}
+
+TEST(MemoryProtectionInForce, IsOffInTheFaultHandlerAndAfterAReset_Hfnmiena) {
+  constexpr std::uint32_t page = 0x2000'4000;
+  using namespace drivers::cortex_m;
+  for (const bool in_fault_handlers : {false, true}) {
+    Guarded board(load, {{page, of_size(10, 0)}});
+    board.handler(exception_number::hard_fault, {0x6841, 0xBE09});  // ldr r1, [r0, #4]
+    if (in_fault_handlers) {
+      board.unit(offsetof(MpuRegisters, ctrl), mpu_ctrl::Enable::mask | mpu_ctrl::PrivilegedDefault::mask |
+                                                   mpu_ctrl::InFaultHandlers::mask);
+    }
+    board.set(0, page);
+    EXPECT_EQ(board.run(), in_fault_handlers ? RunEnd::fault : RunEnd::stopped)
+        << "a second violation locks up";
+    board.processor.reset(board.processor.now());
+    board.set(0, page);
+    EXPECT_EQ(board.run(2 * units_per_second), RunEnd::stopped) << board.processor.fault();
+    EXPECT_EQ(board.processor.breakpoint(), 1);
+  }
+}
+
+TEST(MemoryProtectionInForce, StopsTheRunWithThePlaceUnlessFaultsAreTheFirmwares) {
+  constexpr std::uint32_t page = 0x2000'4000;
+  Guarded board(store, {{page, of_size(10, 5)}}, {});
+  board.set(0, page).set(1, 1);
+  expect_fault(board, {"store", "0x20004004", "pc 0x08000202", "memory protection"});
+}
+
+TEST(MemoryProtectionInForce, RefusesBordersFinerThanAPage) {
+  using namespace drivers::cortex_m;
+  EXPECT_THROW(Guarded(load, {{0x2000'0000, of_size(5, 0)}}), RefusedAccess);
+  EXPECT_THROW(Guarded(load, {{0x2000'0000, of_size(12, 0) | mpu_rasr::SubregionDisable::bits(1)}}),
+               RefusedAccess);
+  EXPECT_NO_THROW(Guarded(load, {{0, of_size(5, 0)}})) << "where there is no memory";
+  EXPECT_THROW(Guarded(load, {{0x2000'0000, of_size(10, 4)}}), RefusedAccess) << "reserved permission";
+  EXPECT_THROW(Guarded(load, {{0, of_size(7, 0) | mpu_rasr::SubregionDisable::bits(1)}}), RefusedAccess);
+}
+
 }  // namespace
 }  // namespace kmax::virtual_board::processor_faults_test

@@ -1,0 +1,164 @@
+// What the memory protection of the flashed image catches, with both axes armed: the bridges are off at once
+// and the record says what it was. Each case is tried without the protection as well: it is what makes the
+// difference.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
+#include "drivers/cortex_m/registers.hpp"
+#include "host_tools/device/crash_words.hpp"
+#include "tests/image/image_bench.hpp"
+
+namespace kmax::tests::memory_guard_test {
+namespace {
+
+namespace cortex = drivers::cortex_m;
+using virtual_board::VirtualBoard;
+
+struct Mishap {
+  const char* name;
+  /// An instruction somewhere in the application, which is run next with the registers below.
+  std::uint16_t instruction;
+  std::uint32_t program_counter;  ///< instead of `instruction`; 0: none
+  std::uint32_t r0, stack_pointer;
+  std::uint32_t status;   ///< CFSR
+  std::uint32_t address;  ///< 0: none
+  const char* words;
+  /// Without the protection: the words of the BusFault, "" if nothing notices.
+  const char* unguarded;
+};
+
+constexpr std::uint16_t push_r4_to_lr = 0xB570, store_r1_at_r0 = 0x6001, load_r1_from_r0 = 0x6801;
+constexpr std::uint32_t bottom = 0x2000'0000, somewhere = 0x2000'1000;
+constexpr std::uint32_t data =
+    cortex::scb_cfsr::DataViolation::mask | cortex::scb_cfsr::MemoryFaultAddressValid::mask;
+constexpr std::uint32_t stacking = cortex::scb_cfsr::MemoryFaultStacking::mask;
+constexpr std::uint32_t fetch = cortex::scb_cfsr::FetchViolation::mask;
+
+const Mishap mishaps[] = {
+    {"PushPastTheStack", push_r4_to_lr, 0, 0, bottom + 8, data | stacking, bottom - 8,
+     "data access that the memory protection forbids", "bus error"},
+    {"InterruptPastTheStack", 0, 0, 0, bottom + 16, stacking, 0, "stack overflow?", "bus error"},
+    {"StoreThroughNull", store_r1_at_r0, 0, 0, somewhere, data, 0,
+     "data access that the memory protection forbids at address 0x00000000", "bus error"},
+    {"LoadThroughNull", load_r1_from_r0, 0, 0, somewhere, data, 0,
+     "data access that the memory protection forbids at address 0x00000000", "bus error"},
+    {"StoreToCode", store_r1_at_r0, 0, 0x0800'C000, somewhere, data, 0x0800'C000,
+     "data access that the memory protection forbids at address 0x0800C000", "bus error"},
+    {"JumpIntoRam", 0, 0x2001'8000, 0, somewhere, fetch, 0, "instruction fetch from where no code may be",
+     ""},
+};
+
+class MemoryGuard : public testing::TestWithParam<Mishap> {
+ protected:
+  MemoryGuard()
+      : bench({{"axis0.wall.position", -1.0}, {"axis1.wall.position", -1.0}}, 1.0, "motor_axes",
+              as_on_the_chip()) {
+    bench.start();
+    for (const std::size_t axis : {0U, 1U}) {
+      bench.master->arm(axis);
+      EXPECT_TRUE(bench.board->bridge_armed(axis));
+    }
+    // An endless loop, should it ever be reached.
+    bench.board->bus().store(0x2001'8000, 0xE7FE'E7FE);
+  }
+
+  static virtual_board::VirtualBoardConfig as_on_the_chip() {
+    virtual_board::VirtualBoardConfig config;
+    config.processor.faults_to_firmware = true;
+    return config;
+  }
+
+  std::uint32_t address_of(std::uint16_t instruction) {
+    const auto flash = bench.board->bus().flash();
+    for (std::size_t at = 0xC000; at + 1 < flash.size(); at += 2) {
+      if ((flash[at] | flash[at + 1] << 8) == instruction)
+        return static_cast<std::uint32_t>(0x0800'0000 + at);
+    }
+    throw std::runtime_error("the image does not have the instruction");
+  }
+
+  /// s from the mishap until both bridges were off; negative: they never were within 100 us.
+  double happen() {
+    VirtualBoard& board = *bench.board;
+    const Mishap& mishap = GetParam();
+    // Asleep in the main loop.
+    while (!board.processor().sleeping() || board.core().exceptions.active_count() != 0) board.run_for(1e-6);
+    board.processor().set_core_register(13, mishap.stack_pointer);
+    board.processor().set_core_register(0, mishap.r0);
+    std::uint32_t next = mishap.program_counter;
+    if (mishap.instruction != 0) next = address_of(mishap.instruction);
+    if (next != 0) board.processor().set_core_register(15, next);
+    const auto begin = board.now();
+    while (board.now() < begin + ticks(2)) {
+      board.run_for(0.1e-6);
+      if (!board.bridge_armed(0) && !board.bridge_armed(1))
+        return virtual_board::seconds(board.now() - begin);
+    }
+    return -1.0;
+  }
+
+  std::uint32_t number(std::string_view name) {
+    const std::size_t entry = firmware::find_entry(name);
+    const auto words = firmware::register_count(firmware::entry_at(entry).type);
+    const auto read = bench.master->read_input(firmware::register_address(entry, 0), words);
+    return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
+  }
+  firmware::CrashRecord crash() {
+    firmware::CrashRecord record;
+    record.count = number("info.crash_count");
+    record.cause = static_cast<firmware::CrashCause>(number("info.crash_cause"));
+    record.exception_number = static_cast<std::uint16_t>(number("info.crash_exception"));
+    record.program_counter = number("info.crash_program_counter");
+    record.status = number("info.crash_status");
+    record.hard_fault_status = number("info.crash_hard_fault_status");
+    record.address = number("info.crash_address");
+    return record;
+  }
+
+  ImageBench bench;
+};
+
+TEST_P(MemoryGuard, TurnsAMishapIntoANamedFault) {
+  const Mishap& mishap = GetParam();
+  const double off = happen();
+  // The next interrupt, at most half a tick away, is what finds a stack that has no room for a frame.
+  EXPECT_GE(off, 0.0) << "the bridges are still on";
+  EXPECT_LT(off, mishap.instruction != 0 || mishap.program_counter != 0 ? 3e-6 : 0.5 * tick_s + 3e-6);
+  bench.board->run_for(1e-3);
+  bench.start();
+  EXPECT_EQ(bench.board->resets(), 2U);
+  EXPECT_FALSE(bench.board->bridge_armed(0));
+  EXPECT_FALSE(bench.board->bridge_armed(1));
+  const firmware::CrashRecord record = crash();
+  EXPECT_EQ(record.count, 1U);
+  EXPECT_EQ(record.cause, firmware::CrashCause::fault);
+  EXPECT_EQ(record.exception_number, 3U);
+  EXPECT_EQ(record.status, mishap.status);
+  EXPECT_EQ(record.hard_fault_status, cortex::scb_hfsr::Forced::mask);
+  EXPECT_EQ(record.address, mishap.address);
+  EXPECT_NE(device::crash_words(record).find(mishap.words), std::string::npos) << device::crash_words(record);
+}
+
+TEST_P(MemoryGuard, IsWhatCatchesIt) {
+  const Mishap& mishap = GetParam();
+  bench.board->core().memory_protection.write({offsetof(cortex::MpuRegisters, ctrl), 4, bench.board->now()},
+                                              0);
+  const double off = happen();
+  if (*mishap.unguarded == '\0') {
+    EXPECT_LT(off, 0.0) << "nothing notices";
+    return;
+  }
+  bench.board->run_for(1e-3);
+  bench.start();
+  const firmware::CrashRecord record = crash();
+  EXPECT_EQ(record.status & 0xFFU, 0U) << "no fault of the memory protection";
+  EXPECT_NE(device::crash_words(record).find(mishap.unguarded), std::string::npos)
+      << device::crash_words(record);
+}
+
+INSTANTIATE_TEST_SUITE_P(Image, MemoryGuard, testing::ValuesIn(mishaps),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+}  // namespace
+}  // namespace kmax::tests::memory_guard_test
