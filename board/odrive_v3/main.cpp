@@ -41,8 +41,8 @@ namespace cortex = drivers::cortex_m;
 namespace stm32 = drivers::stm32f4;
 using namespace odrive_v3;
 
-/// The main loop's heartbeat and the microsecond clock; also the tick of the axes where the clock is too slow
-/// for the power stage, so that parameters can be set and read there.
+/// The main loop's heartbeat and the microsecond clock; where the clock is too slow for the power stage, the
+/// axes tick with it, so that parameters can be set and read there.
 constexpr std::uint32_t clock_rate_hz = 1'000;
 
 /// Longer than an erase of the parameter flash, during which nothing runs.
@@ -161,6 +161,13 @@ void poll_power(std::uint32_t now_us) {
   cortex::reset_core();
 }
 
+/// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on
+/// a slow clock a tick takes longer than the characters of the serial line, and they would be lost.
+void tick_without_power() {
+  constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
+  static_cast<void>(application->ISR_tick(input));
+}
+
 [[noreturn]] void run() {
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
@@ -190,6 +197,7 @@ void poll_power(std::uint32_t now_us) {
         !power_runs || power->drives().main_loop_due() || serial->poll_due() || can_line->poll_due();
     if (due) {
       const std::uint32_t now = system_tick.now_us();
+      if (!power_runs) tick_without_power();
       if (power_runs) {
         firmware::BoardReadings readings = power->drives().readings();
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
@@ -243,15 +251,9 @@ void ISR_exti4() {
 void ISR_system_tick() {
   using namespace kmax;
   board::system_tick.ISR_count();
-  if (board::power_runs) {
-    // Not before the first ticks: the power stage takes longer to become ready than this takes to settle.
-    if (board::power->ready() && board::power->drives().ISR_ticks_have_stopped())
-      board::ticks_have_stopped.store(true, std::memory_order_relaxed);
-    return;
-  }
-  // No encoder is read here, and none is claimed: the axes tick, and refuse to be armed.
-  constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
-  static_cast<void>(board::application->ISR_tick(input));
+  // Not before the first ticks: the power stage takes longer to become ready than this takes to settle.
+  if (board::power_runs && board::power->ready() && board::power->drives().ISR_ticks_have_stopped())
+    board::ticks_have_stopped.store(true, std::memory_order_relaxed);
 }
 
 void ISR_can1_tx() {

@@ -238,8 +238,9 @@ inline firmware::AxisInput Drives<Hardware>::ISR_measure(std::size_t index, cons
   } else if (supply_.saturated(supply)) [[unlikely]] {
     condition = firmware::Fault::over_voltage;
   } else if (axis.sense_b.ISR_saturated(phase_b) || axis.sense_c.ISR_saturated(phase_c)) [[unlikely]] {
-    // Amplifiers of a bridge that is off may read anything.
-    if (driving) condition = firmware::Fault::current_sense;
+    // Also of a bridge that is off: its amplifiers read zero, and until they are awake the stage says so
+    // below.
+    condition = firmware::Fault::current_sense;
   }
   if (calibrating_.load(std::memory_order_relaxed)) [[unlikely]]
     ISR_calibrate(axis, sample);

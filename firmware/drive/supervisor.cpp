@@ -163,6 +163,9 @@ bool Supervisor::cause_remains(const Situation& now) const {
     case Fault::over_temperature:
       if (now.thermal.power_stage_too_hot()) return true;
       break;
+    case Fault::tick_missed:
+      if (now.ticks_have_stopped) return true;
+      break;
     case Fault::motor_too_hot:
       if (now.thermal.motor_too_hot()) return true;
       break;
