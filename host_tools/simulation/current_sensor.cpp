@@ -22,6 +22,7 @@ double CurrentSensor::sample(Channel channel, double shunt_current) {
   double input = shorted_[index] ? 0.0 : config_.shunt * shunt_current;
   if (inverted_[index]) input = -input;
   if (config_.noise > 0.0) input += config_.noise * noise_[index].gaussian();
+  if (stuck_[index]) return std::clamp(*stuck_[index], 0.0, reference);
   const double offset = channel == Channel::b ? config_.offset_b : config_.offset_c;
   return std::clamp(0.5 * reference + offset + config_.gain * input, 0.0, reference);
 }

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "host_tools/simulation/model_field.hpp"
@@ -56,6 +57,10 @@ class CurrentSensor {
   void short_inputs(Channel channel, bool shorted) { shorted_[static_cast<std::size_t>(channel)] = shorted; }
   // Defect: the shunt's wires are exchanged, so that the current reads with the wrong sign.
   void invert(Channel channel, bool inverted) { inverted_[static_cast<std::size_t>(channel)] = inverted; }
+  // Defect: the pin stands at this voltage, bounded to 0 .. 3.3 V, whatever flows. None: mended.
+  void set_stuck(Channel channel, std::optional<double> volts) {
+    stuck_[static_cast<std::size_t>(channel)] = volts;
+  }
 
   const CurrentSensorConfig& config() const { return config_; }
 
@@ -63,6 +68,7 @@ class CurrentSensor {
   CurrentSensorConfig config_;
   std::array<bool, 2> shorted_{};
   std::array<bool, 2> inverted_{};
+  std::array<std::optional<double>, 2> stuck_{};
   std::array<NoiseGenerator, 2> noise_;
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware/crash_record.hpp"
 #include "firmware/drive/fault.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
@@ -65,6 +66,24 @@ class ImageBench {
 
   std::uint16_t reading(std::size_t entry, std::size_t axis) {
     return master->read_input(firmware::register_address(entry, axis), 1)[0];
+  }
+  /// Of the device, of one word or two.
+  std::uint32_t number(std::string_view name) {
+    const std::size_t entry = firmware::find_entry(name);
+    const auto words = firmware::register_count(firmware::entry_at(entry).type);
+    const auto read = master->read_input(firmware::register_address(entry, 0), words);
+    return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
+  }
+  firmware::CrashRecord crash() {
+    firmware::CrashRecord record;
+    record.count = number("info.crash_count");
+    record.cause = static_cast<firmware::CrashCause>(number("info.crash_cause"));
+    record.exception_number = static_cast<std::uint16_t>(number("info.crash_exception"));
+    record.program_counter = number("info.crash_program_counter");
+    record.status = number("info.crash_status");
+    record.hard_fault_status = number("info.crash_hard_fault_status");
+    record.address = number("info.crash_address");
+    return record;
   }
   firmware::Fault fault(std::size_t axis) {
     const auto* text = firmware::fault_by_error_code(reading(firmware::entry_of<"drive.error_code">(), axis));

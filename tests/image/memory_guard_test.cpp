@@ -98,24 +98,6 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
     return -1.0;
   }
 
-  std::uint32_t number(std::string_view name) {
-    const std::size_t entry = firmware::find_entry(name);
-    const auto words = firmware::register_count(firmware::entry_at(entry).type);
-    const auto read = bench.master->read_input(firmware::register_address(entry, 0), words);
-    return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
-  }
-  firmware::CrashRecord crash() {
-    firmware::CrashRecord record;
-    record.count = number("info.crash_count");
-    record.cause = static_cast<firmware::CrashCause>(number("info.crash_cause"));
-    record.exception_number = static_cast<std::uint16_t>(number("info.crash_exception"));
-    record.program_counter = number("info.crash_program_counter");
-    record.status = number("info.crash_status");
-    record.hard_fault_status = number("info.crash_hard_fault_status");
-    record.address = number("info.crash_address");
-    return record;
-  }
-
   ImageBench bench;
 };
 
@@ -130,7 +112,7 @@ TEST_P(MemoryGuard, TurnsAMishapIntoANamedFault) {
   EXPECT_EQ(bench.board->resets(), 2U);
   EXPECT_FALSE(bench.board->bridge_armed(0));
   EXPECT_FALSE(bench.board->bridge_armed(1));
-  const firmware::CrashRecord record = crash();
+  const firmware::CrashRecord record = bench.crash();
   EXPECT_EQ(record.count, 1U);
   EXPECT_EQ(record.cause, firmware::CrashCause::fault);
   EXPECT_EQ(record.exception_number, 3U);
@@ -151,7 +133,7 @@ TEST_P(MemoryGuard, IsWhatCatchesIt) {
   }
   bench.board->run_for(1e-3);
   bench.start();
-  const firmware::CrashRecord record = crash();
+  const firmware::CrashRecord record = bench.crash();
   EXPECT_EQ(record.status & 0xFFU, 0U) << "no fault of the memory protection";
   EXPECT_NE(device::crash_words(record).find(mishap.unguarded), std::string::npos)
       << device::crash_words(record);
