@@ -78,7 +78,9 @@ class ParameterStore {
           found.newest = StoreSurvey::Place{sector, word};
           found.header = header;
         }
-        word += record::aligned_up(record::length_of(header.count)) - record::alignment;
+        // The next record may begin in the place of a commit word that was never written.
+        const std::size_t unwritten = here.condition == record::Condition::uncommitted ? 1 : 0;
+        word += record::aligned_up(record::length_of(header.count) - unwritten) - record::alignment;
       }
     }
     return found;

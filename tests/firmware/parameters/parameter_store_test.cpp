@@ -209,6 +209,27 @@ TEST(ParameterStore, LengthsAtTheEndOfASectorAreNotBelieved) {
   }
 }
 
+// Where the commit word alone would be the first of a new line of 16, the next record begins in its place.
+// How many parameters a record has is up to the firmware that wrote it.
+TEST(ParameterStore, ASetBehindARecordThatLacksOnlyItsCommitWordIsFoundWhateverTheRecordsLength) {
+  for (std::uint32_t count = 0; count < record::alignment; ++count) {
+    FakeFlash flash;
+    const record::Header header{.sequence = 1, .schema = dictionary_checksum, .erases = 0, .count = count};
+    Crc32 crc;
+    const std::size_t covered = record::length_of(count) - 2;
+    for (std::size_t i = 0; i < covered; ++i) {
+      const std::uint32_t word = i < record::header_words ? header.word(i) : 0x1234'5678U;
+      flash.program(0, i, word);
+      crc.add(word);
+    }
+    flash.program(0, covered, crc.value());
+    Store store(flash);
+    ASSERT_EQ(save(store, some_values(1)), SaveProgress::done) << count;
+    EXPECT_EQ(loaded(flash), persistent_part(some_values(1))) << count << " parameters";
+    EXPECT_EQ(store.survey().damaged, 1) << count << " parameters";
+  }
+}
+
 TEST(ParameterStore, AWordThatDoesNotTakeIsSteppedOver) {
   for (const std::size_t bad : {std::size_t{0}, std::size_t{3}, Store::length - 2, Store::length - 1}) {
     for (const std::uint32_t bits : {0xFFFF'FFFFU, 0x0000'0001U, 0x8000'0000U}) {
