@@ -92,7 +92,7 @@ constexpr Entry pdo_value(std::size_t pdo, std::size_t value) {
                            "Least time between two of them.");
     case 3:
       return communication(
-          name, group(false), 5, Type::unsigned16, "ms", 65535, 1,
+          name, group(false), 5, Type::unsigned16, "ms", 65535, 10,
           "Time between two of them, at least 1 ms x 1 Mbit/s / can.bit_rate; 0: sent at a change.");
     case 4:
       return communication(

@@ -17,6 +17,7 @@
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
 #include "host_tools/record/recording.hpp"
+#include "host_tools/record/telemetry_request.hpp"
 
 namespace kmax::cli {
 
@@ -118,12 +119,20 @@ std::optional<std::uint32_t> held_back_since(Context& context, const PdoPlan& pl
 
 Finished record_pdos(Context& context, const link::DeviceAddress& address, const RecordOptions& options,
                      const Interruption& interruption) {
+  record::TelemetryRequest telemetry([&context] { return context.connect(); },
+                                     [&context](const std::string& text) { context.note(text); });
+  telemetry.ask();
   const PdoPlan plan = [&] {
     device::Device device = context.connect();
     return record::read_pdo_plan(device, address.node);
   }();
   const auto port = context.open_bus(address.path, record::port_options(plan));
-  record::CanSource source(*port, plan);
+  record::CanSource source(*port, plan, [&] {
+    if (telemetry.ask())
+      context.note(
+          "another program, perhaps a recording that ended, had put the PDOs' event times back; they were "
+          "asked for again");
+  });
   Finished finished{.progress = {},
                     .source = fmt::format("{}, a PDO set every {:g} ms", link::text_of(address),
                                           1000.0 * plan.period_ticks / firmware::tick_rate_hz)};
@@ -200,7 +209,8 @@ void add_record_command(CLI::App& app, Context& context) {
   kmax record - --for 1 | head
 
 Over CAN both axes of a row are of the same tick; rows that are lost are counted, and show as gaps in
-the ticks. A node that is not operational is started and put back afterwards. Over other links values
+the ticks. A node that is not operational is started, and PDOs with the factory's event times are asked for
+every millisecond; both are put back afterwards. Over other links values
 are read as fast as the link goes, one axis after the other: axis1_tick is when axis 1 was read.
 Times are the device's own. 'kmax capture' records every tick of a short time instead.)"},
       Takes::device_and_axis, run_record);

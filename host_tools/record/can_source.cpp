@@ -25,7 +25,8 @@ link::CanPortOptions port_options(const PdoPlan& plan) {
   return options;
 }
 
-CanSource::CanSource(link::CanPort& port, const PdoPlan& plan) : port_(port), plan_(plan), rows_(plan) {
+CanSource::CanSource(link::CanPort& port, const PdoPlan& plan, std::function<void()> ask_again)
+    : port_(port), plan_(plan), ask_again_(std::move(ask_again)), rows_(plan) {
   if (plan.node_state == operational) return;
   start();
 }
@@ -65,11 +66,18 @@ std::optional<Row> CanSource::next(std::chrono::microseconds wait) {
       ++frames_since_row_;
       if (row) {
         frames_since_row_ = 0;
+        last_row_ = now;
+        may_ask_again_ = true;
         return row;
       }
     }
     const std::chrono::milliseconds periods(3 * plan_.period_ticks / (firmware::tick_rate_hz / 1000));
-    if (!received && now - last_pdo_ > std::max(silence, periods)) start_again();
+    const auto long_enough = std::max(silence, periods);
+    if (now - last_row_ > long_enough && may_ask_again_ && ask_again_) {
+      may_ask_again_ = false;
+      ask_again_();
+    }
+    if (!received && now - last_pdo_ > long_enough) start_again();
     const auto sets =
         static_cast<std::uint64_t>(patience.count()) * (firmware::tick_rate_hz / 1000) / plan_.period_ticks;
     if (now - last_frame_ > patience || frames_since_row_ > plan_.identifiers.size() * (sets + 1))

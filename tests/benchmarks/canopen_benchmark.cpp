@@ -108,7 +108,7 @@ void block_upload(tests::CanBench& bench, const std::string& what) {
       "85 %", share >= 0.85 && bytes.size() == 49152);
 }
 
-/// All four PDOs by their event time of 1 ms.
+/// All four PDOs by an event time of 1 ms.
 void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
   std::array<std::uint64_t, 4> received{};
   std::array<double, 4> before{};
@@ -127,6 +127,7 @@ void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
       before[i] = time;
     }
   });
+  bench.ask_for_telemetry();
   bench.nmt(0x01);
   const auto busy = bench.board->can_bus().busy_time();
   // A host that lives: an armed axis would lose its force otherwise.

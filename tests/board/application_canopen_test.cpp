@@ -244,6 +244,7 @@ class LssOnCan : public OnCan {
 
 // 1 M -> 500 k used to keep 4,000 PDOs a second, and nothing else got through.
 TEST_F(LssOnCan, PdosGoNoFasterThanANewBitRateAllows) {
+  for (std::uint16_t tpdo = 0x1800; tpdo < 0x1804; ++tpdo) EXPECT_EQ(write(tpdo, 5, 1, 2), 0U);
   nmt(1);
   run_ms(20);
   const auto at_1000_kbit = pdos_in_a_second();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware/canopen/communication_rules.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/modbus/register_bank.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
@@ -152,6 +153,16 @@ class FakeLink final : public link::RegisterLink {
   }
   std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
     return read_registers(4, address, count, [&](auto out) { return device_->read_input(address, out); });
+  }
+  /// CANopen's own settings as over CAN, which alone writes them.
+  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+             const std::function<void()>& before = {}) override {
+    if (values.size() != 1 || !firmware::canopen::is_communication(values[0].slot))
+      return RegisterLink::write(values, repeat, before);
+    exchange(16, 0, [&] {
+      device_->registers.values().set_raw(values[0].slot, values[0].raw);
+      return firmware::modbus::Exception::none;
+    });
   }
   void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
     exchange(16, address, [&] { return device_->write_holding(address, values); });

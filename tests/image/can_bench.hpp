@@ -93,6 +93,10 @@ class CanBench : public ImageBench {
     for (std::size_t i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
     sdo.download({index, subindex}, bytes, true);
   }
+  /// All four TPDOs every millisecond.
+  void ask_for_telemetry() {
+    for (std::uint16_t tpdo = 0x1800; tpdo < 0x1804; ++tpdo) write(tpdo, 5, 1, 2);
+  }
   /// Through the three states; the last statusword.
   std::uint32_t arm(std::size_t axis = 0) {
     const auto index = static_cast<std::uint16_t>(0x6040 + 0x800 * axis);

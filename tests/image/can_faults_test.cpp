@@ -60,6 +60,7 @@ class BusFaults : public testing::Test {
 
 TEST_F(BusFaults, NobodyAcknowledges) {
   ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.ask_for_telemetry();
   bench.nmt(0x01);
   bench.board->run_for(0.01);
   bench.port.node().set_connected(false, bench.board->now());

@@ -96,6 +96,7 @@ TEST(CanOpen, PdosTellOfOneTickAndOfRegularOnes) {
   bench.write(0x1A03, 2, 0x2812'0120, 4);  // and of axis 1
   bench.write(0x1A03, 0, 2, 1);
   bench.write(0x1803, 1, 0x0000'0481, 4);
+  bench.ask_for_telemetry();
   virtual_board::CanHostNode listener(bench.board->can_bus(), 1'000'000);
   std::vector<std::array<std::uint32_t, 2>> ticks;
   listener.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime) {

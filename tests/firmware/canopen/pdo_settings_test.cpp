@@ -20,7 +20,7 @@ TEST(PdoSettings, TheDefaultsAreAllUsable) {
     EXPECT_TRUE(sent.good && received.good) << n;
     EXPECT_TRUE(sent.settings.exists) << n;
     EXPECT_EQ(sent.settings.identifier, 0x185 + 0x100 * n);
-    EXPECT_EQ(sent.settings.event_us, 1000U);
+    EXPECT_EQ(sent.settings.event_us, 10'000U);
     EXPECT_EQ(sent.settings.mapping.bytes(), 8);
     EXPECT_EQ(received.settings.exists, n < 2) << n;
     EXPECT_EQ(received.settings.identifier, n < 2 ? 0x205 + 0x100 * n : 0);

@@ -50,7 +50,7 @@ TEST(Dbc, SignalsAreWhatIsMappedLittleEndian) {
         " SG_ axis1_telemetry_current : 16|16@1- (1,0) [-32768|32767] \"mA\" Host\n",
         " SG_ telemetry_tick : 48|16@1+ (1,0) [0|65535] \"ticks\" Host\n",
         "SIG_VALTYPE_ 385 axis0_measured_force : 1;\n", "SIG_VALTYPE_ 897 axis0_measured_velocity : 1;\n",
-        "BA_ \"GenMsgCycleTime\" BO_ 385 1;\n", "VAL_ 1793 nmt_state 0 \"initialising\""})
+        "BA_ \"GenMsgCycleTime\" BO_ 385 10;\n", "VAL_ 1793 nmt_state 0 \"initialising\""})
     EXPECT_CONTAINS(text, line);
 }
 

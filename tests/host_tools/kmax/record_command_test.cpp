@@ -16,6 +16,7 @@ using host_tools_test::FakeLink;
 struct FakeBus {
   std::vector<drivers::CanFrame> sent;
   int frames = 0, first_lost = -1, last_lost = -1, raises_signal_at = -1, ends_at = 1'000'000;
+  std::function<void(int)> on_frame{};
 };
 
 /// Gives the four PDOs of node 1, a set every millisecond of its own time, once it is operational.
@@ -25,6 +26,7 @@ class FakePort final : public link::CanPort {
   void send(const drivers::CanFrame& frame) override { bus_.sent.push_back(frame); }
   std::optional<link::Received> receive(std::chrono::microseconds) override {
     const int number = bus_.frames++;
+    if (bus_.on_frame) bus_.on_frame(number);
     if (number == bus_.raises_signal_at) raise(SIGINT);
     if (number >= bus_.ends_at) throw link::LinkError("fake0: the interface is gone");
     if (bus_.first_lost <= number && number <= bus_.last_lost) return std::nullopt;
@@ -91,6 +93,24 @@ TEST_F(RecordCommand, LostRowsAreSaidAndShowInTheTicks) {
   EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "0.5", "--device", "can:fake0"}), done) << said;
   EXPECT_CONTAINS(output, "497 rows in 0.499 s");
   EXPECT_CONTAINS(output, "3 lost in 1 gap");
+}
+
+TEST_F(RecordCommand, ThePdosAreAskedForEachMillisecondAndPutBackHoweverItEnds) {
+  const auto time = [this] { return fake->registers.values().whole<"tpdo4.event_time">(); };
+  for (const int ends_at : {400, 1'000'000}) {
+    bus = {};
+    bus.ends_at = ends_at;
+    if (ends_at != 400) bus.raises_signal_at = 400;
+    std::uint32_t meanwhile = 0;
+    bus.on_frame = [&](int number) {
+      if (number == 200) meanwhile = time();
+    };
+    EXPECT_EQ(time(), 10u);
+    EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), ends_at == 400 ? failed : done)
+        << said;
+    EXPECT_EQ(meanwhile, 1u);
+    EXPECT_EQ(time(), 10u);
+  }
 }
 
 TEST_F(RecordCommand, CtrlCEndsInOrder) {

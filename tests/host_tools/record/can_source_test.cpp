@@ -119,6 +119,25 @@ TEST(CanSource, SilenceEndsTheRecordingAndSaysWhatTheBusSays) {
   EXPECT_CONTAINS(message, "nobody acknowledges");
 }
 
+// Another recording that asked for the PDOs has ended, and put their event times back.
+TEST(CanSource, RowsThatCeaseAreAskedForAgainOnceUntilOneComes) {
+  FakePort port;
+  int asked = 0;
+  CanSource source(port, plan_in(5), [&] { ++asked; });
+  std::uint16_t tick = 1000;
+  for (int round = 1; round <= 2; ++round) {
+    while (!source.next(microseconds(1000))) port.arrive_row(tick = static_cast<std::uint16_t>(tick + 20));
+    EXPECT_EQ(asked, round - 1);
+    const auto end = std::chrono::steady_clock::now() + 2 * CanSource::silence;
+    while (std::chrono::steady_clock::now() < end) {
+      port.arrive_row(tick = static_cast<std::uint16_t>(tick + 200));
+      EXPECT_FALSE(source.next(microseconds(10'000)));
+    }
+    EXPECT_EQ(asked, round);
+  }
+  EXPECT_EQ(source.restarts(), 0u);
+}
+
 // Another recording that started the node has ended, and put it back.
 TEST(CanSource, ANodeThatIsPutBackByAnotherIsStartedAgain) {
   FakePort port;

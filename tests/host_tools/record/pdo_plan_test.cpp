@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <vector>
+
 #include "host_tools/base/errors.hpp"
+#include "host_tools/record/telemetry_request.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
@@ -20,9 +24,35 @@ class PdoPlanTest : public testing::Test {
   std::string refusal() {
     return host_tools_test::thrown_message<device::DeviceError>([this] { read(); });
   }
+  TelemetryRequest of_fake() {
+    return TelemetryRequest(
+        [this] {
+          auto made = std::make_unique<FakeLink>(fake);
+          if (lost_requests_from != 0) {
+            made->loss = FakeLink::Loss::request;
+            made->first_lost = lost_requests_from;
+            made->last_lost = 1000;
+          }
+          return device::Device(std::move(made));
+        },
+        [this](const std::string& text) { noticed = text; });
+  }
+  void set_event_times(std::uint32_t ms) {
+    for (const std::size_t slot : event_time_slots) values().set_raw(slot, ms);
+  }
+  std::vector<std::uint32_t> event_times() {
+    std::vector<std::uint32_t> all;
+    for (const std::size_t slot : event_time_slots) all.push_back(values().raw(slot));
+    return all;
+  }
   firmware::ParameterValues& values() { return fake->registers.values(); }
 
+  const std::array<std::size_t, 4> event_time_slots = {
+      device::Parameter::of<"tpdo1.event_time">().slot(), device::Parameter::of<"tpdo2.event_time">().slot(),
+      device::Parameter::of<"tpdo3.event_time">().slot(), device::Parameter::of<"tpdo4.event_time">().slot()};
   std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
+  int lost_requests_from = 0;  ///< of a connection, from 1; 0: none
+  std::string noticed;
 };
 
 TEST_F(PdoPlanTest, TheFactorysSettings) {
@@ -33,7 +63,7 @@ TEST_F(PdoPlanTest, TheFactorysSettings) {
   const PdoPlan plan = read();
   EXPECT_EQ(plan.node, 9);
   EXPECT_EQ(plan.identifiers, (std::array<std::uint32_t, 4>{0x189, 0x289, 0x389, 0x489}));
-  EXPECT_EQ(plan.period_ticks, 20u);
+  EXPECT_EQ(plan.period_ticks, 200u);
   EXPECT_EQ(plan.node_state, 127);
   EXPECT_EQ(plan.held_back, 3u);
   EXPECT_EQ(plan.tick, 777u);
@@ -42,17 +72,87 @@ TEST_F(PdoPlanTest, TheFactorysSettings) {
 
 TEST_F(PdoPlanTest, OtherIdentifiersAndTimesAreFollowed) {
   values().set_whole<"tpdo2.cob_id">(0x40000234);
-  for (const std::size_t entry :
-       {firmware::entry_of<"tpdo1.event_time">(), firmware::entry_of<"tpdo2.event_time">(),
-        firmware::entry_of<"tpdo3.event_time">(), firmware::entry_of<"tpdo4.event_time">()})
-    values().set_raw(firmware::slot_of(entry, 0), 5);
+  set_event_times(5);
   EXPECT_EQ(read().identifiers[1], 0x234u);
   EXPECT_EQ(read().period_ticks, 100u);
 }
 
 TEST_F(PdoPlanTest, ASlowBusIsSlower) {
+  TelemetryRequest request = of_fake();
+  request.ask();
   values().set_whole<"can.bit_rate_in_use">(125000);
   EXPECT_EQ(read().period_ticks, 160u);
+}
+
+TEST_F(PdoPlanTest, WhatIsAskedForIsPutBackOnce) {
+  {
+    TelemetryRequest request = of_fake();
+    EXPECT_EQ(read().period_ticks, 200u) << "nothing is asked for yet";
+    EXPECT_TRUE(request.ask());
+    EXPECT_EQ(read().period_ticks, 20u);
+    request.put_back();
+    EXPECT_EQ(read().period_ticks, 200u);
+    set_event_times(1);  // somebody else's wish
+  }
+  EXPECT_EQ(read().period_ticks, 20u);
+}
+TEST_F(PdoPlanTest, OtherEventTimesStayInTheBeginningAndInTheEnd) {
+  set_event_times(5);
+  {
+    TelemetryRequest request = of_fake();
+    EXPECT_FALSE(request.ask());
+  }
+  EXPECT_EQ(read().period_ticks, 100u);
+  set_event_times(10);
+  {
+    TelemetryRequest request = of_fake();
+    EXPECT_TRUE(request.ask());
+    set_event_times(7);
+  }
+  EXPECT_EQ(read().period_ticks, 140u);
+}
+// The first to ask has ended; the second asks again, and is then the one who puts it back.
+TEST_F(PdoPlanTest, TwoWhoAskedLeaveTheFactorys) {
+  {
+    TelemetryRequest second = of_fake();
+    {
+      TelemetryRequest first = of_fake();
+      EXPECT_TRUE(first.ask());
+      EXPECT_FALSE(second.ask());
+    }
+    EXPECT_EQ(read().period_ticks, 200u);
+    EXPECT_TRUE(second.ask());
+    EXPECT_EQ(read().period_ticks, 20u);
+  }
+  EXPECT_EQ(read().period_ticks, 200u);
+}
+TEST_F(PdoPlanTest, ARequestThatIsCutShortAnywhereIsPutBackToo) {
+  const std::vector<std::uint32_t> factory(4, 10);
+  int halves = 0;
+  for (bool whole = false; !whole;) {
+    const int from = ++lost_requests_from;
+    ASSERT_LT(from, 100);
+    TelemetryRequest request = of_fake();
+    try {
+      whole = request.ask();
+    } catch (const link::LinkError&) {
+      halves += event_times() != factory ? 1 : 0;
+    }
+    lost_requests_from = 0;
+    request.put_back();
+    EXPECT_EQ(event_times(), factory) << from;
+    lost_requests_from = from;
+  }
+  EXPECT_EQ(halves, 3);
+  EXPECT_EQ(noticed, "");
+}
+TEST_F(PdoPlanTest, ALinkThatIsGoneInTheEndIsSaid) {
+  {
+    TelemetryRequest request = of_fake();
+    request.ask();
+    lost_requests_from = 1;
+  }
+  EXPECT_CONTAINS(noticed, "could not be put back to 10 ms");
 }
 
 TEST_F(PdoPlanTest, AnyOtherMappingIsRefusedByName) {
@@ -73,7 +173,7 @@ TEST_F(PdoPlanTest, SoIsOneThatWaitsForSync) {
 }
 TEST_F(PdoPlanTest, SoAreTimesThatDiffer) {
   values().set_whole<"tpdo4.event_time">(2);
-  EXPECT_CONTAINS(refusal(), "tpdo4.event_time is 2 ms, but tpdo1.event_time 1 ms");
+  EXPECT_CONTAINS(refusal(), "tpdo4.event_time is 2 ms, but tpdo1.event_time 10 ms");
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ class Frames(unittest.TestCase):
             self.check_each(frames)
             for pdo in self.promised.tpdos:
                 own = [frame for frame in frames if frame.id == pdo.identifier]
-                self.assertEqual(pdo.event_time_ms, 1)
+                self.assertEqual(pdo.event_time_ms, 10)
                 for entry in pdo.mapped:
                     values = {pdo.parts(frame.data)[entry.name] for frame in own}
                     if entry.name.endswith("telemetry.tick"):
