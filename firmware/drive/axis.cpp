@@ -34,6 +34,11 @@ constexpr bool is_within(float value, float low, float high) {
   return bits >= std::bit_cast<std::uint32_t>(low) && bits <= std::bit_cast<std::uint32_t>(high);
 }
 
+/// value < 0, by its bits, as below.
+constexpr bool is_negative(float value) {
+  return std::bit_cast<std::int32_t>(value) < 0;
+}
+
 /// value > 0, by its bits: shorter than a comparison of floats.
 constexpr bool is_positive(float value) {
   return std::bit_cast<std::int32_t>(value) > 0;
@@ -61,7 +66,7 @@ constexpr bool is_positive(float value) {
   const std::int64_t position = position_of(extender_.count(), setting);
   std::uint32_t state = state_word(trip_, condition_of(setting, input), enable, input);
   const bool sound = (state & ~referenced_bit) == (enabled_bit | count_valid_bit);
-  const bool brakes = demand.share < 0.0f;
+  const bool brakes = is_negative(demand.share);
   const bool by_force = sound && setting.mode != DriveMode::excitation && !brakes;
   const auto& out = setting.mode == DriveMode::torque
                         ? loop_.follow(setting.haptic, position, by_force, demand.from_host)

@@ -15,9 +15,9 @@ ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "host_tools" / "simulation" / "scenes" / "motor_axes.toml"
 
 # % of 168 MHz that both axes' ticks may take at most. What is wanted is the budget's own bound, 25; this one is what
-# is reached, so that it does not grow unseen: 43.3, and 5.6 for the watch for unstable walls where its worst tick meets
-# all other worst ticks.
-LOAD_AT_MOST = 49.5
+# is reached, so that it does not grow unseen: 43.3, 5.6 for the watch for unstable walls where its worst tick meets all
+# other worst ticks, and 0.7 for the share of the force that is left when a commander is lost.
+LOAD_AT_MOST = 49.7
 
 
 def kmax_board(*arguments, timeout=2 * PATIENCE):
