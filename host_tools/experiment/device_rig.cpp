@@ -12,9 +12,10 @@
 namespace kmax::experiment {
 
 namespace {
+/// The wall's last, as TouchWatch has them.
 std::vector<std::size_t> axes_of(const TouchLimits& limits, RigAxes axes) {
   if (axes == RigAxes::wall) return {limits.axis};
-  return {limits.axis, along(limits.axis)};
+  return {along(limits.axis), limits.axis};
 }
 
 std::vector<std::string> protective_of(device::Device& device, const TouchLimits& limits, RigAxes axes) {
@@ -157,36 +158,22 @@ RigTouch DeviceRig::hold(const TouchPlan& plan) {
   }
   if (session_.prompter != nullptr) session_.prompter->ask(plan.request);
   if (plan.wall) set_with_limits(*plan.wall);
+  const bool two_axes = axes_ == RigAxes::wall_along;
   TouchWatch watch;
-  watch.axis = limits_.axis;
+  watch.axes = axes_of(limits_, axes_);
   watch.name = plan.name;
   watch.hold_time = plan.hold_time;
   watch.contact_patience = limits_.patience;
   watch.abort_amplitude = limits_.abort_amplitude;
-  if (axes_ == RigAxes::wall_along) return hold_on_two_axes(plan, watch);
-  const WatchedTouch watched = watch_touch(device_, watch, session_.report);
-  RigTouch touch;
-  touch.touched = true;
-  touch.speed = std::max(0.0, touch_speed(watched));
-  touch.surface = watched.surface;
-  touch.side = watched.side;
-  touch.limited_share = watched.limited_share;
-  touch.aborted_at = watched.aborted_at;
-  touch.lost_records = watched.lost_records;
-  if (plan.threshold > 0.0) touch.judgement = measure_touch(watched, plan.hold_time, plan.threshold);
-  for (const device::TraceSample& sample : watched.samples)
-    touch.samples.push_back({sample.time, watched.side * (sample.position - watched.surface), sample.force,
-                             0.0, 0.0, sample.magnetic_coefficient});
-  return touch;
-}
-
-RigTouch DeviceRig::hold_on_two_axes(const TouchPlan& plan, TouchWatch watch) {
-  watch.hold_time += 0.1;  // a change comes at the link's pace
-  std::vector<TimedChange> changes;
+  if (two_axes) {
+    watch.hold_time += 0.1;  // a change comes at the link's pace
+    watch.release = 0.0;
+    watch.trace_rate = 100.0;
+    watch.wall_abort_amplitude = limits_.wall_abort_amplitude;
+  }
   for (const ForceChange& change : plan.changes)
-    changes.push_back({change.time, {force_text(change)}, change.of == ForceChange::Of::background});
-  TwoAxisTouch watched =
-      watch_two_axes(device_, watch, changes, session_.report, limits_.wall_abort_amplitude);
+    watch.changes.push_back({change.time, {force_text(change)}, change.of == ForceChange::Of::background});
+  WatchedTouch watched = watch_touch(device_, watch, session_.report);
   RigTouch touch;
   touch.touched = true;
   touch.change_times = std::move(watched.change_times);
@@ -194,8 +181,18 @@ RigTouch DeviceRig::hold_on_two_axes(const TouchPlan& plan, TouchWatch watch) {
   touch.limited_share = watched.limited_share;
   touch.aborted_at = watched.aborted_at;
   touch.lost_records = watched.lost_records;
+  if (two_axes) {
+    for (const device::TraceSample& sample : watched.samples)
+      touch.samples.push_back({sample.time, 0.0, 0.0, sample.position, sample.force, 0.0});
+    return touch;
+  }
+  touch.speed = std::max(0.0, touch_speed(watched));
+  touch.surface = watched.surface;
+  touch.side = watched.side;
+  if (plan.threshold > 0.0) touch.judgement = measure_touch(watched, plan.hold_time, plan.threshold);
   for (const device::TraceSample& sample : watched.samples)
-    touch.samples.push_back({sample.time, 0.0, 0.0, sample.position, sample.force, 0.0});
+    touch.samples.push_back({sample.time, watched.side * (sample.position - watched.surface), sample.force,
+                             0.0, 0.0, sample.magnetic_coefficient});
   return touch;
 }
 

@@ -4,9 +4,8 @@
 //
 // Before anybody is asked for anything, the limits that keep the person safe are at work (TouchLimits,
 // protective_assignments()), and all that is going to change has been read, to be put back at the end. Each
-// touch is asked for, watched within these limits (watched_touch.hpp; two_axis_touch.hpp where forces act
-// along the surface), made again if it did not count or if a standstill of this computer cut it off
-// (bench/held_up.hpp), and kept in the journal (touch_journal.hpp).
+// touch is asked for, watched within these limits (watched_touch.hpp), made again if it did not count or if a
+// standstill of this computer cut it off (bench/held_up.hpp), and kept in the journal (touch_journal.hpp).
 //
 // A person simulated on a device answers to F_B on the wall's axis, and on the other one where its scene says
 // that it is the same person's hand (operator.same_person).
@@ -14,12 +13,19 @@
 #include <string>
 #include <vector>
 
+#include "firmware/drive/axes_law.hpp"
+#include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/bench/journal.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/rig.hpp"
-#include "host_tools/experiment/two_axis_touch.hpp"
+#include "host_tools/experiment/watched_touch.hpp"
 
 namespace kmax::experiment {
+
+/// The axis along the surface of this one's wall.
+constexpr std::size_t along(std::size_t axis) {
+  return firmware::axis_along<firmware::axis_count>(axis);
+}
 
 /// Of every touch of an experiment.
 struct TouchLimits {
@@ -27,7 +33,7 @@ struct TouchLimits {
   double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
   double abort_amplitude = 0.01;                  ///< m; TouchWatch::abort_amplitude
   double patience = 20.0;                         ///< s for the person to come to the wall
-  double wall_abort_amplitude = 1e-3;  ///< m, against a wall that forces act along: two_axis_touch.hpp
+  double wall_abort_amplitude = 1e-3;             ///< m, against a wall that forces act along: TouchWatch
 };
 
 /// Everything the touches of `experiment` depend on, for a journal: the device's circumstances, the
@@ -72,7 +78,6 @@ class DeviceRig final : public Rig {
 
  private:
   RigTouch hold(const TouchPlan& plan) override;
-  RigTouch hold_on_two_axes(const TouchPlan& plan, TouchWatch watch);
   const TouchSession* session() const override { return &session_; }
   /// Somebody else may have raised a limit since the touch before.
   void set_with_limits(const RigWall& wall);

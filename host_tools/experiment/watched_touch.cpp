@@ -16,48 +16,78 @@ using device::TraceSample;
 using std::chrono::milliseconds;
 
 namespace {
-constexpr double afterwards = 0.3;                         // s of the release, for the picture
 constexpr auto longest_silence = std::chrono::seconds(2);  // of the trace; each request takes < 1 s
-constexpr double trace_rate = 500.0;                       // records per s: 8 kB/s of 11.5 at 115200 baud
 constexpr double longest_timeout = 1.0;                    // s an axis may push that nobody watches
 
-/// Removes the force whatever happens.
-class ArmedWhile {
+/// Somebody came to the wall between the look and the arming, which was refused.
+class CameTooSoon : public device::DeviceError {
  public:
-  ArmedWhile(device::Device& device, std::size_t axis) : drive_(device, axis) { drive_.arm(); }
-  ~ArmedWhile() {
+  using device::DeviceError::DeviceError;
+};
+
+/// Removes the force of all axes whatever happens.
+class ArmedAxes {
+ public:
+  ArmedAxes(device::Device& device, const std::vector<std::size_t>& axes) {
+    for (const std::size_t axis : axes) drives_.emplace_back(device, axis);
     try {
-      if (armed_) drive_.disarm();
-    } catch (const std::exception&) {
-      // The link is gone: link.timeout removes the force on the device.
+      for (device::Drive& drive : drives_) arm(drive);
+    } catch (...) {
+      disarm_quietly();
+      throw;
     }
   }
-  ArmedWhile(const ArmedWhile&) = delete;
-  ArmedWhile& operator=(const ArmedWhile&) = delete;
+  ~ArmedAxes() {
+    if (armed_) disarm_quietly();
+  }
+  ArmedAxes(const ArmedAxes&) = delete;
+  ArmedAxes& operator=(const ArmedAxes&) = delete;
 
   void require_armed() {
-    const device::DriveStatus status = drive_.status();
-    if (!status.armed()) fail_without_force(status);
+    for (device::Drive& drive : drives_) {
+      const device::DriveStatus status = drive.status();
+      if (!status.armed()) fail_without_force(drive.axis(), status);
+    }
   }
   /// An axis that stays armed is an error to be told.
   void disarm() {
-    drive_.disarm();
+    for (device::Drive& drive : drives_) drive.disarm();
     armed_ = false;
   }
   /// After disarming: what the touch was aborted for at `time` of the trace happened under force.
   void require_force_until(double time, const LateAbort& late) {
-    const device::DriveStatus status = drive_.status();
-    if (late.is_late(time, status)) fail_without_force(status);
+    for (device::Drive& drive : drives_) {
+      const device::DriveStatus status = drive.status();
+      if (late.is_late(time, status)) fail_without_force(drive.axis(), status);
+    }
   }
 
  private:
-  [[noreturn]] static void fail_without_force(const device::DriveStatus& status) {
+  static void arm(device::Drive& drive) {
+    try {
+      drive.arm();
+    } catch (const device::DeviceError& error) {
+      // What the device says: the handle may be out again by now.
+      if (drive.status().refusal != firmware::Refusal::handle_inside_wall) throw;
+      throw CameTooSoon(error.what());
+    }
+  }
+  [[noreturn]] static void fail_without_force(std::size_t axis, const device::DriveStatus& status) {
     throw device::DeviceError(
-        fmt::format("the axis lost its force during the trial: {}",
+        fmt::format("axis {} lost its force during the touch: {}", axis,
                     status.faulty() ? status.fault_words() : std::string(device::to_string(status.state()))));
   }
+  void disarm_quietly() {
+    for (device::Drive& drive : drives_) {
+      try {
+        drive.disarm();
+      } catch (const std::exception&) {
+        // The link is gone: link.timeout removes the force on the device.
+      }
+    }
+  }
 
-  device::Drive drive_;
+  std::vector<device::Drive> drives_;
   bool armed_ = true;
 };
 
@@ -74,48 +104,137 @@ bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
   return *std::min_element(count.begin(), count.end()) >= 2;
 }
 
-/// Whoever pressed in the trial before may still be inside the wall, where arming is refused: waits until the
-/// handle is out, as long as the patience lasts.
-void wait_until_outside(device::Device& device, const WatchedTouch& touch, const TouchWatch& watch,
-                        const ReportText& report) {
-  const auto begin = device.link().now();
-  const auto outside = [&] {
-    return touch.side * (axis_number(device, watch.axis, "measured.position") - touch.surface) > 0.0;
-  };
-  while (!outside() && device.link().now() - begin < std::chrono::duration<double>(watch.contact_patience)) {
-    report(fmt::format("{}: take the handle out of the wall", watch.name));
-    device.link().wait(milliseconds(200));
-  }
-}
-
-/// What the loop knows of the samples so far.
-class Progress {
+class Watch {
  public:
-  Progress(const TouchWatch& watch, WatchedTouch& touch) : watch_(watch), touch_(touch) {}
+  Watch(device::Device& device, const TouchWatch& watch, const ReportText& report)
+      : device_(device), watch_(watch), report_(report) {}
 
-  /// Looks at the samples that have come since the last time. False: there are none.
-  bool look() {
-    if (looked_at_ == touch_.samples.size()) return false;
+  WatchedTouch run() {
+    if (wall_traced()) {
+      touch_.surface = axis_number(device_, wall(), "wall.position");
+      touch_.side = axis_number(device_, wall(), "wall.side");
+    }
+    wait_until_outside();
+    const double thinning =
+        std::max(1.0, std::round(axis_number(device_, traced(), "haptic.rate") / watch_.trace_rate));
+    device::TraceReader trace(device_, traced(), static_cast<std::uint16_t>(thinning));
+    {
+      ArmedAxes armed(device_, watch_.axes);
+      record(trace, armed);
+      if (!touch_.aborted_at) armed.require_armed();
+      armed.disarm();
+      if (touch_.aborted_at) armed.require_force_until(touched_ + *touch_.aborted_at, late_);
+    }
+    trace.stop();
+    for (const std::size_t axis : watch_.axes) {
+      const double all = axis_number(device_, axis, "measured.armed_samples");
+      if (all > 0)
+        touch_.limited_share =
+            std::max(touch_.limited_share, axis_number(device_, axis, "measured.limited_samples") / all);
+    }
+    touch_.lost_records = trace.lost();
+    if (!looks_.empty())
+      touch_.contact_share = static_cast<double>(touching_) / static_cast<double>(looks_.size());
+    for (TraceSample& sample : touch_.samples) sample.time -= touched_;
+    return std::move(touch_);
+  }
+
+ private:
+  std::size_t traced() const { return watch_.axes.front(); }
+  std::size_t wall() const { return watch_.axes.back(); }
+  bool wall_traced() const { return traced() == wall(); }
+  bool touched() const { return touched_ >= 0.0; }
+  double now() const { return touch_.samples.empty() ? 0.0 : touch_.samples.back().time; }
+  bool over() const { return touched() && now() >= touched_ + watch_.hold_time + watch_.release; }
+
+  /// Of the wall's axis from the surface, m, as the device has it when it refuses to be armed inside.
+  double distance() { return axis_number(device_, wall(), "measured.distance"); }
+
+  /// Whoever pressed in the touch before may still be inside the wall, where arming is refused: waits until
+  /// the handle is out, as long as the patience lasts.
+  void wait_until_outside() {
+    const auto begin = device_.link().now();
+    while (distance() <= 0.0 &&
+           device_.link().now() - begin < std::chrono::duration<double>(watch_.contact_patience)) {
+      report_(fmt::format("{}: take the handle out of the wall", watch_.name));
+      device_.link().wait(milliseconds(200));
+    }
+  }
+
+  void record(device::TraceReader& trace, ArmedAxes& armed) {
+    auto last_record = device_.link().now();
+    for (int round = 0;; ++round) {
+      device_.link().wait(milliseconds(20));
+      trace.read(touch_.samples);
+      if (looked_at_ < touch_.samples.size()) last_record = device_.link().now();
+      late_.looked(now());
+      if (!wall_traced()) look_at_wall();
+      look_at_trace();
+      if (touch_.aborted_at || over()) return;
+      // Without this the axes would stay armed for ever.
+      if (device_.link().now() - last_record > longest_silence)
+        throw device::DeviceError("the trace has stopped during the touch; does another program use it?");
+      if (!touched() && now() > watch_.contact_patience)
+        throw NobodyTouched(
+            fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
+                        watch_.contact_patience));
+      if (touched()) make_changes();
+      if (round % 10 != 0) continue;
+      armed.require_armed();
+      report_(words());
+    }
+  }
+
+  void begin_touch(double time) { touched_ = disturbed_ = time; }
+
+  /// At the samples that have come since the last time.
+  void look_at_trace() {
     for (; looked_at_ < touch_.samples.size() && !touch_.aborted_at; ++looked_at_) {
       const TraceSample& sample = touch_.samples[looked_at_];
-      if (!touched() && touch_.side * (sample.position - touch_.surface) <= 0.0) {
-        first_ = looked_at_;
-        touched_ = sample.time;
+      if (!touched() && wall_traced() && touch_.side * (sample.position - touch_.surface) <= 0.0)
+        begin_touch(sample.time);
+      if (!touched() || sample.time < touched_) {
+        first_ = looked_at_ + 1;
+        continue;
       }
-      if (!touched() || watch_.abort_amplitude <= 0.0 || sample.time > touched_ + watch_.hold_time) continue;
+      if (watch_.abort_amplitude <= 0.0 || sample.time > touched_ + watch_.hold_time) continue;
       const std::span<const TraceSample> since(&touch_.samples[first_], looked_at_ - first_ + 1);
       const double amplitude = oscillation(since, watch_.abort_window);
-      if (amplitude <= watch_.abort_amplitude) continue;
-      touch_.aborted_at = sample.time - touched_;
-      touch_.aborted_amplitude = amplitude;
+      if (amplitude > watch_.abort_amplitude) abort(sample.time, amplitude);
     }
-    return true;
   }
 
-  double now() const { return touch_.samples.empty() ? 0.0 : touch_.samples.back().time; }
-  bool touched() const { return touched_ >= 0.0; }
-  double touched_at() const { return touched_; }
-  bool over() const { return touched() && now() >= touched_ + watch_.hold_time + afterwards; }
+  /// By one reading.
+  void look_at_wall() {
+    const double here = distance();
+    if (!touched() && here <= 0.0) begin_touch(now());
+    if (!touched()) return;
+    looks_.push_back({now(), here, 0.0, 0.0});
+    touching_ += here <= 0.0 ? 1 : 0;
+    const auto settled = std::ranges::find_if(
+        looks_, [&](const TraceSample& look) { return look.time >= disturbed_ + wall_settling; });
+    const double limit = watch_.wall_abort_amplitude, amplitude = oscillation(looks_, watch_.abort_window);
+    if (limit <= 0.0 ||
+        (oscillation({settled, looks_.end()}, watch_.abort_window) <= limit && amplitude <= 5.0 * limit))
+      return;
+    abort(now(), amplitude);
+  }
+
+  void abort(double time, double amplitude) {
+    touch_.aborted_at = time - touched_;
+    touch_.aborted_amplitude = amplitude;
+  }
+
+  void make_changes() {
+    while (touch_.change_times.size() < watch_.changes.size()) {
+      const double time = now();
+      const TimedChange& next = watch_.changes[touch_.change_times.size()];
+      if (time < touched_ + next.time) return;
+      device_.apply(device::parse_assignments(next.assignments, wall()));
+      touch_.change_times.push_back(time - touched_);
+      if (next.moves_wall_axis) disturbed_ = time;
+    }
+  }
 
   std::string words() const {
     if (!touched()) return fmt::format("{}: waiting for the touch", watch_.name);
@@ -123,11 +242,17 @@ class Progress {
                        std::min(now() - touched_, watch_.hold_time), watch_.hold_time);
   }
 
- private:
+  device::Device& device_;
   const TouchWatch& watch_;
-  WatchedTouch& touch_;
-  std::size_t looked_at_ = 0, first_ = 0;
+  const ReportText& report_;
+  WatchedTouch touch_;
+  LateAbort late_;
+  std::size_t looked_at_ = 0,
+              first_ = 0;  ///< of the samples: the next to be looked at, the first of the touch
   double touched_ = -1.0;
+  double disturbed_ = -1.0;         ///< the touch or the last change that moved the wall's axis
+  std::vector<TraceSample> looks_;  ///< at the wall's axis, since the touch
+  std::size_t touching_ = 0;        ///< of the looks
 };
 }  // namespace
 
@@ -151,80 +276,30 @@ double oscillation(std::span<const TraceSample> samples, double window) {
 
 void require_sound(const TouchWatch& watch) {
   // With a NaN no comparison would ever end the touch.
-  const bool times = std::isfinite(watch.hold_time) && watch.hold_time > 0.0 &&
-                     std::isfinite(watch.contact_patience) && watch.contact_patience > 0.0;
-  const bool abort = std::isfinite(watch.abort_amplitude) && watch.abort_amplitude >= 0.0 &&
-                     std::isfinite(watch.abort_window) && watch.abort_window > 0.0;
-  if (times && abort) return;
+  const auto sound = [](double value, bool may_be_0) {
+    return std::isfinite(value) && (value > 0.0 || (may_be_0 && value == 0.0));
+  };
+  if (watch.axes.empty()) throw std::invalid_argument("a touch on no axis: name the wall's");
+  if (sound(watch.hold_time, false) && sound(watch.contact_patience, false) &&
+      sound(watch.abort_window, false) && sound(watch.trace_rate, false) && sound(watch.release, true) &&
+      sound(watch.abort_amplitude, true) && sound(watch.wall_abort_amplitude, true))
+    return;
   throw std::invalid_argument(
-      fmt::format("a touch held for {} s, waited for {} s, ended by {} m within {} s: all must be finite, "
-                  "the times above 0, the amplitude 0 or above",
-                  watch.hold_time, watch.contact_patience, watch.abort_amplitude, watch.abort_window));
+      fmt::format("a touch held for {} s, waited for {} s, traced {} times a second and for {} s after the "
+                  "hold, ended by "
+                  "{} m, or {} m of the wall, within {} s: all must be finite, the amplitudes and the time "
+                  "after the hold "
+                  "0 or above, the others above 0",
+                  watch.hold_time, watch.contact_patience, watch.trace_rate, watch.release,
+                  watch.abort_amplitude, watch.wall_abort_amplitude, watch.abort_window));
 }
-
-namespace {
-/// Somebody came to the wall between the look and the arming, which was refused.
-class CameTooSoon : public device::DeviceError {
- public:
-  using device::DeviceError::DeviceError;
-};
-
-WatchedTouch watch_once(device::Device& device, const TouchWatch& watch, const ReportText& report) {
-  WatchedTouch touch;
-  touch.surface = axis_number(device, watch.axis, "wall.position");
-  touch.side = axis_number(device, watch.axis, "wall.side");
-  wait_until_outside(device, touch, watch, report);
-  const double thinning =
-      std::max(1.0, std::round(axis_number(device, watch.axis, "haptic.rate") / trace_rate));
-  device::TraceReader trace(device, watch.axis, static_cast<std::uint16_t>(thinning));
-  Progress progress(watch, touch);
-  LateAbort late;
-  {
-    std::optional<ArmedWhile> holding;
-    try {
-      holding.emplace(device, watch.axis);
-    } catch (const device::DeviceError& error) {
-      if (touch.side * (axis_number(device, watch.axis, "measured.position") - touch.surface) > 0.0) throw;
-      throw CameTooSoon(error.what());
-    }
-    ArmedWhile& armed = *holding;
-    auto last_news = device.link().now();
-    for (int round = 0; !progress.over(); ++round) {
-      device.link().wait(milliseconds(20));
-      trace.read(touch.samples);
-      if (progress.look()) last_news = device.link().now();
-      late.looked(progress.now());
-      if (touch.aborted_at) break;
-      // Without this the axis would stay armed for ever.
-      if (device.link().now() - last_news > longest_silence)
-        throw device::DeviceError("the trace has stopped during the trial; does another program use it?");
-      if (!progress.touched() && progress.now() > watch.contact_patience)
-        throw NobodyTouched(
-            fmt::format("nobody touched the wall within {} s of arming; press the handle against it",
-                        watch.contact_patience));
-      if (round % 10 != 0 || progress.over()) continue;
-      armed.require_armed();
-      report(progress.words());
-    }
-    if (!touch.aborted_at) armed.require_armed();
-    armed.disarm();
-    if (touch.aborted_at) armed.require_force_until(progress.touched_at() + *touch.aborted_at, late);
-  }
-  trace.stop();
-  const double all = axis_number(device, watch.axis, "measured.armed_samples");
-  touch.limited_share = all > 0 ? axis_number(device, watch.axis, "measured.limited_samples") / all : 0.0;
-  touch.lost_records = trace.lost();
-  for (TraceSample& sample : touch.samples) sample.time -= progress.touched_at();
-  return touch;
-}
-}  // namespace
 
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const ReportText& report) {
   require_sound(watch);
   const auto begin = device.link().now();
   for (;;) {
     try {
-      return watch_once(device, watch, report);
+      return Watch(device, watch, report).run();
     } catch (const CameTooSoon&) {
       const std::chrono::duration<double> waited = device.link().now() - begin;
       if (waited.count() >= watch.contact_patience) throw;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -74,7 +75,28 @@ class TouchedBoard : public testing::Test {
     device.apply(device::parse_assignments(assignments));
   }
 
+  /// Once, when this axis begins to be armed, the hand is in the wall of axis 0, until it is asked to go
+  /// back. (It is the wall that comes: the hand rests at 0.02 m until its axis is armed.)
+  void come_while_arming(std::size_t axis) {
+    cable().before_request = [this, axis, asking = false]() mutable {
+      if (came || asking) return;
+      asking = true;
+      came = device::Drive(device, axis).status().state() == firmware::DriveState::ready_to_switch_on;
+      if (came) set({"wall.position=0.05"});
+      asking = false;
+    };
+    report = [this](const std::string& text) {
+      reported.push_back(text);
+      if (text.ends_with("take the handle out of the wall")) set({"wall.position=0"});
+    };
+  }
+  void expect_came_and_went(const std::string& touch) {
+    EXPECT_TRUE(came);
+    EXPECT_EQ(std::ranges::count(reported, touch + ": take the handle out of the wall"), 1);
+  }
+
   device::Device device;
+  bool came = false;
   std::vector<std::string> reported;
   std::function<void(const std::string&)> report = [this](const std::string& text) {
     reported.push_back(text);

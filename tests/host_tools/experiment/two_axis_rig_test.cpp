@@ -122,6 +122,16 @@ TEST_F(DeviationDevice, ABackgroundForceOnAStableWallEndsNothing) {
   EXPECT_EQ(result.results[0].touches, 1u) << result.results[0].without_contact;
 }
 
+// The wall's axis is armed last, and a hand may have come to the wall meanwhile.
+TEST_F(DeviationDevice, AHandThatComesBeforeTheRecordingBeganIsAskedToGoBack) {
+  come_while_arming(1);
+  const DeviationRun result = run();
+  expect_came_and_went("F_B = 0 N, F_I = 3 N");
+  expect_disarmed_and_restored();
+  EXPECT_EQ(result.results[0].touches, 1u);
+  EXPECT_EQ(person.requests.size(), 1u);
+}
+
 DeviationRun served(const simulation::Scene& scene, const DeviationSettings& settings) {
   device::Device device(std::make_unique<link::SimLink>(scene));
   device.apply(device::parse_assignments({"axis1.wall.law=none"}));

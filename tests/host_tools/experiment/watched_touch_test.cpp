@@ -160,19 +160,31 @@ TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
   expect_disarmed();
 }
 
+TEST_F(Watched, AHandThatComesBeforeTheRecordingBeganIsAskedToGoBack) {
+  come_while_arming(0);
+  const WatchedTouch touched = touch();
+  expect_came_and_went("wall");
+  expect_disarmed();
+  EXPECT_GT(touched.samples.back().time, 1.0);
+}
+
 // No comparison with a NaN is ever true: the axis would stay armed for ever.
 TEST_F(Watched, WhatWouldNeverEndTheTouchIsRefusedBeforeArming) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   constexpr double infinity = std::numeric_limits<double>::infinity();
   report = [&](const std::string&) { FAIL() << "begun"; };
   for (const double bad : {nan, infinity, -1.0}) {
-    for (double TouchWatch::*member : {&TouchWatch::hold_time, &TouchWatch::contact_patience,
-                                       &TouchWatch::abort_amplitude, &TouchWatch::abort_window}) {
+    for (double TouchWatch::*member :
+         {&TouchWatch::hold_time, &TouchWatch::contact_patience, &TouchWatch::abort_amplitude,
+          &TouchWatch::abort_window, &TouchWatch::release, &TouchWatch::trace_rate,
+          &TouchWatch::wall_abort_amplitude}) {
       TouchWatch one = watch;
       one.*member = bad;
       EXPECT_NE(thrown_message<std::invalid_argument>([&] { watch_touch(device, one, report); }), "") << bad;
     }
   }
+  watch.axes.clear();
+  EXPECT_CONTAINS(thrown_message<std::invalid_argument>([&] { touch(); }), "on no axis");
   expect_disarmed();
 }
 
@@ -223,7 +235,7 @@ TEST_F(WatchedSpringyHand, StaysWithinItsBoundUnderForce) {
 TEST_F(WatchedSpringyHand, WhatItDoesAfterItsForceWasRemovedUnseenIsNoOscillation) {
   stall = {Stall::Of::program, 30, [](int) { return true; }};
   const auto what = thrown_message<device::DeviceError>([&] { watch_touch(device, watch, report); });
-  EXPECT_CONTAINS(what, "lost its force during the trial: the host was silent");
+  EXPECT_CONTAINS(what, "lost its force during the touch: the host was silent");
   expect_disarmed();
 }
 

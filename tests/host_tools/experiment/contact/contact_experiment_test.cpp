@@ -112,7 +112,7 @@ TEST_F(Contact, AnExceptionFromTellDisarms) {
 TEST_F(Contact, AFaultOnTheWayIsReported) {
   report = [&](const std::string&) { simulation().device().connect_encoder(0, false); };
   const auto what = thrown_message<device::DeviceError>([&] { run(0); });
-  EXPECT_CONTAINS(what, "lost its force during the trial");
+  EXPECT_CONTAINS(what, "lost its force during the touch");
   EXPECT_CONTAINS(what, "encoder");
   expect_disarmed();
 }

@@ -158,7 +158,7 @@ TEST_F(DeviceStiffness, AFaultEndsTheRunWithItsWordsAndKeepsTheTouchesBefore) {
       simulation().device().connect_encoder(0, false);
   };
   const auto what = thrown_message<device::DeviceError>([&] { find(wall_with(2), nullptr, journal.get()); });
-  EXPECT_CONTAINS(what, "lost its force during the trial");
+  EXPECT_CONTAINS(what, "lost its force during the touch");
   EXPECT_CONTAINS(what, "encoder");
   EXPECT_EQ(journal->size(), 1u);
   expect_disarmed();
