@@ -36,42 +36,26 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
   const auto choice = [](const device::Parameter& parameter, auto value) {
     return device::value_text(parameter, static_cast<std::uint32_t>(value));
   };
-  const std::string law = "wall.law=" + choice(device::Parameter::of<"wall.law">(), wall.law),
-                    stiffness = fmt::format("wall.stiffness={}", wall.stiffness),
-                    rate = fmt::format("haptic.rate={}", wall.haptic_rate),
-                    resolution = fmt::format("position.resolution={}", wall.resolution),
-                    mode = "interference.mode=" +
-                           choice(device::Parameter::of<"interference.mode">(), wall.interference);
-  if (wall.law != control::WallKind::plain)
-    return {stiffness,
-            rate,
-            "wall.damping=0",
-            resolution,
-            "wall.magnetic_length=0.001",
-            "wall.adaptive_gain=2.4",
-            "wall.adaptive_offset=0.8",
-            "wall.adaptive_velocity_max=2.4",
-            "wall.adaptive_relation=linear",
-            "wall.adaptive_velocity=approach",
-            "wall.adaptive_force_min=0.8",
-            "wall.adaptive_force_max=2",
-            "wall.adaptive_hold_time=1.2",
-            mode,
-            law,
-            wall.law == control::WallKind::magnetic
-                ? fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient)
-                : "wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)};
   std::vector<std::string> all = {
-      law,
+      fmt::format("wall.stiffness={}", wall.stiffness),
+      fmt::format("haptic.rate={}", wall.haptic_rate),
       "wall.damping=0",
-      "interference.onset_time=0",
-      stiffness,
-      rate,
-      resolution,
+      fmt::format("position.resolution={}", wall.resolution),
       "position.rounding=" + choice(device::Parameter::of<"position.rounding">(), wall.rounding),
-      mode,
+      "interference.mode=" + choice(device::Parameter::of<"interference.mode">(), wall.interference),
       fmt::format("interference.force={}", wall.force),
-      fmt::format("interference.background_force={}", wall.background_force)};
+      fmt::format("interference.background_force={}", wall.background_force),
+      "interference.onset_time=0",
+      "wall.law=" + choice(device::Parameter::of<"wall.law">(), wall.law)};
+  if (wall.law != control::WallKind::plain)
+    all.insert(
+        all.end(),
+        {"wall.magnetic_length=0.001", "wall.adaptive_gain=2.4", "wall.adaptive_offset=0.8",
+         "wall.adaptive_velocity_max=2.4", "wall.adaptive_relation=linear", "wall.adaptive_velocity=approach",
+         "wall.adaptive_force_min=0.8", "wall.adaptive_force_max=2", "wall.adaptive_hold_time=1.2",
+         wall.law == control::WallKind::magnetic
+             ? fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient)
+             : "wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)});
   if (axes == RigAxes::wall_along)
     for (const std::string& one :
          {std::string("wall.law=none"), std::string("position.resolution=0"),

@@ -86,6 +86,40 @@ TEST_F(Limited, LimitsThatAreLowerAlreadyStay) {
   expect_restored();
 }
 
+TEST_F(Limited, AWallOfEveryLawIsSetWithAllThatItHas) {
+  begin(RigAxes::wall_along);
+  for (const auto law :
+       {control::WallKind::plain, control::WallKind::magnetic, control::WallKind::adaptive}) {
+    SCOPED_TRACE(static_cast<int>(law));
+    // What the wall before has left.
+    set({"position.rounding=nearest", "interference.mode=none", "interference.force=0",
+         "interference.background_force=0", "interference.onset_time=1", "axis1.wall.law=plain",
+         "axis1.position.resolution=0.001", "axis1.interference.mode=perpendicular",
+         "axis1.haptic.rate=20000"});
+    RigWall wall;
+    wall.law = law;
+    wall.resolution = 0.4e-3;
+    wall.rounding = control::Rounding::floor;
+    wall.interference = control::InterferenceMode::parallel;
+    wall.force = 1.5;
+    wall.background_force = 0.5;
+    rig->set(wall);
+    const auto value = [&](const char* name) { return device.read_number(name); };
+    EXPECT_EQ(value("wall.law"), static_cast<double>(law));
+    EXPECT_EQ(value("position.resolution"), 0.4e-3F);
+    EXPECT_EQ(value("position.rounding"), static_cast<double>(control::Rounding::floor));
+    EXPECT_EQ(value("interference.mode"), static_cast<double>(control::InterferenceMode::parallel));
+    EXPECT_EQ(value("interference.force"), 1.5);
+    EXPECT_EQ(value("interference.background_force"), 0.5);
+    EXPECT_EQ(value("interference.onset_time"), 0.0);
+    EXPECT_EQ(value("axis1.wall.law"), static_cast<double>(control::WallKind::none));
+    EXPECT_EQ(value("axis1.position.resolution"), 0.0);
+    EXPECT_EQ(value("axis1.interference.mode"), static_cast<double>(control::InterferenceMode::none));
+    EXPECT_EQ(value("axis1.haptic.rate"), wall.haptic_rate);
+  }
+  expect_restored();
+}
+
 TEST_F(Limited, ALimitThatTheDeviceRefusesChangesNothing) {
   limits.force_limit = -1.0;
   EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { begin(RigAxes::wall_along); }), "force.limit");
