@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 
 #include "firmware/drive/fault.hpp"
@@ -33,33 +32,38 @@ constexpr milliseconds transition_poll_interval{10};
 // haptic sample. A refusal that is shown for longer after the attempt is the attempt's own.
 constexpr milliseconds judgement{50};
 
-struct StateWords {
-  DriveState state;
+struct StateText {
   std::string_view name, text;
 };
-constexpr StateWords state_words[] = {
-    {DriveState::not_ready_to_switch_on, "not_ready_to_switch_on", "Not ready to switch on"},
-    {DriveState::switch_on_disabled, "switch_on_disabled", "Switch on disabled"},
-    {DriveState::ready_to_switch_on, "ready_to_switch_on", "Ready to switch on"},
-    {DriveState::switched_on, "switched_on", "Switched on"},
-    {DriveState::operation_enabled, "operation_enabled", "Operation enabled"},
-    {DriveState::quick_stop_active, "quick_stop_active", "Quick stop active"},
-    {DriveState::fault_reaction_active, "fault_reaction_active", "Fault reaction active"},
-    {DriveState::fault, "fault", "Fault"},
-};
-
-StateWords words_of(DriveState state) {
-  const auto found = std::ranges::find(state_words, state, &StateWords::state);
-  return found != std::end(state_words) ? *found : StateWords{state, "unknown", "Unknown"};
+StateText text_of(DriveState state) {
+  switch (state) {
+    case DriveState::not_ready_to_switch_on:
+      return {"not_ready_to_switch_on", "Not ready to switch on"};
+    case DriveState::switch_on_disabled:
+      return {"switch_on_disabled", "Switch on disabled"};
+    case DriveState::ready_to_switch_on:
+      return {"ready_to_switch_on", "Ready to switch on"};
+    case DriveState::switched_on:
+      return {"switched_on", "Switched on"};
+    case DriveState::operation_enabled:
+      return {"operation_enabled", "Operation enabled"};
+    case DriveState::quick_stop_active:
+      return {"quick_stop_active", "Quick stop active"};
+    case DriveState::fault_reaction_active:
+      return {"fault_reaction_active", "Fault reaction active"};
+    case DriveState::fault:
+      return {"fault", "Fault"};
+  }
+  return {"unknown", "Unknown"};
 }
 }  // namespace
 
 std::string_view name_of(DriveState state) {
-  return words_of(state).name;
+  return text_of(state).name;
 }
 
 std::string_view to_string(DriveState state) {
-  return words_of(state).text;
+  return text_of(state).text;
 }
 
 std::string DriveStatus::fault_words() const {
