@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <vector>
 
@@ -217,19 +216,26 @@ BackEmfFit fit_back_emf(std::span<const BackEmfRecord> records, const BackEmfCon
 }
 
 std::string_view to_string(BackEmfCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "back-EMF: too few samples, or channels of different length",
-      "back-EMF: a sample is not a number",
-      "back-EMF: the shaft hardly moves; more current, a longer half period, or free the handle",
-      "back-EMF: the shaft turns and no voltage is induced; the encoder is not on this motor's shaft, or a "
-      "phase is open",
-      "back-EMF: the induced voltage has the wrong sign; encoder.direction is wrong, or two wires are "
-      "swapped",
-      "back-EMF: the torque constant is not determined; more speed or more samples"};
-  static_assert(std::size(words) == static_cast<std::size_t>(BackEmfCause::not_resolved) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case BackEmfCause::none:
+      break;
+    case BackEmfCause::too_little_data:
+      return "back-EMF: too few samples, or channels of different length";
+    case BackEmfCause::not_finite:
+      return "back-EMF: a sample is not a number";
+    case BackEmfCause::no_motion:
+      return "back-EMF: the shaft hardly moves; more current, a longer half period, or free the handle";
+    case BackEmfCause::no_voltage:
+      return "back-EMF: the shaft turns and no voltage is induced; the encoder is not on this motor's shaft, "
+             "or a "
+             "phase is open";
+    case BackEmfCause::reversed:
+      return "back-EMF: the induced voltage has the wrong sign; encoder.direction is wrong, or two wires are "
+             "swapped";
+    case BackEmfCause::not_resolved:
+      return "back-EMF: the torque constant is not determined; more speed or more samples";
+  }
+  return {};
 }
 
 }  // namespace kmax::calibration

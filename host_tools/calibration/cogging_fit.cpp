@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <vector>
 
@@ -314,18 +313,27 @@ CoggingFit fit_cogging(std::span<const CoggingSweep> sweeps, const CoggingFitCon
 }
 
 std::string_view to_string(CoggingCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "cogging: too few samples that move; sweep further or longer",
-      "cogging: a sample is not a number",
-      "cogging: the handle does not move; it is blocked, or friction is more than the force allowed",
-      "cogging: sweeps in both directions are needed",
-      "cogging: the shaft stands and jumps; raise excitation.stiffness above what the cogging has itself",
-      "cogging: fewer than 2 of its periods were swept; sweep further (friction and gravity are valid)",
-      "cogging: another number of periods per turn fits as well; sweep further or slower"};
-  static_assert(std::size(words) == static_cast<std::size_t>(CoggingCause::periods_ambiguous) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case CoggingCause::none:
+      break;
+    case CoggingCause::too_little_data:
+      return "cogging: too few samples that move; sweep further or longer";
+    case CoggingCause::not_finite:
+      return "cogging: a sample is not a number";
+    case CoggingCause::no_motion:
+      return "cogging: the handle does not move; it is blocked, or friction is more than the force allowed";
+    case CoggingCause::one_direction:
+      return "cogging: sweeps in both directions are needed";
+    case CoggingCause::uneven_motion:
+      return "cogging: the shaft stands and jumps; raise excitation.stiffness above what the cogging has "
+             "itself";
+    case CoggingCause::range_too_short:
+      return "cogging: fewer than 2 of its periods were swept; sweep further (friction and gravity are "
+             "valid)";
+    case CoggingCause::periods_ambiguous:
+      return "cogging: another number of periods per turn fits as well; sweep further or slower";
+  }
+  return {};
 }
 
 }  // namespace kmax::calibration

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <iterator>
 
 #include "host_tools/calibration/step.hpp"
 
@@ -39,16 +38,22 @@ CurrentOffset check_current_offset(std::span<const double> current, const Curren
 }
 
 std::string_view to_string(CurrentOffsetCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "current offset: too few samples; capture more",
-      "current offset: a sample is not a number",
-      "current offset: with the bridge off a current is read; the amplifier drifts, or the shaft is turned",
-      "current offset: the noise is large; look at the shunts' wiring and the amplifier's gain",
-      "current offset: the reading is constant and far from zero; amplifier or converter is stuck"};
-  static_assert(std::size(words) == static_cast<std::size_t>(CurrentOffsetCause::railed) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case CurrentOffsetCause::none:
+      break;
+    case CurrentOffsetCause::too_little_data:
+      return "current offset: too few samples; capture more";
+    case CurrentOffsetCause::not_finite:
+      return "current offset: a sample is not a number";
+    case CurrentOffsetCause::offset_large:
+      return "current offset: with the bridge off a current is read; the amplifier drifts, or the shaft is "
+             "turned";
+    case CurrentOffsetCause::noise_large:
+      return "current offset: the noise is large; look at the shunts' wiring and the amplifier's gain";
+    case CurrentOffsetCause::railed:
+      return "current offset: the reading is constant and far from zero; amplifier or converter is stuck";
+  }
+  return {};
 }
 
 void check_current_sensors(Calibration& run) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -201,25 +200,39 @@ FieldTurnFit fit_field_turn(const FieldTurn& forwards, const FieldTurn& backward
 }
 
 std::string_view to_string(FieldTurnCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "field turn: less than one electrical turn each way; increase excitation.angle_span",
-      "field turn: a sample is not a number",
-      "field turn: the commanded angle does not turn forwards and back; look at excitation.angle_rate",
-      "field turn: the field turns and the encoder does not count; the motor is blocked, a phase is open, or "
-      "the encoder is dead",
-      "field turn: the number of pole pairs is not whole; encoder.counts_per_turn is wrong, or counts are "
-      "lost",
-      "field turn: the counts per electrical turn are not always the same; the rotor slips (more current), "
-      "the encoder slips on the shaft, or counts are lost",
-      "field turn: the forward and the backward sweep do not meet; friction is too much for the current, or "
-      "something slipped",
-      "field turn: the shaft did not follow the field's reversal; a phase is open, or the encoder's lines "
-      "are mixed up",
-      "field turn: motor.pole_pairs is not what the motor has"};
-  static_assert(std::size(words) == static_cast<std::size_t>(FieldTurnCause::pole_pairs_differ) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case FieldTurnCause::none:
+      break;
+    case FieldTurnCause::too_little_data:
+      return "field turn: less than one electrical turn each way; increase excitation.angle_span";
+    case FieldTurnCause::not_finite:
+      return "field turn: a sample is not a number";
+    case FieldTurnCause::field_still:
+      return "field turn: the commanded angle does not turn forwards and back; look at excitation.angle_rate";
+    case FieldTurnCause::motor_still:
+      return "field turn: the field turns and the encoder does not count; the motor is blocked, a phase is "
+             "open, or "
+             "the encoder is dead";
+    case FieldTurnCause::not_whole:
+      return "field turn: the number of pole pairs is not whole; encoder.counts_per_turn is wrong, or counts "
+             "are "
+             "lost";
+    case FieldTurnCause::slipping:
+      return "field turn: the counts per electrical turn are not always the same; the rotor slips (more "
+             "current), "
+             "the encoder slips on the shaft, or counts are lost";
+    case FieldTurnCause::not_meeting:
+      return "field turn: the forward and the backward sweep do not meet; friction is too much for the "
+             "current, or "
+             "something slipped";
+    case FieldTurnCause::direction_differs:
+      return "field turn: the shaft did not follow the field's reversal; a phase is open, or the encoder's "
+             "lines "
+             "are mixed up";
+    case FieldTurnCause::pole_pairs_differ:
+      return "field turn: motor.pole_pairs is not what the motor has";
+  }
+  return {};
 }
 
 }  // namespace kmax::calibration

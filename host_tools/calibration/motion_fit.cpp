@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <vector>
 
@@ -236,18 +235,26 @@ MotionFit fit_motion(std::span<const MotionRecord> records, const MotionFitConfi
 }
 
 std::string_view to_string(MotionCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "motion: too little of the record moves; more force, or a longer capture",
-      "motion: a sample is not a number",
-      "motion: there is no force; set excitation.alternation",
-      "motion: the handle does not move; it is blocked or sticks (more force), or the encoder is dead",
-      "motion: the handle accelerates against the force; direction or commutation is wrong",
-      "motion: friction comes out negative; the handle was held or pushed meanwhile: take the hand off",
-      "motion: the mass is not determined; more force, or a longer capture"};
-  static_assert(std::size(words) == static_cast<std::size_t>(MotionCause::not_resolved) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case MotionCause::none:
+      break;
+    case MotionCause::too_little_data:
+      return "motion: too little of the record moves; more force, or a longer capture";
+    case MotionCause::not_finite:
+      return "motion: a sample is not a number";
+    case MotionCause::no_force:
+      return "motion: there is no force; set excitation.alternation";
+    case MotionCause::no_motion:
+      return "motion: the handle does not move; it is blocked or sticks (more force), or the encoder is dead";
+    case MotionCause::reversed:
+      return "motion: the handle accelerates against the force; direction or commutation is wrong";
+    case MotionCause::negative_friction:
+      return "motion: friction comes out negative; the handle was held or pushed meanwhile: take the hand "
+             "off";
+    case MotionCause::not_resolved:
+      return "motion: the mass is not determined; more force, or a longer capture";
+  }
+  return {};
 }
 
 }  // namespace kmax::calibration

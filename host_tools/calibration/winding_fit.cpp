@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <vector>
 
@@ -334,22 +333,34 @@ WindingFit fit_winding(std::span<const WindingRecord> records, const WindingFitC
 }
 
 std::string_view to_string(WindingCause cause) {
-  // In the order of the causes.
-  static constexpr std::string_view words[] = {
-      "",
-      "winding: too few samples, or channels of different length; capture more",
-      "winding: a sample is not a number",
-      "winding: the voltage does not change; set excitation.alternation",
-      "winding: the voltage asked for is more than the supply can give; lower the voltage or raise the "
-      "supply",
-      "winding: no current follows the voltage; a phase is open, or the bridge is off",
-      "winding: a current is read that does not follow the voltage; the current sensor is faulty",
-      "winding: the current goes against the voltage; a current sensor is inverted",
-      "winding: the record does not determine R and L; more current, a longer half period or more samples",
-      "winding: the current does not behave as R and L in series; look at the capture (motion, saturation, a "
-      "loose wire)"};
-  static_assert(std::size(words) == static_cast<std::size_t>(WindingCause::bad_fit) + 1);
-  return words[static_cast<std::size_t>(cause)];
+  switch (cause) {
+    case WindingCause::none:
+      break;
+    case WindingCause::too_little_data:
+      return "winding: too few samples, or channels of different length; capture more";
+    case WindingCause::not_finite:
+      return "winding: a sample is not a number";
+    case WindingCause::no_alternation:
+      return "winding: the voltage does not change; set excitation.alternation";
+    case WindingCause::supply_saturated:
+      return "winding: the voltage asked for is more than the supply can give; lower the voltage or raise "
+             "the "
+             "supply";
+    case WindingCause::no_current:
+      return "winding: no current follows the voltage; a phase is open, or the bridge is off";
+    case WindingCause::current_constant:
+      return "winding: a current is read that does not follow the voltage; the current sensor is faulty";
+    case WindingCause::current_inverted:
+      return "winding: the current goes against the voltage; a current sensor is inverted";
+    case WindingCause::not_resolved:
+      return "winding: the record does not determine R and L; more current, a longer half period or more "
+             "samples";
+    case WindingCause::bad_fit:
+      return "winding: the current does not behave as R and L in series; look at the capture (motion, "
+             "saturation, a "
+             "loose wire)";
+  }
+  return {};
 }
 
 }  // namespace kmax::calibration
