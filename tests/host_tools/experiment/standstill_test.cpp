@@ -183,9 +183,8 @@ TEST_F(DisturbedTouches, APersonIsAskedAgain) {
 
 TEST_F(DisturbedTouches, WhatNeverEndsIsToldAfterTheThirdRepetition) {
   stall = {Stall::Of::program, 40, [](int) { return true; }};
-  EXPECT_CONTAINS(
-      thrown_message<device::DeviceError>([&] { run_contacts(); }),
-      "axis 0 lost its force during the touch: the host was silent for longer than link.timeout");
+  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }),
+                  "axis 0 lost its force during the touch: the host was silent for longer than link.timeout");
   EXPECT_EQ(touches, 1 + most_standstills);
   EXPECT_EQ(notices.size(), static_cast<std::size_t>(most_standstills));
   expect_left_in_order();
