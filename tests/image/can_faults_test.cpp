@@ -178,6 +178,7 @@ TEST_F(BusFaults, AFloodOfWritesDoesNotStarveTheMainLoop) {
 
 TEST_F(BusFaults, ParametersInPdosAtAKilohertzDoNotStarveTheMainLoop) {
   ASSERT_EQ(state, DriveState::operation_enabled);
+  bench.write(0x6040, 0, 0x00, 2);  // receive PDOs and their mapping change only while disarmed
   bench.write(0x1402, 1, 0x80000401, 4);
   bench.write(0x1602, 0, 0, 1);
   bench.write(0x1602, 1, 0x20000820, 4);
@@ -185,6 +186,7 @@ TEST_F(BusFaults, ParametersInPdosAtAKilohertzDoNotStarveTheMainLoop) {
   bench.write(0x1602, 0, 2, 1);
   bench.write(0x1402, 1, 0x401, 4);
   bench.nmt(0x01);
+  ASSERT_EQ(state_of(static_cast<std::uint16_t>(bench.arm())), DriveState::operation_enabled);
   for (int i = 0; i < 1000; ++i) {
     bench.port.send({.identifier = 0x401,
                      .length = 8,
