@@ -483,29 +483,42 @@ std::string letters_of(std::string name) {
 
 class FaultMatrix : public testing::TestWithParam<std::size_t> {};
 
+/// All states on both axes; else one axis, in turn, is tried in all of them and the other one armed.
+bool is_thorough() {
+  return std::getenv("KMAX_SOAK") != nullptr || std::getenv("KMAX_WRITE_DOCS") != nullptr;
+}
+
 TEST_P(FaultMatrix, IsWhatThePageSays) {
   const Cause cause = causes()[GetParam()];
-  std::array<std::string, axes> cells;
-  for (std::size_t axis = 0; axis < axes; ++axis) {
+  const std::size_t first = GetParam() % axes;
+  std::array<std::string, std::size(states)> cells;
+  for (const std::size_t axis : {first, 1 - first}) {
     auto bench = std::make_unique<Bench>();
     bench->start();
     bench->begin();
     if (cause.prepare) cause.prepare(*bench);
     ASSERT_TRUE(bench->recover());
-    for (const auto& [state, name] : states) {
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const DriveState state = states[i].first;
+      if (axis != first && state != DriveState::operation_enabled && !is_thorough()) continue;
       if (cause.at_start == Cause::AtStart::not_seen) {
         // The index must be where the handle is when the counter starts.
         bench = std::make_unique<Bench>();
         bench->start();
         bench->begin();
       }
-      cells[axis] += " | " + Cell(*bench, cause, state, axis).measure();
+      const std::string cell = Cell(*bench, cause, state, axis).measure();
+      if (axis == first)
+        cells[i] = cell;
+      else
+        EXPECT_EQ(cell, cells[i]) << "both axes alike: " << states[i].second;
     }
   }
-  EXPECT_EQ(cells[0], cells[1]) << "both axes alike";
+  std::string row;
+  for (const std::string& cell : cells) row += " | " + cell;
   compare(cause.name,
           "| " + std::string(cause.name) + " | " + (cause.hits == Hits::both ? "both axes" : "its axis") +
-              " | " + in_words(cause.ticks) + cells[0] + " |\n",
+              " | " + in_words(cause.ticks) + row + " |\n",
           "<!-- end of states -->");
 }
 
