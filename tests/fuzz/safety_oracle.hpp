@@ -9,7 +9,8 @@
 // 2. Once armed it stays so no longer than link.timeout, and one poll, after the last message of the link
 // that armed it that could be a sign of life.
 //
-// 3. Force is finite, within force.limit, and none at all unless the axis is armed and its inputs are sound.
+// 3. Force is finite, within force.limit, and none at all unless the axis is armed, or its force fades for at
+// most two seconds as link.loss says, and its inputs are sound.
 //
 // 4. Every setting is finite and within its bounds, at all times.
 //
@@ -84,7 +85,7 @@ class SafetyOracle {
   /// Of `axis`, after a tick.
   void take_tick(std::size_t axis, const Axis::Input& input, const Axis::Output& output) {
     const bool armed = states_[axis] == DriveState::operation_enabled;
-    if (output.enabled && !armed) complain("driven, and not armed", axis);
+    if (output.enabled && !armed && !may_fade(axis)) complain("driven, and not armed", axis);
     if (!output.enabled && output.force != 0.0f) complain("force without being driven", axis);
     if (output.enabled && (input.condition != Fault::none || !input.count_valid))
       complain("driven, and its inputs are not sound", axis);
@@ -222,7 +223,15 @@ class SafetyOracle {
            values_.whole<"heartbeat_consumer.node_4">() != 0;
   }
 
+  /// What link.loss allows after the commander was lost, with a few polls to find out.
+  bool may_fade(std::size_t axis) const {
+    constexpr std::uint64_t longest_us = 2'010'000;
+    return states_[axis] == DriveState::fault_reaction_active && values_.whole<"link.loss">() != 0 &&
+           now_us_ - reacts_since_us_[axis] <= longest_us;
+  }
+
   void judge_state(std::size_t axis, DriveState before) {
+    if (states_[axis] != before) reacts_since_us_[axis] = now_us_;
     auto& words = words_[axis];
     const bool armed = states_[axis] == DriveState::operation_enabled;
     const bool was_armed = before == DriveState::operation_enabled;
@@ -306,7 +315,8 @@ class SafetyOracle {
   States states_{};
   std::array<std::vector<Word>, axis_count> words_;
   std::array<bool, axis_count> shut_down_{};
-  std::array<std::array<bool, 2>, axis_count> armed_by_{};  ///< links that may have
+  std::array<std::uint64_t, axis_count> reacts_since_us_{};  ///< since when the state is what it is
+  std::array<std::array<bool, 2>, axis_count> armed_by_{};   ///< links that may have
   std::array<std::uint64_t, 2> life_us_{};
   std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0;
   std::vector<std::uint8_t> frame_;

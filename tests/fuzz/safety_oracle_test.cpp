@@ -160,6 +160,31 @@ TEST_F(SafetyOracleRule, DrivenWhileDisarmed) {
   tick(0.0f);
   expect_complaint("driven, and not armed, axis 0");
 }
+TEST_F(SafetyOracleRule, FadingAsTheOwnerChoseIsNoForceWithoutArming) {
+  set<"link.loss">(1);
+  start();
+  arm();
+  poll(DriveState::fault_reaction_active);
+  tick(1.0f);
+  poll(DriveState::fault_reaction_active, 1'900'000);
+  tick(0.1f);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, FadingForEver) {
+  set<"link.loss">(2);
+  start();
+  arm();
+  poll(DriveState::fault_reaction_active);
+  poll(DriveState::fault_reaction_active, 2'100'000);
+  tick(0.1f);
+  expect_complaint("driven, and not armed, axis 0");
+}
+TEST_F(SafetyOracleRule, FadingWhereTheOwnerChoseLimp) {
+  arm();
+  poll(DriveState::fault_reaction_active);
+  tick(0.1f);
+  expect_complaint("driven, and not armed, axis 0");
+}
 TEST_F(SafetyOracleRule, ForceWithoutBeingDriven) {
   tick(0.1f, false);
   expect_complaint("force without being driven, axis 0");
