@@ -48,7 +48,7 @@ const LoadReport& Application::attach_store(AnyFlashSectors flash) {
 }
 
 ParameterAccess::Result Application::preset(std::size_t entry, std::size_t axis, std::uint32_t raw) {
-  const SlotValue one{static_cast<std::uint16_t>(slot_of(entry, axis)), raw};
+  const SlotValue one{slot_of(entry, axis), raw};
   const auto result = parameters_.write({&one, 1}, Link::local, axes_.armed(), axes_.now_us());
   axes_.offer_settings_if_changed();
   serial_.follow_parameters();

@@ -4,16 +4,16 @@
 #include <cstdint>
 #include <span>
 
-#include "firmware/axes.hpp"
-#include "firmware/board_identity.hpp"
-#include "firmware/board_readings.hpp"
-#include "firmware/canopen_edge.hpp"
-#include "firmware/host_writes.hpp"
-#include "firmware/link_states.hpp"
-#include "firmware/modbus_edge.hpp"
-#include "firmware/parameters/parameter_access.hpp"
-#include "firmware/parameters/store_commands.hpp"
-#include "firmware/readings.hpp"
+#include "firmware/board_interface/board_identity.hpp"
+#include "firmware/board_interface/board_readings.hpp"
+#include "firmware/command/axes.hpp"
+#include "firmware/command/host_writes.hpp"
+#include "firmware/command/link_states.hpp"
+#include "firmware/command/parameter_access.hpp"
+#include "firmware/command/store_commands.hpp"
+#include "firmware/links/canopen_edge.hpp"
+#include "firmware/links/modbus_edge.hpp"
+#include "firmware/links/readings.hpp"
 
 namespace kmax::firmware {
 

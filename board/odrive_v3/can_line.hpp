@@ -9,7 +9,7 @@
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
-#include "firmware/canopen_edge.hpp"
+#include "firmware/links/canopen_edge.hpp"
 
 namespace kmax::board::odrive_v3 {
 

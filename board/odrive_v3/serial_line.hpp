@@ -9,7 +9,7 @@
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/usart.hpp"
-#include "firmware/modbus_edge.hpp"
+#include "firmware/links/modbus_edge.hpp"
 
 namespace kmax::board::odrive_v3 {
 

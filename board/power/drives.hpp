@@ -14,7 +14,7 @@
 #include "drivers/referenced_quadrature_counter.hpp"
 #include "drivers/supply_divider.hpp"
 #include "firmware/application.hpp"
-#include "firmware/double_buffer.hpp"
+#include "firmware/exchange/double_buffer.hpp"
 
 namespace kmax::board {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "drivers/cortex_m/fault_handler.hpp"
-#include "firmware/crash_record.hpp"
+#include "firmware/board_interface/crash_record.hpp"
 
 namespace kmax::board {
 

@@ -50,9 +50,6 @@ struct CommunicationRow {
   std::uint16_t predefined = 0;  ///< COB-ID without the node ID
 };
 
-/// CANopen's entries are the last of the dictionary.
-inline constexpr std::size_t first_communication_slot = slot_count - communication_entries.size();
-
 inline constexpr auto communication_rows = [] {
   std::array<CommunicationRow, communication_entries.size()> rows{};
   for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -8,7 +8,7 @@
 
 #include "drivers/can_frame.hpp"
 #include "firmware/canopen/abort_code.hpp"
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 
 namespace kmax::firmware::canopen {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "drivers/can_frame.hpp"
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/nmt.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 
 namespace kmax::firmware::canopen {
 

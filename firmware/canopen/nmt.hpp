@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "drivers/can_frame.hpp"
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 
 namespace kmax::firmware::canopen {
 

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <optional>
 
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/object_access.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 

@@ -51,9 +51,6 @@ class Rpdos {
     }
   }
 
-  /// Nothing is received any more, and what is kept is dropped.
-  void stop() { pdos_ = {}; }
-
   /// The state operational was left: what waits for a SYNC is dropped.
   void drop_kept() {
     for (Pdo& pdo : pdos_) pdo.kept = false;

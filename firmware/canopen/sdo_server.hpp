@@ -8,12 +8,12 @@
 #include <span>
 
 #include "drivers/can_frame.hpp"
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/sdo_block_download.hpp"
 #include "firmware/canopen/sdo_block_upload.hpp"
 #include "firmware/canopen/sdo_frame.hpp"
 #include "firmware/canopen/sdo_sink.hpp"
 #include "firmware/canopen/sdo_source.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 
 // The SDO server of a CANopen device (CiA 301 v4.2, 7.2.4): one channel, request 0x600 + node ID, response
 // 0x580 + node ID. Expedited, segmented and block transfers in both directions.

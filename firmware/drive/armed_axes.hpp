@@ -12,6 +12,12 @@ namespace kmax::firmware {
 enum class Link : std::uint8_t { serial, can, local };
 inline constexpr std::size_t link_count = 3;
 
+/// A controlword, and who wrote it.
+struct Controlword {
+  std::uint16_t word;
+  Link by;
+};
+
 /// Which axes make force, and which link commands each of those.
 struct ArmedAxes {
   std::array<bool, axis_count> axis{};

@@ -7,14 +7,14 @@
 #include <span>
 #include <type_traits>
 
-#include "firmware/capture.hpp"
-#include "firmware/double_buffer.hpp"
+#include "firmware/capture/capture.hpp"
+#include "firmware/capture/trace.hpp"
 #include "firmware/drive/axes_law.hpp"
 #include "firmware/drive/axis.hpp"
 #include "firmware/drive/device_law.hpp"
+#include "firmware/exchange/double_buffer.hpp"
+#include "firmware/exchange/seqlock.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
-#include "firmware/seqlock.hpp"
-#include "firmware/trace.hpp"
 
 namespace kmax::firmware {
 

@@ -1,7 +1,7 @@
 #include "firmware/drive/supervisor.hpp"
 
 #include "firmware/drive/haptic_configuration.hpp"
-#include "firmware/stability_guard.hpp"
+#include "firmware/drive/stability_guard.hpp"
 
 namespace kmax::firmware {
 

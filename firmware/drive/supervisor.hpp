@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <optional>
 
+#include "firmware/drive/armed_axes.hpp"
 #include "firmware/drive/axis.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/commutation.hpp"
 #include "firmware/drive/thermal_supervisor.hpp"
-#include "firmware/parameters/parameter_access.hpp"
 
 namespace kmax::firmware {
 

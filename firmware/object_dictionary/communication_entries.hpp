@@ -4,7 +4,7 @@
 #include <array>
 #include <iterator>
 
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/entry.hpp"
 
 namespace kmax::firmware {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "firmware/capture_channel.hpp"
+#include "firmware/object_dictionary/capture_channel.hpp"
 #include "firmware/object_dictionary/entry.hpp"
 
 namespace kmax::firmware {

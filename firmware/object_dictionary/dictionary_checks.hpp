@@ -4,9 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/capture.hpp"
+#include "firmware/object_dictionary/register_windows.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
-#include "firmware/trace.hpp"
 
 /// What must hold of all places in the object dictionary, for any number of axes: functions of that number,
 /// so that more can be tried than this firmware is built for. Evaluated when compiled.

@@ -4,9 +4,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "firmware/capture.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
-#include "firmware/trace.hpp"
+#include "firmware/object_dictionary/register_windows.hpp"
 
 namespace kmax::firmware {
 

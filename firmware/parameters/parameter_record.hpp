@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "firmware/crc32.hpp"
+#include "firmware/parameters/crc32.hpp"
 #include "firmware/parameters/flash_sectors.hpp"
 
 /// The parameter store's format in flash, in words of 32 bits:

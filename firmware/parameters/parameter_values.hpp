@@ -11,6 +11,15 @@
 
 namespace kmax::firmware {
 
+/// A value of the device: a slot of the object dictionary (slot_of) and the 32 bits that are in it.
+struct SlotValue {
+  std::size_t slot;
+  std::uint32_t raw;
+};
+
+/// CANopen's own settings are the last slots.
+inline constexpr std::size_t first_communication_slot = slot_count - communication_entries.size();
+
 /// First register of an entry, from the compact table.
 constexpr std::uint16_t register_address(std::size_t entry, std::size_t axis) {
   return static_cast<std::uint16_t>(descriptors[entry].address +

@@ -14,7 +14,7 @@ class PowerOnCommunication {
  public:
   void take(const ParameterValues& values) { at_power_on_ = part_of(values); }
   void put_back(ParameterValues& values) const {
-    for (std::size_t i = 0; i < at_power_on_.size(); ++i) values.set_raw(first_slot + i, at_power_on_[i]);
+    for (std::size_t i = 0; i < at_power_on_.size(); ++i) values.set_raw(first_communication_slot + i, at_power_on_[i]);
   }
   /// Of a set that is being saved.
   void note_saving(const ParameterValues& values) { saving_ = part_of(values); }
@@ -24,13 +24,11 @@ class PowerOnCommunication {
   }
 
  private:
-  /// CANopen's entries are the last of the dictionary.
-  static constexpr std::size_t first_slot = slot_count - communication_entries.size();
   using Part = std::array<std::uint32_t, communication_entries.size()>;
 
   static Part part_of(const ParameterValues& values) {
     Part part{};
-    for (std::size_t i = 0; i < part.size(); ++i) part[i] = values.raw(first_slot + i);
+    for (std::size_t i = 0; i < part.size(); ++i) part[i] = values.raw(first_communication_slot + i);
     return part;
   }
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "firmware/drive/stability_case.hpp"
 #include "firmware/parameters/parameter_rules.hpp"
-#include "firmware/stability_case.hpp"
 
 namespace kmax::check {
 

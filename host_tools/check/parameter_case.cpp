@@ -1,6 +1,6 @@
 #include "host_tools/check/parameter_case.hpp"
 
-#include "firmware/stability_case.hpp"
+#include "firmware/drive/stability_case.hpp"
 #include "host_tools/base/numbers.hpp"
 
 namespace kmax::check {

@@ -9,8 +9,8 @@
 
 namespace kmax::check {
 
-/// What the criteria judge of one axis, see firmware/stability_case.hpp: with the hand that holds it, and
-/// each number as the user wrote it: 0.1, not the 0.100000001490116 of the float that is nearest to it.
+/// What the criteria judge of one axis, see firmware/drive/stability_case.hpp: with the hand that holds it,
+/// and each number as the user wrote it: 0.1, not the 0.100000001490116 of the float that is nearest to it.
 control::StabilityCase<double> parameter_case(const firmware::ParameterValues& values, std::size_t axis,
                                               const control::Hand<double>& hand = {});
 

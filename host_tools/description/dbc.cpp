@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/emergency.hpp"
 #include "firmware/canopen/nmt.hpp"
 #include "firmware/canopen/object_places.hpp"
 #include "firmware/drive/fault.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/parameter.hpp"
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "firmware/application.hpp"
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/pdo_mapping.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/description/described_objects.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "firmware/capture.hpp"
+#include "firmware/capture/capture.hpp"
 #include "firmware/drive/haptic_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/suggestion.hpp"

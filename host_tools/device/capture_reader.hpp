@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware/capture_channel.hpp"
+#include "firmware/object_dictionary/capture_channel.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::device {
@@ -61,7 +61,8 @@ std::vector<std::string> capture_channel_names();
 /// Its unit; empty for a pure number. ValueError for an unknown name.
 std::string capture_channel_unit(std::string_view name);
 
-/// The device's triggered full-rate capture (firmware/capture.hpp): up to four channels, 12288 values.
+/// The device's triggered full-rate capture (firmware/capture/capture.hpp): up to four channels, 12288
+/// values.
 ///
 ///   CaptureReader reader(device);
 ///   reader.arm({.channels = {"position", "force"}, .trigger = firmware::CaptureTrigger::contact});

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "firmware/crash_record.hpp"
+#include "firmware/board_interface/crash_record.hpp"
 
 namespace kmax::device {
 

@@ -6,7 +6,7 @@
 
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/fault.hpp"
-#include "firmware/stability_guard.hpp"
+#include "firmware/drive/stability_guard.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::device {

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "firmware/stability_guard.hpp"
+#include "firmware/drive/stability_guard.hpp"
 
 namespace kmax::device {
 

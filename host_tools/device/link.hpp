@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "firmware/parameters/parameter_values.hpp"
+
 namespace kmax::link {
 
 /// No conversation is possible: the port cannot be opened, vanished, or nobody answers. The message says
@@ -30,11 +32,7 @@ class RefusedError : public std::runtime_error {
 /// Something the user should know while waiting, one line without a newline.
 using Notice = std::function<void(const std::string&)>;
 
-/// A value of the device: a slot of the object dictionary (firmware::slot_of) and the 32 bits that are in it.
-struct SlotValue {
-  std::size_t slot;
-  std::uint32_t raw;
-};
+using firmware::SlotValue;
 
 /// What is to happen when it is unknown whether a write arrived: a write that states a value does no harm
 /// when the device carries it out twice, one that asks for a step does.
@@ -64,15 +62,15 @@ class Link {
   virtual void write(std::span<const SlotValue> values, Repeat repeat,
                      const std::function<void()>& before_request = {}) = 0;
 
-  /// `count` records of the trace's ring (firmware/trace.hpp) from place `first` on, as their 32-bit words.
-  /// Both are within the ring, and `count` is at most trace_records_at_once.
+  /// `count` records of the trace's ring (firmware/capture/trace.hpp) from place `first` on, as their 32-bit
+  /// words. Both are within the ring, and `count` is at most trace_records_at_once.
   virtual std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) = 0;
 
   /// How many of the words asked for have been read; rises up to all of them. What it throws ends the reading
   /// and comes through.
   using Progress = std::function<void(std::size_t done)>;
 
-  /// The first `count` 32-bit words of the completed capture (firmware/capture.hpp).
+  /// The first `count` 32-bit words of the completed capture (firmware/capture/capture.hpp).
   virtual std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) = 0;
 
   /// Texts of the device's identification by the standard names of Modbus (function 43/14) in snake case:

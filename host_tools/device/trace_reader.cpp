@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "firmware/trace.hpp"
+#include "firmware/capture/trace.hpp"
 
 namespace kmax::device {
 

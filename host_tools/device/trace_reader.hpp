@@ -15,8 +15,8 @@ struct TraceSample {
   double magnetic_coefficient;  ///< N
 };
 
-/// Reads the device's running trace (firmware/trace.hpp) without gaps as long as it is read often enough:
-/// the device keeps 512 records, one second at 500 Hz.
+/// Reads the device's running trace (firmware/capture/trace.hpp) without gaps as long as it is read often
+/// enough: the device keeps 512 records, one second at 500 Hz.
 ///
 /// A record that was overwritten before it was read is counted as lost, never replaced.
 class TraceReader {

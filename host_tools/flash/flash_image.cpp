@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "firmware/crc32.hpp"
+#include "firmware/parameters/crc32.hpp"
 #include "host_tools/flash/chip_memory.hpp"
 
 namespace kmax::flash {

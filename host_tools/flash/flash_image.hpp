@@ -29,7 +29,7 @@ struct FlashPiece {
   std::string read_file_name() const;  ///< "read_08000000.bin"
 };
 
-/// CRC-32 (firmware/crc32.hpp; the one of zip and Ethernet) of whole words.
+/// CRC-32 (firmware/parameters/crc32.hpp; the one of zip and Ethernet) of whole words.
 std::uint32_t crc_of(const std::vector<std::uint8_t>& bytes);
 
 class FlashImage {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "host_tools/base/errors.hpp"
 
 namespace kmax::record {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/device/device.hpp"
 

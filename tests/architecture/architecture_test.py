@@ -26,17 +26,29 @@ FLOORS = {
     "host_tools": ["control", "drivers", "firmware", "board"],
     "tests": ["control", "drivers", "firmware", "board", "host_tools"],
 }
-# The folders of host_tools from the bottom: each may include what stands in a row above its own. A folder within one
+# The folders of a floor from the bottom: each may include what stands in a row above its own. A folder within one
 # of these belongs to it unless it has a place of its own.
-HOST_TOOLS = [
-    ["base"],
-    ["plot", "report", "lines", "simulation"],
-    ["flash", "wall", "device"],
-    ["description", "record", "check", "bench", "simulated_board"],
-    ["device/sim", "serve", "calibration", "selftest"],
-    ["experiment"],
-    ["virtual_board", "kmax"],
-]
+FOLDERS = {
+    "firmware": [
+        ["exchange", "object_dictionary"],
+        ["parameters", "capture"],
+        ["canopen", "modbus"],
+        ["drive"],
+        ["board_interface"],
+        ["command"],
+        ["links"],
+        [""],
+    ],
+    "host_tools": [
+        ["base"],
+        ["plot", "report", "lines", "simulation"],
+        ["flash", "wall", "device"],
+        ["description", "record", "check", "bench", "simulated_board"],
+        ["device/sim", "serve", "calibration", "selftest"],
+        ["experiment"],
+        ["virtual_board", "kmax"],
+    ],
+}
 # Standard headers whose contents need a heap, an operating system or libm.
 NOT_ON_THE_DEVICE = set("""
     any chrono cmath complex condition_variable cstdio cstdlib deque exception filesystem format fstream functional
@@ -50,7 +62,7 @@ EXCEPTIONS = {
     "class_in_one_place": {"kmax::virtual_board::Row"},
     "class_size": {"CoupledHandle", "Processor", "VirtualBoard"},
     "friends": {"host_tools/virtual_board/cortex_m/processor.hpp"},
-    "host_tools_order": {"device -> device/sim"},
+    "folder_order": {"host_tools: device -> device/sim"},
     "using_namespace": {
         "board/odrive_v3/main.cpp",
         "firmware/object_dictionary/axis_groups.hpp",
@@ -95,29 +107,31 @@ def floors(tree):
                 yield place, f'"{include.target}" is not there'
 
 
-def host_tools_order(tree):
-    """The folders of host_tools use each other in one direction, so there is no cycle between them."""
-    rows = {folder: row for row, folders in enumerate(HOST_TOOLS) for folder in folders}
+def folder_order(tree):
+    """The folders of a floor use each other in one direction, so there is no cycle between them."""
+    rows = {floor: {folder: row for row, folders in enumerate(order) for folder in folders}
+            for floor, order in FOLDERS.items()}
 
-    def folder_of(path):
+    def folder_of(path, floor):
         parts = path.split("/")[1:-1]
-        return next((name for name in ("/".join(parts[:n]) for n in range(len(parts), 0, -1)) if name in rows),
+        return next((name for name in ("/".join(parts[:n]) for n in range(len(parts), 0, -1)) if name in rows[floor]),
                     "/".join(parts))
 
     found = defaultdict(list)
     for path, text in tree.items():
-        if not path.startswith("host_tools/"):
+        floor = path.split("/")[0]
+        if floor not in rows:
             continue
-        folder = folder_of(path)
-        if folder not in rows:
-            found[folder].append(f"{path} lies in no folder that HOST_TOOLS places")
+        folder, row_of = folder_of(path, floor), rows[floor]
+        if folder not in row_of:
+            found[f"{floor}: {folder}"].append(f"{path} lies in no folder that FOLDERS places")
             continue
         for include in includes(text):
-            if not include.quoted or not include.target.startswith("host_tools/"):
+            if not include.quoted or include.target.split("/")[0] != floor:
                 continue
-            used = folder_of(include.target)
-            if used != folder and rows.get(used, len(rows)) >= rows[folder]:
-                found[f"{folder} -> {used}"].append(f"{path}:{include.line} includes {include.target}")
+            used = folder_of(include.target, floor)
+            if used != folder and row_of.get(used, len(row_of)) >= row_of[folder]:
+                found[f"{floor}: {folder} -> {used}"].append(f"{path}:{include.line} includes {include.target}")
     for what, places in found.items():
         yield what, "; ".join(places)
 
@@ -186,7 +200,7 @@ def test_namespaces(tree):
             yield path, f"has no namespace that ends in {Path(path).stem}"
 
 
-RULES = [floors, host_tools_order, pragma_once, class_in_one_place, class_size, friends, using_namespace, telling_names,
+RULES = [floors, folder_order, pragma_once, class_in_one_place, class_size, friends, using_namespace, telling_names,
          test_namespaces]
 
 
@@ -251,13 +265,16 @@ class EachRuleSees(unittest.TestCase):
             for directive in "#include", "  #  include":
                 self.bad(floors, path, f"{directive} {target}", **present)
 
-    def test_host_tools_order(self):
-        self.good(host_tools_order, "host_tools/device/can/a.hpp", '#include "host_tools/base/b.hpp"')
-        self.good(host_tools_order, "host_tools/device/sim/a.hpp", '#include "host_tools/simulated_board/b.hpp"')
-        self.bad(host_tools_order, "host_tools/base/a.hpp", '#include "host_tools/device/b.hpp"')
-        self.bad(host_tools_order, "host_tools/device/a.hpp", '#include "host_tools/device/sim/b.hpp"')
-        self.bad(host_tools_order, "host_tools/plot/a.hpp", '#include "host_tools/report/b.hpp"')
-        self.bad(host_tools_order, "host_tools/new_folder/a.hpp", "")
+    def test_folder_order(self):
+        self.good(folder_order, "host_tools/device/can/a.hpp", '#include "host_tools/base/b.hpp"')
+        self.good(folder_order, "host_tools/device/sim/a.hpp", '#include "host_tools/simulated_board/b.hpp"')
+        self.bad(folder_order, "host_tools/base/a.hpp", '#include "host_tools/device/b.hpp"')
+        self.bad(folder_order, "host_tools/device/a.hpp", '#include "host_tools/device/sim/b.hpp"')
+        self.bad(folder_order, "host_tools/plot/a.hpp", '#include "host_tools/report/b.hpp"')
+        self.bad(folder_order, "host_tools/new_folder/a.hpp", "")
+        self.good(folder_order, "firmware/application.hpp", '#include "firmware/links/b.hpp"')
+        self.bad(folder_order, "firmware/drive/a.hpp", '#include "firmware/command/b.hpp"')
+        self.bad(folder_order, "firmware/drive/a.hpp", '#include "firmware/application.hpp"')
 
     def test_pragma_once(self):
         self.good(pragma_once, "control/a.hpp", "#pragma once\n")

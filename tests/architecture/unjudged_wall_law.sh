@@ -11,7 +11,7 @@ mkdir "$work/control"
 
 compiles() { # as the targets do: -Wall has -Wswitch in it
   "$cxx" -std=c++20 -fsyntax-only -DKMAX_AXIS_COUNT=2 -Wall -Wextra -Werror -I"$work" -I"$source_dir" \
-    "$source_dir/firmware/stability_guard.cpp" 2> "$work/messages"
+    "$source_dir/firmware/drive/stability_guard.cpp" 2> "$work/messages"
 }
 
 compiles || { cat "$work/messages"; echo "the guard does not compile as it is"; exit 1; }

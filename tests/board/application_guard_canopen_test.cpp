@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "firmware/canopen/abort_code.hpp"
-#include "firmware/stability_guard.hpp"
+#include "firmware/drive/stability_guard.hpp"
 #include "tests/board/canopen_host.hpp"
 
 namespace kmax::board::application_guard_canopen_test {

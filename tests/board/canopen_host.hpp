@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "firmware/canopen/cob_id.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"
 

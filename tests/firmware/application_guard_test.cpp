@@ -5,7 +5,7 @@
 
 #include "control/stability_case.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
-#include "firmware/stability_guard.hpp"
+#include "firmware/drive/stability_guard.hpp"
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/capture.hpp"
+#include "firmware/capture/capture.hpp"
 #include "tests/host_tools/fake_device.hpp"
 
 namespace kmax::host_tools_test {

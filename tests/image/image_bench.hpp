@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/crash_record.hpp"
+#include "firmware/board_interface/crash_record.hpp"
 #include "firmware/drive/fault.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"

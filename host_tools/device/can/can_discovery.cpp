@@ -5,8 +5,8 @@
 #include <memory>
 #include <set>
 
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/sdo_frame.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "host_tools/device/can/can_node_lock.hpp"
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/can/sdo_client.hpp"

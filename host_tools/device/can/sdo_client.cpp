@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "firmware/canopen/cob_id.hpp"
 #include "firmware/canopen/sdo_frame.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 
 namespace kmax::link {
 

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "firmware/capture.hpp"
-#include "firmware/trace.hpp"
+#include "firmware/capture/capture.hpp"
+#include "firmware/capture/trace.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/serial/tagged_exchange.hpp"
 

@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-#include "tests/firmware/drive_model.hpp"
+#include "tests/firmware/drive/drive_model.hpp"
 
 namespace kmax::firmware::axis_state_machine_histories_test {
 namespace {

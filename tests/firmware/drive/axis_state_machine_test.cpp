@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "tests/firmware/drive_model.hpp"
+#include "tests/firmware/drive/drive_model.hpp"
 
 namespace kmax::firmware::axis_state_machine_test {
 namespace {

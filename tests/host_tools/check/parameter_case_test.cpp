@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "firmware/stability_case.hpp"
+#include "firmware/drive/stability_case.hpp"
 
 namespace kmax::check::parameter_case_test {
 namespace {

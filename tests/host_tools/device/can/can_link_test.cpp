@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/capture/trace.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
-#include "firmware/trace.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/device.hpp"
 #include "tests/host_tools/device/can/can_device.hpp"

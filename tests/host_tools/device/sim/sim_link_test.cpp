@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "firmware/trace.hpp"
+#include "firmware/capture/trace.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

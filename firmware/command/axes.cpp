@@ -1,0 +1,227 @@
+#include "firmware/command/axes.hpp"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "firmware/drive/cyclic_torque.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/modbus/rtu_timing.hpp"
+
+namespace kmax::firmware {
+
+Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
+           const LinkStates& links, std::span<std::uint32_t> capture_memory)
+    : modulation_limit_(modulation_limit),
+      parameters_(parameters),
+      store_(store),
+      links_(links),
+      settings_(make_settings()),
+      tick_(settings_, capture_memory) {
+  configure_thermal();
+  make_scales();
+}
+
+ArmedAxes Axes::armed() const {
+  ArmedAxes armed;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    armed.axis[axis] = supervisors_[axis].makes_force();
+    armed.commander[axis] = supervisors_[axis].commander();
+  }
+  return armed;
+}
+
+Axes::Settings Axes::make_settings() const {
+  Settings settings;
+  const ParameterValues& values = parameters_.values();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    settings[axis].encoder_offset = values.whole<"encoder.offset">(axis);
+    settings[axis].encoder_direction = values.whole<"encoder.direction">(axis);
+    settings[axis].generation = generation_;
+    // Near the position by the new origin: the resampler starts from there.
+    const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
+    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
+    const Circumstances now = offered_[axis];
+    auto motor = motor_configuration(values, axis, now.winding_temperature, now.current_share);
+    motor.modulation_limit = modulation_limit_;
+    settings[axis].motor = MotorControl::prepare(motor);
+    settings[axis].compensation =
+        control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
+    settings[axis].plausibility = control::MotionPlausibility<float>::prepare(
+        plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
+    settings[axis].watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
+    settings[axis].excitation = Excitation::prepare(excitation_configuration(values, axis));
+    settings[axis].mode = values.choice<DriveMode, "drive.mode">(axis);
+    settings[axis].commutated = now.commutated;
+    settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
+    settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
+  }
+  return settings;
+}
+
+void Axes::make_scales() {
+  const ParameterValues& values = parameters_.values();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const double length = count_length(values, axis);
+    const double step =
+        control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), length);
+    scale_[axis] = {length, static_cast<float>(step * length)};
+  }
+}
+
+void Axes::offer_settings_if_changed() {
+  std::array<Circumstances, axis_count> now;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) now[axis] = circumstances_of(axis);
+  if (parameters_.changes() == offered_changes_ && now == offered_) return;
+  offered_ = now;
+  if (parameters_.changes() != offered_changes_) {
+    configure_thermal();
+    make_scales();
+  }
+  offered_changes_ = parameters_.changes();
+  if (parameters_.restarting_changes() != offered_restarts_) {
+    offered_restarts_ = parameters_.restarting_changes();
+    ++generation_;
+  }
+  settings_ = make_settings();
+  tick_.offer(settings_);
+  tick_.trace_axis(static_cast<std::size_t>(parameters_.values().whole<"trace.axis">()),
+                   static_cast<std::uint32_t>(parameters_.values().whole<"trace.interval">()));
+}
+
+/// So that readings and arming never go by an older set, and nothing is worked out twice.
+void Axes::judge_if_changed() {
+  if (parameters_.changes() == judged_changes_) return;
+  judged_changes_ = parameters_.changes();
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    guard_[axis] = guard_finding(parameters_.values(), axis);
+}
+
+/// The tick works by the present settings, and knows of the axis' last disarming.
+bool Axes::settled(std::size_t of_axis) const {
+  if (!tick_.settings_taken() || report_[of_axis].enabled) return false;
+  return std::ranges::all_of(report_,
+                             [this](const AxisReport& axis) { return axis.generation == generation_; });
+}
+
+/// What the hand does on this axis would be felt on one that another link has armed.
+bool Axes::pushes_anothers_axis(std::size_t axis) const {
+  constexpr bool always_coupled = !std::is_same_v<DeviceLaw<axis_count>, TangentialInterference<axis_count>>;
+  const auto parallel = [this](std::size_t one) {
+    return parameters_.values().choice<control::InterferenceMode, "interference.mode">(one) ==
+           control::InterferenceMode::parallel;
+  };
+  const ArmedAxes now = armed();
+  for (std::size_t other = 0; other < axis_count; ++other) {
+    const bool coupled = other != axis && (always_coupled || parallel(axis) || parallel(other));
+    if (coupled && now.is_anothers(other, supervisors_[axis].commander())) return true;
+  }
+  return false;
+}
+
+Axes::Circumstances Axes::circumstances_of(std::size_t axis) const {
+  return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis)};
+}
+
+void Axes::configure_thermal() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    thermal_[axis].configure(thermal_configuration(parameters_.values(), axis));
+}
+
+void Axes::poll_temperatures() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    thermal_[axis].poll(now_us_, report_[axis].motor.current_square, readings_.power_stage_temperature[axis]);
+}
+
+bool Axes::commutation_known(std::size_t axis) const {
+  return !readings_.has_power_stage ||
+         Commutation::known(parameters_.values(), axis, report_[axis].referenced);
+}
+
+Supervisor::Situation Axes::situation(std::size_t axis) {
+  const Supervisor& supervisor = supervisors_[axis];
+  const auto signed_us = supervisor.signed_us();
+  const auto heard_us = signed_us ? signed_us : links_[supervisor.commander()].heard_us;
+  const LinkState& can = links_[Link::can];
+  return {.values = parameters_.values(),
+          .commutation = commutation_[axis],
+          .thermal = thermal_[axis],
+          .report = report_[axis],
+          .setting = settings_[axis],
+          .silent_us = heard_us ? std::optional(modbus::elapsed_us(now_us_, *heard_us)) : std::nullopt,
+          .power_stage_temperature = readings_.power_stage_temperature[axis],
+          .supply_voltage = readings_.supply_voltage,
+          .enabled = tick_.enabled(axis),
+          .settled = settled(axis),
+          .ticks_have_stopped = readings_.ticks_have_stopped,
+          .commutation_known = commutation_known(axis),
+          .guard_failed = guard_[axis].verdict == GuardFinding::Verdict::fail,
+          .store_busy = store_.keeper().busy(),
+          .restarting = can.restart_asked,
+          .pushes_anothers_axis = pushes_anothers_axis(axis),
+          .off_the_bus = can.is_off,
+          .heartbeat_lost = can.heartbeat_lost};
+}
+
+void Axes::begin_poll(std::uint32_t now_us) {
+  now_us_ = now_us;
+  tick_.keep_alive();
+  // The last axis' first: that it is of a round says that those of the others are of the same.
+  for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = tick_.report(axis);
+  poll_temperatures();
+}
+
+void Axes::act() {
+  for (std::size_t axis = 0; axis < axis_count; ++axis)
+    commutation_[axis].follow(parameters_.values(), axis, report_[axis].reference_generation);
+  offer_settings_if_changed();
+  judge_if_changed();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    Supervisor& supervisor = supervisors_[axis];
+    if (const auto controlword = parameters_.fetch_controlword(axis))
+      supervisor.request(*controlword, now_us_);
+    supervisor.poll(situation(axis), axis);
+    tick_.leave_share(axis, supervisor.force_share());
+    tick_.enable(axis, supervisor.makes_force());
+    supervisor.finish_reaction();
+  }
+  command_forces();
+}
+
+void Axes::command_forces() {
+  ParameterValues& values = parameters_.values();
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const bool armed = supervisors_[axis].makes_force();
+    // What was asked for while nothing could follow must not act later.
+    if (!armed) {
+      values.set_whole<"profile.target_torque">(0, axis);
+      values.set_real<"profile.target_force">(0.0f, axis);
+    }
+    tick_.command_force(axis, commanded_force(values, axis, armed, supervisors_[axis].is_halted()));
+  }
+}
+
+void Axes::disarm(std::size_t axis) {
+  supervisors_[axis].disarm();
+  tick_.enable(axis, supervisors_[axis].makes_force());
+}
+
+void Axes::trip_all_of(Link link, Fault fault) {
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (supervisors_[axis].armed() && supervisors_[axis].commander() == link)
+      supervisors_[axis].trip(situation(axis), axis, fault, 0.0f, 0.0f);
+  }
+}
+
+void Axes::note_commander(std::span<const SlotValue> written, Link by) {
+  const auto number_of = [](std::uint32_t raw) { return static_cast<std::uint16_t>(raw); };
+  for (const SlotValue& one : written) {
+    const auto [entry, axis] = owner_of(one.slot);
+    if (entry == entry_of<"drive.commander">()) supervisors_[axis].set_next_number(by, number_of(one.raw));
+    if (entry == entry_of<"link.sign_of_life">()) {
+      for (Supervisor& supervisor : supervisors_)
+        supervisor.take_sign_of_life(by, number_of(one.raw), now_us_);
+    }
+  }
+}
+
+}  // namespace kmax::firmware

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "firmware/command/axes.hpp"
+#include "firmware/command/parameter_access.hpp"
+#include "firmware/command/store_commands.hpp"
+
+namespace kmax::firmware {
+
+/// What hosts write, by whichever link: parameters, controlwords and targets, or one command to the store or
+/// the capture. Main loop only; why something was refused is also in refusal.reason.
+class HostWrites {
+ public:
+  HostWrites(ParameterAccess& parameters, StoreCommands& store, Axes& axes)
+      : parameters_(parameters), store_(store), axes_(axes) {}
+
+  /// store.command and capture.command come alone; `wanted` is not empty.
+  ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
+
+ private:
+  /// Begins a capture with the settings capture.*, or ends it.
+  ParameterAccess::Result command_capture(std::uint32_t command);
+
+  ParameterAccess& parameters_;
+  StoreCommands& store_;
+  Axes& axes_;
+};
+
+}  // namespace kmax::firmware

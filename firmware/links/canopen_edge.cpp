@@ -1,0 +1,166 @@
+#include "firmware/links/canopen_edge.hpp"
+
+namespace kmax::firmware {
+
+CanopenEdge::CanopenEdge(const Sources& sources)
+    : parameters_(sources.parameters),
+      store_(sources.store),
+      writes_(sources.writes),
+      axes_(sources.axes),
+      state_(sources.state),
+      objects_({.parameters = sources.parameters,
+                .store = sources.store,
+                .writes = sources.writes,
+                .readings = sources.readings,
+                .axes = sources.axes,
+                .state = sources.state,
+                .node = node_,
+                .board_name = sources.board.board_name}),
+      node_(objects_,
+            {.vendor = vendor_id,
+             .product = product_code,
+             .revision = firmware_version,
+             .serial = sources.board.serial_number},
+            Axes::round_interval_us) {
+  power_on();
+  state_.is_off = true;  // until the board has said what its controller is at
+}
+
+void CanopenEdge::power_on() {
+  store_.power_on_communication().take(parameters_.values());
+  configured_communication_ = parameters_.communication_changes();
+  node_.power_on(parameters_.values(), axes_.now_us());
+}
+
+/// A host resets the communication, which then has the settings of the last start again.
+void CanopenEdge::reset_communication() {
+  parameters_.drop(Link::can, axes_.now_us());
+  store_.power_on_communication().put_back(parameters_.values());
+  configured_communication_ = parameters_.communication_changes();
+  start_node();
+}
+
+void CanopenEdge::start_node() {
+  node_.start(parameters_.values(), axes_.now_us());
+}
+
+void CanopenEdge::set_readings(const CanReadings& readings) {
+  readings_ = readings;
+  state_.is_off = readings.state == CanState::bus_off || readings.state == CanState::stopped ||
+                  readings.state == CanState::absent;
+}
+
+void CanopenEdge::poll() {
+  const std::uint32_t now_us = axes_.now_us();
+  constexpr int frames_per_poll = 16;
+  // A flood of frames must not keep the main loop from all else that it watches.
+  drivers::CanFrame frame;
+  for (int i = 0; i < frames_per_poll && queue_.pop(frame); ++i) {
+    node_.lss().hold_bit_rate(axes_.any_armed());
+    act_on(node_.receive(frame, parameters_.values(), now_us));
+  }
+  node_.lss().hold_bit_rate(axes_.any_armed());
+  if (parameters_.communication_changes() != configured_communication_) {
+    configured_communication_ = parameters_.communication_changes();
+    node_.configure(parameters_.values(), now_us);
+  }
+  act_on(node_.poll(parameters_.values(), now_us));
+  if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us);
+  const bool bus_off = readings_.state == CanState::bus_off;
+  if (bus_off && !was_bus_off_) act_on(node_.bus_off());
+  was_bus_off_ = bus_off;
+  report_emergencies();
+  restart_wanted_ = state_.restart_asked && !axes_.any_armed() && !store_.keeper().busy();
+}
+
+void CanopenEdge::act_on(const canopen::NodeEvents& events) {
+  if (events.heartbeat) state_.heard_us = axes_.now_us();
+  state_.heartbeat_lost = node_.any_heartbeat_lost();
+  if (events.heartbeat_lost) axes_.trip_all_of(Link::can, Fault::heartbeat_lost);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    // Nobody can change the target any more.
+    const bool without_target =
+        events.pdos_ended && axes_.supervisor(axis).armed() &&
+        axes_.supervisor(axis).commander() == Link::can &&
+        parameters_.values().choice<DriveMode, "drive.mode">(axis) == DriveMode::torque;
+    if (events.remove_force || without_target) axes_.disarm(axis);
+  }
+  if (events.store_identity) {
+    identity_saving_ = save_identity();
+    if (!identity_saving_) node_.lss().finish(canopen::LssStore::failed);
+  }
+  if (events.start_node) start_node();
+  if (events.reset_communication) reset_communication();
+  if (events.reset_node) state_.restart_asked = true;
+}
+
+bool CanopenEdge::save_identity() {
+  if (parameters_.transaction_open() || axes_.any_armed()) return false;
+  const auto set = [this](std::size_t entry, std::uint32_t raw) {
+    const SlotValue one{slot_of(entry, 0), raw};
+    return writes_.write({&one, 1}, Link::local).refusal == Refusal::none;
+  };
+  return set(entry_of<"node.id">(), node_.lss().pending_node_id()) &&
+         set(entry_of<"can.bit_rate">(), node_.lss().pending_bit_rate()) &&
+         store_.save(axes_.any_armed()).refusal == Refusal::none;
+}
+
+void CanopenEdge::finish_saves() {
+  if (!identity_saving_ || store_.keeper().busy()) return;
+  const bool saved = store_.keeper().state() == StoreState::saved;
+  node_.lss().finish(saved ? canopen::LssStore::stored : canopen::LssStore::failed);
+  identity_saving_ = false;
+}
+
+void CanopenEdge::report_emergencies() {
+  EmergencyCauses now{.can_state = readings_.state,
+                      .identity_conflicts = node_.identity_conflicts(),
+                      .frames_lost = readings_.overruns + queue_.overflows()};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    now.faults[axis] = axes_.supervisor(axis).machine().fault();
+    now.fault_values[axis] = axes_.supervisor(axis).last_trip().value;
+  }
+  emergencies_.poll(now, node_.emergency(), axes_.now_us());
+}
+
+bool CanopenEdge::next_frame(drivers::CanFrame& frame) {
+  return !state_.restart_asked && node_.next_frame(frame, axes_.now_us());
+}
+
+std::optional<std::uint32_t> RoundClock::poll(const Axes& axes, std::uint32_t now_us) {
+  constexpr std::uint32_t without_ticks_us = 1'000;  // where none come, or none any more
+  const std::uint32_t round = axes.report(axis_count - 1).tick / Axes::round_ticks;
+  const std::uint32_t waited_us = now_us - began_us_;
+  // So late that the first axis has reported of the next round: a moment more, and the last will have too.
+  const bool complete = round != round_ && axes.report(0).tick / Axes::round_ticks == round;
+  if (!complete && waited_us < without_ticks_us) return std::nullopt;
+  clock_us_ += round == round_ ? waited_us : (round - round_) * Axes::round_interval_us;
+  round_ = round;
+  began_us_ = now_us;
+  return clock_us_;
+}
+
+void CanopenEdge::publish(ParameterValues& values) const {
+  values.set_whole<"can.state">(static_cast<std::uint32_t>(readings_.state));
+  values.set_whole<"can.node_state">(static_cast<std::uint32_t>(node_.state()));
+  values.set_whole<"can.node_in_use">(node_.node_id());
+  values.set_whole<"can.transmit_errors">(readings_.transmit_errors);
+  values.set_whole<"can.receive_errors">(readings_.receive_errors);
+  values.set_whole<"can.received">(readings_.received);
+  values.set_whole<"can.sent">(readings_.sent);
+  values.set_whole<"can.overruns">(readings_.overruns);
+  values.set_whole<"can.queue_overflows">(queue_.overflows());
+  values.set_whole<"can.bus_offs">(readings_.bus_offs);
+  values.set_whole<"can.discarded">(readings_.discarded);
+  values.set_whole<"can.sdo_aborts">(node_.sdo_counters().aborts_sent);
+  values.set_whole<"can.sdo_timeouts">(node_.sdo_counters().timeouts);
+  values.set_whole<"can.rpdo_refused">(node_.rpdo_counters().refused);
+  values.set_whole<"can.pdo_length_errors">(node_.rpdo_counters().too_short);
+  values.set_whole<"can.tpdo_held_back">(node_.tpdo_counters().held_back);
+  values.set_whole<"can.emergencies_lost">(node_.emergency().overflows());
+  values.set_whole<"can.heartbeats_lost">(node_.heartbeat_counters().lost);
+  values.set_whole<"can.identity_conflicts">(node_.identity_conflicts());
+  values.set_whole<"can.bit_rate_in_use">(node_.settings().bit_rate);
+}
+
+}  // namespace kmax::firmware

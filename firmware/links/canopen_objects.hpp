@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "firmware/canopen/object_places.hpp"
+#include "firmware/command/axes.hpp"
+#include "firmware/command/host_writes.hpp"
+#include "firmware/command/link_states.hpp"
+#include "firmware/command/parameter_access.hpp"
+#include "firmware/command/store_commands.hpp"
+#include "firmware/links/readings.hpp"
+#include "firmware/object_dictionary/special_objects.hpp"
+
+namespace kmax::firmware {
+
+namespace canopen {
+template <typename Objects>
+class Node;
+}  // namespace canopen
+
+/// The device as CANopen sees it: what SDO reads and writes (canopen::ObjectAccess), where PDOs take
+/// their values from and bring them to (canopen::PdoSource).
+///
+/// Everything a host can reach is the dictionary's: values go through the same checks, rules and transactions
+/// as Modbus registers, and refusal.reason says why one was refused on either link. Main loop only.
+class CanopenObjects {
+ public:
+  /// What the objects stand for. The node is used from the first request on, not before.
+  struct Sources {
+    ParameterAccess& parameters;
+    StoreCommands& store;
+    HostWrites& writes;
+    Readings& readings;
+    Axes& axes;  ///< their trace and captures
+    LinkState& state;
+    canopen::Node<CanopenObjects>& node;
+    std::string_view board_name;
+  };
+  explicit CanopenObjects(const Sources& sources) : of_(sources) {}
+  CanopenObjects(const CanopenObjects&) = delete;
+  CanopenObjects& operator=(const CanopenObjects&) = delete;
+
+  canopen::Abort read_begin(canopen::ObjectAddress address, std::uint32_t& size);
+  canopen::Abort read(canopen::ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out);
+  canopen::Abort write_begin(canopen::ObjectAddress address, canopen::WriteBounds& bounds);
+  canopen::Abort write(canopen::ObjectAddress address, std::span<const std::uint8_t> in);
+
+  void refresh();
+  std::uint32_t value(std::size_t slot) const;
+  /// A value of a received PDO; false: refused.
+  bool take(std::size_t slot, std::uint32_t raw);
+
+ private:
+  canopen::Abort find(canopen::ObjectAddress address, std::optional<std::size_t>& slot,
+                      const canopen::SpecialPlace*& special) const;
+  canopen::Abort special_size(const canopen::SpecialPlace& place, std::uint8_t subindex,
+                              std::uint32_t& size) const;
+  canopen::Abort read_special(const canopen::SpecialPlace& place, std::uint8_t subindex, std::uint32_t offset,
+                              std::span<std::uint8_t> out) const;
+  canopen::Abort write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in);
+  canopen::Abort write_slot(std::size_t slot, std::uint32_t raw);
+  canopen::Abort set_slot(std::size_t slot, std::uint32_t raw);
+  std::uint32_t number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const;
+  std::span<const char> text_of(SpecialObject what) const;
+
+  Sources of_;
+  std::array<std::uint8_t, scratch_bytes> scratch_{};
+  std::uint32_t scratch_size_ = 0;
+};
+
+}  // namespace kmax::firmware

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "firmware/board_interface/board_identity.hpp"
+#include "firmware/command/axes.hpp"
+#include "firmware/command/parameter_access.hpp"
+#include "firmware/command/store_commands.hpp"
+
+namespace kmax::firmware {
+
+class CanopenEdge;
+class ModbusEdge;
+
+/// Brings what a host can read up to date, when somebody reads it: to the reports that the present poll began
+/// with, so that all are of one moment. Main loop only.
+class Readings {
+ public:
+  /// From where the values come; the links are used from the first refresh on, not before.
+  struct Sources {
+    const BoardIdentity& board;
+    ParameterAccess& parameters;
+    const StoreCommands& store;
+    Axes& axes;
+    const ModbusEdge& serial;
+    const CanopenEdge& can;
+  };
+  explicit Readings(const Sources& sources) : of_(sources) {}
+
+  /// In every poll.
+  void count_uptime(std::uint32_t now_us);
+  void refresh();
+  /// Only those of the axis, or of the device, that this slot belongs to.
+  void refresh(std::size_t slot);
+
+ private:
+  void refresh_axis(std::size_t axis);
+  void refresh_device();
+  void publish_crash();
+  void publish_capture();
+  std::uint32_t flags_of(std::size_t axis) const;
+  bool saturated(std::size_t axis) const;
+
+  Sources of_;
+  std::uint32_t second_us_ = 0, uptime_s_ = 0;
+  bool started_ = false;
+};
+
+}  // namespace kmax::firmware

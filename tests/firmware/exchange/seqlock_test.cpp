@@ -1,0 +1,60 @@
+#include "firmware/exchange/seqlock.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <functional>
+
+namespace kmax::firmware::seqlock_test {
+namespace {
+
+// Reading copies by construction, publishing by assignment: the interrupt runs in the middle of the former.
+struct Interrupted {
+  static constexpr std::size_t pieces = 4;
+  static inline std::function<void()> interrupt;
+  static inline int interrupts_left = 0;
+  static inline std::size_t interrupt_at = 0;
+  std::array<int, pieces> piece{};
+
+  Interrupted() = default;
+  explicit Interrupted(int value) { piece.fill(value); }
+  Interrupted(const Interrupted& other) {
+    for (std::size_t i = 0; i <= pieces; ++i) {
+      if (i == interrupt_at && interrupts_left > 0 && interrupt) {
+        --interrupts_left;
+        interrupt();
+      }
+      if (i < pieces) piece[i] = other.piece[i];
+    }
+  }
+  Interrupted& operator=(const Interrupted&) = default;
+};
+
+TEST(Seqlock, BeforeTheFirstPublicationTheValueIsEmpty) {
+  Seqlock<int> snapshot;
+  EXPECT_EQ(snapshot.read(), 0);
+  snapshot.ISR_publish(5);
+  EXPECT_EQ(snapshot.read(), 5);
+  EXPECT_EQ(snapshot.read(), 5);
+}
+
+TEST(Seqlock, InterruptAtEveryPointOfTheCopyGivesTheNewestWholeValue) {
+  for (std::size_t point = 0; point <= Interrupted::pieces; ++point) {
+    for (const int times : {1, 2, 5}) {  // also again during the repetition
+      Seqlock<Interrupted> snapshot;
+      int published = 1;
+      snapshot.ISR_publish(Interrupted(published));
+      Interrupted::interrupt = [&] { snapshot.ISR_publish(Interrupted(++published)); };
+      Interrupted::interrupt_at = point;
+      Interrupted::interrupts_left = times;
+      const Interrupted read = snapshot.read();
+      EXPECT_EQ(Interrupted::interrupts_left, 0);
+      EXPECT_EQ(published, 1 + times);
+      for (const int piece : read.piece) EXPECT_EQ(piece, published) << "point " << point;
+    }
+  }
+  Interrupted::interrupt = nullptr;
+}
+
+}  // namespace
+}  // namespace kmax::firmware::seqlock_test
