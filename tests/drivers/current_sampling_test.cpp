@@ -110,47 +110,6 @@ TEST(CurrentSampling, RefusesWhatCannotWorkAndTouchesNothing) {
   EXPECT_TRUE(refused({.slow_sampling_code = 8}, apb2));
 }
 
-TEST(CurrentSampling, AlternatesAndArmsTheOtherAxis) {
-  Started board;
-  for (unsigned i = 0; i < 6; ++i) {
-    const unsigned axis = i % 2;
-    EXPECT_EQ(board.adc2.jsqr.value >> 15, axis == 0 ? 10U : 13U);
-    board.trigger(100 + i, 200 + i);
-    const CurrentSample sample = board.sampling.ISR_read(axis);
-    EXPECT_TRUE(sample.valid);
-    EXPECT_EQ(sample.phase_b, 100 + i);
-    EXPECT_EQ(sample.phase_c, 200 + i);
-    EXPECT_EQ(board.adc2.flags | board.adc3.flags, 0U);
-  }
-  EXPECT_EQ(board.sampling.counters().axis_mismatches, 0U);
-  EXPECT_EQ(board.sampling.counters().overruns, 0U);
-}
-
-TEST(CurrentSampling, WrongPhaseIsCountedAndHealsAtOnce) {
-  Started board;
-  board.trigger(1, 2);
-  EXPECT_FALSE(board.sampling.ISR_read(1).valid) << "the list was that of axis 0";
-  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
-  EXPECT_EQ(board.sampling.counters().overruns, 0U);
-  EXPECT_EQ(board.adc2.jsqr.value, 10U << 15) << "axis 0 is next by the timer";
-  board.trigger(3, 4);
-  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
-  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
-}
-
-TEST(CurrentSampling, LostInterruptIsOverrunAndMismatch) {
-  Started board;
-  board.trigger(1, 2);
-  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
-  board.trigger(3, 4);  // axis 1; nobody reads
-  board.trigger(5, 6);  // axis 0, but converted with the list of axis 1
-  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
-  EXPECT_EQ(board.sampling.counters().overruns, 1U);
-  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
-  board.trigger(7, 8);
-  EXPECT_TRUE(board.sampling.ISR_read(1).valid);
-}
-
 TEST(CurrentSampling, TriggerBetweenReadingAndArmingIsCounted) {
   Started board;
   board.trigger(1, 2);

@@ -39,7 +39,6 @@ struct Chip {
   FakeFlash flash;
   std::vector<FakeWord> memory{2 * Sectors::words_per_sector};
   std::function<bool()> store_works = [] { return true; };
-  bool unlocks = true;
   bool erases = true;
   std::uint32_t flags_of_operation = 0;
   std::string order;
@@ -51,7 +50,7 @@ struct Chip {
     flash.cr.value = flash_cr::Lock::mask;
     flash.keyr.on_write = [this](std::uint32_t key) {
       order += key == 0x4567'0123U ? "1" : key == 0xCDEF'89ABU ? "2" : "?";
-      if (key == 0xCDEF'89ABU && unlocks) flash.cr.value &= ~flash_cr::Lock::mask;
+      if (key == 0xCDEF'89ABU) flash.cr.value &= ~flash_cr::Lock::mask;
     };
     flash.cr.on_write = [this](std::uint32_t word) {
       order += (word & flash_cr::Lock::mask) != 0 ? "L" : word == 0 ? "0" : "c";
@@ -156,23 +155,6 @@ TEST(FlashSectors, OldErrorFlagsAreNotTakenForNewOnes) {
   Chip chip;
   chip.flash.sr.value = flash_sr::errors;
   EXPECT_TRUE(chip.sectors.program(0, 0, 1));
-}
-
-TEST(FlashSectors, RegisterThatDoesNotUnlock) {
-  Chip chip;
-  chip.unlocks = false;
-  EXPECT_FALSE(chip.sectors.erase(0));
-  EXPECT_EQ(chip.sectors.result(), FlashResult::locked);
-  EXPECT_TRUE(chip.flash.cr.writes.empty());
-  EXPECT_EQ(chip.flash.acr.value, 0x705U);
-}
-
-TEST(FlashSectors, UnlockedRegisterGetsNoKeysButALock) {
-  Chip chip;
-  chip.flash.cr.value = 0;
-  EXPECT_TRUE(chip.sectors.program(0, 0, 1));
-  EXPECT_EQ(chip.count('1') + chip.count('2'), 0U) << "keys out of turn lock it for good";
-  EXPECT_EQ(chip.flash.cr.value, flash_cr::Lock::mask);
 }
 
 TEST(FlashSectors, BusyFromBeforeTouchesNothing) {

@@ -24,13 +24,6 @@ TEST(QuadratureTimer, CountsAllFourEdgesOnBothInputs) {
   EXPECT_EQ(encoder.count(), 0x2345);
 }
 
-TEST(QuadratureTimer, ReversedInvertsOneInputOnly) {
-  TimerRegisters timer{};
-  QuadratureTimer<> encoder{timer};
-  ASSERT_TRUE(encoder.configure({.reversed = true}));
-  EXPECT_EQ(timer.ccer, 2U) << "CC1P";
-}
-
 TEST(QuadratureTimer, ThirtyTwoBitTimerUsesItsWholeRange) {
   TimerRegisters timer{};
   QuadratureTimer<TimerRegisters, std::uint32_t> encoder{timer};

@@ -179,7 +179,7 @@ std::uint32_t UsartModel::read_data(const Access& access) {
   refuse_if(!enabled() && status_seen_ == 0, access, "DR read while UE is 0");
   sr_ &= ~(status_seen_ & cleared_by_data_read);
   sr_ &= ~usart_sr::ReceiveNotEmpty::mask;
-  status_seen_ = 0;
+  status_seen_ &= usart_sr::TransmissionComplete::mask;  // waits for a write of DR
   update_interrupt();
   return received_;
 }

@@ -106,7 +106,7 @@ class UsartModel final : public RegisterBlock<UsartModel> {
   std::function<void(bool, BoardTime)> on_transmitting_;
 
   std::uint32_t sr_, brr_ = 0, cr1_ = 0, cr2_ = 0;
-  std::uint32_t status_seen_ = 0;  // flags that a read of SR has shown, and no DR access has followed
+  std::uint32_t status_seen_ = 0;  // flags that a read of SR has shown, until the DR access that clears them
   bool level_ = false;
 
   std::uint32_t received_ = 0;

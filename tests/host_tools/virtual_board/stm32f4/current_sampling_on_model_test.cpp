@@ -121,6 +121,7 @@ TEST(CurrentSamplingOnModel, InterruptAfterTheNextTriggerIsCountedAndNothingWron
     board.run(late);
     EXPECT_FALSE(board.sampling.ISR_read(1).valid) << late;
     EXPECT_GE(board.sampling.counters().overruns, 1U) << late;
+    EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U) << late;
     // Where the late handler ran into the conversion, that one ends now and asks again.
     board.run_until(board.first_trigger + 6 * period - 1);
     if (board.interrupts.level(Interrupt::adc)) {

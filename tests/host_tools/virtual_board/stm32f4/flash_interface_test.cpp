@@ -350,6 +350,7 @@ TEST(FlashSectorsOnModel, TakesOverARegisterThatWasLeftUnlocked) {
   chip.flash_registers.cr = 0;
   ASSERT_TRUE(chip.sectors->erase(0));
   EXPECT_TRUE(chip.sectors->program(0, 0, 0x1234'5678));
+  EXPECT_EQ(static_cast<std::uint32_t>(chip.flash_registers.cr), cr::Lock::mask);
 }
 
 // The power goes in the n-th operation: what is torn is confined to that operation's words.

@@ -158,13 +158,6 @@ TEST(PhaseShiftedPwmOnModel, LockProtectsTheDeadTime) {
   EXPECT_TRUE(other.configure());
 }
 
-TEST(PhaseShiftedPwmOnModel, ArmNeedsTheCounter) {
-  Board board;
-  ASSERT_TRUE(board.pwm1.configure());
-  EXPECT_FALSE(board.pwm1.arm());
-  EXPECT_FALSE(board.tim1.moe());
-}
-
 RC_GTEST_PROP(PhaseShiftedPwmOnModel, OutputIsTheDutyThatWasSet, ()) {
   const auto half = *rc::gen::inRange<std::uint16_t>(300, 60000);
   const auto high = *rc::gen::inRange<std::uint16_t>(0, 65535);

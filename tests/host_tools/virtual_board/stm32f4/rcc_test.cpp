@@ -1,7 +1,9 @@
 #include "host_tools/virtual_board/stm32f4/rcc.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -275,6 +277,7 @@ TEST(ClockTreeOnModel, EndsAt168MHzFromTheCrystal) {
   EXPECT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
   chip.expect_clocks(168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000);
   const double start_up = seconds(chip.now);
+  EXPECT_EQ(static_cast<std::uint32_t>(chip.flash_registers.acr), 0x705U);
   EXPECT_GT(start_up, 2.2e-3) << "crystal and PLL take that long";
   EXPECT_LT(start_up, 2.3e-3);
 }
@@ -292,6 +295,8 @@ TEST(ClockTreeOnModel, DeadCrystalGives168MHzFromTheInternalOscillator) {
   chip.rcc.set_crystal_works(false);
   EXPECT_EQ(chip.start().source, stm32::ClockSource::internal_pll);
   chip.expect_clocks(168'000'000, 42'000'000, 84'000'000, 84'000'000, 168'000'000);
+  EXPECT_EQ(static_cast<std::uint32_t>(chip.rcc_registers.cr) & cr::CrystalOn::mask, 0U)
+      << "a crystal that does not start is switched off";
 }
 
 TEST(ClockTreeOnModel, DeadPllLeaves16MHz) {
@@ -316,6 +321,145 @@ TEST(ClockTreeOnModel, ResetBringsTheInternalOscillatorBack) {
   chip.flash.reset(chip.now);
   chip.expect_clocks(16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000);
   EXPECT_EQ(chip.start().source, stm32::ClockSource::crystal_pll);
+}
+
+/// A register that is broken: what is read or written is changed on the way.
+struct BrokenRegister {
+  using Change = std::function<std::uint32_t(std::uint32_t)>;
+
+  explicit operator std::uint32_t() const {
+    ++reads;
+    return read(static_cast<std::uint32_t>(behind));
+  }
+  BrokenRegister& operator=(std::uint32_t word) {
+    written = word;
+    behind = write(word);
+    return *this;
+  }
+
+  RegisterOnModel behind;
+  Change read = std::identity{}, write = std::identity{};
+  std::uint32_t written = 0;
+  mutable unsigned reads = 0;
+};
+struct BrokenRcc {
+  BrokenRegister cr, pllcfgr, cfgr, apb1enr;
+};
+struct BrokenPwr {
+  BrokenRegister cr;
+};
+struct BrokenFlash {
+  BrokenRegister acr;
+};
+
+/// Parts of the clocks that can be broken one by one.
+struct BrokenChip : ClockTreeChip {
+  BrokenChip() {
+    broken.cr.read = [this](std::uint32_t word) {
+      const bool from_crystal =
+          pllcfgr::FromCrystal::of(static_cast<std::uint32_t>(rcc_registers.pllcfgr)) != 0;
+      if (!internal_starts) word &= ~cr::InternalReady::mask;
+      if (!crystal_starts) word &= ~cr::CrystalReady::mask;
+      if (!(from_crystal ? pll_locks_on_crystal : pll_locks_on_internal)) word &= ~cr::PllReady::mask;
+      return word;
+    };
+    broken.cfgr.write = [this](std::uint32_t word) {
+      const std::uint32_t wanted = cfgr::Switch::of(word);
+      const bool switches = wanted == cfgr::pll ? switch_to_pll_works : switch_to_internal_works;
+      return switches ? word : (word & ~cfgr::Switch::mask) | cfgr::Switch::bits(source());
+    };
+    broken_power.cr.write = [this](std::uint32_t word) {
+      EXPECT_NE(static_cast<std::uint32_t>(rcc_registers.apb1enr) & stm32::rcc_apb1enr::Power::mask, 0U);
+      return word;
+    };
+    broken_flash.acr.read = [this](std::uint32_t word) { return wait_states_stick ? word : word & ~7U; };
+  }
+  std::uint32_t source() { return cfgr::SwitchStatus::of(static_cast<std::uint32_t>(rcc_registers.cfgr)); }
+  stm32::ClockSource start_broken(stm32::ClockWaits waits = {}) {
+    return stm32::ClockTree<BrokenRcc, BrokenPwr, BrokenFlash>{broken, broken_power, broken_flash, waits}
+        .start()
+        .source;
+  }
+
+  bool internal_starts = true, crystal_starts = true;
+  bool pll_locks_on_crystal = true, pll_locks_on_internal = true;
+  bool switch_to_pll_works = true, switch_to_internal_works = true, wait_states_stick = true;
+  BrokenRcc broken{
+      {rcc_registers.cr}, {rcc_registers.pllcfgr}, {rcc_registers.cfgr}, {rcc_registers.apb1enr}};
+  BrokenPwr broken_power{{power_registers.cr}};
+  BrokenFlash broken_flash{{flash_registers.acr}};
+};
+
+TEST(ClockTreeOnBrokenChip, EachDefectLeavesItsSource) {
+  struct Row {
+    const char* what;
+    void (*make)(BrokenChip&);
+    stm32::ClockSource source;
+  };
+  using enum stm32::ClockSource;
+  for (const Row& row :
+       {Row{"a PLL that locks only on the internal oscillator",
+            [](BrokenChip& chip) { chip.pll_locks_on_crystal = false; }, internal_pll},
+        Row{"wait states that do not stick forbid full speed",
+            [](BrokenChip& chip) { chip.wait_states_stick = false; }, internal},
+        Row{"a switch that does not happen", [](BrokenChip& chip) { chip.switch_to_pll_works = false; },
+            internal},
+        Row{"a clock control that shows nothing ready",
+            [](BrokenChip& chip) {
+              chip.broken.cr.read = [](std::uint32_t word) { return word & cr::InternalTrim::mask; };
+            },
+            unresponsive},
+        Row{"an internal oscillator that cannot be reached: the PLL under the core must not be stopped",
+            [](BrokenChip& chip) {
+              chip.start();
+              chip.switch_to_internal_works = false;
+            },
+            unresponsive}}) {
+    SCOPED_TRACE(row.what);
+    BrokenChip chip;
+    row.make(chip);
+    EXPECT_EQ(chip.start_broken(), row.source);
+    if (row.source != internal) continue;
+    chip.expect_clocks(16'000'000, 16'000'000, 16'000'000, 16'000'000, 16'000'000);
+    EXPECT_EQ(chip.broken.cfgr.written & cfgr::Switch::mask, 0U)
+        << "a late switch must not happen behind the program's back";
+    EXPECT_EQ(static_cast<std::uint32_t>(chip.rcc_registers.cr) & cr::PllOn::mask, 0U);
+  }
+}
+
+TEST(ClockTreeOnBrokenChip, WaitBoundsAreRespectedExactly) {
+  BrokenChip chip;
+  chip.crystal_starts = chip.pll_locks_on_internal = false;
+  EXPECT_EQ(chip.start_broken({.crystal = 500, .pll = 70, .other = 9}), stm32::ClockSource::internal);
+  // 500 for the crystal, 70 for the PLL; what is ready at once and the read-modify-writes add a handful.
+  EXPECT_GE(chip.broken.cr.reads, 570U);
+  EXPECT_LE(chip.broken.cr.reads, 570U + 20U);
+}
+
+// The models refuse each step that the manual forbids on the way.
+RC_GTEST_PROP(ClockTreeOnBrokenChip, EveryMixOfDefectsEndsWithAnHonestResult,
+              (bool internal, bool crystal, bool lock_crystal, bool lock_internal, bool to_pll,
+               bool to_internal, bool latency, bool boot_loader)) {
+  BrokenChip chip;
+  chip.access_time = 2000;  // so that oscillators start within the reads
+  if (boot_loader) chip.start();
+  chip.internal_starts = internal;
+  chip.crystal_starts = crystal;
+  chip.pll_locks_on_crystal = lock_crystal;
+  chip.pll_locks_on_internal = lock_internal;
+  chip.switch_to_pll_works = to_pll;
+  chip.switch_to_internal_works = to_internal;
+  chip.wait_states_stick = latency;
+  const stm32::ClockSource source = chip.start_broken({.crystal = 400, .pll = 100, .other = 100});
+  RC_ASSERT(chip.broken.cr.reads + chip.broken.cfgr.reads + chip.broken_flash.acr.reads < 1500U);
+  const bool on_pll = chip.source() == cfgr::pll;
+  const bool full = chip.clocks.core == units_per_period(168'000'000);
+  RC_ASSERT(on_pll == full);
+  using enum stm32::ClockSource;
+  if (source != unresponsive) RC_ASSERT(full == (source == crystal_pll || source == internal_pll));
+  const auto pll = static_cast<std::uint32_t>(chip.rcc_registers.pllcfgr);
+  if (full && source != unresponsive)
+    RC_ASSERT((pllcfgr::FromCrystal::of(pll) != 0) == (source == crystal_pll));
 }
 
 }  // namespace

@@ -284,14 +284,19 @@ struct DrivenPort : testing::ModelBench {
     const BoardTime end = now + duration;
     while (now < end) {
       run(2 * units_per_microsecond);
-      if (interrupts.level(Interrupt::uart4)) events_served.push_back(usart.ISR_serve());
+      if (interrupts.level(Interrupt::uart4)) serve_once();
     }
+  }
+  void serve_once() {
+    events_served.push_back(usart.ISR_serve());
+    if (events_served.back().transmission_complete) sent_at_completion = sent.size();
   }
 
   UsartModel model{clocks, interrupts, Interrupt::uart4};
   UsartOnModel registers = block_on_model<UsartOnModel>(*this, model);
   stm32::Usart<UsartOnModel> usart{registers};
   std::vector<std::uint8_t> sent;
+  std::size_t sent_at_completion = 0;
   std::vector<BoardTime> start_bits;
   BoardTime last_stop_bit = 0;
   std::vector<stm32::UsartEvent> events_served;
@@ -308,7 +313,9 @@ TEST(UsartOnModel, RoundTripOf256BytesInBothDirectionsAtOnce) {
   const auto bytes = all_bytes();
   for (const std::uint8_t byte : bytes)
     port.model.receive(static_cast<std::uint8_t>(~byte), true, true, port.now + 12 * bit_at_115200);
+  EXPECT_FALSE(port.usart.transmit({}));
   ASSERT_TRUE(port.usart.transmit(bytes));
+  EXPECT_FALSE(port.usart.transmit(bytes)) << "one transmission at a time";
   port.serve(260 * 11 * bit_at_115200);
 
   EXPECT_TRUE(std::equal(port.sent.begin(), port.sent.end(), bytes.begin(), bytes.end()));
@@ -322,6 +329,8 @@ TEST(UsartOnModel, RoundTripOf256BytesInBothDirectionsAtOnce) {
   ASSERT_EQ(received.size(), bytes.size());
   for (std::size_t i = 0; i < bytes.size(); ++i) EXPECT_EQ(received[i], static_cast<std::uint8_t>(~bytes[i]));
   EXPECT_EQ(completions, 1U);
+  EXPECT_EQ(port.sent_at_completion, bytes.size()) << "only when the last stop bit has left";
+  EXPECT_FALSE(port.usart.transmitting());
   EXPECT_FALSE(port.interrupts.level(Interrupt::uart4));
   // 256 frames of 11 bits without a gap.
   EXPECT_EQ(port.last_stop_bit - port.start_bits.front(), 256 * 11 * bit_at_115200);
@@ -334,10 +343,14 @@ TEST(UsartOnModel, ErrorsOnTheLineReachTheirByte) {
   port.model.receive(3, true, false, port.now);
   port.model.receive(4, true, true, port.now);
   port.serve(60 * bit_at_115200);
-  ASSERT_EQ(port.events_served.size(), 4U);
-  for (std::size_t i = 0; i < 4; ++i) {
+  port.model.add_noise();
+  port.model.receive(5, true, true, port.now);
+  port.model.receive(6, true, true, port.now);
+  port.serve(40 * bit_at_115200);
+  ASSERT_EQ(port.events_served.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(port.events_served[i].byte, i + 1);
-    EXPECT_EQ(port.events_served[i].line_error, i == 1 || i == 2);
+    EXPECT_EQ(port.events_served[i].line_error, i == 1 || i == 2 || i == 4) << i;
   }
 }
 
@@ -354,6 +367,53 @@ TEST(UsartOnModel, LateServiceIsAnOverrunAndTheNextByteIsClean) {
   ASSERT_EQ(port.events_served.size(), 2U);
   EXPECT_EQ(port.events_served[1].byte, 9);
   EXPECT_FALSE(port.events_served[1].line_error);
+}
+
+TEST(UsartOnModel, AnOverrunIsReportedWithoutAByteAndDroppedByConfigure) {
+  DrivenPort port;
+  port.model.receive(1, true, true, port.now);
+  port.run(12 * bit_at_115200);
+  static_cast<void>(static_cast<std::uint32_t>(port.registers.sr));  // before the second byte has come
+  port.model.receive(2, true, true, port.now);
+  port.run(12 * bit_at_115200);
+  static_cast<void>(static_cast<std::uint32_t>(port.registers.dr));
+  const stm32::UsartEvent event = port.usart.ISR_serve();
+  EXPECT_TRUE(!event.received && event.line_error);
+  port.model.receive(3, true, false, port.now);
+  port.run(12 * bit_at_115200);
+  EXPECT_TRUE(port.interrupts.level(Interrupt::uart4));
+  ASSERT_TRUE(port.usart.configure({}, apb1_hz));
+  EXPECT_FALSE(port.interrupts.level(Interrupt::uart4));
+}
+
+// Bytes in at any time, interrupts served late, or with nothing to serve: every byte leaves once and in
+// order, every received byte is seen or its loss is.
+RC_GTEST_PROP(UsartOnModel, AnyInterleaving, ()) {
+  DrivenPort port;
+  const auto message = *rc::gen::nonEmpty(rc::gen::arbitrary<std::vector<std::uint8_t>>());
+  const auto script = *rc::gen::container<std::vector<int>>(100, rc::gen::inRange(0, 4));
+  RC_ASSERT(port.usart.transmit(message));
+  std::uint8_t received = 0;
+  for (const int action : script) {
+    if (action == 0) port.model.receive(received++, true, true, port.now);
+    if (action == 1) port.run(8 * bit_at_115200);
+    if (action == 2 && port.interrupts.level(Interrupt::uart4)) port.serve_once();
+    if (action == 3) port.serve_once();  // pended by software
+  }
+  port.serve((message.size() + received + 3) * 11 * bit_at_115200);
+  unsigned completions = 0;
+  bool lost = false;
+  std::vector<std::uint8_t> seen;
+  for (const stm32::UsartEvent& event : port.events_served) {
+    if (event.received) seen.push_back(event.byte);
+    completions += event.transmission_complete ? 1 : 0;
+    lost = lost || event.line_error;
+  }
+  RC_ASSERT(completions == 1U);
+  RC_ASSERT(port.sent == message);
+  RC_ASSERT(port.sent_at_completion == message.size());
+  RC_ASSERT(lost || seen.size() == received);
+  for (std::size_t i = 0; !lost && i < seen.size(); ++i) RC_ASSERT(seen[i] == i);
 }
 
 TEST(UsartOnModel, ReconfiguredInTheMiddleOfATelegram) {
