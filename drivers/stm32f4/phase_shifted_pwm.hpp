@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "drivers/stm32f4/registers/timer.hpp"
 #include "drivers/stm32f4/three_phase_pwm.hpp"
 

@@ -1,7 +1,6 @@
 #pragma once
 // What an axis is excited with, what is captured of it, and what the capture showed.
 
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <span>

@@ -22,7 +22,6 @@
 // second: 0.2 electrical degrees, of which 0.15 are the half count. Standard error: the scatter of the single
 // electrical turns' means; it does not know of gravity.
 
-#include <cstdint>
 #include <span>
 
 #include "host_tools/calibration/estimate.hpp"

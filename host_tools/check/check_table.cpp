@@ -144,7 +144,6 @@ std::string conclusion(const Judgement& judgement) {
 }
 
 std::string region_text(const control::StabilityCase<double>& c) {
-  using control::DiolaitiRegion;
   if (!(c.stiffness > 0)) return "";
   const double speed = escape_speed_of(c);
   const std::string_view name = to_string(region_of(c));

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <filesystem>
-
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/input_file.hpp"
 #include "host_tools/base/toml_text.hpp"

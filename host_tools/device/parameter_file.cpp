@@ -4,7 +4,6 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <tuple>
 
 #include "host_tools/base/errors.hpp"

@@ -9,7 +9,6 @@
 
 namespace kmax::device {
 
-using firmware::Refusal;
 using firmware::StoreCommand;
 using firmware::StoreState;
 using link::LinkError;

@@ -4,7 +4,6 @@
 // once, so that nothing is lost when the run ends early.
 
 #include <functional>
-#include <optional>
 #include <string>
 
 #include <fmt/format.h>

@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <optional>
 
 #include "host_tools/device/drive.hpp"
 

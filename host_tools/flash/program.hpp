@@ -7,7 +7,6 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 // Runs other programs: by argument vector, never through a shell.
 

@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <bit>
 
 #include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"

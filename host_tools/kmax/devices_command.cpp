@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <memory>
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"

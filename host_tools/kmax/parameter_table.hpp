@@ -2,7 +2,6 @@
 
 #include <ostream>
 #include <span>
-#include <vector>
 
 #include "host_tools/device/parameter.hpp"
 

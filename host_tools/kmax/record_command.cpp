@@ -5,7 +5,6 @@
 #include <cmath>
 #include <csignal>
 #include <fstream>
-#include <memory>
 #include <optional>
 
 #include "host_tools/base/interruption.hpp"

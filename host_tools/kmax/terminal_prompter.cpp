@@ -6,7 +6,6 @@
 
 #include <cerrno>
 
-
 namespace kmax::cli {
 
 // Byte by byte, past the buffers of std::cin: what they held would be an answer that poll() does not see.

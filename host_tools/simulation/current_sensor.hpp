@@ -14,7 +14,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 
 #include "host_tools/simulation/model_field.hpp"
 #include "host_tools/simulation/noise_generator.hpp"

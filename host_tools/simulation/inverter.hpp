@@ -32,7 +32,6 @@
 // in the interval where diodes stop. No heap.
 
 #include <array>
-#include <span>
 
 #include "host_tools/simulation/brushed_dc_motor.hpp"
 #include "host_tools/simulation/model_field.hpp"

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <stdexcept>
-
 namespace kmax::simulation {
 
 QuadratureEncoder::QuadratureEncoder(const EncoderConfig& config, double position, std::uint64_t seed)

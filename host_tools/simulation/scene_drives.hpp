@@ -15,7 +15,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/scene.hpp"

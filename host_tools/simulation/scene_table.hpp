@@ -6,7 +6,6 @@
 #include <toml++/toml.h>
 
 #include <array>
-#include <filesystem>
 #include <initializer_list>
 #include <optional>
 #include <span>

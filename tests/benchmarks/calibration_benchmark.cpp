@@ -6,9 +6,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdlib>
-#include <map>
 #include <vector>
 
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"

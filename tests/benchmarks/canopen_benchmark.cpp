@@ -7,8 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <random>
 
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
 #include "tests/image/can_bench.hpp"

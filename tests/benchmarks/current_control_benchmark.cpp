@@ -5,7 +5,6 @@
 // gnuplot. Exit code 1 when a file cannot be read or written or gnuplot fails, 2 on wrong usage.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>

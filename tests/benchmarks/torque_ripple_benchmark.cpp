@@ -9,7 +9,6 @@
 #include <exception>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "host_tools/plot/figure.hpp"
 #include "tests/host_tools/simulated_board/torque_ripple.hpp"

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <cstdlib>
 
 #include "tests/benchmarks/speed_and_error/processor_time.hpp"
 #include "tests/image/image_bench.hpp"

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <random>
-#include <vector>
 
 namespace kmax::control::chord_window_test {
 namespace {

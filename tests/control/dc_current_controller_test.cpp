@@ -16,7 +16,6 @@ namespace {
 
 using test::Belief;
 using test::DcMotor;
-using test::tick;
 template <typename Scalar>
 using Loop = test::DcLoop<Scalar>;
 

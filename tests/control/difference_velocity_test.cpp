@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 
 namespace kmax::control::difference_velocity_test {
 namespace {

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <vector>
 
 namespace kmax::control::haptic_loop_test {
 namespace {

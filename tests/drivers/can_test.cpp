@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <deque>
-
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::can_test {

@@ -3,10 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <deque>
-#include <vector>
 
 #include "tests/drivers/fake_register.hpp"
 

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <functional>
-#include <memory>
 #include <utility>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <deque>
-#include <memory>
 
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/can/sdo_client.hpp"

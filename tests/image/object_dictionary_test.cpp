@@ -9,7 +9,6 @@
 namespace kmax::tests::object_dictionary_test {
 namespace {
 
-using description::DataType;
 using description::DescribedObject;
 using description::ObjectAccess;
 using firmware::canopen::Abort;

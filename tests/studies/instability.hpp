@@ -8,7 +8,6 @@
 // softening scales the wall's force before the device clips it.
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 

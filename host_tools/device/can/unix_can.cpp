@@ -1,7 +1,6 @@
 #include "host_tools/device/can/unix_can.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 

@@ -9,7 +9,6 @@
 
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "host_tools/experiment/contact/contact_experiment.hpp"

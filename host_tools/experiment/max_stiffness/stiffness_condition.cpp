@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "host_tools/experiment/paper_numbers.hpp"
 
 namespace kmax::experiment {

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
 
 #include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/register_block.hpp"

@@ -19,7 +19,6 @@ namespace timer_cr1 = drivers::stm32f4::timer_cr1;
 namespace timer_cr2 = drivers::stm32f4::timer_cr2;
 namespace timer_egr = drivers::stm32f4::timer_egr;
 namespace timer_smcr = drivers::stm32f4::timer_smcr;
-namespace timer_sr = drivers::stm32f4::timer_sr;
 
 constexpr std::uint32_t cr1_writable = timer_cr1::Enable::mask | timer_cr1::UpdateRequestSource::mask |
                                        timer_cr1::CountingDown::mask | timer_cr1::Alignment::mask |

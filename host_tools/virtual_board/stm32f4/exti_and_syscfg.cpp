@@ -1,7 +1,6 @@
 #include "host_tools/virtual_board/stm32f4/exti_and_syscfg.hpp"
 
 #include <cstddef>
-#include <string>
 
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/syscfg.hpp"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
-#include <string>
 
 namespace kmax::virtual_board {
 

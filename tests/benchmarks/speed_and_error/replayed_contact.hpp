@@ -1,7 +1,6 @@
 #pragma once
 // A person presses the simulated device into a wall: the trial on which the integrators are compared.
 
-#include <cstddef>
 #include <memory>
 #include <vector>
 

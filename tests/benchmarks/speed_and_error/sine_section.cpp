@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <numbers>
-#include <string>
-#include <vector>
 
 #include "control/sine_cosine.hpp"
 #include "host_tools/plot/figure.hpp"

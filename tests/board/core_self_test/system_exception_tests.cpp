@@ -1,7 +1,5 @@
 // SVC, PendSV, the vector table's place. PM0214, exception types.
 
-#include <cstring>
-
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/registers.hpp"
 #include "tests/board/core_self_test/lines.hpp"

@@ -4,7 +4,6 @@
 // steps, noise, offsets that are averaged while the bridge is off, dead time and supply sag are on.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "tests/host_tools/calibration/calibrated_device.hpp"

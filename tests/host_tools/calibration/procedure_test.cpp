@@ -10,7 +10,6 @@ namespace kmax::calibration_test::procedure_test {
 namespace {
 
 using calibration::CalibrationSettings;
-using calibration::StepSet;
 
 TEST(Procedure, SavesOnceWhenAllStepsPass) {
   CalibratedDevice device("dc_coreless_a");

@@ -4,7 +4,6 @@
 #include <rapidcheck/gtest.h>
 
 #include <bit>
-#include <cmath>
 
 #include "firmware/parameters/parameter_rules.hpp"
 

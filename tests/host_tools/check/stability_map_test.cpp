@@ -12,7 +12,6 @@
 
 namespace kmax::check::stability_map_test {
 namespace {
-using control::Criterion;
 using device::Parameter;
 using device::ValueError;
 using firmware::ParameterValues;

@@ -7,7 +7,6 @@
 #include <atomic>
 #include <latch>
 #include <mutex>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>

@@ -1,8 +1,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "host_tools/flash/program.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"
 #include "tests/host_tools/temporary_folder.hpp"

@@ -5,7 +5,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/board_services.hpp"

@@ -1,9 +1,6 @@
 // kmax dump, load and diff on a simulated device that outlives the commands.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <sstream>
-
 #include "host_tools/device/parameter_file.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "tests/host_tools/kmax/wired_command_line.hpp"

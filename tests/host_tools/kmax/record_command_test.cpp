@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <sstream>
 
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/kmax/command_line_fixture.hpp"

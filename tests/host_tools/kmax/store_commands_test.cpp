@@ -1,8 +1,6 @@
 // kmax save, defaults and info on a simulated device that outlives the commands, and restarts when told.
 #include <gtest/gtest.h>
 
-#include <sstream>
-
 #include "host_tools/kmax/commands.hpp"
 #include "tests/host_tools/kmax/wired_command_line.hpp"
 

@@ -4,14 +4,12 @@
 #include <rapidcheck/gtest.h>
 
 #include <bit>
-#include <cstring>
 #include <vector>
 
 namespace kmax::record::pdo_rows_test {
 namespace {
 using drivers::CanFrame;
 using std::chrono::microseconds;
-using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
 constexpr std::uint32_t period = 20;

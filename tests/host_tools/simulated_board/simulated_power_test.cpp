@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "tests/firmware/modbus/rtu_line.hpp"
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
@@ -11,7 +10,6 @@
 namespace kmax::simulated_board::simulated_power_test {
 namespace {
 
-using firmware::DriveState;
 using firmware::Fault;
 using firmware::Refusal;
 using simulation::Defect;

@@ -2,8 +2,6 @@
 // controllers, and what their compensation makes of it.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/host_tools/simulation/sine_through_zero.hpp"
 
 namespace kmax::simulation::dead_time_under_control_test {

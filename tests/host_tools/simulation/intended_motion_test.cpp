@@ -5,7 +5,6 @@
 
 #include <limits>
 #include <stdexcept>
-#include <vector>
 
 namespace kmax::simulation::intended_motion_test {
 namespace {

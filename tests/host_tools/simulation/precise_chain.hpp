@@ -7,7 +7,6 @@
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <cstddef>
-#include <vector>
 
 #include "host_tools/simulation/chain_dynamics.hpp"
 

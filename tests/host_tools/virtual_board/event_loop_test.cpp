@@ -11,7 +11,6 @@
 namespace kmax::virtual_board::event_loop_test {
 namespace {
 
-namespace chip = drivers::stm32f4;
 using drivers::stm32f4::Interrupt;
 
 constexpr unsigned tim2 = exception_number::first_interrupt + static_cast<unsigned>(Interrupt::tim2);

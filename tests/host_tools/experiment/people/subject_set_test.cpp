@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <iterator>
 
 #include "host_tools/experiment/paper_numbers.hpp"

@@ -11,7 +11,6 @@ namespace kmax::virtual_board::processor_faults_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
-namespace chip = drivers::stm32f4;
 
 constexpr unsigned tim2 = exception_number::first_interrupt + static_cast<unsigned>(Interrupt::tim2);
 const ProcessorConfig as_on_the_chip{.units_per_instruction = 0, .faults_to_firmware = true};

@@ -10,7 +10,6 @@ namespace kmax::virtual_board::processor_time_test {
 namespace {
 
 using drivers::stm32f4::Interrupt;
-namespace chip = drivers::stm32f4;
 
 constexpr unsigned tim2 = exception_number::first_interrupt + static_cast<unsigned>(Interrupt::tim2);
 constexpr BoardTime cycle = ProgramOnCore::cycle;
