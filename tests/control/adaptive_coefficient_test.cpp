@@ -6,7 +6,6 @@
 #include <cmath>
 
 namespace kmax::control::adaptive_coefficient_test {
-namespace {
 
 using Config = AdaptiveCoefficientConfig<double>;
 using Coefficient = AdaptiveCoefficient<double>;
@@ -171,5 +170,4 @@ TEST(AdaptiveCoefficient, ANotANumberDoesNotPoisonTheMemory) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::adaptive_coefficient_test

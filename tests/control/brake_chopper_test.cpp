@@ -6,7 +6,6 @@
 #include <limits>
 
 namespace kmax::control::brake_chopper_test {
-namespace {
 
 constexpr auto fitted = BrakeChopper::prepare({25.0f, 0.5f});
 
@@ -49,5 +48,4 @@ TEST(BrakeChopper, TakesAVoltageThatIsNoNumberAsLow) {
   EXPECT_EQ(ticks_on(chopper, fitted, std::nanf("")), 0);
 }
 
-}  // namespace
 }  // namespace kmax::control::brake_chopper_test

@@ -7,7 +7,6 @@
 #include <random>
 
 namespace kmax::control::chord_window_test {
-namespace {
 
 // The definition in whole numbers: the chord to sample n passes within 1 of sample j when n D_j - j D_n is
 // within n.
@@ -123,5 +122,4 @@ TEST(ChordWindow, TheLargestBendsEndTheWindow) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::chord_window_test

@@ -8,7 +8,6 @@
 #include <limits>
 
 namespace kmax::control::closed_form_criteria_test {
-namespace {
 
 // Numbers that no two formulas share, and every part of a minimum the smaller one in turn.
 constexpr StabilityCase<double> held_case{.stiffness = 1100.0,
@@ -137,5 +136,4 @@ TEST(ClosedFormCriteria, WhatIsLeftOutDoesNotApplyAndTheRestIsTheSame) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::closed_form_criteria_test

@@ -8,7 +8,6 @@
 #include <vector>
 
 namespace kmax::control::count_extender_test {
-namespace {
 
 TEST(CountExtender, WithoutACountTheRawValueIsSigned) {
   CountExtender<std::uint16_t> short_counter;
@@ -58,5 +57,4 @@ RC_GTEST_PROP(CountExtender, FollowsEveryLegalWalk, (std::int32_t start)) {
   follows_every_legal_walk<std::uint32_t>(std::int64_t{start} * 1000, steps());
 }
 
-}  // namespace
 }  // namespace kmax::control::count_extender_test

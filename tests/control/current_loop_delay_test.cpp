@@ -8,7 +8,6 @@
 #include "control/current_loop_gains.hpp"
 
 namespace kmax::control::current_loop_delay_test {
-namespace {
 
 constexpr double rate = 20000.0;
 
@@ -61,5 +60,4 @@ TEST(CurrentLoopDelay, KnownNumbers) {
   EXPECT_FLOAT_EQ(current_loop_delay(1000.0f, 20000.0f), 1032.5e-6f);
 }
 
-}  // namespace
 }  // namespace kmax::control::current_loop_delay_test

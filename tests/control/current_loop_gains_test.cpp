@@ -8,7 +8,6 @@
 #include <numbers>
 
 namespace kmax::control::current_loop_gains_test {
-namespace {
 
 constexpr double period = 5e-5;
 
@@ -110,5 +109,4 @@ TEST(CurrentLoopGains, FloatFollowsDouble) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::current_loop_gains_test

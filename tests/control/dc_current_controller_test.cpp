@@ -12,7 +12,6 @@
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::control::dc_current_controller_test {
-namespace {
 
 using test::Belief;
 using test::DcMotor;
@@ -258,5 +257,4 @@ TEST(DcCurrentController, ResetEmptiesTheIntegrator) {
   EXPECT_EQ(loop.controller.update(loop.c, 1.0, 1.0, 0.0, 24.0).voltage, 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::control::dc_current_controller_test

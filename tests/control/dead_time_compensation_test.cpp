@@ -7,7 +7,6 @@
 #include <limits>
 
 namespace kmax::control::dead_time_compensation_test {
-namespace {
 
 TEST(DeadTimeCompensation, IsTheShareBeyondTheBandAndAStraightLineWithin) {
   const auto c = DeadTimeCompensation<double>::prepare(500e-9, 0.2, 20'000.0);
@@ -67,5 +66,4 @@ TEST(DeadTimeCompensation, WhatMakesNoSenseSwitchesItOff) {
   EXPECT_EQ(off.share, 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::control::dead_time_compensation_test

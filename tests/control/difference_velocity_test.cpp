@@ -7,7 +7,6 @@
 #include <cstdint>
 
 namespace kmax::control::difference_velocity_test {
-namespace {
 
 TEST(DifferenceVelocity, OneCountIsOneQuantumPerPeriod) {
   const auto coefficients = DifferenceVelocity<double>::prepare(2e-3, 55e-6);
@@ -38,5 +37,4 @@ RC_GTEST_PROP(DifferenceVelocity, EveryPairOfCountsGivesAFiniteValue,
   RC_ASSERT(value == 0.0F || (value > 0.0F) == (second > first));
 }
 
-}  // namespace
 }  // namespace kmax::control::difference_velocity_test

@@ -9,7 +9,6 @@
 #include "control/stiffness_limits.hpp"
 
 namespace kmax::control::diolaiti_criterion_test {
-namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
 
@@ -72,5 +71,4 @@ RC_GTEST_PROP(DiolaitiCriterion, EscapeIsHarderWithFrictionAndEasierWithStiffnes
   RC_ASSERT(escape_speed(k, b, f, period, 2 * quantum) <= speed);
 }
 
-}  // namespace
 }  // namespace kmax::control::diolaiti_criterion_test

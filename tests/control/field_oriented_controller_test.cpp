@@ -13,7 +13,6 @@
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::control::field_oriented_controller_test {
-namespace {
 
 using test::Belief;
 using test::SynchronousMotor;
@@ -517,5 +516,4 @@ TEST(FieldOrientedController, TheSupplyIsHalvedInMidStep) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::field_oriented_controller_test

@@ -7,7 +7,6 @@
 #include <cmath>
 
 namespace kmax::control::finite_test {
-namespace {
 
 RC_GTEST_PROP(Finite, AgreesWithTheStandardLibraryOnEveryPattern, (std::uint32_t bits)) {
   const auto value = std::bit_cast<float>(bits);
@@ -45,5 +44,4 @@ TEST(BoundedShare, StaysBetweenNothingAndAll) {
   EXPECT_EQ(bounded_share(std::nanf("")), 1.0F);
 }
 
-}  // namespace
 }  // namespace kmax::control::finite_test

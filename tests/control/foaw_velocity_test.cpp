@@ -10,7 +10,6 @@
 #include <vector>
 
 namespace kmax::control::foaw_velocity_test {
-namespace {
 
 struct Choice {
   int window = 1;
@@ -252,5 +251,4 @@ TEST(FoawVelocity, WindowsOutsideTheRangeAreTakenAsTheNearerLimit) {
   EXPECT_EQ(FoawVelocity<float>::prepare(16, 1.0F, 1.0F, 0).step, 1);
 }
 
-}  // namespace
 }  // namespace kmax::control::foaw_velocity_test

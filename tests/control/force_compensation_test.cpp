@@ -9,7 +9,6 @@
 #include <limits>
 
 namespace kmax::control::force_compensation_test {
-namespace {
 
 using Compensation = ForceCompensation<float>;
 using Config = ForceCompensationConfig<float>;
@@ -309,5 +308,4 @@ TEST(ForceCompensation, BeyondTheFrictionAHandleIsMoved) {
   EXPECT_GT(handle.position, 1e-5);
 }
 
-}  // namespace
 }  // namespace kmax::control::force_compensation_test

@@ -7,7 +7,6 @@
 #include <limits>
 
 namespace kmax::control::force_limiter_test {
-namespace {
 
 using Limiter = ForceLimiter<float>;
 constexpr float period = 1e-3f;
@@ -98,5 +97,4 @@ TEST(ForceLimiter, NotFiniteGivesZeroAndTheSoftStartAgain) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::force_limiter_test

@@ -9,7 +9,6 @@
 #include "tests/control/drawn_loop.hpp"
 
 namespace kmax::control::handle_transition_test {
-namespace {
 
 using Model = HandleModel<double>;
 using Transition = HandleTransition<double>;
@@ -117,5 +116,4 @@ TEST(HandleTransition, NoTimeIsNoChange) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::handle_transition_test

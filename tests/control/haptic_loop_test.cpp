@@ -7,7 +7,6 @@
 #include <cmath>
 
 namespace kmax::control::haptic_loop_test {
-namespace {
 
 // A plain wall without soft start, sampled at every tick.
 template <typename Scalar>
@@ -381,5 +380,4 @@ TEST(HapticLoop, ParallelInterferenceIsReportedForTheOtherAxis) {
   EXPECT_EQ(loop.at(-1000, false).tangential_force, 0.0f) << "not while disabled";
 }
 
-}  // namespace
 }  // namespace kmax::control::haptic_loop_test

@@ -10,7 +10,6 @@
 #include <vector>
 
 namespace kmax::control::instability_detector_test {
-namespace {
 
 using Detector = InstabilityDetector<float>;
 using Config = InstabilityDetectorConfig<float>;
@@ -314,5 +313,4 @@ TEST(InstabilityDetector, TakesAnyConfiguration) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::instability_detector_test

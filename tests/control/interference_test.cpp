@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::control::interference_test {
-namespace {
 
 TEST(Interference, PerpendicularIsEquationTwo) {
   Interference<double> interference;
@@ -56,5 +55,4 @@ TEST(Interference, NoneDoesNothing) {
   EXPECT_EQ(interference.background(c), 0.0f);
 }
 
-}  // namespace
 }  // namespace kmax::control::interference_test

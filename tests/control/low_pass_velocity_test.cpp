@@ -7,7 +7,6 @@
 #include <numbers>
 
 namespace kmax::control::low_pass_velocity_test {
-namespace {
 
 constexpr double period = 5e-5;
 constexpr double nanometre = 1e-9;
@@ -57,5 +56,4 @@ TEST(LowPassVelocity, SineHasTheAmplitudeAndLagOfAFirstOrderFilter) {
       0.025 * peak);  // half a sample of the difference and one of the discretization, at 0.031 rad each
 }
 
-}  // namespace
 }  // namespace kmax::control::low_pass_velocity_test

@@ -10,7 +10,6 @@
 #include "control/foaw_velocity.hpp"
 
 namespace kmax::control::motion_plausibility_test {
-namespace {
 
 using Watch = MotionPlausibility<float>;
 
@@ -314,5 +313,4 @@ TEST(MotionPlausibility, ResetForgets) {
   for (int n = 0; n < 100; ++n) EXPECT_FALSE(handle.step(0.0, 0.0, 0.0));
 }
 
-}  // namespace
 }  // namespace kmax::control::motion_plausibility_test

@@ -6,7 +6,6 @@
 #include <limits>
 
 namespace kmax::control::motor_transmission_test {
-namespace {
 
 MotorTransmissionConfig<float> capstan() {
   MotorTransmissionConfig<float> config;
@@ -79,5 +78,4 @@ TEST(MotorTransmission, ALimitOfZeroMeansNoCurrent) {
   EXPECT_TRUE(out.limited);
 }
 
-}  // namespace
 }  // namespace kmax::control::motor_transmission_test

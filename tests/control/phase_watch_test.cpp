@@ -8,7 +8,6 @@
 #include <vector>
 
 namespace kmax::control::phase_watch_test {
-namespace {
 
 using Watch = PhaseWatch<float>;
 using Currents = PhaseCurrents<float>;
@@ -200,5 +199,4 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
   expect(watch, {{dc(0.0f), dc(1.0f)}}, "after a reset");
 }
 
-}  // namespace
 }  // namespace kmax::control::phase_watch_test

@@ -8,7 +8,6 @@
 #include <vector>
 
 namespace kmax::control::resampler_test {
-namespace {
 
 // The parameter's values.
 static_assert(static_cast<int>(Rounding::nearest) == 0 && static_cast<int>(Rounding::floor) == 1 &&
@@ -182,5 +181,4 @@ TEST(ResamplerStep, NonsenseAndExcessAreBounded) {
   EXPECT_EQ(resampler_step(1e9, 1e-9), resampler_step_max);
 }
 
-}  // namespace
 }  // namespace kmax::control::resampler_test

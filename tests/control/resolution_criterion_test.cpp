@@ -6,7 +6,6 @@
 #include <limits>
 
 namespace kmax::control::resolution_criterion_test {
-namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
 
@@ -41,5 +40,4 @@ RC_GTEST_PROP(ResolutionCriterion, TheSpeedLimitIsWhereTheStepMeetsTheForce, ())
   RC_ASSERT(force_step(2 * k, 1e-9, share, speed, period) >= force_step(k, 1e-9, share, speed, period));
 }
 
-}  // namespace
 }  // namespace kmax::control::resolution_criterion_test

@@ -11,7 +11,6 @@
 #include "tests/control/drawn_loop.hpp"
 
 namespace kmax::control::sampled_loop_test {
-namespace {
 
 using Complex = std::complex<double>;
 
@@ -164,5 +163,4 @@ TEST(LoopEquation, KnowsWhatCannotBeComputed) {
   EXPECT_FALSE(LoopEquation<double>({0.05, 0.1, 0.0, 1e-3, 0.0, {1.0, infinite, 0, 0, 0}}).finite());
 }
 
-}  // namespace
 }  // namespace kmax::control::sampled_loop_test

@@ -15,7 +15,6 @@
 #include "tests/control/drawn_loop.hpp"
 
 namespace kmax::control::sampled_stability_test {
-namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::max();
 
@@ -349,5 +348,4 @@ RC_GTEST_PROP(SampledStability, ScalesWithTimeAndMass, ()) {
   RC_ASSERT(spectral_radius(other, 1000.0 * mass / (time * time)) == spectral_radius(loop, 1000.0));
 }
 
-}  // namespace
 }  // namespace kmax::control::sampled_stability_test

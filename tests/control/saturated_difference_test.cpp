@@ -8,7 +8,6 @@
 #include <limits>
 
 namespace kmax::control::saturated_difference_test {
-namespace {
 
 constexpr std::int64_t largest = std::numeric_limits<std::int32_t>::max();
 constexpr std::int64_t smallest = std::numeric_limits<std::int32_t>::min();
@@ -61,5 +60,4 @@ RC_GTEST_PROP(DifferenceToFourBits, IsTheDifferenceCutToItsRange, (std::int32_t 
   RC_ASSERT(difference_to_4_bits(to, from) == std::clamp<std::int64_t>(std::int64_t{to} - from, -8, 7));
 }
 
-}  // namespace
 }  // namespace kmax::control::saturated_difference_test

@@ -7,7 +7,6 @@
 #include <limits>
 
 namespace kmax::control::saturated_quotient_test {
-namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
 
@@ -35,5 +34,4 @@ RC_GTEST_PROP(SaturatedQuotient, FiniteForFinite, (float numerator, float denomi
     RC_ASSERT(quotient == numerator / denominator);
 }
 
-}  // namespace
 }  // namespace kmax::control::saturated_quotient_test

@@ -9,7 +9,6 @@
 #include "control/wall_law.hpp"
 
 namespace kmax::control::saturation_depth_test {
-namespace {
 
 TEST(SaturationDepth, PaperOnesStiffestWallSaturatesWithinThreeCounts) {
   const double depth = saturation_depth(8410.0, 2.0, 3.3);
@@ -38,5 +37,4 @@ RC_GTEST_PROP(SaturationDepth, IsWhereTheLawMeetsTheLimit, ()) {
   RC_ASSERT(std::abs(law.update(prepared, -depth, 0.0).force - limit) < 1e-12 * limit);
 }
 
-}  // namespace
 }  // namespace kmax::control::saturation_depth_test

@@ -6,7 +6,6 @@
 #include <cstdint>
 
 namespace kmax::control::sine_cosine_test {
-namespace {
 
 static_assert(radians_per_turn_fraction<double> * 4294967296.0 == 6.283185307179586476925286766559);
 
@@ -85,5 +84,4 @@ TEST(SineCosine, OppositeAnglesAreOppositeToTheBit) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::sine_cosine_test

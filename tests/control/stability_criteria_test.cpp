@@ -10,7 +10,6 @@
 #include <limits>
 
 namespace kmax::control::stability_criteria_test {
-namespace {
 
 template <typename Scalar>
 constexpr Scalar infinite = std::numeric_limits<Scalar>::max();
@@ -273,5 +272,4 @@ RC_GTEST_PROP(StabilityCriteria, UnitsDoNotMatter, ()) {
 static_assert(judge(Criterion::colgate, desktop_case<float>()).applies);
 static_assert(!judge(Criterion::colgate, desktop_case<float>()).pass);
 
-}  // namespace
 }  // namespace kmax::control::stability_criteria_test

@@ -13,7 +13,6 @@
 #include "tests/control/drawn_loop.hpp"
 
 namespace kmax::control::stiffness_limits_test {
-namespace {
 
 constexpr double largest = std::numeric_limits<double>::max();
 
@@ -262,5 +261,4 @@ RC_GTEST_PROP(FieldCriterion, IsTheLawsSteepestSlope, ()) {
   RC_ASSERT(std::abs(slope_at(config.magnetic_length) / steepest - 0.125) < 1e-4);  // as the header says
 }
 
-}  // namespace
 }  // namespace kmax::control::stiffness_limits_test

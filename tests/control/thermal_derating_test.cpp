@@ -8,7 +8,6 @@
 #include <limits>
 
 namespace kmax::control::thermal_derating_test {
-namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float largest = std::numeric_limits<float>::max();
@@ -59,5 +58,4 @@ TEST(ThermalDerating, BoundsFarApartDoNotOverflow) {
   EXPECT_FLOAT_EQ(thermal_derating(0.0f, -largest, largest), 0.5f);
 }
 
-}  // namespace
 }  // namespace kmax::control::thermal_derating_test

@@ -7,7 +7,6 @@
 #include <numbers>
 
 namespace kmax::control::tracking_velocity_test {
-namespace {
 
 constexpr double period = 5e-5;
 constexpr double nanometre = 1e-9;
@@ -88,5 +87,4 @@ TEST(TrackingVelocity, FloatDoesNotDriftOnALongRamp) {
   EXPECT_LT(std::fabs(velocity.update(coefficients, 864'000'370'000)), 1e-12F);
 }
 
-}  // namespace
 }  // namespace kmax::control::tracking_velocity_test

@@ -13,7 +13,6 @@
 #include "control/resampler.hpp"
 
 namespace kmax::control::velocity_estimator_test {
-namespace {
 
 using Kind = VelocityEstimatorKind;
 constexpr std::array<Kind, 5> kinds = {Kind::difference, Kind::low_pass, Kind::foaw, Kind::foaw_end_fit,
@@ -247,5 +246,4 @@ RC_GTEST_PROP(VelocityEstimator, EveryOutputIsFinite, (const std::vector<std::in
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::velocity_estimator_test

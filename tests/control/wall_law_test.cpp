@@ -8,7 +8,6 @@
 #include <random>
 
 namespace kmax::control::wall_law_test {
-namespace {
 
 template <typename Scalar>
 Scalar force_at(const WallLawConfig<Scalar>& config, Scalar outside_distance,
@@ -163,5 +162,4 @@ TEST(WallLaw, NotANumberIsNotHidden) {
   EXPECT_TRUE(std::isnan(force_at(damped, -1e-3f, nan)));
 }
 
-}  // namespace
 }  // namespace kmax::control::wall_law_test

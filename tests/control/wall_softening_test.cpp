@@ -6,7 +6,6 @@
 #include <limits>
 
 namespace kmax::control::wall_softening_test {
-namespace {
 
 using Softening = WallSoftening<float>;
 
@@ -58,5 +57,4 @@ TEST(WallSoftening, TakesAnyConfiguration) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::control::wall_softening_test

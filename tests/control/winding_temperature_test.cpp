@@ -9,7 +9,6 @@
 #include "control/thermal_derating.hpp"
 
 namespace kmax::control::winding_temperature_test {
-namespace {
 
 using Model = WindingTemperature<float>;
 using Config = WindingTemperatureConfig<double>;
@@ -246,5 +245,4 @@ TEST(WindingTemperature, DeratingSettlesBelowTheLimit) {
               current_for(config, static_cast<double>(model.winding()) - 25.0), 0.01);
 }
 
-}  // namespace
 }  // namespace kmax::control::winding_temperature_test

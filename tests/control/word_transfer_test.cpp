@@ -6,7 +6,6 @@
 #include <cstdint>
 
 namespace kmax::control::word_transfer_test {
-namespace {
 
 TEST(WordTransfer, PairsAreReadAndWrittenWhereTheIndexSays) {
   std::array<std::uint32_t, 8> words = {10, 11, 12, 13, 14, 15, 16, 17};
@@ -30,5 +29,4 @@ TEST(WordTransfer, FoursMoveOn) {
   EXPECT_EQ(at, words.data() + 8);
 }
 
-}  // namespace
 }  // namespace kmax::control::word_transfer_test

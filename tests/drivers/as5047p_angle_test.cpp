@@ -7,7 +7,6 @@
 #include <functional>
 
 namespace kmax::drivers::as5047p_angle_test {
-namespace {
 
 /// A chip by its data sheet, one frame late, and a line in between.
 struct Encoder {
@@ -313,5 +312,4 @@ RC_GTEST_PROP(As5047pAngle, RandomNoiseNeverLosesATurn, ()) {
   if (sample.valid && !sample.held) RC_ASSERT(sample.count == static_cast<std::uint32_t>(position));
 }
 
-}  // namespace
 }  // namespace kmax::drivers::as5047p_angle_test

@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace kmax::drivers::stm32f4::can_bit_timing_test {
-namespace {
 
 constexpr std::uint32_t board_clock = 42'000'000;
 
@@ -63,5 +62,4 @@ TEST(CanBitTiming, ValidKnowsTheFields) {
   EXPECT_FALSE((CanBitTiming{1, 5, 1, 2}.valid())) << "jump wider than the segment that is shortened";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::can_bit_timing_test

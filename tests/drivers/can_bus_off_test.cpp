@@ -5,7 +5,6 @@
 #include <utility>
 
 namespace kmax::drivers::stm32f4::can_bus_off_test {
-namespace {
 
 using Action = CanBusOffAction;
 using State = CanBusState;
@@ -85,5 +84,4 @@ TEST(CanBusOff, StoppedDoesNothing) {
   EXPECT_EQ(node.machine.state(), State::off);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::can_bus_off_test

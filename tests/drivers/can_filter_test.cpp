@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::drivers::stm32f4::can_filter_test {
-namespace {
 
 bool accepts(const CanFilter& filter, const CanFrame& frame) {
   const std::uint32_t word = can_identifier_word(frame);
@@ -27,5 +26,4 @@ TEST(CanFilter, AcceptWhatTheySay) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::can_filter_test

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::drivers::can_frame_test {
-namespace {
 
 TEST(CanFrame, ValidKnowsItsRanges) {
   EXPECT_TRUE((CanFrame{.identifier = 0x7FF, .length = 8}.valid()));
@@ -29,5 +28,4 @@ TEST(CanFrame, ArbitrationOfTheSameUpperBits) {
   EXPECT_LT(can_arbitration(extended), can_arbitration(CanFrame{.identifier = 0x124}));
 }
 
-}  // namespace
 }  // namespace kmax::drivers::can_frame_test

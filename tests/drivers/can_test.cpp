@@ -5,7 +5,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::can_test {
-namespace {
 
 struct FakeTransmitMailbox {
   FakeRegister tir, tdtr, tdlr, tdhr;
@@ -228,5 +227,4 @@ TEST(Can, ErrorsByName) {
   EXPECT_EQ(bench.can.msr.value, 4U) << "ERRI is written 1";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::can_test

@@ -7,7 +7,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::current_sampling_test {
-namespace {
 
 constexpr std::uint32_t apb2 = 84'000'000;
 constexpr std::uint32_t jeoc = 1U << 2, jstrt = 1U << 3;
@@ -183,5 +182,4 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   EXPECT_EQ(sample.slow_age, 255U);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::current_sampling_test

@@ -9,7 +9,6 @@
 #include <vector>
 
 namespace kmax::drivers::current_sense_test {
-namespace {
 
 float amperes_per_code(const CurrentSense& sense) {
   return sense.ISR_amperes(2049) - sense.ISR_amperes(2048);
@@ -147,5 +146,4 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
   RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::current_sense_test

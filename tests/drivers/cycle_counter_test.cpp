@@ -5,7 +5,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::cortex_m::cycle_counter_test {
-namespace {
 
 struct FakeDwt {
   FakeRegister ctrl, cyccnt;
@@ -46,5 +45,4 @@ TEST(CycleCounter, MissingCounterIsReported) {
   EXPECT_FALSE((CycleCounter<FakeDwt, FakeCoreDebug>{dead, core_debug}.start()));
 }
 
-}  // namespace
 }  // namespace kmax::drivers::cortex_m::cycle_counter_test

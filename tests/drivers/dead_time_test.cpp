@@ -6,7 +6,6 @@
 #include <type_traits>
 
 namespace kmax::drivers::stm32f4::dead_time_test {
-namespace {
 
 // RM0090, TIMx_BDTR, DTG: its four lines, written out with the manual's own symbols.
 std::uint32_t by_the_manual(std::uint32_t dtg) {
@@ -64,5 +63,4 @@ TEST(DeadTime, DoesNotCompileOutOfRange) {
   static_assert(!Solvable<6001>, "6 us are 1008 ticks");
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::dead_time_test

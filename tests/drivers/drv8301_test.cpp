@@ -6,7 +6,6 @@
 #include <string>
 
 namespace kmax::drivers::drv8301_test {
-namespace {
 
 /// A minimal chip by the frame rules alone, and a line that can be tampered with.
 struct FakeChip {
@@ -150,5 +149,4 @@ TEST(Drv8301, ControlWords) {
   static_assert(drv8301_control_2({.gain = CurrentSenseGain::x10}) == 0);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::drv8301_test

@@ -8,7 +8,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::external_interrupt_test {
-namespace {
 
 struct FakeExti {
   FakeRegister imr, emr, rtsr, ftsr, swier, pr;
@@ -115,5 +114,4 @@ TEST(ExtiInterrupt, VectorOfEachLine) {
   for (const unsigned line : {0U, 1U, 3U, 16U, 22U}) EXPECT_EQ(exti_interrupt(line), std::nullopt) << line;
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::external_interrupt_test

@@ -7,7 +7,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::field_test {
-namespace {
 
 static_assert(Register<volatile std::uint32_t>);
 static_assert(Register<FakeRegister>);
@@ -74,5 +73,4 @@ TEST(PeripheralClock, KeepsWhatIsOnAndReadsBackTwice) {
   EXPECT_EQ(enable.reads, 3U);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::field_test

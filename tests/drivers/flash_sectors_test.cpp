@@ -13,7 +13,6 @@
 // tests/host_tools/virtual_board/stm32f4/flash_interface_test.cpp.
 
 namespace kmax::drivers::stm32f4::flash_sectors_test {
-namespace {
 
 struct FakeFlash {
   FakeRegister acr, keyr, sr, cr;
@@ -196,5 +195,4 @@ TEST(FlashSectors, CachesThatWereOffStayOff) {
   EXPECT_EQ(chip.flash.acr.value, 0x105U);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::flash_sectors_test

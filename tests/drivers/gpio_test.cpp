@@ -8,7 +8,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::gpio_test {
-namespace {
 
 GpioRegisters filled_with(std::uint32_t word) {
   GpioRegisters port{};
@@ -99,5 +98,4 @@ TEST(GpioPin, LevelBeforeDirectionAndFunctionBeforeHandOver) {
   EXPECT_EQ(order, "pam") << "an output level must not be touched by a pin that is no output";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::gpio_test

@@ -10,7 +10,6 @@
 // On the model: tests/host_tools/virtual_board/stm32f4/iwdg_test.cpp.
 
 namespace kmax::drivers::stm32f4::independent_watchdog_test {
-namespace {
 
 struct FakeIwdg {
   FakeRegister kr, pr, rlr, sr;
@@ -108,5 +107,4 @@ TEST(IndependentWatchdog, UpdateThatNeverEndsIsReportedAndStillFed) {
   EXPECT_EQ(busy_before.order, "S") << "RLR may not be written while RVU is set";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::independent_watchdog_test

@@ -6,7 +6,6 @@
 #include "drivers/stm32f4/interrupts.hpp"
 
 namespace kmax::drivers::cortex_m::interrupt_controller_test {
-namespace {
 
 using stm32f4::Interrupt;
 
@@ -62,5 +61,4 @@ RC_GTEST_PROP(InterruptController, PriorityLeavesItsNeighboursAlone,
   RC_ASSERT(((b.nvic.ipr[number / 4] & mask) >> (8 * (number % 4))) == std::min<unsigned>(priority, 15) * 16);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::cortex_m::interrupt_controller_test

@@ -5,7 +5,6 @@
 #include <array>
 
 namespace kmax::drivers::cortex_m::memory_protection_test {
-namespace {
 
 // PM0214, MPU region attribute and size register.
 TEST(ProtectedRegion, ItsAttributesAreThoseOfTheRegister_Rasr) {
@@ -42,5 +41,4 @@ TEST(ProtectMemory, EnablesTheUnitWithoutTheDefaultMap_Ctrl) {
   EXPECT_EQ(unit.rasr, 0U) << "those that are not used are switched off";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::cortex_m::memory_protection_test

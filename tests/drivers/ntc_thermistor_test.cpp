@@ -6,7 +6,6 @@
 #include <cmath>
 
 namespace kmax::drivers::ntc_thermistor_test {
-namespace {
 
 constexpr NtcThermistor board_ntc{};
 
@@ -86,5 +85,4 @@ TEST(NtcThermistor, OtherPartsAndResistors) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::drivers::ntc_thermistor_test

@@ -7,7 +7,6 @@
 // What needs hardware that acts is tested on the virtual board's timers; here, what happens when it does not.
 
 namespace kmax::drivers::stm32f4::phase_shifted_pwm_test {
-namespace {
 
 struct Pair {
   Pair() {
@@ -65,5 +64,4 @@ TEST(StartPhaseShifted, LeavesTheUpdateEventAsTriggerAndTheFollowerFree) {
   EXPECT_FALSE(leader.armed() || follower.armed());
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::phase_shifted_pwm_test

@@ -9,7 +9,6 @@
 #include <utility>
 
 namespace kmax::drivers::quadrature_index_watch_test {
-namespace {
 
 constexpr QuadratureIndexConfig config{8192, 4};
 
@@ -242,5 +241,4 @@ TEST(QuadratureIndexWatch, ResetBelievesAgain) {
   EXPECT_TRUE(watch.ISR_plausible(1000, false));
 }
 
-}  // namespace
 }  // namespace kmax::drivers::quadrature_index_watch_test

@@ -5,7 +5,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::quadrature_timer_test {
-namespace {
 
 TEST(QuadratureTimer, CountsAllFourEdgesOnBothInputs) {
   TimerRegisters timer{};
@@ -43,5 +42,4 @@ TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   EXPECT_TRUE(timer.smcr.writes.empty());
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::quadrature_timer_test

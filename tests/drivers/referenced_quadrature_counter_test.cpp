@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::drivers::referenced_quadrature_counter_test {
-namespace {
 
 /// An encoder of 8192 counts a turn whose index is three counts wide, on a 16-bit timer.
 struct Encoder {
@@ -154,5 +153,4 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
   EXPECT_EQ(encoder.reading.reference_generation, 0u);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::referenced_quadrature_counter_test

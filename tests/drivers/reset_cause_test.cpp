@@ -5,7 +5,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::reset_cause_test {
-namespace {
 
 TEST(ResetCause, EachAsTheChipShowsIt) {
   EXPECT_EQ(reset_cause(0x0E00'0000), ResetCause::power_on);
@@ -36,5 +35,4 @@ TEST(ResetCause, TakingItRemovesTheFlagsAndLeavesTheOscillatorOn) {
       << "or the flags of the next reset are removed too";
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::reset_cause_test

@@ -5,7 +5,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::spi_master_test {
-namespace {
 
 struct FakeSpi {
   FakeRegister cr1, cr2, sr, dr;
@@ -95,5 +94,4 @@ TEST(SpiMaster, OneHolderAtATime) {
   EXPECT_TRUE(bus.master.claim());
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::spi_master_test

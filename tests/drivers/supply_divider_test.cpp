@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::drivers::supply_divider_test {
-namespace {
 
 TEST(SupplyDivider, FullScaleOfBothBoards) {
   EXPECT_NEAR((SupplyDivider{{.ratio = 11.0F}}.volts(4095)), 36.29, 0.01);
@@ -23,5 +22,4 @@ TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {
   EXPECT_TRUE(divider.saturated(4095));
 }
 
-}  // namespace
 }  // namespace kmax::drivers::supply_divider_test

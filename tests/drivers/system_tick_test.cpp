@@ -9,7 +9,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::cortex_m::system_tick_test {
-namespace {
 
 /// SysTick and the pending bit on a time line of core cycles. Each register access takes time; unless masked,
 /// the handler runs between two accesses as soon as a tick is pending.
@@ -222,5 +221,4 @@ TEST(SystemTick, HeldUpAtEveryAccess) {
   EXPECT_LE(read, core.true_us());
 }
 
-}  // namespace
 }  // namespace kmax::drivers::cortex_m::system_tick_test

@@ -12,7 +12,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::three_phase_pwm_test {
-namespace {
 
 constexpr std::uint32_t moe = 1U << 15;
 // DTG 21, LOCK 2, OSSI, OSSR, BKE, BKP; AOE and MOE 0.
@@ -162,5 +161,4 @@ RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::three_phase_pwm_test

@@ -8,7 +8,6 @@
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::usart_test {
-namespace {
 
 constexpr std::uint32_t apb1 = 42'000'000;
 
@@ -81,5 +80,4 @@ TEST(Usart, ImpossibleBaudRateTouchesNothing) {
   EXPECT_EQ(registers.brr, 0x55U);
 }
 
-}  // namespace
 }  // namespace kmax::drivers::stm32f4::usart_test

@@ -33,7 +33,6 @@ void stop_on_unexpected_interrupt() {
 }  // namespace kmax::drivers::cortex_m
 
 namespace kmax::board::vectors_test {
-namespace {
 
 using drivers::stm32f4::Interrupt;
 
@@ -96,5 +95,4 @@ TEST(OdriveV3Pins, GatesAreOffAndTheMasterSwitchComesFirst) {
   EXPECT_EQ(gates, 12U);
 }
 
-}  // namespace
 }  // namespace kmax::board::vectors_test

@@ -11,7 +11,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::calibration_test {
-namespace {
 
 /// A board with the motor of a scene that nobody has identified.
 struct Bench {
@@ -86,5 +85,4 @@ TEST(ImageSelfTest, NamesTheSupplyTheEmergencyStopAndAPhase) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::tests::calibration_test

@@ -9,7 +9,6 @@
 #include "tests/image/can_bench.hpp"
 
 namespace kmax::tests::can_faults_test {
-namespace {
 
 using firmware::DriveState;
 using firmware::Fault;
@@ -229,5 +228,4 @@ TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
   expect_link_is_back();
 }
 
-}  // namespace
 }  // namespace kmax::tests::can_faults_test

@@ -6,7 +6,6 @@
 #include "tests/image/can_bench.hpp"
 
 namespace kmax::tests::canopen_test {
-namespace {
 
 using firmware::DriveState;
 using firmware::statusword::state_of;
@@ -133,5 +132,4 @@ TEST(CanOpen, PdosTellOfOneTickAndOfRegularOnes) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::tests::canopen_test

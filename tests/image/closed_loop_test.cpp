@@ -9,7 +9,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::closed_loop_test {
-namespace {
 
 using firmware::Fault;
 using virtual_board::BoardTime;
@@ -271,5 +270,4 @@ TEST_F(ClosedLoop, AnEncoderThatCameOffStaysWrong) {
   EXPECT_EQ(bench.fault(0), Fault::encoder);
 }
 
-}  // namespace
 }  // namespace kmax::tests::closed_loop_test

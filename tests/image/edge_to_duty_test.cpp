@@ -10,7 +10,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::edge_to_duty_test {
-namespace {
 
 using virtual_board::BoardTime;
 
@@ -115,5 +114,4 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
   EXPECT_EQ(missed(), missed_before);
 }
 
-}  // namespace
 }  // namespace kmax::tests::edge_to_duty_test

@@ -20,7 +20,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::fault_matrix_test {
-namespace {
 
 using firmware::DriveState;
 using firmware::Fault;
@@ -674,5 +673,4 @@ TEST(FaultMatrixPage, HasNoRowThatNobodyMeasures) {
   EXPECT_EQ(rows, headings + causes().size() + upsets().size());
 }
 
-}  // namespace
 }  // namespace kmax::tests::fault_matrix_test

@@ -10,7 +10,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::memory_guard_test {
-namespace {
 
 namespace cortex = drivers::cortex_m;
 using virtual_board::VirtualBoard;
@@ -142,5 +141,4 @@ TEST_P(MemoryGuard, IsWhatCatchesIt) {
 INSTANTIATE_TEST_SUITE_P(Image, MemoryGuard, testing::ValuesIn(mishaps),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
-}  // namespace
 }  // namespace kmax::tests::memory_guard_test

@@ -7,7 +7,6 @@
 #include "tests/image/can_bench.hpp"
 
 namespace kmax::tests::object_dictionary_test {
-namespace {
 
 using description::DescribedObject;
 using description::ObjectAccess;
@@ -198,5 +197,4 @@ TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   EXPECT_EQ(number_in(sdo.upload({0x1000, 0})), firmware::device_type_of_several_axes);
 }
 
-}  // namespace
 }  // namespace kmax::tests::object_dictionary_test

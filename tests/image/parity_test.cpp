@@ -9,7 +9,6 @@
 #include "tests/image/axis_tick_calls.hpp"
 
 namespace kmax::tests::parity_test {
-namespace {
 
 using firmware::Axis;
 using virtual_board::BoardTime;
@@ -205,5 +204,4 @@ TEST(Parity, AContactIsBitIdentical) {
   EXPECT_GT(companion.driven, 30'000u);
 }
 
-}  // namespace
 }  // namespace kmax::tests::parity_test

@@ -8,7 +8,6 @@
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::power_cut_test {
-namespace {
 
 using firmware::entry_of;
 using firmware::register_address;
@@ -167,5 +166,4 @@ TEST(PowerCut, AlongASaveThatChangesTheSectorToo) {
   cut_all_along(prepared(true));
 }
 
-}  // namespace
 }  // namespace kmax::tests::power_cut_test

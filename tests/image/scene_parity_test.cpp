@@ -25,7 +25,6 @@
 #include "tests/image/axis_tick_calls.hpp"
 
 namespace kmax::tests::scene_parity_test {
-namespace {
 
 using firmware::Axis;
 using simulated_board::SimulatedDevice;
@@ -321,5 +320,4 @@ TEST(SceneParityItself, SeesAStiffnessThatDiffersInItsLastBit) {
   EXPECT_GT(first, armed_in(native, 0)) << "the start is common";
 }
 
-}  // namespace
 }  // namespace kmax::tests::scene_parity_test

@@ -5,7 +5,6 @@
 #include "tests/board/canopen_host.hpp"
 
 namespace kmax::board::made_up_board_test {
-namespace {
 
 using firmware::AxisOutput;
 using firmware::DriveState;
@@ -234,5 +233,4 @@ TEST_F(Arming, ADutyThatIsNotANumberDisarms) {
   EXPECT_FALSE(bridge().armed());
 }
 
-}  // namespace
 }  // namespace kmax::board::made_up_board_test

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::studies::instability_test {
-namespace {
 
 using experiment::SubjectSet;
 
@@ -41,5 +40,4 @@ TEST(InstabilityStudy, StableWallsAndRoughTouchesAreNotCalledUnstable) {
   EXPECT_EQ(result.throws, 8U * 5U);
 }
 
-}  // namespace
 }  // namespace kmax::studies::instability_test

@@ -9,7 +9,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::studies::studies_test {
-namespace {
 
 using experiment::few_people;
 using experiment::found_stiffness;
@@ -400,5 +399,4 @@ TEST(RateSection, HasATableForEachEncoderAndMeasureAndGapsWhereNothingWasRun) {
   EXPECT_EQ(folder.read("r.svg").find(fine.setting.name()), std::string::npos);
 }
 
-}  // namespace
 }  // namespace kmax::studies::studies_test

@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 namespace kmax::instruction_budget::fingerprint_test {
-namespace {
 
 // The image for the Cortex-M4F compares its own with the same number.
 TEST(Fingerprint, IsTheKnownOneOnThisMachineToo) {
   EXPECT_EQ(Fingerprint{}.of_all(), known_fingerprint);
 }
 
-}  // namespace
 }  // namespace kmax::instruction_budget::fingerprint_test

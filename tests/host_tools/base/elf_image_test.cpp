@@ -9,7 +9,6 @@
 #include <functional>
 
 namespace kmax::elf_image_test {
-namespace {
 
 struct File {
   Elf32_Ehdr header{};
@@ -138,5 +137,4 @@ TEST(ElfImage, SaysWhichFileCannotBeRead) {
   EXPECT_THROW(ElfImage::load("."), ElfError);
 }
 
-}  // namespace
 }  // namespace kmax::elf_image_test

@@ -12,7 +12,6 @@
 #include "host_tools/base/output_file.hpp"
 
 namespace kmax::base::files_test {
-namespace {
 
 class Files : public testing::Test {
  protected:
@@ -106,5 +105,4 @@ TEST_F(Files, WhatIsNoRegularFileIsWrittenDirectly) {
   EXPECT_TRUE(std::filesystem::exists("/dev/null"));
 }
 
-}  // namespace
 }  // namespace kmax::base::files_test

@@ -9,7 +9,6 @@
 #include <limits>
 
 namespace kmax::device::number_text_test::numbers_test {
-namespace {
 
 TEST(NumberText, IsShortAndPlainWherePeopleReadIt) {
   EXPECT_EQ(number_text(2.4f), "2.4");
@@ -52,5 +51,4 @@ RC_GTEST_PROP(NumberText, EveryFiniteDoubleComesBack, (std::uint64_t pattern)) {
   RC_ASSERT(std::strtod(number_text(value).c_str(), nullptr) == value);
 }
 
-}  // namespace
 }  // namespace kmax::device::number_text_test::numbers_test

@@ -8,7 +8,6 @@
 #include <utility>
 
 namespace kmax::cli::print_test {
-namespace {
 
 template <typename... Values>
 std::string printed(fmt::format_string<Values...> text, Values&&... values) {
@@ -42,5 +41,4 @@ TEST(Print, AStreamThatFailsSaysSo) {
   EXPECT_EQ(out.str(), "");
 }
 
-}  // namespace
 }  // namespace kmax::cli::print_test

@@ -6,7 +6,6 @@
 #include <sstream>
 
 namespace kmax::cli::progress_test {
-namespace {
 
 TEST(Progress, ElsewhereThanOnATerminalItIsALineNowAndThen) {
   std::ostringstream messages;
@@ -29,5 +28,4 @@ TEST(Progress, NothingShownLeavesNoTrace) {
   EXPECT_EQ(messages.str(), "");
 }
 
-}  // namespace
 }  // namespace kmax::cli::progress_test

@@ -4,7 +4,6 @@
 #include <rapidcheck/gtest.h>
 
 namespace kmax::device::suggestion_test {
-namespace {
 
 const std::vector<std::string> names = {"wall.stiffness", "wall.damping",   "guard.damping",    "force.limit",
                                         "current.limit",  "velocity.limit", "temperature.limit"};
@@ -45,5 +44,4 @@ TEST(Closest, NoMoreThanThreeAndNothingFarFetched) {
   EXPECT_EQ(did_you_mean("stiffness", names), "; did you mean wall.stiffness?");
 }
 
-}  // namespace
 }  // namespace kmax::device::suggestion_test

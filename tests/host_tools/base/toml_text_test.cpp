@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 namespace kmax::base::toml_text_test {
-namespace {
 
 std::string repeated(std::string_view part, std::size_t times) {
   std::string all;
@@ -56,5 +55,4 @@ TEST(TomlText, WhatIsNotTomlIsSaidWithItsPlace) {
   EXPECT_THROW(parsed_toml<std::invalid_argument>("]", "x"), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::base::toml_text_test

@@ -5,7 +5,6 @@
 #include "firmware/object_dictionary/dictionary.hpp"
 
 namespace kmax::device::unit_test::units_test {
-namespace {
 
 double convert(double number, std::string_view suffix, std::string_view unit) {
   const auto scale = scale_from(suffix, unit);
@@ -54,5 +53,4 @@ TEST(Unit, SuffixesStartWithTheUnitItself) {
   EXPECT_TRUE(suffixes_of("").empty());
 }
 
-}  // namespace
 }  // namespace kmax::device::unit_test::units_test

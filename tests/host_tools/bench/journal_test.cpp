@@ -5,7 +5,6 @@
 #include "tests/host_tools/fake_device.hpp"
 
 namespace kmax::bench::journal_test {
-namespace {
 
 class ParameterJournal : public testing::Test {
  protected:
@@ -67,5 +66,4 @@ TEST_F(ParameterJournal, PutsBackWhatSomebodyElseChanged) {
   EXPECT_EQ(fake->settings(), before);
 }
 
-}  // namespace
 }  // namespace kmax::bench::journal_test

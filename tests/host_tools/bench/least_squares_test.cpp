@@ -7,7 +7,6 @@
 #include "host_tools/simulation/noise_generator.hpp"
 
 namespace kmax::bench::least_squares_test {
-namespace {
 
 TEST(LeastSquares, ALineWithItsStandardErrors) {
   double squares = 0.0;
@@ -63,5 +62,4 @@ TEST(LeastSquares, ResidualsThatAreNotFiniteEndWithoutAResult) {
   EXPECT_FALSE(std::isfinite(fit.standard_error[0]));
 }
 
-}  // namespace
 }  // namespace kmax::bench::least_squares_test

@@ -7,7 +7,6 @@
 #include <vector>
 
 namespace kmax::bench::winding_model_test {
-namespace {
 
 // The definition's equation in steps of 25 ns, over 100 ticks of a wave.
 TEST(WindingModel, FollowsTheEquationAlsoInTheDeadTimesBand) {
@@ -62,5 +61,4 @@ TEST(WindingModel, NothingToSimulateIsNoAccess) {
   EXPECT_TRUE(current.empty());
 }
 
-}  // namespace
 }  // namespace kmax::bench::winding_model_test

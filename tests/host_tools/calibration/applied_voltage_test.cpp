@@ -8,7 +8,6 @@
 #include "control/field_oriented_controller.hpp"
 
 namespace kmax::calibration::applied_voltage_test {
-namespace {
 
 double ticks(float duty) {
   return std::floor(static_cast<double>(duty) * 4200.0 + 0.5);
@@ -61,5 +60,4 @@ TEST(AppliedVoltage, IsBoundedByTheSupplyAndZeroWithoutOne) {
   EXPECT_EQ(applied_vector({1.0, 1.0}, 0.3, 0.0).d, 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::applied_voltage_test

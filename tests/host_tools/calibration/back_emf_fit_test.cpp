@@ -8,7 +8,6 @@
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
 namespace kmax::calibration::back_emf_fit_test {
-namespace {
 
 using test::BenchMotor;
 using test::MotorBench;
@@ -135,5 +134,4 @@ TEST(BackEmfFit, BlockedMotorDoesNotMove) {
             BackEmfCause::no_motion);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::back_emf_fit_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
 namespace kmax::calibration::cogging_fit_test {
-namespace {
 
 using test::BenchMotor;
 using test::MotorBench;
@@ -213,5 +212,4 @@ TEST(CoggingFit, WhatIsWrongIsNamed) {
     EXPECT_GT(to_string(static_cast<CoggingCause>(n)).size(), 20u);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::cogging_fit_test

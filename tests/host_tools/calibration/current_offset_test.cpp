@@ -8,7 +8,6 @@
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
 namespace kmax::calibration::current_offset_test {
-namespace {
 
 TEST(CurrentOffset, ASensorOfTheSimulationIsGood) {
   for (const test::BenchMotor& motor : test::bench_motors()) {
@@ -50,5 +49,4 @@ TEST(CurrentOffset, WhatIsWrongIsNamed) {
     EXPECT_GT(to_string(static_cast<CurrentOffsetCause>(n)).size(), 20u);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::current_offset_test

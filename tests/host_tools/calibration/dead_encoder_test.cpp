@@ -1,7 +1,6 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 
 namespace kmax::calibration_test::dead_encoder_test {
-namespace {
 
 using calibration::CalibrationSettings;
 using simulation::Defect;
@@ -60,5 +59,4 @@ TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::calibration_test::dead_encoder_test

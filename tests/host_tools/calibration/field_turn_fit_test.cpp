@@ -8,7 +8,6 @@
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
 namespace kmax::calibration::field_turn_fit_test {
-namespace {
 
 using test::BenchMotor;
 using test::MotorBench;
@@ -237,5 +236,4 @@ TEST(FieldTurnFit, RecordsThatHoldNothingAreNamed) {
     EXPECT_GT(to_string(static_cast<FieldTurnCause>(n)).size(), 20u);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::field_turn_fit_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::calibration_test::held_up_test {
-namespace {
 
 using calibration::CalibrationReport;
 using calibration::CalibrationSettings;
@@ -146,5 +145,4 @@ TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::calibration_test::held_up_test

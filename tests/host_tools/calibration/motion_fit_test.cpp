@@ -9,7 +9,6 @@
 #include "tests/host_tools/calibration/torque_loop.hpp"
 
 namespace kmax::calibration::motion_fit_test {
-namespace {
 
 using test::BenchMotor;
 using test::MotorBench;
@@ -163,5 +162,4 @@ TEST(MotionFit, HalfAWaveOnlyIsNotAResult) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::calibration::motion_fit_test

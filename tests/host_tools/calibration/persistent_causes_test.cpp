@@ -3,7 +3,6 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 
 namespace kmax::calibration_test::persistent_causes_test {
-namespace {
 
 using simulation::Defect;
 
@@ -64,5 +63,4 @@ TEST(LinkTimeout, IsOnDuringTheProcedureAndAsBeforeAfterwards) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::calibration_test::persistent_causes_test

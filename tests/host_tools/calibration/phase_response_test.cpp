@@ -6,7 +6,6 @@
 #include <vector>
 
 namespace kmax::calibration::phase_response_test {
-namespace {
 
 /// B and C of a motor of 1 ohm at 1 V along 0 and along 90 degrees, phase resistances a, b, c; infinite:
 /// open.
@@ -107,5 +106,4 @@ TEST(PhaseAnswer, IsNothingWithoutAWave) {
   EXPECT_EQ(phase_response({}, {}, {}, 20, 0).b, 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::phase_response_test

@@ -1,7 +1,6 @@
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
 
 namespace kmax::calibration_test::procedure_accuracy_test {
-namespace {
 
 class Accuracy : public testing::TestWithParam<const char*> {};
 
@@ -57,5 +56,4 @@ TEST_P(Accuracy, LostTravelIsSeenAgainstTheCalibrationBefore) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Accuracy, testing::ValuesIn(scene_names));
 
-}  // namespace
 }  // namespace kmax::calibration_test::procedure_accuracy_test

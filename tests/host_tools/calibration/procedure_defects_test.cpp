@@ -3,7 +3,6 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 
 namespace kmax::calibration_test::procedure_defects_test {
-namespace {
 
 using calibration::CalibrationSettings;
 using simulation::Defect;
@@ -170,5 +169,4 @@ TEST(IndexSearch, FindsTheIndexAndRefersTheOffsetToIt) {
       0.02);
 }
 
-}  // namespace
 }  // namespace kmax::calibration_test::procedure_defects_test

@@ -7,7 +7,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::calibration_test::procedure_test {
-namespace {
 
 using calibration::CalibrationSettings;
 
@@ -146,5 +145,4 @@ TEST(Procedure, AnArmedAxisIsLeftAlone) {
   EXPECT_TRUE(device.armed());
 }
 
-}  // namespace
 }  // namespace kmax::calibration_test::procedure_test

@@ -5,7 +5,6 @@
 #include <limits>
 
 namespace kmax::calibration::winding_excitation_test {
-namespace {
 
 TEST(WindingExcitation, HalfPeriodIsThreeTimeConstantsWithinItsBounds) {
   constexpr double tick = 50e-6;
@@ -29,5 +28,4 @@ TEST(WindingExcitation, NoPhaseCurrentChangesItsSign) {
   EXPECT_EQ(brushed_excitation(5.0, 1e-3, 1.0, 50e-6).bias, 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::winding_excitation_test

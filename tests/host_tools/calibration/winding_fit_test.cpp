@@ -11,7 +11,6 @@
 #include "tests/host_tools/calibration/motor_bench.hpp"
 
 namespace kmax::calibration::winding_fit_test {
-namespace {
 
 using test::BenchMotor;
 using test::MotorBench;
@@ -280,5 +279,4 @@ TEST(WindingFit, EveryCauseHasWordsAndTheNumbersFollow) {
   EXPECT_NE(fit_words(still).find("found 0 V, bound 0.001 V"), std::string::npos) << fit_words(still);
 }
 
-}  // namespace
 }  // namespace kmax::calibration::winding_fit_test

@@ -8,7 +8,7 @@
 #include "firmware/parameters/parameter_rules.hpp"
 
 namespace kmax::check::change_search_test {
-namespace {
+
 using control::Criterion;
 using device::Parameter;
 using firmware::ParameterValues;
@@ -117,5 +117,4 @@ RC_GTEST_PROP(ChangeSearch, WhatIsProposedWorksAndLittleLessDoesNot, ()) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::check::change_search_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::check::check_table_test {
-namespace {
+
 using firmware::ParameterValues;
 
 std::string text_for(const ParameterValues& values, const control::Hand<double>& hand = {}) {
@@ -118,5 +118,4 @@ TEST(CheckTable, LinesFitATerminal) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::check::check_table_test

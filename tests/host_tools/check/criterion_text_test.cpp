@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::check::criterion_text_test {
-namespace {
+
 using control::Criterion;
 
 TEST(CriterionText, EveryCriterionIsExplainedOnce) {
@@ -74,5 +74,4 @@ TEST(CriterionText, LinesAreShortAndWhole) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::check::criterion_text_test

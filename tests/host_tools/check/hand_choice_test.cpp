@@ -9,7 +9,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::check::hand_choice_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -53,5 +53,4 @@ TEST(HandChoice, WhatIsNoHandIsRefusedWithThePlace) {
                     "none, subject_1");
 }
 
-}  // namespace
 }  // namespace kmax::check::hand_choice_test

@@ -7,7 +7,7 @@
 #include <limits>
 
 namespace kmax::check::judgement_test {
-namespace {
+
 using control::Criterion;
 using control::CriterionResult;
 using firmware::ParameterValues;
@@ -152,5 +152,4 @@ TEST(Judgement, TheAdaptiveLawIsSaidNotToBeJudgedWhole) {
   EXPECT_FALSE(judge_parameters(values, 0, {}).guaranteed());
 }
 
-}  // namespace
 }  // namespace kmax::check::judgement_test

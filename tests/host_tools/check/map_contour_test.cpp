@@ -6,7 +6,6 @@
 #include <limits>
 
 namespace kmax::check::map_contour_test {
-namespace {
 
 template <typename Function>
 Field field_of(std::size_t columns, std::size_t rows, Function function) {
@@ -86,5 +85,4 @@ TEST(MapContour, OneSignHasNoLine) {
   EXPECT_TRUE(positive_area(field_of(3, 3, [](double, double) { return -1.0; })).empty());
 }
 
-}  // namespace
 }  // namespace kmax::check::map_contour_test

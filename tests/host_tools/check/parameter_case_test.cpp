@@ -10,7 +10,7 @@
 #include "firmware/drive/stability_case.hpp"
 
 namespace kmax::check::parameter_case_test {
-namespace {
+
 using firmware::ParameterValues;
 
 template <typename Scalar>
@@ -94,5 +94,4 @@ RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
   RC_ASSERT(here.detection_share == static_cast<double>(there.detection_share));
 }
 
-}  // namespace
 }  // namespace kmax::check::parameter_case_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::check::stability_map_test {
-namespace {
+
 using device::Parameter;
 using device::ValueError;
 using firmware::ParameterValues;
@@ -141,5 +141,4 @@ TEST(StabilityMap, AMapWithoutABorderIsDrawnToo) {
   EXPECT_CONTAINS(folder.read("map.svg"), "all criteria met");
 }
 
-}  // namespace
 }  // namespace kmax::check::stability_map_test

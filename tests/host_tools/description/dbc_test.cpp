@@ -13,7 +13,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::description::dbc_test {
-namespace {
+
 std::string dbc(std::uint8_t node) {
   std::ostringstream out;
   write_dbc(out, node);
@@ -132,5 +132,4 @@ TEST(Dbc, NamesAreUniqueAndShortEnough) {
   EXPECT_EQ(names.size(), 19u);
 }
 
-}  // namespace
 }  // namespace kmax::description::dbc_test

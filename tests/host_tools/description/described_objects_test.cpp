@@ -10,7 +10,7 @@
 #include "firmware/canopen/pdo_mapping.hpp"
 
 namespace kmax::description::described_objects_test {
-namespace {
+
 const DescribedObject* find(const std::vector<DescribedObject>& all, std::uint16_t index,
                             std::uint8_t subindex) {
   const auto found = std::find_if(all.begin(), all.end(), [&](const DescribedObject& object) {
@@ -132,5 +132,4 @@ TEST(DescribedIndices, KindsAndNames) {
   EXPECT_EQ(by_index[0x5820].objects.size(), 1u + firmware::trace_objects);
 }
 
-}  // namespace
 }  // namespace kmax::description::described_objects_test

@@ -8,7 +8,7 @@
 #include "host_tools/description/described_objects.hpp"
 
 namespace kmax::description::eds_test {
-namespace {
+
 using Section = std::map<std::string, std::string>;
 
 std::map<std::string, Section> sections_of(const std::string& text) {
@@ -139,5 +139,4 @@ TEST_F(Eds, NumbersAreWrittenAsReadersExpect) {
   EXPECT_EQ(sections["5820sub40"].at("ObjectType"), "0x2");  // hexadecimal sub-index
 }
 
-}  // namespace
 }  // namespace kmax::description::eds_test

@@ -15,7 +15,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::capture_reader_test {
-namespace {
 
 using firmware::CaptureChannel;
 using firmware::CaptureTrigger;
@@ -377,5 +376,4 @@ TEST(CaptureReaderOnSimulatedBoard, AnExcitationIsSeenFromItsFirstTick) {
   EXPECT_LT(most, 1.2 * 1.5 / 2.3);
 }
 
-}  // namespace
 }  // namespace kmax::device::capture_reader_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::crash_words_test {
-namespace {
+
 using firmware::CrashCause;
 using firmware::CrashRecord;
 
@@ -52,5 +52,4 @@ TEST(CrashWords, OneLine) {
   EXPECT_EQ(crash_words(crash), "interrupt 38 came, which nobody handles; 2 crashes since power-on");
 }
 
-}  // namespace
 }  // namespace kmax::device::crash_words_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::device_address_test {
-namespace {
+
 using host_tools_test::thrown_message;
 using Kind = DeviceAddress::Kind;
 
@@ -94,5 +94,4 @@ TEST(DefaultDeviceAddress, ComesFromTheEnvironment) {
   EXPECT_EQ(default_device_address(), "sim");
 }
 
-}  // namespace
 }  // namespace kmax::link::device_address_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::device_test {
-namespace {
+
 using firmware::Refusal;
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
@@ -287,5 +287,4 @@ TEST_F(OpenDevice, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
   EXPECT_EQ(connection.fake->settings(), before);
 }
 
-}  // namespace
 }  // namespace kmax::device::device_test

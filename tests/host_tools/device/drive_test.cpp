@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::drive_test {
-namespace {
+
 using firmware::DriveState;
 using firmware::Fault;
 using firmware::Refusal;
@@ -205,5 +205,4 @@ TEST(FaultOf, IsNoneWithoutAFaultOrForACodeThatIsNotKnown) {
   EXPECT_EQ(fault_of(status_in(DriveState::fault, 0x1234)), Fault::none);
 }
 
-}  // namespace
 }  // namespace kmax::device::drive_test

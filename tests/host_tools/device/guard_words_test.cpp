@@ -5,7 +5,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::guard_words_test {
-namespace {
+
 using control::Criterion;
 using firmware::GuardFinding;
 using Verdict = GuardFinding::Verdict;
@@ -74,5 +74,4 @@ TEST(GuardWords, ACriterionOfALaterFirmwareIsNotMadeUp) {
   EXPECT_EQ(name_of(Verdict::not_judged), "not_judged");
 }
 
-}  // namespace
 }  // namespace kmax::device::guard_words_test

@@ -13,7 +13,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::parameter_file_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 std::vector<FileSetting> parse(std::string_view text) {
@@ -271,5 +271,4 @@ TEST(ParameterFile, IsReadFromDisk) {
     EXPECT_CONTAINS(thrown_message<ValueError>([&] { read_parameter_file(wrong); }), ": cannot be read");
 }
 
-}  // namespace
 }  // namespace kmax::device::parameter_file_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::parameter_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 TEST(Resolve, ANameWithoutPrefixIsOnTheDefaultAxis) {
@@ -65,5 +65,4 @@ TEST(OwnerOfHoldingRegister, FindsBothWordsOfAValueAndNothingBetween) {
   EXPECT_EQ(owner_of_holding_register(0xFFFF), std::nullopt);
 }
 
-}  // namespace
 }  // namespace kmax::device::parameter_test

@@ -13,7 +13,7 @@
 #include "host_tools/device/sim/sim_link.hpp"
 
 namespace kmax::device::trace_reader_test {
-namespace {
+
 using std::chrono::milliseconds;
 
 constexpr Parameter next_record = Parameter::of<"trace.next">();
@@ -173,5 +173,4 @@ TEST(TraceReader, PositionsAndForcesAreThoseOfTheDevice) {
   EXPECT_EQ(samples.back().magnetic_coefficient, 1.0);
 }
 
-}  // namespace
 }  // namespace kmax::device::trace_reader_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::value_text_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 float parse_float(const Parameter& parameter, std::string_view text) {
@@ -166,5 +166,4 @@ RC_GTEST_PROP(ParseValue, AgreesWithTheDeviceOnEveryFloat, (std::uint32_t patter
   if (accepted) RC_ASSERT(same_value(position, raw, pattern));
 }
 
-}  // namespace
 }  // namespace kmax::device::value_text_test

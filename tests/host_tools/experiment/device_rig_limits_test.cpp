@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::device_rig_limits_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 class Limited : public TouchedBoard {
@@ -189,5 +189,4 @@ TEST_F(Limited, SettingsForAJournalAreTheDevicesTheExperimentsAndTheLimits) {
   EXPECT_EQ(all["abort_amplitude_m"], 0.01);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::device_rig_limits_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/experiment/touched_board.hpp"
 
 namespace kmax::experiment::device_rig_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 class JitterDevice : public DeviceExperiment {
@@ -306,5 +306,4 @@ TEST(TouchSpeed, IsTowardsTheWallOverTheLastMoment) {
   EXPECT_EQ(touch_speed({}), 0.0);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::device_rig_test

@@ -13,7 +13,6 @@
 #include <thread>
 
 namespace kmax::experiment::job_pool_test {
-namespace {
 
 RC_GTEST_PROP(JobPoolProperty, ResultsAreInOrderWhateverTheThreads, ()) {
   const auto count = *rc::gen::inRange<std::size_t>(0, 60);
@@ -170,5 +169,4 @@ TEST(JobPool, WithoutANumberThereAreAsManyAsProcessors) {
   run_jobs(default_jobs(), 0, [&](std::size_t) { together.arrive_and_wait(); });
 }
 
-}  // namespace
 }  // namespace kmax::experiment::job_pool_test

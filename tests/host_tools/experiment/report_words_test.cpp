@@ -6,7 +6,6 @@
 #include <utility>
 
 namespace kmax::experiment::report_words_test {
-namespace {
 
 TEST(ReportWords, AreThoseOfEveryReport) {
   EXPECT_EQ(yes_no(true), "yes");
@@ -49,5 +48,4 @@ TEST(ReportWords, TheStiffeningIsTheCauseOnlyOfWhatFallsWithItAndNotWithoutIt) {
     EXPECT_NE(cause_words("it", falls, falls_without).find("nothing to compare with"), std::string::npos);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::report_words_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::setting_check_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 constexpr SettingCheck check("jitter");
@@ -37,5 +37,4 @@ TEST(SettingCheck, SomebodyMustHoldTheHandle) {
                   "jitter: nobody to hold the handle");
 }
 
-}  // namespace
 }  // namespace kmax::experiment::setting_check_test

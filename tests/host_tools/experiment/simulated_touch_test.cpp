@@ -9,7 +9,6 @@
 #include "host_tools/simulated_board/scene_run.hpp"
 
 namespace kmax::experiment::simulated_touch_test {
-namespace {
 
 using simulation::ContactVerdict;
 
@@ -214,5 +213,4 @@ TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
   refused([](TouchSetup& s) { s.person.grip_stiffness = std::numeric_limits<double>::infinity(); });
 }
 
-}  // namespace
 }  // namespace kmax::experiment::simulated_touch_test

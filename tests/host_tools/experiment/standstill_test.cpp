@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::standstill_test {
-namespace {
+
 using firmware::Fault;
 using host_tools_test::thrown_message;
 
@@ -273,5 +273,4 @@ TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::experiment::standstill_test

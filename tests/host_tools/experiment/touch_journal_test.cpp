@@ -6,7 +6,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::touch_journal_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -103,5 +103,4 @@ TEST_F(TouchJournal, WithoutAJournalEveryTouchIsMade) {
   EXPECT_EQ(touch("a").number, 2);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::touch_journal_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/experiment/touched_board.hpp"
 
 namespace kmax::experiment::two_axis_rig_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 class DeviationDevice : public DeviceExperiment {
@@ -246,5 +246,4 @@ TEST_F(DeviationDisturbed, AFaultOfTheSecondAxisIsNotRepeated) {
   expect_disarmed_and_restored();
 }
 
-}  // namespace
 }  // namespace kmax::experiment::two_axis_rig_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::flash_image_test {
-namespace {
 
 class FlashImageFile : public testing::Test {
  protected:
@@ -136,5 +135,4 @@ TEST(FlashCrc, IsTheOneOfZip) {
   EXPECT_EQ(crc_of({}), 0u);
 }
 
-}  // namespace
 }  // namespace kmax::flash::flash_image_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::flash_plan_test {
-namespace {
 
 class FlashPlanText : public testing::Test {
  protected:
@@ -103,5 +102,4 @@ TEST_F(FlashPlanText, TheFirstStepsChangeNothingWhereStepsAreSeparate) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::flash::flash_plan_test

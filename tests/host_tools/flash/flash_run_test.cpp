@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::flash_run_test {
-namespace {
 
 class FlashRun : public testing::TestWithParam<Method> {
  protected:
@@ -165,5 +164,4 @@ TEST_P(FlashRun, AFailedStartSaysThatTheImageIsThere) {
       "the image is written and verified");
 }
 
-}  // namespace
 }  // namespace kmax::flash::flash_run_test

@@ -6,7 +6,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::method_choice_test {
-namespace {
 
 constexpr const char* swd =
     "lines.swdio = {chip = \"g\", line = 1}\nlines.swclk = {chip = \"g\", line = 2}\n";
@@ -102,5 +101,4 @@ TEST_F(MethodChoice, EveryBoardSaysWhyForEveryMethod) {
   EXPECT_EQ(board_kinds(), "odrive_v3, generic_stm32f405");
 }
 
-}  // namespace
 }  // namespace kmax::flash::method_choice_test

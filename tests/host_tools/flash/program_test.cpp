@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::program_test {
-namespace {
 
 using Words = std::vector<std::string>;
 using std::chrono::milliseconds;
@@ -132,5 +131,4 @@ TEST(CommandText, IsWhatAShellUnderstands) {
   EXPECT_EQ(command_text(Words{"a", "", "it's", "$x"}), "a '' 'it'\\''s' '$x'");
 }
 
-}  // namespace
 }  // namespace kmax::flash::program_test

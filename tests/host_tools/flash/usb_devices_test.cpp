@@ -5,7 +5,6 @@
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::flash::usb_devices_test {
-namespace {
 
 TEST(UsbDevices, AreReadFromTheKernelsFiles) {
   host_tools_test::TemporaryFolder folder;
@@ -39,5 +38,4 @@ TEST(UsbDevices, StLinksAreKnownByVendorAndProduct) {
   EXPECT_FALSE((UsbDevice{0x0484, 0x3748, ""}.is_st_link()));
 }
 
-}  // namespace
 }  // namespace kmax::flash::usb_devices_test

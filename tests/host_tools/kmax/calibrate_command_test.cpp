@@ -6,7 +6,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::calibrate_command_test {
-namespace {
 
 /// The program with a device that has a motor, fresh for every call.
 class Calibrate : public SimulatedCommandLine {
@@ -105,5 +104,4 @@ TEST_F(Calibrate, BadOptionsAreWrongUsage) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::cli::calibrate_command_test

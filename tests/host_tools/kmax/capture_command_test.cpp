@@ -7,7 +7,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::capture_command_test {
-namespace {
+
 using Capture = SimulatedCommandLine;
 using host_tools_test::CapturingLink;
 
@@ -145,5 +145,4 @@ TEST(CaptureCommand, CtrlCStopsTheCaptureInTheDeviceAndDisarms) {
   EXPECT_FALSE(watched.armed_at_end);
 }
 
-}  // namespace
 }  // namespace kmax::cli::capture_command_test

@@ -2,7 +2,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::check_command_test {
-namespace {
 
 class Check : public SimulatedCommandLine {
  protected:
@@ -218,5 +217,4 @@ TEST_F(Check, BadMapsAreWrongUsageAndLeaveNothing) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
-}  // namespace
 }  // namespace kmax::cli::check_command_test

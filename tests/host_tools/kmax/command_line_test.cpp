@@ -11,7 +11,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::command_line_test {
-namespace {
+
 using firmware::DriveState;
 using firmware::Fault;
 using firmware::Refusal;
@@ -353,5 +353,4 @@ TEST_F(CommandLine, OutputThatCannotBeWrittenIsAnError) {
   EXPECT_CONTAINS(messages.str(), "could not be written");
 }
 
-}  // namespace
 }  // namespace kmax::cli::command_line_test

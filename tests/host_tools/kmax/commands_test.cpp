@@ -11,7 +11,6 @@
 #include "host_tools/device/link.hpp"
 
 namespace kmax::cli::commands_test {
-namespace {
 
 /// The words of a command line, up to what a shell would take for itself.
 std::vector<std::string> words_in(const std::string& line) {
@@ -85,5 +84,4 @@ TEST_F(Commands, TheAxisIsTakenWhereItIsAskedFor) {
   EXPECT_EQ(context.axis(), 1u);
 }
 
-}  // namespace
 }  // namespace kmax::cli::commands_test

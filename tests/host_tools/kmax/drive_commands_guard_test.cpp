@@ -5,7 +5,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::drive_commands_guard_test {
-namespace {
 
 /// Counts of 1 um, 20 kHz, current loop of 4000 rad/s: 1.23 N s/m allow 4000 N/m.
 class GuardOnCommandLine : public CommandLineFixture {
@@ -96,5 +95,4 @@ TEST_F(GuardOnCommandLine, ASetThatIsRefusedWhileArmedNamesTheParameterAndChange
   EXPECT_TRUE(armed());
 }
 
-}  // namespace
 }  // namespace kmax::cli::drive_commands_guard_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_command_test {
-namespace {
+
 struct Experiment : SimulatedCommandLine {
   /// Of all experiments, as the help lists them: two spaces, the name, what it does.
   std::vector<std::string> names() {
@@ -85,5 +85,4 @@ TEST_F(Experiment, AJournalIsKeptWhereThereIsAFolderAndResumedFromThereOnly) {
   EXPECT_TRUE(std::filesystem::exists(folder / "out/x.journal"));
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_command_test

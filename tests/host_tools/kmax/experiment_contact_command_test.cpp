@@ -5,7 +5,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_contact_command_test {
-namespace {
+
 using ContactCommand = SimulatedCommandLine;
 
 TEST_F(ContactCommand, ContactIsADocumentWithAConditionForEachWall) {
@@ -108,5 +108,4 @@ TEST_F(ContactCommand, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {
   EXPECT_EQ(kmax({"experiment", "contact", "--axis", "1", "--trials", "1", "--json"}), failed) << output;
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_contact_command_test

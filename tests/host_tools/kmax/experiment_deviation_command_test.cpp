@@ -1,7 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
 namespace kmax::cli::experiment_deviation_command_test {
-namespace {
 
 class DeviationCommand : public ExperimentCommandLine {
  protected:
@@ -94,5 +93,4 @@ TEST_F(DeviationCommand, BadValuesAreRefusedWithTheirOption) {
   expect_refused("--pulses", "1.5", "1.5");
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_deviation_command_test

@@ -1,7 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
 namespace kmax::cli::experiment_jitter_command_test {
-namespace {
 
 class JitterCommand : public ExperimentCommandLine {
  protected:
@@ -85,5 +84,4 @@ TEST_F(JitterCommand, BadValuesAreRefusedWithTheirOption) {
   expect_refused("--touches", "1.5", "1.5");
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_jitter_command_test

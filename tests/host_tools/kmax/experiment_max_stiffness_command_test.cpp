@@ -5,7 +5,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::experiment_max_stiffness_command_test {
-namespace {
 
 /// A simulated board that is reached under the address of a real one.
 class MaxStiffness : public SimulatedCommandLine {
@@ -165,5 +164,4 @@ TEST(ConditionJson, AnAdaptiveWallHasNoCoefficientAndAPictureNoNumber) {
   EXPECT_EQ(adaptive["name"], "other");
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_max_stiffness_command_test

@@ -1,7 +1,6 @@
 #include "tests/host_tools/kmax/experiment_command_line.hpp"
 
 namespace kmax::cli::experiment_resolution_command_test {
-namespace {
 
 class ResolutionCommand : public ExperimentCommandLine {
  protected:
@@ -82,5 +81,4 @@ TEST_F(ResolutionCommand, BadValuesAreRefusedWithTheirOption) {
   expect_refused("--touches", "0", "not in range");
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_resolution_command_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::experiment_study_test {
-namespace {
 
 using host_tools_test::thrown_message;
 
@@ -91,5 +90,4 @@ TEST_F(ExperimentStudy, TheGainIsEverybodysOnlyIfItIsGiven) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::cli::experiment_study_test

@@ -4,7 +4,6 @@
 #include "tests/host_tools/kmax/board_command_line.hpp"
 
 namespace kmax::cli::flash_command_test {
-namespace {
 
 using Words = std::vector<std::string>;
 
@@ -187,5 +186,4 @@ TEST_F(FlashCommand, AHangingToolIsEndedAfterTheTimeout) {
   EXPECT_CONTAINS(said, "took too long and was ended");
 }
 
-}  // namespace
 }  // namespace kmax::cli::flash_command_test

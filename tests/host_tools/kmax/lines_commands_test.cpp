@@ -6,7 +6,6 @@
 #include "tests/host_tools/kmax/board_command_line.hpp"
 
 namespace kmax::cli::lines_commands_test {
-namespace {
 
 using Words = std::vector<std::string>;
 
@@ -190,5 +189,4 @@ TEST_F(LinesCommands, WithoutAConfigurationTheyTellWhatToWrite) {
   EXPECT_CONTAINS(said, lines_file + ": [board] kind: there is no board 'toaster'");
 }
 
-}  // namespace
 }  // namespace kmax::cli::lines_commands_test

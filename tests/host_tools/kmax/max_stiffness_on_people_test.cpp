@@ -12,7 +12,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::max_stiffness_on_people_test {
-namespace {
 
 class MaxStiffnessOnPeople : public testing::Test {
  protected:
@@ -99,5 +98,4 @@ TEST_F(MaxStiffnessOnPeople, WhatASetWasFittedToIsNoReasonToRefuseItsJournal) {
   EXPECT_THROW(measure(), std::exception);
 }
 
-}  // namespace
 }  // namespace kmax::cli::max_stiffness_on_people_test

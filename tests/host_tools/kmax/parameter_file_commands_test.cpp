@@ -6,7 +6,6 @@
 #include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::parameter_file_commands_test {
-namespace {
 
 class ParameterFileCommands : public WiredCommandLine {
  protected:
@@ -216,5 +215,4 @@ TEST_F(ParameterFileCommands, AMissingFileNameIsWrongUsage) {
   EXPECT_CONTAINS(output, "Exit code 3 if a value differs");
 }
 
-}  // namespace
 }  // namespace kmax::cli::parameter_file_commands_test

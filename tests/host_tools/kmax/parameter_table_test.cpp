@@ -6,7 +6,7 @@
 #include <sstream>
 
 namespace kmax::cli::parameter_table_test {
-namespace {
+
 using device::Parameter;
 
 std::vector<std::string> lines_of(std::span<const ParameterRow> rows, bool whole_texts) {
@@ -58,5 +58,4 @@ TEST(ParameterTable, WholeTextsLoseNoWord) {
   EXPECT_NE(all.find("difference|low_pass|foaw|foaw_end_fit|tracking"), std::string::npos) << all;
 }
 
-}  // namespace
 }  // namespace kmax::cli::parameter_table_test

@@ -1,7 +1,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::plot_command_test {
-namespace {
+
 using Plot = SimulatedCommandLine;
 
 TEST_F(Plot, EveryColumnOverTheFirstBesideTheTable) {
@@ -38,5 +38,4 @@ TEST_F(Plot, ColumnNamesAreNoCommands) {
   EXPECT_FALSE(std::filesystem::exists(folder / "done"));
 }
 
-}  // namespace
 }  // namespace kmax::cli::plot_command_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::reachable_devices_test {
-namespace {
+
 namespace fs = std::filesystem;
 
 TEST(ReachableDevices, SerialPortsByTheNameThatStays) {
@@ -65,5 +65,4 @@ TEST(ReachableDevices, NodesThatAreKmaxDevicesHaveAnAddress) {
   EXPECT_EQ(devices[3].description, "in use by another program");
 }
 
-}  // namespace
 }  // namespace kmax::cli::reachable_devices_test

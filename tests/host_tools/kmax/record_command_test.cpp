@@ -7,7 +7,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::record_command_test {
-namespace {
+
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
 
@@ -167,5 +167,4 @@ TEST_F(RecordCommand, OtherLinksArePolled) {
   EXPECT_CONTAINS(text, ",axis1_flags,axis1_tick\n");
 }
 
-}  // namespace
 }  // namespace kmax::cli::record_command_test

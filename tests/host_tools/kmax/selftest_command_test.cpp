@@ -5,7 +5,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::selftest_command_test {
-namespace {
 
 class SelfTestCommand : public SimulatedCommandLine {
  protected:
@@ -142,5 +141,4 @@ TEST_F(SelfTestCommand, WrongOptionsAreUsageErrors) {
     expect_error({"selftest", "--patience", number}, wrong_usage, "patience");
 }
 
-}  // namespace
 }  // namespace kmax::cli::selftest_command_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::serve_command_test {
-namespace {
+
 using Serve = SimulatedCommandLine;
 
 TEST_F(Serve, WhatCannotBeServedIsSaidAtOnce) {
@@ -81,5 +81,4 @@ TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
   EXPECT_CONTAINS(said, "CAN frames were lost");
 }
 
-}  // namespace
 }  // namespace kmax::cli::serve_command_test

@@ -2,7 +2,6 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::simulate_command_test {
-namespace {
 
 class Simulate : public SimulatedCommandLine {
  protected:
@@ -103,5 +102,4 @@ TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
   EXPECT_EQ(document()["state"], "fault");
 }
 
-}  // namespace
 }  // namespace kmax::cli::simulate_command_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/kmax/wired_command_line.hpp"
 
 namespace kmax::cli::store_commands_test {
-namespace {
+
 using firmware::DriveState;
 
 class StoreCommands : public WiredCommandLine {
@@ -141,5 +141,4 @@ TEST_F(StoreCommands, HelpSaysWhatSaveAndDefaultsDo) {
   EXPECT_CONTAINS(output, "Exit codes: 0 done");
 }
 
-}  // namespace
 }  // namespace kmax::cli::store_commands_test

@@ -5,7 +5,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::store_text_test {
-namespace {
+
 using device::StoreStatus;
 using firmware::StoreState;
 
@@ -63,5 +63,4 @@ TEST(StoreText, TroublesHaveLinesOfTheirOwnAndNames) {
   EXPECT_EQ(json["first_defaulted"][1], "axis1.wall.stiffness");
 }
 
-}  // namespace
 }  // namespace kmax::cli::store_text_test

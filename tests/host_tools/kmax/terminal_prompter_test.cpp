@@ -9,7 +9,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::terminal_prompter_test {
-namespace {
+
 using host_tools_test::thrown_message;
 
 class GivenUp : public std::runtime_error {
@@ -110,5 +110,4 @@ TEST_F(Prompter, TheCheckMayGiveUpAtAnyTime) {
   EXPECT_THROW(ask(), GivenUp);
 }
 
-}  // namespace
 }  // namespace kmax::cli::terminal_prompter_test

@@ -7,7 +7,7 @@
 #include <cmath>
 
 namespace kmax::cli::value_json_test {
-namespace {
+
 using device::Parameter;
 
 constexpr Parameter position = Parameter::of<"wall.position">();
@@ -44,5 +44,4 @@ RC_GTEST_PROP(ValueJson, EveryFiniteFloatComesBack, (std::uint32_t pattern)) {
   RC_ASSERT(static_cast<float>(Json::parse(text_of(value)).get<double>()) == value);
 }
 
-}  // namespace
 }  // namespace kmax::cli::value_json_test

@@ -1,7 +1,7 @@
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 
 namespace kmax::cli::wall_command_test {
-namespace {
+
 using Wall = SimulatedCommandLine;
 
 TEST_F(Wall, APointAsTextAndAsADocument) {
@@ -75,5 +75,4 @@ TEST_F(Wall, FilesThatCannotBeReadOrWrittenAreNamed) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
-}  // namespace
 }  // namespace kmax::cli::wall_command_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::cli::watch_view_test {
-namespace {
+
 std::vector<WatchedAxis> axes() {
   WatchedAxis good{.axis = 0};
   good.measured = {.tick = 77, .position = 0.0123F, .velocity = -0.5F, .force = 1.25F, .flags = 0x11};
@@ -76,5 +76,4 @@ TEST(LiveLines, NoneScrollsAwayOnASmallTerminal) {
   EXPECT_EQ(terminal.str(), "\x1b[2Fd\x1b[K\n\x1b[J");
 }
 
-}  // namespace
 }  // namespace kmax::cli::watch_view_test

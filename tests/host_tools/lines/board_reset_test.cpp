@@ -6,7 +6,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::lines::board_reset_test {
-namespace {
 
 using Words = std::vector<std::string>;
 
@@ -54,5 +53,4 @@ TEST_F(BoardReset, Boot0IsLetGoWhenTheResetLineCannotBeHad) {
   EXPECT_EQ(gpio.history, (Words{"g line 2 high", "g line 2 released"}));
 }
 
-}  // namespace
 }  // namespace kmax::lines::board_reset_test

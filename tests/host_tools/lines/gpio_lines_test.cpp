@@ -12,7 +12,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::lines::gpio_lines_test {
-namespace {
 
 using std::chrono::milliseconds;
 
@@ -156,5 +155,4 @@ TEST_F(SimulatedChip, ALineBeyondTheChipIsRefused) {
                   "the chip has the lines 0 to");
 }
 
-}  // namespace
 }  // namespace kmax::lines::gpio_lines_test

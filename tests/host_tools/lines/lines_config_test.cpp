@@ -7,7 +7,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::lines::lines_config_test {
-namespace {
 
 std::string refusal(const std::string& text) {
   return host_tools_test::thrown_message<LinesConfigError>([&] { parse_lines_config(text, "lines.toml"); });
@@ -148,5 +147,4 @@ TEST_F(LinesFile, TheDefaultIsInTheHomeWithoutXdg) {
   EXPECT_EQ(default_lines_file(), "/home/somebody/.config/kmax/lines.toml");
 }
 
-}  // namespace
 }  // namespace kmax::lines::lines_config_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::plot::csv_table_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -90,5 +90,4 @@ RC_GTEST_PROP(CsvTableProperty, GarbageIsATableOrACsvError, ()) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::plot::csv_table_test

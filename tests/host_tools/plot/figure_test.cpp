@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::plot::figure_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -173,5 +173,4 @@ TEST(Figure, LabelsMayBeginWithAnApostrophe) {
     EXPECT_CONTAINS(folder.read("a.svg"), text);
 }
 
-}  // namespace
 }  // namespace kmax::plot::figure_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::plot::gnuplot_picture_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -113,5 +113,4 @@ TEST(GnuplotPicture, MissingGnuplotIsSaid) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
-}  // namespace
 }  // namespace kmax::plot::gnuplot_picture_test

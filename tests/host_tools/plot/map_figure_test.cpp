@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::plot::map_figure_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -82,5 +82,4 @@ TEST(MapFigure, TextIsNeverRun) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
-}  // namespace
 }  // namespace kmax::plot::map_figure_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::record::can_source_test {
-namespace {
+
 using drivers::CanFrame;
 using std::chrono::microseconds;
 
@@ -206,5 +206,4 @@ TEST(CanSource, TheFiltersPassWhatItNeeds) {
   EXPECT_EQ(options.filters[4].identifier, 0x705u);
 }
 
-}  // namespace
 }  // namespace kmax::record::can_source_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::record::pdo_plan_test {
-namespace {
+
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
 
@@ -176,5 +176,4 @@ TEST_F(PdoPlanTest, SoAreTimesThatDiffer) {
   EXPECT_CONTAINS(refusal(), "tpdo4.event_time is 2 ms, but tpdo1.event_time 10 ms");
 }
 
-}  // namespace
 }  // namespace kmax::record::pdo_plan_test

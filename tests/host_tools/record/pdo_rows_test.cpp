@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace kmax::record::pdo_rows_test {
-namespace {
+
 using drivers::CanFrame;
 using std::chrono::microseconds;
 using std::chrono::nanoseconds;
@@ -230,5 +230,4 @@ RC_GTEST_PROP(PdoRowsProperty, WhateverIsLostNoRowIsMixedAndAllAreAccountedFor,
   RC_ASSERT(written + rows.losses().rows == (last - first_row) / period + 1);
 }
 
-}  // namespace
 }  // namespace kmax::record::pdo_rows_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::record::polled_source_test {
-namespace {
+
 using host_tools_test::FakeDevice;
 using host_tools_test::FakeLink;
 constexpr std::chrono::microseconds any_time{0};
@@ -93,5 +93,4 @@ TEST_F(PolledSourceTest, TheLinkIsLentTwiceASecond) {
   EXPECT_GE(lent, 5);
 }
 
-}  // namespace
 }  // namespace kmax::record::polled_source_test

@@ -8,7 +8,7 @@
 #include "host_tools/device/link.hpp"
 
 namespace kmax::record::recording_test {
-namespace {
+
 /// A row every 20 ticks, none at every third question, and perhaps an end.
 class MadeUpSource final : public RowSource {
  public:
@@ -109,5 +109,4 @@ TEST(Recording, OneRowOrNoneHasNoRate) {
   EXPECT_EQ((RecordingProgress{.rows = 1, .first_tick = 5, .last_tick = 5}.rate()), 0);
 }
 
-}  // namespace
 }  // namespace kmax::record::recording_test

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kmax::record::row_test {
-namespace {
+
 Row row() {
   Row made{.tick = 1'000'020};
   made.axes[0] = {1'000'020, 0.0123456789, -0.5F, 2.4F, 0.25F, 17};
@@ -38,5 +38,4 @@ TEST(RowCsv, TimesOfLongRecordingsKeepTheTick) {
   EXPECT_TRUE(RowCsv({0}, false).line(late, 1'000'000).starts_with("3600000.00005,"));
 }
 
-}  // namespace
 }  // namespace kmax::record::row_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::report::html_test {
-namespace {
 
 TEST(Html, HasEverythingInItsOrder) {
   const Page page{"Report",
@@ -82,5 +81,4 @@ RC_GTEST_PROP(HtmlProperty, TagsAreThoseOfTheEmptyPageWhateverTheTexts,
   RC_ASSERT(tags(without(a), without(b)) == tags("x", "y"));
 }
 
-}  // namespace
 }  // namespace kmax::report::html_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::report::markdown_test {
-namespace {
 
 TEST(Markdown, HasEverythingInItsOrder) {
   const Page page{"Report",
@@ -79,5 +78,4 @@ RC_GTEST_PROP(MarkdownProperty, ARowIsALineWithAsManyBarsWhateverIsInIt,
   RC_ASSERT(std::count(row.begin(), row.end(), '\n') == 1);
 }
 
-}  // namespace
 }  // namespace kmax::report::markdown_test

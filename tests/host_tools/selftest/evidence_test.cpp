@@ -5,7 +5,6 @@
 #include <limits>
 
 namespace kmax::selftest::evidence_test {
-namespace {
 
 using firmware::Fault;
 using firmware::Refusal;
@@ -97,5 +96,4 @@ TEST(Evidence, WithoutAPowerStageNothingOfItIsJudged) {
   for (const CheckResult& check : run_checks(evidence)) EXPECT_NE(check.verdict, Verdict::fail) << check.name;
 }
 
-}  // namespace
 }  // namespace kmax::selftest::evidence_test

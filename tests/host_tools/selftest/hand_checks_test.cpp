@@ -3,7 +3,6 @@
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
 namespace kmax::selftest::hand_checks_test {
-namespace {
 
 TEST(HandChecks, AnEmergencyStopThatIsPressedAndReleased) {
   TestedAxis tested("dc_coreless_a");
@@ -38,5 +37,4 @@ TEST(HandChecks, AHandleThatNobodyMoves) {
   EXPECT_EQ(result.part, "encoder");
 }
 
-}  // namespace
 }  // namespace kmax::selftest::hand_checks_test

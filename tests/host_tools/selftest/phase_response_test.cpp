@@ -8,7 +8,6 @@
 #include "host_tools/bench/winding_model.hpp"
 
 namespace kmax::selftest::phase_response_test {
-namespace {
 
 /// Pulses whose sensors answer b and c times the winding's current.
 std::vector<PulseResponse> answers(const AxisFacts& facts,
@@ -111,5 +110,4 @@ TEST(JudgePhases, WhatFitsNothingIsUnclear) {
   EXPECT_EQ(judged(motor(false), {{1.0, -0.45}}), Circuit::unclear);
 }
 
-}  // namespace
 }  // namespace kmax::selftest::phase_response_test

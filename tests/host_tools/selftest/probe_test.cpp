@@ -3,7 +3,6 @@
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
 namespace kmax::selftest::probe_test {
-namespace {
 
 constexpr const char* scenes[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
 
@@ -104,5 +103,4 @@ TEST(Probe, ArmsWithTheRunThatWasThereAndStartsPulsesByChangingIt) {
   EXPECT_EQ(tested.device->read(run), before);
 }
 
-}  // namespace
 }  // namespace kmax::selftest::probe_test

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 namespace kmax::selftest::pulse_plan_test {
-namespace {
 
 /// m: largest span of a free handle without friction whose current follows the square wave at once.
 double span(const AxisFacts& facts, const Pulse& pulse, double current) {
@@ -48,5 +47,4 @@ TEST(PulsePlan, ASwingEndsAlmostAtRest) {
   EXPECT_EQ(swing.duration % swing.half_period, swing.half_period - swing.half_period / 2);
 }
 
-}  // namespace
 }  // namespace kmax::selftest::pulse_plan_test

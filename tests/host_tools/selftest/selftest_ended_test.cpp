@@ -5,7 +5,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::selftest::selftest_ended_test {
-namespace {
 
 using host_tools_test::thrown_message;
 
@@ -135,5 +134,4 @@ TEST(SelfTestLeaves, AHandThatMovesTheHandleIsAFailedCheck) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::selftest::selftest_ended_test

@@ -5,7 +5,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::selftest::selftest_held_up_test {
-namespace {
 
 using host_tools_test::thrown_message;
 using std::chrono::milliseconds;
@@ -90,5 +89,4 @@ TEST(SelfTestHeldUp, AgainAndAgainTheTestCannotBeCarriedOut) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::selftest::selftest_held_up_test

@@ -4,7 +4,6 @@
 #include "tests/host_tools/selftest/tested_axis.hpp"
 
 namespace kmax::selftest::selftest_test {
-namespace {
 
 using simulation::Defect;
 
@@ -204,5 +203,4 @@ TEST(SelfTest, ATripInTheMidstOfASwingIsReportedAndLeavesNothingBehind) {
   EXPECT_EQ(tested.settings(), before);
 }
 
-}  // namespace
 }  // namespace kmax::selftest::selftest_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::serve::pseudo_terminal_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 using Bytes = std::vector<std::uint8_t>;
@@ -117,5 +117,4 @@ TEST(PseudoTerminal, AMissingFolderIsSaidAndNothingStaysOpen) {
   EXPECT_EQ(open_descriptors(), before);
 }
 
-}  // namespace
 }  // namespace kmax::serve::pseudo_terminal_test

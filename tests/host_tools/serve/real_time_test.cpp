@@ -10,7 +10,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::serve::real_time_test {
-namespace {
+
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
@@ -62,5 +62,4 @@ TEST(RealTime, StopsBeforeItBegins) {
   EXPECT_EQ(run_in_real_time(served.simulation, {.line = &served.line}, [] { return true; }).ticks, 0u);
 }
 
-}  // namespace
 }  // namespace kmax::serve::real_time_test

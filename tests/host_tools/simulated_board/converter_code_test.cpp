@@ -5,7 +5,6 @@
 #include <limits>
 
 namespace kmax::simulated_board::converter_code_test {
-namespace {
 
 TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
   EXPECT_EQ(converter_code(0.0), 0);
@@ -20,5 +19,4 @@ TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
   EXPECT_THROW(converter_code(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::converter_code_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::simulated_board::file_flash_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -119,5 +119,4 @@ TEST_F(FileFlashTest, KeptParametersReplaceDefaultsAndTheScenesOwnReplaceThem) {
   EXPECT_EQ(values.whole<"encoder.counts_per_turn">(), 1234);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::file_flash_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::simulated_board::scene_parameters_test {
-namespace {
+
 using host_tools_test::thrown_message;
 using simulation::ParameterValue;
 using simulation::SceneError;
@@ -150,5 +150,4 @@ TEST(SceneParameters, CommandsInASceneDoNotArmIt) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::scene_parameters_test

@@ -10,7 +10,7 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::simulated_board::scene_run_test {
-namespace {
+
 using firmware::DriveState;
 
 simulation::Scene touch(double duration) {
@@ -419,5 +419,4 @@ TEST(SuppliedScenes, ANoisyEncoderLosesTheWall) {
   EXPECT_LT(std::abs(at(clean.samples, 2.0).true_position - at(clean.samples, 2.0).position), 0.0551e-3);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::scene_run_test

@@ -6,7 +6,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::simulated_board::simulated_board_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 using simulation::SceneError;
@@ -58,5 +58,4 @@ TEST(SimulatedBoard, FactorySceneHasOnlyWhatDescribesTheHardware) {
   EXPECT_EQ(values.real<"device.mass">(), static_cast<float>(touch.axes[0].device.mass));
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::simulated_board_test

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::simulated_board::simulated_bridge_test {
-namespace {
 
 // Rounding and limits of duties are the driver's: tests/drivers/three_phase_pwm_test.cpp.
 TEST(SimulatedBridge, ADutyWaitsForTheUpdateAndMoeDoesNot) {
@@ -35,5 +34,4 @@ TEST(SimulatedBridge, DeadTimeAndFrequencyAreTheTimers) {
   EXPECT_DOUBLE_EQ(SimulatedBridge().command().pwm_frequency, 20000.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::simulated_bridge_test

@@ -5,7 +5,6 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::simulated_board::simulated_device_test {
-namespace {
 
 firmware::AxisOutput output(float force, bool enabled) {
   firmware::AxisOutput out{};
@@ -184,5 +183,4 @@ TEST(SimulatedDevice, ABoardHasTwoAxes) {
   EXPECT_THROW(SimulatedDevice device(scene), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::simulated_device_test

@@ -7,7 +7,6 @@
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
 namespace kmax::simulated_board::simulated_power_hardware_test {
-namespace {
 
 using board::OffsetProgress;
 using simulation::Defect;
@@ -196,5 +195,4 @@ TEST(SimulatedPowerHardware, AnUnpluggedCableLooksLikeRestUnlessAnIndexIsWatched
   EXPECT_FALSE(serial.turn_for(50e-6).count_valid);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::simulated_power_hardware_test

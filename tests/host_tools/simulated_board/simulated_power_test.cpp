@@ -8,7 +8,6 @@
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
 namespace kmax::simulated_board::simulated_power_test {
-namespace {
 
 using firmware::Fault;
 using firmware::Refusal;
@@ -275,5 +274,4 @@ TEST(SimulatedPower, TheBrakeResistorIsOffWhileASaveIsUnderWay) {
   EXPECT_FALSE(brakes_for());
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::simulated_power_test

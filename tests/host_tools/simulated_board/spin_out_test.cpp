@@ -11,7 +11,6 @@
 #include "tests/host_tools/simulated_board/torque_ripple.hpp"
 
 namespace kmax::simulated_board::spin_out_test {
-namespace {
 
 using firmware::Fault;
 
@@ -166,5 +165,4 @@ TEST(SpinOutOfAMotor, WhatAHandCouldDoDoesNotTrip) {
   EXPECT_EQ(SpinOut("gimbal_a", {pi, false}, 6.0f).under(3.0).fault, Fault::none);
 }
 
-}  // namespace
 }  // namespace kmax::simulated_board::spin_out_test

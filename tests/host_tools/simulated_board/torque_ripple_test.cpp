@@ -5,7 +5,6 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::torque_ripple::torque_ripple_test {
-namespace {
 
 using simulated_board::open_scene;
 
@@ -101,5 +100,4 @@ TEST(TorqueRippleRig, NeedsAMotor) {
   EXPECT_THROW(Rig(open_scene("touch"), {}), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::torque_ripple::torque_ripple_test

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::brushed_dc_motor_test {
-namespace {
 
 TerminalDrive between(double u_b, double u_c, double leg_resistance = 0.0) {
   return {{0.0, u_b, u_c}, {false, true, true}, leg_resistance};
@@ -122,5 +121,4 @@ TEST(BrushedDcMotor, RefusesWhatIsNoMotor) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::brushed_dc_motor_test

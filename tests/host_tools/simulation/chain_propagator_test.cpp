@@ -11,7 +11,6 @@
 #include "host_tools/simulation/chain_motion.hpp"
 
 namespace kmax::simulation::chain_propagator_test {
-namespace {
 
 class RandomChains {
  public:
@@ -147,5 +146,4 @@ TEST(ChainPropagator, AcceptsNothingThatIsNotFinite) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::chain_propagator_test

@@ -10,7 +10,6 @@
 #include <vector>
 
 namespace kmax::simulation::contact_measure_test {
-namespace {
 
 std::vector<ContactSample> record(const std::function<double(double)>& position, double begin = 2.0,
                                   double end = 3.0, double step = 0.002) {
@@ -145,5 +144,4 @@ TEST(ContactMeasure, ThreeCountsAreStableWhateverTheRounding) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::contact_measure_test

@@ -15,7 +15,6 @@
 #include "host_tools/simulation/coupled_handle.hpp"
 
 namespace kmax::simulation::contact_study_test {
-namespace {
 
 enum class Field { constant, instant, latched, peak_hold };
 
@@ -214,5 +213,4 @@ TEST(ContactStudy, LargestStableStiffnessRisesWithTheField) {
   EXPECT_NEAR(largest_stable_stiffness({.coefficient = 2.0}), 10800.0, 500.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::contact_study_test

@@ -15,7 +15,6 @@
 #include "tests/host_tools/simulation/precise_chain.hpp"
 
 namespace kmax::simulation::coupled_handle_hard_cases_test {
-namespace {
 
 using Real = PreciseChain::Real;
 
@@ -354,5 +353,4 @@ TEST(CoupledHandleHardCases, NoEnergyIsGainedOrLostInTenMillionIntervals) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::coupled_handle_hard_cases_test

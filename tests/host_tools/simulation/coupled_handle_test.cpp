@@ -16,7 +16,6 @@
 #include "host_tools/simulation/propagator_table.hpp"
 
 namespace kmax::simulation::coupled_handle_test {
-namespace {
 
 constexpr double period = 0.002;
 
@@ -467,5 +466,4 @@ TEST(CoupledHandle, RefusesWhatIsNotANumberOrNotAnInterval) {
   EXPECT_THROW(CoupledHandle(DeviceModel{}, HandleStart{nan, 0.0}), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::coupled_handle_test

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::current_sensor_test {
-namespace {
 
 using Channel = CurrentSensor::Channel;
 
@@ -90,5 +89,4 @@ TEST(CurrentSensor, RefusesWhatIsNotANumberOrNoSensor) {
     EXPECT_THROW(CurrentSensor{config}, std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::current_sensor_test

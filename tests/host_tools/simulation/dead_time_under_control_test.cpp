@@ -5,7 +5,6 @@
 #include "tests/host_tools/simulation/sine_through_zero.hpp"
 
 namespace kmax::simulation::dead_time_under_control_test {
-namespace {
 
 using test::DeadTimeShare;
 using test::SineThroughZero;
@@ -83,5 +82,4 @@ TEST(DeadTimeUnderControl, TheMeasuredCurrentFeedsBackOnItself) {
   EXPECT_LT(test::distortion_of(run, synchronous[1]).largest, 0.12);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::dead_time_under_control_test

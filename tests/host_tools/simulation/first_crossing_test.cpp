@@ -6,7 +6,6 @@
 #include <vector>
 
 namespace kmax::simulation::first_crossing_test {
-namespace {
 
 std::vector<double> times_root(const std::vector<double>& c, double root) {
   std::vector<double> product(c.size() + 1, 0.0);
@@ -95,5 +94,4 @@ RC_GTEST_PROP(FirstCrossing, AgreesWithADenseScanForRandomCoefficients, ()) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::first_crossing_test

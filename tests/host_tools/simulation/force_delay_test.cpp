@@ -9,7 +9,6 @@
 #include <vector>
 
 namespace kmax::simulation::force_delay_test {
-namespace {
 
 struct Piece {
   double duration;
@@ -123,5 +122,4 @@ RC_GTEST_PROP(ForceDelay, IsTheCommandedStaircaseShifted, ()) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::force_delay_test

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::intended_motion_test {
-namespace {
 
 IntendedMotionConfig example() {
   return IntendedMotionConfig{
@@ -188,5 +187,4 @@ RC_GTEST_PROP(IntendedMotion, IsContinuousNeverTooFastAndCoversTheTime, ()) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::intended_motion_test

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::inverter_test {
-namespace {
 
 constexpr double supply = 24.0;
 
@@ -273,5 +272,4 @@ TEST(Inverter, RefusesWhatIsNotAllowedAndLeavesTheMotorAlone) {
   EXPECT_THROW(Inverter({-1.0, 0.8}), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::inverter_test

@@ -12,7 +12,6 @@
 #include "host_tools/simulation/operator_model.hpp"
 
 namespace kmax::simulation::model_field_test {
-namespace {
 
 template <typename Model, std::size_t count>
 void check_every_field(const std::array<ModelField<Model>, count>& fields) {
@@ -59,5 +58,4 @@ TEST(ModelField, MessageGivesValueAndRange) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::model_field_test

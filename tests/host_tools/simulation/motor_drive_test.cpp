@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::motor_drive_test {
-namespace {
 
 using Channel = CurrentSensor::Channel;
 constexpr double interval = 25e-6;
@@ -351,5 +350,4 @@ TEST_F(MotorDriveTest, RefusesWhatIsNotANumber) {
   EXPECT_THROW(MotorDrive(config, CoupledHandle(frictionless())), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::motor_drive_test

@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace kmax::simulation::noise_generator_test {
-namespace {
 
 // The sequence that the authors' reference implementation gives for seed 1234567.
 TEST(NoiseGenerator, GivesThePublishedSequence) {
@@ -54,5 +53,4 @@ TEST(NoiseGenerator, GaussianHasMeanVarianceAndIsWhite) {
   EXPECT_LT(most, 4.9);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::noise_generator_test

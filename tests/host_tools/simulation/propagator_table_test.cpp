@@ -11,7 +11,6 @@
 #include "host_tools/simulation/coupled_handle.hpp"
 
 namespace kmax::simulation::propagator_table_test {
-namespace {
 
 TEST(GainGrid, RoundsToTheNearestOfItsNumbers) {
   for (const int bits : {4, 10, 12, 16}) {
@@ -167,5 +166,4 @@ TEST(PropagatorTable, RoundsTheGainOfAFieldAndNothingElse) {
     ASSERT_NEAR(with.positions[n], without.positions[n], 2e-6) << n;
 }
 
-}  // namespace
 }  // namespace kmax::simulation::propagator_table_test

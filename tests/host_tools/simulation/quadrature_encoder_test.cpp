@@ -11,7 +11,6 @@
 #include "host_tools/simulation/encoder_coupling.hpp"
 
 namespace kmax::simulation::quadrature_encoder_test {
-namespace {
 
 constexpr double count = 0x1p-20;  // m; a power of two, so that positions have no rounding of their own
 
@@ -340,5 +339,4 @@ TEST(EncoderCoupling, RefusesWhatIsNoShareOrTorque) {
   EXPECT_EQ(coupling.disc(), 1.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::quadrature_encoder_test

@@ -19,7 +19,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::simulation::reference_integrators_test {
-namespace {
 
 using host_tools_test::thrown_message;
 
@@ -529,5 +528,4 @@ TEST(ReferenceIntegratorsRefuse, StepsThatAreTooLongInWordsAndNotInNumbers) {
   EXPECT_EQ(state.position[0], 1.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::reference_integrators_test

@@ -16,7 +16,6 @@
 #include "tests/control/drawn_loop.hpp"
 
 namespace kmax::simulation::sampled_stability_against_simulation_test {
-namespace {
 
 using Loop = control::SampledLoop<double>;
 
@@ -182,5 +181,4 @@ TEST(SampledStabilityAgainstSimulation, EscapeSpeedWithFriction) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::sampled_stability_against_simulation_test

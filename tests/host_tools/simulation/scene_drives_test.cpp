@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace kmax::simulation::scene_drives_test {
-namespace {
 
 using Channel = CurrentSensor::Channel;
 
@@ -256,5 +255,4 @@ TEST(Defects, ASceneMayBeginWithThem) {
   EXPECT_EQ(travel(drives).encoder, 0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::scene_drives_test

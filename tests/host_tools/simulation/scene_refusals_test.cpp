@@ -16,7 +16,6 @@
 #include "tests/host_tools/simulation/scene_file.hpp"
 
 namespace kmax::simulation::scene_refusals_test {
-namespace {
 
 // One key of one table: where it is written, and what it may be.
 struct Key {
@@ -427,5 +426,4 @@ TEST(SceneRefusals, StiffOnLightAndSoftOnHeavy) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::simulation::scene_refusals_test

@@ -9,7 +9,6 @@
 #include "tests/host_tools/simulation/scene_file.hpp"
 
 namespace kmax::simulation::scene_test {
-namespace {
 
 TEST(Scene, DefaultsAreThoseOfTheModels) {
   const Scene scene = parse_scene("[device]\n", "somewhere/plain.toml");
@@ -438,5 +437,4 @@ TEST(SceneParts, IntegratorsInWords) {
   EXPECT_EQ(to_string({.kind = IntegratorKind::adaptive, .tolerance = 1e-9}), "adaptive, tolerance 1e-09");
 }
 
-}  // namespace
 }  // namespace kmax::simulation::scene_test

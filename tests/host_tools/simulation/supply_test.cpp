@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::supply_test {
-namespace {
 
 void run(Supply& supply, double current, double duration, double interval = 25e-6) {
   const int steps = static_cast<int>(std::lround(duration / interval));
@@ -128,5 +127,4 @@ TEST(Supply, RefusesWhatIsNotAllowed) {
   EXPECT_EQ(supply.voltage(), 24.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::supply_test

@@ -10,7 +10,6 @@
 #include "tests/host_tools/simulation/reference_synchronous_motor.hpp"
 
 namespace kmax::simulation::synchronous_motor_test {
-namespace {
 
 constexpr double pi = 3.141592653589793;
 
@@ -208,5 +207,4 @@ TEST(SynchronousMotor, RefusesWhatIsNoMotor) {
   refused(&SynchronousMotorConfig::electrical_offset, std::numeric_limits<double>::infinity());
 }
 
-}  // namespace
 }  // namespace kmax::simulation::synchronous_motor_test

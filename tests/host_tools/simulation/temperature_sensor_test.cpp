@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 namespace kmax::simulation::temperature_sensor_test {
-namespace {
 
 // Shares of the reference published for the ODrive v3.6 circuit.
 TEST(TemperatureSensor, PinFollowsTheThermistor) {
@@ -37,5 +36,4 @@ TEST(TemperatureSensor, RefusesWhatIsNoTemperature) {
   EXPECT_EQ(sensor.temperature(), 25.0);
 }
 
-}  // namespace
 }  // namespace kmax::simulation::temperature_sensor_test

@@ -9,7 +9,6 @@
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board::bus_test {
-namespace {
 
 std::string refusal(const std::function<void()>& access) {
   try {
@@ -120,5 +119,4 @@ TEST(Bus, HandsOutStoresToTheParameterSectors) {
   EXPECT_EQ(bus.read(0x0800'BFFF, 1, 10), 0x7FU);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::bus_test

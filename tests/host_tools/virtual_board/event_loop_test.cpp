@@ -9,7 +9,6 @@
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board::event_loop_test {
-namespace {
 
 using drivers::stm32f4::Interrupt;
 
@@ -129,5 +128,4 @@ TEST(EventLoop, FindsAPeripheralThatDoesNotMoveOn) {
   EXPECT_THROW(board.run(1000), std::logic_error);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::event_loop_test

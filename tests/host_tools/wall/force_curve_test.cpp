@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::wall::force_curve_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -42,5 +42,4 @@ TEST(ForceCurves, ErrorsAreTheFigures) {
       "does not exist");
 }
 
-}  // namespace
 }  // namespace kmax::wall::force_curve_test

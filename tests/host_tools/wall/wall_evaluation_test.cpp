@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace kmax::wall::wall_evaluation_test {
-namespace {
+
 using control::WallKind;
 
 firmware::ParameterValues wall(WallKind kind, std::size_t axis = 0) {
@@ -78,5 +78,4 @@ RC_GTEST_PROP(WallEvaluatorProperty, NothingIsRemembered, ()) {
   RC_ASSERT(used.at(position, velocity).force == fresh.at(position, velocity).force);
 }
 
-}  // namespace
 }  // namespace kmax::wall::wall_evaluation_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::wall::wall_table_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 
@@ -144,5 +144,4 @@ RC_GTEST_PROP(WallTableProperty, RowsAreTheSingleEvaluations,
   }
 }
 
-}  // namespace
 }  // namespace kmax::wall::wall_table_test

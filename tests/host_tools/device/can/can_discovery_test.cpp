@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::can_discovery_test {
-namespace {
+
 using drivers::CanFrame;
 using host_tools_test::FakeSdoNode;
 using host_tools_test::frame_of;
@@ -171,5 +171,4 @@ TEST(CanDiscovery, ABusThatIsClosedMeanwhile) {
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { discover_nodes(node.path(), quick()); }), "closed");
 }
 
-}  // namespace
 }  // namespace kmax::link::can_discovery_test

@@ -6,7 +6,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::can_faults_test {
-namespace {
 
 can_frame report(canid_t classes, std::uint8_t controller = 0, std::uint8_t violation = 0) {
   can_frame frame{};
@@ -86,5 +85,4 @@ TEST(CanFaults, AGoodFrameOrARecoveryEndsTheRest) {
   EXPECT_EQ(faults.words("can0"), "");
 }
 
-}  // namespace
 }  // namespace kmax::link::can_faults_test

@@ -16,7 +16,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::link::can_leak_test {
-namespace {
+
 using device::Parameter;
 using host_tools_test::FakeSdoServer;
 
@@ -116,5 +116,4 @@ TEST(CanLeak, AHundredLinksAndRefusals) {
   EXPECT_LE(open_descriptors(), descriptors + 2);
 }
 
-}  // namespace
 }  // namespace kmax::link::can_leak_test

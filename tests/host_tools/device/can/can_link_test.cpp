@@ -12,7 +12,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::can_link_test {
-namespace {
+
 using device::Parameter;
 using drivers::CanFrame;
 using firmware::canopen::Abort;
@@ -314,5 +314,4 @@ TEST(CanLink, ABusThatIsNotThereIsNamed) {
                   "/no/such/bus");
 }
 
-}  // namespace
 }  // namespace kmax::link::can_link_test

@@ -13,7 +13,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::can_node_lock_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 using namespace std::chrono_literals;
@@ -109,5 +109,4 @@ TEST(CanNodeLock, DisappearsWithAProcessThatIsKilled) {
   close(ready[1]);
 }
 
-}  // namespace
 }  // namespace kmax::link::can_node_lock_test

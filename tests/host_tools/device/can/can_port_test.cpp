@@ -9,7 +9,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::can_port_test {
-namespace {
+
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -81,5 +81,4 @@ TEST(KernelFrame, WhatIsNoFrameIsNone) {
   EXPECT_FALSE(from_kernel(kernel));
 }
 
-}  // namespace
 }  // namespace kmax::link::can_port_test

@@ -16,7 +16,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::sdo_client_test {
-namespace {
+
 using drivers::CanFrame;
 using firmware::canopen::Abort;
 using host_tools_test::FakeSdoNode;
@@ -553,5 +553,4 @@ TEST(SdoClientOnFirmware, Aborts) {
   EXPECT_EQ(node.client().upload(number), (SdoClient::Bytes{1, 2, 3, 4}));
 }
 
-}  // namespace
 }  // namespace kmax::link::sdo_client_test

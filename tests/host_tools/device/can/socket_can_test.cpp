@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::socket_can_test {
-namespace {
+
 using drivers::CanFrame;
 using host_tools_test::thrown_message;
 using namespace std::chrono_literals;
@@ -149,5 +149,4 @@ TEST_F(SocketCanTest, AnInterfaceThatGoesDownIsToldAndHowToBringItUp) {
   EXPECT_NO_THROW(usable.send(frame_with(1)));
 }
 
-}  // namespace
 }  // namespace kmax::link::socket_can_test

@@ -15,7 +15,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::unix_can_test {
-namespace {
+
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -311,5 +311,4 @@ TEST(UnixCanHubAlone, TheSocketOfASuccessorIsNotRemoved) {
   EXPECT_TRUE(std::filesystem::exists(path));
 }
 
-}  // namespace
 }  // namespace kmax::link::unix_can_test

@@ -9,7 +9,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::register_link_test {
-namespace {
+
 using device::all_parameters;
 using device::Parameter;
 using device::Table;
@@ -85,5 +85,4 @@ TEST(RegisterRefused, AnotherLinksTransactionIsSaidInWords) {
   EXPECT_CONTAINS(std::string(RegisterRefused(6, 16, 0x10).what()), "another link has a transaction open");
 }
 
-}  // namespace
 }  // namespace kmax::link::register_link_test

@@ -11,7 +11,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::serial_link_test {
-namespace {
+
 using device::Parameter;
 using host_tools_test::PtyDevice;
 using host_tools_test::thrown_message;
@@ -193,5 +193,4 @@ TEST(SerialLink, FollowsTheDeviceToAnotherRate) {
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);
 }
 
-}  // namespace
 }  // namespace kmax::link::serial_link_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::serial_port_lock_test {
-namespace {
+
 using host_tools_test::PtyDevice;
 using host_tools_test::thrown_message;
 
@@ -62,5 +62,4 @@ TEST(SerialPortLock, MissingPermissionNamesTheGroup) {
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { SerialPortLock(device.path(), {}); }), "dialout");
 }
 
-}  // namespace
 }  // namespace kmax::link::serial_port_lock_test

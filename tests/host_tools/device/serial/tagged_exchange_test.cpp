@@ -12,7 +12,7 @@
 #include "tests/host_tools/device/serial/hostile_line.hpp"
 
 namespace kmax::link::tagged_exchange_test {
-namespace {
+
 using device::Parameter;
 using host_tools_test::HostileLine;
 using Bytes = std::vector<std::uint8_t>;
@@ -247,5 +247,4 @@ TEST(TaggedExchange, ALineThatNeverFallsSilentEnds) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::link::tagged_exchange_test

@@ -8,7 +8,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::link::sim_link_test {
-namespace {
+
 using device::Parameter;
 using host_tools_test::thrown_message;
 using std::chrono::microseconds;
@@ -150,5 +150,4 @@ RC_GTEST_PROP(SimLinkProperty, AnyReadIsAnsweredOrRefused, ()) {
   RC_ASSERT(first == ask());
 }
 
-}  // namespace
 }  // namespace kmax::link::sim_link_test

@@ -14,7 +14,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::contact_experiment_test {
-namespace {
+
 using host_tools_test::thrown_message;
 using simulation::ContactVerdict;
 
@@ -273,5 +273,4 @@ TEST(ContactReport, WhatCannotBeWrittenIsAnError) {
       "must end in");
 }
 
-}  // namespace
 }  // namespace kmax::experiment::contact_experiment_test

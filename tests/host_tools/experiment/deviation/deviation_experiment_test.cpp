@@ -10,7 +10,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::deviation_experiment_test {
-namespace {
 
 DeviationProtocol quick() {
   DeviationProtocol protocol;
@@ -279,5 +278,4 @@ TEST(DeviationReport, PeopleWhoDoNotStiffenShowNoWorkOfStiffening) {
   EXPECT_EQ(words.find("nothing else"), std::string::npos) << words;
 }
 
-}  // namespace
 }  // namespace kmax::experiment::deviation_experiment_test

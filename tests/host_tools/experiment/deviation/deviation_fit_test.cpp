@@ -6,7 +6,6 @@
 #include <cmath>
 
 namespace kmax::experiment::deviation_fit_test {
-namespace {
 
 std::vector<paper::DeviationCell> made_by(const HandResistance& hand) {
   std::vector<paper::DeviationCell> cells(paper::table_2.begin(), paper::table_2.end());
@@ -61,5 +60,4 @@ TEST(FitDeviation, FewerCellsThanNumbersAreRefused) {
   EXPECT_THROW(fit_deviation(std::span(paper::table_2).first(3), fit_both), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::deviation_fit_test

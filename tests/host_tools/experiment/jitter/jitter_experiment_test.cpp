@@ -12,7 +12,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::jitter_experiment_test {
-namespace {
 
 std::vector<RigSample> course(const std::vector<double>& outside, double begin = 0.0) {
   std::vector<RigSample> samples;
@@ -315,5 +314,4 @@ TEST(JitterReport, APairThatNobodyTouchedHasNoNumberAmongTheCauses) {
   EXPECT_EQ(row[5], "- -> -");
 }
 
-}  // namespace
 }  // namespace kmax::experiment::jitter_experiment_test

@@ -7,7 +7,7 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::device_max_stiffness_report_test {
-namespace {
+
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
 using simulation::ContactVerdict;
@@ -76,5 +76,4 @@ TEST(DeviceStiffnessReport, WithoutATouchThereIsNoPicture) {
       write_device_stiffness({untouched, result_of("b", 1)}, {}, {}, "x", folder / "out", ".svg").size(), 5u);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::device_max_stiffness_report_test

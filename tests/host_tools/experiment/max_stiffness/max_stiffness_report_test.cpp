@@ -9,7 +9,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::max_stiffness_report_test {
-namespace {
 
 const std::vector<double> as_in_the_paper{3580, 4000, 5000, 7000, 8410, 8020, 6000, 6000};
 
@@ -149,5 +148,4 @@ TEST(DrawMaxStiffness, WritesAPicture) {
                plot::FigureError);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::max_stiffness_report_test

@@ -7,7 +7,6 @@
 #include "host_tools/experiment/people/subject_set.hpp"
 
 namespace kmax::experiment::max_stiffness_search_test {
-namespace {
 
 TouchSetup plain(const simulation::OperatorModel& person) {
   TouchSetup setup;
@@ -103,5 +102,4 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
   EXPECT_THROW(search_max_stiffness(setup, {}, {.last = std::nan("")}), std::invalid_argument);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::max_stiffness_search_test

@@ -7,7 +7,6 @@
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::experiment::max_stiffness_study_test {
-namespace {
 
 TEST(MaxStiffnessStudy, DoesNotDependOnTheThreads) {
   const auto one = run_max_stiffness_study(few_people(3, 0.5), stiffness_conditions(), quick_run(1));
@@ -113,5 +112,4 @@ TEST(MaxStiffnessStudy, TheSuppliedSetsMeetThePaperWhereTheyWereFitted) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::experiment::max_stiffness_study_test

@@ -5,7 +5,6 @@
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 
 namespace kmax::experiment::operator_calibration_test {
-namespace {
 
 // A target made by known numbers is met by the numbers that are found for it.
 TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
@@ -58,5 +57,4 @@ TEST(OperatorCalibration, LeavesTheFrictionWhereItIsToldTo) {
   EXPECT_EQ(fit.friction, 0.111);
 }
 
-}  // namespace
 }  // namespace kmax::experiment::operator_calibration_test

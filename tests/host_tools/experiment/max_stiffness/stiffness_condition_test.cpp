@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::experiment::stiffness_condition_test {
-namespace {
 
 TEST(StiffnessCondition, AreThoseOfThePaper) {
   const auto conditions = stiffness_conditions();
@@ -23,5 +22,4 @@ TEST(StiffnessCondition, AreThoseOfThePaper) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::experiment::stiffness_condition_test

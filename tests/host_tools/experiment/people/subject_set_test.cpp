@@ -11,7 +11,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::subject_set_test {
-namespace {
 
 using simulation::SceneError;
 
@@ -168,5 +167,4 @@ TEST(SubjectSet, RefusesAFitThatIsNotAllThere) {
   EXPECT_TRUE(message("plain = 1\nplan = 2\n").starts_with("people.toml:4:"));
 }
 
-}  // namespace
 }  // namespace kmax::experiment::subject_set_test

@@ -11,7 +11,6 @@
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::experiment::resolution_experiment_test {
-namespace {
 
 ResolutionCell cell(double resolution, double speed, bool vibrates) {
   ResolutionCell made;
@@ -252,5 +251,4 @@ TEST(ResolutionReport, WhatNoTouchTestedIsNeitherYesNorNo) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::experiment::resolution_experiment_test

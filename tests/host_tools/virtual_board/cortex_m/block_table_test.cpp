@@ -5,7 +5,6 @@
 #include <array>
 
 namespace kmax::virtual_board::block_table_test {
-namespace {
 
 constexpr std::uint32_t address = 0x0800'1000;
 // str r1, [r0]; vldr s0, [r0, #8]; ldmia r0!, {r2, r3}; bne
@@ -69,5 +68,4 @@ TEST(AccessLocator, FindsTheInstructionByItsEffectiveAddress) {
   EXPECT_TRUE(locator.is_piece(2));
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::block_table_test

@@ -13,7 +13,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::core_peripherals_test {
-namespace {
 
 using namespace drivers::cortex_m;
 
@@ -256,5 +255,4 @@ TEST(SystemTickOnModel, GivesMicroseconds) {
   EXPECT_EQ(served, 4U);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::core_peripherals_test

@@ -23,7 +23,6 @@
 #include "tests/board/core_self_test/float_loop.hpp"
 
 namespace kmax::virtual_board::core_self_test_test {
-namespace {
 
 using namespace drivers::cortex_m;
 using namespace drivers::stm32f4;
@@ -191,5 +190,4 @@ TEST_F(CoreSelfTest, ComputesTheSameBitsAsTheHost) {
   EXPECT_EQ(lines.at("float_loop").result, expected.data());
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::core_self_test_test

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::virtual_board::exception_table_test {
-namespace {
 
 constexpr unsigned a = 20;
 constexpr unsigned b = 40;
@@ -177,5 +176,4 @@ TEST(ExceptionTable, KeepsLinesOverAReset) {
   EXPECT_EQ(table.candidate(), a);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::exception_table_test

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 namespace kmax::virtual_board::instruction_test {
-namespace {
 
 using Operand = std::optional<MemoryOperand>;
 
@@ -169,5 +168,4 @@ TEST(Instruction, CountsLiteralsFromTheAlignedProgramCounter) {
   EXPECT_EQ(decode(0x4802, 0, 0x0800'0102).memory->offset, 0x0800'010CU);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::instruction_test

@@ -10,7 +10,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::nvic_test {
-namespace {
 
 using drivers::cortex_m::NvicRegisters;
 using drivers::stm32f4::Interrupt;
@@ -113,5 +112,4 @@ TEST(Nvic, TakesLinesOfPeripherals) {
   EXPECT_EQ(controller.read(ispr), 0U);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::nvic_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board::processor_faults_test {
-namespace {
 
 using drivers::stm32f4::Interrupt;
 
@@ -395,5 +394,4 @@ TEST(MemoryProtectionInForce, RefusesBordersFinerThanAPage) {
   EXPECT_THROW(Guarded(load, {{0, of_size(7, 0) | mpu_rasr::SubregionDisable::bits(1)}}), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::processor_faults_test

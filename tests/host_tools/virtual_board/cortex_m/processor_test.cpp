@@ -11,7 +11,6 @@
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board::processor_test {
-namespace {
 
 using drivers::stm32f4::Interrupt;
 
@@ -258,5 +257,4 @@ TEST(Processor, KeepsTheConditionOfAnIfThenThatThePageEndCuts_IfThenBlocks) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::processor_test

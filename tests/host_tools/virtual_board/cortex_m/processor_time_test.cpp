@@ -7,7 +7,6 @@
 #include "tests/host_tools/virtual_board/cortex_m/program_on_core.hpp"
 
 namespace kmax::virtual_board::processor_time_test {
-namespace {
 
 using drivers::stm32f4::Interrupt;
 
@@ -162,5 +161,4 @@ TEST(ProcessorTime, ChargesFloatingPointFramesWhenTheHandlerUsesTheUnit_LazyPres
   EXPECT_EQ(cycles_of(plain, false), 1 + 12 + 17 + 3 + 12 + 17U);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::processor_time_test

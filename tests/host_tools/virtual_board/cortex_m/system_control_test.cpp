@@ -9,7 +9,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::system_control_test {
-namespace {
 
 using namespace drivers::cortex_m;
 namespace number = exception_number;
@@ -169,5 +168,4 @@ TEST(SystemControl, RefusesModesThatAreNotModelled) {
   EXPECT_THROW(block.read(icsr, 2), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::system_control_test

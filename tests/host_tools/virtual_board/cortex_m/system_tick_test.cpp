@@ -9,7 +9,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::system_tick_test {
-namespace {
 
 using namespace drivers::cortex_m;
 constexpr unsigned tick = exception_number::system_tick;
@@ -170,5 +169,4 @@ TEST(SystemTickModel, RefusesWhatDoesNotExist) {
   EXPECT_THROW(timer.read(0, 1), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::system_tick_test

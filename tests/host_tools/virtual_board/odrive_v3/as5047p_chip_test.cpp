@@ -6,7 +6,6 @@
 #include "host_tools/virtual_board/peripheral.hpp"
 
 namespace kmax::virtual_board::as5047p_chip_test {
-namespace {
 
 struct Bench {
   unsigned frame(unsigned word) {
@@ -72,5 +71,4 @@ TEST(As5047pChip, RefusesWrites) {
   EXPECT_THROW(bench.chip.exchange(0xC003, 0), RefusedAccess) << "PROG";
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::as5047p_chip_test

@@ -6,7 +6,6 @@
 #include "host_tools/virtual_board/peripheral.hpp"
 
 namespace kmax::virtual_board::drv8301_chip_test {
-namespace {
 
 using drivers::Drv8301Fault;
 constexpr BoardTime us = units_per_microsecond;
@@ -145,5 +144,4 @@ TEST(Drv8301Chip, RefusesWhatTheDataSheetDoesNotAllow) {
   EXPECT_THROW(bench.chip.exchange(0x8800, bench.now), RefusedAccess) << "nSCS has to rise after 16 bits";
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::drv8301_chip_test

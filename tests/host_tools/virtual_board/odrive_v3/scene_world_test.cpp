@@ -13,7 +13,6 @@
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::virtual_board::scene_world_test {
-namespace {
 
 using simulation::Defect;
 
@@ -184,5 +183,4 @@ TEST(SceneWorld, AnOpenConnectorHasNoCurrentAndNoEdges) {
   EXPECT_EQ(world.analogue(wiring.axes[0].b, 6000), 1.65);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::scene_world_test

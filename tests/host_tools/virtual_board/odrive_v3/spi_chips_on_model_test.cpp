@@ -11,7 +11,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::spi_chips_on_model_test {
-namespace {
 
 using drivers::Drv8301Result;
 using testing::RegisterOnModel;
@@ -156,5 +155,4 @@ TEST(SpiChipsOnModel, WholeFrameTakesSixMicroseconds) {
   EXPECT_LT(board.now - begin, 7 * us);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::spi_chips_on_model_test

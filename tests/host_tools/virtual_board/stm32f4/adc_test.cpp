@@ -14,7 +14,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::adc_test {
-namespace {
 
 using drivers::stm32f4::AdcRegisters;
 using drivers::stm32f4::Interrupt;
@@ -317,5 +316,4 @@ TEST(AdcModel, ResetStopsAndClears) {
   EXPECT_EQ(board.get(0, ccr), 0U);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::adc_test

@@ -11,7 +11,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::advanced_timer_test {
-namespace {
 
 using testing::TimerOnModel;
 
@@ -409,5 +408,4 @@ TEST(AdvancedTimerModel, StoppedCounterFreezesTheOutputs) {
   EXPECT_EQ(bench.model.outputs()[1].high_duty, 1.0);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::advanced_timer_test

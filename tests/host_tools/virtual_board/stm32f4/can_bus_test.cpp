@@ -12,7 +12,6 @@
 #include "tests/host_tools/virtual_board/stm32f4/random_can_frame.hpp"
 
 namespace kmax::virtual_board::can_bus_test {
-namespace {
 
 using drivers::CanFrame;
 constexpr BoardTime bit = units_per_second / 500'000;
@@ -266,5 +265,4 @@ RC_GTEST_PROP(CanFrameBits, ArbitrationAgreesWithTheBits, ()) {
   RC_ASSERT((key_a < key_b) == (can_frame_bits(a).bits < can_frame_bits(b).bits));
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::can_bus_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::can_controller_test {
-namespace {
 
 using drivers::CanFrame;
 using drivers::stm32f4::Interrupt;
@@ -311,5 +310,4 @@ TEST(CanFilters, Protection) {
   EXPECT_THROW(bench.write(fa1r, 1U << 14), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::can_controller_test

@@ -13,7 +13,6 @@
 #include "tests/host_tools/virtual_board/stm32f4/random_can_frame.hpp"
 
 namespace kmax::virtual_board::can_driver_on_model_test {
-namespace {
 
 using drivers::CanFrame;
 using namespace drivers::stm32f4;
@@ -348,5 +347,4 @@ TEST(CanDriverOnModel, ConfiguredAgainWhileFramesAreWaiting) {
   EXPECT_EQ(bench.driver.transmit_counters().sent, before + 1);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::can_driver_on_model_test

@@ -4,7 +4,6 @@
 #include <rapidcheck/gtest.h>
 
 namespace kmax::virtual_board::centre_aligned_counter_test {
-namespace {
 
 TEST(CentreAlignedCounter, StoppedItStandsStill) {
   CentreAlignedCounter counter;
@@ -53,5 +52,4 @@ RC_GTEST_PROP(CentreAlignedCounter, SkippingEqualsTurning, ()) {
   RC_ASSERT(stepped.next_turn() == skipped.next_turn());
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::centre_aligned_counter_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::current_sampling_on_model_test {
-namespace {
 
 using drivers::stm32f4::adc_stride;
 using drivers::stm32f4::CurrentSample;
@@ -192,5 +191,4 @@ TEST(CurrentSamplingOnModel, StartTooSoonAfterConfigureIsRefusedByTheConverter) 
   EXPECT_THROW(board.model.trigger_injected(board.now), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::current_sampling_on_model_test

@@ -8,7 +8,6 @@
 // and Debug support (DBG), section MCU debug component (DBGMCU).
 
 namespace kmax::virtual_board::device_identity_test {
-namespace {
 
 std::uint32_t get(DeviceIdentity& model, std::uint32_t address, unsigned bytes) {
   return model.read({address - DeviceIdentity::base, bytes, 0});
@@ -63,5 +62,4 @@ TEST(Dbgmcu, RefusesTheRest) {
   EXPECT_THROW(model.read({0, 2, 0}), RefusedAccess);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::device_identity_test

@@ -15,7 +15,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::exti_and_syscfg_test {
-namespace {
 
 using drivers::stm32f4::Edge;
 using drivers::stm32f4::ExtiRegisters;
@@ -267,5 +266,4 @@ TEST(ExternalInterruptOnModel, EdgeBetweenConfigureAndEnableIsNotLost) {
   EXPECT_TRUE(board.interrupts.level(Interrupt::exti2));
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::exti_and_syscfg_test

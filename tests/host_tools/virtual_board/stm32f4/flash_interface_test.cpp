@@ -14,7 +14,6 @@
 // RM0090, chapter Embedded Flash memory interface.
 
 namespace kmax::virtual_board::flash_interface_test {
-namespace {
 
 namespace stm32 = drivers::stm32f4;
 namespace cr = stm32::flash_cr;
@@ -392,5 +391,4 @@ RC_GTEST_PROP(FlashSectorsOnModel, PowerCutTearsOneOperation, (std::uint64_t see
   RC_ASSERT(chip.sectors->erase(0));
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::flash_interface_test

@@ -13,7 +13,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::general_timer_test {
-namespace {
 
 using testing::TimerOnModel;
 
@@ -237,5 +236,4 @@ TEST(QuadratureTimerOnModel, ConfiguredAgainItStartsAtZero) {
   EXPECT_EQ(bench.encoder.count(), 1);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::general_timer_test

@@ -10,7 +10,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::gpio_port_test {
-namespace {
 
 using drivers::stm32f4::GpioMode;
 using drivers::stm32f4::GpioPort;
@@ -252,5 +251,4 @@ TEST(GpioPortModel, DriverNeverShowsAWrongLevelOnTheWay) {
   EXPECT_TRUE(input.read());
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::gpio_port_test

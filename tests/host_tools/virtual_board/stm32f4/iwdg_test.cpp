@@ -14,7 +14,6 @@
 // RM0090, chapter Independent watchdog (IWDG).
 
 namespace kmax::virtual_board::iwdg_test {
-namespace {
 
 namespace stm32 = drivers::stm32f4;
 using stm32::IwdgRegisters;
@@ -215,5 +214,4 @@ TEST(IndependentWatchdogOnModel, StartIsOverWithinAMillisecond) {
   }
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::iwdg_test

@@ -13,7 +13,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::phase_shifted_pwm_on_model_test {
-namespace {
 
 using drivers::stm32f4::ThreePhasePwm;
 using drivers::stm32f4::ThreePhasePwmConfig;
@@ -185,5 +184,4 @@ TEST(PhaseShiftedPwmOnModel, ThreeEventsForEachPeriod) {
   EXPECT_EQ(board.events - before, 200U) << "TIM8's updates fall on those of TIM1";
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::phase_shifted_pwm_on_model_test

@@ -13,7 +13,6 @@
 // RM0090, chapters Reset and clock control for STM32F405xx (RCC) and Power controller (PWR).
 
 namespace kmax::virtual_board::rcc_test {
-namespace {
 
 namespace stm32 = drivers::stm32f4;
 namespace cr = stm32::rcc_cr;
@@ -462,5 +461,4 @@ RC_GTEST_PROP(ClockTreeOnBrokenChip, EveryMixOfDefectsEndsWithAnHonestResult,
     RC_ASSERT((pllcfgr::FromCrystal::of(pll) != 0) == (source == crystal_pll));
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::rcc_test

@@ -8,7 +8,6 @@
 #include "tests/host_tools/virtual_board/model_bench.hpp"
 
 namespace kmax::virtual_board::spi_test {
-namespace {
 
 constexpr std::uint32_t cr1 = 0x00, cr2 = 0x04, sr = 0x08, dr = 0x0C;
 constexpr std::uint32_t settings = 0x0B1D;  // 16 bit, SSM, SSI, /16, MSTR, CPHA
@@ -139,5 +138,4 @@ TEST(SpiModel, RefusesWhatWouldLoseBits) {
   EXPECT_THROW(bench.write(dr, 1), RefusedAccess) << "SPE = 0";
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::spi_test

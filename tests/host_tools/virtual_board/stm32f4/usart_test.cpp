@@ -13,7 +13,6 @@
 // RM0090, chapter Universal synchronous asynchronous receiver transmitter (USART).
 
 namespace kmax::virtual_board::usart_test {
-namespace {
 
 namespace stm32 = drivers::stm32f4;
 namespace sr = stm32::usart_sr;
@@ -432,5 +431,4 @@ TEST(UsartOnModel, ReconfiguredInTheMiddleOfATelegram) {
   EXPECT_EQ(port.sent.size(), before + 10);
 }
 
-}  // namespace
 }  // namespace kmax::virtual_board::usart_test
