@@ -95,23 +95,21 @@ class LoopEquation {
     return order_ + static_cast<std::size_t>(whole_delay_ + (split_ ? 1 : 0) + (damped_ ? 1 : 0));
   }
 
-  /// P, with the circle of radius 1 + e about 0 mapped on the left half plane: z = (1 + e)(1 + s)/(1 - s),
-  /// times (1 - s)^degree.
-  constexpr LoopPolynomial<Scalar> half_plane_polynomial(Scalar kappa, Scalar e) const {
-    const Scalar radius = Scalar(1) + e;
-    LoopPolynomial<Scalar> result = mapped(free_, order_, e);
+  /// P, with the unit circle mapped on the left half plane: z = (1 + s)/(1 - s), times (1 - s)^degree.
+  constexpr LoopPolynomial<Scalar> half_plane_polynomial(Scalar kappa) const {
+    LoopPolynomial<Scalar> result = mapped(free_, order_);
     for (int i = 0; i < whole_delay_ + (split_ ? 1 : 0) + (damped_ ? 1 : 0); ++i)
-      result.multiply(radius, radius);
-    LoopPolynomial<Scalar> feedback = mapped(answer_, order_ - 1, e);
+      result.multiply(Scalar(1), Scalar(1));
+    LoopPolynomial<Scalar> feedback = mapped(answer_, order_ - 1);
     if (split_) {
-      LoopPolynomial<Scalar> older = mapped(older_answer_, order_ - 1, e);
+      LoopPolynomial<Scalar> older = mapped(older_answer_, order_ - 1);
       older.multiply(Scalar(1), Scalar(-1));
-      feedback.multiply(radius, radius);
+      feedback.multiply(Scalar(1), Scalar(1));
       feedback.add(older, Scalar(1));
     }
     Scalar gain = kappa;
     if (damped_) {
-      feedback.multiply(kappa * radius + beta_ * e, kappa * radius + beta_ * (Scalar(2) + e));
+      feedback.multiply(kappa, kappa + beta_ * Scalar(2));
       gain = Scalar(1);
     }
     for (int i = 0; i <= whole_delay_; ++i) feedback.multiply(Scalar(1), Scalar(-1));
@@ -165,13 +163,13 @@ class LoopEquation {
     return sum;
   }
 
-  // sum c_i (e + (2 + e) s)^i (1 - s)^(degree - i)
-  static constexpr LoopPolynomial<Scalar> mapped(const Coefficients& c, std::size_t degree, Scalar e) {
+  // sum c_i (2 s)^i (1 - s)^(degree - i)
+  static constexpr LoopPolynomial<Scalar> mapped(const Coefficients& c, std::size_t degree) {
     LoopPolynomial<Scalar> sum, power;
     sum.coefficient[0] = c[0];
     power.coefficient[0] = Scalar(1);
     for (std::size_t i = 1; i <= degree; ++i) {
-      power.multiply(e, Scalar(2) + e);
+      power.multiply(Scalar(0), Scalar(2));
       sum.multiply(Scalar(1), Scalar(-1));
       sum.add(power, c[i]);
     }

@@ -56,29 +56,7 @@ template <typename Scalar>
 constexpr bool is_stable(const SampledLoop<Scalar>& loop, Scalar stiffness) {
   if (!can_be_judged(loop)) return false;
   const Scalar kappa = stiffness * (loop.period / loop.mass) * loop.period;
-  return all_in_left_half_plane(LoopEquation<Scalar>(loop).half_plane_polynomial(kappa, Scalar(0)));
-}
-
-/// The largest magnitude of those eigenvalues: a disturbance shrinks or grows by it in a sample, in the long
-/// run. By bisection of Routh's test on circles; -1 for a loop that cannot be judged. In double to 1e-9 in
-/// most loops, and to 1e-6 where eigenvalues of that magnitude coincide. Cost: about 40 us on a PC.
-template <typename Scalar>
-constexpr Scalar spectral_radius(const SampledLoop<Scalar>& loop, Scalar stiffness) {
-  if (!can_be_judged(loop)) return Scalar(-1);
-  const LoopEquation<Scalar> equation(loop);
-  const Scalar kappa = stiffness * (loop.period / loop.mass) * loop.period;
-  // In e = radius - 1, which keeps its digits where it matters.
-  Scalar low = -1, high = 0;
-  for (int i = 0; i < 120; ++i) {
-    if (all_in_left_half_plane(equation.half_plane_polynomial(kappa, high))) break;
-    low = high;
-    high = high * Scalar(2) + Scalar(1) / Scalar(1024);
-  }
-  for (int i = 0; i < std::numeric_limits<Scalar>::digits + 8; ++i) {
-    const Scalar middle = low + (high - low) * Scalar(0.5);
-    (all_in_left_half_plane(equation.half_plane_polynomial(kappa, middle)) ? high : low) = middle;
-  }
-  return Scalar(1) + high;
+  return all_in_left_half_plane(LoopEquation<Scalar>(loop).half_plane_polynomial(kappa));
 }
 
 /// The smallest stiffness at which the loop is no longer stable, N/m: 0 < K < bound is stable, at the bound
@@ -140,7 +118,7 @@ class StabilitySearch {
   }
 
   constexpr bool stable(Scalar gain) const {
-    return all_in_left_half_plane(equation_.half_plane_polynomial(gain, Scalar(0)));
+    return all_in_left_half_plane(equation_.half_plane_polynomial(gain));
   }
 
   constexpr Scalar loss_between(Scalar good, Scalar bad) const {

@@ -58,7 +58,7 @@ TEST(LoopEquation, DegreeCountsTheStates) {
 TEST(LoopEquation, OfABareMassByHand) {
   const LoopEquation<double> equation({2.0, 0.0, 0.0, 0.5, 0.0, {}});
   for (const double kappa : {0.1, 1.0, 5.0}) {
-    const auto p = equation.half_plane_polynomial(kappa, 0.0);
+    const auto p = equation.half_plane_polynomial(kappa);
     ASSERT_EQ(p.degree, 2u);
     // z = (1 + s)/(1 - s), times (1 - s)^2: kappa + s (-kappa) + s^2 4.
     EXPECT_NEAR(p.coefficient[0], kappa, 1e-14);
@@ -86,8 +86,8 @@ TEST(LoopEquation, AnnihilatesEveryTrajectory) {
     for (std::size_t r = 0; r < 32; ++r) {
       const Complex z = std::polar(1.0, 2.0 * pi * (static_cast<double>(r) + 0.5) / 32.0);
       const Complex s = (z - 1.0) / (z + 1.0);
-      at_roots[r] = value_of(equation.half_plane_polynomial(kappa, 0.0), s) /
-                    std::pow(1.0 - s, static_cast<double>(degree));
+      at_roots[r] =
+          value_of(equation.half_plane_polynomial(kappa), s) / std::pow(1.0 - s, static_cast<double>(degree));
     }
     std::array<double, 32> shift{};
     for (std::size_t j = 0; j <= degree; ++j) {
@@ -143,8 +143,8 @@ TEST(LoopEquation, OnTheCircleIsThePolynomial) {
     const double omega = draw.log_uniform(1e-3, 1e3);
     const Complex s(0.0, omega);
     const Complex scale = std::pow(1.0 - s, static_cast<double>(equation.degree()));
-    const Complex open = value_of(equation.half_plane_polynomial(0.0, 0.0), s) / scale;
-    const Complex closed = value_of(equation.half_plane_polynomial(1.0, 0.0), s) / scale;
+    const Complex open = value_of(equation.half_plane_polynomial(0.0), s) / scale;
+    const Complex closed = value_of(equation.half_plane_polynomial(1.0), s) / scale;
     const Complex feedback = closed - open;
     const auto found = equation.at(omega);
     const Complex expected = open * std::conj(feedback);

@@ -3,77 +3,18 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <string>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "tests/control/drawn_loop.hpp"
+#include "tests/control/step_matrix.hpp"
 
 namespace kmax::control::sampled_stability_test {
 
 constexpr double unbounded = std::numeric_limits<double>::max();
-
-// The same loop without a characteristic polynomial: the step from one sample to the next as a matrix on the
-// state of the continuous part, the last position, and the forces under way; matrix exponential (Pade) and
-// eigenvalues (QR) by Eigen.
-Eigen::MatrixXd step_matrix(const SampledLoop<double>& l, double stiffness) {
-  const Hand<double>& h = l.hand;
-  const bool held = h.hand_mass > 0.0;
-  const int n = held ? 4 : 2;  // x, v, y, w
-  Eigen::MatrixXd rate = Eigen::MatrixXd::Zero(n + 1, n + 1);
-  rate(0, 1) = 1.0;
-  rate(1, 1) = -l.damping / l.mass;
-  rate(1, n) = 1.0 / l.mass;
-  if (held) {
-    rate(1, 0) -= h.grip_stiffness / l.mass;
-    rate(1, 1) -= h.grip_damping / l.mass;
-    rate(1, 2) += h.grip_stiffness / l.mass;
-    rate(1, 3) += h.grip_damping / l.mass;
-    rate(2, 3) = 1.0;
-    rate(3, 0) = h.grip_stiffness / h.hand_mass;
-    rate(3, 1) = h.grip_damping / h.hand_mass;
-    rate(3, 2) = -(h.grip_stiffness + h.arm_stiffness) / h.hand_mass;
-    rate(3, 3) = -(h.grip_damping + h.arm_damping) / h.hand_mass;
-  }
-  const int whole = static_cast<int>(std::floor(l.delay / l.period));
-  const double late = l.delay - whole * l.period;
-  const Eigen::MatrixXd early = (rate * late).exp(), after = (rate * (l.period - late)).exp();
-  const Eigen::MatrixXd both = after.topLeftCorner(n, n) * early.topLeftCorner(n, n);
-  const Eigen::VectorXd old_force = after.topLeftCorner(n, n) * early.topRightCorner(n, 1);
-  const Eigen::VectorXd new_force = after.topRightCorner(n, 1);
-
-  // state: continuous, x_{k-1}, F_{k-1} .. F_{k-whole-1}
-  const int size = n + 1 + whole + 1;
-  Eigen::MatrixXd step = Eigen::MatrixXd::Zero(size, size);
-  Eigen::RowVectorXd force = Eigen::RowVectorXd::Zero(size);
-  force(0) = -stiffness - l.wall_damping / l.period;
-  force(n) = l.wall_damping / l.period;
-  step.topLeftCorner(n, n) = both;
-  step.block(0, n + 1 + whole, n, 1) += old_force;
-  if (whole == 0)
-    step.topRows(n) += new_force * force;
-  else
-    step.block(0, n + whole, n, 1) += new_force;
-  step(n, 0) = 1.0;
-  step.row(n + 1) = force;
-  for (int i = 1; i <= whole; ++i) step(n + 1 + i, n + i) = 1.0;
-  // Metres, metres per sample, and forces by the metres they move the device in a sample: in SI units QR
-  // alone errs by 1e-5.
-  Eigen::VectorXd unit = Eigen::VectorXd::Ones(size);
-  unit(1) = 1.0 / l.period;
-  if (held) unit(3) = 1.0 / l.period;
-  unit.tail(whole + 1).setConstant(l.mass / (l.period * l.period));
-  return unit.cwiseInverse().asDiagonal() * step * unit.asDiagonal();
-}
-
-double radius_by_eigenvalues(const SampledLoop<double>& loop, double stiffness) {
-  return step_matrix(loop, stiffness).eigenvalues().cwiseAbs().maxCoeff();
-}
 
 SampledLoop<float> in_float(const SampledLoop<double>& l) {
   const auto f = [](double value) { return static_cast<float>(value); };
@@ -170,15 +111,13 @@ TEST(SampledStability, AgreesWithEigenvaluesByQr) {
   RecordProperty("worst_radius_error", std::to_string(worst));
 }
 
-TEST(SampledStability, SpectralRadiusAgreesWithEigenvaluesByQr) {
+TEST(SampledStability, StabilityAgreesWithEigenvaluesByQr) {
   LoopDraw draw(12);
   for (int i = 0; i < 500; ++i) {
     const SampledLoop<double> loop = draw.loop();
-    const double k = draw.log_uniform(1.0, 1e5);
-    const double expected = radius_by_eigenvalues(loop, k);
-    EXPECT_NEAR(spectral_radius(loop, k), expected, 1e-6 * expected) << i;
-    if (std::abs(expected - 1.0) > 1e-6) {
-      EXPECT_EQ(is_stable(loop, k), expected < 1.0) << i;
+    const double k = draw.log_uniform(1.0, 1e5), radius = radius_by_eigenvalues(loop, k);
+    if (std::abs(radius - 1.0) > 1e-6) {
+      EXPECT_EQ(is_stable(loop, k), radius < 1.0) << i;
     }
   }
 }
@@ -203,24 +142,21 @@ TEST(SampledStability, FloatIsCloseToDouble) {
 TEST(SampledStability, AHandleThatNobodyHoldsIsFree) {
   const SampledLoop<double> alone{0.045, 0.5, 0.0, 1e-3, 0.0, {}};
   EXPECT_FALSE(is_stable(alone, 0.0));
-  EXPECT_NEAR(spectral_radius(alone, 0.0), 1.0, 1e-12);
   for (const double k : {1e-9, 1e-6, 1e-3, 1.0}) EXPECT_TRUE(is_stable(alone, k)) << k;
   EXPECT_FALSE(is_stable(alone, -1e-3));
   SampledLoop<double> held = alone;
   held.hand = {0.234, 540, 1.7, 147, 9.1};
   EXPECT_TRUE(is_stable(held, 0.0));
-  EXPECT_LT(spectral_radius(held, 0.0), 1.0);
   // An arm without a spring: the pair drifts as one.
   held.hand.arm_stiffness = 0.0;
   EXPECT_FALSE(is_stable(held, 0.0));
-  EXPECT_NEAR(spectral_radius(held, 0.0), 1.0, 1e-9);
   EXPECT_TRUE(is_stable(held, 1e-3));
 }
 
 TEST(SampledStability, WithoutAnyDampingNothingIsStable) {
   SampledLoop<double> loop{0.045, 0.0, 0.0, 1e-3, 0.0, {}};
   EXPECT_EQ(largest_stable_stiffness(loop), 0.0);
-  EXPECT_GT(spectral_radius(loop, 10.0), 1.0);
+  EXPECT_FALSE(is_stable(loop, 10.0));
   loop.hand = {0.2, 500, 0, 150, 0};
   EXPECT_EQ(largest_stable_stiffness(loop), 0.0);
   // Free masses joined by a spring and, in the second, a damper between them that the rigid motion never
@@ -268,7 +204,6 @@ TEST(SampledStability, DelayIsContinuousAcrossWholeSamples) {
   loop.delay = 8.0001e-3;
   EXPECT_FALSE(can_be_judged(loop));
   EXPECT_EQ(largest_stable_stiffness(loop), 0.0);
-  EXPECT_EQ(spectral_radius(loop, 100.0), -1.0);
   EXPECT_FALSE(is_stable(loop, 100.0));
 }
 
@@ -345,7 +280,6 @@ RC_GTEST_PROP(SampledStability, ScalesWithTimeAndMass, ()) {
   for (double* stiffness : {&other.hand.grip_stiffness, &other.hand.arm_stiffness})
     *stiffness *= mass / (time * time);
   RC_ASSERT(largest_stable_stiffness(other) == largest_stable_stiffness(loop) * mass / (time * time));
-  RC_ASSERT(spectral_radius(other, 1000.0 * mass / (time * time)) == spectral_radius(loop, 1000.0));
 }
 
 }  // namespace kmax::control::sampled_stability_test

@@ -14,6 +14,7 @@
 #include "control/sampled_stability.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "tests/control/drawn_loop.hpp"
+#include "tests/control/step_matrix.hpp"
 
 namespace kmax::simulation::sampled_stability_against_simulation_test {
 
@@ -79,7 +80,7 @@ Fate fate_of(const Loop& loop, double stiffness, double samples_per_e_fold,
 }
 
 double samples_per_e_fold(const Loop& loop, double stiffness) {
-  return 1.0 / std::abs(std::log(control::spectral_radius(loop, stiffness)));
+  return 1.0 / std::abs(std::log(control::radius_by_eigenvalues(loop, stiffness)));
 }
 
 // Whether the motion dies away by `share` of the limit below it, and grows by as much above.
