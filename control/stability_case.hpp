@@ -17,7 +17,7 @@ enum class Criterion : std::uint8_t {
   resolution = 5,           ///< resolution_criterion.hpp
   resolution_speed = 6,     ///< resolution_criterion.hpp
   field_slope = 7,          ///< stiffness_limits.hpp
-  saturation_depth = 8,     ///< saturation_depth.hpp
+  saturation_depth = 8,     ///< closed_form_criteria.hpp
 };
 inline constexpr std::size_t criterion_count = 9;
 

@@ -52,4 +52,64 @@ std::string number_text(double value) {
   return power.size() < plain.size() ? power : std::string(plain);
 }
 
+namespace {
+struct Conversion {
+  std::string_view unit;    ///< as the dictionary writes it
+  std::string_view suffix;  ///< as users write it
+  UnitScale scale;
+};
+
+constexpr UnitScale times(double factor) {
+  return {factor, 1};
+}
+constexpr UnitScale over(double factor) {
+  return {1, factor};
+}
+
+// Case matters: mN is not MN.
+constexpr Conversion conversions[] = {
+    {"m", "mm", over(1e3)},          {"m", "um", over(1e6)},          {"m", "µm", over(1e6)},
+    {"m", "cm", over(1e2)},          {"m/s", "mm/s", over(1e3)},      {"m/s", "cm/s", over(1e2)},
+    {"m/rad", "mm/rad", over(1e3)},  {"N", "mN", over(1e3)},          {"N", "kN", times(1e3)},
+    {"N/m", "N/mm", times(1e3)},     {"N/m", "kN/m", times(1e3)},     {"N/m", "N/cm", times(1e2)},
+    {"N s/m", "N s/mm", times(1e3)}, {"N s/m", "mN s/mm", times(1)},  {"N/s", "kN/s", times(1e3)},
+    {"N/s", "N/ms", times(1e3)},     {"N m/A", "mN m/A", over(1e3)},  {"s", "ms", over(1e3)},
+    {"s", "us", over(1e6)},          {"s", "min", times(60)},         {"Hz", "kHz", times(1e3)},
+    {"kg", "g", over(1e3)},          {"ohm", "mohm", over(1e3)},      {"ohm", "Ohm", times(1)},
+    {"H", "mH", over(1e3)},          {"H", "uH", over(1e6)},          {"A", "mA", over(1e3)},
+    {"V", "mV", over(1e3)},          {"degC", "C", times(1)},         {"degC", "°C", times(1)},
+    {"bit/s", "kbit/s", times(1e3)}, {"bit/s", "Mbit/s", times(1e6)}, {"rad/s", "krad/s", times(1e3)},
+};
+
+std::string without_spacing(std::string_view text) {
+  std::string bare;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text.substr(i).starts_with("·")) {
+      i += std::string_view("·").size() - 1;
+    } else if (text[i] != ' ' && text[i] != '*') {
+      bare += text[i];
+    }
+  }
+  return bare;
+}
+}  // namespace
+
+std::optional<UnitScale> scale_from(std::string_view suffix, std::string_view unit) {
+  const std::string bare = without_spacing(suffix);
+  if (bare.empty() || bare == without_spacing(unit)) return UnitScale{};
+  for (const Conversion& conversion : conversions) {
+    if (conversion.unit == unit && without_spacing(conversion.suffix) == bare) return conversion.scale;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> suffixes_of(std::string_view unit) {
+  if (unit.empty()) return {};
+  std::vector<std::string> suffixes{std::string(unit)};
+  for (const Conversion& conversion : conversions) {
+    if (conversion.unit == unit) suffixes.emplace_back(conversion.suffix);
+  }
+  return suffixes;
+}
+
 }  // namespace kmax::device

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace kmax::device {
 
@@ -14,5 +17,21 @@ std::string number_text(double value);
 inline std::string number_text(float value) {
   return number_text(shortest_double(value));
 }
+
+/// number x multiply / divide: a factor of a thousandth as a division, so that "1mm" is the double nearest
+/// to 0.001.
+struct UnitScale {
+  double multiply = 1;
+  double divide = 1;
+
+  double to_si(double number) const { return number * multiply / divide; }
+};
+
+/// How a number written in `suffix` becomes one in the dictionary's `unit`: "N/mm" -> "N/m" is 1000. Spaces
+/// and middle dots in a suffix do not matter ("N s/m", "Ns/m"); an empty suffix is the unit itself.
+std::optional<UnitScale> scale_from(std::string_view suffix, std::string_view unit);
+
+/// Suffixes that are understood for `unit`, the unit itself first; empty for a number without a unit.
+std::vector<std::string> suffixes_of(std::string_view unit);
 
 }  // namespace kmax::device

@@ -1,4 +1,4 @@
-#include "host_tools/check/change_search.hpp"
+#include "host_tools/check/judgement.hpp"
 
 #include <algorithm>
 #include <bit>

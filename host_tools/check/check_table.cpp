@@ -1,4 +1,4 @@
-#include "host_tools/check/check_table.hpp"
+#include "host_tools/check/judgement.hpp"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include <toml++/toml.h>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/toml_text.hpp"
 #include "host_tools/simulation/operator_model.hpp"
 #include "host_tools/simulation/scene.hpp"

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "host_tools/check/change_search.hpp"
+#include "firmware/drive/stability_case.hpp"
+#include "host_tools/base/numbers.hpp"
 
 namespace kmax::check {
 
@@ -103,6 +104,19 @@ Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
     });
   }
   return judgement;
+}
+
+control::StabilityCase<double> parameter_case(const firmware::ParameterValues& values, std::size_t axis,
+                                              const control::Hand<double>& hand) {
+  auto judged = firmware::stability_case<double>(values, axis, device::shortest_double);
+  judged.hand = hand;
+  return judged;
+}
+
+std::vector<device::Parameter> parameters_of_case(std::size_t axis) {
+  std::vector<device::Parameter> all;
+  for (const auto& one : firmware::case_parameters) all.emplace_back(one.entry, axis);
+  return all;
 }
 
 }  // namespace kmax::check

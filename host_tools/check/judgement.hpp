@@ -1,12 +1,16 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "control/stability_criteria.hpp"
+#include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/check/criterion_text.hpp"
-#include "host_tools/check/parameter_case.hpp"
+#include "host_tools/device/parameter.hpp"
 
 namespace kmax::check {
 
@@ -66,5 +70,33 @@ double escape_speed_of(const control::StabilityCase<double>& c);
 /// parameters are searched for values that help.
 Judgement judge_parameters(const firmware::ParameterValues& values, std::size_t axis,
                            const control::Hand<double>& hand);
+
+/// What the criteria judge of one axis, see firmware/drive/stability_case.hpp: with the hand that holds it,
+/// and each number as the user wrote it: 0.1, not the 0.100000001490116 of the float that is nearest to it.
+control::StabilityCase<double> parameter_case(const firmware::ParameterValues& values, std::size_t axis,
+                                              const control::Hand<double>& hand = {});
+
+/// The parameters that it reads, of that axis.
+std::vector<device::Parameter> parameters_of_case(std::size_t axis);
+
+/// Whether a set of parameters does what is wanted.
+using Wanted = std::function<bool(const firmware::ParameterValues&)>;
+
+/// Single parameters whose change alone makes `wanted` true, the user's own choices first, then the facts
+/// about device and operator. For each: the change nearest to the present value, rounded to three digits (or
+/// as few more as it takes) towards the side on which it is still true.
+///
+/// `values` is a set for which `wanted` is false. Each parameter is walked from its present value to the end
+/// of its range in 60 steps, so what is true only within a gap narrower than that is not found. About 1000
+/// calls of `wanted`.
+std::vector<Change> find_changes(const firmware::ParameterValues& values, std::size_t axis,
+                                 const Wanted& wanted);
+
+/// The verdicts for people: what went in, the criteria by what they are worth, what each failed one would
+/// need, and what follows.
+std::string judgement_text(const Judgement& judgement, const std::string& hand);
+
+/// "wall.stiffness at most 1990 N/m".
+std::string text_of(const Change& change);
 
 }  // namespace kmax::check

@@ -8,10 +8,10 @@
 #include <cmath>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/numbers.hpp"
-#include "host_tools/base/output_file.hpp"
 #include "host_tools/check/criterion_text.hpp"
-#include "host_tools/check/parameter_case.hpp"
+#include "host_tools/check/judgement.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::check {

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/base/toml_text.hpp"
 

@@ -11,7 +11,6 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/suggestion.hpp"
-#include "host_tools/base/units.hpp"
 
 namespace kmax::device {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "host_tools/flash/board_profile.hpp"
-#include "host_tools/flash/usb_devices.hpp"
+#include "host_tools/flash/method_choice.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/lines/board_reset.hpp"
 #include "host_tools/lines/gpio_lines.hpp"

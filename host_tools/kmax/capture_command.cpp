@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/interruption.hpp"
-#include "host_tools/base/output_file.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"

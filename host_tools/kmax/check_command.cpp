@@ -6,11 +6,10 @@
 
 #include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/numbers.hpp"
-#include "host_tools/base/output_file.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/suggestion.hpp"
-#include "host_tools/check/check_table.hpp"
 #include "host_tools/check/hand_choice.hpp"
 #include "host_tools/check/judgement.hpp"
 #include "host_tools/check/stability_map.hpp"

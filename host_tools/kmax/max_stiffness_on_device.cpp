@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "host_tools/base/print.hpp"
-#include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
+#include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/kmax/experiment_study.hpp"
 #include "host_tools/kmax/max_stiffness_options.hpp"

@@ -6,7 +6,7 @@
 
 #include "firmware/parameters/parameter_rules.hpp"
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/parameter_file.hpp"
 #include "host_tools/kmax/commands.hpp"

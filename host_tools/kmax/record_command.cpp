@@ -7,8 +7,8 @@
 #include <fstream>
 #include <optional>
 
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/interruption.hpp"
-#include "host_tools/base/output_file.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/device_address.hpp"

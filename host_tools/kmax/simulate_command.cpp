@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"

@@ -10,7 +10,7 @@
 #include <sstream>
 #include <utility>
 
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/toml_text.hpp"
 
 namespace kmax::lines {

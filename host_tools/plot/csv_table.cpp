@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 
 namespace kmax::plot {
 

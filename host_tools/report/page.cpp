@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 
 namespace kmax::report {
 

@@ -1,7 +1,6 @@
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
 
 #include "drivers/as5047p_frames.hpp"
-#include "host_tools/simulated_board/converter_code.hpp"
 
 namespace kmax::simulated_board {
 

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
 
 #include "board/power/power.hpp"
 #include "host_tools/simulated_board/simulated_bridge.hpp"
@@ -87,5 +90,13 @@ class SimulatedPowerHardware {
   std::uint16_t supply_code_;
   bool emergency_stop_pressed_ = false, gate_driver_fault_ = false;
 };
+
+/// What a 12-bit converter with a reference of 3.3 V makes of a voltage: the nearest code, and the ends
+/// beyond (RM0090, ADC; STM32F405 data sheet, ADC accuracy: transitions lie half a code below the ideal
+/// value). Throws std::invalid_argument for a voltage that is not a number.
+inline std::uint16_t converter_code(double volts) {
+  if (std::isnan(volts)) throw std::invalid_argument("the voltage to convert is not a number");
+  return static_cast<std::uint16_t>(std::clamp(std::floor(volts * (4096.0 / 3.3) + 0.5), 0.0, 4095.0));
+}
 
 }  // namespace kmax::simulated_board

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/toml_text.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 

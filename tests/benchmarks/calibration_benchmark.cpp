@@ -21,7 +21,7 @@ int main(int count, char** arguments) {
   }
   bool good = true;
   fmt::print("| scene | value | truth | worst error of {} | bound |\n|---|---|---|---|---|\n", seeds);
-  for (const char* scene : calibration_test::scene_names) {
+  for (const char* scene : calibration_test::motor_scenes) {
     std::vector<Judged> worst;
     for (int seed = 1; seed <= seeds; ++seed) {
       calibration_test::CalibratedDevice device(scene, static_cast<std::uint64_t>(seed));

@@ -19,7 +19,7 @@ using namespace kmax;
 using torque_ripple::Compensations;
 using torque_ripple::Felt;
 
-constexpr std::array scene_names{"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
+constexpr std::array motor_scenes{"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
 
 struct Row {
   const char* name;
@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   }
   try {
     print_introduction();
-    for (const char* const name : scene_names) print_motor(name);
+    for (const char* const name : motor_scenes) print_motor(name);
     print_conclusions();
     if (!picture.empty()) {
       plot::write_figure({"Force felt while the handle is moved at 5 mm/s, 0.5 N asked for",

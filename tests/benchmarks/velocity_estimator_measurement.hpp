@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "control/velocity_estimator.hpp"
-#include "tests/benchmarks/speed_and_error/processor_time.hpp"
+#include "tests/benchmarks/speed_and_error/measurement.hpp"
 
 namespace kmax::benchmark::velocity {
 

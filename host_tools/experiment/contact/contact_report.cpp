@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
 

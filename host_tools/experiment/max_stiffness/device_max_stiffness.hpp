@@ -7,14 +7,17 @@
 // oscillates too much, which counts as unstable. Each touch that is over is in the journal at once: a run
 // that was interrupted goes on with the next one.
 
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_search.hpp"
 #include "host_tools/experiment/max_stiffness/stiffness_condition.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::experiment {
 
@@ -114,5 +117,24 @@ class StiffnessClimb {
   bool stable_seen_ = false, unstable_seen_ = false, given_up_ = false;
   double best_ = 0.0;
 };
+
+/// A row for each condition: K_max beside the paper's, each with where it comes from.
+report::Table device_stiffness_table(const std::vector<DeviceStiffnessResult>& results);
+
+/// A row for each touch.
+report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& results);
+
+/// What was done, in sentences.
+std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& settings,
+                                                const TouchLimits& limits, const std::string& device);
+
+/// max_stiffness.md, .html, both tables as .csv, and a picture of every touch's oscillation over its
+/// stiffness, if there are touches. Returns the names written. Throws plot::FigureError, std::runtime_error.
+std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
+                                                          const DeviceStiffnessSettings& settings,
+                                                          const TouchLimits& limits,
+                                                          const std::string& device,
+                                                          const std::filesystem::path& folder,
+                                                          const std::string& picture_ending);
 
 }  // namespace kmax::experiment

@@ -1,4 +1,4 @@
-#include "host_tools/experiment/max_stiffness/device_max_stiffness_report.hpp"
+#include "host_tools/experiment/max_stiffness/device_max_stiffness.hpp"
 
 #include <fmt/format.h>
 

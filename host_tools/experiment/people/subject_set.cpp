@@ -8,8 +8,7 @@
 #include <set>
 #include <sstream>
 
-#include "host_tools/base/input_file.hpp"
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/toml_text.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/simulation/scene.hpp"

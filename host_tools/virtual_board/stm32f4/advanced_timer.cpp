@@ -50,10 +50,6 @@ BoardTime AdvancedTimerModel::next_event() const {
   return triggers || waiting_ ? counter_.next_turn() : never;
 }
 
-void AdvancedTimerModel::clock_changed(BoardTime now) {
-  advance(now);
-}
-
 bool AdvancedTimerModel::moe() const {
   return timer_bdtr::MainOutputEnable::of(bdtr_) != 0;
 }

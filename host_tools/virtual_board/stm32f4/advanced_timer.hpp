@@ -4,12 +4,31 @@
 #include <cstdint>
 #include <functional>
 
+#include "drivers/stm32f4/registers/timer.hpp"
 #include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/register_block.hpp"
 #include "host_tools/virtual_board/stm32f4/centre_aligned_counter.hpp"
-#include "host_tools/virtual_board/stm32f4/timer_channels.hpp"
 
 namespace kmax::virtual_board {
+
+// What all timers' capture/compare channels share: RM0090, registers TIMx_CCMR1, TIMx_CCMR2 and TIMx_CCER.
+// Channels by index from 0; the fields are those of channel 1.
+
+/// A register that takes effect with an update event.
+struct PreloadedWord {
+  std::uint32_t preload = 0;  ///< as written
+  std::uint32_t active = 0;
+};
+
+/// A channel's part of CCMR1 and CCMR2.
+constexpr std::uint32_t channel_mode(const std::array<std::uint32_t, 2>& ccmr, unsigned index) {
+  return ccmr[index / 2] >> (drivers::stm32f4::timer_ccmr::bits_per_channel * (index % 2));
+}
+
+/// A channel's part of CCER, with those of the channels above it.
+constexpr std::uint32_t channel_switches(std::uint32_t ccer, unsigned index) {
+  return ccer >> (drivers::stm32f4::timer_ccer::bits_per_channel * index);
+}
 
 enum class AdvancedTimer : std::uint8_t { tim1, tim8 };
 
@@ -55,9 +74,6 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   void trigger_input(BoardTime now);
   /// The clock security system has seen the crystal fail. Without BKE nothing happens.
   void clock_failure_break(BoardTime now);
-  /// To be called when BoardClocks::apb2_timer has changed. Without it the change is noticed at the next
-  /// access or event.
-  void clock_changed(BoardTime now);
 
   /// Legs A, B, C. The caller must have advanced the timer to the present.
   const std::array<PwmLegOutput, 3>& outputs() const { return outputs_; }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host_tools/plot/figure.hpp"
-#include "tests/benchmarks/speed_and_error/processor_time.hpp"
+#include "tests/benchmarks/speed_and_error/measurement.hpp"
 #include "tests/benchmarks/speed_and_error/replayed_contact.hpp"
 #include "tests/benchmarks/speed_and_error/sections.hpp"
 

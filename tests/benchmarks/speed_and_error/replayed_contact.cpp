@@ -7,7 +7,7 @@
 
 #include "control/haptic_loop.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
-#include "tests/benchmarks/speed_and_error/error_statistics.hpp"
+#include "tests/benchmarks/speed_and_error/measurement.hpp"
 #include "tests/host_tools/simulation/reference_handle.hpp"
 
 namespace kmax::benchmark {

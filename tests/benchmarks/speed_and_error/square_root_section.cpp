@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "host_tools/plot/figure.hpp"
-#include "tests/benchmarks/speed_and_error/error_statistics.hpp"
-#include "tests/benchmarks/speed_and_error/processor_time.hpp"
+#include "tests/benchmarks/speed_and_error/measurement.hpp"
 #include "tests/benchmarks/speed_and_error/sections.hpp"
 
 namespace kmax::benchmark {

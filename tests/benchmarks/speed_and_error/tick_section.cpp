@@ -9,8 +9,7 @@
 #include "control/haptic_loop.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
-#include "tests/benchmarks/speed_and_error/error_statistics.hpp"
-#include "tests/benchmarks/speed_and_error/processor_time.hpp"
+#include "tests/benchmarks/speed_and_error/measurement.hpp"
 #include "tests/benchmarks/speed_and_error/sections.hpp"
 
 namespace kmax::benchmark {

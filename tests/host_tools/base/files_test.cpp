@@ -8,8 +8,7 @@
 #include <csignal>
 #include <stdexcept>
 
-#include "host_tools/base/input_file.hpp"
-#include "host_tools/base/output_file.hpp"
+#include "host_tools/base/files.hpp"
 
 namespace kmax::base::files_test {
 

@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include "firmware/object_dictionary/dictionary.hpp"
+
 namespace kmax::device::number_text_test::numbers_test {
 
 TEST(NumberText, IsShortAndPlainWherePeopleReadIt) {
@@ -49,6 +51,53 @@ RC_GTEST_PROP(NumberText, EveryFiniteDoubleComesBack, (std::uint64_t pattern)) {
   const auto value = std::bit_cast<double>(pattern);
   RC_PRE(std::isfinite(value));
   RC_ASSERT(std::strtod(number_text(value).c_str(), nullptr) == value);
+}
+
+double convert(double number, std::string_view suffix, std::string_view unit) {
+  const auto scale = scale_from(suffix, unit);
+  EXPECT_TRUE(scale.has_value()) << suffix << " of " << unit;
+  return scale ? scale->to_si(number) : 0;
+}
+
+TEST(Unit, ConvertsToTheNearestDouble) {
+  EXPECT_EQ(convert(3.58, "N/mm", "N/m"), 3580.0);
+  EXPECT_EQ(convert(1, "mm", "m"), 0.001);
+  EXPECT_EQ(convert(55, "um", "m"), 55e-6);
+  EXPECT_EQ(convert(2400, "mm/s", "m/s"), 2.4);
+  EXPECT_EQ(convert(0.5, "kHz", "Hz"), 500.0);
+  EXPECT_EQ(convert(45, "g", "kg"), 0.045);
+  EXPECT_EQ(convert(1, "Mbit/s", "bit/s"), 1e6);
+}
+
+TEST(Unit, SpacingDoesNotMatterCaseDoes) {
+  EXPECT_EQ(convert(2, "Ns/m", "N s/m"), 2.0);
+  EXPECT_EQ(convert(2, "N·s/m", "N s/m"), 2.0);
+  EXPECT_EQ(convert(2, "N*s/m", "N s/m"), 2.0);
+  EXPECT_EQ(convert(2, "Nm/A", "N m/A"), 2.0);
+  EXPECT_FALSE(scale_from("MN", "N").has_value());
+  EXPECT_FALSE(scale_from("n", "N").has_value());
+}
+
+TEST(Unit, AnotherQuantityIsRefused) {
+  EXPECT_FALSE(scale_from("N", "N/m").has_value());
+  EXPECT_FALSE(scale_from("mm", "m/s").has_value());
+  EXPECT_FALSE(scale_from("m", "").has_value());
+  EXPECT_TRUE(scale_from("", "").has_value());
+}
+
+TEST(Unit, EveryUnitOfTheDictionaryIsItsOwnSuffix) {
+  for (std::size_t i = 0; i < firmware::entry_count; ++i) {
+    const auto unit = firmware::entry_at(i).unit;
+    EXPECT_EQ(convert(1, unit, unit), 1.0) << unit;
+    for (const std::string& suffix : suffixes_of(unit)) EXPECT_GT(convert(1, suffix, unit), 0.0) << suffix;
+  }
+}
+
+// A conversion to a unit that no parameter has could never be used: it would be a misspelt unit.
+TEST(Unit, SuffixesStartWithTheUnitItself) {
+  EXPECT_EQ(suffixes_of("N/m").front(), "N/m");
+  EXPECT_GE(suffixes_of("m").size(), 4u);
+  EXPECT_TRUE(suffixes_of("").empty());
 }
 
 }  // namespace kmax::device::number_text_test::numbers_test

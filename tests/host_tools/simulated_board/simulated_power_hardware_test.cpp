@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/host_tools/simulated_board/motor_bench.hpp"
 
@@ -193,6 +194,19 @@ TEST(SimulatedPowerHardware, AnUnpluggedCableLooksLikeRestUnlessAnIndexIsWatched
   EXPECT_TRUE(serial.turn_for(0.02).count_valid);
   serial.world.plant(0, Defect::encoder_unplugged);
   EXPECT_FALSE(serial.turn_for(50e-6).count_valid);
+}
+
+TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
+  EXPECT_EQ(converter_code(0.0), 0);
+  EXPECT_EQ(converter_code(1.65), 2048);
+  constexpr double step = 3.3 / 4096.0;
+  EXPECT_EQ(converter_code(100.49 * step), 100);
+  EXPECT_EQ(converter_code(100.51 * step), 101);
+  EXPECT_EQ(converter_code(3.3), 4095);
+  EXPECT_EQ(converter_code(5.0), 4095);
+  EXPECT_EQ(converter_code(-1.0), 0);
+  EXPECT_EQ(converter_code(std::numeric_limits<double>::infinity()), 4095);
+  EXPECT_THROW(converter_code(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
 }
 
 }  // namespace kmax::simulated_board::simulated_power_hardware_test

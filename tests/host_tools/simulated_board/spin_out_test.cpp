@@ -6,8 +6,8 @@
 #include <string>
 
 #include "firmware/drive/axis.hpp"
-#include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/simulated_board/simulated_power_hardware.hpp"
 #include "tests/host_tools/simulated_board/torque_ripple.hpp"
 
 namespace kmax::simulated_board::spin_out_test {

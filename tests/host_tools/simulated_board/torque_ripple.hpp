@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "firmware/drive/axis.hpp"
-#include "host_tools/simulated_board/converter_code.hpp"
+#include "host_tools/simulated_board/simulated_power_hardware.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::torque_ripple {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "drivers/stm32f4/current_sampling.hpp"
-#include "host_tools/simulated_board/converter_code.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/simulated_board/simulated_power_hardware.hpp"
 
 namespace kmax::virtual_board::scene_world_test {
 

@@ -187,21 +187,6 @@ TEST(AdvancedTimerModel, TriggerStartsTheSlaveOnce) {
   EXPECT_FALSE((static_cast<std::uint32_t>(follower.timer.cr1) & cen) != 0) << "no new edge, no new start";
 }
 
-TEST(AdvancedTimerModel, ClockChangeKeepsTheCount) {
-  Bench bench;
-  bench.load(4200);
-  bench.count();
-  bench.run(1000 * tick);
-  bench.clocks.apb2_timer = 21;
-  bench.model.clock_changed(bench.now);
-  EXPECT_EQ(bench.cnt(), 1000U);
-  bench.run(10 * 21);
-  EXPECT_EQ(bench.cnt(), 1010U);
-  bench.run(3190 * 21);
-  EXPECT_EQ(bench.cnt(), 4200U);
-  EXPECT_TRUE(bench.down());
-}
-
 TEST(AdvancedTimerModel, EventsCostNothingUntilSomebodyLooks) {
   Bench bench;
   bench.pwm(4200);
