@@ -14,23 +14,12 @@
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
+#include "tests/host_tools/disturbed_link.hpp"
 
 namespace kmax::calibration_test {
 
-inline constexpr const char* scene_names[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b",
-                                              "drone"};
-
-/// All that is set, volatile or not, but commands.
-inline std::vector<std::uint32_t> all_settings(device::Device& device) {
-  std::vector<device::Parameter> all;
-  for (const device::Parameter& parameter : device::all_parameters()) {
-    const std::string name(parameter.definition().name);
-    const bool passing = name.ends_with("drive.controlword") || name == "capture.command" ||
-                         name == "transaction.control" || name == "store.command";
-    if (parameter.writable() && !passing) all.push_back(parameter);
-  }
-  return device.read(all);
-}
+using host_tools_test::all_settings;
+using host_tools_test::motor_scenes;
 
 /// How often a calibration reported its progress.
 struct CalibrationLength {

@@ -34,7 +34,7 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
 }
 
 class DeadEncoder : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(scene_names));
+INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(motor_scenes));
 
 TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
@@ -47,8 +47,8 @@ TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
   const int whole = length_of(GetParam()).whole;
   constexpr int points = 9;
-  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation. 90 mm is the
-  // farthest that has been seen, where gimbal_b's encoder dies at about three quarters of the way.
+  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation. 90 mm
+  // is the farthest that has been seen, where gimbal_b's encoder dies at about three quarters of the way.
   const double farthest = 5.0 * settings.travel;
   for (int point = 1; point < points; ++point) {
     const int at = whole * point / points;

@@ -15,59 +15,28 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds too_long{1100};  // link.timeout is 1 s
 
-/// The simulated board behind a link whose host can be held up before any message.
-class HeldUpLink final : public link::RegisterLink {
- public:
-  explicit HeldUpLink(const simulation::Scene& scene) : link_(scene) {}
-
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    hold_up();
-    return link_.read_holding(address, count);
-  }
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    hold_up();
-    return link_.read_input(address, count);
-  }
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-    hold_up();
-    link_.write_holding(address, values);
-  }
-  void follow_serial_settings(std::optional<std::uint8_t> unit,
-                              std::optional<std::uint32_t> baud_rate) override {
-    link_.follow_serial_settings(unit, baud_rate);
-  }
-  std::string description() const override { return "sim"; }
-  std::chrono::microseconds now() const override { return link_.now(); }
-  void wait(std::chrono::microseconds duration) override { link_.wait(duration); }
-
-  /// Called before every message that is sent while the bridge is on: whether the host is held up.
-  std::function<bool()> held_up;
-  int times = 0;
-
- private:
-  void hold_up() {
-    const auto& legs = link_.simulation().device().power().drives().bridge(0).legs;
-    if (!held_up || !(legs[1].enabled || legs[2].enabled) || !held_up()) return;
-    ++times;
-    link_.wait(too_long);
-  }
-  link::SimLink link_;
-};
-
 struct HeldUpDevice {
   explicit HeldUpDevice(const std::string& name)
       : scene(simulated_board::open_scene(name)),
-        link(new HeldUpLink(scene)),
+        link(new host_tools_test::DisturbedLink(scene)),
         device(std::unique_ptr<link::Link>(link)) {
     device.apply(device::parse_assignments({"modbus.baud_rate=921600"}));
     link->wait(milliseconds(300));  // the power stage starts
+    link->before_request = [this] {
+      const auto& legs = link->sim.simulation().device().power().drives().bridge(0).legs;
+      if (!held_up || !(legs[1].enabled || legs[2].enabled) || !held_up()) return;
+      ++times;
+      link->wait(too_long);
+    };
   }
-
-  std::vector<std::uint32_t> parameters() { return all_settings(device); }
+  std::vector<std::uint32_t> parameters() { return host_tools_test::all_settings(device); }
 
   simulation::Scene scene;
-  HeldUpLink* link;
+  host_tools_test::DisturbedLink* link;
   device::Device device;
+  /// Called before every message that is sent while the bridge is on: whether the host is held up.
+  std::function<bool()> held_up;
+  int times = 0;
   std::string step;  ///< that has begun last
   int messages = 0;  ///< while its bridge was on
 
@@ -95,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, HeldUpCalibration, testing::Values("dc_coreless
 TEST_P(HeldUpCalibration, OnceInEveryStepFindsWhatIsTrue) {
   HeldUpDevice whole(GetParam());
   std::map<std::string, int> length;
-  whole.link->held_up = [&] {
+  whole.held_up = [&] {
     ++length[whole.step];
     return false;
   };
@@ -103,12 +72,10 @@ TEST_P(HeldUpCalibration, OnceInEveryStepFindsWhatIsTrue) {
   constexpr int runs = 2;
   for (int run = 0; run < runs; ++run) {
     HeldUpDevice tested(GetParam());
-    tested.link->held_up = [&] {
-      return tested.messages++ == length[tested.step] * (2 * run + 1) / (2 * runs);
-    };
+    tested.held_up = [&] { return tested.messages++ == length[tested.step] * (2 * run + 1) / (2 * runs); };
     const CalibrationReport report = tested.calibrate(all_steps());
     ASSERT_TRUE(report.pass()) << cause_of(report) << " in run " << run;
-    EXPECT_EQ(tested.link->times, static_cast<int>(length.size())) << "run " << run;
+    EXPECT_EQ(tested.times, static_cast<int>(length.size())) << "run " << run;
     EXPECT_TRUE(report.stored);
     EXPECT_FALSE(device::Drive(tested.device, 0).status().faulty());
     for (const Judged& value : judge(tested.scene.axes[0], report))
@@ -121,10 +88,10 @@ TEST_P(HeldUpCalibration, OnceInEveryStepFindsWhatIsTrue) {
 TEST_P(HeldUpCalibration, EveryNowAndThenFindsWhatIsTrue) {
   HeldUpDevice tested(GetParam());
   int message = 0;
-  tested.link->held_up = [&] { return ++message % 997 == 0; };
+  tested.held_up = [&] { return ++message % 997 == 0; };
   const CalibrationReport report = tested.calibrate(all_steps());
   ASSERT_TRUE(report.pass()) << cause_of(report);
-  EXPECT_GT(tested.link->times, 5);
+  EXPECT_GT(tested.times, 5);
   for (const Judged& value : judge(tested.scene.axes[0], report))
     EXPECT_TRUE(value.good()) << value.name << " is " << value.found << " instead of " << value.truth;
 }
@@ -133,12 +100,12 @@ TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
   for (const std::string step : {"winding", "torque_constant", "compensation_map"}) {
     HeldUpDevice tested(GetParam());
     const auto before = tested.parameters();
-    tested.link->held_up = [&] { return tested.step == step; };
+    tested.held_up = [&] { return tested.step == step; };
     EXPECT_CONTAINS(
         host_tools_test::thrown_message<device::DeviceError>([&] { tested.calibrate(all_steps()); }),
         "3 times in a row the device heard nothing for 1 s and removed the force");
-    EXPECT_EQ(tested.link->times, bench::most_silences) << step;
-    tested.link->held_up = {};
+    EXPECT_EQ(tested.times, bench::most_silences) << step;
+    tested.held_up = {};
     EXPECT_EQ(tested.parameters(), before) << step;
     const device::DriveStatus status = device::Drive(tested.device, 0).status();
     EXPECT_FALSE(status.armed() || status.faulty()) << step;

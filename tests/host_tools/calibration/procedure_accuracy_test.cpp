@@ -54,6 +54,6 @@ TEST_P(Accuracy, LostTravelIsSeenAgainstTheCalibrationBefore) {
   EXPECT_EQ(device.parameters(), before);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Accuracy, testing::ValuesIn(scene_names));
+INSTANTIATE_TEST_SUITE_P(Scenes, Accuracy, testing::ValuesIn(motor_scenes));
 
 }  // namespace kmax::calibration_test::procedure_accuracy_test

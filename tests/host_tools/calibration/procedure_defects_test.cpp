@@ -50,7 +50,7 @@ TEST_P(Defects, ComeOutUnderTheirOwnNameAndNothingIsKept) {
 
 std::vector<Planted> planted() {
   std::vector<Planted> all;
-  for (const char* scene : scene_names) {
+  for (const char* scene : motor_scenes) {
     const bool brushed = std::string(scene).starts_with("dc");
     if (!brushed) all.push_back({scene, Defect::phase_a_open, "phase_a_open"});
     all.push_back({scene, Defect::phase_b_open, brushed ? "motor_open" : "phase_b_open"});
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Defects, testing::ValuesIn(planted()), [](const
 });
 
 class InEveryScene : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, InEveryScene, testing::ValuesIn(scene_names));
+INSTANTIATE_TEST_SUITE_P(Scenes, InEveryScene, testing::ValuesIn(motor_scenes));
 
 // One turned sign against the other: the same remark, and the same cure.
 TEST_P(InEveryScene, WithoutAHandSwappedPhasesAndATurnedEncoderAreCuredAlike) {

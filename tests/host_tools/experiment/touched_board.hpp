@@ -11,46 +11,16 @@
 #include "host_tools/bench/prompter.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/drive.hpp"
-#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/simulation/scene.hpp"
+#include "tests/host_tools/disturbed_link.hpp"
 
 namespace kmax::experiment {
 
-/// A simulated board in virtual time with the simulated person of the supplied scene "touch", behind a link
-/// that can be cut and that tells of its requests.
+/// A simulated board with the simulated person of the supplied scene "touch", behind a link to disturb.
 class TouchedBoard : public testing::Test {
  protected:
-  class CutLink final : public link::RegisterLink {
-   public:
-    explicit CutLink(const simulation::Scene& scene) : sim(scene) {}
-    std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-      require();
-      return sim.read_holding(address, count);
-    }
-    std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-      require();
-      return sim.read_input(address, count);
-    }
-    void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-      require();
-      sim.write_holding(address, values);
-    }
-    std::map<std::string, std::string> identify() override { return sim.identify(); }
-    std::string description() const override { return sim.description(); }
-    std::chrono::microseconds now() const override { return sim.now(); }
-    void wait(std::chrono::microseconds duration) override { sim.wait(duration); }
-
-    link::SimLink sim;
-    bool cut = false;
-    std::function<void()> before_request;  ///< may be empty; what it throws, the request throws
-
-   private:
-    void require() const {
-      if (before_request) before_request();
-      if (cut) throw link::LinkError("the cable is gone");
-    }
-  };
+  using CutLink = host_tools_test::DisturbedLink;
 
   explicit TouchedBoard(const simulation::Scene& scene = simulated_board::factory_scene())
       : device(std::make_unique<CutLink>(scene)) {}

@@ -4,8 +4,6 @@
 
 namespace kmax::selftest::probe_test {
 
-constexpr const char* scenes[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
-
 /// A, largest true current of any leg in every tick until it is told to begin again.
 class TrueCurrent {
  public:
@@ -42,7 +40,7 @@ double current_after_arming(TestedAxis& tested, const std::string& kind) {
 }
 
 TEST(Probe, AnInvertedSensorDrivesNoCurrentFromArmingOn) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     for (const auto defect :
          {simulation::Defect::current_b_inverted, simulation::Defect::current_c_inverted}) {
       TestedAxis tested(scene);
@@ -68,7 +66,7 @@ TEST(Probe, WithACurrentControllerThatSensorWouldDriveTheCurrentUp) {
 }
 
 TEST(Probe, WithAnInvertedSensorTheWholeTestStaysBelowTheTestCurrent) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     TestedAxis tested(scene);
     tested.plant(simulation::Defect::current_b_inverted);
     const double limit = tested.device->read_number("axis0.current.limit");

@@ -7,8 +7,6 @@ namespace kmax::selftest::selftest_test {
 
 using simulation::Defect;
 
-constexpr const char* scenes[] = {"dc_coreless_a", "dc_coreless_b", "gimbal_a", "gimbal_b", "drone"};
-
 bool is_dc(const std::string& scene) {
   return scene.starts_with("dc_");
 }
@@ -37,7 +35,7 @@ void expect_part(const std::string& scene, Defect defect, const std::string& par
 }
 
 TEST(SelfTest, HealthyAxesPassCalibratedOrNot) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     for (const bool identified : {true, false}) {
       TestedAxis tested(scene, identified);
       const Report report = run_and_check(tested, scene);
@@ -61,7 +59,7 @@ TEST(SelfTest, BothAxesOfABoardWithTwoMotors) {
 }
 
 TEST(SelfTest, AnOpenPhaseIsNamed) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     const char* circuit = "motor winding or cable (B to C open)";
     // A DC motor has no lead at A.
     if (!is_dc(scene)) expect_part(scene, Defect::phase_a_open, "phase A (open)");
@@ -71,14 +69,14 @@ TEST(SelfTest, AnOpenPhaseIsNamed) {
 }
 
 TEST(SelfTest, AnInvertedCurrentSensorIsNamed) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     expect_part(scene, Defect::current_b_inverted, "current sensor B");
     expect_part(scene, Defect::current_c_inverted, "current sensor C");
   }
 }
 
 TEST(SelfTest, ADeadCurrentSensorIsNamed) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     for (const bool of_b : {true, false}) {
       TestedAxis tested(scene);
       using Channel = simulation::CurrentSensor::Channel;
@@ -91,7 +89,7 @@ TEST(SelfTest, ADeadCurrentSensorIsNamed) {
 }
 
 TEST(SelfTest, ADeadEncoderIsToldFromABlockedHandle) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     expect_part(scene, Defect::encoder_stuck, "encoder");
     expect_part(scene, Defect::encoder_unplugged, "encoder");
     expect_part(scene, Defect::motor_blocked, "handle (blocked or held)");
@@ -99,12 +97,12 @@ TEST(SelfTest, ADeadEncoderIsToldFromABlockedHandle) {
 }
 
 TEST(SelfTest, ASlippingEncoderIsNamed) {
-  for (const char* scene : scenes)
+  for (const char* scene : host_tools_test::motor_scenes)
     expect_part(scene, Defect::encoder_slipping, "encoder (slips or wrong scale)");
 }
 
 TEST(SelfTest, AWrongDirectionIsNamed) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     const char* either = "direction of the encoder or the motor leads";
     expect_part(scene, Defect::encoder_reversed, is_dc(scene) ? either : "direction of the encoder");
     expect_part(scene, Defect::phases_swapped,
@@ -113,7 +111,7 @@ TEST(SelfTest, AWrongDirectionIsNamed) {
 }
 
 TEST(SelfTest, ASupplyOutsideItsLimitsIsNamed) {
-  for (const char* scene : scenes) {
+  for (const char* scene : host_tools_test::motor_scenes) {
     expect_part(scene, Defect::supply_low, "supply");
     for (const double voltage : {0.0, 12.0, 35.0}) {
       TestedAxis tested(scene);

@@ -5,41 +5,27 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "firmware/modbus/crc.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/serial/register_link.hpp"
 #include "host_tools/selftest/selftest.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
+#include "tests/host_tools/disturbed_link.hpp"
 
 namespace kmax::selftest {
 
 /// A link to the simulated board that looks at the true handle in every tick.
-class WatchedLink final : public link::RegisterLink {
+class WatchedLink final : public link::FrameLink {
  public:
-  WatchedLink(const simulation::Scene& scene, std::size_t axis) : board_(scene), axis_(axis) {
+  WatchedLink(const simulation::Scene& scene, std::size_t axis) : FrameLink(1), board_(scene), axis_(axis) {
     start_ = position();
     // Until the power stage is ready.
     wait(std::chrono::milliseconds(200));
   }
 
-  std::vector<std::uint16_t> read_holding(std::uint16_t address, std::uint16_t count) override {
-    return read_registers(3, address, count);
-  }
-  std::vector<std::uint16_t> read_input(std::uint16_t address, std::uint16_t count) override {
-    return read_registers(4, address, count);
-  }
-  void write_holding(std::uint16_t address, std::span<const std::uint16_t> values) override {
-    std::vector<std::uint16_t> words{address, static_cast<std::uint16_t>(values.size())};
-    std::vector<std::uint8_t> request = start_of(16, words);
-    request.push_back(static_cast<std::uint8_t>(2 * values.size()));
-    for (const std::uint16_t value : values) push(request, value);
-    exchange(request, address);
-  }
   std::chrono::microseconds now() const override {
     return std::chrono::microseconds(board_.board().now_us());
   }
@@ -61,22 +47,12 @@ class WatchedLink final : public link::RegisterLink {
   std::function<std::chrono::milliseconds()> held_up;
 
  private:
-  static void push(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
-    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
-    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
-  }
-  static std::vector<std::uint8_t> start_of(std::uint8_t function, const std::vector<std::uint16_t>& words) {
-    std::vector<std::uint8_t> request{1, function};
-    for (const std::uint16_t word : words) push(request, word);
-    return request;
-  }
   void tick() {
     if (before_tick) before_tick();
     board_.board().advance(1);
     largest_ = std::max(largest_, std::abs(position() - start_));
   }
-  std::vector<std::uint8_t> exchange(std::vector<std::uint8_t> frame, std::uint16_t address) {
-    const std::uint8_t function = frame[1];
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame, link::Repeat /*repeat*/) override {
     if (held_up) wait(held_up());
     if (cut_) {
       wait(std::chrono::milliseconds(100));
@@ -86,26 +62,13 @@ class WatchedLink final : public link::RegisterLink {
       wait(std::chrono::milliseconds(100));
       throw link::LinkError("lost");
     }
-    const std::uint16_t crc = firmware::modbus::crc_of(frame);
-    frame.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-    frame.push_back(static_cast<std::uint8_t>(crc >> 8));
     board_.board().receive(frame);
     for (int tries = 0; tries < 20000; ++tries) {
       tick();
       const std::vector<std::uint8_t> reply = board_.board().transmitted();
-      if (reply.size() <= 3) continue;
-      if (reply[1] != function) throw link::RegisterRefused(reply[2], function, address);
-      return reply;
+      if (reply.size() > 3) return reply;
     }
     throw link::LinkError("no answer");
-  }
-  std::vector<std::uint16_t> read_registers(std::uint8_t function, std::uint16_t address,
-                                            std::uint16_t count) {
-    const auto reply = exchange(start_of(function, {address, count}), address);
-    std::vector<std::uint16_t> words;
-    for (std::size_t i = 0; i < count; ++i)
-      words.push_back(static_cast<std::uint16_t>((reply.at(3 + 2 * i) << 8) | reply.at(4 + 2 * i)));
-    return words;
   }
 
   simulated_board::SimulatedBoard board_;
@@ -140,17 +103,7 @@ class TestedAxis {
   simulation::SceneDrives& drives() { return link->hardware().power().drives(); }
   void plant(simulation::Defect defect) { drives().plant(axis, defect); }
 
-  std::map<std::string, std::uint32_t> settings() {
-    std::map<std::string, std::uint32_t> all;
-    for (const device::Parameter& parameter : device::all_parameters()) {
-      const auto name = parameter.name();
-      const bool command = name == "store.command" || name == "capture.command" ||
-                           name == "transaction.control" || name.ends_with("drive.controlword");
-      if (parameter.writable() && !command) all[name] = device->read(parameter);
-    }
-    return all;
-  }
-
+  std::vector<std::uint32_t> settings() { return host_tools_test::all_settings(*device); }
   Report run() {
     SelfTestSettings settings;
     settings.axis = axis;
