@@ -16,8 +16,7 @@ using host_tools_test::thrown_message;
 
 class JitterDevice : public DeviceExperiment {
  protected:
-  explicit JitterDevice(const simulation::Scene& scene = simulated_board::factory_scene())
-      : DeviceExperiment(scene) {
+  JitterDevice() {
     limits = jitter_limits();
     settings.wall.window = 0.6;
     settings.touches = 1;
@@ -46,18 +45,6 @@ TEST_F(JitterDevice, EveryTouchIsAskedForAndMeasured) {
   EXPECT_CONTAINS(person.requests[1], "1 N act at once, inside 6 N");
 }
 
-TEST_F(JitterDevice, TheForceLimitIsLoweredButNeverRaised) {
-  settings.pairs.resize(1);
-  limits.force_limit = 1.5;
-  run();
-  EXPECT_EQ(force_limit, 1.5);
-  expect_disarmed_and_restored();
-  limits.force_limit = 50.0;
-  run();
-  EXPECT_NEAR(force_limit, 3.3, 1e-6);
-  expect_disarmed_and_restored();
-}
-
 TEST_F(JitterDevice, ASwingTooLargeEndsATouchAndIsCounted) {
   limits.abort_amplitude = 1e-4;
   settings.pairs = {*paper::jitter(0, 7)};
@@ -66,14 +53,6 @@ TEST_F(JitterDevice, ASwingTooLargeEndsATouchAndIsCounted) {
   EXPECT_EQ(result.results[0].aborted, 1u);
   EXPECT_EQ(result.results[0].touches, 0u);
   EXPECT_EQ(judge_jitter(result.results).claim_met(), std::nullopt);
-}
-
-TEST_F(JitterDevice, GivingUpOnTheWayLeavesNothingBehind) {
-  report = [this](const std::string&) {
-    if (forceful()) throw std::logic_error("enough");
-  };
-  EXPECT_THROW(run(), std::logic_error);
-  expect_disarmed_and_restored();
 }
 
 TEST_F(JitterDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
@@ -101,53 +80,6 @@ TEST_F(JitterDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
   EXPECT_CONTAINS(thrown_message<JournalError>([&] { open_journal(settings, RunJournal::Begin::resume); }),
                   "window_s");
   expect_disarmed_and_restored();
-}
-
-TEST_F(JitterDevice, AStiffnessThatIsNotAllowedIsRefusedBeforeAnybodyIsAsked) {
-  settings.wall.stiffness = -1.0;
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(); }), "wall.stiffness");
-  EXPECT_TRUE(person.requests.empty());
-  expect_disarmed_and_restored();
-}
-
-class JitterOfNobody : public JitterDevice {
- protected:
-  JitterOfNobody() : JitterDevice(nobody()) { limits.patience = 0.5; }
-};
-
-TEST_F(JitterOfNobody, WhoDoesNotTouchIsAskedThreeTimes) {
-  EXPECT_THROW(run(), NobodyTouched);
-  EXPECT_EQ(person.requests.size(), 3u);
-  prompter = nullptr;
-  EXPECT_THROW(run(), NobodyTouched);
-  EXPECT_EQ(person.requests.size(), 3u);
-}
-
-class JitterDisturbed : public JitterDevice {
- protected:
-  JitterDisturbed() : JitterDevice(two_held_axes()) {
-    cable().sim.wait(std::chrono::milliseconds(2000));
-    set({"force.limit=10", "axis1.force.limit=9", "link.timeout=5"});
-    before = values();
-    settings.wall.window = 1.0;
-    settings.touches = 2;
-    settings.pairs = {*paper::jitter(0, 1)};
-  }
-};
-
-TEST_F(JitterDisturbed, IsThatOfAnUndisturbedRun) {
-  const JitterResult undisturbed = run().results.front();
-  ASSERT_EQ(undisturbed.touches, 2u);
-  for (const Stall::Of of : every_stall) {
-    SCOPED_TRACE(static_cast<int>(of));
-    disturb(of, 1);
-    const JitterResult disturbed = run().results.front();
-    expect_one_repetition();
-    EXPECT_EQ(disturbed.touches, 2u);
-    EXPECT_EQ(disturbed.aborted, 0u);
-    EXPECT_NEAR(disturbed.amplitude, undisturbed.amplitude, 0.05 * undisturbed.amplitude);
-  }
-  expect_to_end_after_all([&] { run(); });
 }
 
 // A host that cannot fetch the trace as fast as the device writes it sees gaps, and a jitter that fell into

@@ -110,7 +110,7 @@ class DisturbedTouches : public StalledBoard {
 
   template <typename Run>
   auto with_rig(const Run& run) {
-    DeviceRig rig(device, touch_limits, {prompter, nullptr, report, notice});
+    DeviceRig rig(device, touch_limits, {nullptr, nullptr, report, notice});
     return run(rig);
   }
   /// Three touches of a wall that holds still.
@@ -133,8 +133,6 @@ class DisturbedTouches : public StalledBoard {
 
   ContactSettings contact;
   TouchLimits touch_limits = contact_limits();
-  bench::Prompter* prompter = nullptr;
-  AskedPerson person;
   std::vector<std::string> notices;
   std::vector<double> limits;
   const ReportText notice = [this](const std::string& text) { notices.push_back(text); };
@@ -169,14 +167,6 @@ TEST_F(DisturbedTouches, OneOfThemIsMadeAgainAndMeasuresTheSame) {
       expect_left_in_order();
     }
   }
-}
-
-TEST_F(DisturbedTouches, APersonIsAskedAgain) {
-  prompter = &person;
-  stall = {Stall::Of::program, 40, [](int touch) { return touch == 2; }};
-  EXPECT_EQ(run_contacts().size(), 3u);
-  EXPECT_EQ(person.requests.size(), 4u);
-  EXPECT_EQ(notices.size(), 1u);
 }
 
 TEST_F(DisturbedTouches, WhatNeverEndsIsToldAfterTheThirdRepetition) {

@@ -11,7 +11,7 @@ using host_tools_test::thrown_message;
 
 class DeviationDevice : public DeviceExperiment {
  protected:
-  explicit DeviationDevice(const simulation::Scene& scene = two_held_axes()) : DeviceExperiment(scene) {
+  DeviationDevice() : DeviceExperiment(two_held_axes()) {
     axes = RigAxes::wall_along;
     limits = deviation_limits();
     settings.protocol.pulses = 1;
@@ -94,25 +94,6 @@ TEST_F(DeviationDevice, ATouchComesBackFromTheJournal) {
   EXPECT_EQ(again.contact_share, made.contact_share);
 }
 
-TEST_F(DeviationDevice, GivingUpOnTheWayLeavesNothingBehind) {
-  report = [this](const std::string&) {
-    if (device::Drive(device, 1).status().armed()) throw std::logic_error("enough");
-  };
-  EXPECT_THROW(run(), std::logic_error);
-  expect_disarmed_and_restored();
-}
-
-TEST_F(DeviationDevice, BothForceLimitsAreLowered) {
-  limits.force_limit = 2.0;
-  std::vector<double> seen;
-  report = [&](const std::string&) { seen.push_back(device.read_number("axis1.force.limit")); };
-  run();
-  EXPECT_EQ(force_limit, 2.0);
-  ASSERT_FALSE(seen.empty());
-  EXPECT_EQ(seen.front(), 2.0);
-  expect_disarmed_and_restored();
-}
-
 // F_B pushes the handle out of the hand's rest against the wall, and it swings: that is no instability.
 TEST_F(DeviationDevice, ABackgroundForceOnAStableWallEndsNothing) {
   settings.pairs = {*paper::deviation(1, 3)};
@@ -185,24 +166,6 @@ TEST(DeviationOfAServedPerson, TheSuppliedSceneHoldsForWholeTouches) {
   EXPECT_LT(results[0].deviation, 0.5 * results[1].deviation);
   EXPECT_LT(results[2].deviation, 0.5 * results[1].deviation);
   EXPECT_LT(results[2].deviation, 0.5 * results[2].before);
-}
-
-class DeviationWithoutAPerson : public DeviationDevice {
- protected:
-  static simulation::Scene wall_without_a_person() {
-    simulation::Scene scene = two_held_axes();
-    scene.axes[0].person.reset();
-    scene.axes[0].motion.reset();
-    scene.axes[0].start.position = 0.02;
-    return scene;
-  }
-  DeviationWithoutAPerson() : DeviationDevice(wall_without_a_person()) {}
-};
-
-TEST_F(DeviationWithoutAPerson, NoTouchWithinPatienceIsAnError) {
-  limits.patience = 1.0;
-  EXPECT_CONTAINS(thrown_message<NobodyTouched>([&] { run(); }), "nobody touched the wall within 1 s");
-  expect_disarmed_and_restored();
 }
 
 class DeviationDisturbed : public DeviationDevice {

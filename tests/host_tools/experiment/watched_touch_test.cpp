@@ -160,14 +160,6 @@ TEST_F(Watched, WhatIsThrownOnTheWayDisarms) {
   expect_disarmed();
 }
 
-TEST_F(Watched, AHandThatComesBeforeTheRecordingBeganIsAskedToGoBack) {
-  come_while_arming(0);
-  const WatchedTouch touched = touch();
-  expect_came_and_went("wall");
-  expect_disarmed();
-  EXPECT_GT(touched.samples.back().time, 1.0);
-}
-
 // No comparison with a NaN is ever true: the axis would stay armed for ever.
 TEST_F(Watched, WhatWouldNeverEndTheTouchIsRefusedBeforeArming) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -255,46 +247,6 @@ TEST_F(WatchedSpringyHand, WhatItDidUnderForceIsOneWhateverCameAfterwards) {
     device::Drive(device, 0).clear();
   }
   EXPECT_GT(tripped, 0);
-}
-
-class WatchedByNobody : public TouchedBoard {
- protected:
-  WatchedByNobody() : TouchedBoard(nobody()) {}
-};
-
-TEST_F(WatchedByNobody, HasATypeOfItsOwn) {
-  set({"haptic.rate=500"});
-  TouchWatch watch;
-  watch.contact_patience = 1.0;
-  EXPECT_THROW(watch_touch(device, watch, report), NobodyTouched);
-  expect_disarmed();
-}
-
-class Protective : public TouchedBoard {
- protected:
-  double limit_with(const std::vector<std::string>& assignments, double force_limit) {
-    set(assignments);
-    set(protective_assignments(device, 0, force_limit));
-    return device.read_number("force.limit");
-  }
-};
-
-TEST_F(Protective, TheForceLimitIsLoweredAndNeverRaised) {
-  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=10"}, 3.3)), 3.3F);
-  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=2"}, 3.3)), 2.0F);
-  EXPECT_FLOAT_EQ(static_cast<float>(limit_with({"force.limit=1000"}, 0.5)), 0.5F);
-}
-
-TEST_F(Protective, TheLinkIsWatchedByTheDevice) {
-  const auto timeout_with = [&](const char* assignment) {
-    set({assignment});
-    set(protective_assignments(device, 0, 1000));
-    return device.read_number("link.timeout");
-  };
-  EXPECT_EQ(timeout_with("link.timeout=0"), 1.0);
-  EXPECT_EQ(timeout_with("link.timeout=60"), 1.0);
-  EXPECT_EQ(timeout_with("link.timeout=0.5"), 0.5);
-  EXPECT_TRUE(protective_assignments(device, 0, 1000).empty());
 }
 
 using firmware::DriveState;

@@ -20,9 +20,7 @@ using simulation::ContactVerdict;
 
 class Contact : public TouchedBoard {
  protected:
-  explicit Contact(const simulation::Scene& scene = simulated_board::factory_scene()) : TouchedBoard(scene) {
-    settings.hold_time = 1.0;
-  }
+  Contact() { settings.hold_time = 1.0; }
 
   ContactResult run(std::size_t condition) {
     const ReportText nobody = [](const std::string&) {};
@@ -95,28 +93,6 @@ TEST_F(Contact, AnotherTrialOnTheSameDeviceWaitsForTheHandle) {
   expect_disarmed();
 }
 
-TEST_F(Contact, AnExceptionFromTellDisarms) {
-  for (const std::size_t after : {0u, 1u}) {
-    std::size_t calls = 0;
-    report = [&](const std::string& text) {
-      if (text.ends_with("out of the wall")) return;
-      EXPECT_TRUE(simulation().board().output().axis[0].enabled);
-      if (calls++ == after) throw std::logic_error("enough");
-    };
-    EXPECT_THROW(run(0), std::logic_error);
-    EXPECT_EQ(calls, after + 1);
-    expect_disarmed();
-  }
-}
-
-TEST_F(Contact, AFaultOnTheWayIsReported) {
-  report = [&](const std::string&) { simulation().device().connect_encoder(0, false); };
-  const auto what = thrown_message<device::DeviceError>([&] { run(0); });
-  EXPECT_CONTAINS(what, "lost its force during the touch");
-  EXPECT_CONTAINS(what, "encoder");
-  expect_disarmed();
-}
-
 // Between the last look at the statusword and the end of the trial.
 TEST_F(Contact, AFaultJustBeforeTheEndIsReportedToo) {
   std::size_t trials = 0;
@@ -144,19 +120,6 @@ TEST_F(Contact, ValuesThatAreNotAllowedAreRefusedBeforeArming) {
   settings.haptic_rate = 333;
   EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "haptic.rate");
   EXPECT_TRUE(reported.empty());
-  expect_disarmed();
-}
-
-class ContactWithoutAPerson : public Contact {
- protected:
-  ContactWithoutAPerson() : Contact(nobody()) {}
-};
-
-TEST_F(ContactWithoutAPerson, NoTouchWithinPatienceIsAnError) {
-  limits.patience = 2.0;
-  const auto begin = device.link().now();
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "nobody touched the wall within 2 s");
-  EXPECT_LT(device.link().now() - begin, std::chrono::seconds(4));
   expect_disarmed();
 }
 
