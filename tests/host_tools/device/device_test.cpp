@@ -52,16 +52,6 @@ TEST_F(OpenDevice, ReadsEverythingInOneRequestPerGroup) {
   }
 }
 
-TEST_F(OpenDevice, OneGroupIsOneRequest) {
-  connection.link->requests = 0;
-  std::vector<Parameter> wall;
-  for (const Parameter& parameter : all_parameters()) {
-    if (parameter.axis() == 0 && parameter.name().starts_with("wall.")) wall.push_back(parameter);
-  }
-  EXPECT_EQ(device.read(wall).size(), 18u);
-  EXPECT_EQ(connection.link->requests, 1);
-}
-
 TEST(Device, AnotherDictionaryIsRefusedWithAdvice) {
   Connection connection;
   connection.fake->registers.values().set_whole<"info.dictionary_checksum">(0x12345678);

@@ -33,16 +33,6 @@ TEST_F(JitterCommand, AHandThatCannotStiffenIsAnswerNo) {
   EXPECT_EQ(document()["files"], Json::array());
 }
 
-TEST_F(JitterCommand, PicturesHaveTheKindAskedFor) {
-  // Which verdict does not matter here: half a second is too short to settle.
-  EXPECT_EQ(simulated({"--touches", "1", "--window", "0.5", "--out", in("results"), "--format", "png"}),
-            verdict_is_no)
-      << said;
-  EXPECT_EQ(folder.read("results/jitter_trends.png").substr(1, 3), "PNG");
-  EXPECT_CONTAINS(output, in("results/jitter.csv"));
-  EXPECT_CONTAINS(output, "F_B");
-}
-
 TEST_F(JitterCommand, ADeviceIsMeasured) {
   const int code = on_device({"--touches", "1", "--window", "0.6", "--json"});
   ASSERT_TRUE(code == done || code == verdict_is_no) << said;

@@ -47,14 +47,6 @@ TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
     EXPECT_TRUE(variation["verdict"]["fine_vibrates_above_onset"].is_null()) << variation;
 }
 
-TEST_F(ResolutionCommand, PicturesHaveTheKindAskedFor) {
-  EXPECT_EQ(simulated({"--touches", "1", "--speeds", "0.05,0.3", "--out", in("results"), "--format", "png"}),
-            done)
-      << said;
-  EXPECT_EQ(folder.read("results/resolution_speeds.png").substr(1, 3), "PNG");
-  EXPECT_CONTAINS(output, in("results/resolution.csv"));
-}
-
 TEST_F(ResolutionCommand, ADeviceIsMeasured) {
   // The board's person comes at one speed, whatever is asked for: never on both sides of the onset.
   EXPECT_EQ(on_device({"--speeds", "0.1", "--hold", "1", "--json"}), verdict_is_no) << said;

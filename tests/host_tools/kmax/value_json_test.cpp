@@ -16,13 +16,6 @@ std::string text_of(float value) {
   return value_json(position, std::bit_cast<std::uint32_t>(value)).dump();
 }
 
-TEST(ValueJson, FloatsAreTheShortestTextOfTheFloat) {
-  EXPECT_EQ(text_of(2.4f), "2.4");
-  EXPECT_EQ(text_of(3580.0f), "3580");
-  EXPECT_EQ(text_of(-0.001f), "-0.001");
-  EXPECT_EQ(text_of(1e-6f), "1e-06");
-}
-
 TEST(ValueJson, CountersKeepAllTheirBits) {
   EXPECT_EQ(value_json(Parameter::of<"info.tick">(), 0xFFFFFFFFu).dump(), "4294967295");
   EXPECT_EQ(value_json(Parameter::of<"encoder.offset">(), 0x80000000u).dump(), "-2147483648");
@@ -36,12 +29,6 @@ TEST(ValueJson, ChoicesAreTheirNames) {
 // JSON has no NaN; a document with one would be no document.
 TEST(ValueJson, WhatIsNoNumberIsNull) {
   EXPECT_EQ(text_of(std::nanf("")), "null");
-}
-
-RC_GTEST_PROP(ValueJson, EveryFiniteFloatComesBack, (std::uint32_t pattern)) {
-  const auto value = std::bit_cast<float>(pattern);
-  RC_PRE(std::isfinite(value));
-  RC_ASSERT(static_cast<float>(Json::parse(text_of(value)).get<double>()) == value);
 }
 
 }  // namespace kmax::cli::value_json_test

@@ -130,21 +130,6 @@ TEST(Figure, OtherEndingsMissingFoldersAndNothingToDrawAreRefused) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
-TEST(Figure, APictureThatFailsLeavesTheOldOne) {
-  const TemporaryFolder folder;
-  folder.write("a.svg", "as it was");
-  EXPECT_CONTAINS(thrown_message<FigureError>([&] {
-                    write_figure(figure_of({"", {nan}, {nan}}), folder / "a.svg");
-                  }),
-                  "a.svg: gnuplot could not draw it");
-  EXPECT_EQ(folder.read("a.svg"), "as it was");
-  EXPECT_EQ(folder.entries(), 1u);
-  std::filesystem::create_directory(folder / "b.svg");
-  EXPECT_CONTAINS(thrown_message<FigureError>([&] { write_figure(figure_of(line), folder / "b.svg"); }),
-                  "b.svg");
-  EXPECT_EQ(folder.entries(), 2u);
-}
-
 // Titles and column names come from files that others make.
 TEST(Figure, TextIsOnlyText) {
   const TemporaryFolder folder;
@@ -158,19 +143,6 @@ TEST(Figure, TextIsOnlyText) {
   EXPECT_FALSE(std::filesystem::exists(folder / "done"));
   EXPECT_EQ(folder.entries(), 1u);
   EXPECT_CONTAINS(folder.read("it's `a` \"name\".svg"), "`touch");
-}
-
-TEST(Figure, LabelsMayBeginWithAnApostrophe) {
-  const TemporaryFolder folder;
-  Figure figure = figure_of(line);
-  figure.title = "'title' of it";
-  figure.x_label = "'x' (m)";
-  figure.panels[0].y_label = "'y' (N)";
-  figure.panels[0].series[0].label = "'series' shown";
-  figure.panels[0].marks[0].label = "'mark' there";
-  write_figure(figure, folder / "a.svg");
-  for (const char* text : {"'title' of it", "'x' (m)", "'y' (N)", "'series' shown", "'mark' there"})
-    EXPECT_CONTAINS(folder.read("a.svg"), text);
 }
 
 }  // namespace kmax::plot::figure_test

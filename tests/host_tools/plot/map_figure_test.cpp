@@ -62,24 +62,4 @@ TEST(MapFigure, SidesThatAreNoRangeAreRefused) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
-TEST(MapFigure, NamesThatCannotBePicturesAreRefused) {
-  const TemporaryFolder folder;
-  EXPECT_CONTAINS(thrown_message<PictureNameError>([&] { write_map_figure(map(), folder / "a.gif"); }),
-                  "must end in .svg or .png");
-  EXPECT_CONTAINS(thrown_message<PictureNameError>([&] { write_map_figure(map(), folder / "none/a.svg"); }),
-                  "does not exist");
-  EXPECT_EQ(folder.entries(), 0u);
-}
-
-// Between double quotes gnuplot would run it.
-TEST(MapFigure, TextIsNeverRun) {
-  const TemporaryFolder folder;
-  const std::string touched = (folder / "touched").string();
-  MapFigure figure = map();
-  figure.title = "`touch " + touched + "` it's\nall \\ text";
-  figure.lines[0].label = "'; system('touch " + touched + "') '";
-  write_map_figure(figure, folder / "a.svg");
-  EXPECT_EQ(folder.entries(), 1u);
-}
-
 }  // namespace kmax::plot::map_figure_test

@@ -50,18 +50,6 @@ TEST(BrushedDcMotor, OneStepIsWhatAThousandSubstepsGive) {
   }
 }
 
-TEST(BrushedDcMotor, ManyShortIntervalsAreOneLongOne) {
-  BrushedDcMotor one, many;
-  one.advance(between(10.0, 0.0), {0.0, 50.0}, 1e-3);
-  double charge = 0.0;
-  for (int n = 0; n < 1000; ++n) {
-    many.advance(between(10.0, 0.0), {0.0, 50.0}, 1e-6);
-    charge += many.mean_currents()[terminal_b] * 1e-6;
-  }
-  EXPECT_NEAR(one.current(), many.current(), 1e-11);
-  EXPECT_NEAR(one.mean_currents()[terminal_b] * 1e-3, charge, 1e-14);
-}
-
 TEST(BrushedDcMotor, SettlesAtVoltageLessBackEmfOverResistance) {
   BrushedDcMotor motor({2.0, 1e-3, 0.05});
   motor.advance(between(12.0, 2.0, 0.25), {0.0, 40.0}, 0.1);

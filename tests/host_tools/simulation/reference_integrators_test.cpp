@@ -283,25 +283,6 @@ TEST(ReferenceIntegrators, FrictionNeverGivesEnergy) {
   }
 }
 
-TEST(ReferenceIntegrators, ThreeMassesAgreeWithEachOther) {
-  const ChainDynamics chain{.masses = 3,
-                            .mass = {0.03, 0.015, 0.234},
-                            .stiffness = {2e4, 540.0, 147.0},
-                            .damping = {2.0, 1.7, 9.1},
-                            .base_damping = 0.05,
-                            .friction = 0.093};
-  std::vector<ChainState> states(3);
-  for (int n = 0; n < 200; ++n) {
-    for (std::size_t i = 0; i < 3; ++i)
-      all()[i].integrate(chain, states[i], {0.8 * std::sin(0.3 * n), 1e-4 * n, 0.05}, 0.002);
-  }
-  EXPECT_GT(std::abs(states[2].position[0]), 1e-3);
-  for (std::size_t mass = 0; mass < 3; ++mass) {
-    EXPECT_NEAR(states[0].position[mass], states[2].position[mass], 5e-6);
-    EXPECT_NEAR(states[1].position[mass], states[2].position[mass], 1e-8);
-  }
-}
-
 TEST(ReferenceIntegrators, MassesThatAreNotThereAreNotRead) {
   for (const auto& [name, integrate, error] : all()) {
     ChainDynamics chain = sliding_block(0.1, 0.0);

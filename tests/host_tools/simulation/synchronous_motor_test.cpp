@@ -173,16 +173,6 @@ TEST(SynchronousMotor, AnOpenedPhaseIsCurrentlessAtOnce) {
   EXPECT_EQ(motor.mean_torque(), 0.0);
 }
 
-RC_GTEST_PROP(SynchronousMotor, HalvesMakeAWhole, (int u_seed, int speed_seed)) {
-  const double u[3] = {std::fabs(std::sin(u_seed)) * 24, std::fabs(std::cos(u_seed)) * 24, 12.0};
-  const double speed = 2000.0 * std::sin(speed_seed * 1.7);
-  SynchronousMotor one(salient()), two(salient());
-  one.advance(driven(u), {0.0, speed}, 25e-6);
-  two.advance(driven(u), {0.0, speed}, 10e-6);
-  two.advance(driven(u), {speed * 10e-6, speed}, 15e-6);
-  for (std::size_t k = 0; k < 3; ++k) RC_ASSERT(std::fabs(one.currents()[k] - two.currents()[k]) < 1e-10);
-}
-
 TEST(SynchronousMotor, CoggingPullsIntoItsPositions) {
   SynchronousMotorConfig config{.cogging_torque = 1e-3, .cogging_periods = 42};
   const SynchronousMotor motor(config);
