@@ -23,14 +23,6 @@ class BusFaults : public testing::Test {
     state = state_of(static_cast<std::uint16_t>(bench.arm()));
   }
 
-  /// By way of the serial line, which has nothing to do with the bus.
-  std::uint32_t serial_number(std::string_view name) {
-    const std::size_t entry = firmware::find_entry(name);
-    const auto words = firmware::register_count(firmware::entry_at(entry).type);
-    const auto read = bench.master->read_input(firmware::register_address(entry, 0), words);
-    return words == 2 ? std::uint32_t{read[0]} << 16 | read[1] : read[0];
-  }
-
   /// Force is gone, named; no tick was missed.
   void expect_safe(Fault fault) {
     EXPECT_FALSE(bench.board->bridge_armed(0));
@@ -39,7 +31,7 @@ class BusFaults : public testing::Test {
     expect_no_tick_missed();
   }
   void expect_no_tick_missed() {
-    EXPECT_EQ(serial_number("counters.missed_ticks"), 0U);
+    EXPECT_EQ(bench.number("counters.missed_ticks"), 0U);
     EXPECT_EQ(bench.board->resets(), 1U);
   }
 
@@ -67,12 +59,12 @@ TEST_F(BusFaults, NobodyAcknowledges) {
   expect_safe(Fault::link_silent);
   // Error passive and not bus-off: a node that is alone may not silence itself (ISO 11898-1, fault
   // confinement).
-  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::error_passive));
-  EXPECT_EQ(serial_number("can.bus_offs"), 0U);
-  EXPECT_GT(serial_number("can.tpdo_held_back"), 1000U);
+  EXPECT_EQ(bench.number("can.state"), static_cast<std::uint32_t>(firmware::CanState::error_passive));
+  EXPECT_EQ(bench.number("can.bus_offs"), 0U);
+  EXPECT_GT(bench.number("can.tpdo_held_back"), 1000U);
   bench.port.node().set_connected(true, bench.board->now());
   bench.board->run_for(0.1);
-  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
+  EXPECT_EQ(bench.number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
   expect_link_is_back();
 }
 
@@ -85,12 +77,12 @@ TEST_F(BusFaults, BusOffAndBack) {
   bench.board->can_bus().destroy_frames(40);
   bench.board->run_for(0.02);
   expect_safe(Fault::bus_off);
-  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::bus_off));
-  EXPECT_EQ(serial_number("can.bus_offs"), 1U);
+  EXPECT_EQ(bench.number("can.state"), static_cast<std::uint32_t>(firmware::CanState::bus_off));
+  EXPECT_EQ(bench.number("can.bus_offs"), 1U);
   bench.board->can_bus().destroy_frames(0);
   bench.port.forget();
   bench.board->run_for(0.3);
-  EXPECT_EQ(serial_number("can.node_state"), 127U) << "the error behaviour's default";
+  EXPECT_EQ(bench.number("can.node_state"), 127U) << "the error behaviour's default";
   // The axis' fault and the bus-off itself are told when that is possible again.
   bool reported = false;
   while (const auto emergency = bench.next(0x081, 0.001))
@@ -134,7 +126,7 @@ TEST_F(BusFaults, TwoNodesHaveOneIdentifier) {
     twin.send({.identifier = 0x701, .length = 1, .data = {0x05}}, bench.board->now());
     bench.board->run_for(0.01);
   }
-  EXPECT_EQ(serial_number("can.identity_conflicts"), 20U);
+  EXPECT_EQ(bench.number("can.identity_conflicts"), 20U);
   const auto reported = bench.next(0x081, 0.1);
   ASSERT_TRUE(reported);
   EXPECT_EQ(reported->frame.data[0] | reported->frame.data[1] << 8, 0x8100);
@@ -213,7 +205,7 @@ TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
   bench.board->run_for(0.00015);
   follow(125'000);
   bench.board->run_for(3.0);
-  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
+  EXPECT_EQ(bench.number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
   virtual_board::CanHostNode other(bench.board->can_bus(), 125'000);
   set_rate(1'000'000);
   for (int i = 0; i < 40; ++i)
@@ -224,7 +216,7 @@ TEST_F(BusFaults, ANewBitRateOnABusyBusIsTakenOverInTheEnd) {
   other.set_connected(false, bench.board->now());
   follow(1'000'000);
   bench.board->run_for(3.0);
-  EXPECT_EQ(serial_number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
+  EXPECT_EQ(bench.number("can.state"), static_cast<std::uint32_t>(firmware::CanState::active));
   expect_link_is_back();
 }
 

@@ -5,13 +5,11 @@
 #include <cmath>
 #include <string>
 
-#include "drivers/stm32f4/registers/adc.hpp"
 #include "tests/image/image_bench.hpp"
 
 namespace kmax::tests::closed_loop_test {
 
 using firmware::Fault;
-using virtual_board::BoardTime;
 
 ImageBench::Parameters stiff_walls() {
   ImageBench::Parameters parameters{{"supply.voltage_min", 10.0}, {"link.timeout", 0.0}};
@@ -24,8 +22,6 @@ ImageBench::Parameters stiff_walls() {
 
 /// From the event to the next sample at most one tick; from there to MOE = 0 the tick's own time, 12 us.
 constexpr double one_tick_and_handling = 1.3;
-// The supply is converted beside the currents of both axes, and its code is ready half a tick after them.
-constexpr double supply_and_handling = one_tick_and_handling + 0.5;
 
 class ClosedLoop : public testing::Test {
  protected:
@@ -40,16 +36,6 @@ class ClosedLoop : public testing::Test {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       ASSERT_TRUE(bench.board->bridge_armed(axis)) << axis << ": " << text_of(bench.fault(axis)).name;
     }
-  }
-
-  /// Board time from now until the bridge of the axis is off.
-  double ticks_until_off(std::size_t axis) {
-    const BoardTime begin = bench.board->now();
-    while (bench.board->bridge_armed(axis)) {
-      bench.board->run_until(bench.board->now() + ticks(0.02));
-      if (bench.board->now() > begin + ticks(1000)) return 1000.0;
-    }
-    return virtual_board::seconds(bench.board->now() - begin) / tick_s;
   }
 
   ImageBench bench{stiff_walls(), 2.0};
@@ -76,46 +62,6 @@ TEST_F(ClosedLoop, HoldsTheHandlesAtAStiffWallOnBothAxes) {
     EXPECT_TRUE(bench.board->bridge_armed(axis));
     EXPECT_EQ(bench.fault(axis), Fault::none);
   }
-}
-
-TEST_F(ClosedLoop, AnEncoderThatComesOffTakesTheForceWithinOneTick) {
-  press();
-  bench.world.connect_encoder(0, false);
-  EXPECT_LE(ticks_until_off(0), one_tick_and_handling);
-  EXPECT_TRUE(bench.board->bridge_armed(1)) << "the other axis goes on";
-  EXPECT_EQ(bench.fault(0), Fault::encoder);
-  EXPECT_EQ(bench.fault(1), Fault::none);
-}
-
-TEST_F(ClosedLoop, ASupplyThatFailsTakesTheForceWithinOneTick) {
-  press();
-  bench.world.supply().disconnect();
-  bench.world.supply().set_voltage(7.0);
-  EXPECT_LE(ticks_until_off(0), supply_and_handling);
-  EXPECT_LE(ticks_until_off(1), supply_and_handling);
-  EXPECT_EQ(bench.fault(0), Fault::under_voltage);
-  EXPECT_EQ(bench.fault(1), Fault::under_voltage);
-}
-
-TEST_F(ClosedLoop, TheGateDriversFaultLineTakesTheForceAtOnce) {
-  press();
-  bench.board->hold_fault_line(true);
-  EXPECT_LE(ticks_until_off(0), 0.1);
-  EXPECT_LE(ticks_until_off(1), 0.1);
-  bench.board->run_for(0.001);
-  EXPECT_EQ(bench.fault(0), Fault::gate_driver);
-  EXPECT_EQ(bench.fault(1), Fault::gate_driver);
-  EXPECT_FALSE(bench.board->healthy());
-}
-
-TEST_F(ClosedLoop, TheEmergencyStopTakesTheForceAtOnce) {
-  press();
-  bench.board->open_emergency_stop(true);
-  EXPECT_LE(ticks_until_off(0), 0.1);
-  EXPECT_LE(ticks_until_off(1), 0.1);
-  bench.board->run_for(0.001);
-  EXPECT_EQ(bench.fault(0), Fault::emergency_stop);
-  EXPECT_FALSE(bench.board->healthy());
 }
 
 /// What a hand that presses on meets when the link is lost, until the bridge is off.
@@ -174,15 +120,6 @@ TEST(ClosedLoopOfALostLink, TheShortedMotorBrakesAndGivesTheHandNothing) {
   }
 }
 
-// Legs B and C carry the DC motor of axis 0; the synchronous motor of axis 1 has three.
-TEST_F(ClosedLoop, AnOpenPhaseTakesTheForceWithinOneTick) {
-  press();
-  bench.world.drive(0).open_terminal(1, true);
-  EXPECT_LE(ticks_until_off(0), one_tick_and_handling);
-  EXPECT_EQ(bench.fault(0), Fault::phase_open);
-  EXPECT_TRUE(bench.board->bridge_armed(1));
-}
-
 // Wherever the rotor stands a phase may carry next to nothing, and then nobody misses it: other places are
 // tried.
 TEST(ClosedLoopOfEachPhase, AnOpenPhaseOfTheSynchronousMotorIsNamed) {
@@ -206,55 +143,6 @@ TEST(ClosedLoopOfEachPhase, AnOpenPhaseOfTheSynchronousMotorIsNamed) {
     }
     EXPECT_TRUE(tried) << terminal;
   }
-}
-
-// A fault is not the end: what caused it gone, the host clears it and arms again.
-TEST_F(ClosedLoop, ComesBackAfterTheFaultLineHasRisen) {
-  press();
-  bench.board->hold_fault_line(true);
-  bench.board->run_for(0.01);
-  bench.board->hold_fault_line(false);
-  bench.board->run_for(0.5);
-  const auto controlword = firmware::register_address(firmware::entry_of<"drive.controlword">(), 0);
-  bench.master->write_register(controlword, 0x80);
-  EXPECT_EQ(bench.fault(0), Fault::none);
-  bench.board->run_for(3.0);  // the person lets go
-  bench.master->arm(0);
-  bench.board->run_for(0.01);
-  EXPECT_TRUE(bench.board->bridge_armed(0));
-}
-
-// The clock security system: NMI, safe state, and a new start from the internal oscillator.
-TEST_F(ClosedLoop, ACrystalThatStopsTakesTheForceAtOnce) {
-  press();
-  const auto resets = bench.board->resets();
-  bench.board->rcc().fail_crystal(bench.board->now());
-  EXPECT_LE(ticks_until_off(0), 0.5);
-  EXPECT_LE(ticks_until_off(1), 0.5);
-  bench.board->run_for(0.1);
-  EXPECT_EQ(bench.board->resets(), resets + 1);
-  EXPECT_FALSE(bench.board->bridge_armed(0));
-}
-
-// Nothing but the clock's interrupt can tell that there are no ticks any more.
-TEST_F(ClosedLoop, TicksThatStopTakeTheForceWithinThreeMilliseconds) {
-  press();
-  bench.board->bus().write(drivers::stm32f4::adc_base + drivers::stm32f4::adc_stride + 0x08, 4, 0,
-                           bench.board->now());
-  bench.board->run_for(0.003);
-  EXPECT_FALSE(bench.board->bridge_armed(0));
-  EXPECT_FALSE(bench.board->bridge_armed(1));
-  bench.board->run_for(0.01);
-  EXPECT_EQ(bench.fault(0), Fault::tick_missed);
-}
-
-TEST_F(ClosedLoop, ABrokenThermistorIsTooHot) {
-  press();
-  bench.world.temperature(0).set_wiring(simulation::TemperatureSensor::Wiring::open);
-  bench.board->run_for(0.005);
-  EXPECT_FALSE(bench.board->bridge_armed(0));
-  EXPECT_TRUE(bench.board->bridge_armed(1));
-  EXPECT_EQ(bench.fault(0), Fault::over_temperature);
 }
 
 // A plug that is off is not forgotten because some parameter has changed.
