@@ -2,46 +2,62 @@
 
 usage: tests/architecture/lone_headers.py FOLDER [--plain]        FOLDER: for what is precompiled
 
-The standard library's headers are read once, precompiled, which halves the time and hides that one of them is missing.
-A header that another one includes before any other of this repository has compiled by itself there, and is not compiled
-again. --plain has nothing precompiled, compiles each and finds that too; it is how the preset plain runs this. On x86 the chip's headers
-compile as well: they name registers but touch none.
+The headers of the standard library and of other libraries are read once, precompiled, which takes a third of the time and
+hides that one of them is missing. So is the costliest of DEAR, for a header that includes it in any case: its place among
+the includes is all that this hides. A header that another one includes before any other of this repository
+has compiled by itself there, and is not compiled again. --plain has nothing precompiled, compiles each and finds that too;
+it is how the preset plain runs this. On x86 the chip's headers compile as well: they name registers but touch none.
 """
 
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from os import cpu_count
 from pathlib import Path
 
 from source_text import includes
 
 ROOT = Path(__file__).resolve().parents[2]
+# What takes the compiler longest, by what each includes.
+DEAR = ["firmware/parameters/parameter_values.hpp", "firmware/canopen/communication_rules.hpp", "host_tools/device/device.hpp",
+        "firmware/application.hpp", "host_tools/simulation/scene.hpp"]
 FLOORS = ["control", "drivers", "firmware", "board", "host_tools"]
 CLANG = ["clang++", "-std=c++20", f"-I{ROOT}", "-isystem", "/usr/include/eigen3", "-DKMAX_AXIS_COUNT=2",
          '-DKMAX_VERSION=""', "-fconstexpr-steps=100000000", "-Wno-pragma-once-outside-header", "-x", "c++-header"]
 
 
-def is_standard(include):
-    """The standard library's headers have neither a folder nor a suffix."""
-    return not include.quoted and "/" not in include.target and "." not in include.target
+def is_library(include):
+    """Of the standard library, whose headers have neither a folder nor a suffix, or in another library's folder."""
+    return not include.quoted and ("/" in include.target or "." not in include.target)
 
 
-def precompiled(folder, headers):
-    """The standard headers of all that the headers include."""
-    folder.mkdir(parents=True, exist_ok=True)
-    names = {include.target for header in headers for include in includes(header.read_text()) if is_standard(include)}
-    listed, result = folder / "standard.hpp", folder / "standard.pch"
-    listed.write_text("".join(f"#include <{name}>\n" for name in sorted(names)))
-    subprocess.run([*CLANG, "-fpch-instantiate-templates", str(listed), "-o", str(result)], check=True)
-    return result
+def precompiled(listed, text, *first):
+    """The compiler's options that bring what `text` includes."""
+    result = listed.with_suffix(".pch")
+    listed.write_text(text)
+    subprocess.run([*CLANG, *first, "-fpch-instantiate-templates", str(listed), "-o", str(result)], check=True)
+    return "-include-pch", str(result)
+
+
+def libraries_of(headers):
+    names = {include.target for header in headers for include in includes(header.read_text()) if is_library(include)}
+    return "".join(f"#include <{name}>\n" for name in sorted(names))
+
+
+@cache
+def included_by(header):
+    """All of this repository that a header includes, whether itself or through others."""
+    path = ROOT / header
+    own = {include.target for include in includes(path.read_text()) if include.quoted} if path.is_file() else set()
+    return own.union(*map(included_by, own))
 
 
 def without_those_that_come_first(headers):
     """Those before which no other one has anything but what is precompiled."""
     firsts = set()
     for header in headers:
-        others = [include for include in includes(header.read_text()) if not is_standard(include)]
+        others = [include for include in includes(header.read_text()) if not is_library(include)]
         if others and others[0].quoted:
             firsts.add(others[0].target)
     return [header for header in headers if str(header.relative_to(ROOT)) not in firsts]
@@ -54,16 +70,25 @@ def message_of(header, first):
 
 
 def main(folder, plain):
-    headers = [header for floor in FLOORS for header in sorted((ROOT / floor).rglob("*.hpp"))]
-    first = [] if plain else ["-include-pch", str(precompiled(folder, headers))]
-    broken = folder / "broken.hpp"
     folder.mkdir(parents=True, exist_ok=True)
+    headers = [header for floor in FLOORS for header in sorted((ROOT / floor).rglob("*.hpp"))]
+    # By how much it includes: what is to be precompiled before a header.
+    ready = [("", ())]
+    if not plain:
+        ready = [("", precompiled(folder / "libraries.hpp", libraries_of(headers)))]
+        ready += [(dear, precompiled(folder / Path(dear).name, f'#include "{dear}"\n', *ready[0][1])) for dear in DEAR]
+
+    def before(header):
+        present = included_by(str(header.relative_to(ROOT)))
+        return [first for dear, first in ready if not dear or dear in present][-1]
+
+    broken = folder / "broken.hpp"
     broken.write_text('#include "control/wall_law.hpp"\ninline kmax::firmware::Axis* nothing() { return nullptr; }\n')
-    if not message_of(broken, first):
+    if not message_of(broken, ready[0][1]):
         sys.exit("the check itself is broken: it does not see what a header lacks")
     compiled = headers if plain else without_those_that_come_first(headers)
     with ThreadPoolExecutor(cpu_count()) as pool:
-        messages = list(pool.map(lambda header: message_of(header, first), compiled))
+        messages = list(pool.map(lambda header: message_of(header, before(header)), compiled))
     print("".join(messages), end="")
     print(f"{len(headers)} headers, {len(compiled)} of them compiled; {sum(map(bool, messages))} lack something")
     return any(messages)

@@ -2,11 +2,14 @@
 // simulated motors; and the self-test with what only this board has.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/selftest/selftest.hpp"
+#include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
 #include "tests/image/image_bench.hpp"
 
@@ -56,10 +59,12 @@ TEST_P(ImageCalibration, FindsTheMotorWithinItsBounds) {
     EXPECT_TRUE(one.good()) << one.name << ": " << one.found << ", truth " << one.truth;
 }
 
-// A minute or more each: the others with --gtest_also_run_disabled_tests. Natively all run each time.
-INSTANTIATE_TEST_SUITE_P(Scenes, ImageCalibration, testing::Values("dc_coreless_a", "gimbal_b"));
-INSTANTIATE_TEST_SUITE_P(DISABLED_OtherScenes, ImageCalibration,
-                         testing::Values("dc_coreless_b", "gimbal_a", "drone"));
+// A minute or more each: a soak (KMAX_SOAK) takes all. Natively all run each time.
+std::vector<const char*> scenes() {
+  if (std::getenv("KMAX_SOAK") == nullptr) return {"gimbal_b"};
+  return {std::begin(kmax::calibration_test::motor_scenes), std::end(kmax::calibration_test::motor_scenes)};
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, ImageCalibration, testing::ValuesIn(scenes()));
 
 TEST(ImageSelfTest, AHealthyBoardPasses) {
   Bench bench("gimbal_a");

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <string>
@@ -20,6 +22,12 @@ namespace kmax::calibration_test {
 
 using host_tools_test::all_settings;
 using host_tools_test::motor_scenes;
+
+/// One of each kind of motor; a soak (KMAX_SOAK) takes all.
+inline std::vector<const char*> representative_scenes() {
+  if (std::getenv("KMAX_SOAK") != nullptr) return {std::begin(motor_scenes), std::end(motor_scenes)};
+  return {"dc_coreless_a", "gimbal_b"};
+}
 
 /// How often a calibration reported its progress.
 struct CalibrationLength {

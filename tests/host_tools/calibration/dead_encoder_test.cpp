@@ -34,7 +34,7 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
 }
 
 class DeadEncoder : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(motor_scenes));
+INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(representative_scenes()));
 
 TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
   const CalibrationSettings settings;

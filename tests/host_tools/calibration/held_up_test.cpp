@@ -58,7 +58,7 @@ CalibrationSettings all_steps() {
 }
 
 class HeldUpCalibration : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, HeldUpCalibration, testing::Values("dc_coreless_a", "gimbal_b"));
+INSTANTIATE_TEST_SUITE_P(Scenes, HeldUpCalibration, testing::ValuesIn(representative_scenes()));
 
 // In each step once, at a place that differs from run to run; the values are as true as ever.
 TEST_P(HeldUpCalibration, OnceInEveryStepFindsWhatIsTrue) {

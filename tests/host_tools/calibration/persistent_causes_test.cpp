@@ -21,7 +21,7 @@ const Cause causes[] = {
 };
 
 class Persistent : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, Persistent, testing::Values("dc_coreless_a", "gimbal_b"));
+INSTANTIATE_TEST_SUITE_P(Scenes, Persistent, testing::ValuesIn(representative_scenes()));
 
 // In the middle of each step. The fault cannot be cleared afterwards: a verdict all the same, and everything
 // is put back.

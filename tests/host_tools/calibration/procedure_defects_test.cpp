@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Defects, testing::ValuesIn(planted()), [](const
 });
 
 class InEveryScene : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, InEveryScene, testing::ValuesIn(motor_scenes));
+INSTANTIATE_TEST_SUITE_P(Scenes, InEveryScene, testing::ValuesIn(representative_scenes()));
 
 // One turned sign against the other: the same remark, and the same cure.
 TEST_P(InEveryScene, WithoutAHandSwappedPhasesAndATurnedEncoderAreCuredAlike) {
