@@ -1,6 +1,7 @@
 """kmax-board as a user runs it: the very image that is flashed, at real speed, set and armed with kmax."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -120,6 +121,19 @@ class Store(unittest.TestCase):
             self.assertEqual(done.returncode, 1)
             self.assertIn("32768", done.stderr)
             self.assertEqual(text.read_text(), "not a store\n")
+
+
+class CanInterface(unittest.TestCase):
+    def test_one_that_has_gone_is_a_cable_pulled_out(self):
+        """The loop that waits for its frames runs the board and sees Ctrl-C: it must not stay there."""
+        with tempfile.TemporaryDirectory() as folder:
+            gone = Path(folder) / "ended_can_socket.so"
+            source = Path(__file__).with_name("ended_can_socket.c")
+            subprocess.run(["cc", "-shared", "-fPIC", "-o", gone, source, "-ldl"], check=True, timeout=PATIENCE)
+            done = subprocess.run([BOARD, ELF, "--can", "can9", "--duration", "0.3"], capture_output=True, text=True,
+                                  timeout=PATIENCE, env={**os.environ, "LD_PRELOAD": str(gone)})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("0.300 s of board time", done.stderr)
 
 
 class BadInput(unittest.TestCase):
