@@ -2,9 +2,11 @@
 
 namespace kmax::firmware {
 
-Application::Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory)
+Application::Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory,
+                         std::span<std::uint32_t> log_memory)
     : board_(board),
-      axes_(board.modulation_limit, parameters_, store_, links_, capture_memory),
+      log_(log_memory, board.reset_cause, board.crash),
+      axes_(board.modulation_limit, parameters_, store_, links_, log_, capture_memory),
       readings_({.board = board_,
                  .parameters = parameters_,
                  .store = store_,
@@ -29,7 +31,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
 
 void Application::poll(std::uint32_t now_us) {
   axes_.begin_poll(now_us);
-  readings_.count_uptime(now_us);
+  log_.count_time(now_us);
   parameters_.poll(now_us);
   serial_.poll(now_us);
   can_.poll();

@@ -7,6 +7,7 @@
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/board_interface/board_readings.hpp"
 #include "firmware/command/axes.hpp"
+#include "firmware/command/fault_log.hpp"
 #include "firmware/command/host_writes.hpp"
 #include "firmware/command/link_states.hpp"
 #include "firmware/command/parameter_access.hpp"
@@ -56,10 +57,11 @@ class Application {
   using Tick = AxesTick<axis_count>;
   static constexpr bool needs_all_positions = Tick::needs_all_positions;
 
-  /// `capture_memory`: for captures, up to capture_words; without it none can be taken. It outlives the
-  /// application.
-  [[gnu::cold]] explicit Application(const BoardIdentity& board,
-                                     std::span<std::uint32_t> capture_memory = {});
+  /// `capture_memory`: for captures, up to capture_words; without it none can be taken. `log_memory`: for the
+  /// fault log, untouched since power-on but by the application before this one; without it none is kept.
+  /// Both outlive the application.
+  [[gnu::cold]] explicit Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory = {},
+                                     std::span<std::uint32_t> log_memory = {});
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 
@@ -114,6 +116,7 @@ class Application {
   ParameterAccess parameters_;
   StoreCommands store_{parameters_};
   LinkStates links_;
+  FaultLog log_;
   Axes axes_;
   HostWrites writes_{parameters_, store_, axes_};
   Readings readings_;

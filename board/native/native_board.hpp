@@ -51,7 +51,8 @@ concept HeldDevice = requires(Device device, std::size_t axis, float force) {
 /// on a wire of modbus.baud_rate, and so do CAN frames, each as long as on a bus without other traffic;
 /// whoever wants real time calls advance() at the pace of a clock.
 ///
-/// A restart that a host asks for (NMT reset node) makes a new Application in the place of the old one.
+/// A restart that a host asks for (NMT reset node) makes a new Application in the place of the old one, over
+/// the same memories.
 template <SimulatedDevice Device>
 class NativeBoard {
  public:
@@ -131,7 +132,7 @@ class NativeBoard {
                                                  .core_clock_hz = 0,
                                                  .clock_source = 4,
                                                  .reset_cause = cause},
-                         capture_memory_);
+                         capture_memory_, log_memory_);
     if (prepare_) prepare_(*application_);
   }
 
@@ -181,7 +182,7 @@ class NativeBoard {
     send_can();
     if (application_->can().restart_wanted()) {
       sending_until_us_ = 0;
-      start(firmware::ResetCause::native);
+      start(firmware::ResetCause::software);
     }
     if constexpr (PoweredDevice<Device>) device_.poll(*application_, now);
     if (sending_until_us_ != 0) {
@@ -198,6 +199,7 @@ class NativeBoard {
 
   Device& device_;
   std::vector<std::uint32_t> capture_memory_;
+  firmware::FaultLogMemory log_memory_{};
   std::function<void(firmware::Application&)> prepare_;
   std::optional<firmware::Application> application_;
   firmware::TickOutput output_{};

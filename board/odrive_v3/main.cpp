@@ -63,6 +63,7 @@ std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_se
 ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, parameter_sector(1)}}}};
 
 /// In the memory beside the buses' RAM.
+[[gnu::section(".ccm_noinit")]] firmware::FaultLogMemory log_memory;
 [[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
 std::optional<firmware::Application> application;
@@ -103,6 +104,7 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
   if (identity.reset_cause == firmware::ResetCause::power_on) cortex::fault_record.magic = 0;
   identity.crash = crash_record_of(cortex::fault_record);
+  cortex::fault_record.reported = true;
   return identity;
 }
 
@@ -172,7 +174,7 @@ void tick_without_power() {
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
-  application.emplace(identity(clocks), capture_memory);
+  application.emplace(identity(clocks), capture_memory, log_memory);
   application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
   priority::set_all(interrupts);

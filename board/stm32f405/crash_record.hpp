@@ -11,6 +11,7 @@ inline firmware::CrashRecord crash_record_of(const drivers::cortex_m::FaultRecor
   using drivers::cortex_m::FaultCause;
   if (kept.magic != drivers::cortex_m::FaultRecord::valid_magic) return crash;
   crash.count = kept.count;
+  crash.is_new = !kept.reported;
   crash.cause = kept.cause == FaultCause::unexpected_interrupt ? firmware::CrashCause::unexpected_interrupt
                                                                : firmware::CrashCause::fault;
   crash.exception_number = static_cast<std::uint16_t>(kept.exception_number);

@@ -32,6 +32,7 @@ namespace {
   fault_record.memory_fault_address = scb().mmfar;
   fault_record.bus_fault_address = scb().bfar;
   fault_record.frame_valid = false;
+  fault_record.reported = false;
   fault_record.magic = FaultRecord::valid_magic;
 }
 

@@ -31,6 +31,7 @@ struct FaultRecord {
   std::uint32_t hard_fault_status;     // HFSR
   std::uint32_t memory_fault_address;  // MMFAR
   std::uint32_t bus_fault_address;     // BFAR
+  bool reported;                       // the application has read it at a start
 };
 
 /// Outside .data and .bss: random after power-on, kept over a reset.

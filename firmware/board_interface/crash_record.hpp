@@ -29,6 +29,7 @@ struct CrashRecord {
   std::uint32_t status = 0;             ///< Cortex-M4 CFSR (PM0214, configurable fault status register)
   std::uint32_t hard_fault_status = 0;  ///< Cortex-M4 HFSR
   std::uint32_t address = 0;            ///< that was accessed; only if `status` says that it is known
+  bool is_new = false;                  ///< it is what ended the run before, not an earlier one
 };
 
 }  // namespace kmax::firmware

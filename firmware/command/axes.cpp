@@ -10,11 +10,12 @@
 namespace kmax::firmware {
 
 Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
-           const LinkStates& links, std::span<std::uint32_t> capture_memory)
+           const LinkStates& links, FaultLog& log, std::span<std::uint32_t> capture_memory)
     : modulation_limit_(modulation_limit),
       parameters_(parameters),
       store_(store),
       links_(links),
+      log_(log),
       settings_(make_settings()),
       tick_(settings_, capture_memory) {
   configure_thermal();
@@ -170,6 +171,19 @@ void Axes::begin_poll(std::uint32_t now_us) {
   poll_temperatures();
 }
 
+void Axes::log_trip(std::size_t axis) {
+  const Fault fault = logged_[axis] = supervisors_[axis].machine().fault();
+  if (fault == Fault::none) return;
+  const Supervisor::Trip& trip = supervisors_[axis].last_trip();
+  const TripRecord& record = trip.record;
+  const double position = static_cast<double>(record.position) * scale_[axis].count_length;
+  // By TripNumber.
+  log_.add_trip(
+      axis, error_code_of(fault), record.tick,
+      {trip.value, trip.bound, static_cast<float>(position), record.velocity, record.force, record.current,
+       record.current_reference, record.supply, trip.power_stage_temperature, trip.winding_temperature});
+}
+
 void Axes::act() {
   for (std::size_t axis = 0; axis < axis_count; ++axis)
     commutation_[axis].follow(parameters_.values(), axis, report_[axis].reference_generation);
@@ -183,6 +197,8 @@ void Axes::act() {
     tick_.leave_share(axis, supervisor.force_share());
     tick_.enable(axis, supervisor.makes_force());
     supervisor.finish_reaction();
+    // One that goes and comes again does so in two calls: what arms an axis is not what finds its fault.
+    if (supervisor.machine().fault() != logged_[axis]) log_trip(axis);
   }
   command_forces();
 }

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "firmware/board_interface/board_readings.hpp"
+#include "firmware/command/fault_log.hpp"
 #include "firmware/command/link_states.hpp"
 #include "firmware/command/store_commands.hpp"
 #include "firmware/drive/axes_tick.hpp"
@@ -32,7 +33,7 @@ class Axes {
 
   /// `modulation_limit`: see BoardIdentity. `capture_memory`: see AxesTick.
   Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
-       const LinkStates& links, std::span<std::uint32_t> capture_memory);
+       const LinkStates& links, FaultLog& log, std::span<std::uint32_t> capture_memory);
   Axes(const Axes&) = delete;
   Axes& operator=(const Axes&) = delete;
 
@@ -72,6 +73,10 @@ class Axes {
   /// The rotor's angle is known, or nobody asks for it.
   bool commutation_known(std::size_t axis) const;
 
+  /// Each fault of an axis is in it by the end of the poll that finds it.
+  FaultLog& log() { return log_; }
+  const FaultLog& log() const { return log_; }
+
   AxesTick<axis_count>& tick() { return tick_; }
   const AxesTick<axis_count>& tick() const { return tick_; }
 
@@ -91,6 +96,7 @@ class Axes {
   [[gnu::cold]] void poll_temperatures();
   void configure_thermal();
   void judge_if_changed();
+  [[gnu::cold]] void log_trip(std::size_t axis);
   bool settled(std::size_t axis) const;
   bool pushes_anothers_axis(std::size_t axis) const;
   Circumstances circumstances_of(std::size_t axis) const;
@@ -100,9 +106,11 @@ class Axes {
   ParameterAccess& parameters_;
   const StoreCommands& store_;
   const LinkStates& links_;
+  FaultLog& log_;
   BoardReadings readings_;
   std::uint32_t now_us_ = 0;
   std::array<Supervisor, axis_count> supervisors_;
+  std::array<Fault, axis_count> logged_{};  ///< the faults that there were when it was last looked
   std::array<ThermalSupervisor, axis_count> thermal_;
   std::array<Commutation, axis_count> commutation_;
   std::array<Scale, axis_count> scale_{};

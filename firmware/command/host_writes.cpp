@@ -6,6 +6,7 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
   const std::size_t entry = owner_of(wanted[0].slot).entry;
   if (entry == entry_of<"store.command">()) return store_.command(wanted[0].raw, axes_.any_armed());
   if (entry == entry_of<"capture.command">()) return command_capture(wanted[0].raw);
+  if (entry == entry_of<"log.command">()) return command_log(wanted[0].raw);
   const auto result = parameters_.write(wanted, by, axes_.armed(), axes_.now_us());
   if (result.refusal == Refusal::none) axes_.note_commander(wanted, by);
   // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come
@@ -16,6 +17,14 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
   else
     axes_.command_forces();
   return result;
+}
+
+ParameterAccess::Result HostWrites::command_log(std::uint32_t command) {
+  const Refusal refusal = command != 1        ? Refusal::out_of_range
+                          : axes_.any_armed() ? Refusal::while_armed
+                                              : Refusal::none;
+  if (refusal == Refusal::none) axes_.log().erase();
+  return parameters_.refuse_slot(refusal, slot_of(entry_of<"log.command">(), 0));
 }
 
 ParameterAccess::Result HostWrites::command_capture(std::uint32_t command) {

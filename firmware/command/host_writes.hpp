@@ -9,17 +9,18 @@
 
 namespace kmax::firmware {
 
-/// What hosts write, by whichever link: parameters, controlwords and targets, or one command to the store or
-/// the capture. Main loop only; why something was refused is also in refusal.reason.
+/// What hosts write, by whichever link: parameters, controlwords and targets, or one command to the store,
+/// the capture or the fault log. Main loop only; why something was refused is also in refusal.reason.
 class HostWrites {
  public:
   HostWrites(ParameterAccess& parameters, StoreCommands& store, Axes& axes)
       : parameters_(parameters), store_(store), axes_(axes) {}
 
-  /// store.command and capture.command come alone; `wanted` is not empty.
+  /// store.command, capture.command and log.command come alone; `wanted` is not empty.
   ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
 
  private:
+  ParameterAccess::Result command_log(std::uint32_t command);
   /// Begins a capture with the settings capture.*, or ends it.
   ParameterAccess::Result command_capture(std::uint32_t command);
 

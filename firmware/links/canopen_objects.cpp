@@ -118,6 +118,9 @@ Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint
       size = 4 * readings.taken * readings.channels;
       return Abort::none;
     }
+    case SpecialObject::fault_log:
+      size = 4 * fault_log_words;
+      return Abort::none;
     case SpecialObject::scratch:
       size = scratch_size_;
       return Abort::none;
@@ -180,6 +183,9 @@ Abort CanopenObjects::read_special(const canopen::SpecialPlace& place, std::uint
     case SpecialObject::capture_samples:
       if (!of_.axes.tick().capture().readable()) return Abort::device_state;  // another capture has begun
       put_words(offset, out, [&](std::uint32_t word) { return of_.axes.tick().capture().value_at(word); });
+      return Abort::none;
+    case SpecialObject::fault_log:
+      put_words(offset, out, [&](std::uint32_t word) { return of_.axes.log().word(subindex - 1U, word); });
       return Abort::none;
     case SpecialObject::scratch:
       canopen::copy_bytes(std::span(scratch_).subspan(offset, out.size()), out);

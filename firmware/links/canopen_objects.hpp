@@ -34,7 +34,7 @@ class CanopenObjects {
     StoreCommands& store;
     HostWrites& writes;
     Readings& readings;
-    Axes& axes;  ///< their trace and captures
+    Axes& axes;  ///< their trace, captures and fault log
     LinkState& state;
     canopen::Node<CanopenObjects>& node;
     std::string_view board_name;

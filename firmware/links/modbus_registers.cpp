@@ -32,6 +32,14 @@ Exception ModbusRegisters::read_input(std::uint16_t address, std::span<std::uint
       out[i] = of_.axes.tick().capture().word_at(static_cast<std::uint16_t>(address + i));
     return Exception::none;
   }
+  if (address >= fault_log_window && last < fault_log_window + fault_log_registers) {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const std::size_t at = address - fault_log_window + i;
+      const std::uint32_t word = of_.axes.log().word(at / (2 * fault_log_words), at / 2 % fault_log_words);
+      out[i] = static_cast<std::uint16_t>(at % 2 == 0 ? word >> 16 : word);
+    }
+    return Exception::none;
+  }
   if (!modbus::readable(false, address, out.size())) return Exception::illegal_data_address;
   of_.readings.refresh();
   modbus::read_registers(of_.parameters, false, address, out);

@@ -15,8 +15,8 @@ namespace kmax::firmware {
 
 class ModbusEdge;
 
-/// The device as Modbus sees it (modbus::RegisterBank): parameters and readings, the windows of the trace and
-/// the capture, and the texts of the device identification. Main loop only.
+/// The device as Modbus sees it (modbus::RegisterBank): parameters and readings, the windows of the trace,
+/// the capture and the fault log, and the texts of the device identification. Main loop only.
 class ModbusRegisters {
  public:
   /// What the registers stand for. The edge is used from the first request on, not before.
@@ -24,7 +24,7 @@ class ModbusRegisters {
     ParameterAccess& parameters;
     HostWrites& writes;
     Readings& readings;
-    Axes& axes;  ///< their trace and captures
+    Axes& axes;  ///< their trace, captures and fault log
     LinkState& state;
     const ModbusEdge& edge;
     std::string_view board_name;

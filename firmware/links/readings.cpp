@@ -9,15 +9,6 @@
 
 namespace kmax::firmware {
 
-void Readings::count_uptime(std::uint32_t now_us) {
-  if (!started_) second_us_ = now_us;
-  started_ = true;
-  while (now_us - second_us_ >= 1'000'000) {
-    second_us_ += 1'000'000;
-    ++uptime_s_;
-  }
-}
-
 void Readings::refresh() {
   for (std::size_t axis = 0; axis < axis_count; ++axis) refresh_axis(axis);
   refresh_device();
@@ -163,7 +154,7 @@ void Readings::refresh_device() {
   v.set_whole<"info.tick_rate">(tick_rate_hz);
   v.set_whole<"info.core_clock">(of_.board.core_clock_hz);
   v.set_whole<"info.clock_source">(of_.board.clock_source);
-  v.set_whole<"info.uptime">(uptime_s_);
+  v.set_whole<"info.uptime">(of_.axes.log().uptime_s());
   v.set_whole<"info.tick">(of_.axes.report(0).tick);
 
   v.set_whole<"counters.missed_ticks">(of_.axes.readings().missed_ticks);
@@ -175,6 +166,8 @@ void Readings::refresh_device() {
   of_.can.publish(v);
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(of_.parameters.last_refusal().refusal));
   v.set_whole<"refusal.register">(of_.parameters.last_refusal().address);
+  v.set_whole<"log.newest">(of_.axes.log().newest());
+  v.set_whole<"log.start">(of_.axes.log().start());
   v.set_whole<"trace.next">(of_.axes.tick().trace().next());
 }
 

@@ -28,8 +28,6 @@ class Readings {
   };
   explicit Readings(const Sources& sources) : of_(sources) {}
 
-  /// In every poll.
-  void count_uptime(std::uint32_t now_us);
   void refresh();
   /// Only those of the axis, or of the device, that this slot belongs to.
   void refresh(std::size_t slot);
@@ -43,8 +41,6 @@ class Readings {
   bool saturated(std::size_t axis) const;
 
   Sources of_;
-  std::uint32_t second_us_ = 0, uptime_s_ = 0;
-  bool started_ = false;
 };
 
 }  // namespace kmax::firmware

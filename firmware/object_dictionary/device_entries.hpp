@@ -29,6 +29,8 @@ inline constexpr Group capture_command{"capture", 0x581A, Scope::device, 0x2140}
 inline constexpr Group capture_status{"capture", 0x5819, Scope::device, 0x20F0};
 inline constexpr Group can_status{"can", 0x581B, Scope::device, 0x2160};
 inline constexpr Group telemetry_state{"telemetry", 0x581C, Scope::device, 0x21C0};
+inline constexpr Group log{"log", 0x5829, Scope::device, 0x2200};
+inline constexpr Group log_status{"log", 0x582A, Scope::device, 0x2200};
 }  // namespace group
 
 namespace names {
@@ -289,6 +291,16 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "measured.flags of both axes: axis 0 in the low byte, axis 1 in the high one."),
     reading("telemetry.tick", group::telemetry_state, 2, Type::unsigned16, "ticks",
             "Low 16 bits of the tick at which the values of the PDOs were taken."),
+
+    whole("log.command", group::log, 1, Type::unsigned16, "", 0, 1, 0,
+          "1 erases the fault log, while no axis is armed; reads as 0.")
+        .volatile_value(),
+
+    reading("log.newest", group::log_status, 1, Type::unsigned32, "",
+            "Number of the newest entry of the fault log, which outlives resets but no loss of power; 0: "
+            "none yet. 'kmax faults' shows it."),
+    reading("log.start", group::log_status, 2, Type::unsigned16, "",
+            "How many starts there have been since power-on, with this one."),
 });
 
 }  // namespace kmax::firmware

@@ -31,10 +31,10 @@ constexpr std::size_t axes_of(const Entry& entry, std::size_t axes) {
   return entry.scope() == Scope::axis ? axes : 1;
 }
 
-/// One of the two tables; the windows of the trace and of captures are in that of the input registers.
+/// One of the two tables; the windows of memories are in that of the input registers.
 template <std::size_t axes>
 constexpr bool registers_are_apart(bool holding) {
-  std::array<Place, axes * entry_count + 2> places{};
+  std::array<Place, axes * entry_count + 3> places{};
   std::size_t count = 0;
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& entry = entry_at(i);
@@ -47,6 +47,7 @@ constexpr bool registers_are_apart(bool holding) {
   if (!holding) {
     places[count++] = {trace_window, trace_window + trace_words_per_record * trace_capacity - 1};
     places[count++] = {capture_window, capture_window + 2 * capture_words - 1};
+    places[count++] = {fault_log_window, fault_log_window + fault_log_registers - 1U};
   }
   return apart(places, count) && places[count - 1].last <= 0xFFFF;
 }

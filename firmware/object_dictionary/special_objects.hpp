@@ -25,6 +25,7 @@ enum class SpecialObject : std::uint8_t {
   trace_records,        ///< 0x5820:1 to 64, eight records of the trace window each, little-endian
   capture_samples,      ///< 0x5821:1, all values of a complete capture, 32 bits each
   scratch,              ///< 0x5822:1, keeps what is written, for trying transfers
+  fault_log,            ///< 0x5828:1 to 16, an entry each with its CRC, little-endian
 };
 
 enum class ObjectType : std::uint8_t { unsigned8, unsigned32, visible_string, domain };
@@ -82,6 +83,9 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
      ObjectAccessKind::read_only, 0, "All values of a complete capture, 32 bits each."},
     {SpecialObject::scratch, "Scratch pad", 0x5822, 1, 1, ObjectType::domain, ObjectAccessKind::read_write, 0,
      "Keeps up to 2048 bytes in RAM, for trying a bus and its transfers."},
+    {SpecialObject::fault_log, "Fault log entry", 0x5828, 1, fault_log_entries, ObjectType::domain,
+     ObjectAccessKind::read_only, 0,
+     "The entry whose number modulo 16 is one less than the sub-index, 16 words of 32 bits; zeros: none."},
 });
 
 }  // namespace kmax::firmware

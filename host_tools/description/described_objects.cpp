@@ -99,6 +99,7 @@ DescribedObject described(const SpecialObjectRow& row, std::uint8_t subindex) {
   if (row.type == ObjectType::unsigned32) object.length = 4;
   if (object.length != 0 && object.access != ObjectAccess::read_only) object.default_raw = row.default_value;
   if (row.what == SpecialObject::trace_records) object.length = firmware::trace_object_bytes;
+  if (row.what == SpecialObject::fault_log) object.length = 4 * firmware::fault_log_words;
   return object;
 }
 

@@ -73,6 +73,10 @@ class Link {
   /// The first `count` 32-bit words of the completed capture (firmware/capture/capture.hpp).
   virtual std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) = 0;
 
+  /// The words of the fault log's entry at `place` (firmware/command/fault_log.hpp) and its CRC, all zeros if
+  /// there is none.
+  virtual std::vector<std::uint32_t> read_log_entry(std::size_t place) = 0;
+
   /// Texts of the device's identification by the standard names of Modbus (function 43/14) in snake case:
   /// vendor_name, product_code, revision, product_name, model_name, ... Empty if the device offers none.
   virtual std::map<std::string, std::string> identify() { return {}; }

@@ -142,6 +142,8 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
       fail(parameter, "it is a command, not a value; use 'kmax arm', 'disarm', 'stop' or 'clear'");
     if (parameter.entry() == firmware::entry_of<"transaction.control">())
       fail(parameter, "it is what 'kmax set' itself uses to set all values at once");
+    if (parameter.entry() == firmware::entry_of<"log.command">())
+      fail(parameter, "it is a command, not a value; use 'kmax faults --clear'");
     if (parameter.entry() == firmware::entry_of<"store.command">())
       fail(parameter, "it is a command, not a value; use 'kmax save' or 'kmax defaults'");
     for (const Assignment& other : assignments) {

@@ -16,6 +16,7 @@ void add_store_commands(CLI::App& app, Context& context);           // save, def
 void add_info_command(CLI::App& app, Context& context);
 void add_devices_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
+void add_faults_command(CLI::App& app, Context& context);
 void add_watch_command(CLI::App& app, Context& context);
 void add_record_command(CLI::App& app, Context& context);
 void add_capture_command(CLI::App& app, Context& context);
@@ -33,11 +34,12 @@ void add_describe_command(CLI::App& app, Context& context);
 
 std::span<const AddCommand> all_commands() {
   static constexpr std::array commands = {
-      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_info_command,
-      &add_devices_command,    &add_drive_commands,          &add_watch_command,      &add_record_command,
-      &add_capture_command,    &add_calibrate_command,       &add_selftest_command,   &add_wall_command,
-      &add_check_command,      &add_simulate_command,        &add_experiment_command, &add_plot_command,
-      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command};
+      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,    &add_info_command,
+      &add_devices_command,    &add_drive_commands,          &add_faults_command,    &add_watch_command,
+      &add_record_command,     &add_capture_command,         &add_calibrate_command, &add_selftest_command,
+      &add_wall_command,       &add_check_command,           &add_simulate_command,  &add_experiment_command,
+      &add_plot_command,       &add_lines_commands,          &add_flash_command,     &add_serve_command,
+      &add_describe_command};
   return commands;
 }
 

@@ -127,16 +127,25 @@ std::vector<std::uint32_t> CanLink::read_words(SdoClient::Object object, std::si
   }
 }
 
+std::vector<std::uint32_t> CanLink::read_object(SdoClient::Object object, std::size_t bytes) {
+  auto words = read_words(object, bytes);
+  if (4 * words.size() != bytes)
+    throw LinkError(fmt::format("{}: object {} of node {} has {} bytes instead of {}", address_.path,
+                                text_of(object), address_.node, 4 * words.size(), bytes));
+  return words;
+}
+
+std::vector<std::uint32_t> CanLink::read_log_entry(std::size_t place) {
+  return read_object({index_of(SpecialObject::fault_log), static_cast<std::uint8_t>(place + 1)},
+                     4 * firmware::fault_log_words);
+}
+
 std::vector<std::uint32_t> CanLink::read_trace(std::size_t first, std::size_t count) {
   std::vector<std::uint32_t> words;
   for (std::size_t at = first; at < first + count;) {
     const SdoClient::Object object{index_of(SpecialObject::trace_records),
                                    static_cast<std::uint8_t>(at / records_per_object + 1)};
-    const auto piece = read_words(object, firmware::trace_object_bytes);
-    if (4 * piece.size() != firmware::trace_object_bytes)
-      throw LinkError(fmt::format("{}: object {} of node {} has {} bytes instead of {}", address_.path,
-                                  text_of(object), address_.node, 4 * piece.size(),
-                                  firmware::trace_object_bytes));
+    const auto piece = read_object(object, firmware::trace_object_bytes);
     const std::size_t skipped = at % records_per_object;
     const std::size_t taken = std::min(records_per_object - skipped, first + count - at);
     const auto begin = piece.begin() + static_cast<std::ptrdiff_t>(skipped * words_per_record);

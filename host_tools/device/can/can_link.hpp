@@ -42,6 +42,7 @@ class CanLink final : public Link {
              const std::function<void()>& before_request = {}) override;
   std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
+  std::vector<std::uint32_t> read_log_entry(std::size_t place) override;
   std::map<std::string, std::string> identify() override;
   std::string description() const override { return text_of(address_); }
   void wait(std::chrono::microseconds duration) override { lock_.yield(duration); }
@@ -53,6 +54,8 @@ class CanLink final : public Link {
   std::uint32_t read(std::size_t slot);
   std::vector<std::uint32_t> read_words(SdoClient::Object object, std::size_t bytes,
                                         const SdoClient::ReportProgress& progress = {});
+  /// One that has exactly so many bytes.
+  std::vector<std::uint32_t> read_object(SdoClient::Object object, std::size_t bytes);
   void claim(const SlotValue& next);
   void keep_alive();
 

@@ -132,6 +132,12 @@ std::vector<std::uint32_t> RegisterLink::read_capture(std::size_t count, const P
   return joined(all);
 }
 
+std::vector<std::uint32_t> RegisterLink::read_log_entry(std::size_t place) {
+  constexpr std::uint16_t registers = 2 * firmware::fault_log_words;
+  return joined(
+      read_input(static_cast<std::uint16_t>(firmware::fault_log_window + place * registers), registers));
+}
+
 std::map<std::string, std::string> RegisterLink::identify() {
   std::map<std::string, std::string> texts;
   std::uint8_t first = 0;

@@ -52,6 +52,7 @@ class RegisterLink : public Link {
              const std::function<void()>& before_request = {}) override;
   std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
+  std::vector<std::uint32_t> read_log_entry(std::size_t place) override;
   std::map<std::string, std::string> identify() override;
 
   /// Exactly `count` registers, 1..read_count_max.

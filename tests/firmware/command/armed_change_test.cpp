@@ -209,8 +209,8 @@ TEST_F(WhileArmed, EveryEntryHasTheRuleThatItsDangerAsksFor) {
   // Of the device: what only reads, what asks for something that is refused while armed, and what takes
   // effect at the next start.
   const std::set<std::string_view> anytime_by_anybody = {
-      "drive.controlword", "link.sign_of_life",   "node.id",
-      "can.bit_rate",      "transaction.control", "store.command"};
+      "drive.controlword",   "link.sign_of_life", "node.id",    "can.bit_rate",
+      "transaction.control", "store.command",     "log.command"};
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& e = entry_at(i);
     if (e.access == Access::read_only) continue;
