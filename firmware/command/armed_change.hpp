@@ -60,6 +60,9 @@ constexpr Refusal armed_change_refusal(const ParameterValues& now, const SlotVal
   // Such a change restarts every axis' estimators.
   if (descriptor.disarmed_only()) return Refusal::while_armed;
   if (is_anothers && descriptor.of_commander) return Refusal::other_commander;
+  const bool fades = descriptor.per_axis && armed.fades[axis];
+  // A force that goes does not come back. The number is for the next arming.
+  if (fades && descriptor.of_commander && entry != entry_of<"drive.commander">()) return Refusal::while_armed;
   if (descriptor.change() == Change::any_time) return Refusal::none;
   if (descriptor.per_axis && !armed.axis[axis]) return Refusal::none;
   // The other way round is not nearer: within one tick the force would turn.
@@ -67,8 +70,9 @@ constexpr Refusal armed_change_refusal(const ParameterValues& now, const SlotVal
       descriptor.change() == Change::only_nearer_zero &&
       armed_change::number_of(descriptor, raw) * armed_change::number_of(descriptor, now.raw(slot)) < 0.0f;
   float loosest = turns ? 0.0f : armed_change::looseness(descriptor, now.raw(slot));
+  // A ceiling is its commander's.
   for (const auto& ceiling : armed_change::ceilings) {
-    if (ceiling.of == entry)
+    if (ceiling.of == entry && !is_anothers && !fades)
       loosest = std::max(loosest, std::bit_cast<float>(now.raw(slot_of(ceiling.entry, axis))));
   }
   return armed_change::looseness(descriptor, raw) <= loosest ? Refusal::none : Refusal::only_tightens;

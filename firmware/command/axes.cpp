@@ -27,6 +27,7 @@ ArmedAxes Axes::armed() const {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     armed.axis[axis] = supervisors_[axis].makes_force();
     armed.commander[axis] = supervisors_[axis].commander();
+    armed.fades[axis] = armed.axis[axis] && !supervisors_[axis].armed();
   }
   return armed;
 }

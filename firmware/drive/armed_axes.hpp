@@ -22,6 +22,7 @@ struct Controlword {
 struct ArmedAxes {
   std::array<bool, axis_count> axis{};
   std::array<Link, axis_count> commander{};
+  std::array<bool, axis_count> fades{};  ///< its commander was lost: nobody commands it, and its force goes
 
   constexpr ArmedAxes() = default;
   /// All or none.

@@ -111,19 +111,19 @@ void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float
 void Supervisor::begin_reaction(const Situation& now, std::size_t axis) {
   const auto kind = now.values.choice<LinkLoss, "link.loss">();
   if (kind == LinkLoss::limp || mode_of(now.values, axis) == DriveMode::excitation) return;
-  reaction_ = Reaction{kind, now.report.tick, now.report.tick, 1.0f};
-  go_on_with_reaction(now, axis);
+  const float ramp = now.values.real<"force.ramp_time">(axis) * static_cast<float>(tick_rate_hz);
+  reaction_ = Reaction{kind, now.report.tick, now.report.tick, ramp, 1.0f};
+  go_on_with_reaction(now);
 }
 
-void Supervisor::go_on_with_reaction(const Situation& now, std::size_t axis) {
+void Supervisor::go_on_with_reaction(const Situation& now) {
   Reaction& reaction = *reaction_;
   const std::uint32_t now_tick = now.report.tick, elapsed = now_tick - reaction.began;
   bool over = now.report.fault != Fault::none || now.ticks_have_stopped || elapsed > longest_reaction;
   if (reaction.kind == LinkLoss::ramp) {
-    const float ramp = now.values.real<"force.ramp_time">(axis) * static_cast<float>(tick_rate_hz);
     const auto gone = static_cast<float>(elapsed);
-    over = over || !(gone < ramp);
-    reaction.share = over ? 0.0f : 1.0f - gone / ramp;
+    over = over || !(gone < reaction.ramp);
+    reaction.share = over ? 0.0f : 1.0f - gone / reaction.ramp;
   } else {
     const float velocity = now.report.haptic.velocity;
     if (!(velocity < standstill && velocity > -standstill)) reaction.moved_last = now_tick;
@@ -184,7 +184,7 @@ void Supervisor::obey(const Situation& now, std::size_t axis) {
   const bool arms = machine_.asks_to_enable(word, by);
   if (arms && !now.settled) return;
   const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
-  halted_ = halted(word) || (halted_ && makes_force() && by != commander_);
+  halted_ = halted(word) || (halted_ && makes_force() && (by != commander_ || reaction_));
   machine_.command(word, by, obstacle_to_arming(now, axis), cause_remains(now),
                    {.stay_in_quick_stop = stays});
   waiting_.reset();
@@ -196,7 +196,7 @@ void Supervisor::poll(const Situation& now, std::size_t axis) {
   if (armed())
     watch(now, axis);
   else if (reaction_)
-    go_on_with_reaction(now, axis);
+    go_on_with_reaction(now);
   if (waiting_) obey(now, axis);
   if (claimed_ && !makes_force()) {
     claimed_ = false;

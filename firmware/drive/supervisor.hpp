@@ -111,7 +111,7 @@ class Supervisor {
   void watch(const Situation& now, std::size_t axis);
   void obey(const Situation& now, std::size_t axis);
   [[gnu::cold]] void begin_reaction(const Situation& now, std::size_t axis);
-  [[gnu::cold]] void go_on_with_reaction(const Situation& now, std::size_t axis);
+  [[gnu::cold]] void go_on_with_reaction(const Situation& now);
   // Rare: small code rather than fast code.
   [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, std::size_t axis) const;
   [[gnu::cold]] bool cause_remains(const Situation& now) const;
@@ -120,6 +120,7 @@ class Supervisor {
   struct Reaction {
     LinkLoss kind;
     std::uint32_t began, moved_last;
+    float ramp;  ///< ticks, as it was then
     float share;
   };
 
@@ -132,7 +133,7 @@ class Supervisor {
   std::array<std::uint16_t, link_count> next_number_{};
   std::uint32_t signed_us_ = 0;
   bool claimed_ = false;  ///< somebody has armed it, or tried to: the next one's number is another
-  bool halted_ = false;   ///< who does not command may begin a halt and not end it
+  bool halted_ = false;   ///< who does not command, or no longer, may begin a halt and not end it
 };
 
 }  // namespace kmax::firmware

@@ -44,7 +44,7 @@ enum class Access : std::uint8_t { read_only, read_write, communication };
 /// When and how a value may be changed; by whom, Group::of_commander says. disarmed_only ones would make the
 /// force jump or the scale change under the hand, or cut a commander off. The others bound what a hand may
 /// feel, and one direction of theirs is safe: while the axis is armed they go only there (a device entry:
-/// while any axis is), or the other way as far as a ceiling that was set before arming.
+/// while any axis is), or, for their commander, the other way as far as a ceiling that was set before arming.
 enum class Change : std::uint8_t {
   any_time,
   disarmed_only,

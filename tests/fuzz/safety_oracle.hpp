@@ -15,6 +15,7 @@
 // 4. Every setting is finite and within its bounds, at all times.
 //
 // 5. While an axis is armed, its bounds only get tighter, or looser as far as a ceiling that was set before.
+// While its force fades, no looser at all, and what its commander asks of it stays as it was.
 //
 // Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
 // allows what they could mean at most: it never complains of what is right.
@@ -290,6 +291,10 @@ class SafetyOracle {
     const auto [entry, of_axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
     if (entry == entry_of<"modbus.unit">()) unit_before_ = static_cast<std::uint8_t>(values_.raw(slot));
+    const bool fades = e.scope() == Scope::axis && before[of_axis] == DriveState::fault_reaction_active &&
+                       states_[of_axis] == before[of_axis];
+    if (fades && e.group.of_commander && entry != entry_of<"drive.commander">())
+      complain("changed while its force fades", of_axis, e.name);
     bool any_armed = false, armed = false;
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       const bool stayed = before[axis] == DriveState::operation_enabled && states_[axis] == before[axis];
@@ -301,9 +306,9 @@ class SafetyOracle {
       if (any_armed) complain("changed while armed", of_axis, e.name);
       return;
     }
-    if (!armed) return;
+    if (!armed && !fades) return;
     double loosest = looseness(e, number_from_raw(e.type, values_.raw(slot)));
-    if (!e.ceiling.empty()) {
+    if (!e.ceiling.empty() && !fades) {
       const std::size_t ceiling = slot_of(find_entry(e.ceiling), of_axis);
       loosest = std::max(loosest, number_from_raw(Type::float32, values_.raw(ceiling)));
     }

@@ -2,6 +2,8 @@
 // of an entry leaves no wrong one, and that power-on leaves none.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "host_tools/device/fault_log.hpp"
 #include "tests/image/can_bench.hpp"
 
@@ -37,7 +39,7 @@ class Bench : public CanBench {
   /// An instruction of the image that looks like this is next.
   std::uint32_t go_on_with(std::uint16_t instruction, std::uint16_t mask) {
     const auto flash = board->bus().flash();
-    for (std::size_t at = 0xC000; at + 1 < flash.size(); at += 2) {
+    for (std::size_t at = 98 * sizeof(std::uint32_t); at + 1 < flash.size(); at += 2) {
       if (((flash[at] | flash[at + 1] << 8) & mask) != instruction) continue;
       const auto address = static_cast<std::uint32_t>(virtual_board::memory_map::flash.base + at);
       board->processor().set_core_register(15, address);
@@ -126,13 +128,17 @@ TEST(ImageFaultLog, NamesTheCrashOnceAndWhereItWas) {
 TEST(ImageFaultLog, AResetInTheMiddleOfAnEntryLeavesItWholeOrOut) {
   Bench bench;
   std::size_t entries = 0, with = 0, without = 0;
-  // By board time: the main loop's poll after the stop writes the entry.
-  constexpr double instants = 24, spread_s = 120e-6;
-  for (double i = 0; i < instants; ++i) {
+  const auto memory = bench.board->bus().ccm();
+  // Half a microsecond later each time, from its first store on.
+  for (int i = 0; i < 24; ++i) {
     for (const unsigned word : {0x00, 0x80, 0x00, 0x06, 0x0F}) bench.command(word);
     ASSERT_TRUE(bench.board->bridge_armed(0));
+    const std::vector<std::uint8_t> before(memory.begin(), memory.end());
     bench.board->open_emergency_stop(true);
-    bench.board->run_for(spread_s * i / instants);
+    for (int waited = 0; waited < 4000 && std::ranges::equal(before, memory); ++waited)
+      bench.board->run_for(0.5e-6);
+    ASSERT_FALSE(std::ranges::equal(before, memory));
+    bench.board->run_for(0.5e-6 * i);
     bench.board->pull_reset();
     bench.board->open_emergency_stop(false);
     bench.start();

@@ -151,6 +151,15 @@ TEST_F(WhileArmed, ATransactionBeganDisarmedIsJudgedByWhatIsArmedWhenItIsApplied
             Refusal::none);
 }
 
+TEST_F(WhileArmed, AnotherLinkLoosensNothingUpToACeiling) {
+  ASSERT_EQ(set("force.ceiling", 10), Refusal::none);
+  ASSERT_EQ(set("force.limit", 3), Refusal::none);
+  const ArmedAxes over_can = only(0, Link::can);
+  EXPECT_EQ(set_armed("force.limit", 8, 0, over_can, Link::serial), Refusal::only_tightens);
+  EXPECT_EQ(set_armed("force.limit", 8, 0, over_can, Link::can), Refusal::none) << "its commander";
+  EXPECT_EQ(set_armed("force.limit", 2, 0, over_can, Link::serial), Refusal::none);
+}
+
 TEST_F(WhileArmed, AStoredSetIsNoWayRound) {
   ParameterValues looser = registers.values();
   looser.set_real<"force.limit">(10.0f, 0);
