@@ -25,7 +25,8 @@ device::Assignment assignment_of(const std::string& name, const simulation::Para
   const device::Parameter parameter = device::resolve(name);
   if (!parameter.writable())
     throw device::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
-  if (parameter == device::Parameter::of<"store.command">())
+  if (parameter == device::Parameter::of<"store.command">() ||
+      parameter == device::Parameter::of<"log.command">())
     throw device::ValueError(fmt::format("{} is a command, not a value; leave it out of the scene", name));
   return {parameter, device::parse_value(parameter, text_of(value))};
 }

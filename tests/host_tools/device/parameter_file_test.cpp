@@ -182,6 +182,7 @@ TEST(ParameterFile, EveryBadLineIsNamedWithWhatIsAllowed) {
            {"measured.position = 0", "measured or fixed and can only be read"},
            {"drive.controlword = 15", "use 'kmax arm'"},
            {"store.command = 1", "use 'kmax save' or 'kmax defaults'"},
+           {"log.command = 1", "use 'kmax faults --clear'"},
            {"transaction.control = 1", "what 'kmax set' itself uses"},
            {"trace.interval = 1", "trace.interval: 'kmax save' does not keep it"},
            {"excitation.run = 1", "no place in a file of parameters"},

@@ -264,6 +264,18 @@ TEST(CanLink, ACaptureIsOneTransfer) {
   EXPECT_EQ(bench.can.node.count(0xA4), 1u) << "one initiation, with CRC";
 }
 
+TEST(CanLink, AnEntryOfTheFaultLogIsOneObject) {
+  Bench bench;
+  const Bytes entry = host_tools_test::some_bytes(64);
+  bench.can.special = [&](Object object) -> std::variant<Bytes, Abort> {
+    if (object.index != index_of(firmware::SpecialObject::fault_log)) return Abort::none;
+    return object.subindex == 16 ? entry : Bytes(60);
+  };
+  EXPECT_EQ(bench.link().read_log_entry(15), words_of(entry));
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { bench.link().read_log_entry(0); }),
+                  "has 60 bytes instead of 64");
+}
+
 TEST(CanLink, APartOfACapture) {
   Bench bench;
   const Bytes all = host_tools_test::some_bytes(4000);
