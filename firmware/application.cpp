@@ -25,7 +25,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
             .writes = writes_,
             .readings = readings_,
             .axes = axes_,
-            .state = links_[Link::can]}) {
+            .links = links_}) {
   readings_.refresh();
 }
 

@@ -38,8 +38,12 @@ struct NodeEvents {
 ///   SDO, SYNC, emergency                           x               x
 ///   PDO                                                            x
 ///
-/// `Objects`: ObjectAccess, PdoSource, and `bool take(slot, raw)` for what PDOs bring. Frames are sent in the
-/// order boot-up and heartbeat, emergency, PDO, SDO, LSS; the controller sorts them by identifier.
+/// `Objects`: SharedObjectAccess, PdoSource, and `bool take(slot, raw)` for what PDOs bring. Frames are sent
+/// in the order boot-up and heartbeat, SYNC, emergency, PDO, SDO, LSS; the controller sorts them by
+/// identifier.
+///
+/// There are two SDO servers, the second one where object 0x1201 says. Each has its own transfer; if both
+/// have something to send, they take turns. One whose channel has changed ends what it has under way first.
 ///
 /// After bus-off a transfer under way is dropped and the state follows canopen.error_behaviour.
 ///
@@ -49,7 +53,7 @@ class Node {
  public:
   /// `pdo_interval_us`: of poll_pdos().
   Node(Objects& objects, const LssIdentity& identity, std::uint32_t pdo_interval_us)
-      : objects_(objects), lss_(identity), sdo_(objects), pdo_interval_us_(pdo_interval_us) {}
+      : objects_(objects), lss_(identity), pdo_interval_us_(pdo_interval_us) {}
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
@@ -74,18 +78,14 @@ class Node {
     heartbeats_.start();
     stop_pdos();
     configure(values, now_us);
-    sdo_silent_ = !nmt_.configured();
-    if (sdo_silent_) {
-      sdo_.stop();
-    } else {
-      sdo_.start(node_id());
-    }
+    stop_sdo();
+    if (nmt_.configured()) start_if_silent();
   }
 
   /// CANopen's own settings have changed.
   void configure(const ParameterValues& values, std::uint32_t now_us) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    sync_.configure(stored<"canopen.sync_cob_id">(values));
+    configure_sync(values);
     emergency_.configure(resolved_cob_id(stored<"canopen.emergency_cob_id">(values), cob_id::emergency, id),
                          static_cast<std::uint16_t>(stored<"canopen.emergency_inhibit_time">(values)));
     const std::uint16_t heartbeat_ms = heartbeat_time_in(values);
@@ -99,6 +99,7 @@ class Node {
         emergency_.clear(0x8130, source_of(*forgotten));
     }
     error_behaviour_ = stored<"canopen.error_behaviour">(values);
+    second_channel_ = second_channel_in(values);
     rpdos_.configure(values, id);
     if (nmt_.state() == NmtState::operational) configure_tpdos(values);
     list_identifiers(id);
@@ -113,8 +114,8 @@ class Node {
       follow(nmt_.receive(frame), values, events);
     } else if (id == cob_id::lss_request) {
       act_on(lss_.receive(frame, now_us), values, events);
-    } else if (nmt_.configured() && id == cob_id::sdo_request + node_id()) {
-      if (speaks()) sdo_.receive(frame, now_us);
+    } else if (auto* const server = server_of(id)) {
+      if (speaks()) server->receive(frame, now_us);
     } else if (nmt_.configured() && only_ours(id)) {
       ++identity_conflicts_;
     } else {
@@ -131,15 +132,19 @@ class Node {
     }
     if (events.heartbeat_lost) communication_error(events);
     act_on(lss_.poll(now_us), values, events);
-    sdo_.poll(now_us);
+    for (auto& server : sdo_) server.poll(now_us);
+    if (!sdo_silent_ && sdo_[1].channel() != second_channel_ && !sdo_[1].busy())
+      sdo_[1].start(second_channel_);
     return events;
   }
 
-  /// For PDOs that go by time, which have a clock of their own: `pdo_us` goes on by the interval from call to
-  /// call, also if a call is late. So a PDO goes with the same one of so many calls, and with values at the
-  /// same distance, however long the calls before took and whatever comes between them.
-  void poll_pdos(std::uint32_t pdo_us) {
+  /// For PDOs that go by time and own SYNCs, which have a clock of their own: `pdo_us` goes on by the
+  /// interval from call to call, also if a call is late. So a PDO goes with the same one of so many calls,
+  /// and with values at the same distance, however long the calls before took and whatever comes between
+  /// them.
+  void poll_pdos(std::uint32_t pdo_us, std::uint32_t now_us) {
     pdo_us_ = pdo_us;
+    if (speaks() && sync_.poll(pdo_us_)) act_on_sync(now_us);
     if (nmt_.state() != NmtState::operational) return;
     tpdos_.poll(pdo_us_);
     tpdos_.read_due(objects_);
@@ -148,15 +153,16 @@ class Node {
   /// The next frame to send, if there is one; it counts as sent.
   [[nodiscard]] bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
     if (lss_.quiet()) return false;
-    return nmt_.next_frame(out, now_us) || emergency_.next_frame(out, nmt_.state(), now_us) ||
+    return nmt_.next_frame(out, now_us) || (speaks() && sync_.next_frame(out)) ||
+           emergency_.next_frame(out, nmt_.state(), now_us) ||
            (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
-           (speaks() && sdo_.next_frame(out, now_us)) || lss_.next_frame(out);
+           (speaks() && next_answer(out, now_us)) || lss_.next_frame(out);
   }
 
   /// The controller has gone off the bus.
   [[nodiscard]] NodeEvents bus_off() {
     NodeEvents events;
-    if (nmt_.configured()) sdo_.start(node_id());
+    if (nmt_.configured()) start_sdo();
     communication_error(events);
     return events;
   }
@@ -170,13 +176,16 @@ class Node {
   const CanSettings& settings() const { return settings_; }
   bool any_heartbeat_lost() const { return heartbeats_.any_lost(); }
 
-  const SdoCounters& sdo_counters() const { return sdo_.counters(); }
+  /// Of the server at `number`, 0 or 1.
+  const SdoCounters& sdo_counters(std::size_t number) const { return sdo_[number].counters(); }
   const HeartbeatConsumerCounters& heartbeat_counters() const { return heartbeats_.counters(); }
   const TpdoCounters& tpdo_counters() const { return tpdos_.counters(); }
   const RpdoCounters& rpdo_counters() const { return rpdos_.counters(); }
   std::uint32_t identity_conflicts() const { return identity_conflicts_; }
 
  private:
+  using Server = SdoServer<ServedObjects<Objects>>;
+
   /// As it was stored when the node last started: what LSS has given since may differ.
   struct Identity {
     std::uint8_t node_id = 1;
@@ -208,18 +217,27 @@ class Node {
   }
 
   void receive_data(const drivers::CanFrame& frame, std::uint32_t now_us, NodeEvents& events) {
-    const auto write = [this](std::size_t slot, std::uint32_t raw) { return objects_.take(slot, raw); };
     if (frame.identifier > cob_id::heartbeat && frame.identifier <= cob_id::heartbeat + highest_node_id) {
       const std::uint32_t before = heartbeats_.counters().heartbeats;
       if (const auto back = heartbeats_.receive(frame, now_us)) emergency_.clear(0x8130, source_of(*back));
       events.heartbeat = heartbeats_.counters().heartbeats != before;
-    } else if (speaks() && sync_.receive(frame)) {
-      if (nmt_.state() != NmtState::operational) return;
-      rpdos_.on_sync(write, now_us);
-      tpdos_.on_sync();
+    } else if (speaks() && sync_.receives(frame)) {
+      report(frame.length != sync_.length(), 0x8240);
+      if (frame.length <= 1) act_on_sync(now_us);
     } else if (nmt_.state() == NmtState::operational) {
-      tell_pdo(rpdos_.receive(frame, write, now_us));
+      tell_pdo(rpdos_.receive(frame, take_value(), now_us));
     }
+  }
+
+  auto take_value() {
+    return [this](std::size_t slot, std::uint32_t raw) { return objects_.take(slot, raw); };
+  }
+
+  /// Heard or own.
+  void act_on_sync(std::uint32_t now_us) {
+    if (nmt_.state() != NmtState::operational) return;
+    rpdos_.on_sync(take_value(), now_us);
+    tpdos_.on_sync();
   }
 
   void tell_pdo(RpdoResult result) {
@@ -242,20 +260,19 @@ class Node {
       case NmtEvent::none:
         break;
       case NmtEvent::entered_operational:
-        sdo_start_if_silent();
+        start_if_silent();
         rpdos_.configure(values, node_id());
         configure_tpdos(values);
         break;
       case NmtEvent::entered_pre_operational:
-        sdo_start_if_silent();
+        start_if_silent();
         stop_pdos();
         events.pdos_ended = true;
         break;
       case NmtEvent::entered_stopped:
         events.remove_force = true;
         stop_pdos();
-        sdo_.stop();
-        sdo_silent_ = true;
+        stop_sdo();
         break;
       case NmtEvent::reset_node:
         events.remove_force = events.reset_node = true;
@@ -278,14 +295,54 @@ class Node {
     tpdos_.configure(values, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
   }
 
-  void sdo_start_if_silent() {
-    if (sdo_silent_) sdo_.start(node_id());
+  /// After the start, or NMT stop.
+  void start_if_silent() {
+    if (!sdo_silent_) return;
     sdo_silent_ = false;
+    start_sdo();
+    sync_.start(pdo_us_);
+  }
+  void start_sdo() {
+    sdo_[0].start(SdoChannel::predefined(node_id()));
+    sdo_[1].start(second_channel_);
+  }
+  void stop_sdo() {
+    for (auto& server : sdo_) server.stop();
+    sdo_silent_ = true;
+  }
+  Server* server_of(std::uint32_t request) {
+    for (auto& server : sdo_) {
+      if (request == server.channel().request) return &server;
+    }
+    return nullptr;
+  }
+  bool next_answer(drivers::CanFrame& out, std::uint32_t now_us) {
+    const std::size_t other = 1 - answered_last_;
+    if (sdo_[other].next_frame(out, now_us)) {
+      answered_last_ = other;
+      return true;
+    }
+    return sdo_[answered_last_].next_frame(out, now_us);
+  }
+  SdoChannel second_channel_in(const ParameterValues& values) const {
+    const std::uint32_t request = stored<"sdo_server_2.request_cob_id">(values),
+                        response = stored<"sdo_server_2.response_cob_id">(values);
+    const auto bad = [](std::uint32_t id) { return id > cob_id::identifier || cob_id::restricted(id); };
+    if (!nmt_.configured() || bad(request) || bad(response) || request == response) return {};
+    return {static_cast<std::uint16_t>(request), static_cast<std::uint16_t>(response)};
+  }
+  void configure_sync(const ParameterValues& values) {
+    sync_.configure(
+        {.cob_id = stored<"canopen.sync_cob_id">(values),
+         .period_us = stored<"canopen.sync_period">(values),
+         .counter_overflow = static_cast<std::uint8_t>(stored<"canopen.sync_counter_overflow">(values))},
+        lss_.active_bit_rate(), pdo_us_);
   }
 
   void act_on(LssAction action, const ParameterValues& values, NodeEvents& events) {
     if (action == LssAction::switch_bit_rate) {
       settings_.bit_rate = lss_.active_bit_rate();
+      configure_sync(values);
       // What went often enough at the rate before may fill the bus at this one.
       if (nmt_.state() == NmtState::operational) configure_tpdos(values);
     }
@@ -302,8 +359,7 @@ class Node {
       }
     } else if (error_behaviour_ == 2 && nmt_.enter(NmtState::stopped) != NmtEvent::none) {
       stop_pdos();
-      sdo_.stop();
-      sdo_silent_ = true;
+      stop_sdo();
       events.remove_force = true;
     }
   }
@@ -322,8 +378,9 @@ class Node {
       listen(sync_.identifier());
       listen(cob_id::sdo_request + id);
       listen(cob_id::sdo_response + id);
+      if (second_channel_ != SdoChannel{}) listen(second_channel_.request);
       listen(cob_id::heartbeat + id);
-      for (std::size_t i = 0; i < pdo_count; ++i) {
+      for (std::size_t i = 0; i < rpdo_count; ++i) {
         if (const auto identifier = rpdos_.identifier(i)) listen(*identifier);
       }
       for (const std::uint32_t watched : watched_) {
@@ -340,7 +397,11 @@ class Node {
   Emergency emergency_;
   HeartbeatConsumer heartbeats_;
   Sync sync_;
-  SdoServer<Objects> sdo_;
+  std::array<ServedObjects<Objects>, 2> served_{ServedObjects<Objects>(objects_, 0),
+                                                ServedObjects<Objects>(objects_, 1)};
+  std::array<Server, 2> sdo_{Server(served_[0]), Server(served_[1])};
+  std::size_t answered_last_ = 0;  // of the two
+  SdoChannel second_channel_;
   std::uint32_t pdo_interval_us_, pdo_us_ = 0;
   Tpdos tpdos_;
   Rpdos rpdos_;

@@ -13,6 +13,14 @@ namespace kmax::firmware::canopen {
 /// As this device sees them.
 enum class PdoKind : std::uint8_t { receive, transmit };
 
+constexpr std::size_t pdo_count_of(PdoKind kind) {
+  return kind == PdoKind::transmit ? tpdo_count : rpdo_count;
+}
+/// The predefined COB-ID, without the node ID.
+constexpr std::uint32_t predefined_cob_id(PdoKind kind, std::size_t pdo) {
+  return kind == PdoKind::transmit ? cob_id::tpdo[pdo] : cob_id::rpdo[pdo];
+}
+
 inline constexpr std::size_t pdo_bits_max = 64;
 inline constexpr std::size_t mapped_max = 8;
 
@@ -77,9 +85,9 @@ struct PdoSlots {
 };
 
 inline constexpr auto pdo_slots = [] {
-  std::array<std::array<PdoSlots, pdo_count>, 2> all{};
+  std::array<std::array<PdoSlots, tpdo_count>, 2> all{};
   for (std::uint16_t kind = 0; kind < 2; ++kind) {
-    for (std::uint16_t n = 0; n < pdo_count; ++n) {
+    for (std::uint16_t n = 0; n < pdo_count_of(static_cast<PdoKind>(kind)); ++n) {
       const auto at = [&](unsigned index, std::uint8_t subindex) {
         return static_cast<std::uint16_t>(
             slot_at({static_cast<std::uint16_t>(index + 0x400U * kind + n), subindex}).value());

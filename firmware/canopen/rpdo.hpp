@@ -44,7 +44,7 @@ class Rpdos {
   /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were
   /// still have what they keep for the next SYNC.
   void configure(const ParameterValues& values, std::uint8_t node_id) {
-    for (std::size_t i = 0; i < pdo_count; ++i) {
+    for (std::size_t i = 0; i < rpdo_count; ++i) {
       PdoSettings settings;
       (void)read_pdo(PdoKind::receive, i, values, node_id, settings);  // else it does not exist
       if (settings != pdos_[i].settings) pdos_[i] = {.settings = settings};
@@ -123,7 +123,7 @@ class Rpdos {
     }
   }
 
-  std::array<Pdo, pdo_count> pdos_{};
+  std::array<Pdo, rpdo_count> pdos_{};
   RpdoCounters counters_;
 };
 

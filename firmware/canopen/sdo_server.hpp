@@ -15,11 +15,11 @@
 #include "firmware/canopen/sdo_source.hpp"
 #include "firmware/object_dictionary/cob_id.hpp"
 
-// The SDO server of a CANopen device (CiA 301 v4.2, 7.2.4): one channel, request 0x600 + node ID, response
-// 0x580 + node ID. Expedited, segmented and block transfers in both directions.
+// An SDO server of a CANopen device (CiA 301 v4.2, 7.2.4) on one channel, which is the predefined one of a
+// node or any other pair of identifiers. Expedited, segmented and block transfers in both directions.
 //
-//   SdoServer server(objects);   server.start(node_id);
-//   loop:  for each frame of 0x600 + node ID: server.receive(frame, now);
+//   SdoServer server(objects);   server.start(SdoChannel::predefined(node_id));
+//   loop:  for each frame of the request's identifier: server.receive(frame, now);
 //          server.poll(now);
 //          while (room to send && server.next_frame(frame, now)) send(frame);
 //
@@ -58,6 +58,18 @@ struct SdoConfig {
   std::uint8_t download_block_size = 31;
 };
 
+/// The identifiers that a client asks by and is answered by; both 0: none.
+struct SdoChannel {
+  std::uint16_t request = 0, response = 0;
+
+  /// Of a node ID, 1 to 127.
+  static constexpr SdoChannel predefined(std::uint8_t node_id) {
+    return {static_cast<std::uint16_t>(cob_id::sdo_request + node_id),
+            static_cast<std::uint16_t>(cob_id::sdo_response + node_id)};
+  }
+  friend constexpr bool operator==(const SdoChannel&, const SdoChannel&) = default;
+};
+
 /// They wrap.
 struct SdoCounters {
   std::uint32_t aborts_sent = 0;        ///< refused or failed, time-outs included
@@ -77,25 +89,22 @@ class SdoServer {
   SdoServer(const SdoServer&) = delete;
   SdoServer& operator=(const SdoServer&) = delete;
 
-  /// Serves under this node ID, 1 to 127. A transfer under way and an answer that waits are dropped.
-  void start(std::uint8_t node_id) {
-    stop();
-    node_id_ = node_id;
-  }
-
-  /// Silent until the next start, as NMT state Stopped demands.
-  void stop() {
-    node_id_ = 0;
+  /// Serves on this channel; on none it is silent. A transfer under way and an answer that waits are dropped.
+  void start(SdoChannel channel) {
+    channel_ = channel;
     transfer_ = Transfer::none;
     answer_waits_ = false;
   }
 
+  /// Silent until the next start, as NMT state Stopped demands.
+  void stop() { start({}); }
+
+  SdoChannel channel() const { return channel_; }
+
   void receive(const drivers::CanFrame& frame, std::uint32_t now_us) {
-    if (node_id_ == 0) return;
-    if (frame.extended || frame.remote || frame.length != 8 ||
-        frame.identifier != cob_id::sdo_request + node_id_) {
+    if (channel_ == SdoChannel{} || frame.extended || frame.remote || frame.length != 8 ||
+        frame.identifier != channel_.request)
       return;
-    }
     last_us_ = now_us;
     cut_ = false;
     if (transfer_ == Transfer::block_download && block_download_.takes(frame.data)) {
@@ -127,7 +136,7 @@ class SdoServer {
     }
     answer_waits_ = false;
     if (!cut_) last_us_ = now_us;
-    out.identifier = cob_id::sdo_response + node_id_;
+    out.identifier = channel_.response;
     out.extended = false;
     out.remote = false;
     out.length = 8;
@@ -329,7 +338,7 @@ class SdoServer {
 
   void answer(const SdoBytes& bytes) {
     answer_ = bytes;
-    answer_waits_ = node_id_ != 0;  // the object written may have stopped the server
+    answer_waits_ = channel_ != SdoChannel{};  // the object written may have stopped the server
   }
 
   /// Ends the transfer; the abort names its object, or 0 when there is none.
@@ -341,7 +350,7 @@ class SdoServer {
 
   Objects* objects_;
   SdoConfig config_;
-  std::uint8_t node_id_ = 0;  // 0: stopped
+  SdoChannel channel_;
   Transfer transfer_ = Transfer::none;
   bool answer_waits_ = false;
   bool cut_ = false;         // the silence under way has been answered with an acknowledgement

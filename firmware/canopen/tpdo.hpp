@@ -24,7 +24,7 @@ struct TpdoCounters {
   std::uint32_t held_back = 0;  ///< due again before the bus had room for it: its newer values were sent
 };
 
-/// The PDOs that this device sends (CiA 301, 7.2.2; objects 0x1800 to 0x1803 and 0x1A00 to 0x1A03). They go
+/// The PDOs that this device sends (CiA 301, 7.2.2; objects 0x1800 to 0x1804 and 0x1A00 to 0x1A04). They go
 /// in the NMT state operational: between configure() and stop().
 ///
 ///   transmission type   due
@@ -39,7 +39,7 @@ struct TpdoCounters {
 /// settings leaves the others' grid.
 ///
 /// All PDOs that are due at one moment are read together, by read_due() or else when the first of them is
-/// fetched, and go in the order 1 to 4. If one is due again before it was fetched, it goes once, with newer
+/// fetched, and go in the order 1 to 5. If one is due again before it was fetched, it goes once, with newer
 /// values; and on a bus that never has room for all of them each gets its turn.
 ///
 /// The inhibit time (types 254 and 255) is the least time between two frames of a PDO as they are fetched.
@@ -50,18 +50,17 @@ struct TpdoCounters {
 /// first one that its type counts.
 ///
 /// `now_us` wraps at 2^32; call poll() at least every 100 ms, and poll() before next_frame(). Main loop only.
-/// Cost: poll() and next_frame() with nothing to do: 4 and 8 comparisons. A batch: one refresh(), and one
-/// value() for each object of the PDOs that are due. Memory: 368 bytes.
+/// Cost: poll() and next_frame() with nothing to do: 5 and 10 comparisons. A batch: one refresh(), and one
+/// value() for each object of the PDOs that are due. Memory: 460 bytes.
 class Tpdos {
  public:
   /// When communication starts, and whenever a setting has changed: PDOs whose settings are as they were go
   /// on undisturbed.
   void configure(const ParameterValues& values, std::uint8_t node_id, std::uint32_t bit_rate,
                  std::uint32_t now_us) {
-    const std::uint32_t slowest = std::max<std::uint32_t>(bit_rate, 1000);
-    const std::uint32_t least_us = std::max<std::uint32_t>(1000, 1'000'000'000U / slowest);
-    std::array<bool, pdo_count> starts{};
-    for (std::size_t i = 0; i < pdo_count; ++i) {
+    const std::uint32_t least_us = least_period_us(bit_rate);
+    std::array<bool, tpdo_count> starts{};
+    for (std::size_t i = 0; i < tpdo_count; ++i) {
       PdoSettings settings;
       (void)read_pdo(PdoKind::transmit, i, values, node_id, settings);  // else it does not exist
       const std::uint32_t period_us = std::max(settings.event_us, least_us);
@@ -74,7 +73,7 @@ class Tpdos {
              .inhibited = pdo.inhibited && settings.exists && !settings.synchronous() &&
                           settings.identifier == pdo.settings.identifier};
     }
-    for (std::size_t i = 0; i < pdo_count; ++i) {
+    for (std::size_t i = 0; i < tpdo_count; ++i) {
       if (!starts[i]) continue;
       pdos_[i].due_us = first_due(pdos_[i].period_us, starts, now_us);
       starts[i] = false;
@@ -131,8 +130,8 @@ class Tpdos {
     }
     if (!anything) return false;
     read_due(source);
-    for (std::size_t i = 0; i < pdo_count; ++i) {
-      const std::size_t n = (next_ + i) % pdo_count;
+    for (std::size_t i = 0; i < tpdo_count; ++i) {
+      const std::size_t n = (next_ + i) % tpdo_count;
       if (!pdos_[n].ready()) continue;
       fill(out, pdos_[n], now_us);
       const bool more = std::any_of(pdos_.begin(), pdos_.end(), [](const Pdo& pdo) { return pdo.ready(); });
@@ -177,10 +176,10 @@ class Tpdos {
   }
 
   // On the grid of a PDO of the same period that goes already, else on that of any other, else now.
-  std::uint32_t first_due(std::uint32_t period_us, const std::array<bool, pdo_count>& starts,
+  std::uint32_t first_due(std::uint32_t period_us, const std::array<bool, tpdo_count>& starts,
                           std::uint32_t now_us) const {
     const Pdo* other = nullptr;
-    for (std::size_t i = 0; i < pdo_count; ++i) {
+    for (std::size_t i = 0; i < tpdo_count; ++i) {
       if (starts[i] || !pdos_[i].timed()) continue;
       if (other == nullptr || pdos_[i].period_us == period_us) other = &pdos_[i];
     }
@@ -216,7 +215,7 @@ class Tpdos {
     pdo.inhibited = pdo.timed() && pdo.settings.inhibit_us != 0;
   }
 
-  std::array<Pdo, pdo_count> pdos_{};
+  std::array<Pdo, tpdo_count> pdos_{};
   std::size_t next_ = 0;  // looked at first: goes on where a batch was left
   TpdoCounters counters_;
 };

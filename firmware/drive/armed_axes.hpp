@@ -7,10 +7,16 @@
 
 namespace kmax::firmware {
 
-/// From where a host reaches the parameters; `local`: the board or the scene that holds the application.
-/// Clients behind one link cannot be told apart: the device has one Modbus unit and one SDO server.
-enum class Link : std::uint8_t { serial, can, local };
-inline constexpr std::size_t link_count = 3;
+/// From where a host reaches the parameters; `local`: the board or the scene that holds the application;
+/// `can_2`: the second SDO server. Clients behind one link cannot be told apart: the device has one Modbus
+/// unit, and two SDO servers. Nor does a PDO say who sends it: while CAN commands its axis it is the
+/// commander's, else that of `can`.
+enum class Link : std::uint8_t { serial, can, local, can_2 };
+inline constexpr std::size_t link_count = 4;
+inline constexpr std::array can_links{Link::can, Link::can_2};
+constexpr bool is_can(Link link) {
+  return link == Link::can || link == Link::can_2;
+}
 
 /// A controlword, and who wrote it.
 struct Controlword {

@@ -16,6 +16,12 @@ namespace kmax::firmware {
 /// profile.supported_modes: CiA 402 bit 9, and the manufacturer's bits for haptic and excitation.
 inline constexpr std::uint32_t supported_drive_modes = 1u << 9 | 1u << 16 | 1u << 17;
 
+/// profile.digital_inputs. The board names one cause at a time, the emergency stop before all others.
+constexpr std::uint32_t digital_inputs_of(const AxisReport& report) {
+  return (report.condition == Fault::emergency_stop ? 1u << 16 : 0u) |
+         (report.condition == Fault::gate_driver ? 1u << 17 : 0u) | (report.referenced ? 1u << 18 : 0u);
+}
+
 /// The nearest whole number, as the pattern of a value of 16 bits with its sign; what is beyond stays at the
 /// end of the range, and what is not a number is 0.
 constexpr std::uint32_t integer16_of(float value) {
@@ -66,6 +72,7 @@ constexpr void publish_profile(ParameterValues& values, std::size_t axis, const 
   values.set_whole<"profile.current">(integer16_of(1e3f * current / static_cast<float>(milliamperes)), axis);
   values.set_whole<"profile.supported_modes">(supported_drive_modes, axis);
   values.set_whole<"profile.device_type">(device_type_of_axis, axis);
+  values.set_whole<"profile.digital_inputs">(digital_inputs_of(report), axis);
   values.set_whole<"telemetry.current">(integer16_of(current), axis);
 }
 

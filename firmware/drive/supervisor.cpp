@@ -66,7 +66,7 @@ Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) c
   if (now.store_busy) return Refusal::store_busy;  // an erase stops the tick
   if (now.restarting) return Refusal::restarting;
   if (now.pushes_anothers_axis) return Refusal::other_commander;
-  if (commander_ == Link::can && now.heartbeat_lost) return Refusal::heartbeat_missing;
+  if (is_can(commander_) && now.heartbeat_lost) return Refusal::heartbeat_missing;
   if (now.report.condition != Fault::none) return refusal_for(now.report.condition);
   if (now.thermal.power_stage_too_hot()) return Refusal::too_hot;
   if (now.thermal.motor_too_hot()) return Refusal::motor_too_hot;
@@ -150,7 +150,7 @@ void Supervisor::watch(const Situation& now, std::size_t axis) {
     const auto silent_us = static_cast<float>(*now.silent_us);
     if (silent_us > timeout * 1e6f) trip(now, axis, Fault::link_silent, silent_us * 1e-6f, timeout);
   }
-  if (commander_ == Link::can && now.off_the_bus) trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
+  if (is_can(commander_) && now.off_the_bus) trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
 }
 
 bool Supervisor::cause_remains(const Situation& now) const {

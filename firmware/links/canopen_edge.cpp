@@ -7,13 +7,14 @@ CanopenEdge::CanopenEdge(const Sources& sources)
       store_(sources.store),
       writes_(sources.writes),
       axes_(sources.axes),
-      state_(sources.state),
+      links_(sources.links),
+      state_(links_[Link::can]),
       objects_({.parameters = sources.parameters,
                 .store = sources.store,
                 .writes = sources.writes,
                 .readings = sources.readings,
                 .axes = sources.axes,
-                .state = sources.state,
+                .links = sources.links,
                 .node = node_,
                 .board_name = sources.board.board_name}),
       node_(objects_,
@@ -34,7 +35,7 @@ void CanopenEdge::power_on() {
 
 /// A host resets the communication, which then has the settings of the last start again.
 void CanopenEdge::reset_communication() {
-  parameters_.drop(Link::can, axes_.now_us());
+  for (const Link link : can_links) parameters_.drop(link, axes_.now_us());
   store_.power_on_communication().put_back(parameters_.values());
   configured_communication_ = parameters_.communication_changes();
   start_node();
@@ -65,7 +66,7 @@ void CanopenEdge::poll() {
     node_.configure(parameters_.values(), now_us);
   }
   act_on(node_.poll(parameters_.values(), now_us));
-  if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us);
+  if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us, now_us);
   const bool bus_off = readings_.state == CanState::bus_off;
   if (bus_off && !was_bus_off_) act_on(node_.bus_off());
   was_bus_off_ = bus_off;
@@ -74,14 +75,15 @@ void CanopenEdge::poll() {
 }
 
 void CanopenEdge::act_on(const canopen::NodeEvents& events) {
-  if (events.heartbeat) state_.heard_us = axes_.now_us();
   state_.heartbeat_lost = node_.any_heartbeat_lost();
-  if (events.heartbeat_lost) axes_.trip_all_of(Link::can, Fault::heartbeat_lost);
+  for (const Link link : can_links) {
+    if (events.heartbeat) links_[link].heard_us = axes_.now_us();
+    if (events.heartbeat_lost) axes_.trip_all_of(link, Fault::heartbeat_lost);
+  }
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     // Nobody can change the target any more.
     const bool without_target =
-        events.pdos_ended && axes_.supervisor(axis).armed() &&
-        axes_.supervisor(axis).commander() == Link::can &&
+        events.pdos_ended && axes_.supervisor(axis).armed() && is_can(axes_.supervisor(axis).commander()) &&
         parameters_.values().choice<DriveMode, "drive.mode">(axis) == DriveMode::torque;
     if (events.remove_force || without_target) axes_.disarm(axis);
   }
@@ -152,8 +154,9 @@ void CanopenEdge::publish(ParameterValues& values) const {
   values.set_whole<"can.queue_overflows">(queue_.overflows());
   values.set_whole<"can.bus_offs">(readings_.bus_offs);
   values.set_whole<"can.discarded">(readings_.discarded);
-  values.set_whole<"can.sdo_aborts">(node_.sdo_counters().aborts_sent);
-  values.set_whole<"can.sdo_timeouts">(node_.sdo_counters().timeouts);
+  const auto &first = node_.sdo_counters(0), &second = node_.sdo_counters(1);
+  values.set_whole<"can.sdo_aborts">(first.aborts_sent + second.aborts_sent);
+  values.set_whole<"can.sdo_timeouts">(first.timeouts + second.timeouts);
   values.set_whole<"can.rpdo_refused">(node_.rpdo_counters().refused);
   values.set_whole<"can.pdo_length_errors">(node_.rpdo_counters().too_short);
   values.set_whole<"can.tpdo_held_back">(node_.tpdo_counters().held_back);

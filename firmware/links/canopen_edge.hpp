@@ -43,7 +43,7 @@ class CanopenEdge {
     HostWrites& writes;
     Readings& readings;
     Axes& axes;
-    LinkState& state;
+    LinkStates& links;
   };
   explicit CanopenEdge(const Sources& sources);
   CanopenEdge(const CanopenEdge&) = delete;
@@ -81,7 +81,8 @@ class CanopenEdge {
   StoreCommands& store_;
   HostWrites& writes_;
   Axes& axes_;
-  LinkState& state_;
+  LinkStates& links_;
+  LinkState& state_;  ///< of the bus, whichever server is asked
   CanReadings readings_;
   EmergencyReports emergencies_;
   RoundClock rounds_;

@@ -102,6 +102,8 @@ Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint
     case SpecialObject::device_type:
     case SpecialObject::store_parameters:
     case SpecialObject::restore_defaults:
+    case SpecialObject::sdo_request:
+    case SpecialObject::sdo_response:
       size = 4;
       return Abort::none;
     case SpecialObject::device_name:
@@ -148,6 +150,10 @@ std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std:
       return emergency.history_count();
     case SpecialObject::error_history:
       return emergency.history_at(subindex - 1U);
+    case SpecialObject::sdo_request:
+      return canopen::cob_id::sdo_request + of_.node.node_id();
+    case SpecialObject::sdo_response:
+      return canopen::cob_id::sdo_response + of_.node.node_id();
     default:
       return 1;  // 0x1010, 0x1011: on command
   }
@@ -227,14 +233,23 @@ Abort CanopenObjects::write_begin(ObjectAddress address, canopen::WriteBounds& b
   return Abort::none;
 }
 
-Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t> in) {
+/// What is longer than a read of it: the scratch pad, and a capture after which another one has been taken.
+std::uint32_t CanopenObjects::version(ObjectAddress address) const {
+  const canopen::SpecialPlace* const special = canopen::special_at(address);
+  if (special == nullptr) return 0;
+  if (special->what == SpecialObject::scratch) return scratch_version_;
+  if (special->what != SpecialObject::capture_samples) return 0;
+  return of_.axes.tick().capture().readings().first_tick;
+}
+
+Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t> in, std::uint8_t server) {
   std::optional<std::size_t> slot;
   const canopen::SpecialPlace* special = nullptr;
   if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
   if (special != nullptr) return write_special(*special, in);
   if (!slot) return Abort::read_only;
   const std::uint32_t raw = extended(descriptors[owner_of(*slot).entry].type, little_endian(in));
-  return write_slot(*slot, raw);
+  return write_slot(*slot, raw, can_links[server]);
 }
 
 Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in) {
@@ -252,6 +267,7 @@ Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::spa
     case SpecialObject::scratch:
       canopen::copy_bytes(in, scratch_);
       scratch_size_ = static_cast<std::uint32_t>(in.size());
+      ++scratch_version_;
       return Abort::none;
     default:
       return Abort::read_only;
@@ -260,16 +276,17 @@ Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::spa
 
 /// A command is a sign of life of whoever commands, if it is taken; before it acts, since the command to arm
 /// needs it. A setting is none, in a PDO or not: any tool on the bus may write one.
-Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw) {
-  if (!acts_at_once(slot)) return set_slot(slot, raw);
-  const auto before = of_.state.heard_us;
-  of_.state.heard_us = of_.axes.now_us();
-  const Abort abort = set_slot(slot, raw);
-  if (abort != Abort::none) of_.state.heard_us = before;
+Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, Link by) {
+  if (!acts_at_once(slot)) return set_slot(slot, raw, by);
+  auto& heard_us = of_.links[by].heard_us;
+  const auto before = heard_us;
+  heard_us = of_.axes.now_us();
+  const Abort abort = set_slot(slot, raw, by);
+  if (abort != Abort::none) heard_us = before;
   return abort;
 }
 
-Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw) {
+Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw, Link by) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
     const std::uint8_t node_id = of_.node.node_id();
@@ -280,7 +297,7 @@ Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw) {
                      raw);
   }
   const SlotValue one{slot, raw};
-  return abort_for(of_.writes.write({&one, 1}, Link::can).refusal, descriptor, raw);
+  return abort_for(of_.writes.write({&one, 1}, by).refusal, descriptor, raw);
 }
 
 void CanopenObjects::refresh() {
@@ -293,7 +310,9 @@ std::uint32_t CanopenObjects::value(std::size_t slot) const {
 }
 
 bool CanopenObjects::take(std::size_t slot, std::uint32_t raw) {
-  return write_slot(slot, raw) == Abort::none;
+  const Supervisor& supervisor = of_.axes.supervisor(owner_of(slot).axis);
+  const bool commanded = supervisor.makes_force() && is_can(supervisor.commander());
+  return write_slot(slot, raw, commanded ? supervisor.commander() : Link::can) == Abort::none;
 }
 
 }  // namespace kmax::firmware

@@ -35,7 +35,7 @@ class CanopenObjects {
     HostWrites& writes;
     Readings& readings;
     Axes& axes;  ///< their trace, captures and fault log
-    LinkState& state;
+    LinkStates& links;
     canopen::Node<CanopenObjects>& node;
     std::string_view board_name;
   };
@@ -46,7 +46,9 @@ class CanopenObjects {
   canopen::Abort read_begin(canopen::ObjectAddress address, std::uint32_t& size);
   canopen::Abort read(canopen::ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out);
   canopen::Abort write_begin(canopen::ObjectAddress address, canopen::WriteBounds& bounds);
-  canopen::Abort write(canopen::ObjectAddress address, std::span<const std::uint8_t> in);
+  /// `server`: 0 or 1, the SDO server that it came by; see can_links.
+  canopen::Abort write(canopen::ObjectAddress address, std::span<const std::uint8_t> in, std::uint8_t server);
+  std::uint32_t version(canopen::ObjectAddress address) const;
 
   void refresh();
   std::uint32_t value(std::size_t slot) const;
@@ -61,14 +63,14 @@ class CanopenObjects {
   canopen::Abort read_special(const canopen::SpecialPlace& place, std::uint8_t subindex, std::uint32_t offset,
                               std::span<std::uint8_t> out) const;
   canopen::Abort write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in);
-  canopen::Abort write_slot(std::size_t slot, std::uint32_t raw);
-  canopen::Abort set_slot(std::size_t slot, std::uint32_t raw);
+  canopen::Abort write_slot(std::size_t slot, std::uint32_t raw, Link by);
+  canopen::Abort set_slot(std::size_t slot, std::uint32_t raw, Link by);
   std::uint32_t number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const;
   std::span<const char> text_of(SpecialObject what) const;
 
   Sources of_;
   std::array<std::uint8_t, scratch_bytes> scratch_{};
-  std::uint32_t scratch_size_ = 0;
+  std::uint32_t scratch_size_ = 0, scratch_version_ = 0;
 };
 
 }  // namespace kmax::firmware

@@ -94,6 +94,13 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
     reading("profile.device_type", group::profile_actual, 8, unsigned32, "",
             "CiA 402 device type of this axis: servo drive.")
         .at_standard_index(0x67FF),
+    reading(
+        "profile.digital_inputs", group::profile_actual, 9, unsigned32, "",
+        "CiA 402 digital inputs. Bit 16: the emergency stop is pressed or its line open; 17: the gate driver "
+        "pulled its fault line and is not reset yet (not seen while bit 16 is set); 18: the encoder's index "
+        "has been passed since "
+        "the start. There are no limit or home switches.")
+        .at_standard_index(0x60FD),
 
     reading("telemetry.current", group::telemetry, 1, integer16, "mA",
             "measured.current, for a PDO; beyond +-32.767 A it stays there."),

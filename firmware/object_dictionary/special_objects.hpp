@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 #include "firmware/object_dictionary/register_windows.hpp"
 
@@ -26,6 +27,8 @@ enum class SpecialObject : std::uint8_t {
   capture_samples,      ///< 0x5821:1, all values of a complete capture, 32 bits each
   scratch,              ///< 0x5822:1, keeps what is written, for trying transfers
   fault_log,            ///< 0x5828:1 to 16, an entry each with its CRC, little-endian
+  sdo_request,          ///< 0x1200:1, of the server that is always there
+  sdo_response,         ///< 0x1200:2
 };
 
 enum class ObjectType : std::uint8_t { unsigned8, unsigned32, visible_string, domain };
@@ -40,6 +43,7 @@ struct SpecialObjectRow {
   ObjectAccessKind access;
   std::uint32_t default_value;  ///< of numbers
   std::string_view help;
+  bool plus_node_id = false;  ///< the node ID is added to the number
 };
 
 inline constexpr std::uint32_t device_type_of_several_axes = 0xFFFF'0192;
@@ -86,6 +90,10 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
     {SpecialObject::fault_log, "Fault log entry", 0x5828, 1, fault_log_entries, ObjectType::domain,
      ObjectAccessKind::read_only, 0,
      "The entry whose number modulo 16 is one less than the sub-index, 16 words of 32 bits; zeros: none."},
+    {SpecialObject::sdo_request, "COB-ID client to server", 0x1200, 1, 1, ObjectType::unsigned32,
+     ObjectAccessKind::read_only, canopen::cob_id::sdo_request, "Identifier by which hosts ask.", true},
+    {SpecialObject::sdo_response, "COB-ID server to client", 0x1200, 2, 2, ObjectType::unsigned32,
+     ObjectAccessKind::read_only, canopen::cob_id::sdo_response, "Identifier of the answers.", true},
 });
 
 }  // namespace kmax::firmware

@@ -11,9 +11,10 @@
 
 #include "firmware/canopen/emergency.hpp"
 #include "firmware/canopen/nmt.hpp"
-#include "firmware/canopen/object_places.hpp"
+#include "firmware/canopen/pdo_mapping.hpp"
 #include "firmware/drive/fault.hpp"
 #include "firmware/object_dictionary/cob_id.hpp"
+#include "firmware/parameters/linked_parameters.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/parameter.hpp"
 
@@ -44,12 +45,26 @@ struct Message {
   unsigned cycle_ms = 0;
 };
 
-/// "axis1.measured.force" -> "axis1_measured_force"; axis 0 says so too.
+/// "axis1.measured.force" -> "axis1_measured_force"; axis 0 says so too. A name has at most 32 letters: one
+/// that would be longer is without its group.
 std::string signal_name(const Parameter& parameter) {
   std::string name(parameter.definition().name);
+  constexpr std::size_t longest = 32, of_axis = std::string_view("axis0.").size();
+  if (of_axis + name.size() > longest) name = name.substr(name.find('.') + 1);
   if (parameter.belongs_to_axis()) name = fmt::format("axis{}_{}", parameter.axis(), name);
   for (char& letter : name) letter = letter == '.' ? '_' : letter;
   return name;
+}
+
+/// CiA 402 gives them numbers alone.
+std::vector<std::pair<std::int32_t, std::string>> operation_modes() {
+  std::vector<std::pair<std::int32_t, std::string>> modes;
+  for (const auto& mode : firmware::names::drive_mode) {
+    const bool torque = mode.name == "torque";
+    modes.emplace_back(firmware::operation_mode_of(mode.value),
+                       torque ? "cyclic_synchronous_torque" : std::string(mode.name));
+  }
+  return modes;
 }
 
 Signal signal_of(const Parameter& parameter, unsigned start, unsigned bits) {
@@ -63,6 +78,10 @@ Signal signal_of(const Parameter& parameter, unsigned start, unsigned bits) {
                 .help = std::string(entry.help)};
   if (!(signal.real && entry.access == firmware::Access::read_only))
     signal.low = entry.minimum, signal.high = entry.maximum;
+  if (entry.index() == 0x6060 || entry.index() == 0x6061) {
+    signal.values = operation_modes();
+    return signal;
+  }
   for (const auto& choice : entry.values) signal.values.emplace_back(choice.value, std::string(choice.name));
   return signal;
 }
@@ -117,11 +136,9 @@ Message heartbeat(std::uint8_t node) {
 /// What an emergency message can be about: the faults of an axis, and the bus, which has no fault's name for
 /// these. What they share, such as bus-off, has one code for both.
 std::vector<std::pair<std::int32_t, std::string>> error_codes() {
-  std::vector<std::pair<std::int32_t, std::string>> codes{{0x8100, "identity_conflict"},
-                                                          {0x8110, "frames_lost"},
-                                                          {0x8120, "error_passive"},
-                                                          {0x8210, "rpdo_too_short"},
-                                                          {0x8220, "rpdo_too_long"}};
+  std::vector<std::pair<std::int32_t, std::string>> codes{
+      {0x8100, "identity_conflict"}, {0x8110, "frames_lost"},   {0x8120, "error_passive"},
+      {0x8210, "rpdo_too_short"},    {0x8220, "rpdo_too_long"}, {0x8240, "sync_length"}};
   for (const firmware::FaultText& fault : firmware::fault_texts)
     codes.emplace_back(fault.error_code, std::string(fault.name));
   std::sort(codes.begin(), codes.end());
@@ -197,7 +214,9 @@ std::vector<Message> messages_of(std::uint8_t node) {
   messages.push_back(sync());
   messages.push_back(emergency(node));
   for (const bool from_device : {true, false}) {
-    for (std::size_t i = 1; i <= firmware::canopen::pdo_count; ++i) {
+    const auto kind =
+        from_device ? firmware::canopen::PdoKind::transmit : firmware::canopen::PdoKind::receive;
+    for (std::size_t i = 1; i <= firmware::canopen::pdo_count_of(kind); ++i) {
       auto message = pdo(fmt::format("{}pdo{}", from_device ? 't' : 'r', i), from_device, node);
       if (message) messages.push_back(std::move(*message));
     }

@@ -97,7 +97,9 @@ DescribedObject described(const SpecialObjectRow& row, std::uint8_t subindex) {
   if (row.last_subindex > row.first_subindex) object.name += fmt::format(" {}", subindex);
   if (row.type == ObjectType::unsigned8) object.length = 1;
   if (row.type == ObjectType::unsigned32) object.length = 4;
-  if (object.length != 0 && object.access != ObjectAccess::read_only) object.default_raw = row.default_value;
+  object.node_relative = row.plus_node_id;
+  if (object.length != 0 && (object.access != ObjectAccess::read_only || row.plus_node_id))
+    object.default_raw = row.default_value;
   if (row.what == SpecialObject::trace_records) object.length = firmware::trace_object_bytes;
   if (row.what == SpecialObject::fault_log) object.length = 4 * firmware::fault_log_words;
   return object;
@@ -134,6 +136,10 @@ std::string standard_name(std::uint16_t index) {
       return "Identity object";
     case 0x1029:
       return "Error behaviour";
+    case 0x1200:
+      return "SDO server parameter";
+    case 0x1201:
+      return "SDO server 2 parameter";
   }
   const unsigned number = (index & 0xFFU) + 1;
   switch (index & 0xFF00) {
@@ -151,6 +157,7 @@ std::string standard_name(std::uint16_t index) {
 
 bool is_array(std::uint16_t index) {
   if (index == 0x1016 || index == 0x1029) return true;
+  if (index == 0x1200) return false;
   return std::any_of(firmware::special_objects.begin(), firmware::special_objects.end(),
                      [index](const SpecialObjectRow& row) { return row.index == index; });
 }

@@ -146,8 +146,8 @@ void write_device_info(std::ostream& out, const EdsFile& file) {
   fmt::print(out,
              "SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity={}\nDynamicChannelsSupported=0\n"
              "CompactPDO=0\nGroupMessaging=0\nNrOfRxPDO={}\nNrOfTxPDO={}\nLSS_Supported=1\n\n",
-             *std::min_element(dummy_bits.begin(), dummy_bits.end()), firmware::canopen::pdo_count,
-             firmware::canopen::pdo_count);
+             *std::min_element(dummy_bits.begin(), dummy_bits.end()), firmware::canopen::rpdo_count,
+             firmware::canopen::tpdo_count);
 }
 
 /// The basic types that an RPDO may hold where it has nothing for this device, by their own indices.

@@ -14,7 +14,6 @@ namespace kmax::record {
 
 using device::DeviceError;
 using device::Parameter;
-using firmware::canopen::pdo_count;
 namespace cob_id = firmware::canopen::cob_id;
 
 namespace {
@@ -64,7 +63,7 @@ PdoPlan read_pdo_plan(device::Device& device, std::uint8_t node) {
   const Settings settings(device);
   PdoPlan plan{.node = node};
   std::uint32_t event_time = 0;
-  for (std::size_t i = 0; i < pdo_count; ++i) {
+  for (std::size_t i = 0; i < recorded_pdos; ++i) {
     const std::string pdo = fmt::format("tpdo{}", i + 1);
     const std::string cob = pdo + ".cob_id", event = pdo + ".event_time", type = pdo + ".transmission_type";
     if ((settings.value(cob) & cob_id::invalid) != 0) fail(cob, "says that the PDO is switched off");

@@ -8,7 +8,7 @@ namespace kmax::record {
 using std::chrono::nanoseconds;
 
 namespace {
-constexpr std::size_t closing = firmware::canopen::pdo_count - 1;
+constexpr std::size_t closing = recorded_pdos - 1;
 constexpr std::int64_t nanoseconds_per_tick = 1'000'000'000 / firmware::tick_rate_hz;
 
 std::uint16_t word_at(const drivers::CanFrame& frame, std::size_t byte) {

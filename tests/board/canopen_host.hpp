@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "firmware/canopen/sdo_server.hpp"
 #include "firmware/object_dictionary/cob_id.hpp"
 #include "tests/board/bench.hpp"
 #include "tests/firmware/fake_flash.hpp"
@@ -70,6 +71,19 @@ class CanOpenHostWith {
     run_ms(20);
   }
 
+  /// One request to the server that is asked, and its answer.
+  std::array<std::uint8_t, 8> transfer(const std::array<std::uint8_t, 8>& request) {
+    heard.clear();
+    send({.identifier = server.request, .length = 8, .data = request});
+    for (const drivers::CanFrame& frame : heard) {
+      if (frame.identifier == server.response) return frame.data;
+    }
+    ADD_FAILURE() << "no answer";
+    return {};
+  }
+
+  /// The one that is asked.
+  firmware::canopen::SdoChannel server = firmware::canopen::SdoChannel::predefined(1);
   firmware::FakeFlash flash;
   BenchWith<Device> bench;
   std::vector<drivers::CanFrame> heard;
@@ -81,15 +95,6 @@ class CanOpenHostWith {
     std::uint32_t number = 0;
     for (unsigned i = 0; i < 4; ++i) number |= std::uint32_t{answer[4 + i]} << (8 * i);
     return number;
-  }
-  std::array<std::uint8_t, 8> transfer(const std::array<std::uint8_t, 8>& request) {
-    heard.clear();
-    send({.identifier = 0x601, .length = 8, .data = request});
-    for (const drivers::CanFrame& frame : heard) {
-      if (frame.identifier == 0x581) return frame.data;
-    }
-    ADD_FAILURE() << "no answer";
-    return {};
   }
 };
 

@@ -69,17 +69,23 @@ class SafetyOracle {
       take_sdo(data);
       return;
     }
+    if (id == second_request()) {  // whatever its transfer is about
+      life_waits_ = true;
+      for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, true, true);
+      return;
+    }
     const bool is_sync = id == 0x80;
     if (is_sync && !pdo_since_sync_) return;
     // A PDO, which may act at the next SYNC, whatever that is.
     pdo_since_sync_ = !is_sync;
+    if (!is_sync) pdo_us_ = now_us_;
     life_waits_ = true;
     for (std::size_t i = 0; i + 1 < data.size(); ++i) {
       const auto word = static_cast<std::uint16_t>(data[i] | data[i + 1] << 8);
       pdo_shuts_down_ = pdo_shuts_down_ || shuts_down(word);
       pdo_enables_ = pdo_enables_ || asks_to_enable(word);
     }
-    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_);
+    note_pdo_words();
     if (is_sync) pdo_shuts_down_ = pdo_enables_ = false;
   }
 
@@ -103,6 +109,11 @@ class SafetyOracle {
     if (frames_waiting_ > 0 && life_waits_) life_us_[1] = now_us;
     frames_waiting_ -= std::min<std::size_t>(frames_waiting_, 16);
     if (frames_waiting_ == 0) life_waits_ = false;
+    // An own SYNC may come with any poll, as long as the device keeps what waits for one.
+    if (makes_sync() && pdo_since_sync_ && now_us - pdo_us_ < 120'000) {
+      life_us_[1] = now_us;
+      note_pdo_words();
+    }
     const States before = states_;
     states_ = states;
     for (std::size_t axis = 0; axis < axis_count; ++axis) judge_state(axis, before[axis]);
@@ -217,6 +228,19 @@ class SafetyOracle {
       return found && sdo_subindex_ == e.object_subindex();
     });
   }
+  void note_pdo_words() {
+    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_);
+  }
+  bool makes_sync() const {
+    return (values_.whole<"canopen.sync_cob_id">() >> 30 & 1) != 0 &&
+           values_.whole<"canopen.sync_period">() != 0;
+  }
+  /// Of the second SDO server; none: no identifier.
+  std::uint32_t second_request() const {
+    const auto request = static_cast<std::uint32_t>(values_.whole<"sdo_server_2.request_cob_id">());
+    const auto response = static_cast<std::uint32_t>(values_.whole<"sdo_server_2.response_cob_id">());
+    return request > 0x7FF || response > 0x7FF ? 0xFFFF'FFFF : request;
+  }
   bool heartbeat_watched() const {
     return values_.whole<"heartbeat_consumer.node_1">() != 0 ||
            values_.whole<"heartbeat_consumer.node_2">() != 0 ||
@@ -323,7 +347,7 @@ class SafetyOracle {
   std::array<std::uint64_t, axis_count> reacts_since_us_{};  ///< since when the state is what it is
   std::array<std::array<bool, 2>, axis_count> armed_by_{};   ///< links that may have
   std::array<std::uint64_t, 2> life_us_{};
-  std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0;
+  std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0, pdo_us_ = 0;
   std::vector<std::uint8_t> frame_;
   std::uint8_t unit_before_ = 0;
   std::size_t frames_waiting_ = 0;

@@ -132,6 +132,34 @@ TEST_F(SafetyOracleRule, AnotherLinkIsNoSignOfLife) {
   poll(DriveState::operation_enabled, 20'000);
   expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
 }
+TEST_F(SafetyOracleRule, AnOwnSyncIsASignOfLifeWhileAPdoMayWaitForIt) {
+  set<"canopen.sync_cob_id">(0x4000'0080);
+  set<"canopen.sync_period">(1000);
+  start();
+  const auto pdo = [this](std::uint8_t word) {
+    oracle_.take_frame({.identifier = 0x201, .length = 2, .data = {word, 0}});
+    poll();
+  };
+  pdo(0x06);
+  pdo(0x0F);
+  poll(DriveState::operation_enabled, 100'000);
+  EXPECT_EQ(oracle_.complaint(), "");
+  poll(DriveState::operation_enabled, 990'000);
+  EXPECT_EQ(oracle_.complaint(), "");
+  poll(DriveState::operation_enabled, 20'000);
+  expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
+}
+TEST_F(SafetyOracleRule, TheSecondServerCommandsIfThereIsOne) {
+  set<"sdo_server_2.request_cob_id">(0x6A1);
+  set<"sdo_server_2.response_cob_id">(0x6B1);
+  start();
+  for (int i = 0; i < 2; ++i) {
+    oracle_.take_frame({.identifier = 0x6A1, .length = 8, .data = {0x0D}});
+    poll();
+  }
+  poll(DriveState::operation_enabled);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
 TEST_F(SafetyOracleRule, WithoutATimeOutNothingIsLate) {
   set<"link.timeout">(0);
   start();

@@ -38,6 +38,11 @@ class ClosedLoop : public testing::Test {
     }
   }
 
+  /// 0x60FD from bit 16 on: what is not standardised.
+  unsigned digital_inputs(std::size_t axis) {
+    return bench.reading(firmware::entry_of<"profile.digital_inputs">(), axis);
+  }
+
   ImageBench bench{stiff_walls(), 2.0};
 };
 
@@ -62,6 +67,18 @@ TEST_F(ClosedLoop, HoldsTheHandlesAtAStiffWallOnBothAxes) {
     EXPECT_TRUE(bench.board->bridge_armed(axis));
     EXPECT_EQ(bench.fault(axis), Fault::none);
   }
+}
+
+TEST_F(ClosedLoop, TheDigitalInputsShowTheEmergencyStopAndTheGateDriversFaultLine) {
+  press();
+  EXPECT_EQ(digital_inputs(0) & 3U, 0U);
+  bench.board->open_emergency_stop(true);
+  bench.board->run_for(0.001);
+  EXPECT_EQ(digital_inputs(0) & 3U, 1U);
+  bench.board->open_emergency_stop(false);
+  bench.board->hold_fault_line(true);
+  bench.board->run_for(0.001);
+  EXPECT_EQ(digital_inputs(1) & 3U, 2U);
 }
 
 /// What a hand that presses on meets when the link is lost, until the bridge is off.

@@ -186,7 +186,13 @@ TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   EXPECT_EQ(abort_of(0x1A00, 0, {3}), Abort::pdo_length);
   EXPECT_EQ(abort_of(0x1016, 1, {0xE8, 3, 5, 0}), Abort::none);
   EXPECT_EQ(abort_of(0x1016, 2, {0xE8, 3, 5, 0}), Abort::incompatible) << "one node twice";
-  EXPECT_EQ(abort_of(0x1005, 0, {0x80, 0, 0, 0x40}), Abort::value_range) << "it does not generate SYNC";
+  EXPECT_EQ(abort_of(0x1005, 0, {0x80, 0, 0, 0x20}), Abort::value_range) << "29 bits";
+  EXPECT_EQ(abort_of(0x1005, 0, {0x80, 0, 0, 0x40}), Abort::none);
+  EXPECT_EQ(abort_of(0x1005, 0, {0x81, 0, 0, 0x40}), Abort::device_state)
+      << "it is for a device that makes SYNC";
+  EXPECT_EQ(abort_of(0x1006, 0, {0xE7, 3, 0, 0}), Abort::value_range) << "999 us";
+  EXPECT_EQ(abort_of(0x1200, 1, {0x81, 6, 0, 0}), Abort::read_only);
+  EXPECT_EQ(abort_of(0x1201, 1, {0x01, 6, 0, 0}), Abort::value_range) << "a restricted identifier";
   EXPECT_EQ(abort_of(0x1800, 1, {0x81, 0x01, 0, 0x20}), Abort::value_range) << "29 bits";
   // A transaction that another host has open.
   EXPECT_EQ(abort_of(0x5810, 1, {1, 0}), Abort::none);

@@ -81,7 +81,7 @@ class Eds(unittest.TestCase):
 
     def test_what_is_mapped_by_default_may_be_mapped(self):
         for kind in (0x1600, 0x1A00):
-            for number in range(4):
+            for number in range(4 if kind == 0x1600 else 5):
                 count = int(self.section(kind + number, 0)["DefaultValue"])
                 for sub in range(1, count + 1):
                     mapping = int(self.section(kind + number, sub)["DefaultValue"], 16)
@@ -89,6 +89,19 @@ class Eds(unittest.TestCase):
                     self.assertEqual("1", mapped["PDOMapping"])
                     self.assertIn(mapped["AccessType"], ("rw", "rww") if kind == 0x1600 else ("rw", "rwr", "ro"))
                     self.assertEqual(mapping & 0xFF, BITS[int(mapped["DataType"], 16)])
+
+    def test_sdo_servers_and_sync(self):
+        for index, subindex, default, access in (
+                (0x1200, 1, "$NODEID+0x600", "ro"), (0x1200, 2, "$NODEID+0x580", "ro"), (0x1201, 1, "0x80000000", "rw"),
+                (0x1201, 2, "0x80000000", "rw"), (0x1005, 0, "0x00000080", "rw"), (0x1006, 0, "0x00000000", "rw"),
+                (0x1019, 0, "0", "rw")):
+            section = self.section(index, subindex)
+            self.assertEqual((default, access, "0"),
+                             (section["DefaultValue"], section["AccessType"], section["PDOMapping"]), hex(index))
+        for index in (0x1200, 0x1201):
+            self.assertEqual("0x9", self.eds[f"{index:04X}"]["ObjectType"])
+        for index in (0x60FD, 0x68FD):
+            self.assertEqual(("ro", "1"), tuple(self.section(index, 0)[key] for key in ("AccessType", "PDOMapping")))
 
     def test_the_file_is_the_same_whenever_it_is_written(self):
         def eds(epoch):
@@ -224,7 +237,7 @@ class Dbc(unittest.TestCase):
     def test_signals_fill_their_messages(self):
         text = kmax("describe", "--format", "dbc", "--node", "9").stdout
         messages = {int(i): (name, int(size)) for i, name, size in re.findall(r"^BO_ (\d+) (\w+): (\d+) ", text, re.M)}
-        self.assertEqual({0x80, 0x89, 0x189, 0x289, 0x389, 0x489, 0x209, 0x309, 0x709}, set(messages))
+        self.assertEqual({0x80, 0x89, 0x189, 0x289, 0x389, 0x489, 0x509, 0x209, 0x309, 0x709}, set(messages))
         for block in text.split("\n\n"):
             head = re.match(r"BO_ (\d+) (\w+): (\d+) ", block)
             if not head:
@@ -244,7 +257,7 @@ class Dbc(unittest.TestCase):
         text = kmax("describe", "--format", "dbc", "--node", "9").stdout
         matrix = formats.loads_flat(text, "dbc")
         frames = {frame.name: frame for frame in matrix.frames}
-        self.assertEqual(9, len(frames))
+        self.assertEqual(10, len(frames))
 
         def decoded(name, layout, *values):
             signals = frames[name].decode(struct.pack(layout, *values))
@@ -259,6 +272,11 @@ class Dbc(unittest.TestCase):
         self.assertEqual("none", decoded("EMERGENCY", "<HBBf", 0, 0, 0, 0)["error_code"][1])
         telemetry = decoded("TPDO1", "<if", -5, 1.5)
         self.assertEqual((-5, 1.5), tuple(raw for raw, _ in telemetry.values()))
+        states = decoded("TPDO5", "<HbHb", 0x0237, 10, 0x0250, -1)
+        self.assertEqual([(0x237, 10), (0x250, -1)], [tuple(states[f"axis{axis}_{name}"][0] for name in (
+            "drive_statusword", "operation_mode_display")) for axis in range(2)])
+        self.assertEqual("cyclic_synchronous_torque", states["axis0_operation_mode_display"][1])
+        self.assertEqual("haptic", states["axis1_operation_mode_display"][1])
         self.assertEqual((5, "operational"), decoded("HEARTBEAT", "<B", 5)["nmt_state"])
 
 

@@ -163,7 +163,7 @@ class EdsReader(NodeTest):
 
     def test_the_device(self):
         device = self.read["device"]
-        self.assertEqual(["Kmax", 4, 4, True],
+        self.assertEqual(["Kmax", 4, 5, True],
                          [device[key] for key in ("productName", "nrOfRXPDO", "nrOfTXPDO", "lssSupported")])
         self.assertEqual([125000, 250000, 500000, 1000000], device["baudRates"])
         self.assertEqual({f"Dummy{number:04X}": "1" for number in range(1, 8)}, device["dummyUsage"])

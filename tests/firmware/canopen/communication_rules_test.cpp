@@ -32,6 +32,7 @@ struct Pdo {
 
 std::vector<Pdo> all_pdos() {
   std::vector<Pdo> pdos;
+  pdos.push_back({0x1804, 0x1A04, 0x500U, true});
   for (std::uint16_t n = 0; n < 4; ++n) {
     pdos.push_back({static_cast<std::uint16_t>(0x1400 + n), static_cast<std::uint16_t>(0x1600 + n),
                     0x200U + 0x100U * n, false});
@@ -41,8 +42,9 @@ std::vector<Pdo> all_pdos() {
   return pdos;
 }
 
-// A PDO made not to exist; with an object in it that both kinds may hold.
+// A PDO made not to exist; with an object in it that both kinds may hold. There is no other.
 void prepare(Writes& w, const Pdo& pdo) {
+  for (const Pdo& other : all_pdos()) ASSERT_EQ(w.write(other.communication, 1, bit_31 | 0x222), Abort::none);
   ASSERT_EQ(w.write(pdo.communication, 1, bit_31 | 0x222), Abort::none);
   ASSERT_EQ(w.write(pdo.mapping, 0, 0), Abort::none);
   ASSERT_EQ(w.write(pdo.mapping, 1, mapping_of(0x6040, 0, 16)), Abort::none);
@@ -50,7 +52,7 @@ void prepare(Writes& w, const Pdo& pdo) {
 }
 
 TEST(CommunicationRules, EveryCommunicationEntryHasItsRule) {
-  std::vector<int> counts(9);
+  std::vector<int> counts(12);
   for (std::size_t slot = 0; slot < slot_count; ++slot) {
     const Entry& entry = entry_at(owner_of(slot).entry);
     ASSERT_EQ(is_communication(slot), entry.access == Access::communication) << entry.name;
@@ -62,8 +64,8 @@ TEST(CommunicationRules, EveryCommunicationEntryHasItsRule) {
       EXPECT_EQ(row.predefined, raw_from_number(entry.type, entry.default_value) & 0x7FF);
     }
   }
-  // bounds: 0x1015, 0x1017, 0x1029:1 and four event times
-  EXPECT_EQ(counts, (std::vector<int>{7, 1, 1, 4, 8, 8, 4, 8, 64}));
+  // bounds: 0x1015, 0x1017, 0x1029:1 and five event times
+  EXPECT_EQ(counts, (std::vector<int>{8, 1, 1, 4, 9, 9, 5, 9, 72, 1, 1, 2}));
 }
 
 TEST(CommunicationRules, OtherEntriesAreNoneOfItsBusiness) {
@@ -91,8 +93,70 @@ TEST(CommunicationRules, SyncIdentifier) {
   Writes w;
   for (std::uint32_t id = 0; id <= 0x7FF; ++id)
     EXPECT_EQ(w.write(0x1005, 0, id), restricted_identifier(id) ? Abort::value_range : Abort::none) << id;
-  for (unsigned bit = 11; bit <= 30; ++bit)
+  for (unsigned bit = 11; bit <= 29; ++bit)
     EXPECT_EQ(w.write(0x1005, 0, 0x80U | 1U << bit), Abort::value_range) << bit;
+}
+
+TEST(CommunicationRules, TheSyncThatIsMadeKeepsItsIdentifier) {
+  Writes w;
+  EXPECT_EQ(w.write(0x1005, 0, 1U << 30 | 0x85), Abort::none) << "both at once";
+  EXPECT_EQ(w.write(0x1005, 0, 1U << 30 | 0x86), Abort::device_state);
+  EXPECT_EQ(w.write(0x1005, 0, 0x86), Abort::device_state) << "first the bit";
+  EXPECT_EQ(w.write(0x1005, 0, 1U << 30 | 0x181), Abort::device_state);
+  EXPECT_EQ(w.write(0x1005, 0, 1U << 30 | 0x180), Abort::value_range);
+  EXPECT_EQ(w.read(0x1005, 0), 1U << 30 | 0x85);
+  EXPECT_EQ(w.write(0x1005, 0, 0x85), Abort::none);
+  EXPECT_EQ(w.write(0x1005, 0, 0x86), Abort::none);
+}
+
+TEST(CommunicationRules, TheSyncCounterChangesOnlyWithoutAPeriod) {
+  Writes w;
+  for (std::uint32_t overflow = 0; overflow <= 0x101; ++overflow) {
+    const bool good = overflow == 0 || (overflow >= 2 && overflow <= 240);
+    EXPECT_EQ(w.write(0x1019, 0, overflow), good ? Abort::none : Abort::value_range) << overflow;
+  }
+  EXPECT_EQ(w.read(0x1019, 0), 240U);
+  for (const std::uint32_t period : {0U, 1000U, 1001U, 0x7FFF'FFFFU})
+    EXPECT_EQ(w.write(0x1006, 0, period), Abort::none);
+  for (const std::uint32_t period : {1U, 999U, 0x8000'0000U, 0xFFFF'FFFFU})
+    EXPECT_EQ(w.write(0x1006, 0, period), Abort::value_range) << period;
+  EXPECT_EQ(w.write(0x1019, 0, 10), Abort::device_state);
+  EXPECT_EQ(w.write(0x1019, 0, 1), Abort::value_range);
+  EXPECT_EQ(w.write(0x1019, 0, 240), Abort::none) << "as it is";
+  EXPECT_EQ(w.write(0x1006, 0, 0), Abort::none);
+  EXPECT_EQ(w.write(0x1019, 0, 10), Abort::none);
+}
+
+TEST(CommunicationRules, IdentifiersOfTheSecondSdoServer) {
+  for (const unsigned sub : {1U, 2U}) {
+    Writes w;
+    EXPECT_EQ(w.read(0x1201, sub), bit_31);
+    for (std::uint32_t id = 0; id <= 0x7FF; ++id) {
+      ASSERT_EQ(w.write(0x1201, sub, bit_31 | id), Abort::none);
+      EXPECT_EQ(w.write(0x1201, sub, id), restricted_identifier(id) ? Abort::value_range : Abort::none) << id;
+    }
+    for (unsigned bit = 11; bit <= 30; ++bit) {
+      EXPECT_EQ(w.write(0x1201, sub, 0x6A0U | 1U << bit), Abort::value_range) << bit;
+      EXPECT_EQ(w.write(0x1201, sub, bit_31 | 0x6A0U | 1U << bit), Abort::value_range) << bit;
+    }
+    ASSERT_EQ(w.write(0x1201, sub, bit_31), Abort::none);
+    EXPECT_EQ(w.write(0x1201, sub, 0x6A0), Abort::none);
+    EXPECT_EQ(w.write(0x1201, sub, 0x6A0), Abort::none);
+    EXPECT_EQ(w.write(0x1201, sub, 0x6A1), Abort::device_state);
+    EXPECT_EQ(w.write(0x1201, 3 - sub, 0x6A0), Abort::incompatible) << "it would hear itself";
+    EXPECT_EQ(w.write(0x1201, 3 - sub, 0x6A1), Abort::none);
+  }
+}
+
+TEST(CommunicationRules, NothingIsSentByAnIdentifierThatIsListenedTo) {
+  Writes w;
+  EXPECT_EQ(w.remap(0x1403, {mapping_of(0x6040, 0, 16)}, 0x505), Abort::incompatible) << "of TPDO 5";
+  EXPECT_EQ(w.remap(0x1403, {mapping_of(0x6040, 0, 16)}, 0x285), Abort::incompatible);
+  EXPECT_EQ(w.remap(0x1800, {mapping_of(0x6041, 0, 16)}, 0x205), Abort::incompatible) << "of RPDO 1";
+  ASSERT_EQ(w.write(0x1804, 1, bit_31 | 0x505), Abort::none);
+  EXPECT_EQ(w.remap(0x1403, {mapping_of(0x6040, 0, 16)}, 0x505), Abort::none);
+  EXPECT_EQ(w.write(0x1804, 1, 0x505), Abort::incompatible);
+  EXPECT_EQ(w.remap(0x1402, {mapping_of(0x6040, 0, 16)}, 0x505), Abort::none) << "two may listen to one";
 }
 
 TEST(CommunicationRules, EmergencyIdentifier) {
@@ -203,9 +267,10 @@ TEST(CommunicationRules, TheInhibitTimeOnlyWhileThePdoDoesNotExist) {
   for (const Pdo& pdo : all_pdos()) {
     if (!pdo.transmit) continue;
     Writes w;
+    const std::uint32_t factory = w.read(pdo.communication, 3);
     EXPECT_EQ(w.write(pdo.communication, 3, 10), Abort::device_state);
     EXPECT_EQ(w.write(pdo.communication, 3, 65536), Abort::value_range);
-    EXPECT_EQ(w.write(pdo.communication, 3, 0), Abort::none);  // as it is
+    EXPECT_EQ(w.write(pdo.communication, 3, factory), Abort::none);  // as it is
     ASSERT_EQ(w.write(pdo.communication, 1, bit_31 | 0x222), Abort::none);
     EXPECT_EQ(w.write(pdo.communication, 3, 65535), Abort::none);
     EXPECT_EQ(w.write(pdo.communication, 3, 65536), Abort::value_range);
@@ -275,7 +340,7 @@ TEST(CommunicationRules, RemapGoesThroughInTheStandardsOrder) {
   Writes w;
   EXPECT_EQ(w.remap(0x1802, {mapping_of(0x6041, 0, 16), mapping_of(0x6841, 0, 16)}, 0x385, 1, 5, 10),
             Abort::none);
-  EXPECT_EQ(w.remap(0x1403, {mapping_of(5, 0, 8), mapping_of(0x6040, 0, 16)}, 0x505, 1), Abort::none);
+  EXPECT_EQ(w.remap(0x1403, {mapping_of(5, 0, 8), mapping_of(0x6040, 0, 16)}, 0x506, 1), Abort::none);
 }
 
 // What a PDO holds, judged from the dictionary's rows alone.
@@ -322,7 +387,7 @@ RC_GTEST_PROP(CommunicationRules, NoSequenceOfWritesLeavesAnIllegalPdo, ()) {
   for (int step = 0; step < 120; ++step) {
     const int what = *rc::gen::inRange(0, 12);
     if (what < 3) {
-      const std::uint32_t id = *rc::gen::element(0x333U, 0x334U, 0x185U, 0x601U, 0x20000333U);
+      const std::uint32_t id = *rc::gen::element(0x333U, 0x334U, 0x185U, 0x205U, 0x601U, 0x20000333U);
       const bool there = w.write(pdo.communication, 1, id) == Abort::none;
       lives += there ? 1 : 0;
     } else if (what < 5) {
@@ -338,7 +403,7 @@ RC_GTEST_PROP(CommunicationRules, NoSequenceOfWritesLeavesAnIllegalPdo, ()) {
     }
     RC_ASSERT(legal(w.values, pdo));
     PdoSettings settings;
-    RC_ASSERT(read_pdo(pdo.transmit ? PdoKind::transmit : PdoKind::receive, pdo.communication & 3U, w.values,
+    RC_ASSERT(read_pdo(pdo.transmit ? PdoKind::transmit : PdoKind::receive, pdo.communication & 7U, w.values,
                        test_node_id, settings));
   }
   RC_CLASSIFY(lives > 0, "a PDO came to life");

@@ -50,7 +50,7 @@ TEST(PdoMapping, SaysWhetherTheIndexTheSubindexOrTheObjectIsWrong) {
     EXPECT_EQ(find(kind, 0x0008, 0, 64), Abort::no_object);
     EXPECT_EQ(find(kind, 0x5FFF, 0, 32), Abort::no_object);
     EXPECT_EQ(find(kind, 0xFFFF, 0xFF, 0xFF), Abort::no_object);
-    EXPECT_EQ(find(kind, 0x1804, 1, 32), Abort::no_object);
+    EXPECT_EQ(find(kind, 0x1805, 1, 32), Abort::no_object);
     EXPECT_EQ(find(kind, 0x2012, 99, 32), Abort::no_subindex);
     EXPECT_EQ(find(kind, 0x6041, 1, 16), Abort::no_subindex);
     EXPECT_EQ(find(kind, 0x1800, 4, 8), Abort::no_subindex);   // a gap in a record

@@ -15,7 +15,7 @@ struct Read {
 
 TEST(PdoSettings, TheDefaultsAreAllUsable) {
   const ParameterValues values;
-  for (std::size_t n = 0; n < pdo_count; ++n) {
+  for (std::size_t n = 0; n < rpdo_count; ++n) {
     const Read sent(values, PdoKind::transmit, n), received(values, PdoKind::receive, n);
     EXPECT_TRUE(sent.good && received.good) << n;
     EXPECT_TRUE(sent.settings.exists) << n;
@@ -25,6 +25,12 @@ TEST(PdoSettings, TheDefaultsAreAllUsable) {
     EXPECT_EQ(received.settings.exists, n < 2) << n;
     EXPECT_EQ(received.settings.identifier, n < 2 ? 0x205 + 0x100 * n : 0);
   }
+  const Read states(values, PdoKind::transmit, 4);
+  EXPECT_TRUE(states.good && states.settings.exists);
+  EXPECT_EQ(states.settings.identifier, 0x505);
+  EXPECT_EQ(states.settings.event_us, 0U);
+  EXPECT_EQ(states.settings.inhibit_us, 20'000U);
+  EXPECT_EQ(states.settings.mapping.bytes(), 6);
 }
 
 TEST(PdoSettings, TimesAreInMicroseconds) {

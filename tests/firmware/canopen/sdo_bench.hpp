@@ -25,7 +25,7 @@ class SdoBench {
 
   explicit SdoBench(const SdoConfig& config = {}, std::uint32_t start_us = 0xFFFF'F000U)
       : server(objects, config), now_us(start_us) {
-    server.start(node_id);
+    server.start(SdoChannel::predefined(node_id));
   }
 
   void send(const Eight& bytes) {

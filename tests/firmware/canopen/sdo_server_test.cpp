@@ -281,7 +281,7 @@ TEST_F(SdoServerTest, StoppedItIsSilentAndForgetsTheTransfer) {
   bench.ask(request(0x21, domain, {7}));
   bench.wait(2'000'000);
   EXPECT_FALSE(bench.server.busy());
-  bench.server.start(bench.node_id);
+  bench.server.start(SdoChannel::predefined(bench.node_id));
   EXPECT_EQ(bench.ask({0x01}), abort_frame({}, Abort::command));
   expect_alive();
 }
@@ -293,7 +293,7 @@ TEST_F(SdoServerTest, AnObjectMayStopTheServerWhileItIsWritten) {
 }
 
 TEST_F(SdoServerTest, AnotherNodeIdTakesEffectWithTheStart) {
-  bench.server.start(127);
+  bench.server.start(SdoChannel::predefined(127));
   bench.server.receive({.identifier = 0x67F, .length = 8, .data = request(0x40, device_type)}, 0);
   drivers::CanFrame frame;
   ASSERT_TRUE(bench.server.next_frame(frame, 0));

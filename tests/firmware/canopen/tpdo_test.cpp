@@ -57,7 +57,7 @@ struct TpdoBench : CommunicationWrites {
   /// The PDOs with these settings exist and hold `position`.
   explicit TpdoBench(std::initializer_list<Setting> settings = {}, std::uint64_t start_us = 0)
       : now_us(start_us) {
-    for (std::size_t n = 0; n < pdo_count; ++n) write(communication(n), 1, bit_31 | 0x222);
+    for (std::size_t n = 0; n < tpdo_count; ++n) write(communication(n), 1, bit_31 | 0x222);
     for (const Setting& setting : settings) add(setting);
     if (settings.size() != 0) configure();
   }
@@ -133,6 +133,7 @@ TEST(Tpdo, NothingGoesBeforeTheStartOrAfterTheStop) {
 TEST(Tpdo, TheDefaultsGoEveryTenMillisecondsTogetherAndInOrder) {
   TpdoBench bench;
   bench.values = {};
+  bench.write(0x1804, 1, bit_31);
   bench.configure();
   bench.source.live[slot_of(entry_of<"measured.count">(), 0)] = 0x01020304;
   for (int batch = 0; batch < 5; ++batch) {
@@ -146,6 +147,31 @@ TEST(Tpdo, TheDefaultsGoEveryTenMillisecondsTogetherAndInOrder) {
   EXPECT_EQ(bench.tpdos.counters().held_back, 0U);
 }
 
+// The states of both axes: at once, and then not too often.
+TEST(Tpdo, ByDefaultTheStatesGoWhenTheyChange) {
+  TpdoBench bench;
+  bench.values = {};
+  for (std::uint16_t n = 0; n < 4; ++n) bench.write(static_cast<std::uint16_t>(0x1800 + n), 1, bit_31);
+  bench.configure();
+  auto& statusword = bench.source.live[slot_of(entry_of<"drive.statusword">(), 1)];
+  bench.source.live[slot_of(entry_of<"profile.operation_mode_display">(), 0)] = 0xFFFF'FFFF;
+  bench.run(100'000, 50);
+  ASSERT_EQ(bench.sent.size(), 1U) << "once, whatever they are";
+  EXPECT_EQ(bench.sent[0].identifier, 0x505U);
+  EXPECT_EQ(bench.sent[0].length, 6);
+  EXPECT_EQ(bench.sent[0].first_value, 0x00FF'0000U) << "statusword and mode of axis 0, statusword of axis 1";
+  const std::uint64_t changed_us = bench.now_us;
+  statusword = 0x27;
+  bench.run(5'000, 50);
+  statusword = 0x08;
+  bench.run(100'000, 50);
+  ASSERT_EQ(bench.sent.size(), 3U);
+  EXPECT_LE(bench.sent[1].time_us, changed_us + 1050);
+  EXPECT_EQ(bench.sent[1].first_value, 0x27FF'0000U);
+  EXPECT_EQ(bench.sent[2].time_us - bench.sent[1].time_us, 20'000U);
+  EXPECT_EQ(bench.sent[2].first_value, 0x08FF'0000U);
+}
+
 // What nobody has asked for leaves the bus to others, as docs/canopen.md says.
 TEST(Tpdo, TheDefaultsLeaveMostOfTheBusFree) {
   std::ifstream page("../docs/canopen.md");
@@ -156,7 +182,10 @@ TEST(Tpdo, TheDefaultsLeaveMostOfTheBusFree) {
     bench.values = {};
     bench.bit_rate = bit_rate;
     bench.configure();
-    bench.run(1'000'000 - 50, 50);
+    while (bench.now_us < 1'000'000 - 50) {
+      ++bench.source.live[slot_of(entry_of<"drive.statusword">(), 0)];  // as often as it can
+      bench.step(50);
+    }
     std::uint32_t bits = 0;
     for (const SentPdo& pdo : bench.sent) {
       const std::uint32_t data = 8U * pdo.length;
@@ -342,7 +371,7 @@ TEST(Tpdo, APdoWithBrokenSettingsIsLeftOutTheOthersGo) {
   bench.values.set_whole<"tpdo2.mapped_count">(9);
   bench.configure();
   bench.step(0);
-  EXPECT_EQ(bench.identifiers(), (Identifiers{0x185, 0x385, 0x485}));
+  EXPECT_EQ(bench.identifiers(), (Identifiers{0x185, 0x385, 0x485, 0x505}));
 }
 
 RC_GTEST_PROP(Tpdo, PacksTheValuesOneAfterTheOther, ()) {

@@ -23,6 +23,23 @@ struct Told {
   void tell() { publish_profile(values, axis, report); }
 };
 
+TEST(ProfileReadings, TheDigitalInputsAreWhatTheBoardHas) {
+  for (const Fault condition :
+       {Fault::none, Fault::emergency_stop, Fault::gate_driver, Fault::over_voltage}) {
+    for (const bool referenced : {false, true}) {
+      Told told;
+      told.axis = 1;
+      told.report.condition = condition;
+      told.report.referenced = referenced;
+      told.tell();
+      const std::uint32_t expected = (condition == Fault::emergency_stop ? 0x1'0000U : 0U) |
+                                     (condition == Fault::gate_driver ? 0x2'0000U : 0U) |
+                                     (referenced ? 0x4'0000U : 0U);
+      EXPECT_EQ(told.values.whole<"profile.digital_inputs">(1), static_cast<std::int64_t>(expected));
+    }
+  }
+}
+
 TEST(ProfileReadings, WholeNumbersOf16BitsStayAtTheEndsOfTheirRange) {
   const auto whole = [](float value) { return static_cast<std::int32_t>(integer16_of(value)); };
   EXPECT_EQ(whole(0.0f), 0);

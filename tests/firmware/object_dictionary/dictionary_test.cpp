@@ -211,6 +211,11 @@ TEST(Dictionary, ModbusAddressesArePinned) {
       {"rpdo1.cob_id", 0x2900, 0x2900},
       {"rpdo1.mapped_count", 0x2910, 0x2910},
       {"tpdo4.mapped_8", 0x2BDF, 0x2BDF},
+      {"tpdo5.mapped_8", 0x2C1F, 0x2C1F},
+      {"canopen.sync_period", 0x2807, 0x2807},
+      {"canopen.sync_counter_overflow", 0x2809, 0x2809},
+      {"sdo_server_2.response_cob_id", 0x2842, 0x2842},
+      {"profile.digital_inputs", 0x00CD, 0x04CD},
       {"drive.statusword", 0x0000, 0x0400},
       {"drive.error_code", 0x0001, 0x0401},
       {"drive.refusal", 0x0002, 0x0402},
@@ -276,6 +281,7 @@ TEST(Dictionary, Cia402ObjectsStandAtTheStandardsIndexWithItsTypeAndAccess) {
       {"profile.polarity", 0x607E, Type::unsigned8, true},
       {"profile.supported_modes", 0x6502, Type::unsigned32, false},
       {"profile.device_type", 0x67FF, Type::unsigned32, false},
+      {"profile.digital_inputs", 0x60FD, Type::unsigned32, false},
   };
   std::set<int> listed;
   for (const Object& object : objects) {
@@ -307,10 +313,10 @@ TEST(Dictionary, CommunicationSettingsAreKeptReadAndNeverWrittenThroughModbus) {
     EXPECT_GE(entry.index(), 0x1000) << entry.name;
     EXPECT_LT(entry.index(), 0x1C00) << entry.name;
     EXPECT_GE(modbus_address(i, 0), 0x2800) << entry.name;
-    EXPECT_LT(modbus_address(i, 0), 0x2C00) << entry.name;
+    EXPECT_LT(modbus_address(i, 0), 0x2D00) << entry.name;
   }
   // SYNC, emergency, heartbeat, error behaviour; 4 nodes watched; 4 RPDOs of 2 + 9, 4 TPDOs of 4 + 9.
-  EXPECT_EQ(count, 5 + 4 + 4 * 11 + 4 * 13);
+  EXPECT_EQ(count, 7 + 4 + 2 + 4 * 11 + 5 * 13);
 }
 
 TEST(Dictionary, NoTwoObjectsShareAnIndexOnEitherAxis) {

@@ -34,10 +34,10 @@ std::map<int, std::string> error_names(const std::string& text) {
 
 TEST(Dbc, MessagesHaveTheNodesIdentifiers) {
   const std::string text = dbc(5);
-  for (const char* line :
-       {"BO_ 128 SYNC: 0 Host\n", "BO_ 133 EMERGENCY: 8 Kmax\n", "BO_ 389 TPDO1: 8 Kmax\n",
-        "BO_ 645 TPDO2: 8 Kmax\n", "BO_ 901 TPDO3: 8 Kmax\n", "BO_ 1157 TPDO4: 8 Kmax\n",
-        "BO_ 517 RPDO1: 4 Host\n", "BO_ 773 RPDO2: 4 Host\n", "BO_ 1797 HEARTBEAT: 1 Kmax\n"})
+  for (const char* line : {"BO_ 128 SYNC: 0 Host\n", "BO_ 133 EMERGENCY: 8 Kmax\n", "BO_ 389 TPDO1: 8 Kmax\n",
+                           "BO_ 645 TPDO2: 8 Kmax\n", "BO_ 901 TPDO3: 8 Kmax\n", "BO_ 1157 TPDO4: 8 Kmax\n",
+                           "BO_ 1285 TPDO5: 6 Kmax\n", "BO_ 517 RPDO1: 4 Host\n", "BO_ 773 RPDO2: 4 Host\n",
+                           "BO_ 1797 HEARTBEAT: 1 Kmax\n"})
     EXPECT_CONTAINS(text, line);
   EXPECT_EQ(text.find("RPDO3"), std::string::npos);
 }
@@ -50,6 +50,10 @@ TEST(Dbc, SignalsAreWhatIsMappedLittleEndian) {
         " SG_ axis1_telemetry_current : 16|16@1- (1,0) [-32768|32767] \"mA\" Host\n",
         " SG_ telemetry_tick : 48|16@1+ (1,0) [0|65535] \"ticks\" Host\n",
         "SIG_VALTYPE_ 385 axis0_measured_force : 1;\n", "SIG_VALTYPE_ 897 axis0_measured_velocity : 1;\n",
+        " SG_ axis0_drive_statusword : 0|16@1+ (1,0) [0|65535] \"\" Host\n",
+        " SG_ axis1_operation_mode_display : 40|8@1- (1,0) [-128|127] \"\" Host\n",
+        "VAL_ 1281 axis0_operation_mode_display -1 \"haptic\" -2 \"excitation\" 10 "
+        "\"cyclic_synchronous_torque\" ;\n",
         "BA_ \"GenMsgCycleTime\" BO_ 385 10;\n", "VAL_ 1793 nmt_state 0 \"initialising\""})
     EXPECT_CONTAINS(text, line);
 }
@@ -64,8 +68,8 @@ TEST(Dbc, EmergencyMessagesAreDescribedAsTheyAreSent) {
   auto names = error_names(text);
   for (const firmware::FaultText& fault : firmware::fault_texts)
     EXPECT_EQ(names[fault.error_code], fault.name);
-  // PDOs of a wrong length; the others follow below.
-  for (const int code : {0x8210, 0x8220}) EXPECT_NE(names[code], "") << code;
+  // PDOs and SYNCs of a wrong length; the others follow below.
+  for (const int code : {0x8210, 0x8220, 0x8240}) EXPECT_NE(names[code], "") << code;
 }
 
 TEST(Dbc, EveryEmergencyMessageHasANameAPlaceAndTheFaultsNumber) {
@@ -129,7 +133,7 @@ TEST(Dbc, NamesAreUniqueAndShortEnough) {
     EXPECT_TRUE(names.insert(name).second) << name;
     EXPECT_LE(std::stoi((*found)[2]) + std::stoi((*found)[3]), 64) << name;
   }
-  EXPECT_EQ(names.size(), 19u);
+  EXPECT_EQ(names.size(), 23u);
 }
 
 }  // namespace kmax::description::dbc_test

@@ -97,6 +97,13 @@ TEST(DescribedObjects, ValuesAreDescribedAsTheyAre) {
   EXPECT_FALSE(cob->tpdo_mappable);
   EXPECT_FALSE(cob->rpdo_mappable);
 
+  // Fixed, but what it is depends on the node ID.
+  const DescribedObject* request = find(all, 0x1200, 1);
+  ASSERT_NE(request, nullptr);
+  EXPECT_TRUE(request->node_relative);
+  EXPECT_EQ(request->default_raw, 0x600u);
+  EXPECT_EQ(request->access, ObjectAccess::read_only);
+
   const DescribedObject* name = find(all, 0x1008, 0);
   ASSERT_NE(name, nullptr);
   EXPECT_EQ(name->type, DataType::visible_string);
@@ -125,6 +132,12 @@ TEST(DescribedIndices, KindsAndNames) {
   EXPECT_EQ(by_index[0x1018].kind, ObjectKind::record);
   EXPECT_EQ(by_index[0x1018].name, "Identity object");
   EXPECT_EQ(by_index[0x1A03].name, "TPDO4 mapping parameter");
+  EXPECT_EQ(by_index[0x1A04].name, "TPDO5 mapping parameter");
+  EXPECT_EQ(by_index[0x1200].kind, ObjectKind::record);
+  EXPECT_EQ(by_index[0x1200].objects.size(), 3u);
+  EXPECT_EQ(by_index[0x1200].name, "SDO server parameter");
+  EXPECT_EQ(by_index[0x1201].kind, ObjectKind::record);
+  EXPECT_EQ(by_index[0x1201].name, "SDO server 2 parameter");
   EXPECT_EQ(by_index[0x2000].name, "wall");
   EXPECT_EQ(by_index[0x2800].name, "axis1.wall");
   EXPECT_EQ(by_index[0x6840].name, "axis1.drive.controlword");

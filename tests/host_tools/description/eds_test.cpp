@@ -56,7 +56,7 @@ TEST_F(Eds, SaysWhatTheDeviceIs) {
   EXPECT_EQ(device.at("BaudRate_800"), "0");
   EXPECT_EQ(device.at("BaudRate_1000"), "1");
   EXPECT_EQ(device.at("NrOfRxPDO"), "4");
-  EXPECT_EQ(device.at("NrOfTxPDO"), "4");
+  EXPECT_EQ(device.at("NrOfTxPDO"), "5");
   EXPECT_EQ(device.at("LSS_Supported"), "1");
   EXPECT_EQ(device.at("RevisionNumber"), "0x00010203");
   EXPECT_EQ(sections["FileInfo"].at("CreationDate"), "11-14-2023");

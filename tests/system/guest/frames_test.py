@@ -74,7 +74,7 @@ class Frames(unittest.TestCase):
                     self.assertIn(frame.data[0], STATES)
 
     def test_what_is_promised_is_that_of_the_predefined_connection_set(self):
-        self.assertEqual(self.lengths, {0x701: 1, 0x581: 8, 0x081: 8, 0x181: 8, 0x281: 8, 0x381: 8, 0x481: 8})
+        self.assertEqual(self.lengths, {0x701: 1, 0x581: 8, 0x081: 8, 0x181: 8, 0x281: 8, 0x381: 8, 0x481: 8, 0x501: 6})
 
     def test_a_whole_session(self):
         with CanCapture() as capture, BoardOnBus() as board:
@@ -119,10 +119,11 @@ class Frames(unittest.TestCase):
         self.assertEqual(codes, [0xFF02, 0x0000])
 
     def test_pdos_at_rest_are_what_sdo_reads_and_come_every_20_ticks(self):
+        *regular, states = self.promised.tpdos
         with BoardOnBus() as board, CanCapture() as capture:
             board.kmax("set", "wall.law=none")
             send("000#0101")
-            last = self.promised.tpdos[-1].identifier
+            last = regular[-1].identifier
             capture.wait_for(lambda frame: frame.id == last, count=500)
             send("000#8001")
             settle(capture)
@@ -130,7 +131,7 @@ class Frames(unittest.TestCase):
             self.check_each(frames)
             for pdo in self.promised.tpdos:
                 own = [frame for frame in frames if frame.id == pdo.identifier]
-                self.assertEqual(pdo.event_time_ms, 10)
+                self.assertEqual(pdo.event_time_ms, 0 if pdo is states else 10)
                 for entry in pdo.mapped:
                     values = {pdo.parts(frame.data)[entry.name] for frame in own}
                     if entry.name.endswith("telemetry.tick"):
@@ -149,9 +150,10 @@ class Frames(unittest.TestCase):
                     else:
                         self.assertEqual(values, {sdo_upload(capture, entry.index, entry.subindex)}, entry.name)
         # The PDOs of a period go out together.
-        counts = [sum(frame.id == pdo.identifier for frame in frames) for pdo in self.promised.tpdos]
+        counts = [sum(frame.id == pdo.identifier for frame in frames) for pdo in regular]
         self.assertEqual(len(set(counts)), 1, counts)
         self.assertGreaterEqual(counts[0], 500)
+        self.assertEqual(1, sum(frame.id == states.identifier for frame in frames), "nothing changed")
 
 
 if __name__ == "__main__":

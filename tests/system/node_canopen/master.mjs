@@ -17,7 +17,8 @@ const patience = 60000; // ms, for what a machine that is not busy does at once
 const tpdo = 0x180 + node;
 const rpdo = 0x200 + node;
 const bootUp = NmtState.INITIALIZING;
-const abort = { unsupported: 0x06010000, readOnly: 0x06010002, noObject: 0x06020000, notMappable: 0x06040041,
+const second = { request: 0x6a0 + node, response: 0x6b0 + node };
+const abort = { localControl: 0x08000021, deviceState: 0x08000022, unsupported: 0x06010000, readOnly: 0x06010002, noObject: 0x06020000, notMappable: 0x06040041,
                 tooLong: 0x06040042, noSubIndex: 0x06090011 };
 
 const argument = process.argv[2];
@@ -54,6 +55,11 @@ eds.setSyncGenerationEnable(true);
 master.on('message', (message) => bus.send(message));
 bus.on('frame', (message) => master.receive(message));
 master.start();
+const other = new Device({ id: 124 }); // at the second SDO server
+other.eds.addSdoClientParameter(node, second.request, second.response);
+other.on('message', (message) => bus.send(message));
+bus.on('frame', (message) => other.receive(message));
+other.start();
 
 // --- what steps are made of
 
@@ -282,6 +288,61 @@ step('no PDO in pre-operational', async () => {
   await heartbeats(NmtState.PRE_OPERATIONAL, 3);
   bus.off('frame', listen);
   expect(count === 0, `${count} came`);
+});
+
+stepOfFirmware('SDO server 1200h as it is, and the second, 1201h, where it is told to be', async () => {
+  expect((await numberAt(0x1200, 1, 4)) === 0x600 + node, 'it is asked by another identifier');
+  expect((await numberAt(0x1200, 2, 4)) === 0x580 + node, 'it answers by another identifier');
+  expect((await numberAt(0x1201, 1, 4)) === 0x80000000, 'there is a second one from the factory');
+  await refused('a restricted identifier', undefined, set(0x1201, 1, 0x601, 4));
+  await keeps(0x1201, 1, second.request, 4);
+  await keeps(0x1201, 2, second.response, 4);
+  const type = await other.sdo.upload(place(0x1000, 0));
+  expect(type.equals(await read(0x1000)), 'the second one says another device type');
+});
+stepOfFirmware('two masters transfer at once', async () => {
+  const data = pattern(2000, 3);
+  const texts = async () => {
+    const found = [];
+    for (let i = 0; i < 20; ++i) found.push(await other.sdo.upload({ ...place(0x1008, 0), blockTransfer: i % 2 === 1 }));
+    return found;
+  };
+  const [, heard] = await Promise.all([write(0x5822, 1, data, true), texts()]);
+  const [back, trace] = await Promise.all([read(0x5822, 1, true),
+                                           other.sdo.upload({ ...place(0x5820, 1), blockTransfer: true })]);
+  expect(heard.every((text) => text.toString() === 'Kmax haptic device controller'), `there came ${heard[0]}`);
+  expect(back.equals(data), `${back.length} bytes came back`);
+  expect(trace.length === 160, `a trace object has ${trace.length} bytes`);
+});
+stepOfFirmware('a transaction belongs to the master that began it', async () => {
+  const control = (value) => other.sdo.download({ ...place(0x5810, 1), data: bytesOf(value, 2) });
+  await control(1);
+  await refused('the other one', abort.localControl, set(0x5810, 1, 2, 2));
+  await refused('its settings', abort.localControl, set(0x5805, 2, 1, 2));
+  await control(0);
+  await set(0x5805, 2, 0, 2);
+  await set(0x1201, 1, 0x80000000, 4);
+});
+
+const isSync = ({ id }) => id === 0x80;
+stepOfFirmware('SYNC by the device, with its counter', async () => {
+  await set(0x1019, 0, 3, 1);
+  await set(0x1006, 0, 20000, 4);
+  const heard = await frames('SYNC', isSync, 5, () => set(0x1005, 0, 0x40000080, 4));
+  expect(heard.every(({ data }) => data.length === 1), 'it has no counter');
+  expect(heard.map(({ data }) => data[0]).join() === '1,2,3,1,2', `it counts ${heard.map(({ data }) => data[0])}`);
+  await refused('1019h', abort.deviceState, set(0x1019, 0, 4, 1));
+  await refused('1005h', abort.deviceState, set(0x1005, 0, 0x40000090, 4));
+});
+stepOfFirmware('TPDO at each SYNC of the device', async () => {
+  await heartbeats(NmtState.OPERATIONAL, 1, () => nmt.startNode(node));
+  const heard = await frames('SYNC and TPDO', (frame) => isSync(frame) || isTpdo(frame), 11);
+  for (let i = 1; i < heard.length; ++i)
+    expect(isSync(heard[i]) !== isSync(heard[i - 1]), `frame ${i} is ${hex(heard[i].id)} once more`);
+  await heartbeats(NmtState.PRE_OPERATIONAL, 1, () => nmt.enterPreOperational(node));
+  await set(0x1005, 0, 0x80, 4);
+  await set(0x1006, 0, 0, 4);
+  await set(0x1019, 0, 0, 1);
 });
 
 step('EMCY 8130h when a watched heartbeat ends', async () => {
