@@ -312,7 +312,7 @@ stepOfFirmware('two masters transfer at once', async () => {
                                            other.sdo.upload({ ...place(0x5820, 1), blockTransfer: true })]);
   expect(heard.every((text) => text.toString() === 'Kmax haptic device controller'), `there came ${heard[0]}`);
   expect(back.equals(data), `${back.length} bytes came back`);
-  expect(trace.length === 160, `a trace object has ${trace.length} bytes`);
+  expect(trace.length === 128, `a trace object has ${trace.length} bytes`);
 });
 stepOfFirmware('a transaction belongs to the master that began it', async () => {
   const control = (value) => other.sdo.download({ ...place(0x5810, 1), data: bytesOf(value, 2) });
