@@ -53,6 +53,12 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
   }
 }
 
+consteval std::uint16_t index_of(SpecialObject what) {
+  return std::find_if(special_objects.begin(), special_objects.end(),
+                      [what](const SpecialObjectRow& row) { return row.what == what; })
+      ->index;
+}
+
 std::uint32_t little_endian(std::span<const std::uint8_t> in) {
   std::uint32_t raw = 0;
   for (std::size_t i = 0; i < in.size(); ++i) raw |= std::uint32_t{in[i]} << (8 * i);
@@ -233,12 +239,11 @@ Abort CanopenObjects::write_begin(ObjectAddress address, canopen::WriteBounds& b
   return Abort::none;
 }
 
-/// What is longer than a read of it: the scratch pad, and a capture after which another one has been taken.
+/// Of what is longer than a read of it and changes: the scratch pad, and a capture after which another one
+/// has been taken. Every transfer asks, so that nothing is searched for.
 std::uint32_t CanopenObjects::version(ObjectAddress address) const {
-  const canopen::SpecialPlace* const special = canopen::special_at(address);
-  if (special == nullptr) return 0;
-  if (special->what == SpecialObject::scratch) return scratch_version_;
-  if (special->what != SpecialObject::capture_samples) return 0;
+  if (address.index == index_of(SpecialObject::scratch)) return scratch_version_;
+  if (address.index != index_of(SpecialObject::capture_samples)) return 0;
   return of_.axes.tick().capture().readings().first_tick;
 }
 

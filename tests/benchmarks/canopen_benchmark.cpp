@@ -106,22 +106,60 @@ void block_upload(tests::CanBench& bench, const std::string& what) {
       "85 %", share >= 0.85 && bytes.size() == 49152);
 }
 
+/// Of what comes every millisecond: how regularly.
+struct Regularity {
+  Statistic period;  ///< us
+  double square = 0.0;
+  void add(double us) {
+    period.add(us);
+    square += (us - 1000.0) * (us - 1000.0);
+  }
+  std::string text() const {
+    return fmt::format("period {:.0f} to {:.0f} us, RMS deviation {:.1f} us", period.least, period.most,
+                       std::sqrt(square / static_cast<double>(period.count)));
+  }
+};
+
+/// SYNC made by the device, beside its PDOs.
+void own_syncs(tests::CanBench& bench, double duration_s) {
+  std::uint64_t received = 0;
+  double before = 0.0;
+  Regularity regularity;
+  virtual_board::CanHostNode listener(bench.board->can_bus(), 1'000'000);
+  listener.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime now) {
+    if (frame.identifier != 0x80) return;
+    if (received++ != 0) regularity.add(1e6 * (seconds(now) - before));
+    before = seconds(now);
+  });
+  bench.ask_for_telemetry();
+  bench.write(0x1006, 0, 1000, 4);
+  bench.write(0x1005, 0, 0x4000'0080, 4);
+  bench.nmt(0x01);
+  for (double done = 0.0; done < duration_s; done += 0.25) {
+    bench.board->run_for(0.25);
+    bench.port.send(upload_request({0x1000, 0}));
+    bench.port.forget();
+  }
+  bench.nmt(0x80);
+  bench.board->run_for(0.01);
+  row(fmt::format("own SYNC at 1 kHz beside 4 PDOs for {:.0f} s", duration_s),
+      fmt::format("{} at least; {}", received, regularity.text()), "no loss",
+      received >= static_cast<std::uint64_t>(1000.0 * duration_s));
+  bench.write(0x1005, 0, 0x80, 4);
+  bench.write(0x1006, 0, 0, 4);
+}
+
 /// All four PDOs by an event time of 1 ms.
 void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
   std::array<std::uint64_t, 4> received{};
   std::array<double, 4> before{};
-  Statistic period;
-  double square = 0.0;
+  Regularity regularity;
   virtual_board::CanHostNode listener(bench.board->can_bus(), 1'000'000);
   listener.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime now) {
     for (std::size_t i = 0; i < 4; ++i) {
       if (frame.identifier != 0x181 + 0x100 * i) continue;
       const double time = seconds(now);
-      if (received[i]++ != 0) {
-        const double us = 1e6 * (time - before[i]);
-        period.add(us);
-        square += (us - 1000.0) * (us - 1000.0);
-      }
+      if (received[i]++ != 0) regularity.add(1e6 * (time - before[i]));
       before[i] = time;
     }
   });
@@ -141,11 +179,8 @@ void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
   const auto wanted = static_cast<std::uint64_t>(1000.0 * duration_s);
   const std::uint32_t held_back = bench.number(0x581B, 16);
   row(fmt::format("4 PDOs at 1 kHz for {:.0f} s, {}", duration_s, what),
-      fmt::format(
-          "{} of each at least, {} held back; period {:.0f} to {:.0f} us, RMS deviation {:.1f} us; bus load "
-          "{:.0f} %",
-          least, held_back, period.least, period.most, std::sqrt(square / static_cast<double>(period.count)),
-          100.0 * load),
+      fmt::format("{} of each at least, {} held back; {}; bus load {:.0f} %", least, held_back,
+                  regularity.text(), 100.0 * load),
       "no loss", least + 1 >= wanted && held_back == 0);
 }
 
@@ -171,6 +206,7 @@ int main(int argc, char** argv) {
     round_trips(bench, what + ", a reading", {0x2012, 2});
     round_trips(bench, what + ", a counter", {0x5812, 1});
     block_upload(bench, what);
+    if (!armed) own_syncs(bench, std::min(duration_s, 10.0));
     pdos(bench, what, armed ? duration_s : std::min(duration_s, 10.0));
     const std::uint32_t missed = bench.number(0x5812, 10);
     row(fmt::format("control ticks missed meanwhile, {}", what), fmt::format("{}", missed), "0", missed == 0);
