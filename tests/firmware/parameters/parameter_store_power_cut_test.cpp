@@ -108,7 +108,7 @@ TEST(ParameterStorePowerCut, DuringTheEraseAgainAndAgain) {
 
 // A device on a bad supply: cuts in saves that follow cuts.
 TEST(ParameterStorePowerCut, ManyInARowNeverLoseTheLastGoodSet) {
-  rc::check("cuts in a row", [](std::uint32_t seed) {
+  EXPECT_TRUE(rc::check("cuts in a row", [](std::uint32_t seed) {
     std::mt19937 random(seed);
     FakeFlash flash;
     const std::uint32_t full = static_cast<std::uint32_t>(random() % (2 * saves_per_sector));
@@ -123,7 +123,7 @@ TEST(ParameterStorePowerCut, ManyInARowNeverLoseTheLastGoodSet) {
     }
     expect_saving_works(flash, seed);
     RC_ASSERT(!testing::Test::HasFailure());
-  });
+  }));
 }
 
 // The sector with the newest good set is never erased, not even half.
@@ -145,7 +145,7 @@ TEST(ParameterStorePowerCut, NoEraseTouchesTheNewestSet) {
 
 // A memory that wears out and a supply that fails, together.
 TEST(ParameterStorePowerCut, OnAMemoryWithBrokenWords) {
-  rc::check("cuts and bad words", [](std::uint32_t seed) {
+  EXPECT_TRUE(rc::check("cuts and bad words", [](std::uint32_t seed) {
     std::mt19937 random(seed);
     FakeFlash flash;
     for (int i = 0; i < 10; ++i) flash.broken.insert({random() % 2, random() % 4096});
@@ -165,7 +165,7 @@ TEST(ParameterStorePowerCut, OnAMemoryWithBrokenWords) {
       RC_ASSERT(is_new || (found == kept && progress != SaveProgress::done));
       kept = found;
     }
-  });
+  }));
 }
 
 }  // namespace

@@ -321,7 +321,7 @@ TEST(ParameterStore, AMemoryThatIsNotThereFailsInsteadOfHanging) {
 
 // Whatever words are broken: a save either keeps the new set or leaves the old one, and says which.
 TEST(ParameterStore, SavesOnABadMemorySayTheTruth) {
-  rc::check("bad words", [](std::uint32_t seed) {
+  EXPECT_TRUE(rc::check("bad words", [](std::uint32_t seed) {
     FakeFlash flash;
     std::mt19937 random(seed);
     const auto badness = random() % 200;
@@ -334,7 +334,7 @@ TEST(ParameterStore, SavesOnABadMemorySayTheTruth) {
       if (save(store, values) == SaveProgress::done) kept = persistent_part(values);
       RC_ASSERT(loaded(flash) == kept);
     }
-  });
+  }));
 }
 
 }  // namespace
