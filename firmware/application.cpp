@@ -5,11 +5,13 @@ namespace kmax::firmware {
 Application::Application(const BoardIdentity& board, std::span<std::uint32_t> capture_memory,
                          std::span<std::uint32_t> log_memory)
     : board_(board),
+      lock_(parameters_, store_, board.lock_attempts),
       log_(log_memory, board.reset_cause, board.crash),
       axes_(board.modulation_limit, parameters_, store_, links_, log_, capture_memory),
       readings_({.board = board_,
                  .parameters = parameters_,
                  .store = store_,
+                 .lock = lock_,
                  .axes = axes_,
                  .serial = serial_,
                  .can = can_}),
@@ -33,6 +35,7 @@ void Application::poll(std::uint32_t now_us) {
   axes_.begin_poll(now_us);
   log_.count_time(now_us);
   parameters_.poll(now_us);
+  lock_.poll(now_us);
   serial_.poll(now_us);
   can_.poll();
   axes_.act();
@@ -42,6 +45,7 @@ void Application::poll(std::uint32_t now_us) {
 
 const LoadReport& Application::attach_store(AnyFlashSectors flash) {
   const LoadReport& loaded = store_.attach(flash);
+  lock_.follow_store();
   axes_.offer_settings_if_changed();
   serial_.follow_parameters();
   can_.power_on();

@@ -12,6 +12,7 @@
 #include "firmware/command/link_states.hpp"
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/command/store_commands.hpp"
+#include "firmware/command/write_lock.hpp"
 #include "firmware/links/canopen_edge.hpp"
 #include "firmware/links/modbus_edge.hpp"
 #include "firmware/links/readings.hpp"
@@ -32,7 +33,7 @@ struct TickOutput {
 ///
 ///   serial() ModbusEdge  --+                       +--> axes() Axes: supervisors, AxesTick
 ///                          +--> HostWrites --------+--> ParameterAccess
-///   can()    CanopenEdge --+--> Readings           +--> StoreCommands
+///   can()    CanopenEdge --+--> Readings           +--> StoreCommands, WriteLock
 ///
 /// A board owns one, calls ISR_tick() for each axis at 20 kHz from the interrupt that follows the axis'
 /// current sample, serial().ISR_byte() and can().ISR_frame() from its receive interrupts, and everything else
@@ -115,10 +116,11 @@ class Application {
   BoardIdentity board_;
   ParameterAccess parameters_;
   StoreCommands store_{parameters_};
+  WriteLock lock_;
   LinkStates links_;
   FaultLog log_;
   Axes axes_;
-  HostWrites writes_{parameters_, store_, axes_};
+  HostWrites writes_{parameters_, store_, lock_, axes_};
   Readings readings_;
   ModbusEdge serial_;
   CanopenEdge can_;

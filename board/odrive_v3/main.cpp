@@ -55,7 +55,7 @@ stm32::ExternalInterrupts line_interrupts{stm32::exti(), stm32::syscfg()};
 stm32::IndependentWatchdog watchdog{stm32::iwdg(), stm32::dbgmcu()};
 
 using ParameterFlash = stm32::FlashSectors<>;
-static_assert(firmware::ParameterStore<ParameterFlash>::length <= ParameterFlash::words_per_sector);
+static_assert(firmware::ParameterStore<ParameterFlash>::longest <= ParameterFlash::words_per_sector);
 std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_sector(std::size_t index) {
   return std::span<volatile std::uint32_t, ParameterFlash::words_per_sector>{
       kmax_parameters_begin + index * ParameterFlash::words_per_sector, ParameterFlash::words_per_sector};
@@ -65,6 +65,8 @@ ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, p
 /// In the memory beside the buses' RAM.
 [[gnu::section(".ccm_noinit")]] firmware::FaultLogMemory log_memory;
 [[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
+
+[[gnu::section(".noinit")]] firmware::RetainedCount lock_attempts;
 
 std::optional<firmware::Application> application;
 std::optional<SerialLine> serial;
@@ -102,7 +104,11 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.modulation_limit = description.modulation_limit;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
-  if (identity.reset_cause == firmware::ResetCause::power_on) cortex::fault_record.magic = 0;
+  if (identity.reset_cause == firmware::ResetCause::power_on) {
+    cortex::fault_record.magic = 0;
+    lock_attempts.set(0);
+  }
+  identity.lock_attempts = &lock_attempts;
   identity.crash = crash_record_of(cortex::fault_record);
   cortex::fault_record.reported = true;
   return identity;

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "firmware/board_interface/crash_record.hpp"
+#include "firmware/board_interface/retained_count.hpp"
 #include "firmware/drive/motor_control.hpp"
 
 namespace kmax::firmware {
@@ -20,7 +21,8 @@ struct BoardIdentity {
   std::uint32_t core_clock_hz = 0;
   std::uint8_t clock_source = 0;  ///< as info.clock_source says
   ResetCause reset_cause = ResetCause::unknown;
-  CrashRecord crash{};  ///< what is left of the run before
+  CrashRecord crash{};                     ///< what is left of the run before
+  RetainedCount* lock_attempts = nullptr;  ///< where WriteLock counts over resets; null: nowhere
   /// Of the supply, that the current controllers may use: what the board's bridge can give.
   float modulation_limit = MotorControlConfig{}.modulation_limit;
 };

@@ -53,7 +53,7 @@ inline constexpr std::array abort_texts = std::to_array<AbortText>({
     {Abort::sequence, "a sequence number is not valid"},
     {Abort::crc, "the checksum is wrong"},
     {Abort::memory, "out of memory: the value is longer than can be taken"},
-    {Abort::unsupported_access, "this object cannot be accessed in this way now"},
+    {Abort::unsupported_access, "this object cannot be written now: the device is locked"},
     {Abort::write_only, "it can only be written"},
     {Abort::read_only, "it can only be read"},
     {Abort::no_object, "there is no such object"},

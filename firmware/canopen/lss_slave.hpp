@@ -96,11 +96,13 @@ class LssSlave {
     return LssAction::none;
   }
 
-  /// While it is held, "activate" is ignored and one that has begun is given up: whoever holds a device that
-  /// makes force would lose it with the bus.
-  void hold_bit_rate(bool held) {
-    held_ = held;
-    if (held && switching_ == Switching::before) switching_ = Switching::no;
+  /// While the device is armed or locked, "activate" is ignored and one that has begun is given up: whoever
+  /// holds a device that makes force would lose it with the bus. While it is locked, node ID and bit timing
+  /// are neither configured nor stored: error 255 (CiA 305: implementation specific), specific error 1.
+  void hold(bool armed, bool locked) {
+    held_ = armed || locked;
+    locked_ = locked;
+    if (held_ && switching_ == Switching::before) switching_ = Switching::no;
   }
 
   /// `switch_bit_rate` when the first delay of "activate" is over.
@@ -164,6 +166,8 @@ class LssSlave {
     static constexpr std::uint8_t inquire_serial = 0x5D;
     static constexpr std::uint8_t inquire_node_id = 0x5E;
   };
+
+  static constexpr std::uint8_t specific_error = 0xFF, error_locked = 1;
 
   static std::uint32_t number_of(const drivers::CanFrame& frame) {
     return std::uint32_t{frame.data[1]} | std::uint32_t{frame.data[2]} << 8 |
@@ -247,6 +251,9 @@ class LssSlave {
       return answer({which, static_cast<std::uint8_t>(number), static_cast<std::uint8_t>(number >> 8),
                      static_cast<std::uint8_t>(number >> 16), static_cast<std::uint8_t>(number >> 24)});
     }
+    const bool writes = which == service::configure_node_id || which == service::configure_bit_timing ||
+                        which == service::store;
+    if (locked_ && writes) return answer({which, specific_error, error_locked});
     switch (which) {
       case service::configure_node_id:
         return configure_node_id(frame.data[1]);
@@ -296,7 +303,7 @@ class LssSlave {
   Switching switching_ = Switching::no;
   std::uint8_t active_node_id_ = unconfigured_node_id, pending_node_id_ = unconfigured_node_id;
   std::uint8_t scanned_ = 0;  // the number that fastscan is at
-  bool answer_waits_ = false, storing_ = false, held_ = false;
+  bool answer_waits_ = false, storing_ = false, held_ = false, locked_ = false;
 };
 
 }  // namespace kmax::firmware::canopen

@@ -5,6 +5,8 @@ namespace kmax::firmware {
 ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Link by) {
   const std::size_t entry = owner_of(wanted[0].slot).entry;
   if (entry == entry_of<"store.command">()) return store_.command(wanted[0].raw, axes_.any_armed());
+  if (entry == entry_of<"lock.code">()) return lock_.set_code(wanted[0].raw, axes_.any_armed());
+  if (entry == entry_of<"lock.key">()) return lock_.turn_key(wanted[0].raw, axes_.any_armed());
   if (entry == entry_of<"capture.command">()) return command_capture(wanted[0].raw);
   if (entry == entry_of<"log.command">()) return command_log(wanted[0].raw);
   const auto result = parameters_.write(wanted, by, axes_.armed(), axes_.now_us());
@@ -20,9 +22,10 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
 }
 
 ParameterAccess::Result HostWrites::command_log(std::uint32_t command) {
-  const Refusal refusal = command != 1        ? Refusal::out_of_range
-                          : axes_.any_armed() ? Refusal::while_armed
-                                              : Refusal::none;
+  const Refusal refusal = command != 1           ? Refusal::out_of_range
+                          : axes_.any_armed()    ? Refusal::while_armed
+                          : parameters_.locked() ? Refusal::locked
+                                                 : Refusal::none;
   if (refusal == Refusal::none) axes_.log().erase();
   return parameters_.refuse_slot(refusal, slot_of(entry_of<"log.command">(), 0));
 }

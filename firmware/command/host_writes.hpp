@@ -6,17 +6,19 @@
 #include "firmware/command/axes.hpp"
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/command/store_commands.hpp"
+#include "firmware/command/write_lock.hpp"
 
 namespace kmax::firmware {
 
 /// What hosts write, by whichever link: parameters, controlwords and targets, or one command to the store,
-/// the capture or the fault log. Main loop only; why something was refused is also in refusal.reason.
+/// the write lock, the capture or the fault log. Main loop only; why something was refused is also in
+/// refusal.reason.
 class HostWrites {
  public:
-  HostWrites(ParameterAccess& parameters, StoreCommands& store, Axes& axes)
-      : parameters_(parameters), store_(store), axes_(axes) {}
+  HostWrites(ParameterAccess& parameters, StoreCommands& store, WriteLock& lock, Axes& axes)
+      : parameters_(parameters), store_(store), lock_(lock), axes_(axes) {}
 
-  /// store.command, capture.command and log.command come alone; `wanted` is not empty.
+  /// store.command, lock.code, lock.key, capture.command and log.command come alone; `wanted` is not empty.
   ParameterAccess::Result write(std::span<const SlotValue> wanted, Link by);
 
  private:
@@ -26,6 +28,7 @@ class HostWrites {
 
   ParameterAccess& parameters_;
   StoreCommands& store_;
+  WriteLock& lock_;
   Axes& axes_;
 };
 

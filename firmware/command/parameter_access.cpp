@@ -10,11 +10,20 @@ namespace kmax::firmware {
 
 namespace {
 constexpr std::size_t transaction_slot = slot_of(entry_of<"transaction.control">(), 0);
-constexpr std::size_t store_entry = entry_of<"store.command">();
+/// Commands and no values; the application takes them before they come here, if it has a store.
+constexpr std::array store_entries{entry_of<"store.command">(), entry_of<"lock.code">(),
+                                   entry_of<"lock.key">()};
 constexpr std::size_t controlword_entry = entry_of<"drive.controlword">();
 
 bool is_setting(const SlotValue& one) {
   return !acts_at_once(one.slot);
+}
+
+/// Whether a setting says what is recorded, and nothing else.
+bool only_measures(std::size_t slot) {
+  const std::uint8_t group = descriptors[owner_of(slot).entry].group;
+  return group == descriptors[entry_of<"trace.axis">()].group ||
+         group == descriptors[entry_of<"capture.axis">()].group;
 }
 }  // namespace
 
@@ -49,13 +58,20 @@ void ParameterAccess::drop(Link owner, std::uint32_t now_us) {
   dropped_us_[static_cast<std::size_t>(owner)] = now_us;
 }
 
+Refusal ParameterAccess::lock_refusal(const SlotValue& wanted, Link by) const {
+  const bool passes = !locked_ || by == Link::local || wanted.raw == values_.raw(wanted.slot) ||
+                      acts_at_once(wanted.slot) || only_measures(wanted.slot);
+  return passes ? Refusal::none : Refusal::locked;
+}
+
 ParameterAccess::Result ParameterAccess::check(const SlotValue& one, Link by, const ArmedAxes& armed) {
   const std::size_t entry = owner_of(one.slot).entry;
   const SlotDescriptor& descriptor = descriptors[entry];
-  Refusal refusal = descriptor.writable ? check_value(descriptor, one.raw) : Refusal::read_only;
+  Refusal refusal = descriptor.writable ? lock_refusal(one, by) : Refusal::read_only;
+  if (refusal == Refusal::none) refusal = check_value(descriptor, one.raw);
   if (refusal == Refusal::none) refusal = armed_change_refusal(values_, one, by, armed);
-  // A command and no value; the application takes it before it comes here, if it has a store.
-  if (refusal == Refusal::none && entry == store_entry) refusal = Refusal::store_missing;
+  if (refusal == Refusal::none && std::ranges::find(store_entries, entry) != store_entries.end())
+    refusal = Refusal::store_missing;
   return refusal == Refusal::none ? Result{} : refuse_slot(refusal, one.slot);
 }
 
@@ -82,9 +98,10 @@ ParameterAccess::Result ParameterAccess::apply(Link by, const ArmedAxes& armed) 
   for_each_written([&](std::size_t slot) {
     const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
     if (staged_.raw(slot) == values_.raw(slot)) return;
-    // An axis may have been armed since the value was put aside.
+    // An axis may have been armed, or the device locked, since the value was put aside.
     const SlotValue wanted{slot, staged_.raw(slot)};
-    const Refusal refusal = armed_change_refusal(values_, wanted, by, armed);
+    Refusal refusal = lock_refusal(wanted, by);
+    if (refusal == Refusal::none) refusal = armed_change_refusal(values_, wanted, by, armed);
     if (refusal != Refusal::none && refused.refusal == Refusal::none) refused = {refusal, slot};
     (descriptor.writable ? changed : communication_changed) = true;
     restarts = restarts || (descriptor.writable && descriptor.disarmed_only());
@@ -125,9 +142,9 @@ ParameterAccess::Result ParameterAccess::write_communication(std::size_t slot, s
                                                              const ArmedAxes& armed) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   Refusal refusal =
-      descriptor.kept && !descriptor.writable ? check_value(descriptor, raw) : Refusal::read_only;
-  if (refusal == Refusal::none)
-    refusal = armed_change_refusal(values_, {slot, raw}, Link::can, armed);
+      descriptor.kept && !descriptor.writable ? lock_refusal({slot, raw}, Link::can) : Refusal::read_only;
+  if (refusal == Refusal::none) refusal = check_value(descriptor, raw);
+  if (refusal == Refusal::none) refusal = armed_change_refusal(values_, {slot, raw}, Link::can, armed);
   if (refusal != Refusal::none) return refuse_slot(refusal, slot);
   if (values_.raw(slot) != raw) ++communication_changes_;
   values_.set_raw(slot, raw);

@@ -40,6 +40,9 @@ bool acts_at_once(std::size_t slot);
 /// are written, in anybody's transaction too, and are no change of parameters. So are CANopen's own settings
 /// (Access::communication), which only CANopen writes, one by one, with write_communication().
 ///
+/// While the write lock is locked (write_lock.hpp) no link changes anything else than those commands and what
+/// only measures (trace.*, capture.*). A value that is written as it is, is no change.
+///
 /// Of two parameters that are one thing in two standards' numbers (linked_parameters.hpp), writing either
 /// sets both; the last one written wins.
 ///
@@ -83,6 +86,10 @@ class ParameterAccess {
   /// the caller's.
   Result write_communication(std::size_t slot, std::uint32_t raw, const ArmedAxes& armed);
 
+  /// The board's own writes, Link::local, are no host's and pass.
+  void set_locked(bool locked) { locked_ = locked; }
+  bool locked() const { return locked_; }
+
   /// What a request that others carry out came to; last_refusal() says so from now on.
   Result refuse(Refusal refusal, std::uint16_t address) { return last_ = {refusal, address}; }
   Result refuse_slot(Refusal refusal, std::size_t slot);
@@ -104,6 +111,7 @@ class ParameterAccess {
  private:
   static constexpr std::size_t words_of_slots = (slot_count + 31) / 32;
 
+  Refusal lock_refusal(const SlotValue& wanted, Link by) const;
   Result check(const SlotValue& one, Link by, const ArmedAxes& armed);
   void put_aside(const SlotValue& one);
   Result control_transaction(std::uint32_t request, Link by, const ArmedAxes& armed, std::uint32_t now_us);
@@ -126,6 +134,7 @@ class ParameterAccess {
   std::array<std::uint32_t, words_of_slots> written_{};
   Result last_;
   std::uint32_t changes_ = 0, restarting_changes_ = 0, communication_changes_ = 0;
+  bool locked_ = false;
   std::optional<Link> owner_;
   std::uint32_t last_staged_us_ = 0;
   std::array<std::optional<std::uint32_t>, link_count> dropped_us_;  ///< by link: without its doing

@@ -18,7 +18,8 @@ ParameterAccess::Result StoreCommands::command(std::uint32_t command, bool armed
     case StoreCommand::save:
       return save(armed);
     case StoreCommand::defaults: {
-      const Refusal refusal = armed                            ? Refusal::while_armed
+      const Refusal refusal = parameters_.locked()             ? Refusal::locked
+                              : armed                          ? Refusal::while_armed
                               : parameters_.transaction_open() ? Refusal::transaction_open
                                                                : Refusal::none;
       if (refusal == Refusal::none) {
@@ -40,7 +41,7 @@ ParameterAccess::Result StoreCommands::save_defaults(bool armed) {
 }
 
 ParameterAccess::Result StoreCommands::save(const ParameterValues& set, bool armed) {
-  const Refusal refusal = keeper_.save(set, armed);
+  const Refusal refusal = parameters_.locked() ? Refusal::locked : keeper_.save(set, armed);
   if (refusal == Refusal::none) power_on_communication_.note_saving(set);
   return refuse(refusal);
 }

@@ -7,7 +7,8 @@
 namespace kmax::firmware {
 
 /// What hosts ask of the parameter store: store.command, and CANopen's 0x1010 and 0x1011. Main loop only;
-/// what is refused is also in `parameters`' last_refusal(), under store.command.
+/// what is refused, as all is while the device is locked, is also in `parameters`' last_refusal(), under
+/// store.command.
 class StoreCommands {
  public:
   explicit StoreCommands(ParameterAccess& parameters) : parameters_(parameters) {}
@@ -19,6 +20,9 @@ class StoreCommands {
   ParameterAccess::Result save(bool armed) { return save(parameters_.values(), armed); }
   /// The next start has all parameters at their defaults; the present ones stay.
   ParameterAccess::Result save_defaults(bool armed);
+
+  /// See ParameterKeeper. Whether the device may be locked or opened is the caller's question.
+  Refusal save_lock_code(std::uint32_t code, bool armed) { return keeper_.save_lock_code(code, armed); }
 
   /// One step of a save under way.
   void poll();

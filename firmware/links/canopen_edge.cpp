@@ -57,10 +57,10 @@ void CanopenEdge::poll() {
   // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
   for (int i = 0; i < frames_per_poll && queue_.pop(frame); ++i) {
-    node_.lss().hold_bit_rate(axes_.any_armed());
+    node_.lss().hold(axes_.any_armed(), parameters_.locked());
     act_on(node_.receive(frame, parameters_.values(), now_us));
   }
-  node_.lss().hold_bit_rate(axes_.any_armed());
+  node_.lss().hold(axes_.any_armed(), parameters_.locked());
   if (parameters_.communication_changes() != configured_communication_) {
     configured_communication_ = parameters_.communication_changes();
     node_.configure(parameters_.values(), now_us);

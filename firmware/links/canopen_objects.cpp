@@ -31,6 +31,7 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
     }
     case Refusal::not_a_choice:
     case Refusal::not_finite:
+    case Refusal::wrong_code:
       return Abort::value_range;
     case Refusal::adaptive_interval_empty:
     case Refusal::supply_interval_empty:
@@ -48,6 +49,8 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
       return Abort::hardware;
     case Refusal::read_only:
       return Abort::read_only;
+    case Refusal::locked:
+      return Abort::unsupported_access;
     default:
       return Abort::device_state;
   }
@@ -260,6 +263,10 @@ Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t>
 Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::span<const std::uint8_t> in) {
   switch (place.what) {
     case SpecialObject::error_history_count:
+      if (of_.parameters.locked()) {
+        of_.parameters.refuse_slot(Refusal::locked, slot_of(entry_of<"lock.code">(), 0));
+        return abort_for(Refusal::locked, {}, 0);
+      }
       if (in[0] != 0) return Abort::value_range;
       of_.node.emergency().erase_history();
       return Abort::none;
@@ -295,7 +302,10 @@ Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw, Link by) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
     const std::uint8_t node_id = of_.node.node_id();
-    const Abort abort = canopen::check_communication(of_.parameters.values(), slot, raw, node_id);
+    // Locked comes first: what would be right in another order of writes, or not, is no matter then.
+    const Abort abort = of_.parameters.locked()
+                            ? Abort::none
+                            : canopen::check_communication(of_.parameters.values(), slot, raw, node_id);
     if (abort != Abort::none) return abort;
     const std::uint32_t stored = canopen::stored_communication(slot, raw, node_id);
     return abort_for(of_.parameters.write_communication(slot, stored, of_.axes.armed()).refusal, descriptor,

@@ -103,12 +103,16 @@ Exception exception_for(Refusal refusal) {
     case Refusal::other_commander:
     case Refusal::armed_by_broadcast:
     case Refusal::no_transaction:
+    case Refusal::no_code:
     case Refusal::store_missing:
     case Refusal::capture_missing:
       return Exception::server_device_failure;
     case Refusal::transaction_open:
     case Refusal::store_busy:
+    case Refusal::code_waits:
       return Exception::server_device_busy;
+    case Refusal::locked:
+      return Exception::negative_acknowledge;
     default:
       return Exception::illegal_data_value;
   }

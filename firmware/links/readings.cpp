@@ -162,6 +162,7 @@ void Readings::refresh_device() {
 
   publish_crash();
   publish_capture();
+  of_.lock.publish(v);
   of_.serial.publish(v);
   of_.can.publish(v);
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(of_.parameters.last_refusal().refusal));

@@ -7,6 +7,7 @@
 #include "firmware/command/axes.hpp"
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/command/store_commands.hpp"
+#include "firmware/command/write_lock.hpp"
 
 namespace kmax::firmware {
 
@@ -22,6 +23,7 @@ class Readings {
     const BoardIdentity& board;
     ParameterAccess& parameters;
     const StoreCommands& store;
+    const WriteLock& lock;
     Axes& axes;
     const ModbusEdge& serial;
     const CanopenEdge& can;

@@ -11,7 +11,9 @@
 //                                range cuts a
 //                                                               value of several registers in two,
 //                                        illegal_data_value     a value is out of its range,
-//                                        server_device_failure, server_device_busy.
+//                                        server_device_failure, server_device_busy,
+//                                        negative_acknowledge   the device is locked (Modicon's PI-MBUS-300
+//                                                               has it for a programming request refused).
 //   has_holding(address, count)  true if read_holding() over this range returns none. Read/write-multiple
 //   asks before it
 //                                writes, since an exception for the read part must leave the registers
@@ -36,6 +38,7 @@ enum class Exception : std::uint8_t {
   illegal_data_value = 3,
   server_device_failure = 4,
   server_device_busy = 6,
+  negative_acknowledge = 7,
 };
 
 template <typename Bank>

@@ -15,6 +15,10 @@ inline constexpr Group node{"node", 0x5802, Scope::device, 0x2020};
 inline constexpr Group can{"can", 0x5803, Scope::device, 0x2028};
 inline constexpr Group modbus{"modbus", 0x5804, Scope::device, 0x2030};
 inline constexpr Group trace{"trace", 0x5805, Scope::device, 0x2040};
+// Apart from each other, so that no write covers both commands.
+inline constexpr Group lock{"lock", 0x5808, Scope::device, 0x2204};
+inline constexpr Group lock_key{"lock", 0x5809, Scope::device, 0x2208};
+inline constexpr Group lock_status{"lock", 0x580A, Scope::device, 0x2208};
 inline constexpr Group transaction{"transaction", 0x5810, Scope::device, 0x2100};
 inline constexpr Group info{"info", 0x5811, Scope::device, 0x2000};
 inline constexpr Group counters{"counters", 0x5812, Scope::device, 0x2040};
@@ -47,6 +51,7 @@ inline constexpr NamedValue can_state[] = {{"absent", 0}, {"stopped", 1},       
 inline constexpr NamedValue store_state[] = {{"idle", 0},     {"busy", 1},    {"saved", 2},
                                              {"failed", 3},   {"refused", 4}, {"defaults_set", 5},
                                              {"no_memory", 6}};
+inline constexpr NamedValue lock_state[] = {{"no_code", 0}, {"open", 1}, {"locked", 2}};
 inline constexpr NamedValue link_loss[] = {{"limp", 0}, {"ramp", 1}, {"damp", 2}};
 inline constexpr NamedValue baud_rate[] = {{"9600", 9600},     {"19200", 19200},   {"38400", 38400},
                                            {"57600", 57600},   {"115200", 115200}, {"230400", 230400},
@@ -301,6 +306,24 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "none yet. 'kmax faults' shows it."),
     reading("log.start", group::log_status, 2, Type::unsigned16, "",
             "How many starts there have been since power-on, with this one."),
+
+    whole("lock.code", group::lock, 1, Type::unsigned32, "", 0, 4294967295.0, 0,
+          "Sets the code of the write lock, which is kept at once and locks when store.state says saved; 0 "
+          "removes it. Only while it is open and no axis is armed; reads as 0.")
+        .disarmed_only()
+        .volatile_value(),
+    whole("lock.key", group::lock_key, 1, Type::unsigned32, "", 0, 4294967295.0, 0,
+          "The code opens the write lock until the next start; 0 locks again. Only while no axis is armed. "
+          "See lock.state; reads as 0.")
+        .disarmed_only()
+        .volatile_value(),
+    named_reading(
+        "lock.state", group::lock_status, 1, names::lock_state,
+        "Whether settings can be changed: no_code and open, they can; locked, only lock.key opens."),
+    reading("lock.attempts", group::lock_status, 2, Type::unsigned16, "",
+            "Wrong codes since the right one was given; a reset keeps the number, a power-off does not."),
+    reading("lock.wait", group::lock_status, 3, Type::unsigned16, "s",
+            "How long no code is taken, not even the right one: twice as long after each wrong one."),
 });
 
 }  // namespace kmax::firmware

@@ -18,19 +18,32 @@ const LoadReport& ParameterKeeper::attach(AnyFlashSectors flash, ParameterValues
   return loaded_;
 }
 
-Refusal ParameterKeeper::save(const ParameterValues& values, bool armed) {
+Refusal ParameterKeeper::hindrance(bool armed) {
   if (busy()) return Refusal::store_busy;
   if (!flash_.present()) return Refusal::store_missing;
-  if (armed) {
-    state_ = StoreState::refused;
-    return Refusal::while_armed;
-  }
+  if (armed) state_ = StoreState::refused;
+  return armed ? Refusal::while_armed : Refusal::none;
+}
+
+Refusal ParameterKeeper::save(const ParameterValues& values, bool armed) {
+  if (const Refusal refusal = hindrance(armed); refusal != Refusal::none) return refusal;
   // A master that saves at each of its starts must not wear the flash out.
   if (survey_.newest && state_ != StoreState::failed && persistent_part(values) == kept_) {
     state_ = StoreState::saved;
     return Refusal::none;
   }
   store_.begin(values);
+  state_ = StoreState::busy;
+  return Refusal::none;
+}
+
+Refusal ParameterKeeper::save_lock_code(std::uint32_t code, bool armed) {
+  if (const Refusal refusal = hindrance(armed); refusal != Refusal::none) return refusal;
+  if (code == lock_code() && state_ != StoreState::failed) {
+    state_ = StoreState::saved;
+    return Refusal::none;
+  }
+  store_.begin(kept_, code);
   state_ = StoreState::busy;
   return Refusal::none;
 }
@@ -47,13 +60,13 @@ void ParameterKeeper::poll() {
 void ParameterKeeper::publish(ParameterValues& v) const {
   v.set_whole<"store.state">(static_cast<std::uint32_t>(state_));
   v.set_whole<"store.sequence">(survey_.header.sequence);
-  v.set_whole<"store.saved_parameters">(survey_.header.count);
+  v.set_whole<"store.saved_parameters">(survey_.parameters());
   std::uint32_t unsaved = 0;
   for (std::size_t i = 0; i < persistent_count; ++i)
     unsaved += v.raw(persistent_slots[i]) != kept_[i] ? 1U : 0U;
   v.set_whole<"store.unsaved_parameters">(unsaved);
-  v.set_whole<"store.free_saves">(
-      flash_.present() ? static_cast<std::uint32_t>(store_.free_saves(survey_)) : 0U);
+  v.set_whole<"store.free_saves">(flash_.present() ? static_cast<std::uint32_t>(store_.free_saves(survey_))
+                                                   : 0U);
   v.set_whole<"store.erases">(survey_.erases);
   v.set_whole<"store.write_errors">(store_.write_errors());
   v.set_whole<"store.damaged_records">(survey_.damaged);

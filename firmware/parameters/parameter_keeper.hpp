@@ -35,6 +35,12 @@ class ParameterKeeper {
   /// not disturb that.
   Refusal save(const ParameterValues& values, bool armed);
 
+  /// The write lock's code instead of the present one, 0 for none; beside it the set that is kept now, so
+  /// that what has not been saved stays so. As save().
+  Refusal save_lock_code(std::uint32_t code, bool armed);
+  /// The one that a restart brings; 0: none.
+  std::uint32_t lock_code() const { return survey_.lock_code; }
+
   /// All persistent parameters have been set to their defaults, in RAM; or the request was refused.
   void note_defaults(Refusal refusal) {
     if (!busy()) state_ = refusal == Refusal::none ? StoreState::defaults_set : StoreState::refused;
@@ -51,6 +57,8 @@ class ParameterKeeper {
   void publish(ParameterValues& values) const;
 
  private:
+  Refusal hindrance(bool armed);
+
   AnyFlashSectors flash_;
   ParameterStore<AnyFlashSectors> store_{flash_};
   StoreSurvey survey_;

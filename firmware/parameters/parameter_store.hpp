@@ -24,6 +24,10 @@ struct StoreSurvey {
   std::uint32_t erases = 0;                ///< the most that any whole record tells
   std::uint16_t damaged = 0;               ///< records cut short or changed
   std::array<std::size_t, 2> free_from{};  ///< first word a new record may begin at, by sector
+  std::uint32_t lock_code = 0;             ///< of the write lock, in the newest valid record; 0: none
+
+  /// In that record.
+  std::uint32_t parameters() const { return header.count - (lock_code != 0 ? 1U : 0U); }
 };
 
 struct LoadReport {
@@ -35,15 +39,15 @@ struct LoadReport {
 
 enum class SaveProgress : std::uint8_t { busy, done, failed };
 
-/// The persistent parameters in two sectors of flash, such that a loss of power at any moment leaves the set
-/// before or the set after, whole.
+/// The persistent parameters, and the write lock's code, in two sectors of flash, such that a loss of power
+/// at any moment leaves the set before or the set after, whole.
 ///
-/// A save appends a record with all persistent parameters (parameter_record.hpp); the newest valid one
-/// counts. Every word is read back when it has been programmed, the whole record once more at the end. A
-/// sector is erased only when the other holds the newest valid record, or when there is none; so the last
-/// good set is never at stake, whatever fails. The sector is changed only when it is full: with n parameters
-/// it takes its words / (7 + 2n, rounded up to 16) saves per erase, and 10,000 erases of each sector (DS8626,
-/// flash endurance) last for 20,000 times as many.
+/// A save appends a record with all persistent parameters (parameter_record.hpp), then the code if there is
+/// one, as one more pair; the newest valid one counts. Every word is read back when it has been programmed,
+/// the whole record once more at the end. A sector is erased only when the other holds the newest valid
+/// record, or when there is none; so the last good set is never at stake, whatever fails. The sector is
+/// changed only when it is full: with n parameters it takes its words / (7 + 2n, rounded up to 16) saves per
+/// erase, and 10,000 erases of each sector (DS8626, flash endurance) last for 20,000 times as many.
 ///
 /// A word that does not read back as it was written makes the save begin again at the next place, in the end
 /// in the other sector, and is counted. A save fails when there is no place left.
@@ -83,6 +87,11 @@ class ParameterStore {
         word += record::aligned_up(record::length_of(header.count) - unwritten) - record::alignment;
       }
     }
+    if (found.newest && found.header.count != 0) {
+      const std::size_t last = found.newest->word + record::length_of(found.header.count) - 4;
+      if (flash_.read(found.newest->sector, last) == lock_code_identity)
+        found.lock_code = flash_.read(found.newest->sector, last + 1);
+    }
     return found;
   }
 
@@ -94,7 +103,7 @@ class ParameterStore {
     if (!found.newest) return report;
     ParameterMigration migration(values);
     const auto [sector, word] = *found.newest;
-    for (std::size_t i = 0; i < found.header.count; ++i) {
+    for (std::size_t i = 0; i < found.parameters(); ++i) {
       const std::size_t pair = word + record::header_words + 2 * i;
       migration.take(flash_.read(sector, pair), flash_.read(sector, pair + 1));
     }
@@ -106,17 +115,13 @@ class ParameterStore {
     return report;
   }
 
-  /// Begins to save `values`, of which it takes a copy. A save under way is given up.
+  /// Begins to save `values`, of which it takes a copy; the code stays. A save under way is given up.
   void begin(const ParameterValues& values) {
-    pending_ = persistent_part(values);
     const StoreSurvey found = survey();
-    newest_ = found.newest;
-    erased_ = {};
-    if (found.erases > erases_) erases_ = found.erases;
-    header_ = {found.next_sequence, dictionary_checksum, erases_, persistent_count};
-    sector_ = newest_ ? newest_->sector : 0;
-    write_from(found.free_from[sector_]);
+    begin(persistent_part(values), found.lock_code, found);
   }
+  /// The same with another code, 0 for none.
+  void begin(const PersistentValues& set, std::uint32_t lock_code) { begin(set, lock_code, survey()); }
 
   SaveProgress step() {
     switch (phase_) {
@@ -146,14 +151,34 @@ class ParameterStore {
   std::size_t free_saves(const StoreSurvey& found) const {
     const std::size_t from = found.free_from[found.newest ? found.newest->sector : 0];
     const std::size_t left = from < flash_.words_per_sector ? flash_.words_per_sector - from : 0;
+    const std::size_t size = length_with(found.lock_code), stride = record::aligned_up(size);
     // The last of them needs no room for rounding up.
-    return (left + record::aligned_up(length) - length) / record::aligned_up(length);
+    return (left + stride - size) / stride;
   }
 
+  /// Of a record without a code, and of the longest.
   static constexpr std::size_t length = record::length_of(persistent_count);
+  static constexpr std::size_t longest = record::length_of(persistent_count + 1);
 
  private:
   enum class Phase : std::uint8_t { idle, erase, write, verify };
+
+  static constexpr std::size_t length_with(std::uint32_t lock_code) {
+    return lock_code != 0 ? longest : length;
+  }
+
+  void begin(const PersistentValues& set, std::uint32_t lock_code, const StoreSurvey& found) {
+    pending_ = set;
+    lock_code_ = lock_code;
+    size_ = length_with(lock_code);
+    newest_ = found.newest;
+    erased_ = {};
+    if (found.erases > erases_) erases_ = found.erases;
+    const std::size_t count = persistent_count + (lock_code != 0 ? 1 : 0);
+    header_ = {found.next_sequence, dictionary_checksum, erases_, static_cast<std::uint32_t>(count)};
+    sector_ = newest_ ? newest_->sector : 0;
+    write_from(found.free_from[sector_]);
+  }
 
   std::size_t end_of_used(std::size_t sector) const {
     std::size_t end = flash_.words_per_sector;
@@ -171,7 +196,7 @@ class ParameterStore {
     base_ = record::aligned_up(word);
     next_ = 0;
     crc_ = {};
-    if (base_ + length <= flash_.words_per_sector) {
+    if (base_ + size_ <= flash_.words_per_sector) {
       phase_ = Phase::write;
     } else {
       leave_sector();
@@ -200,24 +225,26 @@ class ParameterStore {
 
   std::uint32_t word_at(std::size_t i) const {
     if (i < record::header_words) return header_.word(i);
-    if (i == length - 2) return crc_.value();
-    if (i == length - 1) return record::commit;
+    if (i == size_ - 2) return crc_.value();
+    if (i == size_ - 1) return record::commit;
     const std::size_t pair = (i - record::header_words) / 2;
-    return (i - record::header_words) % 2 == 0 ? persistent_identity(pair) : pending_[pair];
+    const bool identity = (i - record::header_words) % 2 == 0;
+    if (pair == persistent_count) return identity ? lock_code_identity : lock_code_;
+    return identity ? persistent_identity(pair) : pending_[pair];
   }
 
   void write() {
     const std::uint32_t value = word_at(next_);
     const std::size_t word = base_ + next_;
     if (!flash_.program(sector_, word, value) || flash_.read(sector_, word) != value) return spoilt(word + 1);
-    if (next_ < length - 2) crc_.add(value);
+    if (next_ < size_ - 2) crc_.add(value);
     ++next_;
-    if (next_ == length) phase_ = Phase::verify;
+    if (next_ == size_) phase_ = Phase::verify;
   }
 
   void verify() {
-    for (std::size_t i = 0; i < length; ++i) {
-      if (flash_.read(sector_, base_ + i) != word_at(i)) return spoilt(base_ + length);
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (flash_.read(sector_, base_ + i) != word_at(i)) return spoilt(base_ + size_);
     }
     finish(SaveProgress::done);
   }
@@ -233,8 +260,8 @@ class ParameterStore {
   Crc32 crc_;
   std::optional<StoreSurvey::Place> newest_{};
   std::array<bool, 2> erased_{};
-  std::size_t sector_ = 0, base_ = 0, next_ = 0;
-  std::uint32_t write_errors_ = 0, erases_ = 0;
+  std::size_t sector_ = 0, base_ = 0, next_ = 0, size_ = length;
+  std::uint32_t write_errors_ = 0, erases_ = 0, lock_code_ = 0;
   Phase phase_ = Phase::idle;
   SaveProgress result_ = SaveProgress::done;
 };

@@ -52,6 +52,10 @@ constexpr std::uint32_t persistent_identity(std::size_t i) {
   return identity_of(entry, axis).word();
 }
 
+/// Likewise of the write lock's code, which is kept beside them and is no value of the dictionary: nothing
+/// that reads values can reach it.
+inline constexpr std::uint32_t lock_code_identity = identity_of(entry_of<"lock.code">(), 0).word();
+
 /// The values of all persistent parameters, in the order of `persistent_slots`.
 using PersistentValues = std::array<std::uint32_t, persistent_count>;
 

@@ -44,6 +44,10 @@ enum class Refusal : std::uint16_t {
   only_tightens = 32,
   other_commander = 33,
   armed_by_broadcast = 34,
+  locked = 35,
+  wrong_code = 36,
+  code_waits = 37,
+  no_code = 38,
 };
 
 struct RefusalText {
@@ -102,6 +106,11 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
      "another link has armed this axis, or one that it would push: over this link it can be disarmed or "
      "halted, and its protective bounds tightened; all else after it is disarmed"},
     {Refusal::armed_by_broadcast, "a broadcast arms no axis; write the controlword to each unit"},
+    {Refusal::locked, "the device is locked; 'kmax unlock' opens it, with the code that its owner has set"},
+    {Refusal::wrong_code, "the code is wrong"},
+    {Refusal::code_waits,
+     "after a wrong code no code is taken for a while, not even the right one; lock.wait says how long"},
+    {Refusal::no_code, "no code is set, so there is nothing to lock with; 'kmax lock' sets one"},
 });
 
 constexpr std::string_view to_string(Refusal refusal) {

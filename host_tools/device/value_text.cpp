@@ -146,6 +146,10 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
       fail(parameter, "it is a command, not a value; use 'kmax faults --clear'");
     if (parameter.entry() == firmware::entry_of<"store.command">())
       fail(parameter, "it is a command, not a value; use 'kmax save' or 'kmax defaults'");
+    if (parameter.entry() == firmware::entry_of<"lock.code">() ||
+        parameter.entry() == firmware::entry_of<"lock.key">())
+      fail(parameter,
+           "it takes a secret, which others see on a command line; use 'kmax lock' or 'kmax unlock'");
     for (const Assignment& other : assignments) {
       if (other.parameter == parameter) fail(parameter, "it is given twice");
     }

@@ -26,7 +26,8 @@ device::Assignment assignment_of(const std::string& name, const simulation::Para
   if (!parameter.writable())
     throw device::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
   if (parameter == device::Parameter::of<"store.command">() ||
-      parameter == device::Parameter::of<"log.command">())
+      parameter == device::Parameter::of<"log.command">() ||
+      parameter == device::Parameter::of<"lock.code">() || parameter == device::Parameter::of<"lock.key">())
     throw device::ValueError(fmt::format("{} is a command, not a value; leave it out of the scene", name));
   return {parameter, device::parse_value(parameter, text_of(value))};
 }

@@ -68,6 +68,12 @@ class Node : public CanOpenHost {
     EXPECT_EQ(bench.state(), state);
   }
 
+  /// With a code, until it is given.
+  void lock() {
+    EXPECT_EQ(bench.set("lock.code", 4711), 0);
+    while (bench.application().store_busy()) run_ms(1);
+    run_ms(1);
+  }
   /// As the page says it.
   std::string attempt(std::string_view name, double number, Way way) {
     if (way == Way::pdo && !is_mapped_) return "not mappable";
@@ -120,6 +126,8 @@ class Node : public CanOpenHost {
         return "refused: another link's axis";
       case Refusal::armed_by_broadcast:
         return "refused";
+      case Refusal::locked:
+        return "refused: locked";
       default:
         return "refused: ?";
     }
@@ -235,7 +243,8 @@ std::string table_of_values() {
   std::string text =
       "| written | no force | operation enabled, by its commander's link | by the other | force fades, by "
       "its "
-      "commander's link | by the other | by broadcast | in a PDO |\n|---|---|---|---|---|---|---|---|\n";
+      "commander's link | by the other | by broadcast | in a PDO | locked "
+      "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (const Attempt& one : attempts) {
     const Entry& entry = firmware::entry_at(firmware::entry_named(one.name));
     std::vector<std::pair<std::string, std::string>> broadcasts, pdos;
@@ -267,10 +276,17 @@ std::string table_of_values() {
         cells += " | " + together(both);
       }
     }
+    std::vector<std::pair<std::string, std::string>> locked;
+    for (const Way way : {Way::request, Way::broadcast, Way::sdo}) {
+      Node node(DriveState::switch_on_disabled, Link::serial);
+      node.lock();
+      locked.emplace_back(way == Way::sdo ? "by SDO" : "over serial",
+                          node.attempt(one.name, one.number, way));
+    }
     char number[32];
     std::snprintf(number, sizeof number, "%g", one.number);
     text += "| `" + std::string(one.name) + "` = " + number + " | " + cells + " | " + together(broadcasts) +
-            " | " + together(pdos) + " |\n";
+            " | " + together(pdos) + " | " + together(locked) + " |\n";
   }
   return text;
 }

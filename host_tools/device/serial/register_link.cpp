@@ -24,7 +24,8 @@ const char* words_of_exception(std::uint8_t exception) {
                                    "the value is not allowed",
                                    "it cannot do this now",
                                    "it needs more time",
-                                   "it is busy, or another link has a transaction open; try again in 2 s"};
+                                   "it is busy, or another link has a transaction open; try again in 2 s",
+                                   "the device is locked"};
   return words[exception < std::size(words) ? exception : 0];
 }
 

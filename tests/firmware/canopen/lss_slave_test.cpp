@@ -66,6 +66,25 @@ TEST(LssSlave, SwitchStateGlobalIsNeverAnswered) {
   EXPECT_TRUE(bench.slave.configuring()) << "there is no such state";
 }
 
+// CiA 305: error code 255 says that the specific error code behind it counts.
+TEST(LssSlave, LockedItTakesNoNodeIdAndNoBitRateAndStoresNothing) {
+  Bench bench(7);
+  bench.slave.hold(false, true);
+  bench.configure();
+  for (const Eight& wanted : {Eight{0x11, 9}, Eight{0x13, 0, 3}, Eight{0x17}}) {
+    EXPECT_EQ(bench.ask(request(wanted)), response({wanted[0], 0xFF, 1}));
+    EXPECT_EQ(bench.action, LssAction::none);
+  }
+  EXPECT_FALSE(bench.ask(request({0x15, 0, 0})));
+  EXPECT_EQ(bench.slave.poll(bench.now_us + 1'000'000), LssAction::none);
+  EXPECT_EQ(bench.slave.pending_node_id(), 7);
+  EXPECT_EQ(bench.slave.pending_bit_rate(), 500'000u);
+  EXPECT_EQ(bench.ask(request({0x5E})), response({0x5E, 7}));
+  bench.slave.hold(false, false);
+  EXPECT_EQ(bench.ask(request({0x11, 9})), response({0x11, 0}));
+  EXPECT_EQ(bench.slave.pending_node_id(), 9);
+}
+
 TEST(LssSlave, NothingIsConfiguredInTheWaitingState) {
   Bench bench;
   for (const std::uint8_t specifier :
