@@ -55,6 +55,12 @@ Arguments openocd_adapter(Method method, const FlashTarget& target) {
   return arguments;
 }
 
+std::vector<Step> openocd_start(Method method, const FlashTarget& target) {
+  Arguments start = openocd_adapter(method, target);
+  start.insert(start.end(), {"-c", "reset run", "-c", "shutdown"});
+  return {{"start the application", start, false}};
+}
+
 FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget& target) {
   Arguments write = openocd_adapter(method, target);
   const auto command = [&write](const std::string& text) { write.insert(write.end(), {"-c", text}); };
@@ -71,19 +77,22 @@ FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget
         fmt::format("dump_image {} 0x{:08x} {}", piece.read_file_name(), piece.address, piece.bytes.size()));
   command(fmt::format("dump_image {} 0x{:08x} {}", parameters_after_file, parameters_begin, parameters_size));
   command("shutdown");
-
-  Arguments start = openocd_adapter(method, target);
-  start.insert(start.end(), {"-c", "reset run", "-c", "shutdown"});
   return {{{"read the parameters, write and verify the image, read all back", write, true}},
-          {{"start the application", start, false}}};
+          openocd_start(method, target),
+          {}};
+}
+
+Arguments dfu_call(const FlashTarget& target, const std::string& place, const char* way,
+                   const std::string& file) {
+  Arguments arguments = {target.program, "-d", "0483:df11", "-a", "0"};
+  if (!target.usb_serial.empty()) arguments.insert(arguments.end(), {"-S", target.usb_serial});
+  arguments.insert(arguments.end(), {"-s", place, way, file});
+  return arguments;
 }
 
 FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
   const auto dfu = [&target](const std::string& place, const char* way, const std::string& file) {
-    Arguments arguments = {target.program, "-d", "0483:df11", "-a", "0"};
-    if (!target.usb_serial.empty()) arguments.insert(arguments.end(), {"-S", target.usb_serial});
-    arguments.insert(arguments.end(), {"-s", place, way, file});
-    return arguments;
+    return dfu_call(target, place, way, file);
   };
   const auto read = [&](std::uint32_t address, std::size_t size, const std::string& file) {
     return dfu(fmt::format("0x{:08x}:{}", address, size), "-U", file);
@@ -104,13 +113,18 @@ FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
   return plan;
 }
 
+Arguments serial_call(const FlashTarget& target, const Arguments& what, std::uint32_t address,
+                      std::size_t size) {
+  Arguments arguments = {target.program, "-b", std::to_string(target.baud_rate), "-m", "8e1"};
+  std::ranges::copy(what, std::back_inserter(arguments));
+  // Without the length stm32flash would erase as far as the flash goes.
+  arguments.insert(arguments.end(), {"-S", fmt::format("0x{:08x}:{}", address, size), target.serial_port});
+  return arguments;
+}
+
 FlashPlan serial_plan(const FlashImage& image, const FlashTarget& target) {
-  const auto tool = [&target](Arguments what, std::uint32_t address, std::size_t size) {
-    Arguments arguments = {target.program, "-b", std::to_string(target.baud_rate), "-m", "8e1"};
-    std::ranges::move(what, std::back_inserter(arguments));
-    // Without the length stm32flash would erase as far as the flash goes.
-    arguments.insert(arguments.end(), {"-S", fmt::format("0x{:08x}:{}", address, size), target.serial_port});
-    return arguments;
+  const auto tool = [&target](const Arguments& what, std::uint32_t address, std::size_t size) {
+    return serial_call(target, what, address, size);
   };
   FlashPlan plan;
   plan.steps.push_back({"read the parameters",
@@ -127,9 +141,7 @@ FlashPlan serial_plan(const FlashImage& image, const FlashTarget& target) {
   return plan;
 }
 
-}  // namespace
-
-FlashPlan plan_flash(Method method, const FlashImage& image, const FlashTarget& target) {
+FlashPlan image_plan(Method method, const FlashImage& image, const FlashTarget& target) {
   switch (method) {
     case Method::dfu:
       return dfu_plan(image, target);
@@ -140,6 +152,50 @@ FlashPlan plan_flash(Method method, const FlashImage& image, const FlashTarget& 
       break;
   }
   return openocd_plan(method, image, target);
+}
+
+}  // namespace
+
+FlashPlan plan_flash(Method method, const FlashImage& image, const FlashTarget& target) {
+  FlashPlan plan = image_plan(method, image, target);
+  plan.achieved = "the image is written and verified";
+  return plan;
+}
+
+FlashPlan plan_factory_reset(Method method, const FlashTarget& target) {
+  constexpr const char* erases = "erase the stored parameters";
+  constexpr const char* reads = "read back what is left of them";
+  FlashPlan plan{.steps = {}, .start = {}, .achieved = "the stored parameters are erased"};
+  const std::string area = fmt::format("0x{:08x}", parameters_begin);
+  switch (method) {
+    case Method::dfu:
+      for (const std::size_t sector : {1, 2})
+        plan.steps.push_back(
+            {erases, dfu_call(target, fmt::format("0x{:08x}", sectors[sector].begin), "-D", blank_file),
+             true});
+      plan.steps.push_back(
+          {reads, dfu_call(target, fmt::format("{}:{}", area, parameters_size), "-U", parameters_after_file),
+           false});
+      return plan;
+    case Method::serial:
+      plan.steps.push_back({erases, serial_call(target, {"-o"}, parameters_begin, parameters_size), true});
+      plan.steps.push_back(
+          {reads, serial_call(target, {"-r", parameters_after_file}, parameters_begin, parameters_size),
+           false});
+      return plan;
+    case Method::openocd_gpio:
+    case Method::openocd_stlink:
+      break;
+  }
+  Arguments erase = openocd_adapter(method, target);
+  for (const std::string& text :
+       {std::string("reset halt"), fmt::format("flash erase_address {} {}", area, parameters_size),
+        fmt::format("dump_image {} {} {}", parameters_after_file, area, parameters_size),
+        std::string("shutdown")})
+    erase.insert(erase.end(), {"-c", text});
+  plan.steps.push_back({fmt::format("{}, {}", erases, reads), erase, true});
+  plan.start = openocd_start(method, target);
+  return plan;
 }
 
 }  // namespace kmax::flash

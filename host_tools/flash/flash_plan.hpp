@@ -34,6 +34,7 @@ struct Step {
 struct FlashPlan {
   std::vector<Step> steps;
   std::vector<Step> start;  ///< after the comparison; empty where a reset line or a person does it
+  std::string achieved;     ///< what is so before the start, for people
 };
 
 /// A GPIO line as OpenOCD wants it.
@@ -55,5 +56,10 @@ struct FlashTarget {
 };
 
 FlashPlan plan_flash(Method method, const FlashImage& image, const FlashTarget& target);
+
+/// Erases the parameter sectors, and with them the code of the write lock, and reads them back into
+/// parameters_after_file. The program stays. It needs the board in hand: its debug port, or its ROM
+/// bootloader, which BOOT0 starts.
+FlashPlan plan_factory_reset(Method method, const FlashTarget& target);
 
 }  // namespace kmax::flash

@@ -98,6 +98,10 @@ class Run {
   const FlashHooks& hooks_;
 };
 
+void write_blank(const WorkFolder& folder) {
+  write_file(folder.path() / blank_file, std::vector<std::uint8_t>(4, 0xFF));
+}
+
 std::size_t first_difference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
   return static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
 }
@@ -121,7 +125,7 @@ FlashReport write_and_verify(const FlashPlan& plan, const FlashImage& image, Wor
   const auto saved = folder.path() / parameters_before_file;
   const std::string changed_state = fmt::format(half_written, saved.string());
   for (const FlashPiece& piece : image.pieces()) write_file(folder.path() / piece.file_name(), piece.bytes);
-  write_file(folder.path() / blank_file, std::vector<std::uint8_t>(4, 0xFF));
+  write_blank(folder);
 
   bool changed = false;
   for (const Step& step : plan.steps) {
@@ -167,12 +171,29 @@ FlashReport write_and_verify(const FlashPlan& plan, const FlashImage& image, Wor
   return {crc, crc_of(after)};
 }
 
+void erase_parameters(const FlashPlan& plan, WorkFolder& folder, const FlashHooks& hooks) {
+  const std::string half_erased =
+      "the stored parameters may be PARTLY ERASED, and the device still locked: try again";
+  Run run(folder, hooks);
+  write_blank(folder);
+  bool changed = false;
+  for (const Step& step : plan.steps) {
+    run.step(step, [&] { return changed || step.changes_flash ? half_erased : std::string(untouched); });
+    changed = changed || step.changes_flash;
+  }
+  const auto after = run.read(parameters_after_file, parameters_size, half_erased);
+  const auto left = std::ranges::find_if(after, [](std::uint8_t byte) { return byte != 0xFF; });
+  if (left == after.end()) return;
+  folder.keep();
+  throw FlashError(fmt::format("the tool ended well, but at 0x{:08x} there is 0x{:02x} instead of 0xff: {}",
+                               parameters_begin + (left - after.begin()), *left, half_erased));
+}
+
 void start_application(const FlashPlan& plan, WorkFolder& folder, const FlashHooks& hooks) {
   Run run(folder, hooks);
   for (const Step& step : plan.start)
-    run.step(step, [] {
-      return std::string(
-          "the image is written and verified; a reset or switching the supply off and on starts it");
+    run.step(step, [&plan] {
+      return plan.achieved + "; a reset or switching the supply off and on starts the program";
     });
 }
 

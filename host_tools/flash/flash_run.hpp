@@ -52,7 +52,11 @@ class WorkFolder {
 FlashReport write_and_verify(const FlashPlan& plan, const FlashImage& image, WorkFolder& folder,
                              const FlashHooks& hooks);
 
-/// The plan's start steps. FlashError says that the image is in place.
+/// Runs the steps of plan_factory_reset() and makes sure that every byte of the parameter sectors is erased.
+/// FlashError, ProgramError.
+void erase_parameters(const FlashPlan& plan, WorkFolder& folder, const FlashHooks& hooks);
+
+/// The plan's start steps. FlashError says what has been achieved all the same.
 void start_application(const FlashPlan& plan, WorkFolder& folder, const FlashHooks& hooks);
 
 }  // namespace kmax::flash

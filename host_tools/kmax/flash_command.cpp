@@ -6,6 +6,8 @@
 #include <charconv>
 #include <chrono>
 #include <cstdlib>
+#include <functional>
+#include <optional>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/interruption.hpp"
@@ -29,11 +31,16 @@ struct FlashOptions {
   std::string image, method = "auto", board, lines, usb_serial;
   unsigned speed_khz = 1000;
   double at_most = 300;
-  bool dry_run = false;
+  bool dry_run = false, factory_reset = false;
 
   void declare(CLI::App& command) {
-    command.add_option("image", image, "Linked image (default: the one built for the board)")
-        ->option_text("IMAGE.elf");
+    CLI::Option* const file =
+        command.add_option("image", image, "Linked image (default: the one built for the board)")
+            ->option_text("IMAGE.elf");
+    command
+        .add_flag("--factory-reset", factory_reset,
+                  "Write no image: erase the stored parameters, and the write lock's code with them")
+        ->excludes(file);
     std::vector<std::string> methods = {"auto"};
     for (const auto& facts : flash::all_methods) methods.emplace_back(facts.name);
     command.add_option("--method", method, "Way to do it")
@@ -177,7 +184,7 @@ Json pieces_json(const flash::FlashImage& image) {
   return pieces;
 }
 
-int show_plan(Context& context, const BoardProfile& board, Method method, const flash::FlashImage& image,
+int show_plan(Context& context, const BoardProfile& board, Method method, const Json& pieces,
               const flash::FlashPlan& plan, bool by_lines) {
   std::vector<flash::Step> steps = plan.steps;
   steps.insert(steps.end(), plan.start.begin(), plan.start.end());
@@ -187,7 +194,7 @@ int show_plan(Context& context, const BoardProfile& board, Method method, const 
     context.print({{"board", std::string(board.kind)},
                    {"method", std::string(flash::facts_of(method).name)},
                    {"dry_run", true},
-                   {"pieces", pieces_json(image)},
+                   {"pieces", pieces},
                    {"commands", commands}});
     return done;
   }
@@ -200,9 +207,11 @@ int show_plan(Context& context, const BoardProfile& board, Method method, const 
   return done;
 }
 
-int carry_out(Context& context, const BoardServices& services, const lines::LinesConfig& config,
-              const BoardProfile& board, Method method, const flash::FlashImage& image,
-              const flash::FlashPlan& plan, bool by_lines, double at_most) {
+/// Runs the plan with the board in the state that it needs, `work` doing the steps. Whether the application
+/// has been started.
+bool carry_out(Context& context, const BoardServices& services, const lines::LinesConfig& config,
+               Method method, const flash::FlashPlan& plan, bool by_lines, double at_most,
+               const std::function<void(flash::WorkFolder&, const flash::FlashHooks&)>& work) {
   const Interruption interruption;
   refuse_while_armed(context);
   flash::WorkFolder folder;
@@ -218,34 +227,18 @@ int carry_out(Context& context, const BoardServices& services, const lines::Line
     if (method == Method::dfu) wait_for_dfu(services);
   }
   // After a failure the ROM bootloader goes on running: all its pins are inputs.
-  const flash::FlashReport report = flash::write_and_verify(plan, image, folder, hooks);
+  work(folder, hooks);
   flash::start_application(plan, folder, hooks);
   if (by_lines) lines::pulse_reset(*gpio, config, services.sleep);
-  const bool started = by_lines || !plan.start.empty();
-  if (context.json) {
-    context.print({{"board", std::string(board.kind)},
-                   {"method", std::string(flash::facts_of(method).name)},
-                   {"pieces", pieces_json(image)},
-                   {"crc32", hexadecimal(report.image_crc)},
-                   {"verified", true},
-                   {"parameters_kept", true},
-                   {"parameters_crc32", hexadecimal(report.parameters_crc)},
-                   {"started", started}});
-  } else {
-    print(context.out,
-          "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
-          "{})\n",
-          image.size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
-  }
-  if (!started) context.note(fmt::format("to start it: {}", board.to_application));
-  return done;
+  return by_lines || !plan.start.empty();
 }
 
 int run_flash(Context& context, const FlashOptions& options) try {
   const BoardServices& services = board_services(context);
   const lines::LinesConfig config = read_lines_config(options.lines);
   const BoardProfile& board = chosen_board(options.board, config);
-  const flash::FlashImage image = flash::FlashImage::load(chosen_image(options, board));
+  std::optional<flash::FlashImage> image;
+  if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board));
   const auto usb = flash::list_usb_devices(services.usb_devices);
   const auto verdicts = flash::judge_methods(board, config, usb);
   const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);
@@ -258,10 +251,46 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const bool dfu_is_there = std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); });
   const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
   const bool by_lines = has_lines && (method == Method::serial || (method == Method::dfu && !dfu_is_there));
+  const flash::FlashTarget target = target_of(method, board, options, config, services);
   const flash::FlashPlan plan =
-      flash::plan_flash(method, image, target_of(method, board, options, config, services));
-  if (options.dry_run) return show_plan(context, board, method, image, plan, by_lines);
-  return carry_out(context, services, config, board, method, image, plan, by_lines, options.at_most);
+      image ? flash::plan_flash(method, *image, target) : flash::plan_factory_reset(method, target);
+  const Json pieces = image ? pieces_json(*image) : Json::array();
+  if (options.dry_run) return show_plan(context, board, method, pieces, plan, by_lines);
+  flash::FlashReport report{};
+  const bool started = carry_out(context, services, config, method, plan, by_lines, options.at_most,
+                                 [&](flash::WorkFolder& folder, const flash::FlashHooks& hooks) {
+                                   if (image) {
+                                     report = flash::write_and_verify(plan, *image, folder, hooks);
+                                   } else {
+                                     flash::erase_parameters(plan, folder, hooks);
+                                   }
+                                 });
+  Json document = {{"board", std::string(board.kind)}, {"method", std::string(flash::facts_of(method).name)}};
+  if (image) {
+    document.update(Json{{"pieces", pieces},
+                         {"crc32", hexadecimal(report.image_crc)},
+                         {"verified", true},
+                         {"parameters_kept", true},
+                         {"parameters_crc32", hexadecimal(report.parameters_crc)}});
+  } else {
+    document.update(Json{{"factory_reset", true}, {"verified", true}, {"parameters_kept", false}});
+  }
+  document["started"] = started;
+  if (context.json) {
+    context.print(document);
+  } else if (image) {
+    print(context.out,
+          "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
+          "{})\n",
+          image->size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
+  } else {
+    print(
+        context.out,
+        "the stored parameters and the write lock's code are erased, read back blank; the device starts with "
+        "its defaults and open\n");
+  }
+  if (!started) context.note(fmt::format("to start it: {}", board.to_application));
+  return done;
 } catch (const flash::ImageError& error) {
   throw UsageError(error.what());
 } catch (const flash::MethodNotOnBoardError& error) {
@@ -277,7 +306,8 @@ void add_flash_command(CLI::App& app, Context& context) {
       {"flash", "Writes a firmware image into the board, keeps its parameters, and checks what is there.",
        "  kmax flash                                   the built image, the first way that is ready\n"
        "  kmax flash --method dfu --dry-run            the exact command lines\n"
-       "  kmax flash image.elf --method openocd-gpio --device serial:/dev/ttyACM0\n\n"
+       "  kmax flash image.elf --method openocd-gpio --device serial:/dev/ttyACM0\n"
+       "  kmax flash --factory-reset                   all parameters at their defaults, no write lock\n\n"
        "Ways: openocd-gpio (SWD over GPIO lines), openocd-stlink, dfu (USB), serial (ROM bootloader).\n"
        "ODrive v3: SWD on connector J2, or USB with the DIP switch on DFU; serial is not possible.\n"
        "Only the image's sectors are written. All is read back and compared, the parameter sectors, too.\n"

@@ -49,7 +49,7 @@ class BoardWithTools {
 
   /// "", "fail" (at the first write), "fail_early", "flip" (a bit of what is written last), "flip_quietly"
   /// (which the tool's own check does not see), "wipe" (a parameter), "hang" (at the first write),
-  /// "hang_hard" (and ignores SIGINT and SIGTERM), "short_read"
+  /// "hang_hard" (and ignores SIGINT and SIGTERM), "short_read", "no_erase"
   void misbehave(const std::string& how) const { folder.write("mode", how); }
 
   std::string flash() const { return folder.read("flash"); }
@@ -89,6 +89,7 @@ def quit(code, text):
 def erase(address, size):
     memory, begin = load(), address - base
     for first, last in ends:
+        if mode == "no_erase": break
         if first < begin + size and last > begin: memory[first:last] = b"\xff" * (last - first)
     store(memory)
 def write(address, name, erasing=True):

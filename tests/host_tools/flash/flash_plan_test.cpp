@@ -93,6 +93,31 @@ TEST_F(FlashPlanText, Stm32Flash) {
                                       tool + "-r parameters_after.bin -S 0x08004000:32768 /dev/ttyS0"}));
 }
 
+// RM0090: sectors 1 and 2, and nothing else.
+TEST_F(FlashPlanText, AFactoryResetErasesTheParameterSectors) {
+  const auto reset = [this](Method method) {
+    std::vector<std::string> texts;
+    const FlashPlan plan = plan_factory_reset(method, target);
+    for (const Step& step : plan.steps) texts.push_back(command_text(step.arguments));
+    for (const Step& step : plan.start) texts.push_back("start: " + command_text(step.arguments));
+    return texts;
+  };
+  EXPECT_EQ(reset(Method::dfu),
+            (std::vector<std::string>{"tool -d 0483:df11 -a 0 -s 0x08004000 -D blank.bin",
+                                      "tool -d 0483:df11 -a 0 -s 0x08008000 -D blank.bin",
+                                      "tool -d 0483:df11 -a 0 -s 0x08004000:32768 -U parameters_after.bin"}));
+  EXPECT_EQ(reset(Method::serial),
+            (std::vector<std::string>{
+                "tool -b 115200 -m 8e1 -o -S 0x08004000:32768 /dev/ttyS0",
+                "tool -b 115200 -m 8e1 -r parameters_after.bin -S 0x08004000:32768 /dev/ttyS0"}));
+  const auto texts = reset(Method::openocd_gpio);
+  ASSERT_EQ(texts.size(), 2u);
+  EXPECT_CONTAINS(texts[0],
+                  "-c init -c 'reset halt' -c 'flash erase_address 0x08004000 32768' -c 'dump_image "
+                  "parameters_after.bin 0x08004000 32768' -c shutdown");
+  EXPECT_CONTAINS(texts[1], "-c 'reset run' -c shutdown");
+}
+
 TEST_F(FlashPlanText, TheFirstStepsChangeNothingWhereStepsAreSeparate) {
   for (const Method method : {Method::dfu, Method::serial}) {
     const FlashPlan plan = plan_flash(method, image, target);

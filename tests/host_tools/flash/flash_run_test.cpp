@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "firmware/parameters/parameter_store.hpp"
 #include "host_tools/flash/chip_memory.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"
@@ -15,12 +18,13 @@ class FlashRun : public testing::TestWithParam<Method> {
     hooks.say = [this](const std::string& text) { said += text + "\n"; };
     hooks.limits.grace = std::chrono::milliseconds(20);
   }
-  FlashPlan plan() const {
-    FlashTarget target;
-    target.program = find_program(std::string(facts_of(GetParam()).program))->string();
-    target.serial_port = "/dev/ttyUSB0";
-    return plan_flash(GetParam(), image, target);
+  FlashTarget target() const {
+    FlashTarget made;
+    made.program = find_program(std::string(facts_of(GetParam()).program))->string();
+    made.serial_port = "/dev/ttyUSB0";
+    return made;
   }
+  FlashPlan plan() const { return plan_flash(GetParam(), image, target()); }
   FlashReport flash() {
     WorkFolder folder;
     const FlashPlan planned = plan();
@@ -151,6 +155,71 @@ TEST_P(FlashRun, AToolThatHangsIsEndedEvenIfItIgnoresSignals) {
   // From the moment that it hangs; before that it may be as slow as this machine.
   hooks.limits.at_most = std::chrono::milliseconds(1000);
   EXPECT_CONTAINS(failure(), "took too long and was ended");
+}
+
+/// What the firmware would find in the board's parameter sectors.
+class SectorsOf {
+ public:
+  static constexpr std::size_t sector_count = 2, words_per_sector = 4096;
+  explicit SectorsOf(std::string& flash) : flash_(flash) {}
+  std::uint32_t read(std::size_t sector, std::size_t word) const {
+    std::uint32_t value = 0;
+    for (std::size_t i = 4; i-- > 0;)
+      value = value << 8 | static_cast<std::uint8_t>(flash_[at(sector, word) + i]);
+    return value;
+  }
+  bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
+    for (std::size_t i = 0; i < 4; ++i) flash_[at(sector, word) + i] = static_cast<char>(value >> (8 * i));
+    return true;
+  }
+  bool erase(std::size_t sector) {
+    std::fill_n(flash_.begin() + static_cast<std::ptrdiff_t>(at(sector, 0)), 4 * words_per_sector, '\xFF');
+    return true;
+  }
+
+ private:
+  static std::size_t at(std::size_t sector, std::size_t word) { return 0x4000 + 4 * (sector * 4096 + word); }
+  std::string& flash_;
+};
+
+TEST_P(FlashRun, AFactoryResetForgetsParametersAndCodeAndNothingElse) {
+  std::string locked = before_;
+  SectorsOf sectors(locked);
+  for (const std::size_t sector : {0, 1}) sectors.erase(sector);
+  firmware::ParameterStore<SectorsOf> store(sectors);
+  firmware::ParameterValues values;
+  values.set_real<"wall.stiffness">(500);
+  store.begin(firmware::persistent_part(values), 4711);
+  while (store.step() == firmware::SaveProgress::busy) {
+  }
+  ASSERT_EQ(store.survey().lock_code, 4711u);
+  board.folder.write("flash", locked);
+
+  WorkFolder folder;
+  const FlashPlan planned = plan_factory_reset(GetParam(), target());
+  erase_parameters(planned, folder, hooks);
+  start_application(planned, folder, hooks);
+  std::string after = board.flash();
+  EXPECT_EQ(after.substr(0x4000, 0x8000), std::string(0x8000, '\xFF'));
+  EXPECT_EQ(after.substr(0, 0x4000), before_.substr(0, 0x4000));
+  EXPECT_EQ(after.substr(0xC000), before_.substr(0xC000));
+  SectorsOf found(after);
+  firmware::ParameterStore<SectorsOf> fresh(found);
+  EXPECT_EQ(fresh.survey().lock_code, 0u);
+  EXPECT_FALSE(fresh.load(values).found);
+}
+
+TEST_P(FlashRun, AFactoryResetThatLeavesSomethingSaysSo) {
+  const auto reset = [this] {
+    WorkFolder folder;
+    return host_tools_test::thrown_message<FlashError>(
+        [&] { erase_parameters(plan_factory_reset(GetParam(), target()), folder, hooks); });
+  };
+  board.misbehave("no_erase");
+  EXPECT_CONTAINS(reset(), "the tool ended well, but at 0x08004");
+  EXPECT_CONTAINS(reset(), "PARTLY ERASED, and the device still locked: try again");
+  hooks.stop = [] { return true; };
+  EXPECT_CONTAINS(reset(), "to erase the stored parameters");
 }
 
 TEST_P(FlashRun, AFailedStartSaysThatTheImageIsThere) {

@@ -129,6 +129,33 @@ TEST_F(FlashCommand, ADryRunShowsTheCommandLinesAndDoesNothing) {
   EXPECT_FALSE(touched());
 }
 
+TEST_F(FlashCommand, AFactoryResetErasesTheParametersAndLeavesTheProgram) {
+  EXPECT_EQ(kmax({"flash", "--factory-reset", "--method", "dfu"}), failed);
+  EXPECT_CONTAINS(said, "set the DIP switch SW1 to DFU");
+  plug_in("0483", "df11");
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--dry-run"}), done) << said;
+  EXPECT_CONTAINS(output, "-s 0x08008000 -D blank.bin\n");
+  EXPECT_TRUE(board.calls().empty());
+  ASSERT_EQ(kmax({"flash", "--factory-reset"}), done) << said;
+  EXPECT_CONTAINS(output, "the stored parameters and the write lock's code are erased, read back blank");
+  EXPECT_CONTAINS(said, "to start it: set the DIP switch SW1 back to RUN");
+  EXPECT_EQ(board.parameters(), std::string(0x8000, '\xFF'));
+  EXPECT_FALSE(touched());
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--json"}), done) << said;
+  EXPECT_EQ(document()["factory_reset"], true);
+  EXPECT_EQ(document()["parameters_kept"], false);
+  EXPECT_EQ(kmax({"flash", image, "--factory-reset"}), wrong_usage);
+  EXPECT_CONTAINS(said, "excludes");
+}
+
+TEST_F(FlashCommand, AFactoryResetOverSerialGoesThroughTheBootloader) {
+  configure(serial_board);
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--method", "serial"}), done) << said;
+  EXPECT_EQ(gpio.history.size(), 9u);
+  EXPECT_EQ(board.parameters(), std::string(0x8000, '\xFF'));
+  EXPECT_FALSE(touched());
+}
+
 TEST_F(FlashCommand, RefusedWhileAnAxisIsArmed) {
   plug_in("0483", "3748");
   device = std::make_shared<host_tools_test::FakeDevice>();
