@@ -6,6 +6,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/crash_words.hpp"
+#include "host_tools/device/lock.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/store_text.hpp"
@@ -72,6 +73,7 @@ int run_info(Context& context) {
   const auto raw = device.read(parameters);
   const std::string crash = crash_text(device);
   const device::StoreStatus store = device::Store(device).status();
+  const device::LockStatus lock = device::Lock(device).status();
 
   if (context.json) {
     Json identity = Json::object();
@@ -86,6 +88,7 @@ int run_info(Context& context) {
     }
     document["crash"] = crash.empty() ? Json(nullptr) : Json(crash);
     document["store"] = store_json(store);
+    document["lock"] = lock_json(lock);
     context.print(document);
     return done;
   }
@@ -103,6 +106,7 @@ int run_info(Context& context) {
                                                             {"revision", "firmware revision"}};
   for (const auto& [name, text] : texts) line(labels.contains(name) ? labels.at(name) : name, text);
   for (const auto& [name, text] : store_lines(store)) line(name, text);
+  line("write lock", device::lock_words(lock));
   if (!crash.empty()) line("last crash", crash);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (is_about_crash(parameters[i])) continue;  // said in words above

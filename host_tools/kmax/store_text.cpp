@@ -87,4 +87,11 @@ Json store_json(const StoreStatus& status) {
           {"first_defaulted", names_json(status.first_defaulted)}};
 }
 
+Json lock_json(const device::LockStatus& status) {
+  const auto state = device::Parameter::of<"lock.state">();
+  return {{"state", value_text(state, static_cast<std::uint32_t>(status.state))},
+          {"wrong_codes", status.attempts},
+          {"wait_s", status.wait_s}};
+}
+
 }  // namespace kmax::cli

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "host_tools/device/lock.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/kmax/context.hpp"
 
@@ -17,5 +18,6 @@ std::vector<std::pair<std::string, std::string>> store_lines(const device::Store
 std::string counted(std::uint32_t count, const std::string& noun);
 
 Json store_json(const device::StoreStatus& status);
+Json lock_json(const device::LockStatus& status);
 
 }  // namespace kmax::cli

@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "host_tools/device/lock.hpp"
+
 namespace kmax::record {
 
 using device::Parameter;
@@ -31,6 +33,7 @@ bool TelemetryRequest::ask() {
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] != event_times[i].default_raw()) return false;
   }
+  if (device::Lock(device).status().state == device::LockState::locked) return false;
   asked_ = true;
   for (const Parameter& time : event_times) device.write(time, wanted_ms, true);
   return true;

@@ -9,9 +9,10 @@ namespace kmax::record {
 /// A device sends its four TPDOs seldom from the factory, so that most of the bus is free. This asks for one
 /// every millisecond, or as often as the bus allows, and puts the factory's event times back in the end.
 ///
-/// Event times that are not the factory's are somebody's wish and stay as they are, in the beginning (another
-/// recording may have asked already) as in the end. All of this is in the device's RAM unless somebody saves
-/// its parameters meanwhile; a reset of its communication puts back what was saved.
+/// A locked device goes on as it does. Event times that are not the factory's are somebody's wish and stay as
+/// they are, in the beginning (another recording may have asked already) as in the end. All of this is in the
+/// device's RAM unless somebody saves its parameters meanwhile; a reset of its communication puts back what
+/// was saved.
 class TelemetryRequest {
  public:
   /// Both are called by ask() and put_back(), one connection for each: nobody is kept from talking to the
@@ -27,7 +28,7 @@ class TelemetryRequest {
   ~TelemetryRequest();
 
   /// Also when another recording that ends has put the factory's back. True: it had to be asked for.
-  /// Errors: device::DeviceError, link::LinkError. Cost: 4 readings, and 4 writings if it is asked for.
+  /// Errors: device::DeviceError, link::LinkError. Cost: 7 readings, and 4 writings if it is asked for.
   bool ask();
   /// Once; nothing if nothing was asked for. Errors as ask().
   void put_back();

@@ -126,6 +126,14 @@ TEST_F(PdoPlanTest, TwoWhoAskedLeaveTheFactorys) {
   }
   EXPECT_EQ(read().period_ticks, 200u);
 }
+TEST_F(PdoPlanTest, ALockedDeviceIsRecordedAsItSends) {
+  values().set_whole<"lock.state">(2);
+  TelemetryRequest request = of_fake();
+  EXPECT_FALSE(request.ask());
+  EXPECT_EQ(read().period_ticks, 200u);
+  request.put_back();
+  EXPECT_EQ(noticed, "");
+}
 TEST_F(PdoPlanTest, ARequestThatIsCutShortAnywhereIsPutBackToo) {
   const std::vector<std::uint32_t> factory(4, 10);
   int halves = 0;
