@@ -19,9 +19,8 @@ namespace {
 constexpr milliseconds patience{10'000};
 constexpr milliseconds poll_interval{20};
 
-std::string wrong_codes(std::uint32_t attempts) {
-  return attempts == 1 ? std::string("1 wrong code was given")
-                       : fmt::format("{} wrong codes were given", attempts);
+std::string wrong_codes(std::uint32_t count) {
+  return count == 1 ? std::string("1 wrong code was given") : fmt::format("{} wrong codes were given", count);
 }
 }  // namespace
 

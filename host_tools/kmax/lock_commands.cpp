@@ -5,7 +5,7 @@
 #include <charconv>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/input_file.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/lock.hpp"
 #include "host_tools/kmax/commands.hpp"

@@ -75,6 +75,26 @@ TEST(SimulatedPower, AStepOfTheForceRisesWithTheBandwidth) {
   }
 }
 
+TEST(SimulatedPower, TheSameSceneGivesTheSameBits) {
+  const auto record = [](std::uint64_t seed) {
+    simulation::Scene scene = identified("gimbal_b");
+    scene.seed = seed;
+    MotorBench bench(scene);
+    bench.prepare_wall();
+    EXPECT_TRUE(bench.arm());
+    bench.set_wall_force(1.0);
+    std::vector<double> forces;
+    for (int n = 0; n < 2000; ++n) {
+      bench.tick();
+      forces.push_back(bench.drive().force());
+    }
+    return forces;
+  };
+  const auto first = record(14);
+  EXPECT_EQ(first, record(14));
+  EXPECT_NE(first, record(15)) << "the noise has another seed";
+}
+
 TEST(SimulatedPower, IsReadyWhenTheOffsetsAreMeasured) {
   MotorBench bench(identified("gimbal_a"));
   bench.run(0.07);

@@ -454,7 +454,9 @@ struct Objects {
 /// The server on a bus of its own, in a thread. `loses` frames it sends, counted from 1.
 class Node {
  public:
-  explicit Node(std::function<bool(int)> loses = {}) : loses_(std::move(loses)) { server_.start(5); }
+  explicit Node(std::function<bool(int)> loses = {}) : loses_(std::move(loses)) {
+    server_.start(firmware::canopen::SdoChannel::predefined(5));
+  }
   ~Node() {
     done_ = true;
     if (thread_.joinable()) thread_.join();
