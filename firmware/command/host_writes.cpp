@@ -22,10 +22,10 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
 }
 
 ParameterAccess::Result HostWrites::command_log(std::uint32_t command) {
-  const Refusal refusal = command != 1           ? Refusal::out_of_range
-                          : axes_.any_armed()    ? Refusal::while_armed
-                          : parameters_.locked() ? Refusal::locked
-                                                 : Refusal::none;
+  const Refusal refusal = parameters_.locked() ? Refusal::locked
+                          : command != 1       ? Refusal::out_of_range
+                          : axes_.any_armed()  ? Refusal::while_armed
+                                               : Refusal::none;
   if (refusal == Refusal::none) axes_.log().erase();
   return parameters_.refuse_slot(refusal, slot_of(entry_of<"log.command">(), 0));
 }

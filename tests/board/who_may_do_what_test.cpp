@@ -100,7 +100,7 @@ class Node : public CanOpenHost {
         set_by_sdo(name, number);
         break;
       case Way::pdo: {
-        drivers::CanFrame frame{.identifier = 0x501, .length = static_cast<std::uint8_t>(bytes)};
+        drivers::CanFrame frame{.identifier = 0x511, .length = static_cast<std::uint8_t>(bytes)};
         for (unsigned i = 0; i < bytes; ++i) frame.data[i] = static_cast<std::uint8_t>(raw >> 8 * i);
         send(frame);
         break;
@@ -165,7 +165,7 @@ class Node : public CanOpenHost {
   }
   /// Alone in the fourth PDO. False: it cannot be.
   bool map(const Entry& entry) {
-    EXPECT_EQ(write(0x1403, 1, 0x8000'0501U, 4), 0U);
+    EXPECT_EQ(write(0x1403, 1, 0x8000'0511U, 4), 0U);
     EXPECT_EQ(write(0x1603, 0, 0, 1), 0U);
     const std::uint32_t object = std::uint32_t{entry.index()} << 16 |
                                  std::uint32_t{entry.object_subindex()} << 8 |
@@ -174,7 +174,7 @@ class Node : public CanOpenHost {
     EXPECT_EQ(can_be, firmware::canopen::rpdo_mappable(entry)) << entry.name;
     if (!can_be) return false;
     EXPECT_EQ(write(0x1603, 0, 1, 1), 0U);
-    EXPECT_EQ(write(0x1403, 1, 0x501, 4), 0U);
+    EXPECT_EQ(write(0x1403, 1, 0x511, 4), 0U);
     return true;
   }
 
