@@ -58,9 +58,14 @@ class NativeBoard {
  public:
   static constexpr std::uint32_t tick_us = 1'000'000 / firmware::tick_rate_hz;
 
-  /// `prepare` is called with the application at the start and at each restart, before the first tick.
-  explicit NativeBoard(Device& device, std::function<void(firmware::Application&)> prepare = {})
-      : device_(device), capture_memory_(firmware::capture_words), prepare_(std::move(prepare)) {
+  /// `prepare` is called with the application at the start and at each restart, before the first tick. The
+  /// clock begins at `now_us`: its low 32 bits are the firmware's.
+  explicit NativeBoard(Device& device, std::function<void(firmware::Application&)> prepare = {},
+                       std::uint64_t now_us = 0)
+      : device_(device),
+        capture_memory_(firmware::capture_words),
+        prepare_(std::move(prepare)),
+        now_us_(now_us) {
     start(firmware::ResetCause::native);
   }
 
@@ -203,7 +208,7 @@ class NativeBoard {
   std::function<void(firmware::Application&)> prepare_;
   std::optional<firmware::Application> application_;
   firmware::TickOutput output_{};
-  std::uint64_t now_us_ = 0, line_free_us_ = 0, sending_until_us_ = 0;
+  std::uint64_t now_us_, line_free_us_ = 0, sending_until_us_ = 0;
   std::deque<TimedByte> incoming_;
   std::vector<std::uint8_t> reply_, outgoing_;
   firmware::CanReadings can_;

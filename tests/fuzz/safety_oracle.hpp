@@ -9,8 +9,9 @@
 // 2. Once armed it stays so no longer than link.timeout, and one poll, after the last message of the link
 // that armed it that could be a sign of life.
 //
-// 3. Force is finite, within force.limit, and none at all unless the axis is armed, or its force fades for at
-// most two seconds as link.loss says, and its inputs are sound.
+// 3. Force is finite, within force.limit (one that is lowered holds from the next haptic sample on), and none
+// at all unless the axis is armed, or its force fades for at most two seconds as link.loss says, and its
+// inputs are sound.
 //
 // 4. Every setting is finite and within its bounds, at all times.
 //
@@ -98,8 +99,8 @@ class SafetyOracle {
       complain("driven, and its inputs are not sound", axis);
     if (!std::isfinite(output.force)) complain("force that is not finite", axis);
     const bool excites = values_.whole<"drive.mode">(axis) == 1;
-    if (!excites && std::abs(output.force) > values_.real<"force.limit">(axis))
-      complain("force beyond force.limit", axis);
+    const float limit = limit_until_sample(axis);
+    if (!excites && std::abs(output.force) > limit) complain("force beyond force.limit", axis);
   }
 
   /// After a poll at `now_us`, of a clock that does not wrap.
@@ -248,6 +249,21 @@ class SafetyOracle {
            values_.whole<"heartbeat_consumer.node_4">() != 0;
   }
 
+  /// The force of a haptic sample stays until the next one.
+  float limit_until_sample(std::size_t axis) {
+    Held& held = held_[axis];
+    const float limit = values_.real<"force.limit">(axis);
+    if (limit < held.limit) {
+      held.ticks =
+          static_cast<unsigned>(static_cast<float>(tick_rate_hz) / values_.real<"haptic.rate">(axis));
+    } else if (held.ticks > 0) {
+      --held.ticks;
+    }
+    held.limit = limit;
+    if (held.ticks == 0 || limit > held.allowed) held.allowed = limit;
+    return held.allowed;
+  }
+
   /// What link.loss allows after the commander was lost, with a few polls to find out.
   bool may_fade(std::size_t axis) const {
     constexpr std::uint64_t longest_us = 2'010'000;
@@ -345,7 +361,12 @@ class SafetyOracle {
   std::array<std::vector<Word>, axis_count> words_;
   std::array<bool, axis_count> shut_down_{};
   std::array<std::uint64_t, axis_count> reacts_since_us_{};  ///< since when the state is what it is
-  std::array<std::array<bool, 2>, axis_count> armed_by_{};   ///< links that may have
+  struct Held {
+    float limit, allowed;
+    unsigned ticks;  ///< for which more may be left of a sample before
+  };
+  std::array<Held, axis_count> held_{};
+  std::array<std::array<bool, 2>, axis_count> armed_by_{};  ///< links that may have
   std::array<std::uint64_t, 2> life_us_{};
   std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0, pdo_us_ = 0;
   std::vector<std::uint8_t> frame_;

@@ -179,6 +179,18 @@ TEST_F(SafetyOracleRule, ForceBeyondItsLimit) {
   tick(-3.31f);
   expect_complaint("force beyond force.limit, axis 0");
 }
+TEST_F(SafetyOracleRule, ForceBeyondALoweredLimitIsRightUntilTheNextHapticSample) {
+  set<"haptic.rate">(4000);
+  start();
+  arm();
+  tick(3.3f);
+  set<"force.limit">(1);
+  poll();
+  for (int i = 0; i < 5; ++i) tick(3.3f);
+  EXPECT_EQ(oracle_.complaint(), "");
+  tick(3.3f);
+  expect_complaint("force beyond force.limit, axis 0");
+}
 TEST_F(SafetyOracleRule, ForceThatIsNotFinite) {
   arm();
   tick(std::numeric_limits<float>::quiet_NaN());
