@@ -58,6 +58,19 @@ struct Encoder {
   std::vector<std::uint16_t> commands;
 };
 
+// By the data sheet: DIAAGC, LF bit 8, COF 9, MAGH 10, MAGL 11, AGC below.
+TEST(As5047pDiagnostics, EachBitIsItsOwn) {
+  for (unsigned bit = 8; bit < 12; ++bit) {
+    const As5047pDiagnostics found = as5047p_diagnostics(static_cast<std::uint16_t>(1U << bit | 0x5AU));
+    EXPECT_EQ(found.ready, bit == 8);
+    EXPECT_EQ(found.overflow, bit == 9);
+    EXPECT_EQ(found.field_too_strong, bit == 10);
+    EXPECT_EQ(found.field_too_weak, bit == 11);
+    EXPECT_EQ(found.angle_valid(), bit == 8);
+    EXPECT_EQ(found.gain, 0x5A);
+  }
+}
+
 TEST(As5047pAngle, FollowsThroughManyTurnsBothWaysOneTickLate) {
   for (const int speed : {1, -1, 82, -82, 511, -511}) {
     Encoder encoder;

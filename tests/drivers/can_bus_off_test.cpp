@@ -14,7 +14,9 @@ struct Node {
     machine.start({});
     EXPECT_EQ(poll(0, false, true), Action::none);
     EXPECT_EQ(machine.state(), State::joining);
+    EXPECT_TRUE(machine.may_send());
     poll(1, false, false);
+    EXPECT_TRUE(machine.may_send());
     EXPECT_EQ(machine.state(), State::on_bus);
   }
   Action poll(std::uint32_t after_us, bool bus_off, bool initialization) {

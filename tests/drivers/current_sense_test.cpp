@@ -80,6 +80,7 @@ TEST(OffsetCalibration, TakesExactlyItsSamples) {
   EXPECT_EQ(calibration.ISR_add(0), OffsetResult::accepted) << "the result stands";
   EXPECT_EQ(calibration.offset(), 2051.0F);
   calibration.restart();
+  EXPECT_EQ(calibration.spread(), 0) << "of no sample";
   EXPECT_EQ(calibration.result(), OffsetResult::running);
   for (int i = 0; i < 8; ++i) calibration.ISR_add(2040);
   EXPECT_EQ(calibration.offset(), 2040.0F) << "nothing of the first run is left";

@@ -93,6 +93,8 @@ TEST(GpioPin, LevelBeforeDirectionAndFunctionBeforeHandOver) {
   GpioPin<RecordingPort>{port, 1}.configure({.mode = GpioMode::output, .initial_level = true});
   EXPECT_EQ(order, "bpm");
   EXPECT_EQ(port.bsrr.value, 2U);
+  GpioPin<RecordingPort>{port, 1}.configure({.mode = GpioMode::output});
+  EXPECT_EQ(port.bsrr.value, 2U << 16U) << "low unless said otherwise";
   order.clear();
   GpioPin<RecordingPort>{port, 1}.configure({.mode = GpioMode::alternate, .alternate_function = 7});
   EXPECT_EQ(order, "pam") << "an output level must not be touched by a pin that is no output";

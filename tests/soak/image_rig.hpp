@@ -30,9 +30,19 @@ class ImageRig final : public Rig {
   std::int64_t true_count(std::size_t axis) override {
     return bench_.world.drive(axis).encoder().edges() - switched_on_[axis];
   }
-  void cycle_power() override {
-    board_.cycle_power();
+  void restart(bool by_command) override {
+    for (std::size_t axis = 0; axis < switched_on_.size(); ++axis) bench_.world.drive(axis).hold(true);
+    if (by_command) {
+      const auto before = board_.resets();
+      send(reset_node);
+      for (int tries = 0; tries < 100 && board_.resets() == before; ++tries) run_us(1'000);
+    } else {
+      (void)deepest();
+      board_.cycle_power();
+      std::ranges::fill(stack(), painted);
+    }
     settle();
+    for (std::size_t axis = 0; axis < switched_on_.size(); ++axis) bench_.world.drive(axis).hold(false);
   }
   std::string complaint() override {
     return deepest() > stack().size() - 512 ? "the stack is nearly full" : "";
@@ -51,7 +61,7 @@ class ImageRig final : public Rig {
   void settle() {
     constexpr std::uint32_t tick_us_at = 20;  // in SystemTick
     const std::uint32_t clock = symbol("_ZN4kmax5board12_GLOBAL__N_111system_tickE").address + tick_us_at;
-    while (word(clock) == 0) board_.run_for(20e-6);
+    while (word(clock) - 1 >= 1'000) board_.run_for(20e-6);
     word(clock) = 0U - 20'000'000;
     bench_.start();
     const Words before = words();
@@ -59,7 +69,7 @@ class ImageRig final : public Rig {
     const Words now = words();
     unsigned counters = 0;
     for (std::size_t i = 0; i < now.size(); ++i) {
-      if (now[i] - before[i] != 200 || now[i] > 2 * board_.now() / tests::ticks(1)) continue;
+      if (now[i] - before[i] - 199 > 2 || now[i] > board_.now() / tests::ticks(1)) continue;
       word(application().address + static_cast<std::uint32_t>(4 * i)) -= 400'000;
       ++counters;
     }
@@ -83,10 +93,11 @@ class ImageRig final : public Rig {
     const std::uint32_t bottom = symbol("kmax_stack_bottom").address;
     return board_.bus().memory(bottom, symbol("kmax_stack_top").address - bottom);
   }
+  /// Bytes that have been in use since the stack was painted, by the deepest of all starts.
   std::size_t deepest() {
     const auto all = stack();
-    return static_cast<std::size_t>(
-        std::ranges::find_if(all, [](std::uint8_t byte) { return byte != painted; }) - all.begin());
+    const auto used = std::ranges::find_if(all, [](std::uint8_t byte) { return byte != painted; });
+    return deepest_ = std::max(deepest_, static_cast<std::size_t>(all.end() - used));
   }
 
   tests::ImageBench bench_;
@@ -94,6 +105,7 @@ class ImageRig final : public Rig {
   virtual_board::CanHostNode node_;
   std::vector<drivers::CanFrame> frames_;
   std::array<std::int64_t, 2> switched_on_{};
+  std::size_t deepest_ = 0;
 };
 
 }  // namespace kmax::soak

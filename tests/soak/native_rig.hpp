@@ -42,7 +42,7 @@ KMAX_OPENED(TailKey, FrameQueue::tail_);
 
 class NativeRig final : public Rig {
  public:
-  explicit NativeRig(unsigned seed) : random_(seed) { cycle_power(); }
+  explicit NativeRig(unsigned seed) : random_(seed) { restart(false); }
 
   void run_us(std::uint64_t us) override { board_->advance(us / tick_us); }
   std::uint64_t elapsed_us() const override { return hands_.ticks * tick_us; }
@@ -59,7 +59,8 @@ class NativeRig final : public Rig {
   void disturb_bus(unsigned /*count*/) override {}
   void reach_for(std::size_t axis, double position) override { hands_.target[axis] = position; }
   std::int64_t true_count(std::size_t axis) override { return hands_.moved(axis); }
-  void cycle_power() override {
+  void restart(bool by_command) override {
+    if (by_command) return send(reset_node);
     constexpr std::uint64_t wrap = std::uint64_t{1} << 32;
     hands_.now_us = wrap - 1'000'000 - random_() % 40'000'000 / tick_us * tick_us;
     board_.emplace(

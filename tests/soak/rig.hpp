@@ -14,6 +14,8 @@ using firmware::modbus::Bytes;
 
 class Rig {
  public:
+  static constexpr drivers::CanFrame reset_node{.identifier = 0, .length = 2, .data = {0x81, 1}};
+
   virtual ~Rig() = default;
   virtual void run_us(std::uint64_t us) = 0;
   /// Simulated since the rig was made.
@@ -31,7 +33,8 @@ class Rig {
   virtual void reach_for(std::size_t axis, double position) = 0;
   /// By the encoder itself, since the same moment.
   virtual std::int64_t true_count(std::size_t axis) = 0;
-  virtual void cycle_power() = 0;
+  /// By the bus, or by power. Positions and counts begin anew.
+  virtual void restart(bool by_command) = 0;
   /// What the rig itself has seen that is wrong; empty: nothing.
   virtual std::string complaint() = 0;
   /// For the report.

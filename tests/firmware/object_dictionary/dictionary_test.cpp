@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <map>
 #include <set>
 #include <string>
@@ -407,6 +410,57 @@ TEST(Dictionary, ChangesWhileArmedAreAllowedWhereTheyMustBe) {
     EXPECT_EQ(named(name).change, Change::only_lower) << name;
   for (const std::string_view name : {"trace.interval", "transaction.control", "drive.controlword"})
     EXPECT_EQ(named(name).change, Change::any_time) << name;
+}
+
+std::vector<std::string> cells_of(const std::string& row) {
+  std::vector<std::string> cells;
+  for (std::size_t at = 1; at < row.size(); at = row.find('|', at) + 1) {
+    const std::string cell = row.substr(at, row.find('|', at) - at);
+    const std::size_t first = cell.find_first_not_of(" `"), last = cell.find_last_not_of(" `");
+    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+    if (row.find('|', at) == std::string::npos) break;
+  }
+  return cells;
+}
+
+// What users and their programs go by: a number that changes here changes there too, and is noticed.
+TEST(Dictionary, HasTheNumbersOfItsReference) {
+  constexpr std::array types{"unsigned8", "integer8", "unsigned16", "unsigned32",
+                             "integer32", "float32",  "integer16"};
+  std::ifstream page("../docs/parameters.md");
+  std::size_t rows = 0;
+  for (std::string row; std::getline(page, row);) {
+    if (!row.starts_with("| `")) continue;
+    ++rows;
+    const auto cells = cells_of(row);
+    ASSERT_GE(cells.size(), 8U) << row;
+    const std::size_t entry = find_entry(cells[0]);
+    const Entry& e = named(cells[0]);
+    std::array<char, 32> place{};
+    std::snprintf(place.data(), place.size(), "0x%04X:%u 0x%04X", unsigned{e.index()},
+                  unsigned{e.object_subindex()}, unsigned{modbus_address(entry, 0)});
+    EXPECT_EQ(cells[5] + " " + cells[6], place.data()) << row;
+    EXPECT_EQ(cells[1], e.unit) << row;
+    EXPECT_EQ(cells[4], types[static_cast<std::size_t>(e.type)]) << row;
+    EXPECT_EQ(cells[2] == "read only", e.access == Access::read_only) << row;
+    if (e.access == Access::read_only) continue;
+    if (e.values.empty()) {
+      EXPECT_EQ(std::strtod(cells[2].c_str(), nullptr), e.minimum) << row;
+      const std::size_t to = cells[2].find(" .. ");
+      EXPECT_EQ(to == std::string::npos ? e.minimum : std::strtod(cells[2].c_str() + to + 4, nullptr),
+                e.maximum)
+          << row;
+      EXPECT_EQ(std::strtod(cells[3].c_str(), nullptr), e.default_value) << row;
+      continue;
+    }
+    std::string names;
+    for (const NamedValue& value : e.values) {
+      names += (names.empty() ? "" : ", ") + std::string(value.name);
+      EXPECT_EQ(value.name == cells[3], value.value == e.default_value) << row;
+    }
+    EXPECT_EQ(cells[2], names) << row;
+  }
+  EXPECT_EQ(rows, entry_count);
 }
 
 }  // namespace
