@@ -47,6 +47,7 @@ class ImageRig final : public Rig {
   std::string complaint() override {
     return deepest() > stack().size() - 512 ? "the stack is nearly full" : "";
   }
+  std::size_t may_grow() const override { return 4 * 1024 * 1024; }
   std::string remarks() override {
     return std::to_string(board_.resets()) + " starts, stack " + std::to_string(deepest()) + " of " +
            std::to_string(stack().size()) + " bytes";

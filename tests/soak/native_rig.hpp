@@ -68,6 +68,7 @@ class NativeRig final : public Rig {
     board_->connect_can(true);
   }
   std::string complaint() override { return hands_.oracle->complaint(); }
+  std::size_t may_grow() const override { return 64 * 1024; }
   std::string remarks() override { return std::to_string(restarts_) + " starts"; }
 
  private:

@@ -37,6 +37,8 @@ class Rig {
   virtual void restart(bool by_command) = 0;
   /// What the rig itself has seen that is wrong; empty: nothing.
   virtual std::string complaint() = 0;
+  /// Bytes by which the process may grow: what models keep of their own, too.
+  virtual std::size_t may_grow() const = 0;
   /// For the report.
   virtual std::string remarks() = 0;
 };

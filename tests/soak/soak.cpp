@@ -462,7 +462,8 @@ int soak(Rig& rig, unsigned seed, double hours, const char* report) {
       std::fprintf(out, "%.1f s: %s; %s; heap %zu bytes, resident %zu pages\n", now_s(), use.counts().c_str(),
                    rig.remarks().c_str(), now.heap, now.resident_pages);
       std::fflush(out);
-      if (now.heap > first.heap + 65'536 || now.resident_pages > first.resident_pages + 512)
+      if (now.heap > first.heap + rig.may_grow() ||
+          now.resident_pages > first.resident_pages + 512 + rig.may_grow() / 4096)
         throw std::runtime_error("the process has grown since the third tenth");
     }
     if (use.count("contacts") == 0 || use.count("wraps of the tick counter") == 0 || use.count("saves") == 0)
