@@ -241,4 +241,12 @@ void Axes::note_commander(std::span<const SlotValue> written, Link by) {
   }
 }
 
+void Axes::pass_over(std::span<const SlotValue> refused, Link by) {
+  for (const SlotValue& one : refused) {
+    const auto [entry, axis] = owner_of(one.slot);
+    if (entry == entry_of<"drive.controlword">())
+      supervisors_[axis].pass_over(static_cast<std::uint16_t>(one.raw), by);
+  }
+}
+
 }  // namespace kmax::firmware

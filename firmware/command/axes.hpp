@@ -54,6 +54,9 @@ class Axes {
 
   /// What was written just now names `by` as the next commander, or is its sign of life.
   void note_commander(std::span<const SlotValue> written, Link by);
+  /// What was refused, since another link commands: a host that goes on sending it when that one has disarmed
+  /// holds it, and it arms nothing.
+  void pass_over(std::span<const SlotValue> refused, Link by);
 
   std::uint32_t now_us() const { return now_us_; }
   /// Those that make force, also while it fades or brakes.

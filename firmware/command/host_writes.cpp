@@ -11,6 +11,7 @@ ParameterAccess::Result HostWrites::write(std::span<const SlotValue> wanted, Lin
   if (entry == entry_of<"log.command">()) return command_log(wanted[0].raw);
   const auto result = parameters_.write(wanted, by, axes_.armed(), axes_.now_us());
   if (result.refusal == Refusal::none) axes_.note_commander(wanted, by);
+  if (result.refusal == Refusal::other_commander) axes_.pass_over(wanted, by);
   // Controlwords act at once: a poll that comes late finds several, and each must act as if it had come
   // alone, by the settings that came before it. Else settings act at the end of the poll, whichever link they
   // came over: thousands may come in a second.

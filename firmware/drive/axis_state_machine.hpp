@@ -127,7 +127,7 @@ class AxisStateMachine {
     if (state_ == DriveState::not_ready_to_switch_on) state_ = DriveState::switch_on_disabled;
   }
 
-  /// A controlword came and was superseded before it could act.
+  /// A controlword came and was refused, or superseded before it could act.
   void pass_over(std::uint16_t word, Link by) { previous_word_[static_cast<std::size_t>(by)] = word; }
 
   /// A controlword was written, by that link. `obstacle`: why operation cannot be enabled now (none: it can).

@@ -68,6 +68,8 @@ class Supervisor {
     number_ = next_number_[static_cast<std::size_t>(controlword.by)];
     signed_us_ = now_us;
   }
+  /// A controlword that was refused.
+  void pass_over(std::uint16_t word, Link by) { machine_.pass_over(word, by); }
   /// drive.commander was written: the number of that link's next attempt to arm.
   void set_next_number(Link link, std::uint16_t number) {
     next_number_[static_cast<std::size_t>(link)] = number;

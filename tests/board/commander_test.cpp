@@ -197,6 +197,26 @@ TEST_F(Commander, ARefusedWordThatIsHeldArmsNothingAfterAnotherLinksWord) {
   EXPECT_FALSE(armed());
 }
 
+// A master that sends 0x0F all the time while another link commands must not be armed by that link's
+// disarming.
+TEST_F(Commander, AWordThatWasRefusedToAnotherLinkArmsNothingOnceTheCommanderHasDisarmed) {
+  bench.preset("link.timeout", 0);
+  nmt(1);
+  rpdo(0x06, 0);
+  ASSERT_TRUE(bench.arm());
+  rpdo(0x0F, 0, 5);
+  for (const std::uint16_t disarming : {std::uint16_t{0x07}, std::uint16_t{0x06}}) {
+    EXPECT_EQ(bench.command(disarming), 0);
+    rpdo(0x0F, 0, 5);
+    run_ms(3);
+    EXPECT_FALSE(armed()) << disarming;
+  }
+  rpdo(0x06, 0);
+  rpdo(0x0F, 0);
+  run_ms(3);
+  EXPECT_TRUE(armed()) << "an edge of its own";
+}
+
 TEST_F(Commander, AnotherLinkMayBeginAHaltAndNotEndIt) {
   bench.preset("link.timeout", 0);
   EXPECT_EQ(write(0x6060, 0, 10, 1), 0U);
