@@ -39,6 +39,7 @@
 // inside receive(), poll() or reply_due(). Memory: about 650 bytes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -191,7 +192,7 @@ class RtuPort {
     server_.diagnostics().set(diagnostic_counters());
     const std::size_t length =
         server_.process(frame.pdu, std::span(reply_).template subspan<1, pdu_size_max>());
-    answered_ = broadcast ? 0 : crc_of(frame.pdu);
+    answered_ = hash_of(frame.pdu);
     answered_size_ = broadcast ? 0 : frame.pdu.size();
     if (broadcast) {
       finish_request();
@@ -207,11 +208,20 @@ class RtuPort {
   }
 
   // The very tagged write, tag and all, that the reply in the buffer is the answer to: the client has not got
-  // that answer, or the line has doubled the request. It is answered again and not carried out twice.
+  // that answer, or the line has doubled the request. It is answered again and not carried out twice. The tag
+  // is in the reply; a CRC of 16 bits would take one in 65536 other writes for the same.
   bool is_repeated_write(const RtuFrame& frame) const {
     const auto request = untagged(frame.pdu);
     return request.size() != frame.pdu.size() && is_write(request[0]) && frame.pdu.size() == answered_size_ &&
-           crc_of(frame.pdu) == answered_;
+           std::equal(frame.pdu.begin(), frame.pdu.begin() + 1 + tag_size, reply_.begin() + 1) &&
+           hash_of(frame.pdu) == answered_;
+  }
+
+  // FNV-1a.
+  static std::uint32_t hash_of(std::span<const std::uint8_t> bytes) {
+    std::uint32_t hash = 0x811C'9DC5;
+    for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x0100'0193U;
+    return hash;
   }
 
   Diagnostics::Counters diagnostic_counters() const {
@@ -248,7 +258,7 @@ class RtuPort {
   std::uint32_t reply_end_us_ = 0;
   std::size_t reply_size_ = 0;
   std::size_t answered_size_ = 0;  // of the request that `reply_` answers; 0: of none
-  std::uint16_t answered_ = 0;     // its CRC
+  std::uint32_t answered_ = 0;     // its hash
   bool broadcast_ = false;         // what is being executed
   State state_ = State::listening;
   std::array<std::uint8_t, adu_size_max> reply_{};

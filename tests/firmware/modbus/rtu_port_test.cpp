@@ -276,6 +276,30 @@ TEST(RtuPort, ATaggedWriteWhoseAnswerWasDroppedIsNotCarriedOutAgainEither) {
   EXPECT_EQ(client.bank.writes, 1);
 }
 
+/// `begin` with the two bytes behind it that give the CRC of `other`; there always are such.
+Bytes of_equal_crc(const Bytes& begin, const Bytes& other) {
+  Bytes bytes;
+  for (unsigned value = 0; value < 0x1'0000 && reference_crc(bytes) != reference_crc(other); ++value)
+    bytes = begin + Bytes{static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value)};
+  EXPECT_EQ(reference_crc(bytes), reference_crc(other));
+  return bytes;
+}
+
+TEST(RtuPort, AnotherTaggedWriteIsCarriedOutEvenIfItsCrcIsTheSame) {
+  const Bytes one = Bytes{65, 0, 7} + write_pdu;
+  const Bytes two_values{65, 0, 7, 16, 0, 2, 0, 2, 4, 0x12, 0x34, 0, 0};
+  const std::pair<Bytes, Bytes> pairs[] = {
+      {one, of_equal_crc({65, 0, 8, 6, 0, 2}, one)},
+      {two_values, of_equal_crc({65, 0, 7, 16, 0, 2, 0, 2, 4, 0x12, 0x35}, two_values)}};
+  for (const auto& [first, second] : pairs) {
+    RtuClient client;
+    client.exchange_next(adu(1, first));
+    const Bytes reply = client.exchange_next(adu(1, second));
+    EXPECT_EQ(Bytes(reply.begin(), reply.begin() + 4), (Bytes{1, 65, 0, second[2]}));
+    EXPECT_EQ(client.bank.writes, 2);
+  }
+}
+
 TEST(RtuPort, ReadingsAndWritesWithoutATagAreCarriedOutEachTime) {
   RtuClient client;
   client.exchange_next(tagged(7, read_pdu));
