@@ -148,13 +148,13 @@ constexpr int slowest_half_period = 3000;
 // In the middle of a half wave the handle turns back: there the wave ends, since nothing brakes it
 // afterwards.
 ExcitationPlan Shaking::wave(std::size_t ticks) const {
-  const std::size_t waves = ticks / static_cast<std::size_t>(half_period_) + 1;
+  const std::size_t half_waves = ticks / static_cast<std::size_t>(half_period_) + 1;
   ExcitationPlan plan;
   plan.kind = "torque";
   plan.alternation = current_;
   plan.half_period = half_period_;
   plan.ramp = ramp_waves * half_period_ * known_.tick;
-  plan.duration = plan.ramp + (static_cast<double>(waves) + 0.5) * half_period_ * known_.tick;
+  plan.duration = plan.ramp + (static_cast<double>(half_waves) + 0.5) * half_period_ * known_.tick;
   return plan;
 }
 

@@ -69,7 +69,9 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
   return fmt::format("{}: {}; 'kmax {} --help' explains it", command, error.what(), command);
 }
 
-int run_action(Context& context) {
+}  // namespace
+
+int act(Context& context) {
   try {
     const int code = context.action();
     context.out.flush();
@@ -96,9 +98,8 @@ int run_action(Context& context) {
     return report_error(context, error.what(), failed);
   }
 }
-}  // namespace
 
-int run(std::vector<std::string> arguments, Context& context) {
+std::optional<int> parse(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app("Sets parameters of a Kmax haptic device, reads its state and lets it make force.", "kmax");
   app.set_version_flag("--version", "kmax " KMAX_VERSION);
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
@@ -119,7 +120,12 @@ int run(std::vector<std::string> arguments, Context& context) {
     context.json = wants_json;
     return report_error(context, usage_message(app, error, arguments), wrong_usage);
   }
-  return run_action(context);
+  return std::nullopt;
+}
+
+int run(const std::vector<std::string>& arguments, Context& context) {
+  const std::optional<int> ended = parse(arguments, context);
+  return ended ? *ended : act(context);
 }
 
 std::string Context::device_address() const {

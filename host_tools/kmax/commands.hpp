@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -92,6 +93,11 @@ CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, 
 
 /// The whole program behind main(): parses the arguments (without the program's name), runs the command,
 /// turns what is thrown into a message and an exit code.
-int run(std::vector<std::string> arguments, Context& context);
+int run(const std::vector<std::string>& arguments, Context& context);
+
+/// Its halves. parse() leaves in the context what is to be done, and touches nothing else; an exit code: it
+/// was done (--help), or is wrong usage.
+std::optional<int> parse(const std::vector<std::string>& arguments, Context& context);
+int act(Context& context);
 
 }  // namespace kmax::cli

@@ -47,7 +47,10 @@ class Context {
   /// For what a line at a time cannot show (Progress).
   std::ostream& messages() { return messages_; }
 
-  void print(const Json& document) { out << document.dump(2) << '\n'; }
+  /// Arguments and files may hold bytes that are no UTF-8, which JSON is: U+FFFD stands for them.
+  void print(const Json& document) {
+    out << document.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  }
 
   /// --axis, 0 without it.
   std::size_t axis() const { return axis_option.value_or(0); }

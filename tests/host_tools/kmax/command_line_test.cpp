@@ -47,6 +47,11 @@ TEST_F(CommandLine, GetIsTheContractedDocument) {
   EXPECT_CONTAINS(output, "2.4,");  // not 2.4000000953674316
 }
 
+TEST_F(CommandLine, BytesThatAreNoUtf8DoNotEndItWithoutADocument) {
+  EXPECT_EQ(kmax({"--json", "get", "wall.\xFF"}), wrong_usage);
+  EXPECT_CONTAINS(document()["error"].get<std::string>(), "'wall.\uFFFD'");
+}
+
 TEST_F(CommandLine, GetForPeople) {
   EXPECT_EQ(kmax({"get", "wall.stiffness", "wall.law"}), done);
   EXPECT_EQ(output, "wall.stiffness = 1000 N/m\nwall.law = plain\n");
