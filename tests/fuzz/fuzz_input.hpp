@@ -3,9 +3,21 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <span>
+#include <string>
 
 namespace kmax {
+
+/// Ends the program with a message, which scripts/fuzz shows.
+[[noreturn]] inline void broken(const std::string& what) {
+  std::fprintf(stderr, "A rule is broken: %s\n", what.c_str());
+  std::abort();
+}
+inline void require(bool kept, const char* rule) {
+  if (!kept) broken(rule);
+}
 
 /// The bytes of an input, taken one after the other; zeros when they are used up.
 class FuzzInput {

@@ -22,7 +22,7 @@ class SerialLine : WatchedApplication {
       if ((how & 32) == 0) bytes = modbus::with_crc(bytes);
       if (!bytes.empty()) serial(bytes, how & 0xF);
       // A time-out of 50 ms is within reach.
-      if (how & 64) tick(200, 1, 20);
+      if (how & 64) tick(20, 1, 4);
       if (how & 128) step(20'000);
     }
   }

@@ -4,7 +4,8 @@
 // no code that decides anything.
 //
 // 1. An axis is armed only after controlwords that shut down and then enable operation, in this order, since
-// it was last in a state that CiA 402 leads out of in no other way. No enabling one came by a broadcast.
+// it was last in a state that CiA 402 leads out of in no other way. No enabling one came by a broadcast. The
+// word that armed it arms nothing more while its link goes on sending it: one without bit 3 comes in between.
 //
 // 2. Once armed it stays so no longer than link.timeout, and one poll, after the last message of the link
 // that armed it that could be a sign of life.
@@ -18,6 +19,9 @@
 // 5. While an axis is armed, its bounds only get tighter, or looser as far as a ceiling that was set before.
 // While its force fades, no looser at all, and what its commander asks of it stays as it was.
 //
+// 6. What a commander asks of an armed axis, and what the hand there feels, changes only when something came
+// over the link that armed it.
+//
 // Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
 // allows what they could mean at most: it never complains of what is right.
 #pragma once
@@ -27,6 +31,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <span>
@@ -56,6 +61,7 @@ class SafetyOracle {
     const double longest_gap_us = baud_rate > 19200 ? 750.0 : 1.5 * character_us;
     if (static_cast<double>(end_us - byte_us_) > character_us + longest_gap_us + 2.0) frame_.clear();
     byte_us_ = end_us;
+    silence_us_ = baud_rate > 19200 ? 1750.0 + character_us : 4.5 * character_us;
     frame_.push_back(byte);
     if (frame_.size() >= 4 && crc_of(frame_) == 0) take_request(std::span(frame_).first(frame_.size() - 2));
   }
@@ -66,13 +72,14 @@ class SafetyOracle {
     ++frames_waiting_;
     const std::uint32_t id = frame.identifier;
     if (id == 0 || id == 0x7E5 || (id > 0x700 && !heartbeat_watched())) return;  // NMT, LSS, heartbeats
+    wrote_[1] = {polls_, now_us_};
     if (id > 0x600 && id <= 0x67F) {
       take_sdo(data);
       return;
     }
     if (id == second_request()) {  // whatever its transfer is about
       life_waits_ = true;
-      for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, true, true);
+      for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, true, true, true);
       return;
     }
     const bool is_sync = id == 0x80;
@@ -85,9 +92,10 @@ class SafetyOracle {
       const auto word = static_cast<std::uint16_t>(data[i] | data[i + 1] << 8);
       pdo_shuts_down_ = pdo_shuts_down_ || shuts_down(word);
       pdo_enables_ = pdo_enables_ || asks_to_enable(word);
+      pdo_lowers_ = pdo_lowers_ || lowers(word);
     }
     note_pdo_words();
-    if (is_sync) pdo_shuts_down_ = pdo_enables_ = false;
+    if (is_sync) pdo_shuts_down_ = pdo_enables_ = pdo_lowers_ = false;
   }
 
   /// Of `axis`, after a tick.
@@ -108,16 +116,22 @@ class SafetyOracle {
     ++polls_;
     now_us_ = now_us;
     if (frames_waiting_ > 0 && life_waits_) life_us_[1] = now_us;
+    // A request is read when the silence behind it is over.
+    if (request_waits_) life_us_[0] = now_us;
+    if (static_cast<double>(now_us - byte_us_) > silence_us_) request_waits_ = false;
     frames_waiting_ -= std::min<std::size_t>(frames_waiting_, 16);
     if (frames_waiting_ == 0) life_waits_ = false;
     // An own SYNC may come with any poll, as long as the device keeps what waits for one.
     if (makes_sync() && pdo_since_sync_ && now_us - pdo_us_ < 120'000) {
       life_us_[1] = now_us;
+      wrote_[1] = {polls_, now_us_};
       note_pdo_words();
     }
     const States before = states_;
     states_ = states;
     for (std::size_t axis = 0; axis < axis_count; ++axis) judge_state(axis, before[axis]);
+    // Hardly ever, and looking at each slot would take most of a fuzzer's time.
+    if (std::memcmp(&values, &values_, sizeof values) == 0) return;
     for (std::size_t slot = 0; slot < slot_count; ++slot) {
       if (values.raw(slot) != values_.raw(slot)) judge_change(slot, values.raw(slot), before);
     }
@@ -128,16 +142,20 @@ class SafetyOracle {
   const std::string& complaint() const { return complaint_; }
 
  private:
+  struct Moment {
+    std::uint64_t poll = 0, time_us = 0;
+  };
   /// What a message could have meant as a controlword of an axis.
   struct Word {
-    std::uint64_t poll, time_us;
+    Moment when;
     std::size_t link;  ///< 0 serial, 1 CAN
-    bool shuts_down, enables;
+    bool shuts_down, enables, lowers;
   };
 
   // By the standard's command table.
   static constexpr bool shuts_down(std::uint16_t word) { return (word & 0x87) == 0x06; }
   static constexpr bool asks_to_enable(std::uint16_t word) { return (word & 0x8F) == 0x0F; }
+  static constexpr bool lowers(std::uint16_t word) { return (word & 0x08) == 0; }
 
   /// States that only a shutdown leads out of, perhaps after other words.
   static constexpr bool must_start_anew(DriveState state) {
@@ -160,9 +178,13 @@ class SafetyOracle {
                  std::to_string(axis) + ", at " + std::to_string(now_us_) + " us";
   }
 
-  void note_word(std::size_t axis, std::size_t link, bool shuts_down, bool enables) {
-    if (shuts_down || enables) words_[axis].push_back({polls_, now_us_, link, shuts_down, enables});
+  void note_word(std::size_t axis, std::size_t link, bool shuts_down, bool enables, bool lowers) {
+    if (shuts_down || enables || lowers)
+      words_[axis].push_back({{polls_, now_us_}, link, shuts_down, enables, lowers});
   }
+  /// What came then has been read by now: it no longer waits behind other frames, nor for the silence that
+  /// ends its own.
+  bool settled(const Moment& then) const { return polls_ - then.poll > 8 && now_us_ - then.time_us > 12'000; }
 
   static std::uint16_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
     return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
@@ -174,17 +196,20 @@ class SafetyOracle {
     const auto own = static_cast<std::uint8_t>(values_.whole<"modbus.unit">());
     if (unit != 0 && unit != own && unit != unit_before_) return;
     life_us_[0] = byte_us_;
+    request_waits_ = true;
     auto pdu = frame.subspan(1);
     if (pdu.size() > 3 && pdu[0] == 65) pdu = pdu.subspan(3);
+    if (pdu[0] == 6 || pdu[0] == 16 || pdu[0] == 22 || pdu[0] == 23) wrote_[0] = {polls_, now_us_};
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       const std::size_t place = modbus_address(entry_of<"drive.controlword">(), axis);
       std::optional<std::uint16_t> word;
       if (pdu[0] == 6 && pdu.size() == 5) word = word_in(pdu, 1, 3, place);
       if (pdu[0] == 16 && pdu.size() > 6) word = word_in(pdu, 1, 6, place);
       if (pdu[0] == 23 && pdu.size() > 10) word = word_in(pdu, 5, 10, place);
-      if (word) note_word(axis, 0, shuts_down(*word), unit != 0 && asks_to_enable(*word));
+      if (word) note_word(axis, 0, shuts_down(*word), unit != 0 && asks_to_enable(*word), lowers(*word));
       // A mask makes it from what was there before.
-      if (pdu[0] == 22 && pdu.size() == 7 && big_endian(pdu, 1) == place) note_word(axis, 0, true, unit != 0);
+      if (pdu[0] == 22 && pdu.size() == 7 && big_endian(pdu, 1) == place)
+        note_word(axis, 0, true, unit != 0, true);
     }
   }
   /// The register `place` of those that are written from `data` on, the first of them as the word at `first`
@@ -212,7 +237,7 @@ class SafetyOracle {
       if (sdo_index_ != 0x6040U + 0x800U * axis) continue;
       const bool known = expedited && !sdo_in_blocks_ && data.size() == 8;
       const auto word = known ? static_cast<std::uint16_t>(data[4] | data[5] << 8) : std::uint16_t{0};
-      note_word(axis, 1, !known || shuts_down(word), !known || asks_to_enable(word));
+      note_word(axis, 1, !known || shuts_down(word), !known || asks_to_enable(word), !known || lowers(word));
     }
   }
   /// Whether the object that is being written commands; a mere setting is no sign of life.
@@ -230,7 +255,7 @@ class SafetyOracle {
     });
   }
   void note_pdo_words() {
-    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_);
+    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_, pdo_lowers_);
   }
   bool makes_sync() const {
     return (values_.whole<"canopen.sync_cob_id">() >> 30 & 1) != 0 &&
@@ -271,29 +296,42 @@ class SafetyOracle {
            now_us_ - reacts_since_us_[axis] <= longest_us;
   }
 
+  void judge_arming(std::size_t axis) {
+    bool shut_down = shut_down_[axis], in_order = false;
+    auto holds = holds_[axis];
+    armed_by_[axis] = {};
+    for (const Word& word : words_[axis]) {
+      shut_down = shut_down || word.shuts_down;
+      holds[word.link] = holds[word.link] && !word.lowers;
+      if (!word.enables || !shut_down) continue;
+      in_order = true;
+      if (!holds[word.link]) armed_by_[axis][word.link] = true;
+    }
+    if (!in_order) complain("armed without the controlwords for it", axis);
+    const auto& by = armed_by_[axis];
+    if (in_order && !by[0] && !by[1]) complain("armed by a word that was held", axis);
+    shut_down_[axis] = shut_down;
+    if (by[0] == by[1]) return;
+    // There is no doubt whose word it was: what that link had sent before it has been read too.
+    const std::size_t link = by[1] ? 1 : 0;
+    holds_[axis][link] = true;
+    for (Word& word : words_[axis]) {
+      if (word.link == link && word.enables) break;
+      if (word.link == link) word.lowers = false;
+    }
+  }
+
   void judge_state(std::size_t axis, DriveState before) {
     if (states_[axis] != before) reacts_since_us_[axis] = now_us_;
-    auto& words = words_[axis];
     const bool armed = states_[axis] == DriveState::operation_enabled;
     const bool was_armed = before == DriveState::operation_enabled;
-    // A word may have been sent, and not yet read: behind other frames, or in a frame whose end is a silence.
-    const auto settled = [this](const Word& word) {
-      return polls_ - word.poll > 8 && now_us_ - word.time_us > 12'000;
-    };
-    if (armed && !was_armed) {
-      bool shut_down = shut_down_[axis], in_order = false;
-      armed_by_[axis] = {};
-      for (const Word& word : words) {
-        shut_down = shut_down || word.shuts_down;
-        if (!word.enables || !shut_down) continue;
-        in_order = true;
-        armed_by_[axis][word.link] = true;
-      }
-      if (!in_order) complain("armed without the controlwords for it", axis);
-      shut_down_[axis] = shut_down;
-    }
+    if (armed && !was_armed) judge_arming(axis);
     if (must_start_anew(states_[axis])) shut_down_[axis] = false;
-    if (armed || must_start_anew(states_[axis])) std::erase_if(words, settled);
+    if (armed || must_start_anew(states_[axis])) {
+      for (const Word& word : words_[axis])
+        if (settled(word.when) && word.lowers) holds_[axis][word.link] = false;
+      std::erase_if(words_[axis], [this](const Word& word) { return settled(word.when); });
+    }
     if (!armed || !was_armed) return;
     const float timeout = values_.real<"link.timeout">();
     std::uint64_t life_us = 0;
@@ -341,7 +379,14 @@ class SafetyOracle {
       any_armed = any_armed || stayed;
       armed = armed || (stayed && (e.scope() == Scope::device || axis == of_axis));
     }
-    if (e.access != Access::read_write || e.change == Change::any_time) return;
+    if (e.access != Access::read_write) return;
+    const auto& by = armed_by_[of_axis];
+    if (armed && e.group.of_commander && by[0] != by[1]) {
+      const std::size_t link = by[1] ? 1 : 0;
+      if (settled(wrote_[link]) && (link == 0 || frames_waiting_ == 0))
+        complain("changed by another than its commander", of_axis, e.name);
+    }
+    if (e.change == Change::any_time) return;
     if (e.change == Change::disarmed_only) {
       if (any_armed) complain("changed while armed", of_axis, e.name);
       return;
@@ -366,14 +411,19 @@ class SafetyOracle {
     unsigned ticks;  ///< for which more may be left of a sample before
   };
   std::array<Held, axis_count> held_{};
-  std::array<std::array<bool, 2>, axis_count> armed_by_{};  ///< links that may have
+  std::array<std::array<bool, 2>, axis_count> armed_by_{};   ///< links that may have
+  /// By link: since its word armed the axis, it has sent none without bit 3.
+  std::array<std::array<bool, 2>, axis_count> holds_{};
+  std::array<Moment, 2> wrote_{};  ///< when the link last brought what could be a write
   std::array<std::uint64_t, 2> life_us_{};
   std::uint64_t polls_ = 0, now_us_ = 0, byte_us_ = 0, pdo_us_ = 0;
   std::vector<std::uint8_t> frame_;
   std::uint8_t unit_before_ = 0;
   std::size_t frames_waiting_ = 0;
-  bool life_waits_ = false;  ///< among the frames that wait
-  bool pdo_since_sync_ = false, pdo_shuts_down_ = false, pdo_enables_ = false;
+  bool life_waits_ = false;     ///< among the frames that wait
+  bool request_waits_ = false;  ///< on the serial line
+  double silence_us_ = 0.0;     ///< that ends it
+  bool pdo_since_sync_ = false, pdo_shuts_down_ = false, pdo_enables_ = false, pdo_lowers_ = false;
   bool sdo_in_blocks_ = false;  ///< anything may have been a block's contents
   unsigned sdo_index_ = 0;
   std::uint8_t sdo_subindex_ = 0;

@@ -50,6 +50,10 @@ class SafetyOracleRule : public Test {
   }
   /// The settings of a start are those that were set until here.
   void start() { oracle_ = SafetyOracle(values_); }
+  /// What was sent until here has been read.
+  void settle() {
+    for (int i = 0; i < 10; ++i) poll();
+  }
   void tick(float force, bool enabled = true, bool count_valid = true, Fault condition = Fault::none) {
     oracle_.take_tick(0, {.count = 0, .count_valid = count_valid, .condition = condition},
                       {.force = force, .enabled = enabled});
@@ -118,11 +122,45 @@ TEST_F(SafetyOracleRule, ArmedAgainWithoutANewShutdown) {
   expect_complaint(without_words);
 }
 
+TEST_F(SafetyOracleRule, ArmedByAWordThatIsHeld) {
+  arm();
+  settle();
+  can_controlword(0x06);
+  poll(DriveState::ready_to_switch_on);
+  serial_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  expect_complaint("armed by a word that was held, axis 0");
+}
+TEST_F(SafetyOracleRule, ArmedAgainByAnotherWordOfEitherLinkIsRight) {
+  arm();
+  settle();
+  can_controlword(0x06);
+  poll(DriveState::ready_to_switch_on);
+  can_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  settle();
+  serial_controlword(0x07);
+  poll(DriveState::switched_on);
+  serial_controlword(0x0F);
+  poll(DriveState::operation_enabled);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+
 TEST_F(SafetyOracleRule, ArmedBeyondTheTimeOut) {
   arm();
   poll(DriveState::operation_enabled, 990'000);
   EXPECT_EQ(oracle_.complaint(), "");
   poll(DriveState::operation_enabled, 20'000);
+  expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
+}
+TEST_F(SafetyOracleRule, ARequestIsASignOfLifeUntilItIsRead) {
+  arm();
+  serial_controlword(0x0F);
+  poll(DriveState::operation_enabled, 1'000);
+  poll(DriveState::operation_enabled, 5'000);
+  poll(DriveState::operation_enabled, 1'000'000);
+  EXPECT_EQ(oracle_.complaint(), "");
+  poll(DriveState::operation_enabled, 1'000);
   expect_complaint("armed for longer than link.timeout without a sign of life, axis 0");
 }
 TEST_F(SafetyOracleRule, AnotherLinkIsNoSignOfLife) {
@@ -301,6 +339,26 @@ TEST_F(SafetyOracleRule, ChangedWhileArmed) {
   set<"link.timeout">(2);
   poll();
   expect_complaint("changed while armed: link.timeout, axis 0");
+}
+TEST_F(SafetyOracleRule, ChangedByAnotherThanItsCommander) {
+  arm();
+  settle();
+  can_controlword(0x0F);
+  set<"wall.adaptive_gain">(1);
+  poll();
+  expect_complaint("changed by another than its commander: wall.adaptive_gain, axis 0");
+}
+TEST_F(SafetyOracleRule, ChangedByItsCommanderOrByAnybodyWhereThatIsAllowedIsRight) {
+  arm();
+  settle();
+  serial_controlword(0x0F);
+  set<"wall.adaptive_gain">(1);
+  poll();
+  settle();
+  can_controlword(0x0F);
+  set<"force.limit">(1);
+  poll();
+  EXPECT_EQ(oracle_.complaint(), "");
 }
 TEST_F(SafetyOracleRule, ChangedWhileDisarmedIsRight) {
   set<"link.timeout">(2);

@@ -2,16 +2,14 @@
 
 #include <array>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <optional>
 #include <span>
-#include <string>
 #include <string_view>
 
 #include "firmware/application.hpp"
 #include "tests/firmware/fake_flash.hpp"
 #include "tests/firmware/modbus/rtu_line.hpp"
+#include "tests/fuzz/fuzz_input.hpp"
 #include "tests/fuzz/safety_oracle.hpp"
 
 namespace kmax::firmware {
@@ -74,9 +72,7 @@ class WatchedApplication {
     SafetyOracle::States states{};
     for (std::size_t axis = 0; axis < axis_count; ++axis) states[axis] = application_->state(axis);
     oracle_->take_poll(now_us_, application_->values(), states);
-    if (!oracle_->complaint().empty()) {
-      broken(oracle_->complaint());
-    }
+    if (!oracle_->complaint().empty()) broken(oracle_->complaint());
     drivers::CanFrame frame;
     while (application_->can().next_frame(frame)) {
       if (frame.length > 8 || frame.identifier > 0x7FF) broken("a frame was sent that no bus can carry");
@@ -142,12 +138,6 @@ class WatchedApplication {
   }();
   BoardReadings readings_;
   CanReadings can_;
-
- private:
-  [[noreturn]] static void broken(const std::string& what) {
-    std::fprintf(stderr, "A rule of safety is broken: %s\n", what.c_str());
-    std::abort();
-  }
 };
 
 }  // namespace kmax::firmware
