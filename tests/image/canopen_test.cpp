@@ -108,9 +108,14 @@ TEST(CanOpen, OwnSyncsAreRegularWhateverElseIsAskedFor) {
   EXPECT_LT(worst_deviation(2.0), 50.0) << "pre-operational, us";
   bench.ask_for_telemetry();
   bench.nmt(0x01);
-  BusyClient client(*bench.board, {0x2012, 4});
-  EXPECT_LT(worst_deviation(2.0), 200.0) << "beside four PDOs at 1 kHz and transfers, us";
-  EXPECT_GT(client.answers, 1000);
+  {
+    BusyClient client(*bench.board, {0x2012, 4});
+    EXPECT_LT(worst_deviation(2.0), 200.0) << "beside four PDOs at 1 kHz and transfers, us";
+    EXPECT_GT(client.answers, 1000);
+  }
+  // Two that ask one server take each other's answers.
+  bench.board->run_for(0.01);
+  bench.port.forget();
   EXPECT_EQ(bench.number(0x5812, 10), 0U) << "a tick was missed";
 }
 

@@ -105,6 +105,7 @@ TEST(ImageFaultLog, NamesTheCrashOnceAndWhereItWas) {
     for (at = 0xC000; (flash[at + 1]) != 0xDE; at += 2) {
     }
     at += static_cast<std::uint32_t>(virtual_board::memory_map::flash.base);
+    bench.board->processor().set_core_register(14, at);  // else where the main loop happened to be
     bench.board->processor().set_core_register(15, at);
     bench.board->run_for(0.2);
     bench.start();

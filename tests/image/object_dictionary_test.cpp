@@ -69,7 +69,8 @@ std::string place(const DescribedObject& object) {
 
 /// Whether writing its own value to it does something, or is refused for more than the object itself.
 bool acts(const DescribedObject& object) {
-  static const std::set<std::uint16_t> indices{0x1003, 0x1010, 0x1011, 0x5810, 0x5816, 0x581A, 0x5829};
+  static const std::set<std::uint16_t> indices{0x1003, 0x1010, 0x1011, 0x5808, 0x5809,
+                                               0x5810, 0x5816, 0x581A, 0x5829};
   return indices.count(object.index) != 0;
 }
 
