@@ -99,8 +99,9 @@ int act(Context& context) {
   }
 }
 
-std::optional<int> parse(const std::vector<std::string>& arguments, Context& context) {
-  CLI::App app("Sets parameters of a Kmax haptic device, reads its state and lets it make force.", "kmax");
+std::optional<int> parse(CLI::App& app, const std::vector<std::string>& arguments, Context& context) {
+  app.name("kmax");
+  app.description("Sets parameters of a Kmax haptic device, reads its state and lets it make force.");
   app.set_version_flag("--version", "kmax " KMAX_VERSION);
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
   add_device_option(app, context);
@@ -124,7 +125,8 @@ std::optional<int> parse(const std::vector<std::string>& arguments, Context& con
 }
 
 int run(const std::vector<std::string>& arguments, Context& context) {
-  const std::optional<int> ended = parse(arguments, context);
+  CLI::App app;
+  const std::optional<int> ended = parse(app, arguments, context);
   return ended ? *ended : act(context);
 }
 

@@ -96,8 +96,8 @@ CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, 
 int run(const std::vector<std::string>& arguments, Context& context);
 
 /// Its halves. parse() leaves in the context what is to be done, and touches nothing else; an exit code: it
-/// was done (--help), or is wrong usage.
-std::optional<int> parse(const std::vector<std::string>& arguments, Context& context);
+/// was done (--help), or is wrong usage. `app`: a new one, whose options act() still reads.
+std::optional<int> parse(CLI::App& app, const std::vector<std::string>& arguments, Context& context);
 int act(Context& context);
 
 }  // namespace kmax::cli

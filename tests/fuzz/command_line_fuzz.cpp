@@ -62,7 +62,8 @@ void run_all(std::string_view text) {
                   [](const std::string& address, const link::Notice&) -> std::unique_ptr<link::Link> {
                     throw device::DeviceError("there is no device at '" + address + "' here");
                   });
-  const std::optional<int> ended = parse(arguments, context);
+  CLI::App app;
+  const std::optional<int> ended = parse(app, arguments, context);
   if (!ended && !may_act(arguments)) return;
   const int code = ended ? *ended : act(context);
   require(code == done || code == failed || code == wrong_usage || code == verdict_is_no,
