@@ -87,7 +87,7 @@ struct PdoSlots {
 inline constexpr auto pdo_slots = [] {
   std::array<std::array<PdoSlots, tpdo_count>, 2> all{};
   for (std::uint16_t kind = 0; kind < 2; ++kind) {
-    for (std::uint16_t n = 0; n < pdo_count_of(static_cast<PdoKind>(kind)); ++n) {
+    for (std::size_t n = 0; n < pdo_count_of(static_cast<PdoKind>(kind)); ++n) {
       const auto at = [&](unsigned index, std::uint8_t subindex) {
         return static_cast<std::uint16_t>(
             slot_at({static_cast<std::uint16_t>(index + 0x400U * kind + n), subindex}).value());
