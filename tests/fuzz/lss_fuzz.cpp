@@ -31,7 +31,7 @@ class Master {
     const std::uint8_t what = input_.byte();
     switch (what % 8) {
       case 0:
-        return slave_.hold_bit_rate(held_ = (what & 8) != 0);
+        return slave_.hold(held_ = (what & 8) != 0, false);
       case 1:
         now_us_ += 1000U * (1 + what / 8);
         return poll();
