@@ -454,11 +454,12 @@ RC_GTEST_PROP(ClockTreeOnBrokenChip, EveryMixOfDefectsEndsWithAnHonestResult,
   const bool on_pll = chip.source() == cfgr::pll;
   const bool full = chip.clocks.core == units_per_period(168'000'000);
   RC_ASSERT(on_pll == full);
-  using enum stm32::ClockSource;
-  if (source != unresponsive) RC_ASSERT(full == (source == crystal_pll || source == internal_pll));
+  using Source = stm32::ClockSource;
+  if (source != Source::unresponsive)
+    RC_ASSERT(full == (source == Source::crystal_pll || source == Source::internal_pll));
   const auto pll = static_cast<std::uint32_t>(chip.rcc_registers.pllcfgr);
-  if (full && source != unresponsive)
-    RC_ASSERT((pllcfgr::FromCrystal::of(pll) != 0) == (source == crystal_pll));
+  if (full && source != Source::unresponsive)
+    RC_ASSERT((pllcfgr::FromCrystal::of(pll) != 0) == (source == Source::crystal_pll));
 }
 
 }  // namespace kmax::virtual_board::rcc_test
