@@ -34,13 +34,17 @@ void add_serve_command(CLI::App& app, Context& context);
 void add_describe_command(CLI::App& app, Context& context);
 
 std::span<const AddCommand> all_commands() {
-  static constexpr std::array commands = {
-      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,    &add_lock_commands,
-      &add_info_command,       &add_devices_command,         &add_drive_commands,    &add_watch_command,
-      &add_record_command,     &add_capture_command,         &add_calibrate_command, &add_selftest_command,
-      &add_wall_command,       &add_check_command,           &add_simulate_command,  &add_experiment_command,
-      &add_plot_command,       &add_lines_commands,          &add_flash_command,     &add_serve_command,
-      &add_describe_command};
+  static constexpr std::array commands = {&add_parameter_commands, &add_parameter_file_commands,
+                                          &add_store_commands,     &add_lock_commands,
+                                          &add_info_command,       &add_devices_command,
+                                          &add_drive_commands,     &add_faults_command,
+                                          &add_watch_command,      &add_record_command,
+                                          &add_capture_command,    &add_calibrate_command,
+                                          &add_selftest_command,   &add_wall_command,
+                                          &add_check_command,      &add_simulate_command,
+                                          &add_experiment_command, &add_plot_command,
+                                          &add_lines_commands,     &add_flash_command,
+                                          &add_serve_command,      &add_describe_command};
   return commands;
 }
 
