@@ -77,6 +77,50 @@ TEST_F(OnCan, TorqueModeMakesTheNewtonsThatAPdoAsksFor) {
 }
 
 // The one who commands has gone; a second program reads on.
+TEST_F(OnCan, AValueOutOfRangeIsSaidToBeTooHighOrTooLow) {
+  constexpr std::uint32_t too_high = 0x0609'0031, too_low = 0x0609'0032;
+  EXPECT_EQ(write(0x2000, 4, std::bit_cast<std::uint32_t>(2e6f), 4), too_high);
+  EXPECT_EQ(write(0x2000, 4, std::bit_cast<std::uint32_t>(-1.0f), 4), too_low);
+  EXPECT_EQ(write(0x2003, 2, 17, 1), too_high);
+  EXPECT_EQ(write(0x2003, 2, 0, 1), too_low);
+  EXPECT_EQ(write(0x200B, 2, 3, 4), too_low);
+  EXPECT_EQ(write(0x200B, 2, 0xFFFF'FFFF, 4), too_high);
+}
+
+TEST_F(OnCan, ListensToAllThatItReceives) {
+  const auto& settings = bench.application().can().settings();
+  const auto begin = settings.identifiers.begin();
+  for (const int identifier : {0x000, 0x080, 0x201, 0x301, 0x581, 0x601, 0x701, 0x7E5})
+    EXPECT_NE(std::find(begin, begin + settings.identifier_count, identifier),
+              begin + settings.identifier_count)
+        << identifier;
+}
+
+TEST_F(OnCan, PdosBeginWithTheNextRoundButOne) {
+  heard.clear();
+  bench.board().receive_can(std::array{drivers::CanFrame{.identifier = 0, .length = 2, .data = {1, 1}}});
+  int ticks = 0;
+  for (; heard.empty() && ticks < 1000; ++ticks) run_ms(0.05);
+  EXPECT_EQ(ticks, 2 * firmware::Axes::round_ticks);
+}
+
+TEST_F(OnCan, ACaptureIsAsLongAsItsSamples) {
+  const auto set = [this](std::string_view name, double number) {
+    ASSERT_EQ(bench.set(name, number), 0) << name;
+  };
+  set("capture.channel_1", 1);
+  set("capture.channel_2", 3);
+  set("capture.samples", 10);
+  set("capture.command", 1);
+  run_ms(5);
+  ASSERT_EQ(bench.get("capture.taken"), 10);
+  heard.clear();
+  send({.identifier = 0x601, .length = 8, .data = {0x40, 0x21, 0x58, 1}});
+  ASSERT_FALSE(heard.empty());
+  EXPECT_EQ(heard.front().data[0], 0x41);
+  EXPECT_EQ(heard.front().data[4], 4 * 10 * 2);
+}
+
 TEST_F(OnCan, ReadingKeepsNobodysForceAlive) {
   arm_torque(300);
   ASSERT_TRUE(armed());

@@ -225,6 +225,23 @@ TEST(FoawVelocity, StartsOnAKnownVelocityWithAFullWindow) {
   }
 }
 
+// As if it had seen the ramp: what the start puts into the sums is what samples would have.
+TEST(FoawVelocity, AStartOnAKnownVelocityLeavesTheSumsOfThatRamp) {
+  const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);
+  for (const auto fit : {FoawFit::end, FoawFit::best}) {
+    FoawVelocity<double> started, ramped;
+    started.reset(coefficients, 0, 8 * coefficients.scale);
+    ramped.reset(-8 * 40);
+    for (int i = -39; i <= 0; ++i) (void)ramped.update(coefficients, 8 * i, fit);
+    for (int i = 1; i <= 16; ++i) {
+      const int jerk = i % 3 - 1;
+      ASSERT_EQ(started.update(coefficients, 8 * i + jerk, fit),
+                ramped.update(coefficients, 8 * i + jerk, fit))
+          << i;
+    }
+  }
+}
+
 TEST(FoawVelocity, CountsBetweenTheStepsAreCarriedNotLost) {
   const auto coefficients = FoawVelocity<double>::prepare(1, 1.0, 1.0, 10);
   FoawVelocity<double> velocity;

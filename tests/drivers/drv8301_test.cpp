@@ -139,6 +139,13 @@ TEST(Drv8301, OverCurrentLevelIsNeverAboveWhatIsAskedFor) {
   }
 }
 
+// A wrong digit in the table shows in its sum; the data sheet's column adds up to this.
+TEST(Drv8301, OverCurrentLevelsAreThoseOfTheDataSheet) {
+  unsigned sum = 0;
+  for (const unsigned level : drv8301::over_current_millivolts) sum += level;
+  EXPECT_EQ(sum, 20'918U);
+}
+
 TEST(Drv8301, ControlWords) {
   // Data sheet, control register 1: OC_ADJ_SET 10:6, OCP_MODE 5:4, PWM_MODE 3, GATE_CURRENT 1:0.
   static_assert(drv8301_control_1({.over_current_code = 31,

@@ -66,6 +66,12 @@ TEST(NtcThermistor, OpenAndShorted) {
   EXPECT_NEAR(static_cast<double>(board_ntc.read(4095).celsius), 203, 1.5);
 }
 
+TEST(NtcThermistor, CodesBeyondTheConverterReadAsItsLast) {
+  static constexpr NtcThermistor whole{{.shorted_above = 0xFFFF}};
+  for (const std::uint16_t code : {std::uint16_t{4096}, std::uint16_t{0xFFFF}})
+    EXPECT_EQ(whole.read(code).celsius, whole.read(4095).celsius) << code;
+}
+
 TEST(NtcThermistor, StatedStepsPerCode) {
   const auto step = [](std::uint16_t code) {
     return static_cast<double>(board_ntc.read(static_cast<std::uint16_t>(code + 1)).celsius -

@@ -41,6 +41,16 @@ TEST(ObjectPlaces, EveryAddressHasTheSlotThatTheDictionarySays) {
   EXPECT_EQ(found, slot_count);
 }
 
+TEST(ObjectPlaces, APredefinedCobIdFollowsTheNode) {
+  EXPECT_EQ(resolved_cob_id(0x180, 0x180, 5), 0x185U);
+  EXPECT_EQ(resolved_cob_id(0x8000'0180, 0x180, 5), 0x8000'0185U) << "one that is switched off";
+  EXPECT_EQ(resolved_cob_id(0x185, 0x180, 5), 0x185U) << "its own choice";
+  EXPECT_EQ(stored_cob_id(0x185, 0x180, 5), 0x180U);
+  EXPECT_EQ(stored_cob_id(0x8000'0185, 0x180, 5), 0x8000'0180U);
+  EXPECT_EQ(stored_cob_id(0x186, 0x180, 5), 0x186U);
+  EXPECT_EQ(stored_cob_id(0x180, 0x180, 5), 0x180U);
+}
+
 TEST(ObjectPlaces, TheHighestSubindexIsTheLastThatThereIs) {
   std::map<unsigned, unsigned> highest;
   for (const auto& [address, slot] : all_places()) highest[address.first] = address.second;

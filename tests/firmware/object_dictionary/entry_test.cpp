@@ -86,5 +86,19 @@ TEST(Entry, WordsOfARowSetWhatTheySay) {
   EXPECT_EQ(torque.maximum, 32767);
 }
 
+TEST(Entry, AReadingMayBeAllThatItsTypeHolds) {
+  const auto range = [](Type type) {
+    const Entry e = reading("group.reading", plain_group, 1, type, "", "h");
+    return std::pair(e.minimum, e.maximum);
+  };
+  EXPECT_EQ(range(Type::unsigned8), std::pair(0.0, 255.0));
+  EXPECT_EQ(range(Type::integer8), std::pair(-128.0, 127.0));
+  EXPECT_EQ(range(Type::unsigned16), std::pair(0.0, 65535.0));
+  EXPECT_EQ(range(Type::unsigned32), std::pair(0.0, 4294967295.0));
+  EXPECT_EQ(range(Type::integer32), std::pair(-2147483648.0, 2147483647.0));
+  const double largest = static_cast<double>(std::numeric_limits<float>::max());
+  EXPECT_EQ(range(Type::float32), std::pair(-largest, largest));
+}
+
 }  // namespace
 }  // namespace kmax::firmware::entry_test
