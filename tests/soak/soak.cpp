@@ -300,6 +300,7 @@ class Soak {
 
   void save() {
     for (std::size_t axis = 0; axis < axis_count; ++axis) control(axis, {0}, some_link());
+    const std::uint32_t erases = read<"store.erases">();
     demand(write(slot_of(entry_of<"store.command">(), 0), 1, some_link()), "not saved");
     for (int tries = 0; read<"store.state">() == static_cast<std::uint32_t>(StoreState::busy); ++tries) {
       demand(tries < 500, "a save takes more than 5 s");
@@ -311,6 +312,8 @@ class Soak {
     demand(sequence == sequence_ + changed,
            "store.sequence is " + std::to_string(sequence) + " after " + std::to_string(sequence_));
     sequence_ = sequence;
+    // An erase stops the image's processor, and with it what counts ticks and time.
+    if (read<"store.erases">() != erases) note_start();
     kept_ = model_;
     ++counts_["saves"];
   }
