@@ -282,4 +282,30 @@ RC_GTEST_PROP(SampledStability, ScalesWithTimeAndMass, ()) {
   RC_ASSERT(largest_stable_stiffness(other) == largest_stable_stiffness(loop) * mass / (time * time));
 }
 
+TEST(SampledStability, ALoopWithAnyNegativePartIsNotJudged) {
+  constexpr SampledLoop<double> good{.mass = 0.1,
+                                     .damping = 0.1,
+                                     .period = 1e-3,
+                                     .delay = 1e-3,
+                                     .hand = {.hand_mass = 1.0,
+                                              .grip_stiffness = 1.0,
+                                              .grip_damping = 1.0,
+                                              .arm_stiffness = 1.0,
+                                              .arm_damping = 1.0}};
+  EXPECT_TRUE(can_be_judged(good));
+  using Loop = SampledLoop<double>;
+  for (double Loop::*part : {&Loop::mass, &Loop::damping, &Loop::period, &Loop::delay}) {
+    Loop loop = good;
+    loop.*part = -1e-4;
+    EXPECT_FALSE(can_be_judged(loop));
+  }
+  using Hands = Hand<double>;
+  for (double Hands::*part : {&Hands::hand_mass, &Hands::grip_stiffness, &Hands::grip_damping,
+                              &Hands::arm_stiffness, &Hands::arm_damping}) {
+    Loop loop = good;
+    loop.hand.*part = -1e-4;
+    EXPECT_FALSE(can_be_judged(loop));
+  }
+}
+
 }  // namespace kmax::control::sampled_stability_test
