@@ -23,6 +23,7 @@ void add_record_command(CLI::App& app, Context& context);
 void add_capture_command(CLI::App& app, Context& context);
 void add_calibrate_command(CLI::App& app, Context& context);
 void add_selftest_command(CLI::App& app, Context& context);
+void add_bring_up_command(CLI::App& app, Context& context);
 void add_wall_command(CLI::App& app, Context& context);
 void add_check_command(CLI::App& app, Context& context);
 void add_simulate_command(CLI::App& app, Context& context);
@@ -40,7 +41,8 @@ std::span<const AddCommand> all_commands() {
                                           &add_drive_commands,     &add_faults_command,
                                           &add_watch_command,      &add_record_command,
                                           &add_capture_command,    &add_calibrate_command,
-                                          &add_selftest_command,   &add_wall_command,
+                                          &add_selftest_command,   &add_bring_up_command,
+                                          &add_wall_command,
                                           &add_check_command,      &add_simulate_command,
                                           &add_experiment_command, &add_plot_command,
                                           &add_lines_commands,     &add_flash_command,

@@ -15,12 +15,12 @@ CheckResult check_link(const Evidence& evidence) {
   const LinkTrial& link = evidence.link;
   CheckResult result{"link"};
   result.values = {{"exchanges", static_cast<double>(link.exchanges), ""},
-                   {"lost", static_cast<double>(link.lost), ""},
+                   {"lost", static_cast<double>(link.lost), "", 0.0, 0.0},
                    {"mean_round_trip", link.mean_round_trip, "s"},
                    {"longest_round_trip", link.longest_round_trip, "s"}};
   std::string risen;
   for (const LinkTrial::Counter& counter : link.risen) {
-    result.values.push_back({counter.name, counter.rise, ""});
+    result.values.push_back({counter.name, counter.rise, "", 0.0, 0.0});
     risen += fmt::format("; {} rose by {}", counter.name, counter.rise);
   }
   const std::string measured = fmt::format(
@@ -75,7 +75,9 @@ CheckResult check_supply(const Evidence& evidence) {
   const auto [low, high] = std::minmax_element(evidence.supply.begin(), evidence.supply.end());
   const double lowest = low == evidence.supply.end() ? 0.0 : *low;
   const double highest = high == evidence.supply.end() ? 0.0 : *high;
-  result.values = {{"voltage", rest.mean, "V"}, {"lowest", lowest, "V"}, {"highest", highest, "V"}};
+  result.values = {{"voltage", rest.mean, "V", facts.supply_min, facts.supply_max},
+                   {"lowest", lowest, "V", facts.supply_min, facts.supply_max},
+                   {"highest", highest, "V", facts.supply_min, facts.supply_max}};
   const std::string allowed =
       fmt::format("allowed is {:.1f} .. {:.1f} V (supply.voltage_min, supply.voltage_max)", facts.supply_min,
                   facts.supply_max);
@@ -168,7 +170,7 @@ CheckResult check_temperature(const Evidence& evidence) {
   CheckResult result{"temperature"};
   const double temperature = evidence.temperature;
   const double limit = evidence.facts.temperature_limit;
-  result.values = {{"power_stage", temperature, "degC"}, {"limit", limit, "degC"}};
+  result.values = {{"power_stage", temperature, "degC", coldest, limit}, {"limit", limit, "degC"}};
   if (!evidence.measures_currents()) return result.not_judged(reason_without_pulses(evidence));
   if (!(temperature >= coldest && temperature <= hottest_plausible))
     return result.fail(

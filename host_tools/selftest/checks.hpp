@@ -1,6 +1,7 @@
 #pragma once
 // The verdicts of the self-test, each on one part of the axis.
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,11 +25,13 @@ constexpr const char* name_of(Verdict verdict) {
   return "unknown";
 }
 
-/// A number that a check has measured; SI units.
+/// A number that a check has measured, and where it should be; SI units.
 struct MeasuredValue {
   std::string name;
   double value = 0.0;
   std::string unit;
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
 };
 
 /// What one check found. `message` says what was measured, what is allowed, and what to do.

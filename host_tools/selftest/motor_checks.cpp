@@ -17,7 +17,8 @@ CheckResult check_handle(const Evidence& evidence) {
   if (evidence.arming.refusal == Refusal::encoder_invalid || evidence.arming.fault == Fault::encoder ||
       evidence.pulse_fault == Fault::encoder)
     return result.not_judged("where it is nobody knows: the encoder gives no valid count");
-  result.values = {{"largest_displacement", evidence.largest_displacement, "m"}};
+  result.values = {
+      {"largest_displacement", evidence.largest_displacement, "m", 0.0, Evidence::most_displacement}};
   const std::string seen = fmt::format("it moved by {:.2f} mm at most", evidence.largest_displacement * 1e3);
   const std::string allowed = fmt::format("allowed is {:.0f} mm", Evidence::most_displacement * 1e3);
   if (!evidence.handle_was_moved())
@@ -82,10 +83,10 @@ CheckResult check_current_sense(const Evidence& evidence) {
     const auto& rest = *evidence.rest;
     const MeanAndDeviation b = mean_and_deviation(rest.current_b, 0, rest.size());
     const MeanAndDeviation c = mean_and_deviation(rest.current_c, 0, rest.size());
-    result.values = {{"offset_b", b.mean, "A"},
-                     {"offset_c", c.mean, "A"},
-                     {"noise_b", b.deviation, "A"},
-                     {"noise_c", c.deviation, "A"}};
+    result.values = {{"offset_b", b.mean, "A", -allowed, allowed},
+                     {"offset_c", c.mean, "A", -allowed, allowed},
+                     {"noise_b", b.deviation, "A", 0.0, allowed},
+                     {"noise_c", c.deviation, "A", 0.0, allowed}};
     at_rest = fmt::format(
         "bridge off: B {:+.3f} A, noise {:.3f} A; C {:+.3f} A, noise {:.3f} A; allowed is {:.2f} A each",
         b.mean, b.deviation, c.mean, c.deviation, allowed);
@@ -244,7 +245,7 @@ CheckResult check_encoder(const Evidence& evidence) {
   std::string at_rest = "its count is valid";
   if (evidence.rest && !evidence.rest->position.empty()) {
     const double noise = jitter(evidence);
-    result.values.push_back({"jitter_at_rest", noise, "counts"});
+    result.values.push_back({"jitter_at_rest", noise, "counts", 0.0, 5.0});
     at_rest += fmt::format(", at rest it jumps by {:.0f} counts at most", noise);
     if (noise > 5.0)
       return result.fail(
@@ -300,7 +301,8 @@ CheckResult check_encoder(const Evidence& evidence) {
             "(for a DC motor that is the same), or encoder.direction is wrong: run 'kmax calibrate'");
   if (motion.back_emf_moved()) {
     const EncoderScale scale = encoder_scale(motion);
-    result.values.push_back({"encoder_to_back_emf", scale.ratio, ""});
+    result.values.push_back(
+        {"encoder_to_back_emf", scale.ratio, "", EncoderScale::least, EncoderScale::most});
     if (scale.wrong())
       return result.fail(
           "encoder (slips or wrong scale)",
@@ -316,7 +318,8 @@ CheckResult check_encoder(const Evidence& evidence) {
         "; whether its direction fits the phases is not judged, since the commutation is not known "
         "since the last start");
   const double error = commutation_error(evidence);
-  result.values.push_back({"commutation_error", error, "rad"});
+  constexpr double allowed_error = allowed_degrees * std::numbers::pi / 180.0;
+  result.values.push_back({"commutation_error", error, "rad", -allowed_error, allowed_error});
   const double degrees = std::abs(error) * 180.0 / std::numbers::pi;
   if (degrees > 150.0)
     return result.fail(

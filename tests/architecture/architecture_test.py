@@ -46,6 +46,7 @@ FOLDERS = {
         ["description", "record", "check", "bench", "simulated_board"],
         ["device/sim", "serve", "calibration", "selftest"],
         ["experiment"],
+        ["bring_up"],
         ["virtual_board", "kmax"],
     ],
 }

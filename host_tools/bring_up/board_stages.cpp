@@ -1,0 +1,265 @@
+// The stages in which the board is looked at before anything moves: logic, gate_drivers, load, motor.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/bring_up/bring_up.hpp"
+#include "host_tools/device/value_text.hpp"
+#include "host_tools/selftest/selftest.hpp"
+
+namespace kmax::bring_up {
+
+using bench::Circuit;
+using selftest::CheckResult;
+using selftest::Evidence;
+using selftest::Probe;
+using selftest::Verdict;
+using std::chrono::milliseconds;
+
+namespace {
+/// Whether the emergency stop's line is open, as CiA 402's digital inputs have it; nothing is armed for it.
+bool stop_is_open(device::Device& device, std::size_t axis) {
+  constexpr std::uint32_t interlock = 1U << 16;
+  return (device.read(device::Parameter::of<"profile.digital_inputs">(axis)) & interlock) != 0;
+}
+
+/// Looks every 20 ms, for as long as a person has patience.
+template <typename Seen>
+bool wait_for(device::Device& device, const Settings& settings, const Party& party, const char* text,
+              Seen seen) {
+  const auto start = device.link().now();
+  while (std::chrono::duration<double>(device.link().now() - start).count() < settings.patience) {
+    party.progress(text);
+    if (seen()) return true;
+    device.link().wait(milliseconds(20));
+  }
+  return false;
+}
+
+/// The handle counts nothing for 0.3 s.
+bool stands(device::Device& device, const Settings& settings, const Party& party) {
+  constexpr int looks = 15;
+  int still = 0;
+  std::uint32_t before = 0;
+  return wait_for(device, settings, party, "waiting for the handle to rest", [&] {
+    const std::uint32_t count = device.read(device::Parameter::of<"measured.count">(settings.axis));
+    still = count == before ? still + 1 : 0;
+    before = count;
+    return still > looks;
+  });
+}
+
+CheckResult check_stop(device::Device& device, const Settings& settings, const Party& party) {
+  CheckResult check{"emergency stop"};
+  const auto open = [&] { return stop_is_open(device, settings.axis); };
+  if (open())
+    return check.fail(
+        "emergency stop",
+        "its line is open: release the button, or connect GPIO5 with GND of J3 by a wire; if that is "
+        "done, check plug and cable");
+  if (!settings.has_button) return check.pass("its line is closed, by a wire; nothing can stop the device");
+  party.person.ask("Keep a hand at the emergency stop: press it when asked to. Ready? Then");
+  party.progress("press the emergency stop");
+  if (!wait_for(device, settings, party, "press the emergency stop", open))
+    return check.fail(
+        "emergency stop",
+        fmt::format(
+            "nothing was seen of it within {:.0f} s: it must be a normally closed contact in series with "
+            "the wire from GPIO5 to GND; without a button give --no-button",
+            settings.patience));
+  if (!wait_for(device, settings, party, "release the emergency stop", [&] { return !open(); }))
+    return check.fail("emergency stop", "its line did not close again: release it, check its contact");
+  return check.pass("its line opens and closes");
+}
+
+CheckResult check_clock(device::Device& device) {
+  CheckResult check{"controller"};
+  const auto source = device::Parameter::of<"info.clock_source">();
+  const auto cause = device::Parameter::of<"info.reset_cause">();
+  const std::string clock = device::value_text(source, device.read(source));
+  const std::string reset = device::value_text(cause, device.read(cause));
+  const double crashes = device.read_number("info.crash_count");
+  check.values = {{"crashes", crashes, "", 0.0, 0.0}};
+  const std::string seen =
+      fmt::format("clock: {}; started because of: {}; {} crashes since then", clock, reset, crashes);
+  if (clock != "crystal_pll" && clock != "native")
+    return check.fail(
+        "crystal of the board",
+        seen + "; allowed is crystal_pll: the crystal does not run, and there is no power stage");
+  if (crashes > 0)
+    return check.fail("controller",
+                      seen + "; allowed are none: 'kmax info' and 'kmax faults' say what happened");
+  return check.pass(seen);
+}
+
+/// The supply as the board measures it against the supply's own meter: two boards differ in their divider.
+CheckResult check_divider(double measured, double shown) {
+  CheckResult check{"supply divider"};
+  const double ratio = measured / shown;
+  check.values = {{"measured_to_shown", ratio, "", 0.9, 1.1}};
+  const std::string seen =
+      fmt::format("the board measures {:.2f} V, the supply shows {:.2f} V", measured, shown);
+  constexpr double ratio_24 = 11.0, ratio_56 = 19.0;
+  const auto near = [ratio](double other) { return std::abs(ratio / other - 1.0) < 0.1; };
+  if (near(1.0)) return check.pass(seen);
+  if (near(ratio_56 / ratio_24))
+    return check.fail("voltage variant", seen +
+                                             ": this is a board for 24 V that the firmware takes for one of "
+                                             "56 V, since its memory does not say; build the image with "
+                                             "-DKMAX_ODRIVE_VOLTAGE=24");
+  if (near(ratio_24 / ratio_56))
+    return check.fail("voltage variant", seen +
+                                             ": this is a board for 56 V that the firmware takes for one of "
+                                             "24 V; build the image with -DKMAX_ODRIVE_VOLTAGE=56");
+  return check.fail(
+      "supply measurement",
+      seen + "; within 10 % is allowed: check the meter, the cable, and the divider on the board");
+}
+
+/// The self-test's evidence, with everything put back.
+Evidence gather(device::Device& device, const Settings& settings, const Party& party) {
+  Probe probe(device, settings.axis, party.progress);
+  selftest::SelfTestSettings test;
+  test.axis = settings.axis;
+  Evidence evidence = gather_evidence(probe, test);
+  const selftest::Restored restored = probe.restore();
+  if (!restored.in_order) throw device::DeviceError(restored.words);
+  return evidence;
+}
+
+CheckResult check_no_motor(const Evidence& evidence) {
+  CheckResult check{"nothing connected"};
+  if (!evidence.phases) return check.not_judged(reason_without_pulses(evidence));
+  check.values = {{"largest_voltage", evidence.largest_pulse_voltage, "V"}};
+  if (evidence.phases->circuit == Circuit::nothing_flows)
+    return check.pass(
+        fmt::format("no current at up to {:.1f} V between the terminals", evidence.largest_pulse_voltage));
+  return check.fail("motor terminals",
+                    fmt::format("current flows at {:.2f} V although nothing should be connected: unplug the "
+                                "motor; if it is, look for a short between the terminals",
+                                evidence.largest_pulse_voltage));
+}
+
+/// How much more sensor B reads than C. A brushed motor's current flows through both. Of a synchronous motor:
+/// what B shows of a voltage along C, and C of one along B, are the same for every winding, whatever its
+/// saliency, since its admittance is symmetric.
+CheckResult check_gains(const Evidence& evidence) {
+  constexpr double allowed = 0.06;  // beyond it currents seem not to add up (phase_watch.hpp)
+  CheckResult check{"gain mismatch"};
+  if (!evidence.phases || evidence.phases->circuit != Circuit::healthy)
+    return check.not_judged("the circuit must be right first");
+  const auto& answers = evidence.phases->answers;
+  const bool brushed = answers.size() == 1;
+  const double b = brushed ? answers[0].b : -answers[2].b;
+  const double c = brushed ? -answers[0].c : -answers[1].c;
+  const double mismatch = 2.0 * (b - c) / (b + c);
+  check.values = {{"mismatch", mismatch, "", -allowed, allowed}};
+  const std::string seen = fmt::format("sensor B reads {:+.1f} % of sensor C's; allowed are {:.0f} %",
+                                       mismatch * 100.0, allowed * 100.0);
+  if (std::abs(mismatch) > allowed)
+    return check.fail("current sensors (gain)", seen +
+                                                    ": a shunt or an amplifier's resistor is wrong, or the "
+                                                    "winding is not equal in its phases: try another motor");
+  return check.pass(seen);
+}
+
+CheckResult check_brake(const Settings& settings, double brake_voltage, double supply) {
+  CheckResult check{"brake resistor"};
+  if (!settings.brake)
+    return check.not_judged("measure between the terminals of AUX, supply off, and give --brake OHM");
+  const double ohm = *settings.brake;
+  check.values = {{"resistance", ohm, "ohm", 0.47, 100.0}, {"on_voltage", brake_voltage, "V"}};
+  if (ohm <= 0.0 && brake_voltage > 0.0)
+    return check.fail("brake resistor",
+                      fmt::format("supply.brake_voltage is {:.1f} V and no resistor is there: connect "
+                                  "one, or set supply.brake_voltage=0",
+                                  brake_voltage));
+  if (ohm <= 0.0)
+    return check.pass(
+        "none, and none is expected: a handle that is driven back raises the supply until "
+        "supply.voltage_max takes the force away");
+  if (brake_voltage <= 0.0)
+    return check.fail(
+        "supply.brake_voltage",
+        fmt::format("{:.2f} ohm are connected and supply.brake_voltage is 0, so that it is never "
+                    "used: set it a volt or two above {:.1f} V",
+                    ohm, supply));
+  if (brake_voltage < supply + 0.5)
+    return check.fail("supply.brake_voltage",
+                      fmt::format("{:.1f} V is not above the supply ({:.1f} V): the resistor "
+                                  "would heat up all the time",
+                                  brake_voltage, supply));
+  if (ohm < 0.47 || ohm > 100.0)
+    return check.fail("brake resistor", fmt::format("{:.2f} ohm; 0.47 to 100 ohm are allowed", ohm));
+  return check.pass(fmt::format("{:.2f} ohm: {:.0f} W for the moments in which it is on, from {:.1f} V", ohm,
+                                brake_voltage * brake_voltage / ohm, brake_voltage));
+}
+}  // namespace
+
+StageResult try_logic(device::Device& device, const Settings& settings, const Party& party) {
+  StageResult result;
+  Evidence evidence;
+  evidence.facts = selftest::read_facts(device, settings.axis);
+  {
+    Probe probe(device, settings.axis, party.progress);
+    evidence.link = probe.try_link(100);
+    party.progress("supply and temperature");
+    evidence.supply = probe.read_supply(20);
+    evidence.temperature = probe.bench().number("measured.temperature");
+    const selftest::Restored restored = probe.restore();
+    if (!restored.in_order) throw device::DeviceError(restored.words);
+  }
+  result.checks = {check_link(evidence), check_clock(device)};
+  const auto supply = selftest::mean_and_deviation(evidence.supply, 0, evidence.supply.size());
+  // With a wrong divider every voltage is wrong: what is allowed is not looked at then.
+  if (settings.supply && supply.mean > 1.0) result.checks.push_back(check_divider(supply.mean, *settings.supply));
+  if (result.passed()) result.checks.push_back(check_supply(evidence));
+  result.checks.push_back(check_temperature(evidence));
+  if (result.passed()) result.checks.push_back(check_stop(device, settings, party));
+  return result;
+}
+
+StageResult try_gate_drivers(device::Device& device, const Settings& settings, const Party& party) {
+  StageResult result;
+  const Evidence evidence = gather(device, settings, party);
+  result.checks = {check_emergency_stop(evidence), check_gate_driver(evidence), check_current_sense(evidence),
+                   check_no_motor(evidence)};
+  return result;
+}
+
+StageResult try_load(device::Device& device, const Settings& settings, const Party& party) {
+  StageResult result;
+  const Evidence evidence = gather(device, settings, party);
+  result.checks = {check_supply(evidence), check_gate_driver(evidence), check_current_sense(evidence),
+                   check_phases(evidence), check_gains(evidence)};
+  if (evidence.handle_was_moved())
+    result.checks.push_back(CheckResult{"shaft"}.fail("shaft", "it moved: hold it fast, and begin again"));
+  return result;
+}
+
+StageResult try_motor(device::Device& device, const Settings& settings, const Party& party) {
+  StageResult result;
+  {
+    Probe probe(device, settings.axis, party.progress);
+    const selftest::HandSettings hand{.patience = settings.patience};
+    result.checks.push_back(check_hand_motion(
+        probe, hand, [&](const std::string& text) { party.person.ask("When you are ready to " + text); }));
+    probe.restore();
+  }
+  if (!result.passed()) return result;
+  party.person.ask("Let go of the handle. To go on");
+  if (!stands(device, settings, party)) {
+    result.checks.push_back(
+        CheckResult{"handle"}.fail("handle", "it does not come to rest: something moves it"));
+    return result;
+  }
+  const Evidence evidence = gather(device, settings, party);
+  const std::vector<CheckResult> all = run_checks(evidence);
+  result.checks.insert(result.checks.end(), all.begin(), all.end());
+  const auto supply = selftest::mean_and_deviation(evidence.supply, 0, evidence.supply.size());
+  result.checks.push_back(check_brake(settings, device.read_number("supply.brake_voltage"), supply.mean));
+  return result;
+}
+
+}  // namespace kmax::bring_up

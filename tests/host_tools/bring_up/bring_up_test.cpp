@@ -1,0 +1,197 @@
+#include "host_tools/bring_up/bring_up.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/base/errors.hpp"
+#include "tests/host_tools/bring_up/started_board.hpp"
+
+namespace kmax::bring_up::bring_up_test {
+
+using simulation::CurrentSensor;
+using simulation::Defect;
+using simulation::TemperatureSensor;
+
+TEST(BringUp, ABlankBoardComesToItsFirstWalls) {
+  for (const char* scene : {"dc_coreless_a", "gimbal_b"}) {
+    StartedBoard board(scene);
+    EXPECT_TRUE(board.run()) << scene << "\n" << board.text();
+    ASSERT_EQ(board.begun.size(), all_stages().size());
+    EXPECT_EQ(board.kept, static_cast<int>(all_stages().size()));
+    EXPECT_FALSE(board.report.next(0).has_value());
+    EXPECT_TRUE(board.board.disarmed());
+    // Within the limits that it states: those of the first wall, and the calibration's saved, the wall's not.
+    EXPECT_LE(*board.report.number(0, Stage::wall, "wall of 0.50 N/mm", "largest_force"), 1.0);
+    EXPECT_GT(*board.report.number(0, Stage::wall, "wall of 0.50 N/mm", "deepest"), 1e-3);
+    EXPECT_EQ(board.board.device->read_number("motor.calibrated"), 1.0);
+    EXPECT_EQ(board.board.device->read_number("force.limit"), 3.3F);
+    EXPECT_EQ(board.board.device->read_number("store.state"), 2.0) << "saved";
+    // Every number stands in the range that the report gives for it.
+    for (const StageResult& result : board.results) {
+      for (const selftest::CheckResult& check : result.checks) {
+        for (const selftest::MeasuredValue& value : check.values) {
+          EXPECT_GE(value.value, value.least) << check.name << " " << value.name;
+          EXPECT_LE(value.value, value.most) << check.name << " " << value.name;
+        }
+      }
+    }
+    // Any stage can be run again, and says what it measures now.
+    Settings again;
+    again.only = Stage::load;
+    EXPECT_TRUE(board.run(again));
+    EXPECT_FALSE(board.report.next(0).has_value());
+  }
+}
+
+TEST(BringUp, NoStageBeforeItsTurn) {
+  StartedBoard board("dc_coreless_a");
+  Settings settings;
+  settings.only = Stage::load;
+  EXPECT_THROW(board.run(settings), OutOfTurn);
+  EXPECT_TRUE(board.asked.empty());
+  EXPECT_TRUE(board.results.empty());
+  settings.only = Stage::logic;
+  EXPECT_TRUE(board.run(settings));
+  settings.only = Stage::gate_drivers;
+  EXPECT_TRUE(board.run(settings));
+  // One that fails takes back what stood on it.
+  board.board.link->hardware().power().press_emergency_stop(true);
+  settings.only = Stage::logic;
+  EXPECT_FALSE(board.run(settings));
+  EXPECT_EQ(board.report.next(0), Stage::logic);
+  EXPECT_EQ(board.report.result(0, Stage::gate_drivers), nullptr);
+}
+
+/// A fault of the wiring, and where it must be found, with which words.
+struct Planted {
+  const char* name;
+  const char* scene;
+  Stage stage;
+  const char* part;
+  std::function<void(StartedBoard&)> plant;  ///< when that stage begins
+  Settings settings{};
+};
+
+Settings with(void (*change)(Settings&)) {
+  Settings settings;
+  change(settings);
+  return settings;
+}
+
+std::function<void(StartedBoard&)> defect(Defect one) {
+  return [one](StartedBoard& board) { board.board.plant(one); };
+}
+
+std::function<void(StartedBoard&)> supply_of(double volts) {
+  return [volts](StartedBoard& board) {
+    board.board.drives().supply().set_source(volts);
+    board.board.drives().supply().set_voltage(volts);
+    board.board.link->wait(std::chrono::milliseconds(50));
+  };
+}
+
+CurrentSensor& sensor(StartedBoard& board) {
+  return board.board.drives().drive(0).current_sensor();
+}
+
+const std::vector<Planted>& planted() {
+  using Channel = CurrentSensor::Channel;
+  constexpr auto dc = "dc_coreless_a", pmsm = "gimbal_b";
+  static const std::vector<Planted> all = {
+      {"no motor supply", dc, Stage::logic, "supply", supply_of(0.0)},
+      {"supply too low", dc, Stage::logic, "supply", supply_of(11.0)},
+      {"supply too high", dc, Stage::logic, "supply", supply_of(35.0)},
+      {"board for 24 V taken for one of 56 V", dc, Stage::logic, "voltage variant", supply_of(20.8),
+       with([](Settings& s) { s.supply = 12.0; })},
+      {"board for 56 V taken for one of 24 V", dc, Stage::logic, "voltage variant", supply_of(20.0),
+       with([](Settings& s) { s.supply = 34.5; })},
+      {"no wire at GPIO5", dc, Stage::logic, "emergency stop",
+       [](StartedBoard& b) { b.board.link->hardware().power().press_emergency_stop(true); }},
+      {"button beside the wire", dc, Stage::logic, "emergency stop",
+       [](StartedBoard& b) { b.button_works = false; }},
+      {"bad cable of the link", dc, Stage::logic, "link",
+       [](StartedBoard& b) { b.board.link->lose_every(40); }},
+      {"temperature sensor off", dc, Stage::logic, "temperature sensor",
+       [](StartedBoard& b) { b.board.drives().temperature(0).set_wiring(TemperatureSensor::Wiring::open); }},
+      {"motor connected too early", dc, Stage::gate_drivers, "motor terminals",
+       [](StartedBoard& b) {
+         b.board.drives().mend(0, Defect::phase_b_open);
+         b.board.drives().mend(0, Defect::phase_c_open);
+         b.board.plant(Defect::motor_blocked);
+       }},
+      {"gate driver reports a fault", dc, Stage::gate_drivers, "gate driver",
+       [](StartedBoard& b) { b.board.link->hardware().power().set_gate_driver_fault(true); }},
+      {"amplifier stuck at its rail", dc, Stage::gate_drivers, "current sense",
+       [](StartedBoard& b) { sensor(b).set_stuck(Channel::b, 3.3); }},
+      {"phase A loose", pmsm, Stage::load, "phase A (open)", defect(Defect::phase_a_open)},
+      {"phase B loose", pmsm, Stage::load, "phase B (open)", defect(Defect::phase_b_open)},
+      {"phase C loose", pmsm, Stage::load, "phase C (open)", defect(Defect::phase_c_open)},
+      {"brushed motor's lead loose", dc, Stage::load, "motor winding or cable (B to C open)",
+       defect(Defect::phase_c_open)},
+      {"shunt B turned around", dc, Stage::load, "current sensor B", defect(Defect::current_b_inverted)},
+      {"shunt C turned around", pmsm, Stage::load, "current sensor C", defect(Defect::current_c_inverted)},
+      {"sensor C dead", pmsm, Stage::load, "current sensor C",
+       [](StartedBoard& b) { sensor(b).short_inputs(Channel::c, true); }},
+      {"encoder unplugged", dc, Stage::motor, "encoder", defect(Defect::encoder_unplugged)},
+      {"encoder's disc loose", pmsm, Stage::motor, "encoder", defect(Defect::encoder_stuck)},
+      {"handle blocked", dc, Stage::motor, "encoder", defect(Defect::motor_blocked)},
+      {"no brake resistor at AUX", dc, Stage::motor, "brake resistor",
+       [](StartedBoard& b) { b.board.device->apply(device::parse_assignments({"supply.brake_voltage=26"})); },
+       with([](Settings& s) { s.brake = 0.0; })},
+      {"brake resistor never used", dc, Stage::motor, "supply.brake_voltage", [](StartedBoard&) {},
+       with([](Settings& s) { s.brake = 2.0; })},
+      {"encoder slips", pmsm, Stage::calibration, "", defect(Defect::encoder_slipping)},
+  };
+  return all;
+}
+
+TEST(BringUp, EachPlantedFaultIsFoundAtItsStageAndHarmsNothing) {
+  for (const Planted& one : planted()) {
+    SCOPED_TRACE(one.name);
+    StartedBoard board(one.scene);
+    const auto before = board.board.settings();
+    bool there = false;
+    board.at_stage = [&](const std::string& asked) {
+      if (there || !asked.starts_with(fmt::format("Stage {}:", text_of(one.stage).name))) return;
+      there = true;
+      one.plant(board);
+    };
+    EXPECT_FALSE(board.run(one.settings)) << board.text();
+    EXPECT_EQ(board.report.next(0), one.stage) << board.text();
+    EXPECT_TRUE(board.faulty_part() == one.part || *one.part == '\0') << board.faulty_part() << "\n"
+                                                                      << board.text();
+    board.board.link->lose_every(0);
+    EXPECT_TRUE(board.board.disarmed());
+    if (board.asked.size() < 20 && std::string(one.name) != "no brake resistor at AUX") {
+      EXPECT_EQ(board.board.settings(), before);
+    }
+    // It goes on there, and not before.
+    EXPECT_EQ(board.begun.back(), text_of(one.stage).name);
+  }
+}
+
+TEST(BringUp, ExchangedLeadsAndLinesAreCuredByTheCalibration) {
+  for (const auto& [scene, one] :
+       {std::pair("dc_coreless_a", Defect::phases_swapped), std::pair("gimbal_b", Defect::phases_swapped),
+        std::pair("gimbal_b", Defect::encoder_reversed)}) {
+    SCOPED_TRACE(std::string(scene) + ", " + std::string(simulation::name_of(one)));
+    StartedBoard board(scene);
+    board.at_stage = [&board, defect = one](const std::string& asked) {
+      if (asked.starts_with("Stage load")) board.board.plant(defect);
+    };
+    EXPECT_TRUE(board.run()) << board.text();
+  }
+}
+
+TEST(BringUp, WhoEndsItLeavesTheDeviceInOrder) {
+  StartedBoard board("dc_coreless_a");
+  const auto before = board.board.settings();
+  board.at_stage = [&](const std::string& asked) {
+    if (asked.starts_with("Stage load")) throw bench::Interrupted("interrupted");
+  };
+  EXPECT_THROW(board.run(), bench::Interrupted);
+  EXPECT_EQ(board.report.next(0), Stage::load);
+  EXPECT_EQ(board.board.settings(), before);
+  EXPECT_TRUE(board.board.disarmed());
+}
+
+}  // namespace kmax::bring_up::bring_up_test

@@ -1,0 +1,78 @@
+#include <filesystem>
+
+#include "host_tools/base/files.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
+#include "host_tools/simulated_board/simulated_board.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
+
+namespace kmax::cli::bring_up_command_test {
+
+class BringUpCommand : public SimulatedCommandLine {
+ protected:
+  /// On a board with a motor that is connected from the beginning.
+  int bring_up(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "bring-up");
+    std::ostringstream out, messages;
+    Context context(
+        out, messages, [this](const std::string&, const link::Notice&) -> std::unique_ptr<link::Link> {
+          if (silent) throw link::LinkError("nobody answers");
+          auto sim = std::make_unique<link::SimLink>(simulated_board::open_scene("dc_coreless_a"));
+          sim->wait(std::chrono::milliseconds(200));
+          return sim;
+        });
+    const int code = run(std::move(arguments), context);
+    output = out.str();
+    said = messages.str();
+    return code;
+  }
+  bool silent = false;
+  host_tools_test::TemporaryFolder folder;
+  std::string file = (folder.path() / "report.json").string();
+};
+
+TEST_F(BringUpCommand, GoesOnWhereItHasPassedAndStopsWhereItFails) {
+  EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button", "--supply", "24", "--stage", "logic"}), done)
+      << said;
+  EXPECT_CONTAINS(output, "logic: passed");
+  EXPECT_CONTAINS(output, "18 .. 28");
+  EXPECT_CONTAINS(output, "next stage: gate_drivers");
+  EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button"}), verdict_is_no) << said;
+  EXPECT_CONTAINS(output, "gate_drivers: FAILED");
+  EXPECT_CONTAINS(output, "unplug the motor");
+  EXPECT_EQ(output.find("logic:"), std::string::npos) << "it has passed";
+  EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button", "--json"}), verdict_is_no);
+  EXPECT_EQ(document()["passed"], false);
+  EXPECT_EQ(document()["next_stage"], "gate_drivers");
+  EXPECT_EQ(document()["stages"].size(), 2U);
+  // Again, beside what it was.
+  EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button", "--stage", "logic"}), done);
+  EXPECT_CONTAINS(output, "was 24");
+}
+
+TEST_F(BringUpCommand, WhatCannotBeDoneIsSaidAndChangesNothing) {
+  EXPECT_EQ(bring_up({"--report", file, "--yes", "--stage", "wall"}), wrong_usage) << said;
+  EXPECT_CONTAINS(said, "'logic', which has not passed");
+  EXPECT_FALSE(std::filesystem::exists(file) && std::filesystem::file_size(file) > 0);
+  EXPECT_EQ(bring_up({"--stage", "walls"}), wrong_usage);
+  EXPECT_EQ(bring_up({"--supply", "500"}), wrong_usage);
+  base::write_file(file, "my notes");
+  EXPECT_EQ(bring_up({"--report", file, "--yes"}), failed);
+  EXPECT_CONTAINS(said, "not a report of this board");
+  std::string problem;
+  EXPECT_EQ(base::text_of(file, "", problem), "my notes");
+  EXPECT_EQ(bring_up({"--report", "/nowhere/report.json", "--yes"}), failed);
+  silent = true;
+  EXPECT_EQ(bring_up({"--yes"}), failed);
+  EXPECT_CONTAINS(said, "8E1");
+}
+
+TEST_F(BringUpCommand, ListsItsStagesWithoutADevice) {
+  silent = true;
+  EXPECT_EQ(bring_up({"--list"}), done);
+  EXPECT_CONTAINS(output, "gate_drivers: ");
+  EXPECT_EQ(bring_up({"--list", "--json"}), done);
+  EXPECT_EQ(document()["stages"].size(), 7U);
+}
+
+}  // namespace kmax::cli::bring_up_command_test
