@@ -45,6 +45,11 @@ class OutOfTurn : public std::runtime_error {
 bool bring_up(device::Device& device, Report& report, const Settings& settings, const Party& party,
               const std::function<void(const Report&)>& keep);
 
+/// The self-test of a handle that nobody holds, with everything put back. Once or twice more if the handle
+/// has moved by itself: one that friction held beside a detent of the motor's cogging is shaken loose by the
+/// pulses, and finds its place.
+selftest::Evidence test_free_handle(device::Device& device, const Settings& settings, const Party& party);
+
 // The stages, each of which looks at one thing more.
 StageResult try_logic(device::Device& device, const Settings& settings, const Party& party);
 StageResult try_gate_drivers(device::Device& device, const Settings& settings, const Party& party);

@@ -12,7 +12,6 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/device_rig.hpp"
-#include "host_tools/selftest/selftest.hpp"
 
 namespace kmax::bring_up {
 
@@ -159,10 +158,8 @@ StageResult try_calibration(device::Device& device, const Settings& settings, co
   const auto report = calibration::calibrate(device, calibration, nullptr, party.progress);
   for (const calibration::StepReport& step : report.steps) result.checks.push_back(check_of(step));
   if (!result.passed()) return result;
-  selftest::SelfTestSettings test;
-  test.axis = settings.axis;
-  const selftest::Report again = selftest::run_selftest(device, test, party.progress);
-  result.checks.insert(result.checks.end(), again.checks.begin(), again.checks.end());
+  const std::vector<CheckResult> again = run_checks(test_free_handle(device, settings, party));
+  result.checks.insert(result.checks.end(), again.begin(), again.end());
   return result;
 }
 

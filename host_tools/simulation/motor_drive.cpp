@@ -52,7 +52,7 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
     supply.draw(flow.charge);
     torque_sum += torque;
     const double force = torque / transmission_;
-    handle_.advance(force, background_force_, piece);
+    handle_.advance(force + push_ - push_damping_ * velocity, background_force_, piece);
     acceleration_ = (handle_.velocity() - velocity) / piece;
     coupling_.update(handle_.position(), torque);
     encoder_.update(coupling_.disc());
@@ -93,6 +93,14 @@ void MotorDrive::hold(bool held) {
 void MotorDrive::update_encoder() {
   coupling_.update(handle_.position(), mean_torque_);
   encoder_.update(coupling_.disc());
+}
+
+void MotorDrive::push(double force, double damping) {
+  if (!std::isfinite(force) || !(damping >= 0.0 && damping <= 100.0))
+    throw std::invalid_argument(fmt::format(
+        "push of {} N with {} N s/m: the force must be finite, the damping 0 to 100 N s/m", force, damping));
+  push_ = force;
+  push_damping_ = damping;
 }
 
 void MotorDrive::set_background_force(double force) {

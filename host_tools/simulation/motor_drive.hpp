@@ -89,6 +89,10 @@ class MotorDrive {
   // So does somebody's hand until it lets go. Apart from block(), so that letting go does not mend a motor.
   void hold(bool held);
 
+  // A hand that pushes with `force` (N along +x) less `damping` (N s/m) times the handle's speed, besides the
+  // person of the scene; from now on. Throws std::invalid_argument unless finite and damping is 0 to 100.
+  void push(double force, double damping);
+
   void set_background_force(double force);  // N; throws std::invalid_argument unless finite
 
   TerminalValues currents() const;      // A, into the motor's terminals, now
@@ -114,6 +118,7 @@ class MotorDrive {
   std::array<bool, terminal_count> leg_on_{};
   double acceleration_ = 0.0;  // m/s2, of the last piece
   double background_force_ = 0.0;
+  double push_ = 0.0, push_damping_ = 0.0;
   double mean_torque_ = 0.0;
 };
 

@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/base/errors.hpp"
-#include "tests/host_tools/bring_up/started_board.hpp"
+#include "tests/host_tools/bring_up/person_at_the_bench.hpp"
+#include "tests/host_tools/selftest/tested_axis.hpp"
 
 namespace kmax::bring_up::bring_up_test {
 
@@ -11,22 +12,36 @@ using simulation::CurrentSensor;
 using simulation::Defect;
 using simulation::TemperatureSensor;
 
+/// A new board, on x86.
+struct StartedBoard {
+  explicit StartedBoard(const std::string& scene)
+      : board(selftest::TestedAxis::opened(scene, false), 0),
+        person(*board.device, board.drives(), [this](bool pressed) { press_stop(pressed); }) {
+    board.link->before_tick = [this] { person.move_hand(); };
+  }
+
+  void press_stop(bool pressed) { board.link->hardware().power().press_emergency_stop(pressed); }
+
+  selftest::TestedAxis board;
+  PersonAtTheBench person;
+};
+
 TEST(BringUp, ABlankBoardComesToItsFirstWalls) {
   for (const char* scene : {"dc_coreless_a", "gimbal_b"}) {
     StartedBoard board(scene);
-    EXPECT_TRUE(board.run()) << scene << "\n" << board.text();
-    ASSERT_EQ(board.begun.size(), all_stages().size());
-    EXPECT_EQ(board.kept, static_cast<int>(all_stages().size()));
-    EXPECT_FALSE(board.report.next(0).has_value());
+    EXPECT_TRUE(board.person.run()) << scene << "\n" << board.person.text();
+    ASSERT_EQ(board.person.begun.size(), all_stages().size());
+    EXPECT_EQ(board.person.kept, static_cast<int>(all_stages().size()));
+    EXPECT_FALSE(board.person.report.next(0).has_value());
     EXPECT_TRUE(board.board.disarmed());
     // Within the limits that it states: those of the first wall, and the calibration's saved, the wall's not.
-    EXPECT_LE(*board.report.number(0, Stage::wall, "wall of 0.50 N/mm", "largest_force"), 1.0);
-    EXPECT_GT(*board.report.number(0, Stage::wall, "wall of 0.50 N/mm", "deepest"), 1e-3);
+    EXPECT_LE(*board.person.report.number(0, Stage::wall, "wall of 0.50 N/mm", "largest_force"), 1.0);
+    EXPECT_GT(*board.person.report.number(0, Stage::wall, "wall of 0.50 N/mm", "deepest"), 0.5e-3);
     EXPECT_EQ(board.board.device->read_number("motor.calibrated"), 1.0);
     EXPECT_EQ(board.board.device->read_number("force.limit"), 3.3F);
     EXPECT_EQ(board.board.device->read_number("store.state"), 2.0) << "saved";
     // Every number stands in the range that the report gives for it.
-    for (const StageResult& result : board.results) {
+    for (const StageResult& result : board.person.results) {
       for (const selftest::CheckResult& check : result.checks) {
         for (const selftest::MeasuredValue& value : check.values) {
           EXPECT_GE(value.value, value.least) << check.name << " " << value.name;
@@ -37,8 +52,8 @@ TEST(BringUp, ABlankBoardComesToItsFirstWalls) {
     // Any stage can be run again, and says what it measures now.
     Settings again;
     again.only = Stage::load;
-    EXPECT_TRUE(board.run(again));
-    EXPECT_FALSE(board.report.next(0).has_value());
+    EXPECT_TRUE(board.person.run(again));
+    EXPECT_FALSE(board.person.report.next(0).has_value());
   }
 }
 
@@ -46,19 +61,19 @@ TEST(BringUp, NoStageBeforeItsTurn) {
   StartedBoard board("dc_coreless_a");
   Settings settings;
   settings.only = Stage::load;
-  EXPECT_THROW(board.run(settings), OutOfTurn);
-  EXPECT_TRUE(board.asked.empty());
-  EXPECT_TRUE(board.results.empty());
+  EXPECT_THROW(board.person.run(settings), OutOfTurn);
+  EXPECT_TRUE(board.person.asked.empty());
+  EXPECT_TRUE(board.person.results.empty());
   settings.only = Stage::logic;
-  EXPECT_TRUE(board.run(settings));
+  EXPECT_TRUE(board.person.run(settings));
   settings.only = Stage::gate_drivers;
-  EXPECT_TRUE(board.run(settings));
+  EXPECT_TRUE(board.person.run(settings));
   // One that fails takes back what stood on it.
-  board.board.link->hardware().power().press_emergency_stop(true);
+  board.press_stop(true);
   settings.only = Stage::logic;
-  EXPECT_FALSE(board.run(settings));
-  EXPECT_EQ(board.report.next(0), Stage::logic);
-  EXPECT_EQ(board.report.result(0, Stage::gate_drivers), nullptr);
+  EXPECT_FALSE(board.person.run(settings));
+  EXPECT_EQ(board.person.report.next(0), Stage::logic);
+  EXPECT_EQ(board.person.report.result(0, Stage::gate_drivers), nullptr);
 }
 
 /// A fault of the wiring, and where it must be found, with which words.
@@ -104,12 +119,16 @@ const std::vector<Planted>& planted() {
        with([](Settings& s) { s.supply = 12.0; })},
       {"board for 56 V taken for one of 24 V", dc, Stage::logic, "voltage variant", supply_of(20.0),
        with([](Settings& s) { s.supply = 34.5; })},
-      {"no wire at GPIO5", dc, Stage::logic, "emergency stop",
-       [](StartedBoard& b) { b.board.link->hardware().power().press_emergency_stop(true); }},
+      {"no wire at GPIO5", dc, Stage::logic, "emergency stop", [](StartedBoard& b) { b.press_stop(true); }},
       {"button beside the wire", dc, Stage::logic, "emergency stop",
-       [](StartedBoard& b) { b.button_works = false; }},
+       [](StartedBoard& b) { b.person.button_works = false; }},
       {"bad cable of the link", dc, Stage::logic, "link",
-       [](StartedBoard& b) { b.board.link->lose_every(40); }},
+       [](StartedBoard& b) {
+         b.board.link->lose_every(40);
+         b.person.at_progress = [&b](const std::string& text) {
+           if (text == "supply and temperature") b.board.link->lose_every(0);
+         };
+       }},
       {"temperature sensor off", dc, Stage::logic, "temperature sensor",
        [](StartedBoard& b) { b.board.drives().temperature(0).set_wiring(TemperatureSensor::Wiring::open); }},
       {"motor connected too early", dc, Stage::gate_drivers, "motor terminals",
@@ -150,22 +169,23 @@ TEST(BringUp, EachPlantedFaultIsFoundAtItsStageAndHarmsNothing) {
     StartedBoard board(one.scene);
     const auto before = board.board.settings();
     bool there = false;
-    board.at_stage = [&](const std::string& asked) {
+    board.person.at_stage = [&](const std::string& asked) {
       if (there || !asked.starts_with(fmt::format("Stage {}:", text_of(one.stage).name))) return;
       there = true;
       one.plant(board);
     };
-    EXPECT_FALSE(board.run(one.settings)) << board.text();
-    EXPECT_EQ(board.report.next(0), one.stage) << board.text();
-    EXPECT_TRUE(board.faulty_part() == one.part || *one.part == '\0') << board.faulty_part() << "\n"
-                                                                      << board.text();
+    EXPECT_FALSE(board.person.run(one.settings)) << board.person.text();
+    EXPECT_EQ(board.person.report.next(0), one.stage) << board.person.text();
+    EXPECT_TRUE(board.person.faulty_part() == one.part || *one.part == '\0')
+        << board.person.faulty_part() << "\n"
+        << board.person.text();
     board.board.link->lose_every(0);
     EXPECT_TRUE(board.board.disarmed());
-    if (board.asked.size() < 20 && std::string(one.name) != "no brake resistor at AUX") {
+    if (board.person.asked.size() < 20 && std::string(one.name) != "no brake resistor at AUX") {
       EXPECT_EQ(board.board.settings(), before);
     }
     // It goes on there, and not before.
-    EXPECT_EQ(board.begun.back(), text_of(one.stage).name);
+    EXPECT_EQ(board.person.begun.back(), text_of(one.stage).name);
   }
 }
 
@@ -175,21 +195,21 @@ TEST(BringUp, ExchangedLeadsAndLinesAreCuredByTheCalibration) {
         std::pair("gimbal_b", Defect::encoder_reversed)}) {
     SCOPED_TRACE(std::string(scene) + ", " + std::string(simulation::name_of(one)));
     StartedBoard board(scene);
-    board.at_stage = [&board, defect = one](const std::string& asked) {
+    board.person.at_stage = [&board, defect = one](const std::string& asked) {
       if (asked.starts_with("Stage load")) board.board.plant(defect);
     };
-    EXPECT_TRUE(board.run()) << board.text();
+    EXPECT_TRUE(board.person.run()) << board.person.text();
   }
 }
 
 TEST(BringUp, WhoEndsItLeavesTheDeviceInOrder) {
   StartedBoard board("dc_coreless_a");
   const auto before = board.board.settings();
-  board.at_stage = [&](const std::string& asked) {
+  board.person.at_stage = [&](const std::string& asked) {
     if (asked.starts_with("Stage load")) throw bench::Interrupted("interrupted");
   };
-  EXPECT_THROW(board.run(), bench::Interrupted);
-  EXPECT_EQ(board.report.next(0), Stage::load);
+  EXPECT_THROW(board.person.run(), bench::Interrupted);
+  EXPECT_EQ(board.person.report.next(0), Stage::load);
   EXPECT_EQ(board.board.settings(), before);
   EXPECT_TRUE(board.board.disarmed());
 }
