@@ -171,7 +171,7 @@ std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std:
 std::span<const char> CanopenObjects::text_of(SpecialObject what) const {
   constexpr std::string_view name = "Kmax haptic device controller";
   if (what == SpecialObject::device_name) return name;
-  if (what == SpecialObject::hardware_version) return of_.board_name;
+  if (what == SpecialObject::hardware_version) return of_.board.board_name;
   return firmware_version_text;
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "firmware/board_interface/board_identity.hpp"
 #include "firmware/canopen/object_places.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"
@@ -30,6 +31,7 @@ class CanopenObjects {
  public:
   /// What the objects stand for. The node is used from the first request on, not before.
   struct Sources {
+    const BoardIdentity& board;
     ParameterAccess& parameters;
     StoreCommands& store;
     HostWrites& writes;
@@ -37,7 +39,6 @@ class CanopenObjects {
     Axes& axes;  ///< their trace, captures and fault log
     LinkStates& links;
     canopen::Node<CanopenObjects>& node;
-    std::string_view board_name;
   };
   explicit CanopenObjects(const Sources& sources) : of_(sources) {}
   CanopenObjects(const CanopenObjects&) = delete;

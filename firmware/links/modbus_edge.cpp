@@ -15,13 +15,13 @@ modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
 ModbusEdge::ModbusEdge(const Sources& sources)
     : parameters_(sources.parameters),
       state_(sources.state),
-      registers_({.parameters = sources.parameters,
+      registers_({.board = sources.board,
+                  .parameters = sources.parameters,
                   .writes = sources.writes,
                   .readings = sources.readings,
                   .axes = sources.axes,
                   .state = sources.state,
-                  .edge = *this,
-                  .board_name = sources.board_name}),
+                  .edge = *this}),
       port_(registers_, port_configuration(parameters_.values())) {}
 
 void ModbusEdge::poll(std::uint32_t now_us) {

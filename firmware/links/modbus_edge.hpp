@@ -22,12 +22,12 @@ class ModbusEdge {
  public:
   /// See ModbusRegisters::Sources.
   struct Sources {
+    const BoardIdentity& board;
     ParameterAccess& parameters;
     HostWrites& writes;
     Readings& readings;
     Axes& axes;
     LinkState& state;
-    std::string_view board_name;
   };
   explicit ModbusEdge(const Sources& sources);
   ModbusEdge(const ModbusEdge&) = delete;

@@ -76,7 +76,7 @@ std::string_view ModbusRegisters::identification(std::uint8_t object_id) const {
     case 4:
       return "Kmax haptic device controller";
     case 5:
-      return of_.board_name;
+      return of_.board.board_name;
     default:
       return {};
   }

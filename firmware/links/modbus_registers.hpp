@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 
+#include "firmware/board_interface/board_identity.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"
 #include "firmware/command/link_states.hpp"
@@ -21,13 +22,13 @@ class ModbusRegisters {
  public:
   /// What the registers stand for. The edge is used from the first request on, not before.
   struct Sources {
+    const BoardIdentity& board;
     ParameterAccess& parameters;
     HostWrites& writes;
     Readings& readings;
     Axes& axes;  ///< their trace, captures and fault log
     LinkState& state;
     const ModbusEdge& edge;
-    std::string_view board_name;
   };
   explicit ModbusRegisters(const Sources& sources) : of_(sources) {}
 

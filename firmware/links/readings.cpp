@@ -3,8 +3,6 @@
 #include "firmware/drive/haptic_configuration.hpp"
 #include "firmware/drive/profile_readings.hpp"
 #include "firmware/drive/statusword.hpp"
-#include "firmware/links/canopen_edge.hpp"
-#include "firmware/links/modbus_edge.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
 
 namespace kmax::firmware {
@@ -163,8 +161,7 @@ void Readings::refresh_device() {
   publish_crash();
   publish_capture();
   of_.lock.publish(v);
-  of_.serial.publish(v);
-  of_.can.publish(v);
+  for (const LinkReadings& link : of_.links) link.publish(v);
   v.set_whole<"refusal.reason">(static_cast<std::uint32_t>(of_.parameters.last_refusal().refusal));
   v.set_whole<"refusal.register">(of_.parameters.last_refusal().address);
   v.set_whole<"log.newest">(of_.axes.log().newest());

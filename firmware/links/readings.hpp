@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -11,8 +12,20 @@
 
 namespace kmax::firmware {
 
-class CanopenEdge;
-class ModbusEdge;
+/// A link by what it says of itself: its publish(values).
+class LinkReadings {
+ public:
+  template <typename Edge>
+  explicit LinkReadings(const Edge& edge)
+      : edge_(&edge), publish_([](const void* of, ParameterValues& values) {
+          static_cast<const Edge*>(of)->publish(values);
+        }) {}
+  void publish(ParameterValues& values) const { publish_(edge_, values); }
+
+ private:
+  const void* edge_;
+  void (*publish_)(const void*, ParameterValues&);
+};
 
 /// Brings what a host can read up to date, when somebody reads it: to the reports that the present poll began
 /// with, so that all are of one moment. Main loop only.
@@ -25,8 +38,7 @@ class Readings {
     const StoreCommands& store;
     const WriteLock& lock;
     Axes& axes;
-    const ModbusEdge& serial;
-    const CanopenEdge& can;
+    std::array<LinkReadings, 2> links;
   };
   explicit Readings(const Sources& sources) : of_(sources) {}
 
