@@ -45,10 +45,6 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   /// The free-running counter of the axis' quadrature lines, and its index line at the same moment.
   { constant.ISR_counter(axis) } -> std::unsigned_integral;
   { constant.ISR_index_line(axis) } -> std::same_as<bool>;
-  /// The AS5047P, of which a board has one (SerialEncoder).
-  { hardware.serial_encoder().ISR_take().count } -> std::convertible_to<std::uint32_t>;
-  {hardware.serial_encoder().ISR_begin()};
-  {hardware.serial_encoder().restart_without_turns()};
 
   /// The high side of the brake's half-bridge. Any context.
   {hardware.set_brake(level)};
@@ -57,6 +53,22 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   { constant.supply_code() } -> std::same_as<std::uint16_t>;
   { constant.temperature_code(axis) } -> std::same_as<std::uint16_t>;
   { constant.missed_ticks() } -> std::same_as<std::uint32_t>;
+};
+
+/// Stands for the AS5047P of a board that has none, no serial_encoder(): an axis whose encoder.kind asks for
+/// it has no valid count.
+struct NoSerialEncoder {
+  struct Sample {
+    std::uint32_t count = 0;
+    bool valid = false;
+    std::uint32_t reference_generation = 0;
+  };
+  static Sample ISR_take() { return {}; }
+  static void ISR_begin() {}
+  static bool under_way() { return false; }
+  static void ISR_abandon() {}
+  static void restart() {}
+  static void restart_without_turns() {}
 };
 
 /// Encoders, current sensors and bridges of all axes, and what the tick does with them: the same code on a
@@ -85,6 +97,14 @@ class Drives {
 
   Hardware& hardware() { return hardware_; }
   const Hardware& hardware() const { return hardware_; }
+  /// The AS5047P, of which a board has one (SerialEncoder) or none.
+  decltype(auto) serial_encoder() {
+    if constexpr (requires(Hardware & hardware) { hardware.serial_encoder(); }) {
+      return hardware_.serial_encoder();
+    } else {
+      return NoSerialEncoder{};
+    }
+  }
 
   /// The whole tick of an axis. The condition is asked twice, so it comes as the object that has it.
   ///
@@ -206,7 +226,7 @@ class Drives {
   }
   [[gnu::noinline, gnu::cold]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
   [[gnu::noinline]] Count ISR_take_serial();
-  [[gnu::noinline]] void ISR_begin_serial() { hardware_.serial_encoder().ISR_begin(); }
+  [[gnu::noinline]] void ISR_begin_serial() { serial_encoder().ISR_begin(); }
 
   Hardware hardware_;
   drivers::SupplyDivider supply_;
@@ -305,7 +325,7 @@ typename Drives<Hardware>::Inputs Drives<Hardware>::ISR_beside_others(std::size_
 
 template <typename Hardware>
 typename Drives<Hardware>::Count Drives<Hardware>::ISR_take_serial() {
-  const auto angle = hardware_.serial_encoder().ISR_take();
+  const auto angle = serial_encoder().ISR_take();
   return {.count = angle.count,
           .valid = angle.valid,
           .referenced = false,
@@ -317,7 +337,7 @@ void Drives<Hardware>::ISR_configure_encoder(std::size_t axis, const Settings& s
   axes_[axis].encoder_generation = settings.encoder_generation[axis];
   axes_[axis].counter.configure(settings.quadrature[axis]);
   // Nobody would take the frame any more.
-  auto& serial = hardware_.serial_encoder();
+  auto&& serial = serial_encoder();
   if (settings.role[axis] == EncoderRole::lines && serial.under_way()) serial.ISR_abandon();
 }
 
@@ -424,7 +444,7 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
   }
   settings.brake = control::BrakeChopper::prepare({.on_voltage = values.real<"supply.brake_voltage">()});
   settings.has_brake = settings.brake.on_voltage > 0.0f;
-  if (chip_moves) hardware_.serial_encoder().restart_without_turns();
+  if (chip_moves) serial_encoder().restart_without_turns();
   settings_ = settings;
   double_buffer_.offer(settings_);
   gain_ = drivers::gain_for_current(largest_current);

@@ -72,7 +72,7 @@ class Power {
     const bool armed = application.any_armed();
     drives_.inhibit_brake(application.store_busy());
     // Nobody has taken frames while the stage was not ready.
-    if (stage_.ready() && !was_ready_) drives_.hardware().serial_encoder().restart();
+    if (stage_.ready() && !was_ready_) drives_.serial_encoder().restart();
     was_ready_ = stage_.ready();
     if (!armed) {
       if (!taken_ || application.parameter_changes() != taken_changes_) take_parameters(application);

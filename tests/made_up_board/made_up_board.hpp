@@ -62,19 +62,6 @@ class MadeUpHardware {
     std::uint16_t phase_b = 2048, phase_c = 2048, supply = code_of(MadeUpHardware::supply / 10.0);
     std::uint8_t slow_age = 0;
   };
-  struct SerialEncoder {
-    struct Reading {
-      std::uint32_t count = 0;
-      bool valid = false;
-      std::uint32_t reference_generation = 0;
-    };
-    Reading ISR_take() { return {}; }
-    void ISR_begin() {}
-    void ISR_abandon() {}
-    bool under_way() const { return false; }
-    void restart() {}
-    void restart_without_turns() {}
-  };
 
   static constexpr bool has(std::size_t) { return true; }
   MadeUpBridge& bridge(std::size_t axis) { return bridges_[axis]; }
@@ -87,7 +74,6 @@ class MadeUpHardware {
   }
   std::uint16_t ISR_counter(std::size_t axis) const { return counters[axis]; }
   bool ISR_index_line(std::size_t) const { return false; }
-  SerialEncoder& serial_encoder() { return serial_encoder_; }
   void set_brake(bool on) { brake_on = on; }
 
   std::uint16_t supply_code() const { return samples_[0].supply; }
@@ -121,7 +107,6 @@ class MadeUpHardware {
 
   std::array<MadeUpBridge, firmware::axis_count> bridges_;
   std::array<Sample, firmware::axis_count> samples_;
-  SerialEncoder serial_encoder_;
   double gain_ = 80.0;
 };
 static_assert(MotorHardware<MadeUpHardware>);

@@ -60,6 +60,20 @@ TEST_F(MadeUpBoard, ATripOfTheThirdAxisTakesItsForceAlone) {
   EXPECT_TRUE(bench.arm(2)) << "and comes back";
 }
 
+TEST_F(MadeUpBoard, AnAxisThatAsksForTheAs5047pThatThisBoardLacksIsNotArmed) {
+  ASSERT_EQ(bench.set("encoder.kind", 1, 1), 0);
+  bench.run_ms(20);
+  EXPECT_FALSE(bench.arm(1));
+  EXPECT_EQ(bench.application().refusal(1), firmware::Refusal::encoder_invalid);
+  EXPECT_TRUE(bench.arm(0));
+  EXPECT_TRUE(bench.arm(2));
+  bench.disarm(0);
+  bench.disarm(2);
+  EXPECT_EQ(bench.set("encoder.kind", 0, 1), 0);
+  bench.run_ms(20);
+  EXPECT_TRUE(bench.arm(1)) << "its lines are there";
+}
+
 TEST_F(MadeUpBoard, ParametersOfTheThirdAxisAreReachedOverBothBuses) {
   const auto stiffness = [](double number) {
     return std::bit_cast<std::uint32_t>(static_cast<float>(number));
