@@ -50,8 +50,9 @@ std::string in_comment(std::string text) {
 
 const std::vector<std::string>& groups() {
   static const std::vector<std::string> names = [] {
-    std::vector<std::string> all{"axis0", "axis1"};
-    static_assert(firmware::axis_count == 2);
+    std::vector<std::string> all;
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      all.push_back(fmt::format("axis{}", axis));
     for (const Parameter& parameter : all_parameters()) {
       std::string group = group_of(parameter);
       if (std::find(all.begin(), all.end(), group) != all.end()) continue;

@@ -52,32 +52,34 @@ constexpr std::array columns{
 };
 constexpr Column tip_column{"tip_position_m", &RunSample::tip_position};
 
-/// The rows of both axes are those of the same samples as long as both have the same haptic.rate; else axis 1
-/// stands with its last sample.
+/// The rows of all axes are those of the same samples as long as they have the same haptic.rate; else those
+/// beside axis 0 stand with their last sample.
 void write_csv(const simulation::Scene& scene, const RunResult& result, const std::string& path) {
   struct Cell {
-    bool second;
+    std::size_t axis;
     Column column;
   };
   std::vector<Cell> cells;
   std::string head = "time_s";
-  for (const bool second : {false, true}) {
-    if (second && result.second_samples.empty()) break;
+  for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
+    if (result.samples[axis].empty()) continue;
     std::vector<Column> of_axis(columns.begin(), columns.end());
-    if (scene.axes[second ? 1 : 0].device.structure) of_axis.push_back(tip_column);
+    if (scene.axes[axis].device.structure) of_axis.push_back(tip_column);
     for (const Column& column : of_axis) {
-      cells.push_back({second, column});
-      head += fmt::format(",{}{}", second ? "axis1_" : "", column.name);
+      cells.push_back({axis, column});
+      head += fmt::format(",{}{}", axis == 0 ? "" : fmt::format("axis{}_", axis), column.name);
     }
   }
   std::string table = head + '\n';
-  std::size_t other = 0;
-  for (const RunSample& sample : result.samples) {
-    while (other + 1 < result.second_samples.size() && result.second_samples[other + 1].time <= sample.time)
-      ++other;
+  std::vector<std::size_t> at(scene.axes.size());
+  for (const RunSample& sample : result.samples[0]) {
+    for (std::size_t axis = 0; axis < at.size(); ++axis) {
+      const std::vector<RunSample>& own = result.samples[axis];
+      while (at[axis] + 1 < own.size() && own[at[axis] + 1].time <= sample.time) ++at[axis];
+    }
     table += fmt::format("{}", sample.time);
-    for (const Cell& cell : cells)
-      table += fmt::format(",{}", (cell.second ? result.second_samples[other] : sample).*cell.column.member);
+    for (const auto& [axis, column] : cells)
+      table += fmt::format(",{}", result.samples[axis][at[axis]].*column.member);
     table += '\n';
   }
   base::write_file(path, table);
@@ -99,29 +101,25 @@ void write_picture(const simulation::Scene& scene, const RunResult& result, cons
   figure.x_label = "time since arming (s)";
   std::vector<plot::Mark> judged;
   if (result.contact) judged = {{result.judged_from, true, "judged"}, {result.judged_to, true, ""}};
-  const auto position = [&scene](const std::vector<RunSample>& samples, std::size_t axis, const char* label) {
-    plot::Panel panel{label, {series(samples, &RunSample::true_position, 1e3, "handle", false)}, {}};
+  for (std::size_t axis = 0; axis < scene.axes.size(); ++axis) {
+    const std::vector<RunSample>& samples = result.samples[axis];
+    if (samples.empty()) continue;
+    const std::string of_axis = axis == 0 ? "" : fmt::format("axis {}: ", axis);
+    plot::Panel position{
+        of_axis + "position (mm)", {series(samples, &RunSample::true_position, 1e3, "handle", false)}, {}};
     if (scene.axes[axis].device.structure) {
-      panel.series[0].label = "encoder";
-      panel.series.push_back(series(samples, &RunSample::tip_position, 1e3, "handle", false));
+      position.series[0].label = "encoder";
+      position.series.push_back(series(samples, &RunSample::tip_position, 1e3, "handle", false));
     }
     if (scene.axes[axis].person)
-      panel.series.push_back(series(samples, &RunSample::hand_position, 1e3, "hand", false));
-    return panel;
-  };
-  const auto force = [](const std::vector<RunSample>& samples, const char* label) {
-    return plot::Panel{label, {series(samples, &RunSample::applied_force, 1, "", true)}, {}};
-  };
-  figure.panels = {position(result.samples, 0, "position (mm)"), force(result.samples, "force (N)")};
-  const bool field = std::any_of(result.samples.begin(), result.samples.end(),
-                                 [](const RunSample& sample) { return sample.magnetic_coefficient != 0.0; });
-  if (field) {
+      position.series.push_back(series(samples, &RunSample::hand_position, 1e3, "hand", false));
+    figure.panels.push_back(std::move(position));
     figure.panels.push_back(
-        {"F_{MC} (N)", {series(result.samples, &RunSample::magnetic_coefficient, 1, "", true)}, {}});
-  }
-  if (!result.second_samples.empty()) {
-    figure.panels.push_back(position(result.second_samples, 1, "axis 1: position (mm)"));
-    figure.panels.push_back(force(result.second_samples, "axis 1: force (N)"));
+        {of_axis + "force (N)", {series(samples, &RunSample::applied_force, 1, "", true)}, {}});
+    if (std::any_of(samples.begin(), samples.end(),
+                    [](const RunSample& sample) { return sample.magnetic_coefficient != 0.0; }))
+      figure.panels.push_back(
+          {of_axis + "F_{MC} (N)", {series(samples, &RunSample::magnetic_coefficient, 1, "", true)}, {}});
   }
   for (plot::Panel& panel : figure.panels) {
     panel.marks = judged;
@@ -151,7 +149,7 @@ Json result_json(const simulation::Scene& scene, const RunResult& result) {
           {"parts", parts_json(scene)},
           {"state", std::string(device::name_of(result.end_state))},
           {"fault", std::string(firmware::text_of(result.fault).name)},
-          {"samples", result.samples.size()},
+          {"samples", result.samples[0].size()},
           {"contact", contact},
           {"alarms", result.alarms},
           {"first_alarm_s", result.first_alarm ? Json(*result.first_alarm) : Json(nullptr)},
@@ -166,7 +164,7 @@ int run_simulate(Context& context, const SimulateOptions& options) {
   const simulation::Scene scene = simulated_board::open_scene(options.scene);
   const RunResult result = simulated_board::run_scene(scene);
   const std::string axis = scene.axes.size() > 1 ? fmt::format("axis {}", result.axis) : "the axis";
-  if (result.samples.empty())
+  if (result.samples[0].empty())
     throw std::runtime_error(
         fmt::format("{}: {} could not be armed: {}", scene.name, axis, firmware::to_string(result.refusal)));
   if (!options.csv.empty()) write_csv(scene, result, options.csv);

@@ -48,10 +48,10 @@ std::size_t axis_to_report(const firmware::Application& application, std::size_t
 }
 
 std::optional<simulation::ContactMeasure> judge(const simulation::Scene& scene, const RunResult& result) {
-  if (!scene.axes[0].motion || result.judged_to > scene.duration || result.samples.empty())
+  if (!scene.axes[0].motion || result.judged_to > scene.duration || result.samples[0].empty())
     return std::nullopt;
   std::vector<simulation::ContactSample> positions;
-  for (const RunSample& sample : result.samples) positions.push_back({sample.time, sample.true_position});
+  for (const RunSample& sample : result.samples[0]) positions.push_back({sample.time, sample.true_position});
   simulation::ContactCriterion criterion{.window_begin = result.judged_from,
                                          .window_end = result.judged_to,
                                          .threshold = scene.measurement.threshold,
@@ -69,6 +69,7 @@ RunResult run_scene(const simulation::Scene& scene) {
   application.preset(firmware::entry_of<"link.timeout">(), 0, 0);
   RunResult result;
   const std::size_t axes = scene.axes.size();
+  result.samples.resize(axes);
   arm(simulation, axes);
   result.axis = axis_to_report(application, axes);
   result.end_state = application.state(result.axis);
@@ -91,7 +92,7 @@ RunResult run_scene(const simulation::Scene& scene) {
       add_report(samples[axis], haptic, lengths[axis]);
       if (axis == 0 && haptic.unstable && !result.first_alarm) result.first_alarm = time;
       samples[axis].applied_force = simulation.device().handle(axis).applied_force();
-      (axis == 0 ? result.samples : result.second_samples).push_back(samples[axis]);
+      result.samples[axis].push_back(samples[axis]);
     }
   }
   const auto& report = application.ISR_report(0);

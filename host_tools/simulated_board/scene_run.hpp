@@ -24,8 +24,7 @@ struct RunSample {
 };
 
 struct RunResult {
-  std::vector<RunSample> samples;         ///< of axis 0
-  std::vector<RunSample> second_samples;  ///< of axis 1, if the scene has it
+  std::vector<std::vector<RunSample>> samples;  ///< of each axis of the scene; none were taken if not armed
   /// Of the first axis that could not be armed or ended in a fault; else of axis 0.
   std::size_t axis = 0;
   firmware::DriveState end_state{};

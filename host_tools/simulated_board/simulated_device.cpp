@@ -1,5 +1,7 @@
 #include "host_tools/simulated_board/simulated_device.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -8,7 +10,8 @@ namespace kmax::simulated_board {
 
 SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(scene.axes.size()) {
   if (scene.axes.size() > axes_.size())
-    throw std::invalid_argument("a board has two axes; the scene names more");
+    throw std::invalid_argument(
+        fmt::format("a board has {} axes; the scene names {}", axes_.size(), scene.axes.size()));
   for (std::size_t i = 0; i < scene.axes.size(); ++i) {
     const simulation::SceneAxis& axis = scene.axes[i];
     if (axis.motor) {
@@ -17,8 +20,8 @@ SimulatedDevice::SimulatedDevice(const simulation::Scene& scene) : axis_count_(s
     }
     simulation::CoupledHandle handle = scene.make_handle(i);
     const simulation::AxisEncoder encoder(axis.encoder, handle.position(), scene.seed_of(i));
-    axes_[i].emplace(
-        Axis{std::move(handle), encoder, {}, 0.0f, axis.motion.has_value(), axis.same_person, false});
+    axes_[i].emplace(Axis{
+        std::move(handle), encoder, {}, 0.0f, axis.motion.has_value(), i == 0 || axis.same_person, false});
   }
   encoder_connected_.fill(true);
 }
@@ -62,11 +65,14 @@ void SimulatedDevice::advance(double duration) {
   if (power_) power_->advance(duration);
 }
 
-/// What the hand on the axis answers to: the two axes stand at right angles.
+/// What the hand on the axis answers to: the axes that one person holds stand at right angles.
 double SimulatedDevice::background_force(const Axis& axis) const {
-  if (!axes_[0] || !axes_[1] || !axes_[1]->same_person) return static_cast<double>(axis.background_force);
-  return std::hypot(static_cast<double>(axes_[0]->background_force),
-                    static_cast<double>(axes_[1]->background_force));
+  auto force = static_cast<double>(axis.background_force);
+  for (const auto& other : axes_) {
+    if (other && &*other != &axis && other->first_person && axis.first_person)
+      force = std::hypot(force, static_cast<double>(other->background_force));
+  }
+  return force;
 }
 
 void SimulatedDevice::connect_encoder(std::size_t axis, bool connected) {

@@ -64,7 +64,7 @@ class SimulatedDevice {
     firmware::AxisOutput output{};
     float background_force = 0.0f;  ///< N, outwards
     bool moves = false;             ///< somebody holds it who has a motion
-    bool same_person = false;       ///< as axis 0's
+    bool first_person = false;      ///< axis 0's holds it, or would
     bool let_go = false;
   };
 

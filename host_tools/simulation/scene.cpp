@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/toml_text.hpp"
 #include "host_tools/simulation/scene_table.hpp"
@@ -240,10 +241,17 @@ class SceneReader : private SceneTables {
   SceneReader(std::string_view source, const ParameterCheck& check) : SceneTables(source), check_(check) {}
 
   Scene read(const toml::table& root) {
-    require_known(root, "",
-                  {"name", "description", "duration", "seed", "identified", "device", "operator", "motion",
-                   "encoder", "parameters", "measurement", "structure", "motor", "inverter", "current_sensor",
-                   "supply", "integrator", "axis1"});
+    std::vector<std::string> further_axes;  // without a gap
+    for (std::size_t axis = 1; axis < firmware::axis_count; ++axis) {
+      if (axis > 1 && !root.contains(further_axes.back())) break;
+      further_axes.push_back(fmt::format("axis{}", axis));
+    }
+    std::vector<std::string_view> known{
+        "name",     "description", "duration",       "seed",       "identified",  "device",
+        "operator", "motion",      "encoder",        "parameters", "measurement", "structure",
+        "motor",    "inverter",    "current_sensor", "supply",     "integrator"};
+    known.insert(known.end(), further_axes.begin(), further_axes.end());
+    require_known(root, "", known);
     Scene scene;
     scene.name = std::filesystem::path(source()).stem().string();
     read_text(root, "name", scene.name);
@@ -257,11 +265,13 @@ class SceneReader : private SceneTables {
     }
     if (const toml::table* table = part(root, "", "parameters")) read_parameters(*table, "", scene);
     scene.axes.push_back(read_axis(root, "", scene));
-    if (const toml::table* second = part(root, "", "axis1")) {
+    for (const std::string& name : further_axes) {
+      const toml::table* table = part(root, "", name);
+      if (table == nullptr) continue;
       require_known(
-          *second, "axis1.",
+          *table, name + ".",
           {"device", "structure", "operator", "motion", "encoder", "motor", "inverter", "current_sensor"});
-      scene.axes.push_back(read_axis(*second, "axis1.", scene));
+      scene.axes.push_back(read_axis(*table, name + ".", scene));
     }
     read_supply_table(*this, root, scene);
     read_integrator_table(*this, root, scene);
@@ -304,11 +314,10 @@ class SceneReader : private SceneTables {
 
   void read_operator(const toml::table& table, const std::string& prefix, const Scene& scene,
                      SceneAxis& axis) const {
-    const bool second = !scene.axes.empty();
-    const std::initializer_list<std::string_view> others{"same_person"};
-    read_model(table, prefix + "operator.", operator_fields, axis.person.emplace(),
-               second ? others : std::initializer_list<std::string_view>{});
-    if (!second) return;
+    const bool first = scene.axes.empty();
+    const std::initializer_list<std::string_view> none, others{"same_person"};
+    read_model(table, prefix + "operator.", operator_fields, axis.person.emplace(), first ? none : others);
+    if (first) return;
     read_truth(table, prefix + "operator.", "same_person", axis.same_person);
     if (axis.same_person && !scene.axes.front().person) {
       fail(table.get("same_person")->source(),

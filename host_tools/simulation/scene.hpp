@@ -33,7 +33,7 @@
 //   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
 //   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
 //   [axis1.device] [axis1.structure] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor]
-//   [axis1.inverter] [axis1.current_sensor]   a second axis
+//   [axis1.inverter] [axis1.current_sensor]   a second axis, and so on, as many as the firmware has
 //
 // SI units. Numbers that are not given keep the defaults of the model structs. The wall that a motion aims at
 // is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
@@ -43,7 +43,7 @@
 // allowed: syntax errors, unknown keys (with what may have been meant), wrong types, values out of range,
 // parts that contradict each other.
 // Names and values of [parameters] are checked by a function that the caller passes, because the object
-// dictionary is not known here.
+// dictionary is not known here, but for the number of axes.
 
 #include <cstdint>
 #include <functional>
@@ -88,7 +88,7 @@ struct SceneAxis {
   DeviceModel device;
   HandleStart start;
   std::optional<OperatorModel> person;
-  bool same_person = false;  // as axis 0's; of the second axis
+  bool same_person = false;  // as axis 0's; of a further axis
   std::optional<IntendedMotionConfig> motion;
   EncoderConfig encoder;
   std::optional<MotorConfig> motor;  // none: ideal
@@ -107,7 +107,7 @@ struct Scene {
   double duration = 5.0;
   std::uint64_t seed = 1;
   bool identified = true;
-  std::vector<SceneAxis> axes;  // one or two
+  std::vector<SceneAxis> axes;  // 1 to firmware::axis_count
   std::vector<SceneParameter> parameters;
   Measurement measurement;
   std::optional<SupplyConfig> supply;

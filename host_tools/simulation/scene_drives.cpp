@@ -24,7 +24,8 @@ bool driven(const InverterCommand& command) {
 SceneDrives::SceneDrives(const Scene& scene)
     : supply_(scene.make_supply()), source_voltage_(supply_.config().voltage) {
   if (scene.axes.size() > axes_.size())
-    throw std::invalid_argument("a board has two axes; the scene names more");
+    throw std::invalid_argument(
+        fmt::format("a board has {} axes; the scene names {}", axes_.size(), scene.axes.size()));
   std::size_t serial_encoders = 0;
   for (std::size_t i = 0; i < scene.axes.size(); ++i) {
     const SceneAxis& named = scene.axes[i];
@@ -39,7 +40,8 @@ SceneDrives::SceneDrives(const Scene& scene)
     for (const Defect defect : named.defects) plant(i, defect);
   }
   if (serial_encoders > 1)
-    throw std::invalid_argument("encoder.kind = as5047p on both axes: this board has one chip select for it");
+    throw std::invalid_argument(
+        "encoder.kind = as5047p on several axes: this board has one chip select for it");
 }
 
 MotorDrive& SceneDrives::drive(std::size_t axis) {

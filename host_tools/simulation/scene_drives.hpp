@@ -1,5 +1,5 @@
 #pragma once
-// The motors, handles, persons and the supply of a scene behind the power stage of a board with two axes:
+// The motors, handles, persons and the supply of a scene behind the power stage of a board:
 // what the native board and the virtual board have in common.
 //
 // Time passes in advance() only, under the legs set last. An axis that the scene does not have, or has
@@ -12,10 +12,12 @@
 // Defects may be planted and mended at any time; finer ones (a share of slip, edges lost in the cable) are
 // set on the parts themselves: drive(axis).encoder_coupling(), supply(), temperature(axis).
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
 
+#include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/simulation/temperature_sensor.hpp"
@@ -24,14 +26,14 @@ namespace kmax::simulation {
 
 class SceneDrives {
  public:
-  static constexpr std::size_t most_axes = 2;
-
-  // Throws what the parts of the scene throw; std::invalid_argument for more than two axes, or a second
-  // AS5047P: a board has one chip select for it.
+  // Throws what the parts of the scene throw; std::invalid_argument for more axes than a board has, or a
+  // second AS5047P: a board has one chip select for it.
   explicit SceneDrives(const Scene& scene);
 
   bool has(std::size_t axis) const { return axis < axes_.size() && axes_[axis].drive.has_value(); }
-  bool any() const { return has(0) || has(1); }
+  bool any() const {
+    return std::any_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.drive.has_value(); });
+  }
   // Throw std::out_of_range for an axis without a motor.
   MotorDrive& drive(std::size_t axis);
   const MotorDrive& drive(std::size_t axis) const;
@@ -72,7 +74,7 @@ class SceneDrives {
 
   void set(std::size_t axis, Defect defect, bool present);
 
-  std::array<Axis, most_axes> axes_;
+  std::array<Axis, firmware::axis_count> axes_;
   Supply supply_;
   double source_voltage_;  // V, without defect
 };

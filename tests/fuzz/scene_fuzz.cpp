@@ -52,7 +52,8 @@ void read(std::string_view text) {
   } catch (const SceneError& error) {
     return require(says_where(error.what()), error.what());
   }
-  require(scene.axes.size() == 1 || scene.axes.size() == 2, "a scene of neither one nor two axes");
+  require(!scene.axes.empty() && scene.axes.size() <= firmware::axis_count,
+          "a scene without axes, or of too many");
   require_finite({scene.duration, scene.measurement.window, scene.measurement.threshold});
   for (const auto& one : simulated_board::assignments_of(scene))
     require(firmware::check_value(firmware::descriptors[one.parameter.entry()], one.raw) ==

@@ -13,7 +13,7 @@ void SceneWorld::advance_to(BoardTime now) {
   if (now <= time_) return;
   drives_.advance(seconds(now - time_));
   time_ = now;
-  for (std::size_t axis = 0; axis < drives_.most_axes; ++axis) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (drives_.has(axis)) drives_.drive(axis).update_encoder();
   }
 }
@@ -50,7 +50,7 @@ double SceneWorld::current_pin(std::size_t axis, CurrentSensor::Channel channel)
 double SceneWorld::analogue(unsigned channel, BoardTime now) {
   advance_to(now);
   constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
-  for (std::size_t axis = 0; axis < drives_.most_axes; ++axis) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (channel == wiring.axes[axis].b) return current_pin(axis, CurrentSensor::Channel::b);
     if (channel == wiring.axes[axis].c) return current_pin(axis, CurrentSensor::Channel::c);
     if (channel == wiring.temperatures[axis]) return drives_.temperature(axis).pin_voltage();
@@ -69,7 +69,7 @@ EncoderSignals SceneWorld::encoder(std::size_t axis, BoardTime now) {
 
 SerialEncoderState SceneWorld::serial_encoder(BoardTime now) {
   advance_to(now);
-  for (std::size_t axis = 0; axis < drives_.most_axes; ++axis) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!drives_.has(axis) || drives_.encoder_kind(axis) != EncoderKind::as5047p) continue;
     return {drives_.drive(axis).encoder().plugged(), drives_.serial_angle(axis)};
   }

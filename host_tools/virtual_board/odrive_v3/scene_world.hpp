@@ -16,8 +16,8 @@ namespace kmax::virtual_board {
 /// When persons begin and handles are let go, and which defects can be planted: scene_drives.hpp.
 class SceneWorld : public BoardWorld {
  public:
-  /// Throws what the parts of the scene throw; std::invalid_argument for more than two axes or a second
-  /// AS5047P.
+  /// Throws what the parts of the scene throw; std::invalid_argument for more axes than the board has, or a
+  /// second AS5047P.
   explicit SceneWorld(const simulation::Scene& scene);
 
   void set_bridge(std::size_t axis, const std::array<PwmLegOutput, 3>& legs, BoardTime now) override;

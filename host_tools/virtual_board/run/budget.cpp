@@ -137,10 +137,6 @@ class Recorder {
 /// Entry, exit and the FP frame, PM0214; not part of what instructions cost.
 constexpr std::uint32_t exception_cycles = 12 + 12 + 2 * 17;
 
-void add_parameter(simulation::Scene& scene, const std::string& name, simulation::ParameterValue value) {
-  scene.parameters.push_back({name, std::move(value), "budget"});
-}
-
 struct StepSum {
   std::uint64_t ticks = 0, instructions = 0, cycles = 0;
   std::uint32_t worst = 0, worst_cycles = 0;
@@ -214,11 +210,14 @@ bool BudgetReport::kept() const {
 
 BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene,
                             const VirtualBoardConfig& config) {
-  for (const char* prefix : {"", "axis1."}) {
-    add_parameter(scene, std::string(prefix) + "wall.law", std::string("adaptive"));
-    add_parameter(scene, std::string(prefix) + "velocity.estimator", std::string("foaw"));
-    add_parameter(scene, std::string(prefix) + "velocity.window", std::int64_t{16});
-    add_parameter(scene, std::string(prefix) + "haptic.rate", 20000.0);
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const auto add = [&scene, axis](const char* name, simulation::ParameterValue value) {
+      scene.parameters.push_back({fmt::format("axis{}.{}", axis, name), std::move(value), "budget"});
+    };
+    add("wall.law", std::string("adaptive"));
+    add("velocity.estimator", std::string("foaw"));
+    add("velocity.window", std::int64_t{16});
+    add("haptic.rate", 20000.0);
   }
   const ElfImage image = ElfImage::load(elf_path);
   SceneWorld world(scene);
@@ -227,11 +226,11 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   Recorder recorder(image, board);
   board.run_for(0.3);
   BoardLink link(board);
-  for (std::size_t axis = 0; axis < 2; ++axis) link.arm(axis);
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) link.arm(axis);
   recorder.start();
   // The approach, the contact and some of the hold.
   board.run_for(0.3);
-  for (std::size_t axis = 0; axis < 2; ++axis) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!board.bridge_armed(axis))
       throw std::runtime_error(fmt::format("axis {} has tripped during the measurement", axis));
   }

@@ -46,7 +46,7 @@ TEST(SimulatedTouch, IsWhatTheWholeFirmwareMakesOfTheSameScene) {
   )";
   const simulation::Scene scene = simulation::parse_scene(text, "scene", simulated_board::check_parameter);
   const simulated_board::RunResult whole = simulated_board::run_scene(scene);
-  ASSERT_FALSE(whole.samples.empty());
+  ASSERT_FALSE(whole.samples[0].empty());
 
   TouchSetup setup = plain(5500);
   setup.device = scene.axes[0].device;
@@ -60,7 +60,7 @@ TEST(SimulatedTouch, IsWhatTheWholeFirmwareMakesOfTheSameScene) {
   simulate_touch(setup, &bare);
   // The board's plant advances in 50 us, the touch's in 2 ms, and its count length is a float's: the same
   // motion until the oscillation has made the difference of the last bits grow.
-  const std::size_t compared = std::min<std::size_t>({whole.samples.size(), bare.size(), 200});
+  const std::size_t compared = std::min<std::size_t>({whole.samples[0].size(), bare.size(), 200});
   ASSERT_EQ(compared, 200U);
   double worst = 0.0;
   // The firmware's first haptic sample may come up to one period after the person was told to begin.
@@ -68,7 +68,7 @@ TEST(SimulatedTouch, IsWhatTheWholeFirmwareMakesOfTheSameScene) {
   for (std::size_t shift = 0; shift < 2; ++shift) {
     worst = 0.0;
     for (std::size_t n = 0; n + shift < compared; ++n)
-      worst = std::max(worst, std::abs(whole.samples[n + shift].true_position - bare[n].position));
+      worst = std::max(worst, std::abs(whole.samples[0][n + shift].true_position - bare[n].position));
     best = std::min(best, worst);
   }
   EXPECT_LT(best, 0.6e-3);  // 0.2 m/s x 2 ms is 0.4 mm

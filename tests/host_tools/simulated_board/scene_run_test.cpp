@@ -31,13 +31,13 @@ void set(simulation::Scene& scene, const std::string& name, simulation::Paramete
 
 std::vector<std::uint64_t> bits_of(const RunResult& result) {
   std::vector<std::uint64_t> bits;
-  auto all = result.samples;
-  all.insert(all.end(), result.second_samples.begin(), result.second_samples.end());
-  for (const RunSample& s : all) {
-    for (const double value :
-         {s.time, s.true_position, s.tip_position, s.true_velocity, s.hand_position, s.intended_position,
-          s.position, s.velocity, s.force, s.applied_force, s.magnetic_coefficient})
-      bits.push_back(std::bit_cast<std::uint64_t>(value));
+  for (const auto& samples : result.samples) {
+    for (const RunSample& s : samples) {
+      for (const double value :
+           {s.time, s.true_position, s.tip_position, s.true_velocity, s.hand_position, s.intended_position,
+            s.position, s.velocity, s.force, s.applied_force, s.magnetic_coefficient})
+        bits.push_back(std::bit_cast<std::uint64_t>(value));
+    }
   }
   return bits;
 }
@@ -47,7 +47,7 @@ TEST(SceneRun, TheSameSceneGivesTheSameBits) {
     simulation::Scene scene = open_scene(name);
     scene.duration = 0.8;
     const RunResult first = run_scene(scene), second = run_scene(scene);
-    ASSERT_GT(first.samples.size(), 300u) << name;
+    ASSERT_GT(first.samples[0].size(), 300u) << name;
     EXPECT_EQ(bits_of(first), bits_of(second)) << name;
   }
   simulation::Scene changed = touch(0.8);
@@ -66,10 +66,9 @@ TEST(SceneRun, PersonsPressAgainstWallsThatMotorsMake) {
     ASSERT_TRUE(result.contact) << name;
     EXPECT_NEAR(result.contact->deepest, 0.5e-3, 0.15e-3) << name;
     EXPECT_EQ(result.clipped_share, 0.0) << "a motor has no clip of its own";
-    for (const auto* samples : {&result.samples, &result.second_samples}) {
-      if (samples->empty()) continue;
+    for (const auto& samples : result.samples) {
       double asked = 0, made = 0, held = 0, least = 1.0, most = -1.0;
-      for (const RunSample& sample : *samples) {
+      for (const RunSample& sample : samples) {
         if (sample.time < result.judged_from || sample.time > result.judged_to) continue;
         asked += sample.force;
         made += sample.applied_force;
@@ -88,15 +87,15 @@ TEST(SceneRun, PersonsPressAgainstWallsThatMotorsMake) {
 
 TEST(SceneRun, HasEverySampleOfTheDurationAndTheFirmwaresNumbers) {
   const RunResult result = run_scene(touch(1.0));
-  EXPECT_EQ(result.samples.size(), 500u);
+  EXPECT_EQ(result.samples[0].size(), 500u);
   EXPECT_EQ(result.end_state, DriveState::operation_enabled);
   EXPECT_EQ(result.fault, firmware::Fault::none);
   EXPECT_FALSE(result.contact) << "the hold is not over";
   EXPECT_GE(result.simulated_s, 1.0);
   EXPECT_GT(result.real_s, 0.0);
-  for (std::size_t i = 1; i < result.samples.size(); ++i)
-    ASSERT_NEAR(result.samples[i].time - result.samples[i - 1].time, 0.002, 1e-12);
-  for (const RunSample& sample : result.samples) {
+  for (std::size_t i = 1; i < result.samples[0].size(); ++i)
+    ASSERT_NEAR(result.samples[0][i].time - result.samples[0][i - 1].time, 0.002, 1e-12);
+  for (const RunSample& sample : result.samples[0]) {
     ASSERT_NEAR(sample.position, sample.true_position, 0.2e-3);
     ASSERT_LE(std::abs(sample.applied_force), 3.3 + 1e-6);
   }
@@ -117,7 +116,7 @@ TEST(SceneRun, AHandleNobodyHoldsIsNotJudged) {
   scene.duration = 0.5;
   const RunResult result = run_scene(scene);
   EXPECT_FALSE(result.contact);
-  EXPECT_FALSE(result.samples.empty());
+  EXPECT_FALSE(result.samples[0].empty());
 }
 
 TEST(SceneRun, WhatKeepsItFromBeingArmedIsSaid) {
@@ -125,7 +124,7 @@ TEST(SceneRun, WhatKeepsItFromBeingArmedIsSaid) {
   scene.axes[0].start.position = -0.001;
   scene.axes[0].start.velocity = 0;
   const RunResult result = run_scene(scene);
-  EXPECT_TRUE(result.samples.empty());
+  EXPECT_TRUE(result.samples[0].empty());
   EXPECT_EQ(result.refusal, firmware::Refusal::handle_inside_wall);
   EXPECT_NE(result.end_state, DriveState::operation_enabled);
   EXPECT_FALSE(result.contact);
@@ -136,11 +135,11 @@ TEST(SceneRun, BothAxesAreArmedAndSampledTogether) {
   scene.duration = 0.5;
   scene.axes[1].start.velocity = -0.3;
   const RunResult result = run_scene(scene);
-  ASSERT_EQ(result.samples.size(), 250u);
-  ASSERT_EQ(result.second_samples.size(), 250u);
-  EXPECT_EQ(result.samples[100].time, result.second_samples[100].time);
+  ASSERT_EQ(result.samples[0].size(), 250u);
+  ASSERT_EQ(result.samples[1].size(), 250u);
+  EXPECT_EQ(result.samples[0][100].time, result.samples[1][100].time);
   double deepest = 0.0, strongest = 0.0;
-  for (const RunSample& sample : result.second_samples) {
+  for (const RunSample& sample : result.samples[1]) {
     deepest = std::min(deepest, sample.true_position);
     strongest = std::max(strongest, sample.force);
   }
@@ -149,8 +148,8 @@ TEST(SceneRun, BothAxesAreArmedAndSampledTogether) {
   scene.duration = 0.05;
   set(scene, "axis1.haptic.rate", 20000.0);
   const RunResult quick = run_scene(scene);
-  EXPECT_EQ(quick.samples.size(), 25u);
-  EXPECT_EQ(quick.second_samples.size(), 1000u);
+  EXPECT_EQ(quick.samples[0].size(), 25u);
+  EXPECT_EQ(quick.samples[1].size(), 1000u);
 }
 
 TEST(SceneRun, TheSecondAxisIsToldOfToo) {
@@ -160,7 +159,7 @@ TEST(SceneRun, TheSecondAxisIsToldOfToo) {
   const RunResult refused = run_scene(scene);
   EXPECT_EQ(refused.axis, 1u);
   EXPECT_EQ(refused.refusal, firmware::Refusal::handle_inside_wall);
-  EXPECT_TRUE(refused.samples.empty());
+  EXPECT_TRUE(refused.samples[0].empty());
   scene.axes[1].start = {0.005, -1.0};
   set(scene, "axis1.velocity.limit", 0.5);
   const RunResult fast = run_scene(scene);
@@ -175,8 +174,9 @@ TEST(SceneRun, AnotherIntegratorIsAnotherTrace) {
   const auto furthest = [&] {
     const RunResult other = run_scene(scene);
     double largest = 0.0;
-    for (std::size_t n = 0; n < exact.samples.size(); ++n)
-      largest = std::max(largest, std::abs(other.samples[n].true_position - exact.samples[n].true_position));
+    for (std::size_t n = 0; n < exact.samples[0].size(); ++n)
+      largest =
+          std::max(largest, std::abs(other.samples[0][n].true_position - exact.samples[0][n].true_position));
     return largest;
   };
   EXPECT_EQ(furthest(), 0.0);
@@ -184,8 +184,8 @@ TEST(SceneRun, AnotherIntegratorIsAnotherTrace) {
   scene.integrator.kind = simulation::IntegratorKind::rk4;
   const RunResult stepped = run_scene(scene);
   EXPECT_NE(bits_of(stepped), bits_of(exact));
-  EXPECT_NEAR(stepped.samples.back().true_position, exact.samples[stepped.samples.size() - 1].true_position,
-              1e-6);
+  EXPECT_NEAR(stepped.samples[0].back().true_position,
+              exact.samples[0][stepped.samples[0].size() - 1].true_position, 1e-6);
 }
 
 TEST(SceneRun, AFaultEndsTheForceAndIsReported) {
@@ -194,8 +194,8 @@ TEST(SceneRun, AFaultEndsTheForceAndIsReported) {
   const RunResult result = run_scene(scene);
   EXPECT_EQ(result.fault, firmware::Fault::over_speed);
   EXPECT_EQ(result.end_state, DriveState::fault);
-  ASSERT_FALSE(result.samples.empty());
-  EXPECT_EQ(result.samples.back().applied_force, 0.0);
+  ASSERT_FALSE(result.samples[0].empty());
+  EXPECT_EQ(result.samples[0].back().applied_force, 0.0);
 }
 
 // --- Every supplied scene does what its comment says, through the native firmware. What each of them claims
@@ -221,7 +221,7 @@ void without_activation(Scene& scene) {
 double thrown_out(const RunResult& result) {
   double largest = 0.0;
   bool touched = false;
-  for (const RunSample& sample : result.samples) {
+  for (const RunSample& sample : result.samples[0]) {
     touched = touched || sample.true_position <= 0.0;
     if (touched && sample.time < result.judged_to) largest = std::max(largest, sample.true_position);
   }
@@ -237,7 +237,7 @@ const RunSample& at(const std::vector<RunSample>& samples, double time) {
 
 // Where axis 1 has come to rest under the interference, m.
 double pushed_aside(const RunResult& result) {
-  return at(result.second_samples, result.judged_to - 0.1).true_position;
+  return at(result.samples[1], result.judged_to - 0.1).true_position;
 }
 
 TEST(SuppliedScenes, AllRunWithoutAFaultAndAreNamedAsTheirFiles) {
@@ -258,7 +258,7 @@ TEST(SuppliedScenes, AllRunWithoutAFaultAndAreNamedAsTheirFiles) {
     EXPECT_EQ(result.fault, firmware::Fault::none);
     EXPECT_EQ(result.end_state, firmware::DriveState::operation_enabled)
         << "axis " << result.axis << ", " << firmware::to_string(result.refusal);
-    EXPECT_EQ(result.second_samples.empty(), scene.axes.size() < 2);
+    EXPECT_EQ(result.samples.size(), scene.axes.size());
     EXPECT_TRUE(result.contact || !scene.axes[0].motion) << "the run ends before the hold";
     const bool unstable = result.contact && result.contact->verdict == ContactVerdict::unstable;
     // Beyond the plain wall's limit, these two ring for some tenths of a second before the field calms them.
@@ -291,7 +291,7 @@ TEST(SuppliedScenes, ContactsOfPaper1) {
     EXPECT_GE(result.contact->peak_to_peak, contact.least * 1e-3) << contact.name;
     EXPECT_LE(result.contact->peak_to_peak, contact.most * 1e-3) << contact.name;
     EXPECT_GT(result.contact->deepest, 0.0) << contact.name;
-    EXPECT_EQ(result.samples.size(), 2500u) << contact.name;
+    EXPECT_EQ(result.samples[0].size(), 2500u) << contact.name;
   }
 }
 
@@ -327,7 +327,7 @@ TEST(SuppliedScenes, ABackgroundForceMakesTheJitterOfTable1Smaller) {
   EXPECT_NEAR(thrown_out(three), 1.45e-3, 0.3e-3);
   // F_I + F_B is asked for and made.
   const auto strongest = std::max_element(
-      three.samples.begin(), three.samples.end(),
+      three.samples[0].begin(), three.samples[0].end(),
       [](const RunSample& a, const RunSample& b) { return a.applied_force < b.applied_force; });
   EXPECT_GT(strongest->applied_force, 8.0);
   EXPECT_EQ(three.clipped_share, 0.0);
@@ -360,10 +360,10 @@ TEST(SuppliedScenes, ThePositionsStepDecidesInPaper2) {
   const RunResult coarse = run_scene(open_scene("paper2_fig_2"));
   EXPECT_EQ(coarse.contact->verdict, ContactVerdict::unstable);
   EXPECT_NEAR(coarse.contact->peak_to_peak, 0.2e-3, 0.04e-3);
-  EXPECT_EQ(fine.samples.size(), 5000u);
+  EXPECT_EQ(fine.samples[0].size(), 5000u);
   // 17 counts of 0.023 mm at 1.2 N/mm.
   std::set<double> forces;
-  for (const RunSample& sample : coarse.samples) {
+  for (const RunSample& sample : coarse.samples[0]) {
     if (sample.time > 1.0 && sample.time < coarse.judged_to && sample.force > 0.0)
       forces.insert(sample.force);
   }
@@ -390,7 +390,7 @@ TEST(SuppliedScenes, AStructureBendsBetweenEncoderAndHand) {
   const Scene scene = open_scene("compliant_structure");
   const RunResult result = run_scene(scene);
   EXPECT_EQ(result.contact->verdict, ContactVerdict::stable);
-  const RunSample& held = at(result.samples, result.judged_from + 0.5);
+  const RunSample& held = at(result.samples[0], result.judged_from + 0.5);
   const double bent = held.true_position - held.tip_position;
   const double stiffness = scene.axes[0].device.structure->stiffness;
   // The force that the motor makes, but for what friction holds.
@@ -398,8 +398,8 @@ TEST(SuppliedScenes, AStructureBendsBetweenEncoderAndHand) {
   EXPECT_GT(bent, 0.3e-3);
   Scene rigid = scene;
   rigid.axes[0].device.structure.reset();
-  for (const RunSample& sample : run_scene(rigid).samples)
-    ASSERT_EQ(sample.tip_position, sample.true_position);
+  const RunResult unbent = run_scene(rigid);
+  for (const RunSample& sample : unbent.samples[0]) ASSERT_EQ(sample.tip_position, sample.true_position);
 }
 
 TEST(SuppliedScenes, ANoisyEncoderLosesTheWall) {
@@ -407,7 +407,7 @@ TEST(SuppliedScenes, ANoisyEncoderLosesTheWall) {
   EXPECT_EQ(result.fault, firmware::Fault::none) << "nobody can know";
   EXPECT_GT(result.lost_edges, 100);
   EXPECT_EQ(result.contact->verdict, ContactVerdict::no_contact);
-  const RunSample& late = at(result.samples, result.judged_from + 0.5);
+  const RunSample& late = at(result.samples[0], result.judged_from + 0.5);
   EXPECT_GT(late.true_position, 0.15e-3) << "outside, and yet";
   EXPECT_GT(late.force, 0.3) << "the wall is felt";
   EXPECT_GT(late.true_position - late.position, 1e-3);
@@ -416,7 +416,8 @@ TEST(SuppliedScenes, ANoisyEncoderLosesTheWall) {
   const RunResult clean = run_scene(ideal);
   EXPECT_EQ(clean.lost_edges, 0);
   EXPECT_EQ(clean.contact->verdict, ContactVerdict::stable);
-  EXPECT_LT(std::abs(at(clean.samples, 2.0).true_position - at(clean.samples, 2.0).position), 0.0551e-3);
+  EXPECT_LT(std::abs(at(clean.samples[0], 2.0).true_position - at(clean.samples[0], 2.0).position),
+            0.0551e-3);
 }
 
 }  // namespace kmax::simulated_board::scene_run_test
