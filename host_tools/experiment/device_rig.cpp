@@ -47,15 +47,22 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
       fmt::format("interference.background_force={}", wall.background_force),
       "interference.onset_time=0",
       "wall.law=" + choice(device::Parameter::of<"wall.law">(), wall.law)};
-  if (wall.law != control::WallKind::plain)
-    all.insert(
-        all.end(),
-        {"wall.magnetic_length=0.001", "wall.adaptive_gain=2.4", "wall.adaptive_offset=0.8",
-         "wall.adaptive_velocity_max=2.4", "wall.adaptive_relation=linear", "wall.adaptive_velocity=approach",
-         "wall.adaptive_force_min=0.8", "wall.adaptive_force_max=2", "wall.adaptive_hold_time=1.2",
-         wall.law == control::WallKind::magnetic
-             ? fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient)
-             : "wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)});
+  const auto add_field = [&all](const std::string& own) {
+    all.insert(all.end(), {"wall.magnetic_length=0.001", "wall.adaptive_gain=2.4", "wall.adaptive_offset=0.8",
+                           "wall.adaptive_velocity_max=2.4", "wall.adaptive_relation=linear",
+                           "wall.adaptive_velocity=approach", "wall.adaptive_force_min=0.8",
+                           "wall.adaptive_force_max=2", "wall.adaptive_hold_time=1.2", own});
+  };
+  switch (wall.law) {
+    case control::WallKind::none:
+    case control::WallKind::plain:
+      break;
+    case control::WallKind::magnetic:
+      add_field(fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient));
+      break;
+    case control::WallKind::adaptive:
+      add_field("wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode));
+  }
   if (axes == RigAxes::wall_along)
     for (const std::string& one :
          {std::string("wall.law=none"), std::string("position.resolution=0"),

@@ -11,7 +11,7 @@
 namespace kmax::cli {
 
 std::string key_of(const experiment::StiffnessCondition& condition) {
-  if (!condition.adaptive) return fmt::format("{:g}", condition.magnetic_coefficient);
+  if (!condition.adaptive()) return fmt::format("{:g}", condition.magnetic_coefficient);
   switch (condition.mode) {
     case control::AdaptiveMode::latched:
       return "latched";
@@ -42,8 +42,8 @@ Json condition_json(const experiment::StiffnessCondition& condition, double stif
                     const std::vector<double>& subjects, const std::string& name) {
   return {
       {"name", name.empty() ? condition.name : name},
-      {"magnetic_coefficient_n", condition.adaptive ? Json(nullptr) : Json(condition.magnetic_coefficient)},
-      {"adaptive", condition.adaptive},
+      {"magnetic_coefficient_n", condition.adaptive() ? Json(nullptr) : Json(condition.magnetic_coefficient)},
+      {"adaptive", condition.adaptive()},
       {"max_stiffness_n_per_m", stiffness},
       {"subjects", subjects},
       {"paper_n_per_m", condition.paper ? Json(*condition.paper) : Json(nullptr)}};

@@ -42,7 +42,7 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
   limits.axis = context.axis();
   const auto conditions = conditions_for(options.conditions);
   for (const auto& condition : conditions) {
-    if (settings.last < (condition.adaptive ? settings.start_adaptive : settings.start))
+    if (settings.last < (condition.adaptive() ? settings.start_adaptive : settings.start))
       throw UsageError(
           fmt::format("--last {} is below the first stiffness of '{}'", settings.last, condition.name));
   }

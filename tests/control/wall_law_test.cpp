@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "firmware/object_dictionary/axis_groups.hpp"
+
 namespace kmax::control::wall_law_test {
 
 template <typename Scalar>
@@ -120,7 +122,8 @@ RC_GTEST_PROP(WallLaw, EveryFiniteInputGivesAFiniteForce, ()) {
                               [](float v) { return std::isfinite(v); });
   };
   WallLawConfig<float> config;
-  config.kind = *rc::gen::element(WallKind::plain, WallKind::magnetic, WallKind::adaptive);
+  config.kind =
+      static_cast<WallKind>(*rc::gen::inRange<std::size_t>(0, std::size(firmware::names::wall_law)));
   config.stiffness = std::abs(any_finite());
   config.damping = std::abs(any_finite());
   config.magnetic_coefficient = std::abs(any_finite());

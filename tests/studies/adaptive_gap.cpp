@@ -23,7 +23,7 @@ WallChange constant_wall(double coefficient) {
 WallChange adaptive_wall(AdaptiveMode mode, double hold_time = 0.0) {
   return [mode, hold_time](TouchSetup& setup) {
     StiffnessCondition condition;
-    condition.adaptive = true;
+    condition.law = control::WallKind::adaptive;
     condition.mode = mode;
     setup.wall.velocity.kind = control::HapticLoopConfig<float>().velocity.kind;  // the firmware's default
     condition.apply(setup);

@@ -32,8 +32,8 @@ HeldWall hold(TouchSetup setup, const experiment::TouchProtocol& protocol) {
 
 const experiment::paper::ContactVerdict* printed_verdict(const StiffnessCondition& condition) {
   for (const auto& verdict : experiment::paper::contact_verdicts) {
-    if (verdict.adaptive == condition.adaptive &&
-        (condition.adaptive || verdict.magnetic_coefficient == condition.magnetic_coefficient))
+    if (verdict.adaptive == condition.adaptive() &&
+        (condition.adaptive() || verdict.magnetic_coefficient == condition.magnetic_coefficient))
       return &verdict;
   }
   return nullptr;

@@ -77,7 +77,7 @@ std::string finding(const Claim& claim, const std::vector<VariationResult>& resu
     std::vector<double> constant;
     double adaptive = 0.0;
     for (std::size_t n = 0; n < conditions.size(); ++n) {
-      if (conditions[n].adaptive)
+      if (conditions[n].adaptive())
         adaptive = std::max(adaptive, result.means[n].mean);
       else
         constant.push_back(result.means[n].mean);

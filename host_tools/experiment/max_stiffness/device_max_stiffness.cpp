@@ -31,7 +31,7 @@ DeviceStiffnessTouch touch_once(Rig& rig, const StiffnessCondition& condition,
   RigWall wall;
   wall.stiffness = stiffness;
   wall.haptic_rate = settings.touch.haptic_rate;
-  wall.law = condition.adaptive ? control::WallKind::adaptive : control::WallKind::magnetic;
+  wall.law = condition.law;
   wall.magnetic_coefficient = condition.magnetic_coefficient;
   wall.mode = condition.mode;
   TouchPlan plan;
@@ -90,7 +90,7 @@ RunJournal::Json journal_settings(device::Device& device, const TouchLimits& lim
 DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& condition,
                                          const DeviceStiffnessSettings& settings) {
   DeviceStiffnessResult result{condition, {}, {}};
-  StiffnessClimb climb(condition.adaptive ? settings.start_adaptive : settings.start, settings.step,
+  StiffnessClimb climb(condition.adaptive() ? settings.start_adaptive : settings.start, settings.step,
                        settings.last);
   while (const auto stiffness = climb.next()) {
     bool stable = true;
@@ -121,11 +121,11 @@ bool order_is_the_papers(const std::vector<DeviceStiffnessResult>& results) {
     return !result.found.beyond_last && !result.found.never_touched;
   };
   const auto plain = std::find_if(results.begin(), results.end(), [](const DeviceStiffnessResult& result) {
-    return !result.condition.adaptive && result.condition.magnetic_coefficient == 0.0;
+    return !result.condition.adaptive() && result.condition.magnetic_coefficient == 0.0;
   });
   if (plain == results.end() || !measured(*plain)) return true;
   return std::all_of(results.begin(), results.end(), [&](const DeviceStiffnessResult& result) {
-    const bool claimed = result.condition.adaptive || result.condition.magnetic_coefficient >= 2.0;
+    const bool claimed = result.condition.adaptive() || result.condition.magnetic_coefficient >= 2.0;
     return !claimed || !measured(result) || result.found.stiffness > plain->found.stiffness;
   });
 }

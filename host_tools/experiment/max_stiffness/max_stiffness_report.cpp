@@ -23,7 +23,7 @@ std::string either(const MaxStiffness& result) {
 
 const ConditionResult* constant_of(const MaxStiffnessStudy& study, double coefficient) {
   for (const ConditionResult& result : study.conditions) {
-    if (!result.condition.adaptive && result.condition.magnetic_coefficient == coefficient) return &result;
+    if (!result.condition.adaptive() && result.condition.magnetic_coefficient == coefficient) return &result;
   }
   return nullptr;
 }
@@ -127,7 +127,7 @@ report::Table subject_table(const MaxStiffnessStudy& study) {
 bool as_calibrated(const MaxStiffnessStudy& study) {
   double previous = 0.0;
   for (const ConditionResult& result : study.conditions) {
-    if (result.condition.adaptive) continue;
+    if (result.condition.adaptive()) continue;
     if (result.mean() <= previous) return false;
     previous = result.mean();
     if (result.condition.origin != report::Origin::calibrated) continue;
@@ -163,7 +163,7 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
     const ConditionResult* two = constant_of(study, 2.0);
     double most = 0.0;
     for (const ConditionResult& result : study.conditions) {
-      if (result.condition.adaptive) most = std::max(most, result.mean());
+      if (result.condition.adaptive()) most = std::max(most, result.mean());
     }
     if (two == nullptr || most == 0.0) continue;
     const double printed = paper::max_stiffness.back().stiffness;
@@ -227,7 +227,7 @@ plot::Figure max_stiffness_figure(const std::vector<MaxStiffnessStudy>& studies)
     plot::Series constant{std::string("constant, ") + clipped, {}, {}};
     constant.points = true;
     for (const ConditionResult& result : study.conditions) {
-      if (result.condition.adaptive) continue;
+      if (result.condition.adaptive()) continue;
       constant.x.push_back(result.condition.magnetic_coefficient);
       constant.y.push_back(result.mean() / 1e3);
     }
@@ -235,7 +235,7 @@ plot::Figure max_stiffness_figure(const std::vector<MaxStiffnessStudy>& studies)
     plot::Series modes{std::string("adaptive, ") + clipped, {}, {}};
     double least = 1e300, most = 0.0;
     for (const ConditionResult& result : study.conditions) {
-      if (!result.condition.adaptive) continue;
+      if (!result.condition.adaptive()) continue;
       least = std::min(least, result.mean() / 1e3);
       most = std::max(most, result.mean() / 1e3);
     }

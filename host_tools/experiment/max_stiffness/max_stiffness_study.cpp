@@ -27,7 +27,7 @@ constexpr auto search_fields = [](auto& result, const auto& field) {
 
 // A fit with another force limit is none: part of the gain is the limit's.
 report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condition) {
-  if (!set.fitted || set.fitted->force_limit != set.device.force_limit || condition.adaptive)
+  if (!set.fitted || set.fitted->force_limit != set.device.force_limit || condition.adaptive())
     return report::Origin::predicted;
   std::optional<double> target;
   if (condition.magnetic_coefficient == 0.0) target = set.fitted->plain_target;

@@ -21,7 +21,7 @@ SubjectSet with(const SubjectSet& set, double friction, double gain) {
 
 StiffnessCondition constant_field(double coefficient) {
   for (const StiffnessCondition& condition : stiffness_conditions()) {
-    if (!condition.adaptive && condition.magnetic_coefficient == coefficient) return condition;
+    if (!condition.adaptive() && condition.magnetic_coefficient == coefficient) return condition;
   }
   throw std::logic_error("no such condition");
 }

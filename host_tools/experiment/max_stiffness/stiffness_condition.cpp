@@ -7,12 +7,11 @@
 namespace kmax::experiment {
 
 void StiffnessCondition::apply(TouchSetup& setup) const {
-  auto& law = setup.wall.wall;
-  law.kind = adaptive                     ? control::WallKind::adaptive
-             : magnetic_coefficient > 0.0 ? control::WallKind::magnetic
-                                          : control::WallKind::plain;
-  law.magnetic_coefficient = static_cast<float>(magnetic_coefficient);
-  law.adaptive.mode = mode;
+  auto& wall = setup.wall.wall;
+  const bool fieldless = law == control::WallKind::magnetic && magnetic_coefficient == 0.0;
+  wall.kind = fieldless ? control::WallKind::plain : law;
+  wall.magnetic_coefficient = static_cast<float>(magnetic_coefficient);
+  wall.adaptive.mode = mode;
 }
 
 std::vector<StiffnessCondition> stiffness_conditions() {
@@ -37,7 +36,7 @@ std::vector<StiffnessCondition> stiffness_conditions() {
                                    std::pair{AdaptiveMode::peak_hold, "adaptive, peak_hold"}}) {
     StiffnessCondition condition;
     condition.name = name;
-    condition.adaptive = true;
+    condition.law = control::WallKind::adaptive;
     condition.mode = mode;
     condition.paper = printed(0.0, true);
     conditions.push_back(condition);
@@ -53,7 +52,8 @@ TouchSetup touch_setup(const simulation::DeviceModel& device, const simulation::
   setup.wall = touched_wall(paper::update_rate, paper::touch_resolution, device.force_limit);
   // The estimator is the firmware's default where a velocity counts. Constant walls ask for none, and FOAW
   // costs more than all the rest of the tick.
-  if (!condition.adaptive) setup.wall.velocity.kind = control::VelocityEstimatorKind::difference;
+  if (!control::follows_velocity(condition.law))
+    setup.wall.velocity.kind = control::VelocityEstimatorKind::difference;
   condition.apply(setup);
   return setup;
 }

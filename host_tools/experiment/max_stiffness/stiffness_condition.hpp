@@ -13,14 +13,15 @@ namespace kmax::experiment {
 
 struct StiffnessCondition {
   std::string name;
+  control::WallKind law = control::WallKind::magnetic;
   double magnetic_coefficient = 0.0;  // N, of the constant field; 0 for the adaptive wall
-  bool adaptive = false;
   control::AdaptiveMode mode = control::AdaptiveMode::instant;
   std::optional<double> paper;  // N/m
   // Whether the model was fitted to this very number, or it follows without another fit. That hangs on the
   // people: run_max_stiffness_study() sets it in its results.
   report::Origin origin = report::Origin::predicted;
 
+  bool adaptive() const { return law == control::WallKind::adaptive; }
   void apply(TouchSetup& setup) const;
 };
 

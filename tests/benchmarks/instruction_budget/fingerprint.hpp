@@ -2,7 +2,9 @@
 
 #include <bit>
 #include <cstdint>
+#include <iterator>
 
+#include "firmware/object_dictionary/axis_groups.hpp"
 #include "tests/benchmarks/instruction_budget/inputs.hpp"
 #include "tests/benchmarks/instruction_budget/steps.hpp"
 
@@ -53,7 +55,7 @@ class Fingerprint {
     Wall wall;
     for (int i = 0; i < 6000; ++i) {
       control::WallLawConfig<float> config;
-      config.kind = static_cast<control::WallKind>(inputs_.random() % 4);
+      config.kind = static_cast<control::WallKind>(inputs_.random() % std::size(firmware::names::wall_law));
       config.damping = 5.0F;
       config.adaptive.relation = static_cast<control::AdaptiveRelation>(inputs_.random() % 3);
       config.adaptive.velocity = static_cast<control::AdaptiveVelocity>(inputs_.random() % 2);

@@ -87,16 +87,15 @@ TEST_F(Limited, LimitsThatAreLowerAlreadyStay) {
 
 TEST_F(Limited, AWallOfEveryLawIsSetWithAllThatItHas) {
   begin(RigAxes::wall_along);
-  for (const auto law :
-       {control::WallKind::plain, control::WallKind::magnetic, control::WallKind::adaptive}) {
-    SCOPED_TRACE(static_cast<int>(law));
+  for (const firmware::NamedValue& law : firmware::names::wall_law) {
+    SCOPED_TRACE(law.name);
     // What the wall before has left.
     set({"position.rounding=nearest", "interference.mode=none", "interference.force=0",
          "interference.background_force=0", "interference.onset_time=1", "axis1.wall.law=plain",
          "axis1.position.resolution=0.001", "axis1.interference.mode=perpendicular",
          "axis1.haptic.rate=20000"});
     RigWall wall;
-    wall.law = law;
+    wall.law = static_cast<control::WallKind>(law.value);
     wall.resolution = 0.4e-3;
     wall.rounding = control::Rounding::floor;
     wall.interference = control::InterferenceMode::parallel;
@@ -104,7 +103,7 @@ TEST_F(Limited, AWallOfEveryLawIsSetWithAllThatItHas) {
     wall.background_force = 0.5;
     rig->set(wall);
     const auto value = [&](const char* name) { return device.read_number(name); };
-    EXPECT_EQ(value("wall.law"), static_cast<double>(law));
+    EXPECT_EQ(value("wall.law"), law.value);
     EXPECT_EQ(value("position.resolution"), 0.4e-3F);
     EXPECT_EQ(value("position.rounding"), static_cast<double>(control::Rounding::floor));
     EXPECT_EQ(value("interference.mode"), static_cast<double>(control::InterferenceMode::parallel));

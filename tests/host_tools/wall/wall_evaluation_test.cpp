@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "firmware/object_dictionary/axis_groups.hpp"
+
 namespace kmax::wall::wall_evaluation_test {
 
 using control::WallKind;
@@ -53,7 +55,8 @@ TEST(WallEvaluator, ZeroForceOfAMirroredWallHasNoSign) {
 }
 
 RC_GTEST_PROP(WallEvaluatorProperty, OtherSideIsTheMirrorImage, ()) {
-  auto values = wall(static_cast<WallKind>(*rc::gen::inRange(0, 4)));
+  auto values =
+      wall(static_cast<WallKind>(*rc::gen::inRange<std::size_t>(0, std::size(firmware::names::wall_law))));
   values.set_real<"wall.position">(0.0f);
   values.set_real<"wall.damping">(static_cast<float>(*rc::gen::inRange(0, 20)));
   const double position = *rc::gen::inRange(-20000, 20000) * 1e-6;

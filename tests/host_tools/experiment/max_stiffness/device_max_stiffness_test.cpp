@@ -78,7 +78,7 @@ TEST_F(DeviceStiffness, AFieldOfTwoNewtonsAllowsMoreAndStartsAreThoseOfTheLaw) {
   EXPECT_EQ(field.found.stiffness, 5000);
   StiffnessCondition adaptive;
   adaptive.name = "adaptive, latched";
-  adaptive.adaptive = true;
+  adaptive.law = control::WallKind::adaptive;
   adaptive.mode = control::AdaptiveMode::latched;
   settings.start_adaptive = 4500;
   const DeviceStiffnessResult result = find(adaptive);
@@ -301,7 +301,7 @@ TEST(OrderOfThePaper, IsContradictedByAFieldThatDoesNotHelp) {
   const auto found = [](double coefficient, bool adaptive, double stiffness) {
     DeviceStiffnessResult result;
     result.condition.magnetic_coefficient = coefficient;
-    result.condition.adaptive = adaptive;
+    result.condition.law = adaptive ? control::WallKind::adaptive : control::WallKind::magnetic;
     result.found.stiffness = stiffness;
     return result;
   };

@@ -16,9 +16,9 @@ TEST(StiffnessCondition, AreThoseOfThePaper) {
     EXPECT_EQ(condition.origin, report::Origin::predicted);
     TouchSetup setup;
     condition.apply(setup);
-    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::adaptive, condition.adaptive);
+    EXPECT_EQ(setup.wall.wall.kind == control::WallKind::adaptive, condition.adaptive());
     EXPECT_EQ(setup.wall.wall.kind == control::WallKind::plain,
-              !condition.adaptive && condition.magnetic_coefficient == 0.0);
+              !condition.adaptive() && condition.magnetic_coefficient == 0.0);
   }
 }
 
