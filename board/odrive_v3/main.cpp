@@ -201,9 +201,10 @@ void tick_without_power() {
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) cortex::stop_on_unexpected_interrupt();
   }
   for (;;) {
-    const bool due =
-        !power_runs || power->drives().main_loop_due() || serial->poll_due() || can_line->poll_due();
-    if (due) {
+    bool due = serial->poll_due();
+    due = can_line->poll_due() || due;
+    due = (power_runs && power->drives().main_loop_due()) || due;
+    if (due || !power_runs) {
       const std::uint32_t now = system_tick.now_us();
       if (!power_runs) tick_without_power();
       if (power_runs) {
@@ -218,8 +219,9 @@ void tick_without_power() {
       if (application->can().restart_wanted()) restart();
       if (power_runs) poll_power(now);
     }
-    // Work that arrives between the poll and here waits for the next interrupt, at most half a tick.
-    cortex::wait_for_interrupt();
+    // What has come meanwhile does not wait; what comes between the look above and here does, for the next
+    // interrupt, at most half a tick.
+    if (!due) cortex::wait_for_interrupt();
   }
 }
 

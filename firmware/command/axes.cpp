@@ -168,7 +168,7 @@ void Axes::begin_poll(std::uint32_t now_us) {
   now_us_ = now_us;
   tick_.keep_alive();
   // The last axis' first: that it is of a round says that those of the others are of the same.
-  for (std::size_t axis = axis_count; axis-- > 0;) report_[axis] = tick_.report(axis);
+  for (std::size_t axis = axis_count; axis-- > 0;) tick_.report(axis, report_[axis]);
   poll_temperatures();
 }
 

@@ -74,6 +74,7 @@ class AxesTick {
     rounds_alive_.store(rounds_alive_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
   AxisReport report(std::size_t axis) const { return reports_[axis].read(); }
+  void report(std::size_t axis, AxisReport& report) const { reports_[axis].read(report); }
   /// A record of `axis` at every `interval`-th haptic sample; 0: none.
   void trace_axis(std::size_t axis, std::uint32_t interval) {
     trace_axis_.store(static_cast<std::uint8_t>(axis), std::memory_order_relaxed);

@@ -33,13 +33,20 @@ class Seqlock {
   }
 
   Value read() const {
-    for (;;) {
-      const std::uint32_t before = sequence_.load(std::memory_order_acquire);
+    Value copy;
+    read(copy);
+    return copy;
+  }
+
+  /// The same without a second copy, for who keeps the value.
+  void read(Value& copy) const {
+    std::uint32_t before = 0;
+    do {
+      before = sequence_.load(std::memory_order_acquire);
       std::atomic_signal_fence(std::memory_order_seq_cst);
-      const Value copy = value_;
+      copy = value_;
       std::atomic_signal_fence(std::memory_order_seq_cst);
-      if ((before & 1u) == 0 && sequence_.load(std::memory_order_acquire) == before) return copy;
-    }
+    } while ((before & 1u) != 0 || sequence_.load(std::memory_order_acquire) != before);
   }
 
  private:

@@ -87,15 +87,18 @@ void put_words(std::uint32_t offset, std::span<std::uint8_t> out, Word word) {
 
 }  // namespace
 
-Abort CanopenObjects::find(ObjectAddress address, std::optional<std::size_t>& slot,
-                           const canopen::SpecialPlace*& special) const {
-  slot = canopen::slot_at(address);
-  special = slot ? nullptr : canopen::special_at(address);
-  if (slot || special != nullptr) return Abort::none;
+const CanopenObjects::Place& CanopenObjects::find(ObjectAddress address) {
+  if (found_.address == address) return found_;
+  found_ = {address, Abort::none, canopen::slot_at(address)};
+  if (found_.slot) return found_;
+  found_.special = canopen::special_at(address);
+  if (found_.special != nullptr) return found_;
   const auto highest = canopen::highest_subindex(address.index);
-  if (!highest) return Abort::no_object;
-  // The number of sub-indices that every record has.
-  return address.subindex == 0 && *highest != 0 ? Abort::none : Abort::no_subindex;
+  if (!highest)
+    found_.abort = Abort::no_object;
+  else if (address.subindex != 0 || *highest == 0)
+    found_.abort = Abort::no_subindex;
+  return found_;
 }
 
 Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint8_t subindex,
@@ -140,9 +143,8 @@ Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint
 }
 
 Abort CanopenObjects::read_begin(ObjectAddress address, std::uint32_t& size) {
-  std::optional<std::size_t> slot;
-  const canopen::SpecialPlace* special = nullptr;
-  if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
+  const auto& [asked, abort, slot, special] = find(address);
+  if (abort != Abort::none) return abort;
   if (special != nullptr) return special_size(*special, address.subindex, size);
   size = slot ? bytes_of(descriptors[owner_of(*slot).entry].type) : 1U;
   return Abort::none;
@@ -212,9 +214,8 @@ Abort CanopenObjects::read_special(const canopen::SpecialPlace& place, std::uint
 }
 
 Abort CanopenObjects::read(ObjectAddress address, std::uint32_t offset, std::span<std::uint8_t> out) {
-  std::optional<std::size_t> slot;
-  const canopen::SpecialPlace* special = nullptr;
-  if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
+  const auto& [asked, abort, slot, special] = find(address);
+  if (abort != Abort::none) return abort;
   if (special != nullptr) return read_special(*special, address.subindex, offset, out);
   if (!slot) {
     put_bytes(canopen::highest_subindex(address.index).value_or(0), offset, out);
@@ -226,9 +227,8 @@ Abort CanopenObjects::read(ObjectAddress address, std::uint32_t offset, std::spa
 }
 
 Abort CanopenObjects::write_begin(ObjectAddress address, canopen::WriteBounds& bounds) {
-  std::optional<std::size_t> slot;
-  const canopen::SpecialPlace* special = nullptr;
-  if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
+  const auto& [asked, abort, slot, special] = find(address);
+  if (abort != Abort::none) return abort;
   if (special != nullptr) {
     if (special->access != ObjectAccessKind::read_write) return Abort::read_only;
     const bool scratch = special->what == SpecialObject::scratch;
@@ -251,9 +251,8 @@ std::uint32_t CanopenObjects::version(ObjectAddress address) const {
 }
 
 Abort CanopenObjects::write(ObjectAddress address, std::span<const std::uint8_t> in, std::uint8_t server) {
-  std::optional<std::size_t> slot;
-  const canopen::SpecialPlace* special = nullptr;
-  if (const Abort abort = find(address, slot, special); abort != Abort::none) return abort;
+  const auto& [asked, abort, slot, special] = find(address);
+  if (abort != Abort::none) return abort;
   if (special != nullptr) return write_special(*special, in);
   if (!slot) return Abort::read_only;
   const std::uint32_t raw = extended(descriptors[owner_of(*slot).entry].type, little_endian(in));

@@ -57,8 +57,15 @@ class CanopenObjects {
   bool take(std::size_t slot, std::uint32_t raw);
 
  private:
-  canopen::Abort find(canopen::ObjectAddress address, std::optional<std::size_t>& slot,
-                      const canopen::SpecialPlace*& special) const;
+  /// Where an object is: a value of the dictionary, a special object, or neither, which with Abort::none is
+  /// the number of sub-indices that every record has.
+  struct Place {
+    canopen::ObjectAddress address;
+    canopen::Abort abort = canopen::Abort::no_object;
+    std::optional<std::size_t> slot{};
+    const canopen::SpecialPlace* special = nullptr;
+  };
+  const Place& find(canopen::ObjectAddress address);
   canopen::Abort special_size(const canopen::SpecialPlace& place, std::uint8_t subindex,
                               std::uint32_t& size) const;
   canopen::Abort read_special(const canopen::SpecialPlace& place, std::uint8_t subindex, std::uint32_t offset,
@@ -70,6 +77,7 @@ class CanopenObjects {
   std::span<const char> text_of(SpecialObject what) const;
 
   Sources of_;
+  Place found_;  // the last one: a transfer asks several times for the same
   std::array<std::uint8_t, scratch_bytes> scratch_{};
   std::uint32_t scratch_size_ = 0, scratch_version_ = 0;
 };

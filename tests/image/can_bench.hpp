@@ -1,9 +1,12 @@
 #pragma once
 
 #include <deque>
+#include <random>
+#include <vector>
 
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/can/sdo_client.hpp"
+#include "host_tools/virtual_board/stm32f4/can_bus.hpp"
 #include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 #include "tests/image/image_bench.hpp"
 
@@ -59,6 +62,18 @@ inline link::SdoSettings patient_sdo() {
   return settings;
 }
 
+inline drivers::CanFrame upload_request(firmware::canopen::ObjectAddress object) {
+  return {.identifier = 0x601,
+          .length = 8,
+          .data = {0x40, static_cast<std::uint8_t>(object.index),
+                   static_cast<std::uint8_t>(object.index >> 8), object.subindex}};
+}
+
+/// On the bus at 1 Mbit/s.
+inline double frame_us(const drivers::CanFrame& frame) {
+  return static_cast<double>(virtual_board::can_frame_bits(frame).bits.size());
+}
+
 /// ImageBench with a CANopen host beside the serial one.
 class CanBench : public ImageBench {
  public:
@@ -105,6 +120,33 @@ class CanBench : public ImageBench {
       board->run_for(0.005);
     }
     return number(static_cast<std::uint16_t>(index + 1), 0);
+  }
+
+  struct RoundTrip {
+    double us;      ///< from the request's first bit to the answer's last
+    double own_us;  ///< of the two frames alone
+  };
+  /// Expedited uploads at random phases of the tick; those that were answered.
+  std::vector<RoundTrip> round_trips(firmware::canopen::ObjectAddress object, std::size_t rounds) {
+    std::minstd_rand random(1);
+    std::vector<RoundTrip> answered;
+    const drivers::CanFrame request = upload_request(object);
+    double begin = 0.0;
+    bool waits = false;
+    virtual_board::CanHostNode host(board->can_bus(), 1'000'000);
+    host.on_frame([&](const drivers::CanFrame& frame, virtual_board::BoardTime now) {
+      if (!waits || frame.identifier != 0x581) return;
+      waits = false;
+      answered.push_back({1e6 * (virtual_board::seconds(now) - begin), frame_us(request) + frame_us(frame)});
+    });
+    for (std::size_t i = 0; i < rounds; ++i) {
+      board->run_for(1e-3 + 50e-6 * static_cast<double>(random() % 1000) / 1000.0);
+      begin = virtual_board::seconds(board->now());
+      waits = true;
+      host.send(request, board->now());
+      for (int step = 0; step < 100 && waits; ++step) board->run_for(20e-6);
+    }
+    return answered;
   }
 
   BoardCanPort port;
