@@ -3,7 +3,6 @@
 #include "control/diolaiti_criterion.hpp"
 #include "control/finite.hpp"
 #include "control/resolution_criterion.hpp"
-#include "control/saturated_quotient.hpp"
 #include "control/stability_case.hpp"
 #include "control/stiffness_limits.hpp"
 

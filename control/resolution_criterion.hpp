@@ -1,7 +1,6 @@
 #pragma once
 
 #include "control/finite.hpp"
-#include "control/saturated_quotient.hpp"
 
 namespace kmax::control {
 

@@ -3,7 +3,6 @@
 #include <limits>
 
 #include "control/finite.hpp"
-#include "control/saturated_quotient.hpp"
 
 // Stiffnesses that a wall must not reach, by the criteria of the literature that have a closed form.
 

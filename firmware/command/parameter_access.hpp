@@ -17,7 +17,7 @@ namespace kmax::firmware {
 bool acts_at_once(std::size_t slot);
 
 /// The one way to write a parameter, whichever link a host uses: checks, rules, and transactions. Modbus
-/// registers (links/parameter_registers.hpp) and CANopen objects (links/canopen_objects.hpp) are edges of it.
+/// registers (links/modbus_registers.hpp) and CANopen objects (links/canopen_objects.hpp) are edges of it.
 ///
 /// A write is whole or nothing: every value is checked, then the rules between parameters and, for an axis
 /// that is armed, that its bounds are only tightened, that what its commander asks of it is changed by nobody

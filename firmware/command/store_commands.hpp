@@ -1,10 +1,41 @@
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/parameters/parameter_keeper.hpp"
-#include "firmware/parameters/power_on_communication.hpp"
 
 namespace kmax::firmware {
+
+/// CANopen's own settings as the last start, or the last save since, left them: what a reset of the
+/// communication brings back (CiA 301, 7.3.2.2).
+class PowerOnCommunication {
+ public:
+  void take(const ParameterValues& values) { at_power_on_ = part_of(values); }
+  void put_back(ParameterValues& values) const {
+    for (std::size_t i = 0; i < at_power_on_.size(); ++i)
+      values.set_raw(first_communication_slot + i, at_power_on_[i]);
+  }
+  /// Of a set that is being saved.
+  void note_saving(const ParameterValues& values) { saving_ = part_of(values); }
+  void finish_saving(bool saved) {
+    if (saving_ && saved) at_power_on_ = *saving_;
+    saving_.reset();
+  }
+
+ private:
+  using Part = std::array<std::uint32_t, communication_entries.size()>;
+
+  static Part part_of(const ParameterValues& values) {
+    Part part{};
+    for (std::size_t i = 0; i < part.size(); ++i) part[i] = values.raw(first_communication_slot + i);
+    return part;
+  }
+
+  Part at_power_on_{};
+  std::optional<Part> saving_;
+};
 
 /// What hosts ask of the parameter store: store.command, and CANopen's 0x1010 and 0x1011. Main loop only;
 /// what is refused, as all is while the device is locked, is also in `parameters`' last_refusal(), under

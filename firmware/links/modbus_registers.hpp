@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -11,6 +12,35 @@
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/links/readings.hpp"
 #include "firmware/modbus/register_bank.hpp"
+
+/// Registers and slots, either way: the Modbus edge of ParameterAccess. A value of 32 bits has two registers,
+/// high word first.
+namespace kmax::firmware::modbus {
+
+/// Whether every one of these registers is there.
+bool readable(bool holding, std::uint32_t address, std::size_t count);
+
+/// The range must be readable(). Reading may start or end within a value.
+void read_registers(const ParameterAccess& parameters, bool holding, std::uint16_t address,
+                    std::span<std::uint16_t> out);
+
+/// What a write of holding registers wants.
+struct WantedValues {
+  std::array<SlotValue, 123> storage;
+  std::size_t count = 0;
+  Refusal refusal = Refusal::none;  ///< unknown_register, value_cut_in_two: there are no such values
+  std::uint16_t address = 0;        ///< of the register that this is about
+
+  std::span<const SlotValue> values() const { return std::span(storage).first(count); }
+};
+
+/// At most 123 registers. A signed value of 8 bits may come with its sign extended (0xFFFF) or as the bare
+/// byte (0x00FF).
+WantedValues wanted_values(std::uint16_t address, std::span<const std::uint16_t> in);
+
+Exception exception_for(Refusal refusal);
+
+}  // namespace kmax::firmware::modbus
 
 namespace kmax::firmware {
 

@@ -1,6 +1,6 @@
 #include <iostream>
 
-#include "host_tools/device/open_link.hpp"
+#include "host_tools/device/sim/open_link.hpp"
 #include "host_tools/kmax/commands.hpp"
 
 int main(int argc, char** argv) {

@@ -7,7 +7,7 @@
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/record/pdo_plan.hpp"
 #include "host_tools/record/pdo_rows.hpp"
-#include "host_tools/record/row_source.hpp"
+#include "host_tools/record/recording.hpp"
 
 namespace kmax::record {
 

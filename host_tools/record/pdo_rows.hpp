@@ -7,8 +7,8 @@
 
 #include "drivers/can_frame.hpp"
 #include "host_tools/record/pdo_plan.hpp"
+#include "host_tools/record/recording.hpp"
 #include "host_tools/record/row.hpp"
-#include "host_tools/record/row_source.hpp"
 
 namespace kmax::record {
 

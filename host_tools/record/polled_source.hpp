@@ -5,7 +5,7 @@
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/link.hpp"
-#include "host_tools/record/row_source.hpp"
+#include "host_tools/record/recording.hpp"
 
 namespace kmax::record {
 

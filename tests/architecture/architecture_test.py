@@ -63,7 +63,6 @@ EXCEPTIONS = {
     "class_in_one_place": {"kmax::virtual_board::Row"},
     "class_size": {"CoupledHandle", "Processor", "VirtualBoard"},
     "friends": {"host_tools/virtual_board/cortex_m/processor.hpp"},
-    "folder_order": {"host_tools: device -> device/sim"},
     "using_namespace": {
         "board/odrive_v3/main.cpp",
         "firmware/object_dictionary/axis_groups.hpp",

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware/links/parameter_registers.hpp"
+#include "firmware/links/modbus_registers.hpp"
 #include "tests/firmware/register_words.hpp"
 
 namespace kmax::firmware {

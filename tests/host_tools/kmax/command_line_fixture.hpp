@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/device/open_link.hpp"
+#include "host_tools/device/sim/open_link.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "tests/host_tools/temporary_folder.hpp"

@@ -1,4 +1,4 @@
-#include "host_tools/device/open_link.hpp"
+#include "host_tools/device/sim/open_link.hpp"
 
 #include <fmt/format.h>
 
