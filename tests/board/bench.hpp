@@ -21,6 +21,8 @@ using firmware::DriveState;
 using firmware::Refusal;
 using firmware::Words;
 using firmware::modbus::Bytes;
+using firmware::modbus::high;
+using firmware::modbus::low;
 
 template <typename Device>
 class BenchWith {
@@ -50,14 +52,7 @@ class BenchWith {
 
   /// 0: written; else the Modbus exception.
   int write(std::uint16_t address, const Words& words) {
-    Bytes pdu{16,
-              high(address),
-              low(address),
-              0,
-              static_cast<std::uint8_t>(words.size()),
-              static_cast<std::uint8_t>(2 * words.size())};
-    for (const std::uint16_t word : words) pdu.push_back(high(word)), pdu.push_back(low(word));
-    return exception_of(request(pdu));
+    return exception_of(request(firmware::modbus::multiple_request(address, words)));
   }
   int set(std::string_view name, double number, std::size_t axis = 0) {
     return write(firmware::address_of(name, axis), firmware::words_for(name, number));
@@ -125,13 +120,24 @@ class BenchWith {
     if (reply.size() < 2) return -1;
     return (reply[0] & 0x80) != 0 ? reply[1] : 0;
   }
-  static std::uint8_t high(std::uint16_t word) { return static_cast<std::uint8_t>(word >> 8); }
-  static std::uint8_t low(std::uint16_t word) { return static_cast<std::uint8_t>(word); }
 
  private:
   std::unique_ptr<NativeBoard<Device>> board_;
 };
 
 using Bench = BenchWith<ScriptedDevice>;
+
+/// Every axis outside a plain wall of its own.
+class BenchOfWalls : public testing::Test {
+ protected:
+  BenchOfWalls() {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      bench.set_up_plain_wall(axis);
+      bench.device.stand_at(1000, axis);
+    }
+    bench.run_ticks(20);
+  }
+  Bench bench;
+};
 
 }  // namespace kmax::board

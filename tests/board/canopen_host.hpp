@@ -89,8 +89,6 @@ class CanOpenHostWith {
   std::vector<drivers::CanFrame> heard;
 
  private:
-  static std::uint8_t low(std::uint16_t word) { return static_cast<std::uint8_t>(word); }
-  static std::uint8_t high(std::uint16_t word) { return static_cast<std::uint8_t>(word >> 8); }
   static std::uint32_t number_in(const std::array<std::uint8_t, 8>& answer) {
     std::uint32_t number = 0;
     for (unsigned i = 0; i < 4; ++i) number |= std::uint32_t{answer[4 + i]} << (8 * i);

@@ -86,16 +86,10 @@ class Node : public CanOpenHost {
       case Way::request:
         bench.set(name, number);
         break;
-      case Way::broadcast: {
-        const auto words = firmware::words_for(name, number);
-        const auto address = firmware::address_of(name);
-        Data pdu{16, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address),
-                 0,  static_cast<std::uint8_t>(words.size()), static_cast<std::uint8_t>(2 * words.size())};
-        for (const std::uint16_t word : words)
-          pdu.insert(pdu.end(), {static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)});
-        broadcast(pdu);
+      case Way::broadcast:
+        broadcast(firmware::modbus::multiple_request(firmware::address_of(name),
+                                                     firmware::words_for(name, number)));
         break;
-      }
       case Way::sdo:
         set_by_sdo(name, number);
         break;

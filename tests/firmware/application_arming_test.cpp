@@ -6,17 +6,7 @@
 namespace kmax::board::application_arming_test {
 namespace {
 
-class Arming : public testing::Test {
- protected:
-  void SetUp() override {
-    bench.set_up_plain_wall();
-    bench.set_up_plain_wall(1);
-    bench.device.stand_at(1000);
-    bench.device.stand_at(1000, 1);
-    bench.run_ticks(20);
-  }
-  Bench bench;
-};
+class Arming : public BenchOfWalls {};
 
 TEST_F(Arming, OutOfTheBoxWithNoSettingChangedItArmsAndDrives) {
   Bench fresh;

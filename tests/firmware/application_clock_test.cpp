@@ -58,9 +58,7 @@ class BareBoard {
     return application->state(0) == DriveState::operation_enabled;
   }
   double read_input(std::string_view name) {
-    const std::uint16_t address = address_of(name);
-    hear(modbus::adu(1,
-                     {4, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address), 0, 2}));
+    hear(modbus::adu(1, modbus::read_request(4, address_of(name), 2)));
     application->poll(now);
     const auto reply = application->serial().reply_due(now);
     const Bytes bytes(reply.begin(), reply.end());
@@ -159,11 +157,8 @@ TEST(Clock, ForgottenTransactionIsNotFoundAgainOneLapOfTheClockLater) {
     board.application->poll(board.now);
   };
   transaction(1);
-  const Words stiffness = words_for("wall.stiffness", 5000);
-  board.hear(
-      modbus::adu(1, {16, 0x00, 0x04, 0, 2, 4, static_cast<std::uint8_t>(stiffness[0] >> 8),
-                      static_cast<std::uint8_t>(stiffness[0]), static_cast<std::uint8_t>(stiffness[1] >> 8),
-                      static_cast<std::uint8_t>(stiffness[1])}));
+  board.hear(modbus::adu(
+      1, modbus::multiple_request(address_of("wall.stiffness"), words_for("wall.stiffness", 5000))));
   board.application->poll(board.now);
   const std::uint32_t staged = board.now;
   for (int i = 0; i < 4294; ++i) board.step(1'000'000);
@@ -227,11 +222,8 @@ TEST(LatePoll, WallMovedOntoTheHandleAndArmedInOnePollIsRefused) {
   BareBoard board(0);
   board.preset("link.timeout", 0);
   board.command(0x06);
-  const Words position = words_for("wall.position", 0.0015);
-  board.hear(
-      modbus::adu(1, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
-                      static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
-                      static_cast<std::uint8_t>(position[1])}));
+  board.hear(modbus::adu(
+      1, modbus::multiple_request(address_of("wall.position"), words_for("wall.position", 0.0015))));
   board.hear_command(0x0F);
   board.application->poll(board.now);  // no tick in between
   EXPECT_NE(board.application->state(0), DriveState::operation_enabled);
@@ -246,11 +238,8 @@ TEST(LatePoll, SettingsTakenByATickInTheMiddleOfAPollAreNotJudgedByTheReportBefo
   BareBoard board(0);
   board.preset("link.timeout", 0);
   board.command(0x06);
-  const Words position = words_for("wall.position", 0.0015);
-  board.hear(
-      modbus::adu(1, {16, 0x00, 0x01, 0, 2, 4, static_cast<std::uint8_t>(position[0] >> 8),
-                      static_cast<std::uint8_t>(position[0]), static_cast<std::uint8_t>(position[1] >> 8),
-                      static_cast<std::uint8_t>(position[1])}));
+  board.hear(modbus::adu(
+      1, modbus::multiple_request(address_of("wall.position"), words_for("wall.position", 0.0015))));
   board.hear_command(0x0F);
   board.hear(modbus::adu(1, {6, 0x20, 0x40, 0, 0}));       // a third request, whose end is seen only below
   board.application->poll(board.now - 2000);               // the wall moves; the command waits for the tick

@@ -84,13 +84,7 @@ RC_GTEST_PROP(Safety, NoRequestsArmAHandleInsideItsWallAndNoForceIsMadeUnarmed, 
       const auto axis = static_cast<std::size_t>(*rc::gen::inRange(0, 5) / 4);
       const std::uint16_t address = firmware::address_of(name, axis);
       const Words words = firmware::words_for(name, value_for(name));
-      Bytes pdu{16,
-                Bench::high(address),
-                Bench::low(address),
-                0,
-                static_cast<std::uint8_t>(words.size()),
-                static_cast<std::uint8_t>(2 * words.size())};
-      for (const auto word : words) pdu.push_back(Bench::high(word)), pdu.push_back(Bench::low(word));
+      const Bytes pdu = firmware::modbus::multiple_request(address, words);
       bench.board().receive(firmware::modbus::adu(static_cast<std::uint8_t>(*rc::gen::inRange(0, 2)), pdu));
     } else if (action == 5) {
       const auto request = static_cast<std::uint8_t>(*rc::gen::inRange(0, 3));

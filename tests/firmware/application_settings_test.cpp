@@ -9,29 +9,14 @@
 namespace kmax::board::application_settings_test {
 namespace {
 
-class Settings : public testing::Test {
+class Settings : public BenchOfWalls {
  protected:
-  void SetUp() override {
-    bench.set_up_plain_wall();
-    bench.set_up_plain_wall(1);
-    bench.device.stand_at(1000);
-    bench.device.stand_at(1000, 1);
-    bench.run_ticks(20);
-  }
   // The single-register write of a value of two words, and the tick at which its request is executed.
   void send_write(std::string_view name, double number, std::size_t axis = 0) {
-    const auto address = firmware::address_of(name, axis);
-    const Words words = firmware::words_for(name, number);
-    Bytes pdu{16,
-              Bench::high(address),
-              Bench::low(address),
-              0,
-              static_cast<std::uint8_t>(words.size()),
-              static_cast<std::uint8_t>(2 * words.size())};
-    for (const auto word : words) pdu.push_back(Bench::high(word)), pdu.push_back(Bench::low(word));
-    bench.board().receive(firmware::modbus::adu(1, pdu));
+    using namespace firmware;
+    bench.board().receive(
+        modbus::adu(1, modbus::multiple_request(address_of(name, axis), words_for(name, number))));
   }
-  Bench bench;
 };
 
 TEST_F(Settings, StiffnessWhileArmedTakesEffectInTheTickAfterTheRequestIsExecuted) {

@@ -18,6 +18,9 @@
 namespace kmax::firmware::application_transactions_test {
 namespace {
 
+using modbus::high;
+using modbus::low;
+
 enum class Op { begin, write, commit, drop, wait, wait_long, wait_half_a_minute, reset };
 struct Step {
   Link by;
@@ -41,18 +44,8 @@ class Device {
   std::uint32_t write(Link by, std::string_view name, double number) {
     const std::size_t entry = entry_named(name);
     const Entry& e = entry_at(entry);
-    if (by == Link::serial) {
-      const std::uint16_t address = address_of(name);
-      const Words words = words_for(name, number);
-      modbus::Bytes pdu{16,
-                        high(address),
-                        low(address),
-                        0,
-                        static_cast<std::uint8_t>(words.size()),
-                        static_cast<std::uint8_t>(2 * words.size())};
-      for (const std::uint16_t word : words) pdu.push_back(high(word)), pdu.push_back(low(word));
-      return request(pdu);
-    }
+    if (by == Link::serial)
+      return request(modbus::multiple_request(address_of(name), words_for(name, number)));
     const std::uint32_t raw = raw_from_number(e.type, number);
     const auto command = static_cast<std::uint8_t>(0x23 | (4 - bytes_of(e.type)) << 2);
     const auto answer =
@@ -65,7 +58,7 @@ class Device {
   double read(std::string_view name) {
     const Entry& e = entry_at(entry_named(name));
     const std::uint16_t address = address_of(name);
-    EXPECT_EQ(request({3, high(address), low(address), 0, 2}), 0U);
+    EXPECT_EQ(request(modbus::read_request(3, address, 2)), 0U);
     const Words words{static_cast<std::uint16_t>(reply_.at(3) << 8 | reply_.at(4)),
                       static_cast<std::uint16_t>(reply_.at(5) << 8 | reply_.at(6))};
     const auto answer = transfer({0x40, low(e.index()), high(e.index()), e.object_subindex()});
@@ -86,8 +79,6 @@ class Device {
   }
 
  private:
-  static std::uint8_t low(std::uint16_t word) { return static_cast<std::uint8_t>(word); }
-  static std::uint8_t high(std::uint16_t word) { return static_cast<std::uint8_t>(word >> 8); }
   static std::uint32_t number_in(const std::array<std::uint8_t, 8>& answer) {
     std::uint32_t number = 0;
     for (unsigned i = 0; i < 4; ++i) number |= std::uint32_t{answer[4 + i]} << (8 * i);

@@ -14,16 +14,8 @@ int code_of(Fault fault) {
   return firmware::text_of(fault).error_code;
 }
 
-class Trips : public testing::Test {
+class Trips : public BenchOfWalls {
  protected:
-  void SetUp() override {
-    bench.set_up_plain_wall();
-    bench.set_up_plain_wall(1);
-    bench.device.stand_at(1000);
-    bench.device.stand_at(1000, 1);
-    bench.run_ticks(20);
-  }
-
   // Runs to the tick at which the fault is there; the force must be zero from then on, and was not before.
   void expect_no_force_for_ms(double ms) {
     bench.device.recording = true;
@@ -53,8 +45,6 @@ class Trips : public testing::Test {
     bench.run_ms(2);
     EXPECT_EQ(bench.force(), 1.0f);
   }
-
-  Bench bench;
 };
 
 TEST_F(Trips, OverSpeedRemovesTheForceInTheTickThatFindsIt) {

@@ -11,6 +11,9 @@
 namespace kmax::firmware::application_fuzz {
 namespace {
 
+using modbus::high;
+using modbus::low;
+
 class Program : WatchedApplication {
  public:
   explicit Program(FuzzInput input) : WatchedApplication(input.byte()), input_(input) {}
@@ -101,25 +104,10 @@ class Program : WatchedApplication {
   std::uint8_t own_unit() const {
     return static_cast<std::uint8_t>(application_->values().whole<"modbus.unit">());
   }
-  static std::uint8_t high(unsigned word) { return static_cast<std::uint8_t>(word >> 8); }
-  static std::uint8_t low(unsigned word) { return static_cast<std::uint8_t>(word); }
-
   void write_registers(std::uint8_t unit, std::size_t slot, std::uint32_t raw, std::uint8_t how = 0) {
     const auto [entry, axis] = owner_of(slot);
     const std::uint16_t address = modbus_address(entry, axis);
-    std::vector<std::uint8_t> pdu{16, high(address),      low(address),     0, 1,
-                                  2,  high(raw & 0xFFFF), low(raw & 0xFFFF)};
-    if (register_count(entry_at(entry).type) == 2)
-      pdu = {16,
-             high(address),
-             low(address),
-             0,
-             2,
-             4,
-             high(raw >> 16),
-             low(raw >> 16),
-             high(raw & 0xFFFF),
-             low(raw & 0xFFFF)};
+    auto pdu = modbus::multiple_request(address, words_of_raw(entry_at(entry).type, raw));
     if (how & 16) pdu.insert(pdu.begin(), {65, input_.byte(), 0});
     request(unit, pdu, how & 0xF);
   }
@@ -132,13 +120,12 @@ class Program : WatchedApplication {
     const unsigned place = modbus_address(entry, axis);
     switch (input_.byte() % 6) {
       case 0:
-        return request(unit, {3, high(place), low(place), 0, input_.byte()}, disturbed);
+        return request(unit, modbus::read_request(3, place, input_.byte()), disturbed);
       case 1:
-        return request(unit, {4, high(place), low(place), 0, input_.byte()}, disturbed);
+        return request(unit, modbus::read_request(4, place, input_.byte()), disturbed);
       case 2: {
         const std::uint32_t value = some_value(slot);
-        return request(unit, {6, high(place), low(place), high(value & 0xFFFF), low(value & 0xFFFF)},
-                       disturbed);
+        return request(unit, modbus::read_request(6, place, value), disturbed);
       }
       case 3:
         return request(

@@ -359,5 +359,67 @@ TEST_F(ExcitationTest, ANewStrokeIsApproachedFromWhereThePointIs) {
   EXPECT_NEAR(update(config).force, 0.100f, 1e-5f);
 }
 
+// What starts an excitation.
+
+// Only another run starts, and not one that came while it stood by.
+TEST_F(ExcitationTest, StandingByStartsNothing) {
+  auto config = of_kind(ExcitationKind::voltage);
+  config.duration = 0.0005f;  // 10 ticks
+  EXPECT_TRUE(excitation.update(Excitation::prepare(config), 0, 0.0f).finished) << "never stood by, run 0";
+  for (int i = 0; i < 20; ++i) update(config);
+  EXPECT_TRUE(update(config).finished);
+  ++config.run;
+  EXPECT_EQ(update(config).along, 2.0f);
+  for (const bool another : {false, true}) {
+    if (another) ++config.run;
+    excitation.stand_by(started(config));
+    for (int i = 0; i < 20; ++i) {
+      const auto out = update(config);
+      ASSERT_FALSE(out.started);
+      ASSERT_TRUE(out.finished);
+      ASSERT_EQ(out.along, 0.0f);
+      ASSERT_EQ(out.angle, 0u);
+    }
+  }
+  --config.run;
+  const auto out = update(config);
+  EXPECT_TRUE(out.started) << "any other number";
+  EXPECT_EQ(out.along, 2.0f);
+}
+
+TEST_F(ExcitationTest, AnotherKindEndsTheRunSinceItsUnitIsAnother) {
+  auto config = of_kind(ExcitationKind::voltage);
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(update(config).along, 2.0f);
+  for (const ExcitationKind kind : {ExcitationKind::current, ExcitationKind::voltage}) {
+    config.kind = kind;
+    for (int i = 0; i < 10; ++i) {
+      const auto out = update(config);
+      ASSERT_FALSE(out.started);
+      ASSERT_TRUE(out.finished);
+      ASSERT_EQ(out.along, 0.0f) << "also when it is the first kind again";
+    }
+  }
+  ++config.run;
+  EXPECT_EQ(update(config).along, 2.0f);
+}
+
+TEST_F(ExcitationTest, AnotherRunStartsAnewInMidRamp) {
+  auto config = of_kind(ExcitationKind::voltage);
+  config.ramp = 0.01f;
+  config.angle_rate = 100.0f;
+  config.angle_span = 1.0f;
+  config.alternation = 1.0f;
+  config.half_period = 30;
+  for (int i = 0; i < 140; ++i) update(config);
+  config.run = 65'535;
+  auto out = update(config);
+  EXPECT_TRUE(out.started);
+  EXPECT_EQ(out.along, 0.0f);
+  EXPECT_EQ(out.angle, 0u);
+  out = update(config);
+  EXPECT_FALSE(out.started);
+  EXPECT_NEAR(out.along, 3.0f / 200.0f, 1e-6f) << "the square wave begins with its positive half again";
+}
+
 }  // namespace
 }  // namespace kmax::firmware::excitation_test

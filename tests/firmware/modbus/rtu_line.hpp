@@ -44,6 +44,25 @@ inline Bytes adu(std::uint8_t unit, const Bytes& pdu) {
   return with_crc(Bytes{unit} + pdu);
 }
 
+inline std::uint8_t high(unsigned word) {
+  return static_cast<std::uint8_t>(word >> 8);
+}
+inline std::uint8_t low(unsigned word) {
+  return static_cast<std::uint8_t>(word);
+}
+inline Bytes words(const std::vector<std::uint16_t>& values) {
+  Bytes bytes;
+  for (const std::uint16_t value : values) bytes = bytes + Bytes{high(value), low(value)};
+  return bytes;
+}
+inline Bytes read_request(std::uint8_t function, unsigned address, unsigned quantity) {
+  return {function, high(address), low(address), high(quantity), low(quantity)};
+}
+inline Bytes multiple_request(unsigned address, const std::vector<std::uint16_t>& values) {
+  const auto quantity = static_cast<unsigned>(values.size());
+  return read_request(16, address, quantity) + Bytes{low(2 * quantity)} + words(values);
+}
+
 // The time axis of a transmitter: real-valued microseconds, read as a wrapped 32-bit count.
 class RtuLine {
  public:

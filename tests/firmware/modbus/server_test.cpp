@@ -51,28 +51,8 @@ struct Fixture {
   }
 };
 
-std::uint8_t high(unsigned word) {
-  return static_cast<std::uint8_t>(word >> 8);
-}
-std::uint8_t low(unsigned word) {
-  return static_cast<std::uint8_t>(word & 0xFF);
-}
-
-Bytes words(const std::vector<std::uint16_t>& values) {
-  Bytes bytes;
-  for (const std::uint16_t value : values) bytes = bytes + Bytes{high(value), low(value)};
-  return bytes;
-}
-
-Bytes read_request(std::uint8_t function, unsigned address, unsigned quantity) {
-  return {function, high(address), low(address), high(quantity), low(quantity)};
-}
 Bytes single_request(unsigned address, unsigned value) {
   return read_request(6, address, value);
-}
-Bytes multiple_request(unsigned address, const std::vector<std::uint16_t>& values) {
-  const auto quantity = static_cast<unsigned>(values.size());
-  return read_request(16, address, quantity) + Bytes{low(2 * quantity)} + words(values);
 }
 Bytes mask_request(unsigned address, unsigned and_mask, unsigned or_mask) {
   return {22, high(address), low(address), high(and_mask), low(and_mask), high(or_mask), low(or_mask)};
