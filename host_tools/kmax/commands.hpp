@@ -13,7 +13,7 @@
 
 namespace kmax::cli {
 
-// To add a command, write X_command.cpp and name it twice in commands.cpp:
+// To add a command, write X_command.cpp in the folder of its kind and name it twice in commands.cpp:
 //
 //   struct XOptions {
 //     bool fast = false;

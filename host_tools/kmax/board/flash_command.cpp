@@ -1,0 +1,318 @@
+// kmax flash.
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <optional>
+
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/interruption.hpp"
+#include "host_tools/base/print.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/flash/flash_image.hpp"
+#include "host_tools/flash/flash_plan.hpp"
+#include "host_tools/flash/flash_run.hpp"
+#include "host_tools/flash/method_choice.hpp"
+#include "host_tools/kmax/board/board_services.hpp"
+#include "host_tools/kmax/commands.hpp"
+
+namespace kmax::cli {
+
+using flash::BoardProfile;
+using flash::Method;
+using lines::LineRole;
+
+namespace {
+struct FlashOptions {
+  std::string image, method = "auto", board, lines, usb_serial;
+  unsigned speed_khz = 1000;
+  double at_most = 300;
+  bool dry_run = false, factory_reset = false;
+
+  void declare(CLI::App& command) {
+    CLI::Option* const file =
+        command.add_option("image", image, "Linked image (default: the one built for the board)")
+            ->option_text("IMAGE.elf");
+    command
+        .add_flag("--factory-reset", factory_reset,
+                  "Write no image: erase the stored parameters, and the write lock's code with them")
+        ->excludes(file);
+    std::vector<std::string> methods = {"auto"};
+    for (const auto& facts : flash::all_methods) methods.emplace_back(facts.name);
+    command.add_option("--method", method, "Way to do it")
+        ->type_name("METHOD")
+        ->check(CLI::IsMember(methods))
+        ->capture_default_str();
+    command.add_flag("--dry-run", dry_run, "Show the command lines and do nothing");
+    command.add_option("--board", board, "Kind of board: " + flash::board_kinds())->type_name("KIND");
+    add_lines_option(command, lines);
+    command
+        .add_option("--usb-serial", usb_serial,
+                    "Serial number of the ST-Link or of the board in DFU mode, if there are several")
+        ->type_name("TEXT")
+        ->check([](const std::string& text) {
+          // It becomes part of an OpenOCD command.
+          const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
+            return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+          });
+          return plain && !text.empty() ? std::string() : "allowed are letters and digits";
+        });
+    command.add_option("--speed", speed_khz, "Clock of the debug port in kHz")
+        ->type_name("KHZ")
+        ->check(CLI::Range(5, 4000))
+        ->capture_default_str();
+    command.add_option("--timeout", at_most, "A program that takes longer is ended, in s")
+        ->type_name("S")
+        ->check(within(0.1, 3600.0))
+        ->capture_default_str();
+  }
+};
+
+std::filesystem::path chosen_image(const FlashOptions& options, const BoardProfile& board) {
+  if (!options.image.empty()) return options.image;
+  if (board.image.empty())
+    throw UsageError(fmt::format("name the image: none is supplied for {}", board.title));
+  const std::filesystem::path built = board.image;
+  std::error_code ignored;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  for (const auto& candidate : {"build" / built, program.parent_path().parent_path() / built}) {
+    if (std::filesystem::exists(candidate, ignored)) return candidate;
+  }
+  throw UsageError(fmt::format("build/{} is not there: run scripts/build {} or name the image",
+                               built.string(), built.parent_path().string()));
+}
+
+/// OpenOCD wants the chip's number.
+flash::AdapterLine adapter_line(const lines::LineSettings& settings, const BoardServices& services) {
+  const auto number_in = [](std::string_view chip) -> std::optional<unsigned> {
+    constexpr std::string_view folder = "/dev/", prefix = "gpiochip";
+    if (chip.starts_with(folder)) chip.remove_prefix(folder.size());
+    if (!chip.starts_with(prefix)) return std::nullopt;
+    chip.remove_prefix(prefix.size());
+    unsigned number = 0;
+    const auto [end, error] = std::from_chars(chip.data(), chip.data() + chip.size(), number);
+    if (error != std::errc() || end != chip.data() + chip.size()) return std::nullopt;
+    return number;
+  };
+  flash::AdapterLine line{};
+  line.active_low = settings.polarity == lines::Polarity::active_low;
+  line.push_pull = settings.drive == lines::Drive::push_pull;
+  std::optional<unsigned> number = number_in(settings.chip);
+  if (number && settings.offset) {
+    line.offset = *settings.offset;
+  } else {
+    const lines::LineFacts facts = services.open_gpio()->describe(settings);
+    number = number_in(facts.chip);
+    line.offset = facts.offset;
+    if (!number)
+      throw std::runtime_error(fmt::format("GPIO chip '{}' has no number for OpenOCD", facts.chip));
+  }
+  line.chip_number = *number;
+  return line;
+}
+
+flash::FlashTarget target_of(Method method, const BoardProfile& board, const FlashOptions& options,
+                             const lines::LinesConfig& config, const BoardServices& services) {
+  flash::FlashTarget target;
+  const std::string program(flash::facts_of(method).program);
+  const auto found = flash::find_program(program);
+  target.program = found ? found->string() : program;
+  target.openocd_target = board.openocd_target;
+  target.adapter_kilohertz = options.speed_khz;
+  target.usb_serial = options.usb_serial;
+  target.serial_port = config.serial_port.empty() ? "SERIAL_PORT" : config.serial_port;
+  if (method != Method::openocd_gpio) return target;
+  target.swdio = adapter_line(config.required(LineRole::swdio), services);
+  target.swclk = adapter_line(config.required(LineRole::swclk), services);
+  if (const auto* reset = config.find(LineRole::reset)) target.reset = adapter_line(*reset, services);
+  return target;
+}
+
+/// An armed axis makes force with whatever half of a program is there: ask first, if there is somebody to
+/// ask.
+void refuse_while_armed(Context& context) {
+  const char* variable = std::getenv("KMAX_DEVICE");
+  const bool named = !context.device_option.empty() || (variable != nullptr && *variable != '\0');
+  if (!named || context.simulated()) {
+    context.note("no --device is given, so the board was not asked whether an axis is armed");
+    return;
+  }
+  try {
+    device::Device device = context.connect();
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (device::Drive(device, axis).status().armed())
+        throw flash::FlashError(fmt::format(
+            "axis {} is armed: its force would end in whatever way the reset leaves it; 'kmax disarm' "
+            "first. Nothing was changed",
+            axis));
+    }
+  } catch (const link::LinkError& error) {
+    context.note(fmt::format("the board does not answer, so it was not asked whether an axis is armed: {}",
+                             error.what()));
+  } catch (const device::DeviceError& error) {
+    context.note(fmt::format("the board was not asked whether an axis is armed: {}", error.what()));
+  }
+}
+
+/// A board that has just entered DFU mode takes a while to appear on USB.
+void wait_for_dfu(const BoardServices& services) {
+  constexpr std::chrono::milliseconds longest{5'000}, pause{100};
+  for (std::chrono::milliseconds waited{0}; waited < longest; waited += pause) {
+    const auto usb = flash::list_usb_devices(services.usb_devices);
+    if (std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); })) return;
+    services.sleep(pause);
+  }
+  throw flash::FlashError(
+      "BOOT0 and reset were moved, but no board in DFU mode (0483:df11) appeared on USB within 5 s; nothing "
+      "on the board was changed. Is USB connected, and PB2 (BOOT1) low?");
+}
+
+std::string hexadecimal(std::uint32_t value) {
+  return fmt::format("0x{:08x}", value);
+}
+
+Json pieces_json(const flash::FlashImage& image) {
+  Json pieces = Json::array();
+  for (const flash::FlashPiece& piece : image.pieces())
+    pieces.push_back({{"address", hexadecimal(piece.address)},
+                      {"bytes", piece.bytes.size()},
+                      {"crc32", hexadecimal(flash::crc_of(piece.bytes))}});
+  return pieces;
+}
+
+int show_plan(Context& context, const BoardProfile& board, Method method, const Json& pieces,
+              const flash::FlashPlan& plan, bool by_lines) {
+  std::vector<flash::Step> steps = plan.steps;
+  steps.insert(steps.end(), plan.start.begin(), plan.start.end());
+  if (context.json) {
+    Json commands = Json::array();
+    for (const flash::Step& step : steps) commands.push_back(step.arguments);
+    context.print({{"board", std::string(board.kind)},
+                   {"method", std::string(flash::facts_of(method).name)},
+                   {"dry_run", true},
+                   {"pieces", pieces},
+                   {"commands", commands}});
+    return done;
+  }
+  print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
+        flash::facts_of(method).name);
+  if (by_lines) print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  for (const flash::Step& step : steps)
+    print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
+  if (by_lines) print(context.out, "# start the application: [lines.reset]\n");
+  return done;
+}
+
+/// Runs the plan with the board in the state that it needs, `work` doing the steps. Whether the application
+/// has been started.
+bool carry_out(Context& context, const BoardServices& services, const lines::LinesConfig& config,
+               Method method, const flash::FlashPlan& plan, bool by_lines, double at_most,
+               const std::function<void(flash::WorkFolder&, const flash::FlashHooks&)>& work) {
+  const Interruption interruption;
+  refuse_while_armed(context);
+  flash::WorkFolder folder;
+  flash::FlashHooks hooks;
+  hooks.say = [&context](const std::string& text) { context.note(text); };
+  hooks.stop = [&interruption] { return interruption.requested(); };
+  hooks.limits.at_most = std::chrono::milliseconds(static_cast<std::int64_t>(at_most * 1000));
+  std::unique_ptr<lines::GpioLines> gpio;
+  if (by_lines) {
+    gpio = services.open_gpio();
+    context.note("start the ROM bootloader");
+    lines::enter_bootloader(*gpio, config, services.sleep);
+    if (method == Method::dfu) wait_for_dfu(services);
+  }
+  // After a failure the ROM bootloader goes on running: all its pins are inputs.
+  work(folder, hooks);
+  flash::start_application(plan, folder, hooks);
+  if (by_lines) lines::pulse_reset(*gpio, config, services.sleep);
+  return by_lines || !plan.start.empty();
+}
+
+int run_flash(Context& context, const FlashOptions& options) try {
+  const BoardServices& services = board_services(context);
+  const lines::LinesConfig config = read_lines_config(options.lines);
+  const BoardProfile& board = chosen_board(options.board, config);
+  std::optional<flash::FlashImage> image;
+  if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board));
+  const auto usb = flash::list_usb_devices(services.usb_devices);
+  const auto verdicts = flash::judge_methods(board, config, usb);
+  const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);
+  for (const auto& verdict : verdicts) {
+    if (verdict.method == method)
+      context.note(
+          fmt::format("{}: {} because {}", board.title, flash::facts_of(method).name,
+                      verdict.ready ? verdict.text : "you asked for it; not ready: " + verdict.text));
+  }
+  const bool dfu_is_there = std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); });
+  const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
+  const bool by_lines = has_lines && (method == Method::serial || (method == Method::dfu && !dfu_is_there));
+  const flash::FlashTarget target = target_of(method, board, options, config, services);
+  const flash::FlashPlan plan =
+      image ? flash::plan_flash(method, *image, target) : flash::plan_factory_reset(method, target);
+  const Json pieces = image ? pieces_json(*image) : Json::array();
+  if (options.dry_run) return show_plan(context, board, method, pieces, plan, by_lines);
+  flash::FlashReport report{};
+  const bool started = carry_out(context, services, config, method, plan, by_lines, options.at_most,
+                                 [&](flash::WorkFolder& folder, const flash::FlashHooks& hooks) {
+                                   if (image) {
+                                     report = flash::write_and_verify(plan, *image, folder, hooks);
+                                   } else {
+                                     flash::erase_parameters(plan, folder, hooks);
+                                   }
+                                 });
+  Json document = {{"board", std::string(board.kind)}, {"method", std::string(flash::facts_of(method).name)}};
+  if (image) {
+    document.update(Json{{"pieces", pieces},
+                         {"crc32", hexadecimal(report.image_crc)},
+                         {"verified", true},
+                         {"parameters_kept", true},
+                         {"parameters_crc32", hexadecimal(report.parameters_crc)}});
+  } else {
+    document.update(Json{{"factory_reset", true}, {"verified", true}, {"parameters_kept", false}});
+  }
+  document["started"] = started;
+  if (context.json) {
+    context.print(document);
+  } else if (image) {
+    print(context.out,
+          "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
+          "{})\n",
+          image->size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
+  } else {
+    print(
+        context.out,
+        "the stored parameters and the write lock's code are erased, read back blank; the device starts with "
+        "its defaults and open\n");
+  }
+  if (!started) context.note(fmt::format("to start it: {}", board.to_application));
+  return done;
+} catch (const flash::ImageError& error) {
+  throw UsageError(error.what());
+} catch (const flash::MethodNotOnBoardError& error) {
+  throw UsageError(error.what());
+} catch (const lines::LinesConfigError& error) {
+  throw UsageError(error.what());
+}
+}  // namespace
+
+void add_flash_command(CLI::App& app, Context& context) {
+  add_command<FlashOptions>(
+      app, context,
+      {"flash", "Writes a firmware image into the board, keeps its parameters, and checks what is there.",
+       "  kmax flash                                   the built image, the first way that is ready\n"
+       "  kmax flash --method dfu --dry-run            the exact command lines\n"
+       "  kmax flash image.elf --method openocd-gpio --device serial:/dev/ttyACM0\n"
+       "  kmax flash --factory-reset                   all parameters at their defaults, no write lock\n\n"
+       "Ways: openocd-gpio (SWD over GPIO lines), openocd-stlink, dfu (USB), serial (ROM bootloader).\n"
+       "ODrive v3: SWD on connector J2, or USB with the DIP switch on DFU; serial is not possible.\n"
+       "Only the image's sectors are written. All is read back and compared, the parameter sectors, too.\n"
+       "Refused while an axis of --device is armed. Afterwards 'kmax info' shows what runs."},
+      Takes::device, run_flash);
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,134 @@
+// kmax experiment contact.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_tools/base/print.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/experiment/experiment_study.hpp"
+
+namespace kmax::cli {
+
+namespace {
+struct ContactOptions {
+  experiment::ContactSettings settings;
+  experiment::TouchLimits limits = experiment::contact_limits();
+  int trials = 3;
+  ExperimentFiles files;
+  bool no_prompt = false;
+
+  void declare(CLI::App& command) {
+    command.add_option("--stiffness", settings.stiffness, "Stiffness of the wall, N/m")
+        ->capture_default_str();
+    command.add_option("--rate", settings.haptic_rate, "Rate of the haptic loop, Hz")->capture_default_str();
+    add_number(command, "--hold", settings.hold_time, "Time from the first touch to the end of judging, s",
+               1.0, 60.0);
+    add_number(command, "--threshold", settings.threshold, "Peak to peak above which a wall is unstable, m",
+               1e-9, 1.0);
+    add_number(command, "--trials", trials, "Touches per condition; the worst one counts", 1, 1000);
+    add_file_options(command, files, "Folder for a page, and a picture and a CSV file per condition");
+    add_safety_options(command, limits);
+    add_touch_options(command, no_prompt, limits.patience);
+  }
+};
+
+Json condition_json(const experiment::ContactResult& result) {
+  return {{"name", result.condition.name},
+          {"figure", result.condition.figure},
+          {"assignments", result.condition.assignments},
+          {"peak_to_peak_m", result.measure.peak_to_peak},
+          {"verdict", std::string(experiment::to_string(result.measure.verdict))},
+          {"trials", result.trials},
+          {"unstable_trials", result.unstable_trials},
+          {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},
+          {"agrees", result.agrees_with_paper()},
+          {"limited_share", result.limited_share},
+          {"deepest_m", result.measure.deepest},
+          {"aborted", result.aborted_at.has_value()},
+          {"samples", result.samples.size()},
+          {"lost_records", result.lost_records}};
+}
+
+int run_contact_experiment(Context& context, const ContactOptions& options) {
+  const Interruption interruption;
+  const experiment::ContactSettings& settings = options.settings;
+  const auto conditions = experiment::contact_conditions();
+  const auto trials = static_cast<std::size_t>(options.trials);
+  make_folder(options.files);
+  device::Device device = context.connect();
+  TouchRun run{options.limits, !options.no_prompt && !context.simulated()};  // who presses by itself
+  std::size_t made = 0;
+  run.so_far = [&] { return fmt::format("{} of {}, ", made + 1, conditions.size() * trials); };
+  std::vector<experiment::ContactResult> results;
+  const std::string velocity_estimator =
+      make_touches(context, device, interruption, run, [&](experiment::DeviceRig& rig) {
+        for (const experiment::ContactCondition& condition : conditions) {
+          std::vector<experiment::ContactResult> touches;
+          for (std::size_t trial = 0; trial < trials; ++trial, ++made)
+            touches.push_back(run_contact(rig, condition, settings));
+          results.push_back(experiment::worst_of(std::move(touches)));
+        }
+        return rig.velocity_estimator();
+      });
+  const auto words = experiment::contact_words(settings, trials, velocity_estimator);
+  std::vector<std::filesystem::path> files, pictures;
+  if (!options.files.folder.empty()) {
+    for (const experiment::ContactResult& result : results) {
+      const auto written = experiment::write_contact(result, options.files.folder, options.files.ending);
+      files.insert(files.end(), written.begin(), written.end());
+      pictures.push_back(written.front());
+    }
+    const auto origin = context.simulated() ? report::Origin::predicted : report::Origin::measured;
+    const auto pages = experiment::write_contact_page(results, words, pictures, options.files.folder, origin);
+    files.insert(files.end(), pages.begin(), pages.end());
+  }
+  const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {
+    return r.agrees_with_paper();
+  });
+  const int verdict = all_agree ? done : verdict_is_no;
+  if (context.json) {
+    Json list = Json::array();
+    for (const experiment::ContactResult& result : results) list.push_back(condition_json(result));
+    context.print({{"stiffness_n_per_m", settings.stiffness},
+                   {"haptic_rate_hz", settings.haptic_rate},
+                   {"hold_time_s", settings.hold_time},
+                   {"threshold_m", settings.threshold},
+                   {"velocity_estimator", velocity_estimator},
+                   {"conditions", list},
+                   {"files", names_json(files)}});
+    return verdict;
+  }
+  for (const std::string& line : words) print(context.out, "{}\n", line);
+  print(context.out, "\n{}", experiment::contact_table(results));
+  print_names(context.out, files);
+  for (const auto& result : results) {
+    if (result.lost_records > 0)
+      context.note(fmt::format("{}: {} trace records were lost on the way", result.condition.name,
+                               result.lost_records));
+    if (result.aborted_at)
+      context.note(fmt::format("{}: ended {:.2f} s after the touch, the handle oscillated by {:.1f} mm",
+                               result.condition.name, *result.aborted_at,
+                               result.measure.peak_to_peak * 1000));
+  }
+  return verdict;
+}
+}  // namespace
+
+void add_contact_experiment(CLI::App& experiment, Context& context) {
+  add_command<ContactOptions>(
+      experiment, context,
+      {"contact",
+       "Touches a stiff wall under each law and judges whether it holds still (paper 1, Figs. 9 to 12).",
+       "  kmax experiment contact                                       on the simulated device\n"
+       "  kmax experiment contact --device serial:/dev/ttyUSB0 --out results\n\n"
+       "On a device you are told what to do: before each touch take the handle out of the wall and press "
+       "Enter, then\n"
+       "press against the wall until the time is over; a simulated person does so by itself. The axis is "
+       "disarmed after each trial and on Ctrl-C, and its parameters are put back at the end.\n"
+       "A fast touch bounces by millimetres, which is no instability: approach at 0.2 m/s or so.\n"
+       "Exit code 3: some condition did not come out as the paper says."},
+      Takes::device_and_axis, run_contact_experiment);
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,89 @@
+#include "host_tools/kmax/experiment/experiment_options.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <map>
+
+#include "host_tools/base/print.hpp"
+#include "host_tools/experiment/people/subject_set.hpp"
+#include "host_tools/kmax/commands.hpp"
+
+namespace kmax::cli {
+
+void add_file_options(CLI::App& command, ExperimentFiles& files, const std::string& contents) {
+  command.add_option("--out", files.folder, contents)->type_name("DIR");
+  add_format_option(command, files.ending);
+}
+
+void add_format_option(CLI::App& command, std::string& ending) {
+  command.add_option("--format", ending, "Kind of picture")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
+      ->type_name("svg|png");
+}
+
+void make_folder(const ExperimentFiles& files) {
+  if (!files.folder.empty()) std::filesystem::create_directories(files.folder);
+}
+
+Json names_json(const std::vector<std::filesystem::path>& written) {
+  Json names = Json::array();
+  for (const auto& file : written) names.push_back(file.string());
+  return names;
+}
+
+void print_names(std::ostream& out, const std::vector<std::filesystem::path>& written) {
+  for (const auto& file : written) print(out, "{}\n", file.string());
+}
+
+void add_subjects_option(CLI::App& command, std::string& people) {
+  command.add_option("--subjects", people, "People: a file, 'clipped' or 'unclipped'; else subject 1")
+      ->type_name("SET");
+}
+
+std::vector<simulation::OperatorModel> people_of(const std::string& set, simulation::DeviceModel& device) {
+  if (set.empty()) return std::vector<simulation::OperatorModel>(1);
+  const experiment::SubjectSet opened = experiment::open_subject_set(set);
+  device = opened.device;
+  std::vector<simulation::OperatorModel> people;
+  for (const experiment::Subject& subject : opened.subjects) people.push_back(subject.person);
+  return people;
+}
+
+void add_people_options(CLI::App& command, PeopleOptions& options) {
+  add_subjects_option(command, options.subjects);
+  command
+      .add_option("--activation-gain", options.activation_gain,
+                  "How much the hand stiffens per N, 1/N, for everybody; else as the people are")
+      ->check(within(0.0, 100.0));
+}
+
+void add_clip_option(CLI::App& command, double& clip) {
+  add_number(command, "--clip", clip, "Largest force of the simulated device, N; 0: no limit", 0.0, 1000.0);
+}
+
+std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
+                                                 simulation::DeviceModel& device) {
+  std::vector<simulation::OperatorModel> people = people_of(options.subjects, device);
+  device.force_limit = options.clip;
+  if (options.activation_gain >= 0.0)
+    for (simulation::OperatorModel& person : people) person.activation_gain = options.activation_gain;
+  return people;
+}
+
+void add_safety_options(CLI::App& command, experiment::TouchLimits& limits) {
+  add_number(command, "--force-limit", limits.force_limit,
+             "Largest force on a device, N: lowers force.limit, never raises it", 0.01, 1000.0);
+  add_number(
+      command, "--abort-amplitude", limits.abort_amplitude,
+      "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then", 1e-5,
+      1.0);
+}
+
+void add_touch_options(CLI::App& command, bool& no_prompt, double& patience) {
+  command.add_flag("--no-prompt", no_prompt, "Ask nobody: a simulated person needs no asking");
+  add_number(command, "--patience", patience, "Time to come to the wall, s", 1.0, 600.0);
+}
+
+}  // namespace kmax::cli

@@ -1,0 +1,138 @@
+// kmax experiment max-stiffness.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/experiment/experiment_study.hpp"
+#include "host_tools/kmax/experiment/max_stiffness_options.hpp"
+
+namespace kmax::cli {
+
+std::string key_of(const experiment::StiffnessCondition& condition) {
+  if (!condition.adaptive()) return fmt::format("{:g}", condition.magnetic_coefficient);
+  switch (condition.mode) {
+    case control::AdaptiveMode::latched:
+      return "latched";
+    case control::AdaptiveMode::peak_hold:
+      return "peak_hold";
+    default:
+      return "instant";
+  }
+}
+
+std::vector<experiment::StiffnessCondition> conditions_for(const std::vector<std::string>& keys) {
+  const auto all = experiment::stiffness_conditions();
+  std::vector<std::string> names;
+  for (const auto& condition : all) names.push_back(key_of(condition));
+  for (const std::string& key : keys) {
+    if (std::find(names.begin(), names.end(), key) == names.end())
+      throw UsageError(
+          fmt::format("--conditions {}: there is no such wall; allowed are {}", key, fmt::join(names, ", ")));
+  }
+  std::vector<experiment::StiffnessCondition> chosen;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (keys.empty() || std::find(keys.begin(), keys.end(), names[i]) != keys.end()) chosen.push_back(all[i]);
+  }
+  return chosen;
+}
+
+Json condition_json(const experiment::StiffnessCondition& condition, double stiffness,
+                    const std::vector<double>& subjects, const std::string& name) {
+  return {
+      {"name", name.empty() ? condition.name : name},
+      {"magnetic_coefficient_n", condition.adaptive() ? Json(nullptr) : Json(condition.magnetic_coefficient)},
+      {"adaptive", condition.adaptive()},
+      {"max_stiffness_n_per_m", stiffness},
+      {"subjects", subjects},
+      {"paper_n_per_m", condition.paper ? Json(*condition.paper) : Json(nullptr)}};
+}
+
+double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
+  command.add_option("--conditions", conditions, "Walls: 0,0.5,1,1.5,2,instant,latched,peak_hold")
+      ->delimiter(',')
+      ->type_name("LIST");
+  command.add_option("--out", files.folder, "Folder for a page, pictures, CSV and the journal")
+      ->type_name("DIR");
+  add_resume_option(command, resume);
+  add_format_option(command, files.ending);
+
+  simulated = command.add_option_group("Simulated people", "Without --device");
+  simulated
+      ->add_option("--subjects", subjects,
+                   "People and device: a TOML file, 'clipped' or 'unclipped'; else as --clip says")
+      ->type_name("FILE");
+  simulated
+      ->add_option(
+          "--clip", clip,
+          "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, "
+          "whose gamma was fitted to it; on, unless --subjects says otherwise")
+      ->check(CLI::IsMember({"on", "off", "both"}));
+  simulated->add_option("--seed", seed, "Draw other people with this seed; not fitted unless --calibrate");
+  simulated->add_flag(
+      "--calibrate", calibrate,
+      "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out");
+  simulated->add_option("--jobs", jobs, "Searches at a time; all processors without it")
+      ->check(CLI::Range(1, 4096));
+
+  on_device = command.add_option_group("Device", "With --device");
+  add_axis_option(*on_device, context, "Axis that the wall is on");
+  add_number(*on_device, "--start", device.start, "First stiffness, N/m", 1.0, 1e6);
+  add_number(*on_device, "--start-adaptive", device.start_adaptive, "First stiffness of adaptive walls, N/m",
+             1.0, 1e6);
+  add_number(*on_device, "--step", device.step, "Step, N/m", 1.0, 1e6);
+  add_number(*on_device, "--last", device.last, "The search ends there, N/m", 1.0, 1e6);
+  add_number(*on_device, "--trials", device.trials, "Touches at each stiffness; one unstable touch decides",
+             1, 1000);
+  on_device->add_option("--rate", device.touch.haptic_rate, "Rate of the haptic loop, Hz")
+      ->capture_default_str();
+  add_number(*on_device, "--hold", device.touch.hold_time,
+             "Time from the first touch to the end of judging, s", 1.0, 60.0);
+  add_number(*on_device, "--threshold", device.touch.threshold,
+             "Peak to peak above which a wall is unstable, m", 1e-9, 1.0);
+  add_number(*on_device, "--patience", limits.patience, "Time from arming to the first touch, s", 1.0, 600.0);
+  on_device->add_flag("--no-prompt", no_prompt,
+                      "Ask nobody: for a device with a simulated person ('kmax serve')");
+  add_safety_options(*on_device, limits);
+}
+
+namespace {
+int run_max_stiffness(Context& context, const MaxStiffnessOptions& options) {
+  require_folder_to_resume(options.files.folder, options.resume);
+  const Interruption interruption;
+  if (context.simulated()) {
+    require_none(options.on_device->get_options(), for_a_device);
+    return run_model_max_stiffness(context, options, interruption);
+  }
+  require_none(options.simulated->get_options(), for_simulated_people);
+  return run_device_max_stiffness(context, options, interruption);
+}
+}  // namespace
+
+void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
+  add_command<MaxStiffnessOptions>(
+      experiment, context,
+      {"max-stiffness",
+       "Looks for the largest stiffness of a wall that stays stable, under each law (paper 1, Figs. 6 and "
+       "8).",
+       R"(  kmax experiment max-stiffness                                  twelve simulated people, seconds
+  kmax experiment max-stiffness --clip both --out results        a page with tables and pictures
+  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results
+  kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume
+
+Walls: fields with F_MC = 0 (the plain wall), 0.5, 1, 1.5 and 2 N, and the adaptive wall in each mode.
+Simulated people touch each stiffness at several speeds with several pushes. On a device you are told what to do:
+before each touch take the handle out of the wall and press Enter, then press against the wall until the time is
+over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on Ctrl-C; its
+parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from there.
+Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a device,
+2 N or an adaptive wall does not allow more than the plain wall.)"},
+      Takes::device, run_max_stiffness);
+}
+
+}  // namespace kmax::cli

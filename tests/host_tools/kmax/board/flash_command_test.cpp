@@ -1,0 +1,216 @@
+// kmax flash, with tools that write into a file instead of a board.
+#include <gtest/gtest.h>
+
+#include "tests/host_tools/kmax/board/board_command_line.hpp"
+
+namespace kmax::cli::flash_command_test {
+
+using Words = std::vector<std::string>;
+
+constexpr const char* swd_lines = R"(
+[lines.swdio]
+chip = "/dev/gpiochip4"
+line = 24
+[lines.swclk]
+name = "SWCLK"
+[lines.reset]
+chip = "gpiochip4"
+line = 18
+)";
+
+constexpr const char* serial_board = R"(
+[board]
+kind = "generic_stm32f405"
+serial_port = "/dev/ttyUSB0"
+[lines.boot0]
+chip = "gpiochip0"
+line = 5
+[lines.reset]
+chip = "gpiochip0"
+line = 6
+)";
+
+class FlashCommand : public BoardCommandLine {
+ protected:
+  bool touched() const { return board.flash().substr(0, 4) != "ZZZZ"; }
+};
+
+TEST_F(FlashCommand, WithAnStLinkWritesVerifiesAndStarts) {
+  plug_in("0483", "3748");
+  ASSERT_EQ(kmax({"flash", image}), done) << said;
+  EXPECT_CONTAINS(said, "ODrive v3.5 or v3.6: openocd-stlink because an ST-Link is on USB");
+  EXPECT_CONTAINS(output, "flashed 20808 bytes, read back equal, CRC-32 0x");
+  EXPECT_CONTAINS(output, "the stored parameters are as they were");
+  EXPECT_CONTAINS(board.calls().back(), "reset run");
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["method"], "openocd-stlink");
+  EXPECT_EQ(document()["verified"], true);
+  EXPECT_EQ(document()["parameters_kept"], true);
+  EXPECT_EQ(document()["started"], true);
+  EXPECT_EQ(document()["pieces"][1]["address"], "0x0800c000");
+}
+
+// OpenOCD takes chips by number: from the name in the configuration, or from the kernel.
+TEST_F(FlashCommand, OverGpioLinesByTheirNumbers) {
+  configure(swd_lines);
+  ASSERT_EQ(kmax({"flash", image, "--speed", "200"}), done) << said;
+  const std::string call = board.calls().front();
+  EXPECT_CONTAINS(call, "adapter gpio swdio 24 -chip 4");
+  EXPECT_CONTAINS(call, "adapter gpio swclk 42 -chip 7");
+  EXPECT_CONTAINS(call, "adapter gpio srst 18 -chip 4 -c");
+  EXPECT_CONTAINS(call, "adapter speed 200");
+  EXPECT_TRUE(gpio.history.empty()) << "OpenOCD holds the lines itself";
+}
+
+TEST_F(FlashCommand, OverUsbSaysWhatThePersonDoes) {
+  EXPECT_EQ(kmax({"flash", image, "--method", "dfu"}), failed);
+  EXPECT_CONTAINS(said, "set the DIP switch SW1 to DFU");
+  EXPECT_TRUE(board.calls().empty());
+  plug_in("0483", "df11");
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["method"], "dfu");
+  EXPECT_EQ(document()["started"], false);
+  EXPECT_CONTAINS(said, "to start it: set the DIP switch SW1 back to RUN");
+}
+
+TEST_F(FlashCommand, OverSerialTheLinesEnterAndLeaveTheBootloader) {
+  configure(serial_board);
+  ASSERT_EQ(kmax({"flash", image, "--method", "serial"}), done) << said;
+  EXPECT_EQ(gpio.history,
+            (Words{"gpiochip0 line 5 high", "gpiochip0 line 6 low", "gpiochip0 line 6 high",
+                   "gpiochip0 line 6 released", "gpiochip0 line 5 low", "gpiochip0 line 5 released",
+                   "gpiochip0 line 6 low", "gpiochip0 line 6 high", "gpiochip0 line 6 released"}));
+  EXPECT_TRUE(touched());
+}
+
+TEST_F(FlashCommand, OverUsbTheLinesEnterTheBootloaderAndUsbIsWaitedFor) {
+  configure(serial_board);
+  int pauses = 0;
+  at_sleep = [&] {
+    if (++pauses == 8) plug_in("0483", "df11");
+  };
+  ASSERT_EQ(kmax({"flash", image, "--method", "dfu"}), done) << said;
+  EXPECT_EQ(gpio.history.front(), "gpiochip0 line 5 high");
+  EXPECT_EQ(gpio.history.size(), 9u) << "and the application is started";
+  EXPECT_TRUE(touched());
+}
+
+TEST_F(FlashCommand, ABoardThatDoesNotAppearOnUsbIsNotFlashed) {
+  configure(serial_board);
+  EXPECT_EQ(kmax({"flash", image, "--method", "dfu"}), failed);
+  EXPECT_CONTAINS(said, "no board in DFU mode (0483:df11) appeared on USB within 5 s; nothing");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashCommand, AfterAFailureTheBootloaderIsNotLeft) {
+  configure(serial_board);
+  board.misbehave("fail");
+  EXPECT_EQ(kmax({"flash", image, "--method", "serial"}), failed);
+  EXPECT_CONTAINS(said, "PARTLY WRITTEN");
+  EXPECT_EQ(gpio.history.size(), 6u) << "no second reset";
+}
+
+TEST_F(FlashCommand, SerialIsWrongUsageOnTheODrive) {
+  EXPECT_EQ(kmax({"flash", image, "--method", "serial"}), wrong_usage);
+  EXPECT_CONTAINS(said, "are not ports of the ROM bootloader");
+}
+
+TEST_F(FlashCommand, ADryRunShowsTheCommandLinesAndDoesNothing) {
+  configure(serial_board);
+  ASSERT_EQ(kmax({"flash", image, "--method", "serial", "--dry-run"}), done) << said;
+  EXPECT_CONTAINS(output,
+                  "stm32flash -b 115200 -m 8e1 -w image_0800c000.bin -v -S 0x0800c000:20408 /dev/ttyUSB0\n");
+  EXPECT_CONTAINS(output, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  ASSERT_EQ(kmax({"flash", image, "--method", "openocd-stlink", "--dry-run", "--json"}), done) << said;
+  EXPECT_EQ(document()["commands"].size(), 2u);
+  EXPECT_EQ(document()["dry_run"], true);
+  EXPECT_TRUE(board.calls().empty());
+  EXPECT_TRUE(gpio.history.empty());
+  EXPECT_FALSE(touched());
+}
+
+TEST_F(FlashCommand, AFactoryResetErasesTheParametersAndLeavesTheProgram) {
+  EXPECT_EQ(kmax({"flash", "--factory-reset", "--method", "dfu"}), failed);
+  EXPECT_CONTAINS(said, "set the DIP switch SW1 to DFU");
+  plug_in("0483", "df11");
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--dry-run"}), done) << said;
+  EXPECT_CONTAINS(output, "-s 0x08008000 -D blank.bin\n");
+  EXPECT_TRUE(board.calls().empty());
+  ASSERT_EQ(kmax({"flash", "--factory-reset"}), done) << said;
+  EXPECT_CONTAINS(output, "the stored parameters and the write lock's code are erased, read back blank");
+  EXPECT_CONTAINS(said, "to start it: set the DIP switch SW1 back to RUN");
+  EXPECT_EQ(board.parameters(), std::string(0x8000, '\xFF'));
+  EXPECT_FALSE(touched());
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--json"}), done) << said;
+  EXPECT_EQ(document()["factory_reset"], true);
+  EXPECT_EQ(document()["parameters_kept"], false);
+  EXPECT_EQ(kmax({"flash", image, "--factory-reset"}), wrong_usage);
+  EXPECT_CONTAINS(said, "excludes");
+}
+
+TEST_F(FlashCommand, AFactoryResetOverSerialGoesThroughTheBootloader) {
+  configure(serial_board);
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--method", "serial"}), done) << said;
+  EXPECT_EQ(gpio.history.size(), 9u);
+  EXPECT_EQ(board.parameters(), std::string(0x8000, '\xFF'));
+  EXPECT_FALSE(touched());
+}
+
+TEST_F(FlashCommand, RefusedWhileAnAxisIsArmed) {
+  plug_in("0483", "3748");
+  device = std::make_shared<host_tools_test::FakeDevice>();
+  for (const std::uint16_t word : {std::uint16_t{0x6}, std::uint16_t{0x7}, std::uint16_t{0xF}})
+    device->machines[1].command(word, firmware::Link::serial, firmware::Refusal::none, false);
+  ASSERT_TRUE(device->armed());
+  EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/fake"}), failed);
+  EXPECT_CONTAINS(said, "axis 1 is armed");
+  EXPECT_CONTAINS(said, "Nothing was changed");
+  EXPECT_TRUE(board.calls().empty());
+  device->machines[1].command(0, firmware::Link::serial, firmware::Refusal::none, false);
+  EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/fake"}), done) << said;
+  EXPECT_EQ(said.find("not asked"), std::string::npos);
+}
+
+TEST_F(FlashCommand, ABoardThatDoesNotAnswerCanStillBeFlashed) {
+  plug_in("0483", "3748");
+  EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/fake"}), done) << said;
+  EXPECT_CONTAINS(said,
+                  "the board does not answer, so it was not asked whether an axis is armed: nobody answers");
+  EXPECT_EQ(kmax({"flash", image}), done);
+  EXPECT_CONTAINS(said, "no --device is given, so the board was not asked");
+}
+
+TEST_F(FlashCommand, AnImageThatTouchesTheParametersIsRefused) {
+  plug_in("0483", "3748");
+  auto segments = flash::made_image();
+  segments.push_back({0x0800'8000, {1, 2, 3, 4}});
+  const auto bad = board.folder.write("bad.elf", flash::made_elf(segments)).string();
+  EXPECT_EQ(kmax({"flash", bad}), wrong_usage);
+  EXPECT_CONTAINS(said, "covers the parameter sectors");
+  EXPECT_EQ(kmax({"flash", (board.folder / "none.elf").string()}), wrong_usage);
+  EXPECT_CONTAINS(said, "cannot be read");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashCommand, ArgumentsAreChecked) {
+  EXPECT_EQ(kmax({"flash", image, "--method", "magic"}), wrong_usage);
+  EXPECT_EQ(kmax({"flash", image, "--board", "toaster"}), wrong_usage);
+  EXPECT_CONTAINS(said, "--board: there is no board 'toaster'; boards are odrive_v3, generic_stm32f405");
+  EXPECT_EQ(kmax({"flash", image, "--usb-serial", "1; shutdown"}), wrong_usage);
+  EXPECT_CONTAINS(said, "allowed are letters and digits");
+  EXPECT_EQ(kmax({"flash", image, "--speed", "0"}), wrong_usage);
+  EXPECT_EQ(kmax({"flash", "--board", "generic_stm32f405"}), wrong_usage);
+  EXPECT_CONTAINS(said, "name the image");
+  configure("[lines.swdio]\nline = 3\n");
+  EXPECT_EQ(kmax({"flash", image}), wrong_usage);
+  EXPECT_CONTAINS(said, "lines.toml:1:");
+}
+
+TEST_F(FlashCommand, AHangingToolIsEndedAfterTheTimeout) {
+  plug_in("0483", "3748");
+  board.misbehave("hang");
+  EXPECT_EQ(kmax({"flash", image, "--timeout", "0.5"}), failed);
+  EXPECT_CONTAINS(said, "took too long and was ended");
+}
+
+}  // namespace kmax::cli::flash_command_test

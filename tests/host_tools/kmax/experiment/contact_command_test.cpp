@@ -1,0 +1,111 @@
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "host_tools/device/sim/sim_link.hpp"
+#include "tests/host_tools/kmax/command_line_fixture.hpp"
+
+namespace kmax::cli::contact_command_test {
+
+using ContactCommand = SimulatedCommandLine;
+
+TEST_F(ContactCommand, ContactIsADocumentWithAConditionForEachWall) {
+  // Which of the two is a matter of the sampling instants of single touches.
+  const int code =
+      kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("results"), "--json"});
+  ASSERT_TRUE(code == done || code == verdict_is_no) << said;
+  EXPECT_EQ(keys(), (std::vector<std::string>{"stiffness_n_per_m", "haptic_rate_hz", "hold_time_s",
+                                              "threshold_m", "velocity_estimator", "conditions", "files"}));
+  const Json conditions = document()["conditions"];
+  ASSERT_EQ(conditions.size(), 6u);
+  for (const Json& condition : conditions) {
+    EXPECT_EQ(condition["trials"], 1);
+    EXPECT_EQ(condition["lost_records"], 0);
+    EXPECT_EQ(condition["unstable_trials"], condition["verdict"] == "unstable" ? 1 : 0);
+    EXPECT_EQ(condition["agrees"], condition["verdict"] == condition["paper_verdict"]);
+  }
+  const bool all_agree = std::all_of(conditions.begin(), conditions.end(),
+                                     [](const Json& c) { return c["agrees"].get<bool>(); });
+  EXPECT_EQ(code, all_agree ? done : verdict_is_no);
+  ASSERT_EQ(document()["files"].size(), 14u);
+  const Json files = document()["files"];
+  for (const Json& file : files) EXPECT_TRUE(std::filesystem::exists(file.get<std::string>()));
+  const std::string page = folder.read("results/contact.html");
+  for (const char* part : {"alt=\"F_MC = 0 N: position", "src=\"contact_f_mc_0_n.svg\"", "predicted"})
+    EXPECT_CONTAINS(page, part);
+}
+
+TEST_F(ContactCommand, BadOptionsAreWrongUsage) {
+  for (const std::vector<std::string>& bad : std::vector<std::vector<std::string>>{{"--stiffness", "-1"},
+                                                                                   {"--stiffness", "nan"},
+                                                                                   {"--rate", "333"},
+                                                                                   {"--rate", "0"},
+                                                                                   {"--hold", "0.5"},
+                                                                                   {"--threshold", "0"},
+                                                                                   {"--hold", "nan"},
+                                                                                   {"--hold", "inf"},
+                                                                                   {"--threshold", "nan"},
+                                                                                   {"--patience", "nan"},
+                                                                                   {"--trials", "0"},
+                                                                                   {"--trials", "1.5"},
+                                                                                   {"--format", "gif"},
+                                                                                   {"--force-limit", "0"},
+                                                                                   {"--force-limit", "nan"},
+                                                                                   {"--abort-amplitude", "0"},
+                                                                                   {"--axis", "2"},
+                                                                                   {"--device", "tcp:x"}}) {
+    std::vector<std::string> arguments = {"experiment", "contact"};
+    arguments.insert(arguments.end(), bad.begin(), bad.end());
+    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
+  }
+}
+
+TEST_F(ContactCommand, AFolderThatCannotBeMadeIsAFailure) {
+  folder.write("file", "");
+  EXPECT_EQ(kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("file/x"), "--json"}),
+            failed);
+  EXPECT_CONTAINS(document()["error"].get<std::string>(), "file/x");
+}
+
+/// A board that is reached under the address of a real one, by somebody whose standard input has ended.
+class ContactOnADevice : public ContactCommand {
+ protected:
+  ContactOnADevice() : input_(dup(STDIN_FILENO)) {
+    const int nothing = open("/dev/null", O_RDONLY);
+    dup2(nothing, STDIN_FILENO);
+    close(nothing);
+  }
+  ~ContactOnADevice() override {
+    dup2(input_, STDIN_FILENO);
+    close(input_);
+  }
+  int on_device(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"experiment", "contact", "--device", "serial:/dev/none",
+                                          "--trials",   "1",       "--hold",   "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return kmax(std::move(arguments),
+                [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
+  }
+
+ private:
+  int input_;
+};
+
+TEST_F(ContactOnADevice, SomebodyIsAskedBeforeThereIsForce) {
+  EXPECT_EQ(on_device({}), failed);
+  EXPECT_CONTAINS(said, "F_MC = 0 N: take the handle out of the wall");
+  EXPECT_CONTAINS(said, "--no-prompt");
+  EXPECT_EQ(said.find("holding"), std::string::npos);
+}
+
+TEST_F(ContactOnADevice, WithoutAPromptNobodyIsAsked) {
+  const int code = on_device({"--no-prompt", "--json"});
+  EXPECT_TRUE(code == done || code == verdict_is_no) << said;
+  EXPECT_EQ(said.find("take the handle out of the wall and be ready"), std::string::npos) << said;
+  EXPECT_EQ(document()["conditions"].size(), 6u);
+}
+
+TEST_F(ContactCommand, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {
+  EXPECT_EQ(kmax({"experiment", "contact", "--axis", "1", "--trials", "1", "--json"}), failed) << output;
+}
+
+}  // namespace kmax::cli::contact_command_test
