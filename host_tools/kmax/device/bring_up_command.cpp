@@ -10,7 +10,7 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/terminal_prompter.hpp"
+#include "host_tools/kmax/terminal.hpp"
 
 namespace kmax::cli {
 
