@@ -5,6 +5,7 @@
 #include <bit>
 #include <vector>
 
+#include "tests/firmware/register_words.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
 #include "tests/fuzz/watched_application.hpp"
 

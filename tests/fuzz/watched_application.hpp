@@ -29,7 +29,7 @@ class WatchedApplication {
     power_on();
     // In most, walls and time-outs are within reach from the first action on.
     if ((start & 4) == 0) return;
-    preset("wall.law", 1 + start / 16 % (std::size(names::wall_law) - 1));
+    preset("wall.law", static_cast<double>(1 + start / 16 % (std::size(names::wall_law) - 1)));
     preset("wall.position", -0.001);
     preset("force.ramp_time", 0);
     preset("link.timeout", 0.05);
