@@ -102,7 +102,7 @@ class MotorDrive {
   double mean_torque() const { return mean_torque_; }            // N m, with cogging, of the last advance
   double force() const { return mean_torque_ / transmission_; }  // N on the handle, of the last advance
   double magnetic_energy() const;                                // J in the inductances
-  bool brushed() const { return std::holds_alternative<BrushedDcMotor>(motor_); }
+  // Null: a brushed DC motor.
   const SynchronousMotor* synchronous_motor() const { return std::get_if<SynchronousMotor>(&motor_); }
 
  private:

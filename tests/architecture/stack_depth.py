@@ -49,6 +49,8 @@ OF_THE_IMAGE = Stated(
         "firmware::AnyFlashSectors::read": FLASH,
         "firmware::ParameterStore::write": FLASH,
         "firmware::ParameterKeeper::poll": FLASH,
+        # What a link says of itself.
+        "firmware::Readings::refresh_device": ["firmware::LinkReadings::LinkReadings"],
         # What std::any_of() and its like are given.
         "__gnu_cxx::__ops::_Iter_pred::operator": ["firmware::is_setting"],
     },

@@ -87,8 +87,9 @@ class MotorBench {
   double current_force() {
     const simulation::MotorDrive& motor = drive();
     const double transmission = motor.encoder().config().transmission;
-    const double cogging =
-        motor.brushed() ? 0.0 : motor.synchronous_motor()->cogging_torque(motor.shaft_angle());
+    const double cogging = motor.synchronous_motor() == nullptr
+                               ? 0.0
+                               : motor.synchronous_motor()->cogging_torque(motor.shaft_angle());
     return motor.force() - cogging / transmission;
   }
 

@@ -237,8 +237,8 @@ TEST(SceneMotor, ADriveHasNoForceLimitAndItsOwnSeed) {
   drive.block(true);
   for (int n = 0; n < 400; ++n) drive.advance(25e-6, {{{{false, 0.0}, {true, 0.6}, {true, 0.4}}}}, supply);
   EXPECT_GT(drive.force(), 10.0);
-  EXPECT_TRUE(drive.brushed());
-  EXPECT_FALSE(other.brushed());
+  EXPECT_EQ(drive.synchronous_motor(), nullptr);
+  EXPECT_NE(other.synchronous_motor(), nullptr);
   using Channel = CurrentSensor::Channel;
   MotorDrive first = scene.make_drive(0);
   const double pin = first.current_pin(Channel::b, true) - 0.006;

@@ -103,7 +103,7 @@ Record respond(const simulation::Scene& scene, std::optional<Defect> defect) {
   Record record;
   simulated_board::SimulatedBridge before, after;
   for (auto* bridge : {&before, &after}) {
-    EXPECT_TRUE(bridge->pwm().enable_legs({.a = !drives().drive(0).brushed()}));
+    EXPECT_TRUE(bridge->pwm().enable_legs({.a = drives().drive(0).synchronous_motor() != nullptr}));
     EXPECT_TRUE(bridge->pwm().arm());
   }
   // The share of 24 V that drives some amperes through the winding, and makes up for the dead time.
@@ -142,7 +142,7 @@ TEST(SceneWorld, AgreesToTheCodeWithTheNativeBoardsWorld) {
 
 TEST(SceneWorld, EveryDefectShowsInWhatTheBoardReads) {
   for (const char* name : {"dc_coreless_a", "gimbal_a", "gimbal_b", "drone"}) {
-    const bool brushed = simulation::SceneDrives(scene_of(name)).drive(0).brushed();
+    const bool brushed = simulation::SceneDrives(scene_of(name)).drive(0).synchronous_motor() == nullptr;
     const Record good = respond<OnWorld>(scene_of(name), std::nullopt);
     for (const auto& [defect, named] : simulation::defect_names) {
       const bool without_effect = brushed && defect == Defect::phase_a_open;
