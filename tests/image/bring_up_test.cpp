@@ -6,7 +6,7 @@
 #include "tests/host_tools/bring_up/person_at_the_bench.hpp"
 #include "tests/image/image_bench.hpp"
 
-namespace kmax::tests::image_bring_up_test {
+namespace kmax::tests::bring_up_test {
 
 TEST(ImageBringUp, ABlankBoardComesToItsFirstWalls) {
   ImageBench image({{"modbus.baud_rate", std::int64_t{460800}}}, 0.0, "dc_coreless_a");
@@ -26,4 +26,4 @@ TEST(ImageBringUp, ABlankBoardComesToItsFirstWalls) {
   EXPECT_LE(*largest, 1.0);
 }
 
-}  // namespace kmax::tests::image_bring_up_test
+}  // namespace kmax::tests::bring_up_test
