@@ -75,9 +75,11 @@ class Program : WatchedApplication {
       case 11:
         return power_cycle();
       case 12: {
-        // What is written often while an axis is armed.
+        // What is written often.
         constexpr std::array names{entry_of<"link.sign_of_life">(), entry_of<"profile.target_force">(),
-                                   entry_of<"force.limit">(), entry_of<"drive.commander">()};
+                                   entry_of<"force.limit">(),       entry_of<"drive.commander">(),
+                                   entry_of<"lock.key">(),          entry_of<"lock.code">(),
+                                   entry_of<"store.command">()};
         const std::size_t axis = input_.byte() % axis_count;
         const std::size_t slot = slot_of(names[input_.byte() % names.size()], axis);
         return input_.byte() % 2 != 0 ? sdo(slot, some_value(slot))
@@ -206,7 +208,11 @@ class Program : WatchedApplication {
     }
   }
   std::uint32_t some_value(std::size_t slot) {
-    const Entry& e = entry_at(owner_of(slot).entry);
+    const std::size_t entry = owner_of(slot).entry;
+    const Entry& e = entry_at(entry);
+    // Otherwise nobody comes upon it.
+    if ((entry == entry_of<"lock.key">() || entry == entry_of<"lock.code">()) && input_.byte() % 2 != 0)
+      return owners_code;
     switch (const std::uint8_t which = input_.byte(); which % 8) {
       case 0:
         return raw_from_number(e.type, e.minimum);
@@ -244,7 +250,7 @@ class Program : WatchedApplication {
       const std::size_t word = input_.word();
       flash_.words[word % 2][word / 2 % 512] ^= std::uint32_t{1} << input_.byte() % 32;
     }
-    power_on();
+    power_on(damage == 0);
     step(tick_us);
   }
 

@@ -14,6 +14,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/simulation/synchronous_motor.hpp"
+#include "tests/fuzz/fuzz_input.hpp"
 
 namespace kmax {
 namespace {
@@ -79,9 +80,15 @@ Words command_line_words() {
   return words;
 }
 
+/// Both orders of the code of a device that is locked.
+Words codes() {
+  return {bytes(owners_code, owners_code >> 8, owners_code >> 16, owners_code >> 24),
+          bytes(owners_code >> 24, owners_code >> 16, owners_code >> 8, owners_code)};
+}
+
 /// The begin of an SDO download of each object.
 Words can_words() {
-  Words words;
+  Words words = codes();
   for (const device::Parameter& one : device::all_parameters())
     words.insert(bytes(0x23 | static_cast<int>(4 - one.bytes()) << 2, one.index(), one.index() >> 8,
                        one.object().subindex));
@@ -90,7 +97,7 @@ Words can_words() {
 
 /// The begin of a request that writes each register.
 Words modbus_words() {
-  Words words;
+  Words words = codes();
   for (const device::Parameter& one : device::all_parameters())
     if (one.writable()) words.insert(bytes(1, one.words() == 1 ? 6 : 16, one.address() >> 8, one.address()));
   return words;

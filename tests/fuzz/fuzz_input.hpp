@@ -19,6 +19,9 @@ inline void require(bool kept, const char* rule) {
   if (!kept) broken(rule);
 }
 
+/// Of the write lock, where an input begins with a device that is locked.
+inline constexpr std::uint32_t owners_code = 0x8F4B'D16A;
+
 /// The bytes of an input, taken one after the other; zeros when they are used up.
 class FuzzInput {
  public:

@@ -22,6 +22,12 @@
 // 6. What a commander asks of an armed axis, and what the hand there feels, changes only when something came
 // over the link that armed it.
 //
+// 7. While the write lock is locked, as lock.state says, nothing changes that can be set, but what commands
+// an axis and what is recorded, over neither link; nor do the memory of the parameters, the bit rate and the
+// node ID in use, unless NMT resets the communication, and no log is erased. Locked is what has a code, after
+// every start, and only its code opens it, while no axis is armed. No value, nothing that is sent tells the
+// code.
+//
 // Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
 // allows what they could mean at most: it never complains of what is right.
 #pragma once
@@ -55,6 +61,23 @@ class SafetyOracle {
     for (std::size_t slot = 0; slot < slot_count; ++slot) judge_value(slot, values.raw(slot));
   }
 
+  /// A start after the one before. `whole`: with a memory that holds what it held, or what it was to hold.
+  void restart(const ParameterValues& values, bool whole) {
+    SafetyOracle next(values);
+    next.codes_ = std::move(codes_);
+    next.any_code_ = any_code_;
+    next.secret_ = secret_;
+    next.complaint_ = complaint_;
+    next.now_us_ = now_us_;
+    const bool code_is_kept = lock_state(values_) != no_code && !code_;
+    if (whole && code_is_kept && !is_locked(values)) next.complain("not locked after a start", 0);
+    *this = std::move(next);
+  }
+  /// A code that is told by nothing but chance if the device does not tell it.
+  void expect_secret(std::uint32_t code) { secret_ = code; }
+  /// Otherwise nothing of the lock is looked at, and lock.state need not be up to date.
+  bool may_have_code() const { return any_code_ || !codes_.empty(); }
+
   /// A character whose last stop bit ended at `end_us`, on a line of `baud_rate`.
   void take_byte(std::uint8_t byte, std::uint64_t end_us, std::uint32_t baud_rate) {
     const double character_us = 11e6 / baud_rate;
@@ -71,14 +94,19 @@ class SafetyOracle {
     const auto data = std::span(frame.data).first(std::min<std::size_t>(frame.length, frame.data.size()));
     ++frames_waiting_;
     const std::uint32_t id = frame.identifier;
+    const bool for_first_server = id > 0x600 && id <= 0x67F;
+    if (!for_first_server && tellings(data) > 0) secret_.reset();
+    if (id == 0) nmt_ = Moment{polls_, now_us_};
     if (id == 0 || id == 0x7E5 || (id > 0x700 && !heartbeat_watched())) return;  // NMT, LSS, heartbeats
     wrote_[1] = {polls_, now_us_};
-    if (id > 0x600 && id <= 0x67F) {
+    if (for_first_server) {
       take_sdo(data);
       return;
     }
     if (id == second_request()) {  // whatever its transfer is about
       life_waits_ = true;
+      note_code(std::nullopt);
+      note_key(std::nullopt);
       for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, true, true, true);
       return;
     }
@@ -130,6 +158,7 @@ class SafetyOracle {
     const States before = states_;
     states_ = states;
     for (std::size_t axis = 0; axis < axis_count; ++axis) judge_state(axis, before[axis]);
+    judge_lock(values, before);
     // Hardly ever, and looking at each slot would take most of a fuzzer's time.
     if (std::memcmp(&values, &values_, sizeof values) == 0) return;
     for (std::size_t slot = 0; slot < slot_count; ++slot) {
@@ -138,12 +167,29 @@ class SafetyOracle {
     values_ = values;
   }
 
+  /// After a poll: how often the memory of the parameters has been written to, and whether a save is under
+  /// way.
+  void take_memory(int operations, bool saving) {
+    if (memory_ && stays_locked_ && !memory_->saving && memory_->operations != operations)
+      complain("kept while locked", 0);
+    memory_ = {operations, saving};
+    if (code_ && !saving && settled(*code_)) code_.reset();
+  }
+  /// A reply, or the data of a frame, of the device.
+  void take_sent(std::span<const std::uint8_t> data) {
+    if (tellings(data) > 0) complain("the code was told", 0);
+  }
+
   /// The first thing that was wrong; empty: nothing was.
   const std::string& complaint() const { return complaint_; }
 
  private:
   struct Moment {
     std::uint64_t poll = 0, time_us = 0;
+  };
+  struct Memory {
+    int operations;
+    bool saving;
   };
   /// What a message could have meant as a controlword of an axis.
   struct Word {
@@ -200,17 +246,21 @@ class SafetyOracle {
     auto pdu = frame.subspan(1);
     if (pdu.size() > 3 && pdu[0] == 65) pdu = pdu.subspan(3);
     if (pdu[0] == 6 || pdu[0] == 16 || pdu[0] == 22 || pdu[0] == 23) wrote_[0] = {polls_, now_us_};
+    take_lock_request(pdu);
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       const std::size_t place = modbus_address(entry_of<"drive.controlword">(), axis);
-      std::optional<std::uint16_t> word;
-      if (pdu[0] == 6 && pdu.size() == 5) word = word_in(pdu, 1, 3, place);
-      if (pdu[0] == 16 && pdu.size() > 6) word = word_in(pdu, 1, 6, place);
-      if (pdu[0] == 23 && pdu.size() > 10) word = word_in(pdu, 5, 10, place);
+      const auto word = written_word(pdu, place);
       if (word) note_word(axis, 0, shuts_down(*word), unit != 0 && asks_to_enable(*word), lowers(*word));
       // A mask makes it from what was there before.
       if (pdu[0] == 22 && pdu.size() == 7 && big_endian(pdu, 1) == place)
         note_word(axis, 0, true, unit != 0, true);
     }
+  }
+  static std::optional<std::uint16_t> written_word(std::span<const std::uint8_t> pdu, std::size_t place) {
+    if (pdu[0] == 6 && pdu.size() == 5) return word_in(pdu, 1, 3, place);
+    if (pdu[0] == 16 && pdu.size() > 6) return word_in(pdu, 1, 6, place);
+    if (pdu[0] == 23 && pdu.size() > 10) return word_in(pdu, 5, 10, place);
+    return std::nullopt;
   }
   /// The register `place` of those that are written from `data` on, the first of them as the word at `first`
   /// says.
@@ -219,6 +269,89 @@ class SafetyOracle {
     const std::size_t begin = big_endian(pdu, first);
     if (place < begin || data + 2 * (place - begin) + 1 >= pdu.size()) return std::nullopt;
     return big_endian(pdu, data + 2 * (place - begin));
+  }
+
+  // The write lock.
+
+  enum LockState : std::int32_t { no_code, open, locked };
+  static LockState lock_state(const ParameterValues& values) {
+    return static_cast<LockState>(values.whole<"lock.state">());
+  }
+  static bool is_locked(const ParameterValues& values) { return lock_state(values) == locked; }
+  /// Something that came is not yet sure to have been read.
+  bool lately(const std::optional<Moment>& came) const { return came && !settled(*came); }
+
+  /// How often the secret is in there, whichever end comes first.
+  std::ptrdiff_t tellings(std::span<const std::uint8_t> data) const {
+    std::ptrdiff_t count = 0;
+    for (std::size_t i = 0; secret_ && i + 4 <= data.size(); ++i) {
+      std::uint32_t up = 0, down = 0;
+      for (unsigned byte = 0; byte < 4; ++byte) {
+        up |= std::uint32_t{data[i + byte]} << 8 * byte;
+        down = down << 8 | data[i + byte];
+      }
+      if (up == *secret_ || down == *secret_) ++count;
+    }
+    return count;
+  }
+  /// A code that was sent, or that could be any.
+  void note_code(std::optional<std::uint32_t> code) {
+    if (is_locked(values_) && !lately(key_)) return;
+    code_ = Moment{polls_, now_us_};
+    if (!code) any_code_ = true;
+    if (code && *code != 0) codes_.push_back(*code);
+  }
+  void note_key(std::optional<std::uint32_t> key) {
+    if (key && std::ranges::find(codes_, *key) == codes_.end() && !any_code_) return;
+    if (key != 0U) key_ = Moment{polls_, now_us_};
+  }
+  void take_lock_request(std::span<const std::uint8_t> pdu) {
+    std::ptrdiff_t rightly = 0;
+    const auto number_at = [&](std::size_t entry) -> std::optional<std::uint32_t> {
+      const std::size_t place = modbus_address(entry, 0);
+      const auto high = written_word(pdu, place), low = written_word(pdu, place + 1);
+      if (!high || !low) return std::nullopt;
+      const std::uint32_t number = std::uint32_t{*high} << 16 | *low;
+      if (number == secret_) ++rightly;
+      return number;
+    };
+    if (const auto key = number_at(entry_of<"lock.key">())) note_key(key);
+    if (const auto code = number_at(entry_of<"lock.code">())) note_code(code);
+    if (tellings(pdu) > rightly) secret_.reset();
+  }
+  /// `number`: what is written, if that is known.
+  void take_lock_sdo(std::span<const std::uint8_t> data, std::optional<std::uint32_t> number) {
+    const auto is = [this](const Entry& e) {
+      return sdo_index_ == e.index() && sdo_subindex_ == e.object_subindex();
+    };
+    const bool key = is(entry_at(entry_of<"lock.key">())), code = is(entry_at(entry_of<"lock.code">()));
+    if (key) note_key(number);
+    if (code) note_code(number);
+    if (tellings(data) > (key || code ? 1 : 0)) secret_.reset();
+  }
+
+  void judge_lock(const ParameterValues& values, const States& before) {
+    const bool was_locked = is_locked(values_);
+    stays_locked_ = was_locked && is_locked(values) && !lately(key_);
+    if (!was_locked || is_locked(values)) return;
+    if (code_ && lock_state(values) == no_code) return;  // it had been removed before
+    if (!lately(key_)) complain("opened without its code", 0);
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      if (before[axis] == DriveState::operation_enabled && states_[axis] == before[axis])
+        complain("opened while armed", axis);
+    }
+  }
+  /// Of a device that stays locked: whether `slot` may become `raw`.
+  bool passes_lock(const Entry& e, std::size_t slot, std::uint32_t raw) const {
+    if (e.name == "log.newest") return raw >= values_.raw(slot);
+    if (e.name == "can.node_in_use") return values_.raw(slot) > 127 || lately(nmt_);
+    if (e.name == "can.bit_rate_in_use") return lately(nmt_);
+    if (e.access == Access::communication) return lately(nmt_);
+    static constexpr std::array<std::string_view, 6> used{"drive.controlword",     "drive.commander",
+                                                          "profile.target_torque", "profile.max_torque",
+                                                          "profile.target_force",  "link.sign_of_life"};
+    return e.access == Access::read_only || std::ranges::find(used, e.name) != used.end() ||
+           e.name.starts_with("trace.") || e.name.starts_with("capture.");
   }
 
   void take_sdo(std::span<const std::uint8_t> data) {
@@ -233,10 +366,15 @@ class SafetyOracle {
     // Uploads and aborts say nothing, unless they are a block's contents.
     if (!sdo_in_blocks_ && command != 0 && command != 1) return;
     if (sdo_in_blocks_ || is_command()) life_waits_ = true;
+    const bool known = expedited && !sdo_in_blocks_ && data.size() == 8;
+    const auto number = [&] {
+      return std::uint32_t{data[4]} | std::uint32_t{data[5]} << 8 | std::uint32_t{data[6]} << 16 |
+             std::uint32_t{data[7]} << 24;
+    };
+    take_lock_sdo(data, known ? std::optional(number()) : std::nullopt);
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       if (sdo_index_ != 0x6040U + 0x800U * axis) continue;
-      const bool known = expedited && !sdo_in_blocks_ && data.size() == 8;
-      const auto word = known ? static_cast<std::uint16_t>(data[4] | data[5] << 8) : std::uint16_t{0};
+      const auto word = known ? static_cast<std::uint16_t>(number()) : std::uint16_t{0};
       note_word(axis, 1, !known || shuts_down(word), !known || asks_to_enable(word), !known || lowers(word));
     }
   }
@@ -255,7 +393,8 @@ class SafetyOracle {
     });
   }
   void note_pdo_words() {
-    for (std::size_t axis = 0; axis < axis_count; ++axis) note_word(axis, 1, pdo_shuts_down_, pdo_enables_, pdo_lowers_);
+    for (std::size_t axis = 0; axis < axis_count; ++axis)
+      note_word(axis, 1, pdo_shuts_down_, pdo_enables_, pdo_lowers_);
   }
   bool makes_sync() const {
     return (values_.whole<"canopen.sync_cob_id">() >> 30 & 1) != 0 &&
@@ -368,6 +507,9 @@ class SafetyOracle {
     judge_value(slot, raw);
     const auto [entry, of_axis] = owner_of(slot);
     const Entry& e = entry_at(entry);
+    if (stays_locked_ && !passes_lock(e, slot, raw)) complain("changed while locked", of_axis, e.name);
+    if (entry == entry_of<"lock.code">() || entry == entry_of<"lock.key">())
+      complain("the code is a value", 0);
     if (entry == entry_of<"modbus.unit">()) unit_before_ = static_cast<std::uint8_t>(values_.raw(slot));
     const bool fades = e.scope() == Scope::axis && before[of_axis] == DriveState::fault_reaction_active &&
                        states_[of_axis] == before[of_axis];
@@ -411,7 +553,7 @@ class SafetyOracle {
     unsigned ticks;  ///< for which more may be left of a sample before
   };
   std::array<Held, axis_count> held_{};
-  std::array<std::array<bool, 2>, axis_count> armed_by_{};   ///< links that may have
+  std::array<std::array<bool, 2>, axis_count> armed_by_{};  ///< links that may have
   /// By link: since its word armed the axis, it has sent none without bit 3.
   std::array<std::array<bool, 2>, axis_count> holds_{};
   std::array<Moment, 2> wrote_{};  ///< when the link last brought what could be a write
@@ -427,6 +569,12 @@ class SafetyOracle {
   bool sdo_in_blocks_ = false;  ///< anything may have been a block's contents
   unsigned sdo_index_ = 0;
   std::uint8_t sdo_subindex_ = 0;
+  std::vector<std::uint32_t> codes_;  ///< that may be in force
+  bool any_code_ = false, stays_locked_ = false;
+  std::optional<std::uint32_t> secret_;  ///< that no message had but those to the lock
+  std::optional<Moment> key_, nmt_;      ///< when a code that may be right, and a command of NMT, came
+  std::optional<Moment> code_;           ///< when another code came, until it is kept
+  std::optional<Memory> memory_;
   std::string complaint_;
 };
 

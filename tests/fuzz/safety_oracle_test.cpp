@@ -15,13 +15,33 @@ class SafetyOracleRule : public Test {
  protected:
   void serial_controlword(std::uint16_t word, std::uint8_t unit = 1) {
     const std::uint16_t place = modbus_address(entry_of<"drive.controlword">(), 0);
+    request({6, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place),
+             static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)},
+            unit);
+  }
+  void request(const modbus::Bytes& pdu, std::uint8_t unit = 1) {
     now_us_ += 10'000;
-    for (const std::uint8_t byte :
-         modbus::adu(unit, {6, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place),
-                            static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word)})) {
+    for (const std::uint8_t byte : modbus::adu(unit, pdu)) {
       now_us_ += 100;
       oracle_.take_byte(byte, now_us_, 115200);
     }
+  }
+  /// A number of 32 bits.
+  void write_serial(std::size_t entry, std::uint32_t number) {
+    const std::uint16_t place = modbus_address(entry, 0);
+    modbus::Bytes pdu{16, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place), 0, 2, 4};
+    for (int shift = 24; shift >= 0; shift -= 8) pdu.push_back(static_cast<std::uint8_t>(number >> shift));
+    request(pdu);
+  }
+  void write_can(std::size_t entry, std::uint32_t number) {
+    const Entry& e = entry_at(entry);
+    drivers::CanFrame frame{.identifier = 0x601,
+                            .length = 8,
+                            .data = {0x23, static_cast<std::uint8_t>(e.index()),
+                                     static_cast<std::uint8_t>(e.index() >> 8), e.object_subindex()}};
+    for (unsigned byte = 0; byte < 4; ++byte)
+      frame.data[4 + byte] = static_cast<std::uint8_t>(number >> 8 * byte);
+    oracle_.take_frame(frame);
   }
   void can_controlword(std::uint16_t word) {
     oracle_.take_frame({.identifier = 0x601,
@@ -36,6 +56,19 @@ class SafetyOracleRule : public Test {
     oracle_.take_poll(now_us_, values_, states_);
   }
   void poll() { poll(states_[0]); }
+  /// As a device that an owner has locked.
+  void lock() {
+    oracle_.expect_secret(code);
+    write_serial(lock_code, code);
+    poll();
+    set<"lock.state">(2);
+    settle();
+    ASSERT_EQ(oracle_.complaint(), "");
+  }
+  void open() {
+    set<"lock.state">(1);
+    poll();
+  }
   void arm() {
     serial_controlword(0x06);
     poll(DriveState::ready_to_switch_on);
@@ -61,6 +94,9 @@ class SafetyOracleRule : public Test {
   void expect_complaint(const std::string& what) {
     EXPECT_EQ(oracle_.complaint().substr(0, what.size()), what) << oracle_.complaint();
   }
+
+  static constexpr std::uint32_t code = 0x1234'5678;
+  static constexpr std::size_t lock_code = entry_of<"lock.code">(), lock_key = entry_of<"lock.key">();
 
   ParameterValues values_;
   SafetyOracle oracle_{values_};
@@ -365,6 +401,192 @@ TEST_F(SafetyOracleRule, ChangedWhileDisarmedIsRight) {
   set<"force.limit">(5);
   poll();
   EXPECT_EQ(oracle_.complaint(), "");
+}
+
+TEST_F(SafetyOracleRule, ChangedWhileLocked) {
+  lock();
+  set<"force.limit">(1);
+  poll();
+  expect_complaint("changed while locked: force.limit, axis 0");
+}
+TEST_F(SafetyOracleRule, CanopensSettingChangedWhileLocked) {
+  lock();
+  set<"rpdo1.cob_id">(0x8000'0201);
+  poll();
+  expect_complaint("changed while locked: rpdo1.cob_id, axis 0");
+}
+TEST_F(SafetyOracleRule, TheBitRateChangedWhileLocked) {
+  set<"can.bit_rate_in_use">(1'000'000);
+  start();
+  lock();
+  set<"can.bit_rate_in_use">(500'000);
+  poll();
+  expect_complaint("changed while locked: can.bit_rate_in_use, axis 0");
+}
+TEST_F(SafetyOracleRule, TheNodeIdChangedWhileLocked) {
+  set<"can.node_in_use">(1);
+  start();
+  lock();
+  set<"can.node_in_use">(2);
+  poll();
+  expect_complaint("changed while locked: can.node_in_use, axis 0");
+}
+TEST_F(SafetyOracleRule, TheLogErasedWhileLocked) {
+  set<"log.newest">(3);
+  start();
+  lock();
+  set<"log.newest">(0);
+  poll();
+  expect_complaint("changed while locked: log.newest, axis 0");
+}
+TEST_F(SafetyOracleRule, WhatIsUsedWhileLockedIsRight) {
+  lock();
+  set<"profile.target_force">(100);
+  set<"profile.max_torque">(100);
+  set<"trace.axis">(1);
+  set<"capture.interval">(7);
+  set<"log.newest">(1);
+  set<"wall.position">(0);
+  poll();
+  oracle_.take_frame({.identifier = 0, .length = 2, .data = {0x82, 1}});
+  set<"rpdo1.cob_id">(0x8000'0201);
+  set<"can.node_in_use">(2);
+  poll();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, OpenedByItsCodeAndThenChangedIsRight) {
+  lock();
+  write_serial(lock_key, code);
+  open();
+  settle();
+  set<"force.limit">(1);
+  poll();
+  write_can(lock_key, 0);
+  set<"lock.state">(2);
+  poll();
+  settle();
+  write_can(lock_key, code);
+  set<"force.limit">(2);
+  open();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, OpenedByAnotherCode) {
+  lock();
+  write_serial(lock_key, code + 1);
+  write_can(lock_key, 0);
+  write_can(lock_code, 5);  // refused
+  write_can(lock_key, 5);
+  open();
+  expect_complaint("opened without its code, axis 0");
+}
+TEST_F(SafetyOracleRule, OpenedByItsCodeForSomethingElse) {
+  lock();
+  write_can(entry_of<"force.limit">(), code);
+  open();
+  expect_complaint("opened without its code, axis 0");
+}
+TEST_F(SafetyOracleRule, OpenedLongAfterItsCode) {
+  lock();
+  write_can(lock_key, code);
+  settle();
+  open();
+  expect_complaint("opened without its code, axis 0");
+}
+TEST_F(SafetyOracleRule, OpenedByACodeThatWasSetWhileItWasOpenIsRight) {
+  lock();
+  write_serial(lock_key, code);
+  write_can(lock_code, 5);
+  open();
+  settle();
+  set<"lock.state">(2);
+  poll();
+  settle();
+  write_can(lock_key, 5);
+  open();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, OpenedWhileArmed) {
+  lock();
+  arm();
+  write_serial(lock_key, code);
+  open();
+  expect_complaint("opened while armed, axis 0");
+}
+TEST_F(SafetyOracleRule, NotLockedAfterAStart) {
+  lock();
+  oracle_.take_memory(0, false);
+  write_serial(lock_key, code);
+  open();
+  oracle_.restart(values_, true);
+  expect_complaint("not locked after a start, axis 0");
+}
+TEST_F(SafetyOracleRule, AStartWithoutACodeIsRightIfItWasRemovedOrTheMemoryIsDamaged) {
+  lock();
+  oracle_.restart(ParameterValues(), false);
+  EXPECT_EQ(oracle_.complaint(), "");
+  lock();
+  write_serial(lock_key, code);
+  open();
+  write_serial(lock_code, 0);
+  poll();
+  write_serial(lock_key, 0);
+  set<"lock.state">(2);
+  settle();
+  set<"lock.state">(0);
+  poll();
+  oracle_.restart(values_, true);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, TheCodeOpensAfterARestartToo) {
+  lock();
+  oracle_.restart(values_, true);
+  write_can(lock_key, code);
+  open();
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, KeptWhileLocked) {
+  oracle_.take_memory(5, true);
+  lock();
+  oracle_.take_memory(7, false);
+  poll();
+  oracle_.take_memory(7, false);
+  EXPECT_EQ(oracle_.complaint(), "") << "begun before";
+  poll();
+  oracle_.take_memory(8, true);
+  expect_complaint("kept while locked, axis 0");
+}
+TEST_F(SafetyOracleRule, TheCodeIsTold) {
+  for (const bool high_first : {false, true}) {
+    start();
+    lock();
+    oracle_.take_sent(std::array<std::uint8_t, 5>{0x12, 0x34, 0x56, 0x79, 0x12});
+    EXPECT_EQ(oracle_.complaint(), "");
+    if (high_first)
+      oracle_.take_sent(std::array<std::uint8_t, 5>{1, 0x12, 0x34, 0x56, 0x78});
+    else
+      oracle_.take_sent(std::array<std::uint8_t, 5>{0x78, 0x56, 0x34, 0x12, 1});
+    expect_complaint("the code was told, axis 0");
+  }
+}
+TEST_F(SafetyOracleRule, ToRepeatWhatAHostTellsIsRight) {
+  const std::array<std::uint8_t, 4> told{0x12, 0x34, 0x56, 0x78};
+  lock();
+  request({8, 0, 0, 0x12, 0x34, 0x56, 0x78});
+  oracle_.take_sent(told);
+  start();
+  lock();
+  write_can(entry_of<"force.limit">(), code);
+  oracle_.take_sent(told);
+  start();
+  lock();
+  oracle_.take_frame({.identifier = 0x201, .length = 4, .data = {0x12, 0x34, 0x56, 0x78}});
+  oracle_.take_sent(told);
+  EXPECT_EQ(oracle_.complaint(), "");
+}
+TEST_F(SafetyOracleRule, TheCodeIsAValue) {
+  set<"lock.code">(code);
+  poll();
+  expect_complaint("the code is a value, axis 0");
 }
 
 }  // namespace

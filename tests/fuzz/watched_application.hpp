@@ -23,7 +23,8 @@ class WatchedApplication {
   explicit WatchedApplication(std::uint8_t start) {
     // Some begin shortly before the device's clock wraps.
     if (start & 1) now_us_ = (std::uint64_t{1} << 32) - 3'000'000;
-    if (start & 2) keeps_ = true;
+    const bool locks = (start & 0x4C) == 0x4C;
+    keeps_ = locks || (start & 2) != 0;
     can_.state = CanState::active;
     readings_.supply_voltage = 24.0f;
     power_on();
@@ -35,6 +36,7 @@ class WatchedApplication {
     preset("link.timeout", 0.05);
     preset("drive.mode", (start & 8) != 0 ? 2 : 0);
     if (start & 128) preset("velocity.limit", 0);
+    if (locks) lock();
   }
 
  protected:
@@ -46,11 +48,29 @@ class WatchedApplication {
     oracle_.emplace(application_->values());
   }
 
-  void power_on() {
+  /// `whole`: the flash has lost nothing.
+  void power_on(bool whole = true) {
     application_.emplace(BoardIdentity{});
     if (keeps_) application_->attach_store(AnyFlashSectors::of(flash_));
-    oracle_.emplace(application_->values());
+    if (oracle_)
+      oracle_->restart(application_->values(), whole);
+    else
+      oracle_.emplace(application_->values());
+    if (!oracle_->complaint().empty()) broken(oracle_->complaint());
     sending_ = false;
+  }
+  /// As an owner does, who tells nobody.
+  void lock() {
+    oracle_->expect_secret(owners_code);
+    const std::uint16_t address = modbus_address(entry_of<"lock.code">(), 0);
+    modbus::Bytes pdu{16, static_cast<std::uint8_t>(address >> 8), static_cast<std::uint8_t>(address), 0, 2,
+                      4};
+    for (int shift = 24; shift >= 0; shift -= 8)
+      pdu.push_back(static_cast<std::uint8_t>(owners_code >> shift));
+    serial(modbus::adu(1, pdu), 0);
+    for (int i = 0; i < 10'000 && application_->store_busy(); ++i) step(tick_us);
+    step(tick_us);
+    require(application_->values().whole<"lock.state">() == 2, "a code that was set and kept locks");
   }
 
   // Time.
@@ -71,16 +91,20 @@ class WatchedApplication {
     application_->poll(now);
     SafetyOracle::States states{};
     for (std::size_t axis = 0; axis < axis_count; ++axis) states[axis] = application_->state(axis);
+    if (oracle_->may_have_code()) application_->refresh_readings();
     oracle_->take_poll(now_us_, application_->values(), states);
+    oracle_->take_memory(flash_.programs + flash_.erases, application_->store_busy());
     if (!oracle_->complaint().empty()) broken(oracle_->complaint());
     drivers::CanFrame frame;
     while (application_->can().next_frame(frame)) {
       if (frame.length > 8 || frame.identifier > 0x7FF) broken("a frame was sent that no bus can carry");
+      oracle_->take_sent(std::span(frame.data).first(frame.length));
     }
     if (const auto reply = application_->serial().reply_due(now); !sending_ && !reply.empty()) {
       const modbus::Bytes bytes(reply.begin(), reply.end());
       if (bytes.size() < 5 || bytes.size() > 256 || modbus::reference_crc(bytes) != 0)
         broken("a reply was sent that is no frame of Modbus RTU");
+      oracle_->take_sent(reply);
       sending_ = true;
       reply_until_us_ = now_us_ + 2'000;
     } else if (sending_ && now_us_ >= reply_until_us_) {
