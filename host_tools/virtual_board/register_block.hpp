@@ -122,7 +122,8 @@ struct Register {
 template <typename Model>
 class RegisterTable {
  public:
-  RegisterTable(std::initializer_list<Register<Model>> rows) : rows_(rows) {
+  RegisterTable(std::initializer_list<Register<Model>> rows) : RegisterTable(std::vector(rows)) {}
+  explicit RegisterTable(std::vector<Register<Model>> rows) : rows_(std::move(rows)) {
     for (std::size_t row = 0; row < rows_.size(); ++row) {
       const std::size_t word = rows_[row].offset / 4;
       if (word >= index_.size()) index_.resize(word + 1, none);

@@ -95,6 +95,7 @@ using GpioB = Field<1>;
 using GpioC = Field<2>;
 using GpioD = Field<3>;
 using Ccm = Field<20>;  // CCMDATARAMEN; the only one that is on after reset
+using Dma2 = Field<22>;
 }  // namespace rcc_ahb1enr
 
 namespace rcc_apb1enr {

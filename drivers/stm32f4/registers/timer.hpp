@@ -80,9 +80,10 @@ using UpdateDisable = Field<1>;        // UDIS
 using UpdateRequestSource = Field<2>;  // URS; 1 = UG does not set UIF
 using OnePulse = Field<3>;             // OPM
 using CountingDown = Field<4>;         // DIR; read-only in centre-aligned and encoder mode
-using Alignment = Field<5, 2>;         // CMS; 0 = edge, 1 to 3 = centre
-using AutoReloadPreload = Field<7>;    // ARPE
-using ClockDivision = Field<8, 2>;     // CKD; clock of dead time and filters: 0 = /1, 1 = /2, 2 = /4
+/// CMS; 0 = edge, else centre, and CCxIF is set counting down (1), up (2) or both ways (3).
+using Alignment = Field<5, 2>;
+using AutoReloadPreload = Field<7>;  // ARPE
+using ClockDivision = Field<8, 2>;   // CKD; clock of dead time and filters: 0 = /1, 1 = /2, 2 = /4
 }  // namespace timer_cr1
 
 namespace timer_cr2 {
@@ -108,6 +109,9 @@ using UpdateInterrupt = Field<0>;  // UIE
 template <unsigned channel>
 using CaptureCompareInterrupt = Field<channel>;  // CC1IE to CC4IE
 using BreakInterrupt = Field<7>;                 // BIE, advanced
+using UpdateDma = Field<8>;                      // UDE
+template <unsigned channel>
+using CaptureCompareDma = Field<8 + channel>;  // CC1DE to CC4DE
 }  // namespace timer_dier
 
 /// Flags are cleared by writing 0; writing 1 leaves them.
@@ -123,7 +127,9 @@ using Overcapture = Field<8 + channel>;  // CC1OF to CC4OF
 
 namespace timer_egr {
 using Update = Field<0>;  // UG
-using Break = Field<7>;   // BG, advanced
+template <unsigned channel>
+using CaptureCompare = Field<channel>;  // CC1G to CC4G
+using Break = Field<7>;                 // BG, advanced; clears MOE
 }  // namespace timer_egr
 
 /// One byte for each channel.
@@ -134,7 +140,7 @@ inline constexpr unsigned shift = bits_per_channel*((channel - 1) % 2);
 /// CCxS: 0 = output, 1 = input from the channel's own pin. Writable only while CCxE = 0.
 template <unsigned channel>
 using Selection = Field<shift<channel>, 2>;
-// Output:
+// Output; without a mode the comparison acts on no pin, and still sets CCxIF.
 template <unsigned channel>
 using ComparePreload = Field<shift<channel> + 3>;  // OCxPE
 template <unsigned channel>

@@ -84,7 +84,7 @@ void Processor::reset(BoardTime now) {
   block_ = nullptr;
   event_ = Event::none;
   sleeping_ = false;
-  faulted_ = false;
+  faulted_ = locked_up_ = false;
   bad_access_pending_ = false;
   breakpoint_ = -1;
   fault_.clear();
@@ -106,6 +106,10 @@ RunEnd Processor::run_until(BoardTime limit) {
     if (stop_requested_.exchange(false, std::memory_order_relaxed)) {
       breakpoint_ = -1;
       return RunEnd::stopped;
+    }
+    if (locked_up_) {
+      now_ = std::max(now_, limit_);
+      return RunEnd::time_reached;
     }
     if (core_.exceptions.preempting()) {
       const ExceptionMasks special = masks();
@@ -217,7 +221,7 @@ void Processor::after_trap(int error) {
     if (!core_.system_control.raise_fault(exception_number::usage_fault,
                                           drivers::cortex_m::scb_cfsr::UndefinedInstruction::mask,
                                           core_.exceptions.execution_level(masks()))) {
-      fail(fmt::format("lock-up: undefined instruction at {} in a fault handler", place(pc_)));
+      lock_up(fmt::format("lock-up: undefined instruction at {} in a fault handler", place(pc_)));
     }
     return;
   }
@@ -251,8 +255,8 @@ void Processor::report_bad_access() {
     core_.system_control.set_bus_fault_address(bad.address);
   }
   if (!core_.system_control.raise_fault(exception, status, core_.exceptions.execution_level(masks()))) {
-    fail(fmt::format("lock-up: access to 0x{:08X} at {} in a fault handler: {}", bad.address, place(bad.pc),
-                     bad.why));
+    lock_up(fmt::format("lock-up: access to 0x{:08X} at {} in a fault handler: {}", bad.address,
+                        place(bad.pc), bad.why));
   }
 }
 
@@ -324,6 +328,12 @@ void Processor::leave_exception() {
   core_.system_control.set_active_exception(engine_.get(UC_ARM_REG_IPSR) & 0x1FF);
   block_ = nullptr;
   pc_ = *address;
+}
+
+void Processor::lock_up(const std::string& why) {
+  if (!config_.locks_up) return fail(why);
+  locked_up_ = true;
+  fault_ = why;
 }
 
 void Processor::fail(const std::string& why) {

@@ -56,6 +56,9 @@ struct ProcessorConfig {
   /// instead of RunEnd::fault: accesses, and frames that find no room. FP instructions with the FPU off,
   /// exception returns that do not fit and an SVC that cannot be taken always stop.
   bool faults_to_firmware = false;
+  /// A fault within a fault handler locks the core up, as on the chip: it stands until reset(), while all
+  /// else goes on, instead of ending the run as RunEnd::fault.
+  bool locks_up = false;
 };
 
 /// How the processor asks the rest of the board for time; EventLoop provides it.
@@ -110,6 +113,8 @@ class Processor {
 
   /// What ended the run as RunEnd::fault, in words.
   const std::string& fault() const { return fault_; }
+  /// fault() says why.
+  bool locked_up() const { return locked_up_; }
   /// Immediate of the BKPT instruction that ended the run as RunEnd::stopped; -1: it was stop().
   int breakpoint() const { return breakpoint_; }
   /// Address of the next instruction.
@@ -172,6 +177,7 @@ class Processor {
   void enter(unsigned exception, bool tail_chained);
   void leave_exception();
   void fail(const std::string& why);
+  void lock_up(const std::string& why);
   std::string place(std::uint32_t pc) const;
 
   friend struct ProcessorHooks;
@@ -205,6 +211,7 @@ class Processor {
   bool attention_ = false;  ///< something may have changed: look closer before the next block
   bool sleeping_ = false;
   bool faulted_ = false;
+  bool locked_up_ = false;
   bool started_ = false;
   std::atomic<bool> stop_requested_{false};
   int breakpoint_ = -1;

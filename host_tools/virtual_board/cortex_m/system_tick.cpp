@@ -22,7 +22,7 @@ void SystemTick::reset(BoardTime /*now*/) {
   load_ = 0;
   stopped_value_ = 0;
   count_flag_ = false;
-  zero_at_ = never;
+  zero_at_ = left_ = never;
 }
 
 /// The counter holds `value` from `now` on. At 0 it takes LOAD one clock later.
@@ -50,6 +50,17 @@ void SystemTick::advance(BoardTime now) {
     if (system_tick_ctrl::TickInterrupt::of(ctrl_) != 0) exceptions_.pend(exception_number::system_tick);
     start_from(0, zero_at_);
   }
+}
+
+void SystemTick::halt(BoardTime now) {
+  advance(now);
+  left_ = zero_at_ == never ? never : zero_at_ - now;
+  zero_at_ = never;
+}
+
+void SystemTick::resume(BoardTime now) {
+  if (left_ != never) zero_at_ = now + left_;
+  left_ = never;
 }
 
 const RegisterTable<SystemTick>& SystemTick::registers() {

@@ -12,6 +12,8 @@
 // again LOAD + 1 clocks later. Reaching 0 sets COUNTFLAG and, with TICKINT, pends exception 15. With LOAD = 0
 // it never counts.
 //
+// The counter stands while a debugger halts the core (ARMv7-M architecture reference manual, B3.3).
+//
 // CALIB reads 18750 with SKEW: a millisecond, and that only at 150 MHz / 8. The reference clock is HCLK / 8.
 // A change of the core clock while the counter runs takes effect with the next reload.
 
@@ -30,6 +32,10 @@ class SystemTick final : public RegisterBlock<SystemTick> {
   void advance(BoardTime now) override;
   BoardTime next_event() const override { return zero_at_; }
   void reset(BoardTime now) override;
+
+  /// The core is halted, or goes on.
+  void halt(BoardTime now);
+  void resume(BoardTime now);
 
  private:
   static const RegisterTable<SystemTick>& registers();
@@ -50,6 +56,7 @@ class SystemTick final : public RegisterBlock<SystemTick> {
   std::uint32_t stopped_value_ = 0;  ///< VAL while the counter is disabled or idle
   bool count_flag_ = false;
   BoardTime zero_at_ = never;   ///< never: disabled, or at 0 with nothing to load
+  BoardTime left_ = never;      ///< to reach 0, while the core is halted
   BoardTime clock_period_ = 1;  ///< of the count that is running
   std::uint32_t reload_ = 0;    ///< LOAD that the count began with
 };

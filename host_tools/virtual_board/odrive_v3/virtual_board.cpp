@@ -26,7 +26,9 @@ VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const Virtu
       world_(world),
       core_(bus_, clocks_),
       processor_(bus_, core_, clocks_, config.processor),
-      events_(processor_) {
+      events_(processor_),
+      brake_(config.bootstrap),
+      frozen_outputs_(config.frozen_outputs) {
   for (const ElfSegment& segment : image_.segments()) {
     const auto memory = bus_.memory(segment.address, segment.bytes.size());
     if (memory.empty() || !memory_map::flash.contains(segment.address)) {
@@ -76,6 +78,9 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
          chip::rcc_apb1enr::Uart4::mask);
   attach(with_events, chip::spi3_base, sizeof(chip::SpiRegisters), "SPI3", spi3_, apb1,
          chip::rcc_apb1enr::Spi3::mask);
+  attach(with_events, chip::tim2_base, timer_size, "TIM2", brake_timer_, apb1,
+         chip::rcc_apb1enr::Timer2::mask);
+  attach(with_events, chip::dma2_base, DmaModel::size, "DMA2", dma2_, ahb1, chip::rcc_ahb1enr::Dma2::mask);
   attach(with_events, chip::rcc_base, RccModel::size, "RCC", rcc_, always, 0);
   attach(with_events, chip::iwdg_base, IwdgModel::size, "IWDG", iwdg_, always, 0);
   attach(with_events, chip::can1_base, 0x400, "CAN1", can1_, apb1, chip::rcc_apb1enr::Can1::mask);
@@ -94,8 +99,7 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(without_events, chip::exti_base, 0x400, "EXTI", exti_, always, 0);
   attach(without_events, chip::pwr_base, PwrModel::size, "PWR", pwr_, apb1, chip::rcc_apb1enr::Power::mask);
   attach(without_events, chip::flash_interface_base, FlashInterface::size, "FLASH", flash_, always, 0);
-  attach(without_events, chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU",
-         other(std::make_unique<DbgmcuModel>()), always, 0);
+  attach(without_events, chip::dbgmcu_base, DbgmcuModel::size, "DBGMCU", dbgmcu_, always, 0);
   attach(without_events, drivers::cortex_m::dwt_base, DwtModel::size, "DWT",
          other(std::make_unique<DwtModel>([this] { return processor_.cycles(); },
                                           [this] { return core_.core_debug.trace_enabled(); })),
@@ -103,6 +107,7 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(without_events, DeviceIdentity::base, DeviceIdentity::size, "system memory",
          other(std::make_unique<DeviceIdentity>(config.identity)), always, 0);
   iwdg_.set_oscillator_hz(config.watchdog_oscillator_hz);
+  for (AdvancedTimerModel& timer : pwm_) timer.set_break_input(config.break_inputs_high, now());
   events_.add(core_.system_tick);
   events_.add(chip_events_);
   events_.add(flash_stall_);
@@ -120,6 +125,17 @@ void VirtualBoard::wire() {
   for (std::size_t axis = 0; axis < pwm_.size(); ++axis) {
     pwm_[axis].on_output_change([this, axis](BoardTime now) { show_bridge(axis, now); });
   }
+  // RM0090, table DMA2 request mapping; TIM1's update has a request that nobody uses.
+  pwm_[0].on_dma_request([this](TimerRequest request, BoardTime now) {
+    if (request == TimerRequest::compare_4) dma2_.request(chip::dma2_tim1_compare_4, now);
+  });
+  pwm_[1].on_dma_request([this](TimerRequest request, BoardTime now) {
+    dma2_.request(request == TimerRequest::update ? chip::dma2_tim8_update : chip::dma2_tim8_compare_4, now);
+  });
+  brake_timer_.on_output_change([this](BoardTime now) { show_brake(now); });
+  chip_events_.on_brake_change([this](BoardTime now) {
+    if (world_ != nullptr) world_->set_brake(brake_.on(), now);
+  });
   rcc_.on_clock_failure([this](BoardTime now) {
     for (auto& timer : pwm_) timer.clock_failure_break(now);
   });
@@ -169,6 +185,43 @@ void VirtualBoard::show_bridge(std::size_t axis, BoardTime now) {
   world_->set_bridge(axis, legs, now);
 }
 
+// The pin is the port's or TIM2's. The driver has its supply from the gate drivers.
+void VirtualBoard::show_brake(BoardTime now) {
+  const GpioPortModel& port = ports_[static_cast<std::size_t>(pins::brake_high_side.port)];
+  const bool of_timer = port.mode(pins::brake_high_side.number) == chip::GpioMode::alternate;
+  const bool high =
+      of_timer ? brake_timer_.output() : port.output(pins::brake_high_side.number) == PinOutput::high;
+  const bool before = brake_.on();
+  brake_.drive(high, gate_drivers_[0].answers(now), now);
+  if (world_ != nullptr && brake_.on() != before) world_->set_brake(brake_.on(), now);
+}
+
+bool VirtualBoard::gates_active(std::size_t axis) const {
+  return gate_drivers_[axis].drives_gates(now()) &&
+         std::ranges::any_of(pwm_[axis].outputs(), &PwmLegOutput::enabled);
+}
+
+void VirtualBoard::halt() {
+  halted_ = true;
+  core_.system_tick.halt(now());
+  set_frozen(true, now());
+}
+
+void VirtualBoard::resume() {
+  halted_ = false;
+  core_.system_tick.resume(now());
+  set_frozen(false, now());
+}
+
+// TIM3, TIM4 count edges and CAN1 goes on whatever their bits say.
+void VirtualBoard::set_frozen(bool halted, BoardTime now) {
+  constexpr std::array<std::uint32_t, 2> bits{chip::dbgmcu_apb2_fz::Timer1::mask,
+                                              chip::dbgmcu_apb2_fz::Timer8::mask};
+  for (std::size_t axis = 0; axis < pwm_.size(); ++axis)
+    pwm_[axis].freeze(halted && dbgmcu_.freezes_on_apb2(bits[axis]), frozen_outputs_, now);
+  iwdg_.freeze(halted && dbgmcu_.freezes_on_apb1(chip::dbgmcu_apb1_fz::IndependentWatchdog::mask), now);
+}
+
 void VirtualBoard::show_fault_line(BoardTime now) {
   const bool low = fault_line_held_ || !gate_drivers_[0].fault_output() || !gate_drivers_[1].fault_output();
   port(pins::gate_driver_fault.port)
@@ -191,9 +244,7 @@ void VirtualBoard::wire_pins() {
         for (Drv8301Chip& driver : gate_drivers_) driver.enable_gate(high, now);
         for (std::size_t axis = 0; axis < pwm_.size(); ++axis) show_bridge(axis, now);
       }
-      // The brake's driver has its supply from the gate drivers.
-      if (pin == pins::brake_high_side && world_ != nullptr)
-        world_->set_brake(high && gate_drivers_[0].answers(now), now);
+      if (pin == pins::brake_high_side || pin == pins::gate_enable) show_brake(now);
       if (pin == pins::gate_driver0_select) gate_drivers_[0].select(output != PinOutput::low, now);
       if (pin == pins::gate_driver1_select) gate_drivers_[1].select(output != PinOutput::low, now);
       if (pin == pins::encoder_select) serial_encoder_.select(output != PinOutput::low);
@@ -237,15 +288,19 @@ void VirtualBoard::reset(ResetCause cause) {
   for (Peripheral* peripheral : peripherals_) peripheral->reset(at);
   rcc_.note_reset(cause);
   processor_.reset(at);
-  watchdog_fired_ = false;
+  watchdog_fired_ = halted_ = false;
   ++resets_;
 }
 
 void VirtualBoard::run_until(BoardTime time) {
   while (now() < time && !flash_.power_is_cut()) {
+    if (halted_) {
+      stand_still_until(time);
+      continue;
+    }
     const RunEnd end = events_.run_until(time);
     if (flash_stall_.take()) {
-      stall_until(flash_.busy_until());
+      stand_still_until(flash_.busy_until());
       continue;
     }
     if (watchdog_fired_) {
@@ -262,8 +317,8 @@ void VirtualBoard::run_until(BoardTime time) {
   }
 }
 
-// The one bank is busy: the core gets no instruction, everything else goes on.
-void VirtualBoard::stall_until(BoardTime time) {
+// The one bank is busy and the core gets no instruction, or it is halted. Everything else goes on.
+void VirtualBoard::stand_still_until(BoardTime time) {
   while (now() < time && !watchdog_fired_) {
     const BoardTime next = std::min(time, std::max(events_.next_event(), now()));
     processor_.stall_until(next);

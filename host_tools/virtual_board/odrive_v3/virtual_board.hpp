@@ -15,17 +15,20 @@
 #include "host_tools/virtual_board/event_loop.hpp"
 #include "host_tools/virtual_board/odrive_v3/as5047p_chip.hpp"
 #include "host_tools/virtual_board/odrive_v3/board_world.hpp"
+#include "host_tools/virtual_board/odrive_v3/brake_driver.hpp"
 #include "host_tools/virtual_board/odrive_v3/drv8301_chip.hpp"
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
 #include "host_tools/virtual_board/stm32f4/can_controller.hpp"
 #include "host_tools/virtual_board/stm32f4/device_identity.hpp"
+#include "host_tools/virtual_board/stm32f4/dma.hpp"
 #include "host_tools/virtual_board/stm32f4/exti_and_syscfg.hpp"
 #include "host_tools/virtual_board/stm32f4/flash_interface.hpp"
 #include "host_tools/virtual_board/stm32f4/general_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
+#include "host_tools/virtual_board/stm32f4/one_pulse_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/rcc.hpp"
 #include "host_tools/virtual_board/stm32f4/spi.hpp"
 #include "host_tools/virtual_board/stm32f4/usart.hpp"
@@ -37,6 +40,10 @@ struct VirtualBoardConfig {
   /// Processor's own settings, for tests that count instructions.
   ProcessorConfig processor{};
   std::uint32_t watchdog_oscillator_hz = 32'000;
+  FrozenOutputs frozen_outputs = FrozenOutputs::off;
+  /// What the timers' BKIN reads, to which no pin is mapped. RM0090 does not say.
+  bool break_inputs_high = false;
+  BootstrapConfig bootstrap{};
 };
 
 /// Something with events of its own in the board's order of time that is not on the bus.
@@ -48,18 +55,24 @@ class OffTheBus : public Peripheral {
   }
 };
 
-/// The gate drivers wake some time after EN_GATE.
+/// The gate drivers wake some time after EN_GATE; the brake's driver starves.
 class ChipEvents final : public OffTheBus {
  public:
-  explicit ChipEvents(std::array<Drv8301Chip, 2>& chips) : chips_(chips) {}
+  ChipEvents(std::array<Drv8301Chip, 2>& chips, BrakeDriver& brake) : chips_(chips), brake_(brake) {}
   void advance(BoardTime now) override {
     for (Drv8301Chip& chip : chips_) chip.advance(now);
+    if (brake_.advance(now) && brake_change_) brake_change_(now);
   }
-  BoardTime next_event() const override { return std::min(chips_[0].next_event(), chips_[1].next_event()); }
+  BoardTime next_event() const override {
+    return std::min({chips_[0].next_event(), chips_[1].next_event(), brake_.next_event()});
+  }
   void reset(BoardTime /*now*/) override {}
+  void on_brake_change(std::function<void(BoardTime)> listener) { brake_change_ = std::move(listener); }
 
  private:
   std::array<Drv8301Chip, 2>& chips_;
+  BrakeDriver& brake_;
+  std::function<void(BoardTime)> brake_change_;
 };
 
 /// Stops the processor as soon as the flash has become busy, at the end of the block that did it.
@@ -124,7 +137,17 @@ class VirtualBoard {
   /// Its level; low is a fault.
   bool fault_line() const;
 
+  /// A debugger halts the core, between two blocks of instructions: SysTick and what DBGMCU says stand with
+  /// it, all else goes on. run_until() lets the time pass until it is resumed; a reset ends it too.
+  void halt();
+  void resume();
+
   bool bridge_armed(std::size_t axis) const { return pwm_[axis].moe(); }
+  /// A gate signal of an axis is active or will be within the PWM period: its bridge drives the motor's
+  /// wires.
+  bool gates_active(std::size_t axis) const;
+  /// The brake's driver.
+  const BrakeDriver& brake() const { return brake_; }
   std::uint64_t resets() const { return resets_; }
   /// What the processor is about to execute, in words.
   std::string where() const;
@@ -143,6 +166,8 @@ class VirtualBoard {
   AdvancedTimerModel& pwm(std::size_t axis) { return pwm_[axis]; }
   GeneralTimerModel& encoder_timer(std::size_t axis) { return encoders_[axis]; }
   AdcModel& adc() { return adc_; }
+  DbgmcuModel& debug_support() { return dbgmcu_; }
+  DmaModel& dma() { return dma2_; }
   Drv8301Chip& gate_driver(std::size_t axis) { return gate_drivers_[axis]; }
   GpioPortModel& port(drivers::stm32f4::GpioPort port) { return ports_[static_cast<std::size_t>(port)]; }
 
@@ -152,9 +177,11 @@ class VirtualBoard {
   void wire_pins();
   void set_board_resistors();
   void reset(drivers::stm32f4::ResetCause cause);
-  void stall_until(BoardTime time);
+  void stand_still_until(BoardTime time);
   void wire_chips();
+  void set_frozen(bool halted, BoardTime now);
   void show_bridge(std::size_t axis, BoardTime now);
+  void show_brake(BoardTime now);
   void show_fault_line(BoardTime now);
   std::uint16_t exchange(std::uint16_t word, BoardTime now);
   void look_at_world(BoardTime now);
@@ -181,6 +208,9 @@ class VirtualBoard {
                                          AdvancedTimerModel{AdvancedTimer::tim8, clocks_}};
   std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3},
                                              GeneralTimerModel{GeneralTimer::tim4}};
+  OnePulseTimerModel brake_timer_{clocks_};
+  DmaModel dma2_{bus_};
+  DbgmcuModel dbgmcu_;
   AdcModel adc_{clocks_, core_.nvic, [this](unsigned channel, BoardTime at) {
                   return world_ != nullptr ? world_->analogue(channel, at) : 0.0;
                 }};
@@ -193,11 +223,14 @@ class VirtualBoard {
   std::array<Drv8301Chip, 2> gate_drivers_;
   As5047pChip serial_encoder_{
       [this](BoardTime now) { return world_ != nullptr ? world_->serial_encoder(now).angle : 0; }};
-  ChipEvents chip_events_{gate_drivers_};
+  BrakeDriver brake_;
+  ChipEvents chip_events_{gate_drivers_, brake_};
   FlashStall flash_stall_{flash_, processor_};
   std::vector<Peripheral*> peripherals_;  ///< all but the core's
 
   std::vector<std::uint8_t> transmitted_;
+  FrozenOutputs frozen_outputs_ = FrozenOutputs::off;
+  bool halted_ = false;
   bool watchdog_fired_ = false;
   bool fault_line_held_ = false;
   bool supply_was_low_ = false;

@@ -31,6 +31,11 @@ constexpr std::uint32_t channel_switches(std::uint32_t ccer, unsigned index) {
 }
 
 enum class AdvancedTimer : std::uint8_t { tim1, tim8 };
+enum class TimerRequest : std::uint8_t { update, compare_4 };
+/// What becomes of the gate signals while a debugger's halt stops the counter. RM0090 does not say. The
+/// manuals of the older F1 and the newer F3 do: off, as after a break; and the same timer with its counter
+/// stopped otherwise holds the levels that it had.
+enum class FrozenOutputs : std::uint8_t { off, held };
 
 /// What the gate signals of one half-bridge do at present, on average over half a PWM period.
 struct PwmLegOutput {
@@ -45,17 +50,23 @@ struct PwmLegOutput {
 ///
 /// Modelled: centre-aligned counting; ARR and CCR1 to CCR3 with their preload; update event and UIF; UG; TRGO
 /// as UG, CEN or update event; slave trigger mode from ITR0 (TIM8 only, from TIM1); PWM mode 2 on channels 1
-/// to 3 with complementary outputs; MOE, OSSI, OSSR, CKD and DTG; the break and BIF; LOCK levels 1 to 3. No
-/// delay between the two timers (silicon: a tick or two through ITR0).
+/// to 3 with complementary outputs; MOE, OSSI, OSSR, CKD and DTG; the break, BG and BIF; LOCK levels 1 to 3;
+/// the DMA requests of the update event and of channel 4, which compares without an output. No delay between
+/// the two timers (silicon: a tick or two through ITR0).
+///
+/// A debugger's halt stops the counter where DBGMCU says so, see freeze().
 ///
 /// Refused, since no driver uses it: counting edge-aligned, PSC, the repetition counter, UDIS, OPM, external
-/// clock and trigger, all interrupts and DMA, BG, AOE, PWM mode 1, inputs, channel 4, active-low outputs,
-/// idle levels of 1, one output of a pair without the other, writing CNT or CMS or an ARR without preload
-/// while counting, a start with the count at the end of its direction. The compare flags CCxIF stay 0. No pin
-/// is mapped to BKIN on this board; it reads low, so BKE with BKP = 0 would hold MOE at 0 and is refused.
+/// clock and trigger, all interrupts and other DMA requests, AOE, PWM mode 1, inputs, an output of channel 4,
+/// active-low outputs, idle levels of 1, one output of a pair without the other, writing CNT or CMS or an ARR
+/// without preload while counting, a start with the count at the end of its direction. CC4IF is set while
+/// CC4DE is, the other compare flags stay 0.
 ///
-/// The over- and underflow are events of the board only while somebody can see them: trigger output, a
-/// preloaded value that waits. At most two for each PWM period; otherwise they are made up
+/// No pin is mapped to BKIN on this board: it reads as set_break_input() says, and a break that it holds
+/// keeps MOE at 0.
+///
+/// The over- and underflow are events of the board only while somebody can see them: trigger output, a DMA
+/// request, a preloaded value that waits. At most two for each PWM period; otherwise they are made up
 /// for at the next access. Hence any write may bring next_event() forward.
 class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
  public:
@@ -67,6 +78,9 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
 
   /// Rising edges of TRGO. With MMS = 2 this is the update event.
   void on_trigger_output(std::function<void(BoardTime)> listener) { trigger_output_ = std::move(listener); }
+  void on_dma_request(std::function<void(TimerRequest, BoardTime)> listener) {
+    dma_request_ = std::move(listener);
+  }
   /// Called after outputs() has changed.
   void on_output_change(std::function<void(BoardTime)> listener) { output_change_ = std::move(listener); }
 
@@ -74,6 +88,11 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   void trigger_input(BoardTime now);
   /// The clock security system has seen the crystal fail. Without BKE nothing happens.
   void clock_failure_break(BoardTime now);
+  /// The level that BKIN reads without a pin; low at first.
+  void set_break_input(bool high, BoardTime now);
+  /// A debugger halts the core, or lets it go on, with the timer's bit in DBGMCU set. The counter stands
+  /// meanwhile, and then goes on; MOE is left alone.
+  void freeze(bool frozen, FrozenOutputs outputs, BoardTime now);
 
   /// Legs A, B, C. The caller must have advanced the timer to the present.
   const std::array<PwmLegOutput, 3>& outputs() const { return outputs_; }
@@ -93,12 +112,20 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   void write_arr(const Access& access, std::uint32_t value);
   void write_ccr(const Access& access, unsigned index, std::uint32_t value);
   void write_bdtr(const Access& access, std::uint32_t value);
+  void write_ccr4(const Access& access, std::uint32_t value);
+  void write_dier(const Access& access, std::uint32_t value);
+  void write_sr(const Access& access, std::uint32_t value);
   void require_defined_outputs(const Access& access) const;
 
   bool centre_aligned() const;
   BoardTime tick() const { return clocks_.apb2_timer; }
   void start_counter(BoardTime now);
   void pass_turn();
+  void pass_compare();
+  void schedule_compare(BoardTime after);
+  void request(TimerRequest request, BoardTime now);
+  void take_break(BoardTime now);
+  bool break_held() const;
   void update_event(BoardTime now, bool flagged, bool changed);
   bool load_preloaded();
   void software_update(BoardTime now);
@@ -113,6 +140,7 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   const BoardClocks& clocks_;
   std::function<void(BoardTime)> trigger_output_;
   std::function<void(BoardTime)> output_change_;
+  std::function<void(TimerRequest, BoardTime)> dma_request_;
 
   CentreAlignedCounter counter_;
   std::uint32_t cr1_ = 0;  // without CEN and DIR, which the counter has
@@ -120,6 +148,11 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   std::array<std::uint32_t, 2> ccmr_{};
   PreloadedWord arr_;
   std::array<PreloadedWord, 3> ccr_{};
+  std::uint32_t ccr4_ = 0, dier_ = 0;
+  BoardTime compare_at_ = never;  ///< channel 4, before the next turn
+  bool break_input_high_ = false;
+  bool frozen_ = false, held_by_halt_ = false;
+  FrozenOutputs frozen_outputs_ = FrozenOutputs::off;
   bool lock_decided_ = false;
   bool waiting_ = false;  // a preloaded value differs from the active one
   bool trigger_level_ = false;

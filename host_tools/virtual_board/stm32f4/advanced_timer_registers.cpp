@@ -17,7 +17,9 @@ namespace timer_ccer = drivers::stm32f4::timer_ccer;
 namespace timer_ccmr = drivers::stm32f4::timer_ccmr;
 namespace timer_cr1 = drivers::stm32f4::timer_cr1;
 namespace timer_cr2 = drivers::stm32f4::timer_cr2;
+namespace timer_dier = drivers::stm32f4::timer_dier;
 namespace timer_egr = drivers::stm32f4::timer_egr;
+namespace timer_sr = drivers::stm32f4::timer_sr;
 namespace timer_smcr = drivers::stm32f4::timer_smcr;
 
 constexpr std::uint32_t cr1_writable = timer_cr1::Enable::mask | timer_cr1::UpdateRequestSource::mask |
@@ -58,9 +60,12 @@ const RegisterTable<AdvancedTimerModel>& AdvancedTimerModel::registers() {
        Row::takes<&Model::write_cr2>},
       {offsetof(Layout, smcr), "SMCR", Row::shows<&Model::smcr_>, smcr_writable,
        Row::takes<&Model::write_smcr>},
-      Row::reserved(offsetof(Layout, dier), "DIER"),
-      {offsetof(Layout, sr), "SR", Row::shows<&Model::sr_>, any_bits, Row::clears_by_zeros<&Model::sr_>},
-      {offsetof(Layout, egr), "EGR", Row::zero, timer_egr::Update::mask, Row::takes<&Model::write_egr>},
+      {offsetof(Layout, dier), "DIER", Row::shows<&Model::dier_>,
+       timer_dier::UpdateDma::mask | timer_dier::CaptureCompareDma<4>::mask, Row::takes<&Model::write_dier>},
+      {offsetof(Layout, sr), "SR", Row::shows<&Model::sr_>, any_bits, Row::takes<&Model::write_sr>},
+      {offsetof(Layout, egr), "EGR", Row::zero,
+       timer_egr::Update::mask | timer_egr::CaptureCompare<4>::mask | timer_egr::Break::mask,
+       Row::takes<&Model::write_egr>},
       {offsetof(Layout, ccmr[0]), "CCMR1", Row::shows<&Model::ccmr_, 0>, ccmr_writable[0],
        Row::takes<&Model::write_ccmr, 0>},
       {offsetof(Layout, ccmr[1]), "CCMR2", Row::shows<&Model::ccmr_, 1>, ccmr_writable[1],
@@ -78,7 +83,8 @@ const RegisterTable<AdvancedTimerModel>& AdvancedTimerModel::registers() {
        Row::takes<&Model::write_ccr, 1>},
       {offsetof(Layout, ccr[2]), "CCR3", Row::shows<&Model::ccr_, 2, &PreloadedWord::preload>, half_word,
        Row::takes<&Model::write_ccr, 2>},
-      Row::reserved(offsetof(Layout, ccr[3]), "CCR4"),
+      {offsetof(Layout, ccr[3]), "CCR4", Row::shows<&Model::ccr4_>, half_word,
+       Row::takes<&Model::write_ccr4>},
       {offsetof(Layout, bdtr), "BDTR", Row::shows<&Model::bdtr_>,
        half_word & ~timer_bdtr::AutomaticOutputEnable::mask, Row::takes<&Model::write_bdtr>}};
   return table;
@@ -105,6 +111,7 @@ void AdvancedTimerModel::write_cr1(const Access& access, std::uint32_t value) {
 
   if (!enable && counter_.running()) {
     counter_.stop(access.now);
+    compare_at_ = never;
     show_trigger_level(access.now);
   } else if (enable && !counter_.running()) {
     if (alignment == 0) refuse(access, "only centre-aligned counting is modelled; CEN needs CMS 1, 2 or 3");
@@ -147,6 +154,28 @@ void AdvancedTimerModel::write_smcr(const Access& access, std::uint32_t value) {
 
 void AdvancedTimerModel::write_egr(const Access& access, std::uint32_t value) {
   if (timer_egr::Update::of(value) != 0) software_update(access.now);
+  if (timer_egr::Break::of(value) != 0) take_break(access.now);
+  if (timer_egr::CaptureCompare<4>::of(value) == 0) return;
+  sr_ |= timer_sr::CaptureCompare<4>::mask;
+  request(TimerRequest::compare_4, access.now);
+}
+
+void AdvancedTimerModel::write_dier(const Access& access, std::uint32_t value) {
+  dier_ = value;
+  schedule_compare(access.now);
+}
+
+void AdvancedTimerModel::write_sr(const Access& /*access*/, std::uint32_t value) {
+  sr_ &= value;
+  if (break_held()) sr_ |= timer_sr::Break::mask;
+}
+
+/// Without preload; at the turns themselves it is not modelled.
+void AdvancedTimerModel::write_ccr4(const Access& access, std::uint32_t value) {
+  if (timer_dier::CaptureCompareDma<4>::of(dier_) != 0 && (value == 0 || value == arr_.active))
+    refuse(access, "CCR4 at a turn of the counter: no comparison there is modelled");
+  ccr4_ = value;
+  schedule_compare(access.now);
 }
 
 void AdvancedTimerModel::write_ccmr(const Access& access, unsigned index, std::uint32_t value) {
@@ -210,11 +239,9 @@ void AdvancedTimerModel::write_bdtr(const Access& access, std::uint32_t value) {
   std::uint32_t locked = locked_bits(timer_bdtr::Lock::of(bdtr_));
   if (lock_decided_) locked |= timer_bdtr::Lock::mask;
   const std::uint32_t next = (bdtr_ & locked) | (value & ~locked);
-  if (timer_bdtr::BreakEnable::of(next) != 0 && timer_bdtr::BreakActiveHigh::of(next) == 0) {
-    refuse(access, "BKE = 1 with BKP = 0: no pin is mapped to BKIN, it reads low and would break for ever");
-  }
   lock_decided_ = true;
   bdtr_ = next;
+  if (break_held()) take_break(access.now);
   require_defined_outputs(access);
   refresh_outputs(access.now);
 }

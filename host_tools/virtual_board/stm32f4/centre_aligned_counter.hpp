@@ -58,6 +58,9 @@ class CentreAlignedCounter {
   /// `never` while stopped.
   BoardTime next_turn() const { return running_ ? next_turn_ : never; }
 
+  /// When the running counter passes `count`, between 0 and top, on its way to the next turn.
+  BoardTime time_of(std::uint32_t count) const { return next_turn_ - tick_ * (down_ ? count : top_ - count); }
+
   /// Passes the turn at next_turn().
   void turn(BoardTime tick, std::uint32_t top) {
     down_ = !down_;

@@ -41,8 +41,8 @@ class DeviceIdentity final : public Peripheral {
 };
 
 /// Debug support block: RM0090, chapter Debug support (DBG), section MCU debug component (DBGMCU). Identity
-/// and the freeze bits, which are kept but do nothing, since no debugger ever halts the virtual board. Bits
-/// of peripherals that the board does not have, and CR, are refused. System reset does not touch it.
+/// and the freeze bits, which count while a debugger halts the core (VirtualBoard::halt). Bits of peripherals
+/// that the board does not have, and CR, are refused. System reset does not touch it.
 class DbgmcuModel final : public RegisterBlock<DbgmcuModel> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::stm32f4::DbgmcuRegisters);
@@ -50,6 +50,9 @@ class DbgmcuModel final : public RegisterBlock<DbgmcuModel> {
 
   DbgmcuModel() : RegisterBlock("DBGMCU", registers()) {}
   void reset(BoardTime /*now*/) override {}
+
+  bool freezes_on_apb1(std::uint32_t bits) const { return (apb1_fz_ & bits) != 0; }
+  bool freezes_on_apb2(std::uint32_t bits) const { return (apb2_fz_ & bits) != 0; }
 
  private:
   static const RegisterTable<DbgmcuModel>& registers();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace kmax::virtual_board {
 
@@ -27,13 +28,26 @@ std::uint64_t IwdgModel::elapsed_cycles(BoardTime now) const {
   return (now - counted_from_) * oscillator_hz_ / units_per_second;
 }
 
+void IwdgModel::freeze(bool frozen, BoardTime now) {
+  if (frozen == (frozen_at_ != never)) return;
+  if (frozen) {
+    advance(now);
+    frozen_at_ = now;
+    return;
+  }
+  const BoardTime stood = now - std::exchange(frozen_at_, never);
+  counted_from_ += stood;
+  for (BoardTime* effective : {&pr_effective_, &rlr_effective_})
+    if (*effective != never) *effective += stood;
+}
+
 BoardTime IwdgModel::fires_at() const {
-  if (!running_ || fired_) return never;
+  if (!running_ || fired_ || frozen_at_ != never) return never;
   return counted_from_ + cycles(remaining_ * stm32::iwdg_pr::divider(active_pr_));
 }
 
 BoardTime IwdgModel::next_event() const {
-  if (!running_ || fired_) return never;
+  if (!running_ || fired_ || frozen_at_ != never) return never;
   return std::min({fires_at(), pr_effective_, rlr_effective_});
 }
 
@@ -110,7 +124,7 @@ void IwdgModel::reset(BoardTime) {
   running_ = fired_ = unlocked_ = false;
   pr_ = active_pr_ = 0;
   rlr_ = active_rlr_ = stm32::iwdg_rlr::Reload::maximum;
-  pr_effective_ = rlr_effective_ = never;
+  pr_effective_ = rlr_effective_ = frozen_at_ = never;
 }
 
 }  // namespace kmax::virtual_board

@@ -37,6 +37,9 @@ class IwdgModel final : public RegisterBlock<IwdgModel> {
   /// Called when it is started, and with it the oscillator.
   void on_started(std::function<void(BoardTime)> callback) { on_started_ = std::move(callback); }
 
+  /// A debugger halts the core, with the watchdog's bit in DBGMCU set: it stands. Then it goes on.
+  void freeze(bool frozen, BoardTime now);
+
   bool running() const { return running_; }
   /// When it fires unless it is fed.
   BoardTime fires_at() const;
@@ -64,6 +67,7 @@ class IwdgModel final : public RegisterBlock<IwdgModel> {
   // When a written value takes effect; `never` when there is none, 0 when it waits for the oscillator.
   BoardTime pr_effective_ = never;
   BoardTime rlr_effective_ = never;
+  BoardTime frozen_at_ = never;
   BoardTime counted_from_ = 0;   // start of `remaining_`
   std::uint64_t remaining_ = 0;  // prescaled cycles from there to the reset
 };

@@ -233,6 +233,22 @@ TEST(ProcessorFault, LocksUpOnAFaultInTheHardFaultHandler_Lockup) {
   expect_fault(board, {"lock-up", "0x20020004"});
 }
 
+TEST(ProcessorFault, LockedUpItStandsUntilAReset_Lockup) {
+  ProcessorConfig config = as_on_the_chip;
+  config.locks_up = true;
+  ProgramOnCore board(load, config);
+  board.handler(exception_number::hard_fault, load);
+  board.set(0, 0x2002'0000);
+  EXPECT_EQ(board.processor.run_until(1'000'000), RunEnd::time_reached);
+  EXPECT_TRUE(board.processor.locked_up());
+  EXPECT_EQ(board.processor.now(), 1'000'000U);
+  const auto instructions = board.processor.instructions();
+  EXPECT_EQ(board.processor.run_until(2'000'000), RunEnd::time_reached);
+  EXPECT_EQ(board.processor.instructions(), instructions);
+  board.processor.reset(board.processor.now());
+  EXPECT_FALSE(board.processor.locked_up());
+}
+
 /// A core whose unit lets privileged code do all but what the regions say.
 struct Guarded : ProgramOnCore {
   Guarded(const Program& program, const std::vector<MemoryProtection::Region>& regions,

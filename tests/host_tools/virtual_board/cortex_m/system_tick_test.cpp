@@ -40,6 +40,20 @@ struct Timer : testing::ModelBench {
   SystemTick timer{clocks, exceptions};
 };
 
+TEST(SystemTickModel, StandsWhileTheCoreIsHalted) {
+  Timer timer;
+  timer.start(999);
+  timer.pass(400);
+  const std::uint32_t value = timer.read(val);
+  timer.timer.halt(timer.now);
+  timer.pass(1'000'000);
+  EXPECT_FALSE(timer.take());
+  timer.timer.resume(timer.now);
+  EXPECT_EQ(timer.read(val), value);
+  timer.pass(value);
+  EXPECT_TRUE(timer.take());
+}
+
 TEST(SystemTickModel, CountsDownFromTheReloadValueAndTicksAtTheStepToZero) {
   Timer timer;
   timer.start(9);

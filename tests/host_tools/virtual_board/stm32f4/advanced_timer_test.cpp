@@ -220,7 +220,6 @@ TEST(AdvancedTimerModel, RefusesWhatIsNotModelled) {
   refused([](Bench& b) { b.timer.cr2 = 1U << 8; });  // OIS1
   refused([](Bench& b) { b.timer.smcr = 6; });       // TIM1 has no modelled trigger
   refused([](Bench& b) { b.timer.dier = 1; });       // UIE
-  refused([](Bench& b) { b.timer.egr = 1U << 7; });  // BG
   refused([](Bench& b) { b.timer.psc = 1; });
   refused([](Bench& b) { b.timer.rcr = 1; });
   refused([](Bench& b) { b.timer.bdtr = aoe; });
@@ -229,8 +228,6 @@ TEST(AdvancedTimerModel, RefusesWhatIsNotModelled) {
   refused([](Bench& b) { b.timer.ccer = 7; });          // active low
   refused([](Bench& b) { b.timer.ccmr[1] = 0x6000; });
   refused([](Bench& b) { b.timer.ccmr[0] = 0x30; });  // toggle
-  refused([](Bench& b) { b.timer.ccr[3] = 5; });
-  refused([](Bench& b) { b.timer.bdtr = bke; });  // active low break input without a pin
   refused([](Bench& b) { b.timer.bdtr = 1U << 16; });
   refused([](Bench& b) { b.timer.arr = 70000; });
   refused([](Bench& b) {
@@ -355,6 +352,99 @@ TEST(AdvancedTimerModel, BreakNeedsItsEnable) {
   bench.timer.bdtr = ossi_ossr | moe | 21;
   bench.model.clock_failure_break(bench.now);
   EXPECT_TRUE(bench.model.moe()) << "BKE = 0";
+}
+
+// TIMx_EGR, BG: whatever BKE says.
+TEST(AdvancedTimerModel, BreakGenerationClearsMainOutputEnable) {
+  Bench bench;
+  bench.pwm(4200);
+  bench.timer.bdtr = ossi_ossr | moe | 21;
+  bench.timer.egr = 1U << 7;
+  EXPECT_FALSE(bench.model.moe());
+  EXPECT_NE(static_cast<std::uint32_t>(bench.timer.sr) & 1U << 7, 0U);
+}
+
+TEST(AdvancedTimerModel, ABreakInputThatIsHeldKeepsTheOutputsOff) {
+  for (const bool high : {false, true}) {
+    Bench bench;
+    bench.model.set_break_input(high, bench.now);
+    bench.pwm(4200);
+    const std::uint32_t other = ossi_ossr | bke | (high ? 0 : bkp) | moe | 21;
+    const std::uint32_t held = other ^ bkp;
+    bench.timer.bdtr = held;
+    EXPECT_FALSE(bench.model.moe());
+    bench.timer.sr = 0;
+    EXPECT_NE(static_cast<std::uint32_t>(bench.timer.sr) & 1U << 7, 0U) << "BIF comes back";
+    bench.timer.bdtr = other;
+    bench.timer.sr = 0;
+    EXPECT_TRUE(bench.model.moe());
+    EXPECT_EQ(static_cast<std::uint32_t>(bench.timer.sr) & 1U << 7, 0U);
+    bench.model.set_break_input(!high, bench.now);
+    EXPECT_FALSE(bench.model.moe());
+  }
+}
+
+// "Center-aligned mode": CMS says in which direction a comparison sets its flag, and asks for DMA.
+TEST(AdvancedTimerModel, ChannelFourAsksForDmaInTheDirectionsOfItsMode) {
+  constexpr std::uint32_t ude = 1U << 8, cc4de = 1U << 12;
+  for (const std::uint32_t cms : {1U, 2U, 3U}) {
+    Bench bench;
+    std::vector<BoardTime> compares, updates;
+    bench.model.on_dma_request([&](TimerRequest request, BoardTime at) {
+      (request == TimerRequest::update ? updates : compares).push_back(at - 1000);
+    });
+    bench.load(100);
+    bench.timer.cr1 = urs | arpe | cms << 5;
+    bench.timer.dier = ude | cc4de;
+    bench.timer.ccr[3] = 30;
+    bench.count();
+    bench.run(400 * tick);
+    std::vector<BoardTime> expected;
+    for (const BoardTime period : {0, 200}) {
+      if ((cms & 2U) != 0) expected.push_back((period + 30) * tick);
+      if ((cms & 1U) != 0) expected.push_back((period + 170) * tick);
+    }
+    EXPECT_EQ(compares, expected) << cms;
+    EXPECT_EQ(updates, (std::vector<BoardTime>{100 * tick, 200 * tick, 300 * tick, 400 * tick}));
+    EXPECT_NE(static_cast<std::uint32_t>(bench.timer.sr) & 1U << 4, 0U) << "CC4IF";
+    // Out of reach, and back when it has been passed already.
+    compares.clear();
+    bench.timer.ccr[3] = 0xFFFF;
+    bench.run(250 * tick);
+    EXPECT_TRUE(compares.empty());
+    bench.timer.ccr[3] = 30;
+    bench.run(40 * tick);
+    EXPECT_TRUE(compares.empty()) << "at 50 to 90 upwards";
+    bench.timer.egr = 1U << 4;
+    EXPECT_EQ(compares.size(), 1U) << "CC4G";
+    bench.timer.dier = 0;
+    bench.run(400 * tick);
+    EXPECT_EQ(compares.size(), 1U);
+  }
+}
+
+// "Debug mode" and DBGMCU_APB2_FZ.
+TEST(AdvancedTimerModel, AHaltStopsTheCounterAndLeavesMainOutputEnable) {
+  for (const FrozenOutputs outputs : {FrozenOutputs::off, FrozenOutputs::held}) {
+    Bench bench;
+    bench.timer.ccr[0] = 50;
+    bench.pwm(100);
+    bench.run(130 * tick);
+    ASSERT_EQ(bench.cnt(), 70U);
+    bench.model.freeze(true, outputs, bench.now);
+    bench.run(1'000'000 * tick);
+    EXPECT_EQ(bench.cnt(), 70U);
+    EXPECT_TRUE(bench.model.moe());
+    EXPECT_EQ(bench.model.outputs()[0].enabled, outputs == FrozenOutputs::held);
+    if (outputs == FrozenOutputs::held) {
+      EXPECT_EQ(bench.model.outputs()[0].high_duty, 1.0) << "above CCR1, for ever";
+    }
+    bench.model.freeze(false, outputs, bench.now);
+    bench.run(10 * tick);
+    EXPECT_EQ(bench.cnt(), 60U);
+    EXPECT_TRUE(bench.down());
+    EXPECT_EQ(bench.model.outputs()[0].high_duty, 0.5) << "by itself";
+  }
 }
 
 // TIMx_BDTR, LOCK: the first write decides until reset.

@@ -136,6 +136,21 @@ TEST(Iwdg, OscillatorSpread) {
   EXPECT_THROW(model.set_oscillator_hz(47'001), std::invalid_argument);
 }
 
+// DBGMCU_APB1_FZ, DBG_IWDG_STOP.
+TEST(Iwdg, StandsWhileItIsFrozen) {
+  Watchdog watchdog;
+  watchdog.key(start);
+  const BoardTime due = watchdog.model.fires_at();
+  watchdog.run(1000 * lsi_cycle);
+  watchdog.model.freeze(true, watchdog.now);
+  watchdog.run(10 * units_per_second);
+  EXPECT_FALSE(watchdog.fired);
+  watchdog.model.freeze(false, watchdog.now);
+  EXPECT_EQ(watchdog.model.fires_at(), due + 10 * units_per_second);
+  watchdog.run(3096 * 4 * lsi_cycle + units_per_second);
+  EXPECT_EQ(watchdog.fired, due + 10 * units_per_second);
+}
+
 TEST(Iwdg, AResetStopsIt) {
   Watchdog watchdog;
   watchdog.key(start);

@@ -183,7 +183,7 @@ TEST(RccEnables, OneBitOneClock) {
   EXPECT_FALSE(
       chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Usart2::mask | stm32::rcc_apb1enr::Uart4::mask));
   EXPECT_NE(chip.refusal(offset, 1U << 11), "") << "WWDG is not on the board";
-  EXPECT_NE(chip.refusal(offsetof(RccRegisters, ahb1enr), 1U << 22), "") << "DMA2";
+  EXPECT_NE(chip.refusal(offsetof(RccRegisters, ahb1enr), 1U << 21), "") << "DMA1";
   EXPECT_NE(chip.refusal(offsetof(RccRegisters, apb2rstr), 1), "") << "resets are not connected";
 }
 
