@@ -16,6 +16,7 @@ struct BoardDescription {
   float modulation_limit;             ///< of the supply, for the current controllers; below largest_duty()
   double supply_ratio;                ///< of the supply to the voltage at the converter's pin
   double gate_driver_supply_minimum;  ///< V; below it the gate drivers report a fault
+  double brake_pulse;                 ///< s, for which a tick switches the brake resistor on
 
   constexpr double pwm_hz() const { return timer_clock_hz / (2.0 * half_period_ticks); }
   constexpr double dead_time() const { return static_cast<double>(dead_time_ticks) / timer_clock_hz; }  ///< s

@@ -12,8 +12,8 @@ struct BrakeChopperConfig {
 /// Switches a brake resistor by the supply voltage, so that a motor that brakes does not pump the supply up.
 ///
 /// Called at the tick rate. The resistor lies between the half-bridge's middle and ground, so only its high
-/// side is ever switched on: there is nothing to shoot through. Its bootstrap capacitor recharges through the
-/// resistor while the high side is off; every 20th tick is therefore always off (95 % at most).
+/// side is ever switched on: there is nothing to shoot through. The board ends what each call switches on
+/// before the next one, so that the high side's bootstrap capacitor recharges.
 ///
 /// A voltage that is not a number counts as low: off.
 class BrakeChopper {
@@ -27,17 +27,14 @@ class BrakeChopper {
     return {config.on_voltage, config.on_voltage - config.hysteresis};
   }
 
-  /// True: high side on until the next call.
+  /// True: high side on.
   bool update(const Coefficients& c, float supply_voltage) {
     if (!(c.on_voltage > 0.0f) || !(supply_voltage > c.off_voltage)) on_ = false;
     if (c.on_voltage > 0.0f && supply_voltage >= c.on_voltage) on_ = true;
-    ticks_ = ticks_ + 1 < recharge_every ? ticks_ + 1 : 0;
-    return on_ && ticks_ != 0;
+    return on_;
   }
 
  private:
-  static constexpr std::uint32_t recharge_every = 20;
-  std::uint32_t ticks_ = 0;
   bool on_ = false;
 };
 

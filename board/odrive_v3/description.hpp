@@ -20,6 +20,8 @@ inline constexpr BoardDescription description{
     .supply_ratio = 11.0,
     // DRV8301 data sheet, PVDD under-voltage.
     .gate_driver_supply_minimum = 5.9,
+    // Of a tick's 50 us: what its place in the tick varies by is left, and the bootstrap capacitor fills.
+    .brake_pulse = 44e-6,
 };
 static_assert(description.pwm_hz() == firmware::tick_rate_hz);
 static_assert(description.modulation_fits());

@@ -125,9 +125,10 @@ void start_line_interrupts() {
 
 /// Timers, converters and lines. False where they do not exist.
 bool start_power(const stm32::ClockFrequencies& clocks) {
-  stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Timer3::mask |
-                                                           stm32::rcc_apb1enr::Timer4::mask |
-                                                           stm32::rcc_apb1enr::Spi3::mask);
+  stm32::enable_peripheral_clock(stm32::rcc().ahb1enr, stm32::rcc_ahb1enr::Dma2::mask);
+  stm32::enable_peripheral_clock(stm32::rcc().apb1enr,
+                                 stm32::rcc_apb1enr::Timer2::mask | stm32::rcc_apb1enr::Timer3::mask |
+                                     stm32::rcc_apb1enr::Timer4::mask | stm32::rcc_apb1enr::Spi3::mask);
   stm32::enable_peripheral_clock(stm32::rcc().apb2enr,
                                  stm32::rcc_apb2enr::Timer1::mask | stm32::rcc_apb2enr::Timer8::mask |
                                      stm32::rcc_apb2enr::Adc1::mask | stm32::rcc_apb2enr::Adc2::mask |
@@ -160,6 +161,8 @@ void poll_power(std::uint32_t now_us) {
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     healthy = healthy && application->fault(axis) == firmware::Fault::none;
   power->hardware().show_healthy(healthy);
+  // TIM1 and TIM8 go on while a debugger halts the core (tick_watch.hpp), whatever it may have set.
+  stm32::dbgmcu().apb2_fz = 0;
   if (power->drives().all_have_ticked()) watchdog.feed();
 }
 

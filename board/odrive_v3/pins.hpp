@@ -104,8 +104,8 @@ inline constexpr auto can_pins = std::to_array<PinState>({
              {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 9}},
 });
 
-/// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides. The pull-downs hold a leg off that
-/// the timer does not drive.
+/// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides; TIM2 (1): the brake. The pull-downs
+/// hold a leg off that the timer does not drive.
 constexpr GpioConfig gate(std::uint8_t alternate_function) {
   return {.mode = GpioMode::alternate,
           .pull = GpioPull::down,
@@ -125,6 +125,7 @@ inline constexpr auto gate_pins = std::to_array<PinState>({
     PinState{{GpioPort::a, 7}, gate(3)},
     PinState{{GpioPort::b, 0}, gate(3)},
     PinState{{GpioPort::b, 1}, gate(3)},
+    PinState{pins::brake_high_side, gate(1)},
 });
 
 /// TIM3 and TIM4, alternate function 2; the board's own pull-ups are stronger than the chip's.

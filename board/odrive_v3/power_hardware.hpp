@@ -8,8 +8,10 @@
 #include "board/power/power.hpp"
 #include "board/power/serial_encoder.hpp"
 #include "drivers/stm32f4/current_sampling.hpp"
+#include "drivers/stm32f4/one_pulse_output.hpp"
 #include "drivers/stm32f4/phase_shifted_pwm.hpp"
 #include "drivers/stm32f4/quadrature_timer.hpp"
+#include "drivers/stm32f4/tick_watch.hpp"
 
 namespace kmax::board::odrive_v3 {
 
@@ -18,6 +20,10 @@ namespace kmax::board::odrive_v3 {
 /// The conversions' interrupt comes 0.7 us after the middle of an axis' low-side window, the two axes' every
 /// 25 us in turn: TIM1 counts up after its underflow (axis 0), down after its overflow (axis 1). A duty is
 /// active from the timer's next turn on, 25 us after the sample.
+///
+/// Nothing outlives the ticks: TickWatch ends the duties, and the brake's high side is a pulse of TIM2 that
+/// ends by itself before the next tick begins another one, which also leaves its bootstrap capacitor time to
+/// fill.
 class PowerHardware {
  public:
   explicit PowerHardware(ChipBus& bus)
@@ -28,10 +34,13 @@ class PowerHardware {
         encoder0_(drivers::stm32f4::tim3()),
         encoder1_(drivers::stm32f4::tim4()),
         sampling_(drivers::stm32f4::adc(1), drivers::stm32f4::adc(2), drivers::stm32f4::adc(3),
-                  drivers::stm32f4::adc_common()) {}
+                  drivers::stm32f4::adc_common()),
+        brake_(drivers::stm32f4::tim2()),
+        watch_(drivers::stm32f4::tim1(), drivers::stm32f4::tim8(), drivers::stm32f4::dma2()) {}
 
   /// Timers and converters, outputs off. False: the hardware does not do what it is set to.
   [[nodiscard]] bool configure(std::uint32_t apb2_hz) {
+    brake_.configure(brake_pulse_ticks);
     return bridge0_.configure() && bridge1_.configure() && encoder0_.configure({}) &&
            encoder1_.configure({}) && sampling_.configure(apb2_hz);
   }
@@ -39,8 +48,12 @@ class PowerHardware {
   [[nodiscard]] bool start() {
     // The start itself triggers once: as a sample of axis 0.
     sampling_.start(0);
-    return drivers::stm32f4::start_phase_shifted(bridge0_, bridge1_);
+    if (!drivers::stm32f4::start_phase_shifted(bridge0_, bridge1_)) return false;
+    watch_.start(pwm_config.half_period_ticks, bridge1_.disarmed());
+    return true;
   }
+  /// At the beginning of each tick.
+  void ISR_tick_begins() { watch_.ISR_tick(); }
   /// In the conversions' interrupt: whose they are.
   bool ISR_sampled_axis_1() const { return bridge0_.counting_down(); }
 
@@ -57,7 +70,8 @@ class PowerHardware {
     return pin(axis == 0 ? pins::encoder0_index : pins::encoder1_index).read();
   }
   auto& serial_encoder() { return serial_encoder_; }
-  void set_brake(bool on) { pin(pins::brake_high_side).write(on); }
+  /// For the length of a pulse.
+  void set_brake(bool on) { on ? brake_.start() : brake_.stop(); }
 
   std::uint16_t supply_code() const { return sampling_.latest().supply; }
   std::uint16_t temperature_code(std::size_t axis) const { return sampling_.latest().temperatures[axis]; }
@@ -75,6 +89,10 @@ class PowerHardware {
   void show_healthy(bool healthy) { pin(pins::healthy).write(healthy); }
 
  private:
+  /// TIM2 has half the core's clock.
+  static constexpr auto brake_pulse_ticks =
+      static_cast<std::uint32_t>(description.brake_pulse * description.core_clock_hz / 2);
+
   static drivers::stm32f4::GpioPin<> pin(PinLocation location) {
     return {drivers::stm32f4::gpio(location.port), location.number};
   }
@@ -84,6 +102,8 @@ class PowerHardware {
   drivers::stm32f4::ThreePhasePwm<> bridge0_, bridge1_;
   drivers::stm32f4::QuadratureTimer<> encoder0_, encoder1_;
   drivers::stm32f4::CurrentSampling<> sampling_;
+  drivers::stm32f4::OnePulseOutput<> brake_;
+  drivers::stm32f4::TickWatch<> watch_;
 };
 
 /// The conversions' interrupt. In a file of its own, compiled for speed.

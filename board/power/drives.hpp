@@ -46,7 +46,7 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   { constant.ISR_counter(axis) } -> std::unsigned_integral;
   { constant.ISR_index_line(axis) } -> std::same_as<bool>;
 
-  /// The high side of the brake's half-bridge. Any context.
+  /// The high side of the brake's half-bridge, on until the next tick at most. Any context.
   {hardware.set_brake(level)};
 
   // Main loop: codes converted last, and ticks that came too late or not at all.
@@ -139,8 +139,8 @@ class Drives {
     }
   }
 
-  /// A slow clock's interrupt: true when an axis has not ticked between three calls. All bridges are off
-  /// then.
+  /// A slow clock's interrupt: true when an axis has not ticked between three calls. All bridges and the
+  /// brake are off then.
   bool ISR_ticks_have_stopped();
 
   /// Main loop: what the parameters say, when no axis is armed.
@@ -218,6 +218,13 @@ class Drives {
                                                      bool driving);
   void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
   // Rare, and kept out of the tick's one function, whose registers they would take.
+  /// Ticks stayed away, where the board has a watch for that; else the timer's break input.
+  [[gnu::noinline, gnu::cold]] firmware::Fault ISR_why_fallen(std::size_t axis) {
+    if constexpr (requires { hardware_.bridge(axis).ISR_ticks_stayed_away(); }) {
+      if (hardware_.bridge(axis).ISR_ticks_stayed_away()) return firmware::Fault::tick_missed;
+    }
+    return firmware::Fault::power_stage;
+  }
   template <typename Sample>
   [[gnu::noinline, gnu::cold]] void ISR_calibrate(Axis& axis, const Sample& sample) {
     if (!sample.valid) return;
@@ -238,8 +245,9 @@ class Drives {
   std::atomic<bool> calibrating_{false}, main_loop_due_{false}, brake_inhibited_{false};
   bool ISR_brake_on_ = false;
   std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
-  std::array<std::atomic<std::uint32_t>, firmware::axis_count> axis_ticks_{};
-  std::array<std::uint32_t, firmware::axis_count> axis_ticks_seen_{}, axis_ticks_fed_{};
+  /// An axis' tick sets both bits; who has seen one takes it back.
+  static constexpr std::uint8_t for_the_clock = 1, for_the_main_loop = 2;
+  std::array<std::atomic<std::uint8_t>, firmware::axis_count> ticked_{};
 };
 
 template <typename Hardware>
@@ -270,8 +278,9 @@ inline firmware::AxisInput Drives<Hardware>::ISR_measure(std::size_t index, cons
   // Before the condition: a line interrupt in between must be found as what it is.
   const bool bridge_fell = axis.arm_failed || (driving && !hardware_.bridge(index).armed());
   if (const firmware::Fault cause = stage.condition(); cause != firmware::Fault::none) condition = cause;
-  // The bridge fell, or would not rise, without anybody saying why: the timer's break input.
-  if (bridge_fell && condition == firmware::Fault::none) condition = firmware::Fault::power_stage;
+  // The bridge fell, or would not rise, without anybody saying why.
+  if (bridge_fell && condition == firmware::Fault::none) [[unlikely]]
+    condition = ISR_why_fallen(index);
   // Named in full: what is filled with zeros first is filled by a function of the library.
   return {.count = count.count,
           .count_valid = count.valid,
@@ -359,7 +368,7 @@ inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisO
     axis.arm_failed = !axis.driving;
     if (stage.condition() != firmware::Fault::none) bridge.disarm();
   }
-  axis_ticks_[index].store(axis_ticks_[index].load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  ticked_[index].store(for_the_clock | for_the_main_loop, std::memory_order_relaxed);
   if (index == first_axis()) {
     const Settings& settings = double_buffer_.ISR_current();
     if (settings.has_brake || ISR_brake_on_) ISR_brake(settings.brake, supply_voltage);
@@ -387,26 +396,25 @@ bool Drives<Hardware>::ISR_ticks_have_stopped() {
   bool stopped = false;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!hardware_.has(axis)) continue;
-    const std::uint32_t ticks = axis_ticks_[axis].load(std::memory_order_relaxed);
-    stopped = stopped || ticks == axis_ticks_seen_[axis];
-    axis_ticks_seen_[axis] = ticks;
+    constexpr std::uint8_t seen = static_cast<std::uint8_t>(~for_the_clock);
+    if ((ticked_[axis].fetch_and(seen, std::memory_order_relaxed) & for_the_clock) == 0) stopped = true;
   }
   // Twice in a row: after an erase, in which the core stood still, this may come before the last axis' tick.
   ISR_silent_calls_ = stopped ? ISR_silent_calls_ + 1 : 0;
   if (ISR_silent_calls_ < 2) return false;
   ISR_disarm();
+  hardware_.set_brake(false);
   main_loop_due_.store(true, std::memory_order_relaxed);
   return true;
 }
 
 template <typename Hardware>
 bool Drives<Hardware>::all_have_ticked() {
-  std::array<std::uint32_t, firmware::axis_count> ticks{};
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    ticks[axis] = axis_ticks_[axis].load(std::memory_order_relaxed);
-    if (hardware_.has(axis) && ticks[axis] == axis_ticks_fed_[axis]) return false;
+    if (hardware_.has(axis) && (ticked_[axis].load(std::memory_order_relaxed) & for_the_main_loop) == 0)
+      return false;
   }
-  axis_ticks_fed_ = ticks;
+  for (auto& ticked : ticked_) ticked.fetch_and(for_the_clock, std::memory_order_relaxed);
   return true;
 }
 

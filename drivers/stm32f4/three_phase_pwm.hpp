@@ -91,6 +91,7 @@ class ThreePhasePwm {
     stop();
     registers_.smcr = 0;
     registers_.dier = 0;
+    registers_.ccr[3] = 0xFFFF;  // the comparison of TickWatch: out of reach
     // Idle levels 0. TRGO shows CEN, so that the UG below triggers nobody; with MMS = 0 it would.
     registers_.cr2 = timer_cr2::MasterMode::bits(timer_cr2::master_enable);
     registers_.ccer = 0;
@@ -112,6 +113,7 @@ class ThreePhasePwm {
   /// Gives the gate signals to the PWM. False when the counter does not run, or the hardware holds MOE at 0.
   [[nodiscard]] bool arm() {
     if (!running()) return false;
+    registers_.sr = ~timer_sr::CaptureCompare<4>::mask;
     registers_.bdtr = disarmed_ | timer_bdtr::MainOutputEnable::mask;
     // The write acts on the asynchronous bit, the read sees the synchronised one (RM0090, Using the break
     // function).
@@ -120,6 +122,10 @@ class ThreePhasePwm {
   }
 
   bool armed() const { return timer_bdtr::MainOutputEnable::read(registers_.bdtr) != 0; }
+  /// Since `arm`: it was TickWatch that took MOE away.
+  bool ISR_ticks_stayed_away() const { return timer_sr::CaptureCompare<4>::read(registers_.sr) != 0; }
+  /// BDTR without MOE.
+  constexpr std::uint32_t disarmed() const { return disarmed_; }
 
   /// Which legs follow the PWM; the others are released. False, and nothing changed, while armed.
   [[nodiscard]] bool enable_legs(PwmLegs legs) {
@@ -135,9 +141,11 @@ class ThreePhasePwm {
     const float sum = magnitude(duty.a) + magnitude(duty.b) + magnitude(duty.c);
     if (!(sum < convertible)) [[unlikely]]
       return set_far_duty(duty.a, duty.b, duty.c);
-    registers_.ccr[0] = compare_of(duty.a);
-    registers_.ccr[1] = compare_of(duty.b);
-    registers_.ccr[2] = compare_of(duty.c);
+    // Taken here: the compiler would load it again after each store to a register.
+    const std::int32_t fewest = fewest_compare_;
+    registers_.ccr[0] = compare_of(duty.a, fewest);
+    registers_.ccr[1] = compare_of(duty.b, fewest);
+    registers_.ccr[2] = compare_of(duty.c, fewest);
     return true;
   }
 
@@ -181,7 +189,8 @@ class ThreePhasePwm {
     stop();
     registers_.cr1 = loading | timer_cr1::CountingDown::bits(down ? 1 : 0);
     registers_.egr = timer_egr::Update::mask;
-    timer_cr1::Alignment::write(registers_.cr1, 1);
+    // Counted both ways, for the comparison of TickWatch.
+    timer_cr1::Alignment::write(registers_.cr1, 3);
   }
   void enable_counter() { timer_cr1::Enable::set(registers_.cr1); }
   void select_trigger_output(std::uint32_t mode) { timer_cr2::MasterMode::write(registers_.cr2, mode); }
@@ -220,10 +229,10 @@ class ThreePhasePwm {
   /// One instruction, where the comparison with 0 takes four.
   static constexpr float magnitude(float value) { return __builtin_fabsf(value); }
 
-  std::uint32_t compare_of(float duty) const {
+  std::uint32_t compare_of(float duty, std::int32_t fewest) const {
     const auto high = static_cast<std::int32_t>(duty * ticks_per_duty_ + 0.5F);
     const std::int32_t whole = config_.half_period_ticks;
-    const std::int32_t low = std::max(whole - high, fewest_compare_);
+    const std::int32_t low = std::max(whole - high, fewest);
     return static_cast<std::uint32_t>(std::min(low, whole));
   }
 

@@ -51,6 +51,11 @@ bool SimulatedPowerHardware::ISR_index_line(std::size_t axis) const {
          drives_.drive(axis).encoder().lines().z;
 }
 
+void SimulatedPowerHardware::set_brake(bool on) {
+  constexpr const board::BoardDescription& board = board::odrive_v3::description;
+  drives_.supply().set_brake(on ? board.brake_pulse * board.pwm_hz() : 0.0);
+}
+
 std::uint16_t SimulatedPowerHardware::temperature_code(std::size_t axis) const {
   return converter_code(drives_.temperature(axis).pin_voltage());
 }

@@ -68,7 +68,7 @@ class SimulatedPowerHardware {
   std::uint32_t ISR_counter(std::size_t axis) const;
   bool ISR_index_line(std::size_t axis) const;
   SimulatedSerialEncoder& serial_encoder() { return serial_encoder_; }
-  void set_brake(bool on) { drives_.supply().set_brake(on ? 1.0 : 0.0); }
+  void set_brake(bool on);
   std::uint16_t supply_code() const { return supply_code_; }
   std::uint16_t temperature_code(std::size_t axis) const;
   static constexpr std::uint32_t missed_ticks() { return 0; }

@@ -26,7 +26,7 @@ TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
   timer.rcr = 3;
   ThreePhasePwm<> pwm{timer};
   ASSERT_TRUE(pwm.configure());
-  EXPECT_EQ(timer.cr1, 1U << 2 | 1U << 5 | 1U << 7) << "URS, CMS = 1, ARPE, stopped";
+  EXPECT_EQ(timer.cr1, 1U << 2 | 3U << 5 | 1U << 7) << "URS, CMS = 3, ARPE, stopped";
   EXPECT_EQ(timer.cr2 & 0x7F00U, 0U) << "all idle levels 0";
   EXPECT_EQ(timer.dier, 0U);
   EXPECT_EQ(timer.smcr, 0U);
@@ -36,7 +36,9 @@ TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
   EXPECT_EQ(timer.ccer, 0x555U);
   EXPECT_EQ(timer.arr, 4200U);
   for (unsigned leg = 0; leg < 3; ++leg) EXPECT_EQ(timer.ccr[leg], 4200U) << "duty 0";
+  EXPECT_GT(timer.ccr[3], 4200U) << "no comparison of channel 4";
   EXPECT_EQ(timer.bdtr, disarmed);
+  EXPECT_EQ(pwm.disarmed(), disarmed);
   EXPECT_FALSE(pwm.armed());
 }
 
