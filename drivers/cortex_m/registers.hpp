@@ -154,7 +154,8 @@ using BusFaultLazyFloat = Field<13>;       // LSPERR
 using BusFaultAddressValid = Field<15>;    // BFARVALID
 using UndefinedInstruction = Field<16>;
 using InvalidState = Field<17>;
-using NoCoprocessor = Field<18>;    // NOCP
+using InvalidReturn = Field<18>;    // INVPC: an exception return that does not fit
+using NoCoprocessor = Field<19>;    // NOCP
 using UnalignedAccess = Field<24>;  // UNALIGNED
 using DivisionByZero = Field<25>;   // DIVBYZERO
 }  // namespace scb_cfsr

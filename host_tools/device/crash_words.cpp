@@ -32,6 +32,7 @@ constexpr std::array status_bits = std::to_array<BitWords>({
     {cfsr::BusFaultLazyFloat::mask, "bus error on saving floating-point registers"},
     {cfsr::UndefinedInstruction::mask, "undefined instruction"},
     {cfsr::InvalidState::mask, "invalid processor state (a jump to an even address?)"},
+    {cfsr::InvalidReturn::mask, "exception return that does not fit (stack overwritten?)"},
     {cfsr::NoCoprocessor::mask, "floating-point instruction while the unit was off"},
     {cfsr::UnalignedAccess::mask, "unaligned access"},
     {cfsr::DivisionByZero::mask, "division by zero"},

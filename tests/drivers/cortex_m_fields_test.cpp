@@ -52,9 +52,9 @@ TEST(CortexMFields, CoverTheBitsOfTheManual) {
     EXPECT_EQ((bits_of<FetchViolation, DataViolation, MemoryFaultUnstacking, MemoryFaultStacking,
                        MemoryFaultLazyFloat, MemoryFaultAddressValid, FetchBusFault, PreciseBusFault,
                        ImpreciseBusFault, BusFaultUnstacking, BusFaultStacking, BusFaultLazyFloat,
-                       BusFaultAddressValid, UndefinedInstruction, InvalidState, NoCoprocessor,
+                       BusFaultAddressValid, UndefinedInstruction, InvalidState, InvalidReturn, NoCoprocessor,
                        UnalignedAccess, DivisionByZero>()),
-              0x0307'BFBBU);
+              0x030F'BFBBU);
   }
   {
     using namespace scb_hfsr;

@@ -14,15 +14,17 @@ using firmware::CrashRecord;
 // Bit positions as PM0214 gives them for the configurable fault status register.
 TEST(CrashWords, EveryStatusBitHasItsOwnWords) {
   std::set<std::string> seen;
-  for (const unsigned bit : {0, 1, 3, 4, 5, 8, 9, 10, 11, 12, 13, 16, 17, 18, 24, 25}) {
+  for (const unsigned bit : {0, 1, 3, 4, 5, 8, 9, 10, 11, 12, 13, 16, 17, 18, 19, 24, 25}) {
     const std::string words = fault_status_words(1U << bit, 0, 0);
     EXPECT_FALSE(words.empty()) << bit;
     EXPECT_TRUE(seen.insert(words).second) << words;
   }
-  for (const unsigned reserved : {2, 6, 14, 19, 23, 26, 31})
+  for (const unsigned reserved : {2, 6, 14, 20, 23, 26, 31})
     EXPECT_EQ(fault_status_words(1U << reserved, 0, 0), "");
   EXPECT_CONTAINS(fault_status_words(1U << 25, 0, 0), "division by zero");
   EXPECT_CONTAINS(fault_status_words(1U << 16, 0, 0), "undefined instruction");
+  EXPECT_CONTAINS(fault_status_words(1U << 18, 0, 0), "exception return");
+  EXPECT_CONTAINS(fault_status_words(1U << 19, 0, 0), "floating-point");
   EXPECT_CONTAINS(fault_status_words(0, 1U << 1, 0), "vector table");
 }
 
