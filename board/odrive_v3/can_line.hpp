@@ -19,6 +19,7 @@ namespace kmax::board::odrive_v3 {
 /// the serial line's priority: they and the main loop never wait for each other.
 class CanLine {
  public:
+  /// `peripheral_clock_hz`: 0 where the clock is not good enough; the node stays off the bus.
   CanLine(drivers::cortex_m::InterruptController<>& interrupts, std::uint32_t peripheral_clock_hz)
       : interrupts_(interrupts),
         peripheral_clock_hz_(peripheral_clock_hz),

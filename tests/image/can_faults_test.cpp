@@ -49,6 +49,20 @@ class BusFaults : public testing::Test {
   DriveState state{};
 };
 
+// The internal oscillator is right within 1 %, a bus wants 0.5.
+TEST(BusClock, WithoutItsCrystalTheNodeStaysOffTheBus) {
+  CanBench bench;
+  bench.board->rcc().set_crystal_works(false);
+  bench.board->pull_reset();
+  bench.start();
+  EXPECT_EQ(bench.number("info.clock_source"), 1U) << "at full speed all the same";
+  EXPECT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::stopped));
+  bench.board->rcc().set_crystal_works(true);
+  bench.board->pull_reset();
+  bench.start();
+  EXPECT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::active));
+}
+
 TEST_F(BusFaults, NobodyAcknowledges) {
   ASSERT_EQ(state, DriveState::operation_enabled);
   bench.ask_for_telemetry();
