@@ -11,6 +11,7 @@
 #include "drivers/stm32f4/one_pulse_output.hpp"
 #include "drivers/stm32f4/phase_shifted_pwm.hpp"
 #include "drivers/stm32f4/quadrature_timer.hpp"
+#include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/tick_watch.hpp"
 
 namespace kmax::board::odrive_v3 {
@@ -41,8 +42,8 @@ class PowerHardware {
   /// Timers and converters, outputs off. False: the hardware does not do what it is set to.
   [[nodiscard]] bool configure(std::uint32_t apb2_hz) {
     brake_.configure(brake_pulse_ticks);
-    return bridge0_.configure() && bridge1_.configure() && encoder0_.configure({}) &&
-           encoder1_.configure({}) && sampling_.configure(apb2_hz);
+    return configure_bridges() && encoder0_.configure({}) && encoder1_.configure({}) &&
+           sampling_.configure(apb2_hz);
   }
   /// Begins the ticks. False like configure().
   [[nodiscard]] bool start() {
@@ -89,6 +90,17 @@ class PowerHardware {
   void show_healthy(bool healthy) { pin(pins::healthy).write(healthy); }
 
  private:
+  [[nodiscard]] bool configure_bridges() {
+    if (!bridge0_.configure() || !bridge1_.configure()) return false;
+    if (!bridge0_.break_is_held() && !bridge1_.break_is_held()) return true;
+    namespace stm32 = drivers::stm32f4;
+    stm32::rcc().apb2rstr = stm32::rcc_apb2enr::Timer1::mask | stm32::rcc_apb2enr::Timer8::mask;
+    stm32::rcc().apb2rstr = 0;
+    bridge0_.break_when_low();
+    bridge1_.break_when_low();
+    return bridge0_.configure() && bridge1_.configure();
+  }
+
   /// TIM2 has half the core's clock.
   static constexpr auto brake_pulse_ticks =
       static_cast<std::uint32_t>(description.brake_pulse * description.core_clock_hz / 2);

@@ -32,8 +32,8 @@
 //   * A failing crystal: the clock security system's break (BKE = 1) clears MOE in hardware.
 //   * BKP = 1 (break when high). No pin is mapped to BKIN here, and an alternate-function input without a pin
 //   is
-//     taken to read low, so the other polarity would break for ever. If a part reads high, MOE cannot be set
-//     and `arm` says so: the error is on the safe side.
+//     taken to read low. The manual does not say so: where it reads high, `break_is_held` tells, and
+//     `break_when_low` turns BKP round, after a reset of the timer, since LOCK has frozen it.
 //   * LOCK level 2 freezes dead time, idle levels, polarities and break set-up until reset, so that a stray
 //     store cannot short a leg. `configure` may be repeated with the same dead time only, else it fails.
 //     Level 3 would lock the PWM mode too, but then a `disarm` before `configure` would prevent it.
@@ -171,6 +171,15 @@ class ThreePhasePwm {
   /// False from underflow to overflow. The interrupt that follows a conversion 1 us after an update event
   /// reads it: false means the event was this timer's underflow. It stays right for 24 us.
   bool counting_down() const { return timer_cr1::CountingDown::read(registers_.cr1) != 0; }
+  /// After `configure`: the break input keeps MOE at 0, and `arm` would fail for ever.
+  bool break_is_held() {
+    registers_.sr = ~timer_sr::Break::mask;
+    cortex_m::data_synchronization_barrier();
+    return timer_sr::Break::read(registers_.sr) != 0;
+  }
+  /// Before `configure`, the timer fresh from its reset.
+  void break_when_low() { disarmed_ &= ~timer_bdtr::BreakActiveHigh::mask; }
+
   bool running() const { return timer_cr1::Enable::read(registers_.cr1) != 0; }
 
   // The steps of start_phase_shifted(); nobody else needs them.

@@ -107,6 +107,18 @@ TEST(ThreePhasePwm, ArmIsOneStoreAndLooksWhetherItTook) {
   EXPECT_FALSE(pwm.arm());
 }
 
+TEST(ThreePhasePwm, TellsABreakThatIsHeldAndTurnsItRound) {
+  FakeTimer timer;
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_FALSE(pwm.break_is_held());
+  timer.sr.on_read = [](std::uint32_t word) { return word | 1U << 7; };
+  EXPECT_TRUE(pwm.break_is_held());
+  pwm.break_when_low();
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_EQ(timer.bdtr.value, disarmed & ~(1U << 13)) << "BKP";
+}
+
 TEST(ThreePhasePwm, LegsChangeOnlyWhileDisarmed) {
   Configured configured{{.legs = {.a = false}}};
   auto& [timer, pwm] = configured;

@@ -183,6 +183,16 @@ TEST(HaltAndHang, TheTimersAreNotFrozenWhateverADebuggerSets) {
   }
 }
 
+// RM0090 does not say what the break input reads to which no pin is mapped.
+TEST(HaltAndHang, DrivesWhateverTheBreakInputReads) {
+  auto config = as_on_the_chip();
+  config.break_inputs_high = true;
+  Bench bench(config);
+  bench.drive();
+  bench.board->rcc().fail_crystal(bench.board->now());
+  EXPECT_TRUE(bench.gates_off()) << "the clock's break still works";
+}
+
 // The brake driver's supply is a capacitor that a high side drains for as long as it is on.
 TEST(HaltAndHang, TheBrakeLeavesItsDriverItsSupply) {
   Bench bench;

@@ -139,6 +139,10 @@ void VirtualBoard::wire() {
   rcc_.on_clock_failure([this](BoardTime now) {
     for (auto& timer : pwm_) timer.clock_failure_break(now);
   });
+  rcc_.on_peripheral_reset([this](std::uint32_t bits, BoardTime now) {
+    if ((bits & chip::rcc_apb2enr::Timer1::mask) != 0) pwm_[0].reset(now);
+    if ((bits & chip::rcc_apb2enr::Timer8::mask) != 0) pwm_[1].reset(now);
+  });
   rcc_.on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
     if (level) core_.exceptions.pend(exception_number::non_maskable);
   });

@@ -163,7 +163,7 @@ void RccModel::restore_reset_values() {
   pllcfgr_ = rcc_pllcfgr::reset_value;
   cfgr_ = cir_ = 0;
   ahb1enr_ = rcc_ahb1enr::Ccm::mask;
-  apb1enr_ = apb2enr_ = 0;
+  apb1enr_ = apb2enr_ = apb2rstr_ = 0;
   internal_ready_ = 0;
   crystal_ready_ = pll_ready_ = never;
   core_clock_lost_ = false;
@@ -233,7 +233,8 @@ const RegisterTable<RccModel>& RccModel::registers() {
        Row::takes<&Model::write_interrupts>},
       Row::reserved(offsetof(Layout, ahb1rstr), "AHB1RSTR"),
       Row::reserved(offsetof(Layout, apb1rstr), "APB1RSTR"),
-      Row::reserved(offsetof(Layout, apb2rstr), "APB2RSTR"),
+      {offsetof(Layout, apb2rstr), "APB2RSTR", Row::shows<&Model::apb2rstr_>,
+       rcc_apb2enr::Timer1::mask | rcc_apb2enr::Timer8::mask, Row::takes<&Model::write_peripheral_reset>},
       Row::word<&Model::ahb1enr_>(offsetof(Layout, ahb1enr), "AHB1ENR",
                                   ports | rcc_ahb1enr::Ccm::mask | rcc_ahb1enr::Dma2::mask),
       Row::word<&Model::apb1enr_>(offsetof(Layout, apb1enr), "APB1ENR", apb1_bits),
@@ -305,6 +306,12 @@ void RccModel::write_configuration(const Access& access, std::uint32_t value) {
   if (wanted != rcc_cfgr::Switch::of(cfgr_)) switch_requested_ = access.now;
   cfgr_ = (value & (prescaler_bits | rcc_cfgr::Switch::mask)) | rcc_cfgr::SwitchStatus::bits(source_in_use());
   clocks_ = now;
+}
+
+void RccModel::write_peripheral_reset(const Access& access, std::uint32_t value) {
+  const std::uint32_t rising = value & ~apb2rstr_;
+  apb2rstr_ = value;
+  if (rising != 0 && peripheral_reset_) peripheral_reset_(rising, access.now);
 }
 
 void RccModel::write_interrupts(const Access& access, std::uint32_t value) {
