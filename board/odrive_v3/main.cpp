@@ -103,6 +103,8 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.core_clock_hz = clocks.core_hz;
   identity.modulation_limit = description.modulation_limit;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
+  identity.brown_out_level =
+      static_cast<std::uint8_t>(stm32::flash_optcr::BrownOutLevel::read(stm32::flash().optcr));
   identity.reset_cause = static_cast<firmware::ResetCause>(stm32::take_reset_cause(stm32::rcc()));
   if (identity.reset_cause == firmware::ResetCause::power_on) {
     cortex::fault_record.magic = 0;

@@ -45,6 +45,8 @@ inline constexpr NamedValue clock_source[] = {{"crystal_pll", 0}, {"internal_pll
 inline constexpr NamedValue reset_cause[] = {
     {"unknown", 0},         {"power_on", 1},  {"pin", 2},       {"software", 3}, {"independent_watchdog", 4},
     {"window_watchdog", 5}, {"low_power", 6}, {"brown_out", 7}, {"native", 8}};
+inline constexpr NamedValue brown_out_level[] = {
+    {"level_3", 0}, {"level_2", 1}, {"level_1", 2}, {"off", 3}, {"unknown", 4}};
 inline constexpr NamedValue crash_cause[] = {{"none", 0}, {"fault", 1}, {"unexpected_interrupt", 2}};
 inline constexpr NamedValue can_state[] = {{"absent", 0}, {"stopped", 1},       {"joining", 2},
                                            {"active", 3}, {"error_passive", 4}, {"bus_off", 5}};
@@ -150,6 +152,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     reading("info.crash_hard_fault_status", group::info, 18, Type::unsigned32, "", "Cortex-M4 HFSR."),
     reading("info.crash_address", group::info, 19, Type::unsigned32, "",
             "Address of the access that failed, if info.crash_status says that it is known."),
+    named_reading(
+        "info.brown_out_level", group::info, 20, names::brown_out_level,
+        "Holds the processor in reset below 2.7 V, as its full speed needs, if level_3; 'kmax flash' by SWD "
+        "sets that."),
 
     reading("counters.frames_received", group::counters, 1, Type::unsigned32, "",
             "Modbus frames received whole."),

@@ -61,6 +61,15 @@ std::vector<Step> openocd_start(Method method, const FlashTarget& target) {
   return {{"start the application", start, false}};
 }
 
+/// Brown-out level 3 (BOR_LEV = 0), the other option bytes as they are: RM0090, User option bytes. From the
+/// next reset on.
+constexpr const char* set_brown_out_level =
+    "set options [read_memory 0x40023c14 32 1]; if {$options & 0xc} {mww 0x40023c08 0x08192a3b; mww "
+    "0x40023c08 "
+    "0x4c5d6e7f; mww 0x40023c14 [expr {$options & ~0xf}]; mww 0x40023c14 [expr {($options & ~0xf) | 2}]; "
+    "sleep "
+    "500; mww 0x40023c14 [expr {($options & ~0xf) | 1}]}";
+
 FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget& target) {
   Arguments write = openocd_adapter(method, target);
   const auto command = [&write](const std::string& text) { write.insert(write.end(), {"-c", text}); };
@@ -76,8 +85,10 @@ FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget
     command(
         fmt::format("dump_image {} 0x{:08x} {}", piece.read_file_name(), piece.address, piece.bytes.size()));
   command(fmt::format("dump_image {} 0x{:08x} {}", parameters_after_file, parameters_begin, parameters_size));
+  command(set_brown_out_level);
   command("shutdown");
-  return {{{"read the parameters, write and verify the image, read all back", write, true}},
+  return {{{"read the parameters, write and verify the image, read all back, set the brown-out level", write,
+            true}},
           openocd_start(method, target),
           {}};
 }

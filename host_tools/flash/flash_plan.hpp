@@ -15,8 +15,10 @@
 // write the pieces, the one with the vector table last; let the tool verify; read everything back for a
 // comparison by this program; only then start the application.
 //
-// Only sectors of the image are erased and written. Sources: OpenOCD 0.12 user's guide (adapter gpio, flash
-// erase_address, flash write_image, verify_image, dump_image), dfu-util(1) 0.11, stm32flash(1) 0.7.
+// Only sectors of the image are erased and written. OpenOCD also sets the brown-out level
+// (info.brown_out_level); the others have no way of changing one option byte and leaving the rest. Sources:
+// OpenOCD 0.12 user's guide (adapter gpio, flash erase_address, flash write_image, verify_image, dump_image),
+// dfu-util(1) 0.11, stm32flash(1) 0.7.
 
 namespace kmax::flash {
 

@@ -94,6 +94,33 @@ TEST(ImageFaultLog, OutlivesEveryResetAndSaysWhatItWas) {
   EXPECT_EQ(bench.ImageBench::number("log.newest"), 0U);
 }
 
+// The 3.3 V of the logic sag with the supply. Without the brown-out reset the processor would go on at 168
+// MHz.
+TEST(ImageFaultLog, ASupplyThatSagsIsABrownOut) {
+  for (const unsigned level : {0U, 3U}) {
+    virtual_board::VirtualBoardConfig config;
+    config.brown_out_level = level;
+    ImageBench bench({}, 0.0, "motor_axes", config);
+    bench.start();
+    EXPECT_EQ(bench.number("info.brown_out_level"), level);
+    const auto sag = [&bench](double volts) {
+      bench.world.supply().set_source(volts);
+      bench.world.supply().set_voltage(volts);
+      bench.board->run_for(0.02);
+    };
+    if (level != 0) {
+      EXPECT_THROW(sag(3.5), std::runtime_error);
+      continue;
+    }
+    sag(3.5);
+    EXPECT_FALSE(bench.board->gates_active(0));
+    EXPECT_FALSE(bench.board->healthy());
+    sag(24.0);
+    bench.start();
+    EXPECT_EQ(bench.number("info.reset_cause"), static_cast<unsigned>(ResetCause::brown_out));
+  }
+}
+
 TEST(ImageFaultLog, NamesTheCrashOnceAndWhereItWas) {
   virtual_board::VirtualBoardConfig as_on_the_chip;
   as_on_the_chip.processor.faults_to_firmware = true;

@@ -68,6 +68,11 @@ using Lock = Field<31>;
 inline constexpr std::uint32_t by_word = 2;  // of Parallelism: 32 bits, at 2.7 to 3.6 V
 }  // namespace flash_cr
 
+namespace flash_optcr {
+using BrownOutLevel =
+    Field<2, 2>;  // BOR_LEV: held in reset below 2.7 V (0), 2.4 V (1), 2.1 V (2), 1.8 V (3: off)
+}  // namespace flash_optcr
+
 /// Main memory: 1 MiB in twelve sectors of 4 x 16, 64 and 7 x 128 KiB.
 inline constexpr std::uint32_t flash_memory_base = 0x0800'0000;
 inline constexpr unsigned flash_sector_count = 12;

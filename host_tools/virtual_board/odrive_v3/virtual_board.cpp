@@ -107,6 +107,7 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(without_events, DeviceIdentity::base, DeviceIdentity::size, "system memory",
          other(std::make_unique<DeviceIdentity>(config.identity)), always, 0);
   iwdg_.set_oscillator_hz(config.watchdog_oscillator_hz);
+  flash_.set_brown_out_level(config.brown_out_level);
   for (AdvancedTimerModel& timer : pwm_) timer.set_break_input(config.break_inputs_high, now());
   events_.add(core_.system_tick);
   events_.add(chip_events_);
@@ -278,6 +279,7 @@ void VirtualBoard::look_at_world(BoardTime now) {
     if (port(index.port).level(index.number) != signals.index)
       port(index.port).drive(index.number, signals.index ? PinDrive::high : PinDrive::low, now);
   }
+  look_at_logic_supply();
   // DRV8301 data sheet, protection: PVDD under-voltage at 5.9 V.
   constexpr double lowest_supply = 5.9;
   const bool too_low = world_->supply_voltage() < lowest_supply;
@@ -285,6 +287,45 @@ void VirtualBoard::look_at_world(BoardTime now) {
   supply_was_low_ = too_low;
   for (Drv8301Chip& driver : gate_drivers_)
     driver.set_condition(drivers::Drv8301Fault::supply_under_voltage, too_low, now);
+}
+
+/// Volts, behind the gate driver's buck converter and a linear regulator; what they lose when the supply gets
+/// low is a guess.
+double VirtualBoard::logic_supply() const {
+  constexpr double nominal = 3.3, lost = 1.2;
+  return world_ == nullptr ? nominal : std::clamp(world_->supply_voltage() - lost, 0.0, nominal);
+}
+
+// STM32F405 data sheet, BOR thresholds (falling, typical, RM0090: 2.7, 2.4 and 2.1 V) and power-on reset;
+// RM0090, flash: 168 MHz needs 2.7 V.
+void VirtualBoard::look_at_logic_supply() {
+  constexpr std::array<double, 4> thresholds{2.7, 2.4, 2.1, 1.8};
+  constexpr double least_at_full_speed = 2.7;
+  const double volts = logic_supply();
+  if (volts < thresholds[flash_.brown_out_level()]) {
+    browned_out_ = true;
+    if (!halted_) processor_.stop();
+  } else if (volts < least_at_full_speed) {
+    throw std::runtime_error(
+        fmt::format("at {:.6f} s: the processor runs at {} MHz with {} wait states from {:.2f} V; it needs "
+                    "2.7 V, and its "
+                    "brown-out level lets it run from {:.1f} V on",
+                    seconds(now()), units_per_second / clocks_.core / 1'000'000, flash_.wait_states(), volts,
+                    thresholds[flash_.brown_out_level()]));
+  }
+}
+
+// Held in reset until the supply is back.
+void VirtualBoard::sit_brown_out_out(BoardTime time) {
+  constexpr double released = 2.8;
+  reset(ResetCause::brown_out);
+  while (now() < time && logic_supply() < released) {
+    processor_.stall_until(std::min(time, now() + 100 * units_per_microsecond));
+    static_cast<void>(world_->encoder(0, now()));
+  }
+  browned_out_ = logic_supply() < released;
+  // The first instruction of the program that starts now.
+  if (!browned_out_) reset(ResetCause::brown_out);
 }
 
 void VirtualBoard::reset(ResetCause cause) {
@@ -298,6 +339,10 @@ void VirtualBoard::reset(ResetCause cause) {
 
 void VirtualBoard::run_until(BoardTime time) {
   while (now() < time && !flash_.power_is_cut()) {
+    if (browned_out_) {
+      sit_brown_out_out(time);
+      continue;
+    }
     if (halted_) {
       stand_still_until(time);
       continue;
@@ -316,6 +361,7 @@ void VirtualBoard::run_until(BoardTime time) {
       if (flash_.power_is_cut()) return;
       fail();
     } else if (end == RunEnd::stopped) {
+      if (browned_out_) continue;
       return;
     }
   }

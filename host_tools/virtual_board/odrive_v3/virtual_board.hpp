@@ -44,6 +44,7 @@ struct VirtualBoardConfig {
   /// What the timers' BKIN reads, to which no pin is mapped. RM0090 does not say.
   bool break_inputs_high = false;
   BootstrapConfig bootstrap{};
+  std::uint32_t brown_out_level = 0;  ///< BOR_LEV; 3 as the part leaves the factory
 };
 
 /// Something with events of its own in the board's order of time that is not on the bus.
@@ -179,6 +180,9 @@ class VirtualBoard {
   void reset(drivers::stm32f4::ResetCause cause);
   void stand_still_until(BoardTime time);
   void wire_chips();
+  double logic_supply() const;
+  void look_at_logic_supply();
+  void sit_brown_out_out(BoardTime time);
   void set_frozen(bool halted, BoardTime now);
   void show_bridge(std::size_t axis, BoardTime now);
   void show_brake(BoardTime now);
@@ -231,6 +235,7 @@ class VirtualBoard {
   std::vector<std::uint8_t> transmitted_;
   FrozenOutputs frozen_outputs_ = FrozenOutputs::off;
   bool halted_ = false;
+  bool browned_out_ = false;
   bool watchdog_fired_ = false;
   bool fault_line_held_ = false;
   bool supply_was_low_ = false;

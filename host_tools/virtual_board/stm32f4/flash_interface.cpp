@@ -94,7 +94,8 @@ const RegisterTable<FlashInterface>& FlashInterface::registers() {
       {offsetof(Layout, keyr), "KEYR", nullptr, any_bits, Row::takes<&Model::write_key>},
       {offsetof(Layout, sr), "SR", Row::shows<&Model::read_status>, sr_bits,
        Row::clears_by_ones<&Model::sr_>},
-      {offsetof(Layout, cr), "CR", Row::shows<&Model::cr_>, cr_bits, Row::takes<&Model::write_control>}};
+      {offsetof(Layout, cr), "CR", Row::shows<&Model::cr_>, cr_bits, Row::takes<&Model::write_control>},
+      {offsetof(Layout, optcr), "OPTCR", Row::shows<&Model::optcr_>}};
   return table;
 }
 

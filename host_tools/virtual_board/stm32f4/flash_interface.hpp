@@ -33,10 +33,10 @@ class PowerCut : public std::runtime_error {
 /// A store without PG sets PGSERR (so does one while CR is locked, since PG cannot be set then), one of a
 /// width other than PSIZE PGPERR, one to a protected sector WRPERR; nothing is programmed.
 ///
-/// Refused: option bytes, mass erase, interrupts (EOPIE, ERRIE), parallelism 3 (needs Vpp), an erase at other
-/// than x32, writing CR while it is locked (silicon ignores it) or busy (silicon stalls the bus), too few
-/// wait states for HCLK, resetting a cache that is enabled, and starting an operation while error flags are
-/// set.
+/// Refused: writing option bytes, mass erase, interrupts (EOPIE, ERRIE), parallelism 3 (needs Vpp), an erase
+/// at other than x32, writing CR while it is locked (silicon ignores it) or busy (silicon stalls the bus),
+/// too few wait states for HCLK, resetting a cache that is enabled, and starting an operation while error
+/// flags are set.
 class FlashInterface final : public RegisterBlock<FlashInterface> {
  public:
   static constexpr std::uint32_t size = sizeof(drivers::stm32f4::FlashRegisters);
@@ -59,6 +59,12 @@ class FlashInterface final : public RegisterBlock<FlashInterface> {
   /// time).
   static std::uint32_t wait_states_needed(BoardTime core_period);
 
+  /// BOR_LEV of the option bytes, 0 to 3; as it leaves the factory it is off (3).
+  void set_brown_out_level(std::uint32_t level) {
+    optcr_ = (optcr_ & ~drivers::stm32f4::flash_optcr::BrownOutLevel::mask) |
+             drivers::stm32f4::flash_optcr::BrownOutLevel::bits(level);
+  }
+  std::uint32_t brown_out_level() const { return drivers::stm32f4::flash_optcr::BrownOutLevel::of(optcr_); }
   /// As if the option bytes protected the sector.
   void set_write_protected(unsigned sector, bool write_protected);
   /// The operation after `operations - 1` more (each erase and each store is one) is left torn and throws
@@ -97,6 +103,7 @@ class FlashInterface final : public RegisterBlock<FlashInterface> {
   const BoardClocks& clocks_;
   std::span<std::uint8_t> image_;
   std::uint32_t acr_ = 0;
+  std::uint32_t optcr_ = 0x0FFF'AAED;
   std::uint32_t sr_ = 0;  // without BSY, which follows from the time
   std::uint32_t cr_ = drivers::stm32f4::flash_cr::Lock::mask;
   bool first_key_given_ = false;
