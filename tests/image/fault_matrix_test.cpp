@@ -115,7 +115,7 @@ struct Cause {
   enum class AtStart : std::uint8_t { seen, not_seen, not_made } at_start = AtStart::seen;
 };
 
-constexpr double line = 0.1, tick = 1.3, supply_tick = 1.8, slow_tick = 100;
+constexpr double line = 0.1, no_tick = 0.8, tick = 1.3, supply_tick = 1.8, slow_tick = 100;
 
 void plant(Bench& bench, std::size_t axis, Defect defect) {
   bench.world.drives().plant(axis, defect);
@@ -205,7 +205,7 @@ std::vector<Cause> causes() {
                    [](Bench&, std::size_t) {},
                    Hits::both,
                    Fault::tick_missed,
-                   60,
+                   no_tick,
                    Refusal::none};
   converters.ends = Cause::Ends::by_a_new_start;
   converters.at_start = Cause::AtStart::not_made;
@@ -374,7 +374,7 @@ class Cell {
     EXPECT_TRUE(bench_.board->bridge_armed(axis_)) << where() << " " << text_of(bench_.fault(axis_)).name;
     cause_.make(bench_, axis_);
     expect_off();
-    bench_.board->run_for(0.002);
+    bench_.board->run_for(0.005);
     const Fault found = bench_.fault(axis_);
     EXPECT_EQ(text_of(found).name, text_of(cause_.fault).name) << where();
     EXPECT_EQ(bench_.state(axis_), DriveState::fault) << where();
