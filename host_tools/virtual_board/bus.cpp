@@ -13,6 +13,18 @@ static_assert(std::endian::native == std::endian::little, "memory is shared with
 
 /// Neither zeros nor ones: a program that relies on cleared memory shows it.
 constexpr std::uint8_t power_up_pattern = 0xA5;
+constexpr std::uint32_t waits_of(std::uint32_t address) {
+  switch (address >> 16) {
+    case 0x4000:
+      return 10;
+    case 0x4001:
+      return 5;
+    case 0x4002:
+      return 1;
+    default:
+      return 0;
+  }
+}
 constexpr AddressRange boot_alias{0, memory_map::flash.size};
 
 }  // namespace
@@ -79,6 +91,7 @@ std::uint32_t Bus::read(std::uint32_t address, unsigned bytes, BoardTime now) {
     return value;
   }
   const Block& block = block_for(address, bytes);
+  register_waits_ += waits_of(address);
   return block.peripheral->read({address - block.range.base, bytes, now});
 }
 
@@ -90,6 +103,7 @@ void Bus::write(std::uint32_t address, unsigned bytes, std::uint32_t value, Boar
     return;
   }
   const Block& block = block_for(address, bytes);
+  register_waits_ += waits_of(address);
   block.peripheral->write({address - block.range.base, bytes, now}, value);
 }
 

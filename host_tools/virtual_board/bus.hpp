@@ -66,6 +66,10 @@ class Bus {
   std::uint32_t read(std::uint32_t address, unsigned bytes, BoardTime now);
   void write(std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime now);
 
+  /// Cycles of the core that register accesses would have waited for the bridges so far; nothing waits here.
+  /// Assumed: 5 on APB2, which has half the core's clock, 10 on APB1, which has a quarter, 1 on AHB1.
+  std::uint64_t register_waits() const { return register_waits_; }
+
   std::span<std::uint8_t> flash() { return flash_; }
   std::span<std::uint8_t> sram() { return sram_; }
   std::span<std::uint8_t> ccm() { return ccm_; }
@@ -102,6 +106,7 @@ class Bus {
   std::vector<std::unique_ptr<Block>> blocks_;
   std::array<std::vector<Page>, memory_map::register_areas.size()> pages_;
   ParameterStore parameter_store_;
+  std::uint64_t register_waits_ = 0;
 };
 
 }  // namespace kmax::virtual_board

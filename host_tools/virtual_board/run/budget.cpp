@@ -20,6 +20,7 @@
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 #include "host_tools/virtual_board/run/board_link.hpp"
+#include "host_tools/virtual_board/run/flash_accelerator.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
 
 namespace kmax::virtual_board {
@@ -92,6 +93,7 @@ std::uint16_t half_word_at(Bus& bus, std::uint32_t address) {
 struct Tick {
   std::size_t axis = 0;
   std::vector<std::uint32_t> addresses;
+  std::uint64_t register_waits = 0;
 };
 
 /// The sequence of instructions of every run of the conversions' interrupt, without what interrupts it.
@@ -115,7 +117,12 @@ class Recorder {
     constexpr unsigned conversions = 16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::adc);
     if (address == handler_) {
       ticks_.emplace_back();
+      waits_before_ = board_.bus().register_waits();
+      open_ = true;
     }
+    // The first block behind the tick closes it.
+    if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
+    open_ = open_ && exceptions.active(conversions);
     if (ticks_.empty() || !exceptions.active(conversions)) return;
     if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
         exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
@@ -130,7 +137,8 @@ class Recorder {
 
   VirtualBoard& board_;
   std::uint32_t handler_, application_;
-  bool recording_ = false;
+  bool recording_ = false, open_ = false;
+  std::uint64_t waits_before_ = 0;
   std::vector<Tick> ticks_;
 };
 
@@ -252,16 +260,29 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
 
   std::map<std::string, StepSum> sums;
   std::array<StepSum, 2> totals{};
+  struct Waits {
+    std::uint64_t flash = 0, buses = 0, worst = 0;
+  };
+  std::array<Waits, 2> waits{};
   std::array<std::uint32_t, 2> estimate_worst{};
   for (const Tick& tick : ticks) {
     std::map<std::string, std::pair<std::uint32_t, std::uint32_t>> in_tick;
+    FlashAccelerator flash;
+    std::uint64_t flash_waits = 0, cycles_so_far = 0;
     for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
       const Place& place = places.at(tick.addresses[i]);
       const bool taken = i + 1 < tick.addresses.size() &&
                          tick.addresses[i + 1] != tick.addresses[i] + place.instruction.bytes;
       auto& [instructions, cycles] = in_tick[place.step];
       ++instructions;
-      cycles += place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
+      const std::uint32_t its_cycles =
+          place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
+      cycles += its_cycles;
+      flash_waits += flash.fetch(tick.addresses[i], place.instruction.bytes, cycles_so_far + flash_waits);
+      const auto& memory = place.instruction.memory;
+      if (memory && memory->base == MemoryOperand::no_register && memory_map::flash.contains(memory->offset))
+        flash_waits += flash.load(memory->offset, cycles_so_far + flash_waits);
+      cycles_so_far += its_cycles;
     }
     std::uint32_t cycles_of_tick = exception_cycles;
     for (const auto& [step, cost] : in_tick) {
@@ -279,6 +300,9 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     }
     const std::size_t axis = tick.axis & 1U;
     estimate_worst[axis] = std::max(estimate_worst[axis], estimate);
+    waits[axis].flash += flash_waits;
+    waits[axis].buses += tick.register_waits;
+    waits[axis].worst = std::max(waits[axis].worst, cycles_of_tick + flash_waits + tick.register_waits);
     StepSum& total = totals[axis];
     ++total.ticks;
     total.instructions += tick.addresses.size();
@@ -318,6 +342,16 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
        fmt::format("% of {:.0f} MHz", of_board.core_clock_hz * 1e-6),
        "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
   };
+  for (std::size_t axis = 0; axis < totals.size(); ++axis) {
+    const auto share = [&](std::uint64_t of_all) {
+      return 100.0 * static_cast<double>(of_all) /
+             static_cast<double>(std::max<std::uint64_t>(1, totals[axis].ticks)) / tick_cycles;
+    };
+    report.with_waits.mean += share(totals[axis].cycles + waits[axis].flash + waits[axis].buses);
+    report.with_waits.flash += share(waits[axis].flash);
+    report.with_waits.buses += share(waits[axis].buses);
+    report.with_waits.worst += 100.0 * static_cast<double>(waits[axis].worst) / tick_cycles;
+  }
   return report;
 }
 
@@ -335,9 +369,14 @@ std::string budget_table(const BudgetReport& report) {
                         line.name, line.value, line.bound, line.unit);
     if (!line.peers.empty()) text += fmt::format("         peers: {}\n", line.peers);
   }
+  text += fmt::format(
+      "\nwith the waits for flash and buses: both axes {:.1f} % of the core's time on average, of which "
+      "{:.1f} for flash "
+      "and {:.1f}\nfor register accesses; {:.1f} % with both worst ticks together\n",
+      report.with_waits.mean, report.with_waits.flash, report.with_waits.buses, report.with_waits.worst);
   text +=
       "\nInstructions are exact; one that an IT block skips counts as executed. Cycles are a model (no wait "
-      "states) that no\n"
+      "states, but where it says so) that no\n"
       "board has confirmed.\n";
   return text;
 }
@@ -346,6 +385,10 @@ std::string budget_json(const BudgetReport& report) {
   nlohmann::json document;
   document["kept"] = report.kept();
   document["ticks"] = report.ticks;
+  document["with_waits"] = {{"mean_percent", report.with_waits.mean},
+                            {"worst_percent", report.with_waits.worst},
+                            {"flash_percent", report.with_waits.flash},
+                            {"buses_percent", report.with_waits.buses}};
   for (const StepCost& step : report.steps) {
     document["steps"].push_back({{"name", step.name},
                                  {"ticks", step.ticks},

@@ -29,9 +29,18 @@ struct BudgetLine {
   bool kept() const { return value <= bound; }
 };
 
+/// Of the whole ticks of both axes, with the waits for flash and for the buses: FlashAccelerator, which
+/// begins each tick empty because what ran before it was something else, and Bus::register_waits. Flash is
+/// read by instructions and literals alone: tables that are read through a pointer are left out.
+struct WaitReport {
+  double mean = 0.0, worst = 0.0;   ///< % of the core's time; worst: both worst ticks together
+  double flash = 0.0, buses = 0.0;  ///< of the mean
+};
+
 struct BudgetReport {
   std::vector<StepCost> steps;
   std::vector<BudgetLine> lines;
+  WaitReport with_waits;
   std::uint64_t ticks = 0;
   bool kept() const;
 };
