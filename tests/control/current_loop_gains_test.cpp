@@ -87,6 +87,24 @@ TEST(CurrentLoopGains, AWindingWithoutResistanceHasAProportionalGainOnly) {
   EXPECT_EQ(nothing.proportional, 0.0);
 }
 
+TEST(CurrentLoopGains, AreThoseOfTheWindingThatWasSampled) {
+  for (const double resistance : {0.05, 0.7, 20.0}) {
+    for (const double inductance : {1e-5, 1e-3, 0.1}) {
+      for (const double bandwidth : {20.0, 1000.0, 9000.0}) {
+        const double kept = std::exp(-resistance * period / (2.0 * inductance));
+        const double tracking = -std::expm1(-resistance * period / inductance);
+        const auto gains = CurrentLoopGains<double>::prepare(resistance, inductance, bandwidth, period);
+        EXPECT_NEAR(gains.tracking / tracking, 1.0, 1e-12);
+        const double gain = CurrentLoopGains<double>::loop_gain(bandwidth * period, kept);
+        EXPECT_NEAR(gains.proportional / (resistance / tracking * gain), 1.0, 1e-12);
+      }
+    }
+  }
+  const auto resistor = CurrentLoopGains<double>::prepare(3.0, 0.0, 1000.0, period);
+  EXPECT_EQ(resistor.tracking, 1.0);
+  EXPECT_EQ(resistor.proportional, 3.0 * CurrentLoopGains<double>::loop_gain(0.05, 0.0));
+}
+
 TEST(CurrentLoopGains, BandwidthsAboveTheCeilingAreTakenAsTheCeiling) {
   EXPECT_NEAR(current_bandwidth_ceiling(period) / (2.0 * std::numbers::pi), 2500.0, 1e-9);
   const auto highest =

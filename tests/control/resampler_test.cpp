@@ -79,6 +79,20 @@ TEST(Resampler, StepsOutsideTheRangeAreTakenAsTheNearerLimit) {
             1 << 30);
 }
 
+TEST(Resampler, AfterAResetTheFirstSampleIsOfAnyGridFromItsAnchor) {
+  for (const std::int32_t step : {1, 2, 10}) {
+    const ResamplerConfig config{step, Rounding::hysteresis};
+    Resampler resampler;
+    EXPECT_EQ(resampler.update(Resampler::prepare(config, 1000), 1000), 1000);
+    resampler.reset();
+    // So far that whoever still held 1000 would have to catch up.
+    constexpr std::int64_t far = 1LL << 40;
+    EXPECT_EQ(resampler.update(Resampler::prepare(config, far), far), nearest_multiple(far, step));
+    EXPECT_EQ(resampler.update(Resampler::prepare(config, far), far + 2 * step),
+              nearest_multiple(far + 2 * step, step));
+  }
+}
+
 // A jump beyond the precondition: on the grid at every sample, caught up at 2^31 counts per sample.
 TEST(Resampler, CatchesUpWithAJumpBeyondThePrecondition) {
   for (const Rounding rounding : {Rounding::nearest, Rounding::floor, Rounding::hysteresis}) {

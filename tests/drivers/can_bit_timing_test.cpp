@@ -56,9 +56,16 @@ TEST(CanBitTiming, OutsideOfToleranceIsNotUsable) {
 
 TEST(CanBitTiming, ValidKnowsTheFields) {
   EXPECT_FALSE((CanBitTiming{}.valid()));
-  EXPECT_FALSE((CanBitTiming{1, 17, 2, 1}.valid()));
-  EXPECT_FALSE((CanBitTiming{1, 2, 9, 1}.valid()));
-  EXPECT_FALSE((CanBitTiming{1025, 2, 2, 1}.valid()));
+  EXPECT_TRUE((CanBitTiming{1, 1, 1, 1}.valid()));
+  EXPECT_TRUE((CanBitTiming{1024, 16, 8, 4}.valid()));
+  EXPECT_FALSE((CanBitTiming{0, 1, 1, 1}.valid()));
+  EXPECT_FALSE((CanBitTiming{1025, 16, 8, 4}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 0, 1, 1}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 17, 8, 4}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 1, 0, 0}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 16, 9, 4}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 16, 8, 0}.valid()));
+  EXPECT_FALSE((CanBitTiming{1, 16, 8, 5}.valid()));
   EXPECT_FALSE((CanBitTiming{1, 5, 1, 2}.valid())) << "jump wider than the segment that is shortened";
 }
 
