@@ -134,8 +134,9 @@ class ThreePhasePwm {
     return true;
   }
 
-  /// Active from the next over- or underflow. Values outside 0 to what maximum_ticks() are of the half period
-  /// are limited. False, and nothing written, when one is not a number: the caller disarms.
+  /// Active from the next over- or underflow. Values outside 0 to what leaves the low-side window, as a share
+  /// of the half period, are limited. False, and nothing written, when one is not a number: the caller
+  /// disarms.
   [[nodiscard]] bool ISR_set_duty(const PhaseDuty& duty) {
     // One comparison for all: what is not a number, and what would not fit an integer.
     const float sum = magnitude(duty.a) + magnitude(duty.b) + magnitude(duty.c);
@@ -155,17 +156,13 @@ class ThreePhasePwm {
     ISR_set_ticks({middle, middle, middle});
   }
 
-  /// Values above maximum_ticks() are limited.
+  /// Values that would close the low-side window are limited.
   void ISR_set_ticks(const PhaseTicks& high) {
     registers_.ccr[0] = compare_of(high.a);
     registers_.ccr[1] = compare_of(high.b);
     registers_.ccr[2] = compare_of(high.c);
   }
 
-  /// Limit that keeps the low-side window open.
-  constexpr std::uint16_t maximum_ticks() const {
-    return static_cast<std::uint16_t>(config_.half_period_ticks - config_.minimum_low_ticks);
-  }
   constexpr std::uint16_t half_period_ticks() const { return config_.half_period_ticks; }
 
   /// False from underflow to overflow. The interrupt that follows a conversion 1 us after an update event
@@ -251,6 +248,10 @@ class ThreePhasePwm {
     return true;
   }
 
+  /// Limit that keeps the low-side window open.
+  constexpr std::uint16_t maximum_ticks() const {
+    return static_cast<std::uint16_t>(config_.half_period_ticks - config_.minimum_low_ticks);
+  }
   std::uint32_t compare_of(std::uint16_t high) const {
     return std::uint32_t{config_.half_period_ticks} - std::min(high, maximum_ticks());
   }
