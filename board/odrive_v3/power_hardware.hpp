@@ -50,7 +50,7 @@ class PowerHardware {
     // The start itself triggers once: as a sample of axis 0.
     sampling_.start(0);
     if (!drivers::stm32f4::start_phase_shifted(bridge0_, bridge1_)) return false;
-    watch_.start(pwm_config.half_period_ticks, bridge1_.disarmed());
+    watch_.start(pwm_config.half_period_ticks);
     return true;
   }
   /// At the beginning of each tick.

@@ -124,8 +124,6 @@ class ThreePhasePwm {
   bool armed() const { return timer_bdtr::MainOutputEnable::read(registers_.bdtr) != 0; }
   /// Since `arm`: it was TickWatch that took MOE away.
   bool ISR_ticks_stayed_away() const { return timer_sr::CaptureCompare<4>::read(registers_.sr) != 0; }
-  /// BDTR without MOE.
-  constexpr std::uint32_t disarmed() const { return disarmed_; }
 
   /// Which legs follow the PWM; the others are released. False, and nothing changed, while armed.
   [[nodiscard]] bool enable_legs(PwmLegs legs) {

@@ -37,10 +37,10 @@ class TickWatch {
   TickWatch(const TickWatch&) = delete;
   TickWatch& operator=(const TickWatch&) = delete;
 
-  /// `disarmed`: TIM8's BDTR without MOE. Ticks must come already.
-  void start(std::uint32_t half_period_ticks, std::uint32_t disarmed) {
+  /// Ticks must come already.
+  void start(std::uint32_t half_period_ticks) {
     middle_ = half_period_ticks / 2;
-    disarmed_ = disarmed;
+    disarmed_ = static_cast<std::uint32_t>(follower_.bdtr) & ~timer_bdtr::MainOutputEnable::mask;
     carry(dma2_tim8_compare_4, event_, leader_.egr);
     carry(dma2_tim1_compare_4, disarmed_, follower_.bdtr);
     carry(dma2_tim8_update, middle_, follower_.ccr[3]);

@@ -17,7 +17,8 @@ TEST(TickWatch, WiresTheFollowersTurnsAndComparisonsToBothBridges) {
   TimerRegisters leader{}, follower{};
   DmaRegisters dma{};
   TickWatch<> watch{leader, follower, dma};
-  watch.start(4200, 0x3C15);
+  follower.bdtr = 0xBC15;
+  watch.start(4200);
   EXPECT_EQ(dma.stream[1].cr, control(7)) << "TIM8_UP";
   EXPECT_EQ(dma.stream[1].par, address_of(&follower.ccr[3]));
   EXPECT_EQ(dma.stream[7].cr, control(7)) << "TIM8_CH4";
@@ -34,7 +35,7 @@ TEST(TickWatch, ATickPutsTheComparisonOutOfReach) {
   TimerRegisters leader{}, follower{};
   DmaRegisters dma{};
   TickWatch<> watch{leader, follower, dma};
-  watch.start(4200, 0);
+  watch.start(4200);
   watch.ISR_tick();
   EXPECT_EQ(follower.ccr[3], 0xFFFFU);
   EXPECT_EQ(leader.ccr[3], 0U);
