@@ -1,7 +1,6 @@
 #include "firmware/command/axes.hpp"
 
 #include <algorithm>
-#include <type_traits>
 
 #include "firmware/drive/cyclic_torque.hpp"
 #include "firmware/drive/haptic_configuration.hpp"
@@ -33,29 +32,30 @@ ArmedAxes Axes::armed() const {
 }
 
 Axes::Settings Axes::make_settings() const {
-  Settings settings;
   const ParameterValues& values = parameters_.values();
+  Settings settings{.law = DeviceLaw<axis_count>::settings(values)};
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    settings[axis].encoder_offset = values.whole<"encoder.offset">(axis);
-    settings[axis].encoder_direction = values.whole<"encoder.direction">(axis);
-    settings[axis].generation = generation_;
+    AxisSetting& setting = settings.axis[axis];
+    setting.encoder_offset = values.whole<"encoder.offset">(axis);
+    setting.encoder_direction = values.whole<"encoder.direction">(axis);
+    setting.generation = generation_;
     // Near the position by the new origin: the resampler starts from there.
-    const std::int64_t position = Axis::position_of(report_[axis].counted, settings[axis]);
-    settings[axis].haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
+    const std::int64_t position = Axis::position_of(report_[axis].counted, setting);
+    setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
     const Circumstances now = offered_[axis];
     auto motor = motor_configuration(values, axis, now.winding_temperature, now.current_share);
     motor.modulation_limit = modulation_limit_;
-    settings[axis].motor = MotorControl::prepare(motor);
-    settings[axis].compensation =
+    setting.motor = MotorControl::prepare(motor);
+    setting.compensation =
         control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
-    settings[axis].plausibility = control::MotionPlausibility<float>::prepare(
+    setting.plausibility = control::MotionPlausibility<float>::prepare(
         plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
-    settings[axis].watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
-    settings[axis].excitation = Excitation::prepare(excitation_configuration(values, axis));
-    settings[axis].mode = values.choice<DriveMode, "drive.mode">(axis);
-    settings[axis].commutated = now.commutated;
-    settings[axis].supply_voltage_min = values.real<"supply.voltage_min">();
-    settings[axis].supply_voltage_max = values.real<"supply.voltage_max">();
+    setting.watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
+    setting.excitation = Excitation::prepare(excitation_configuration(values, axis));
+    setting.mode = values.choice<DriveMode, "drive.mode">(axis);
+    setting.commutated = now.commutated;
+    setting.supply_voltage_min = values.real<"supply.voltage_min">();
+    setting.supply_voltage_max = values.real<"supply.voltage_max">();
   }
   return settings;
 }
@@ -107,14 +107,9 @@ bool Axes::settled(std::size_t of_axis) const {
 
 /// What the hand does on this axis would be felt on one that another link has armed.
 bool Axes::pushes_anothers_axis(std::size_t axis) const {
-  constexpr bool always_coupled = !std::is_same_v<DeviceLaw<axis_count>, TangentialInterference<axis_count>>;
-  const auto parallel = [this](std::size_t one) {
-    return parameters_.values().choice<control::InterferenceMode, "interference.mode">(one) ==
-           control::InterferenceMode::parallel;
-  };
   const ArmedAxes now = armed();
   for (std::size_t other = 0; other < axis_count; ++other) {
-    const bool coupled = other != axis && (always_coupled || parallel(axis) || parallel(other));
+    const bool coupled = other != axis && DeviceLaw<axis_count>::couples(parameters_.values(), axis, other);
     if (coupled && now.is_anothers(other, supervisors_[axis].commander())) return true;
   }
   return false;
@@ -148,7 +143,7 @@ Supervisor::Situation Axes::situation(std::size_t axis) {
           .commutation = commutation_[axis],
           .thermal = thermal_[axis],
           .report = report_[axis],
-          .setting = settings_[axis],
+          .setting = settings_.axis[axis],
           .silent_us = heard_us ? std::optional(modbus::elapsed_us(now_us_, *heard_us)) : std::nullopt,
           .power_stage_temperature = readings_.power_stage_temperature[axis],
           .supply_voltage = readings_.supply_voltage,

@@ -36,7 +36,11 @@ template <std::size_t axes, typename Law = DeviceLaw<axes>>
 requires AxesLaw<Law, axes>
 class AxesTick {
  public:
-  using Settings = std::array<AxisSetting, axes>;
+  /// What the ticks work by; made in the main loop, handed over whole.
+  struct Settings {
+    std::array<AxisSetting, axes> axis{};
+    [[no_unique_address]] typename Law::Settings law{};
+  };
   using Inputs = std::array<Axis::Input, axes>;
   static constexpr bool needs_all_positions = Law::needs_all_positions;
   /// What one axis' tick needs: its own sample, or, for a law that needs all positions, all counters as they
@@ -107,7 +111,7 @@ class AxesTick {
   /// Of the last tick; also where nothing interrupts.
   AxisReport ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
   float ISR_background_force(std::size_t axis) const {
-    return axes_[axis].ISR_background_force(settings_.ISR_current()[axis]);
+    return axes_[axis].ISR_background_force(settings_.ISR_current().axis[axis]);
   }
 
  private:
@@ -150,10 +154,11 @@ const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axi
   Axis& ticked = axes_[axis];
   const bool enable = enabled_[axis].load(std::memory_order_relaxed);
   if (main_loop_stands_ && enable) ticked.ISR_trip(Fault::main_loop);
-  const Axis::Demand demand{law_.ISR_force(axis, at), commanded_force_[axis].load(std::memory_order_relaxed),
+  const Axis::Demand demand{law_.ISR_force(settings.law, axis, at),
+                            commanded_force_[axis].load(std::memory_order_relaxed),
                             force_share_[axis].load(std::memory_order_relaxed)};
-  const Axis::Output& output = ticked.ISR_tick(settings[axis], input, enable, demand, ticks_);
-  law_.ISR_rendered(axis, ticked.ISR_haptic(), output.enabled);
+  const Axis::Output& output = ticked.ISR_tick(settings.axis[axis], input, enable, demand, ticks_);
+  law_.ISR_rendered(settings.law, axis, ticked.ISR_haptic(), output.enabled);
   if (ticked.ISR_changed() || ISR_round_begins())
     reports_[axis].ISR_publish([&ticked](AxisReport& report) { ticked.ISR_fill(report); });
   if (axis == trace_axis_.load(std::memory_order_relaxed)) ISR_trace(ticked.ISR_haptic());
@@ -169,7 +174,7 @@ const {
   if constexpr (needs_all_positions) {
     for (std::size_t axis = 0; axis < axes; ++axis) {
       at.valid[axis] = axes_[axis].ISR_follows(inputs[axis]);
-      at.position[axis] = axes_[axis].ISR_position(inputs[axis].count, settings_.ISR_current()[axis]);
+      at.position[axis] = axes_[axis].ISR_position(inputs[axis].count, settings_.ISR_current().axis[axis]);
     }
   }
   return at;
@@ -223,7 +228,8 @@ void AxesTick<axes, Law>::ISR_capture(std::size_t axis, const Axis::Input& input
   event.velocity = haptic.velocity;
   capture_.ISR_record(ticks_, event, [&](CaptureSource& source) {
     using enum CaptureChannel;
-    const std::int64_t place = Axis::position_of(axes_[axis].ISR_counted(), settings_.ISR_current()[axis]);
+    const std::int64_t place =
+        Axis::position_of(axes_[axis].ISR_counted(), settings_.ISR_current().axis[axis]);
     source.set<none>(std::int32_t{0});
     source.set<position>(static_cast<std::int32_t>(haptic.position));
     source.set<velocity>(haptic.velocity);

@@ -100,7 +100,7 @@ TEST_F(MadeUpBoard, ALawOverAllPositionsRunsInTheWholeFirmware) {
   bench.device.stand_at(before_the_stop, 1);
   bench.run_ms(20);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) EXPECT_EQ(bench.force(axis), 0.0f) << axis;
-  bench.device.stand_at(before_the_stop + 512, 1);
+  bench.device.stand_at(before_the_stop + 500, 1);
   bench.run_ms(20);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     EXPECT_NEAR(bench.force(axis), -0.5f, 0.001f) << axis << ": the stop that all share";
@@ -110,6 +110,42 @@ TEST_F(MadeUpBoard, ALawOverAllPositionsRunsInTheWholeFirmware) {
   bench.run_ms(20);
   EXPECT_EQ(bench.force(1), 0.0f);
   EXPECT_NEAR(bench.force(2), -0.5f, 0.001f) << "a position counts whether its axis is driven or not";
+}
+
+TEST_F(MadeUpBoard, AParameterOfTheLawReachesItFromBothBuses) {
+  using Law = firmware::DeviceLaw<firmware::axis_count>;
+  bench.device.stand_at(Law::stop - 2 * 1000 + 500, 1);
+  bench.run_ms(20);
+  const auto expect_all = [this](float newtons) {
+    arm_all();
+    bench.run_ms(20);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      EXPECT_NEAR(bench.force(axis), newtons, 1e-5f) << axis;
+      bench.disarm(axis);
+    }
+    bench.run_ms(20);
+  };
+  expect_all(-0.5f);
+  EXPECT_EQ(bench.set("wall.stiffness", 2000, 0), 0);
+  expect_all(-1.0f);
+  EXPECT_EQ(bench.set("wall.stiffness", 500, 1), 0) << "another axis' wall";
+  expect_all(-1.0f);
+  const firmware::Entry& entry = firmware::entry_at(firmware::entry_named("wall.stiffness"));
+  EXPECT_EQ(write(entry.group.index, entry.subindex, std::bit_cast<std::uint32_t>(400.0f), 4), 0U);
+  expect_all(-0.2f);
+}
+
+TEST_F(MadeUpBoard, WhoArmsAnAxisThatTheLawCouplesToAnothersIsRefused) {
+  ASSERT_TRUE(bench.arm(1)) << "over the serial line";
+  command(6);
+  command(15);
+  EXPECT_EQ(bench.application().refusal(0), firmware::Refusal::other_commander) << "over CAN";
+  EXPECT_FALSE(armed());
+  bench.disarm(1);
+  bench.run_ms(20);
+  command(6);
+  command(15);
+  EXPECT_TRUE(armed());
 }
 
 TEST_F(MadeUpBoard, TicksOfAllThreeAreCountedAndMissed) {
@@ -160,11 +196,14 @@ TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
 struct Onlooker {
   static constexpr bool needs_all_positions = true;
   using Positions = firmware::AxesPositions<firmware::axis_count>;
-  float ISR_force(std::size_t, const Positions& at) {
+  struct Settings {};
+  static Settings settings(const firmware::ParameterValues&) { return {}; }
+  static bool couples(const firmware::ParameterValues&, std::size_t, std::size_t) { return false; }
+  float ISR_force(const Settings&, std::size_t, const Positions& at) {
     *seen = at;
     return 0.0f;
   }
-  void ISR_rendered(std::size_t, const control::HapticLoop<float>::Output&, bool) {}
+  void ISR_rendered(const Settings&, std::size_t, const control::HapticLoop<float>::Output&, bool) {}
   Positions* seen;
 };
 

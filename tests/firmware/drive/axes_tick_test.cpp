@@ -20,10 +20,10 @@ ParameterValues micrometre_counts() {
   return values;
 }
 
-template <std::size_t axes>
-typename AxesTick<axes>::Settings settings_of(const ParameterValues& values) {
-  typename AxesTick<axes>::Settings settings{};
-  for (AxisSetting& setting : settings) {
+template <std::size_t axes, template <std::size_t> typename Law = DeviceLaw>
+typename AxesTick<axes, Law<axes>>::Settings settings_of(const ParameterValues& values) {
+  typename AxesTick<axes, Law<axes>>::Settings settings{.law = Law<axes>::settings(values)};
+  for (AxisSetting& setting : settings.axis) {
     setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, 0), 0);
     setting.generation = 1;
     setting.mode = values.choice<DriveMode, "drive.mode">(0);
@@ -35,26 +35,33 @@ Axis::Input at(std::int32_t count, bool valid = true) {
   return {.count = static_cast<std::uint32_t>(count), .count_valid = valid};
 }
 
-/// A spring between the handles: each axis is drawn to the mean of all, 1 N per mm. Stands for any law whose
-/// force follows from all positions.
+/// A spring between the handles: each axis is drawn to the mean of all, as stiff as axis 0's wall. Stands for
+/// any law whose force follows from all positions and from parameters.
 template <std::size_t axes>
 struct SpringBetweenHandles {
   static constexpr bool needs_all_positions = true;
-  float ISR_force(std::size_t axis, const AxesPositions<axes>& at) const {
+  struct Settings {
+    float stiffness = 0.0f;  ///< N/um
+  };
+  static Settings settings(const ParameterValues& values) {
+    return {1e-6f * values.real<"wall.stiffness">(0)};
+  }
+  static bool couples(const ParameterValues&, std::size_t, std::size_t) { return true; }
+  float ISR_force(const Settings& s, std::size_t axis, const AxesPositions<axes>& at) const {
     std::int64_t sum = 0;
     for (std::size_t other = 0; other < axes; ++other) {
       if (!at.valid[other]) return 0.0f;
       sum += at.position[other] - at.position[axis];
     }
-    return 0.001f * static_cast<float>(static_cast<std::int32_t>(sum)) / float{axes};
+    return s.stiffness * static_cast<float>(static_cast<std::int32_t>(sum)) / float{axes};
   }
-  void ISR_rendered(std::size_t, const control::HapticLoop<float>::Output&, bool) {}
+  void ISR_rendered(const Settings&, std::size_t, const control::HapticLoop<float>::Output&, bool) {}
 };
 
 TEST(AxesTick, ALawOverAllPositionsSeesTheCountersOfItsOwnSlotInEveryAxis) {
   ParameterValues values = micrometre_counts();
   values.set_whole<"wall.law">(0);
-  AxesTick<3, SpringBetweenHandles<3>> tick(settings_of<3>(values));
+  AxesTick<3, SpringBetweenHandles<3>> tick(settings_of<3, SpringBetweenHandles>(values));
   const auto force = [&](std::size_t axis, std::int32_t a, std::int32_t b, std::int32_t c) {
     return tick.ISR_tick(axis, {at(a), at(b), at(c)}).force;
   };
@@ -74,7 +81,7 @@ TEST(AxesTick, ALawOverAllPositionsSeesTheCountersOfItsOwnSlotInEveryAxis) {
 TEST(AxesTick, ALawsForceKeepsToTheAxisLimitsAndAnUnknownPositionMakesNone) {
   ParameterValues values = micrometre_counts();
   values.set_whole<"wall.law">(0);
-  AxesTick<2, SpringBetweenHandles<2>> tick(settings_of<2>(values));
+  AxesTick<2, SpringBetweenHandles<2>> tick(settings_of<2, SpringBetweenHandles>(values));
   for (std::size_t axis = 0; axis < 2; ++axis) (void)tick.ISR_tick(axis, {at(0), at(0)});
   tick.enable(0, true);
   EXPECT_EQ(tick.ISR_tick(0, {at(0), at(100'000)}).force, 3.0f) << "force.limit";
@@ -86,6 +93,30 @@ TEST(AxesTick, ALawsForceKeepsToTheAxisLimitsAndAnUnknownPositionMakesNone) {
   EXPECT_EQ(tick.ISR_tick(1, {at(0), referred}).force, 0.0f) << "not enabled";
   EXPECT_EQ(tick.ISR_tick(0, {at(0), referred}).force, 3.0f);
 }
+
+// A set in which the law's parameter and the axes' limits belong together must never be seen in parts.
+TEST(AxesTick, ALawsSettingsAreTakenOverTogetherWithThoseOfTheAxes) {
+  ParameterValues values = micrometre_counts();
+  values.set_whole<"wall.law">(0);
+  AxesTick<2, SpringBetweenHandles<2>> tick(settings_of<2, SpringBetweenHandles>(values));
+  const auto force = [&](std::size_t axis) { return tick.ISR_tick(axis, {at(0), at(1000)}).force; };
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    (void)force(axis);
+    tick.enable(axis, true);
+  }
+  EXPECT_FLOAT_EQ(force(0), 0.5f);
+  EXPECT_FLOAT_EQ(force(1), -0.5f);
+  values.set_real<"wall.stiffness">(8000.0f);
+  values.set_real<"force.limit">(2.5f);
+  (void)force(0);
+  tick.offer(settings_of<2, SpringBetweenHandles>(values));
+  EXPECT_FLOAT_EQ(force(1), -0.5f) << "the second half of a tick: as the first";
+  EXPECT_EQ(force(0), 2.5f) << "4 N, and the limit that came with them";
+  EXPECT_EQ(force(1), -2.5f);
+}
+
+static_assert(sizeof(AxesTick<2, TangentialInterference<2>>::Settings) == 2 * sizeof(AxisSetting),
+              "a law without parameters pays nothing");
 
 // Each axis' tangential force is felt along the next one, and nowhere else, whatever their number.
 template <std::size_t axes>
