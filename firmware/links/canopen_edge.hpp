@@ -11,9 +11,9 @@
 #include "firmware/command/host_writes.hpp"
 #include "firmware/command/link_states.hpp"
 #include "firmware/command/store_commands.hpp"
-#include "firmware/drive/emergency_reports.hpp"
 #include "firmware/exchange/interrupt_queue.hpp"
 #include "firmware/links/canopen_objects.hpp"
+#include "firmware/links/emergency_reports.hpp"
 #include "firmware/links/readings.hpp"
 
 namespace kmax::firmware {

@@ -8,8 +8,8 @@
 #include <set>
 #include <sstream>
 
-#include "firmware/drive/emergency_reports.hpp"
 #include "firmware/drive/fault.hpp"
+#include "firmware/links/emergency_reports.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::description::dbc_test {

@@ -1,4 +1,4 @@
-#include "firmware/drive/emergency_reports.hpp"
+#include "firmware/links/emergency_reports.hpp"
 
 #include <bit>
 
