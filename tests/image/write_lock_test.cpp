@@ -8,7 +8,7 @@
 #include "host_tools/flash/chip_memory.hpp"
 #include "tests/image/can_bench.hpp"
 
-namespace kmax::tests::image_write_lock_test {
+namespace kmax::tests::write_lock_test {
 namespace {
 
 using firmware::canopen::Abort;
@@ -119,4 +119,4 @@ TEST(ImageWriteLock, HoldsOverEveryStartUntilItsCodeOrAFactoryResetOpensIt) {
 }
 
 }  // namespace
-}  // namespace kmax::tests::image_write_lock_test
+}  // namespace kmax::tests::write_lock_test
