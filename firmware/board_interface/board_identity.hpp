@@ -5,14 +5,8 @@
 
 #include "firmware/board_interface/crash_record.hpp"
 #include "firmware/board_interface/retained_count.hpp"
-#include "firmware/drive/motor_control.hpp"
 
 namespace kmax::firmware {
-
-inline constexpr std::uint32_t firmware_version = 0x000100;  ///< 0.1.0
-inline constexpr std::string_view firmware_version_text = "0.1.0";
-inline constexpr std::uint32_t vendor_id = 0;  ///< none assigned by CiA
-inline constexpr std::uint32_t product_code = 1;
 
 /// What a board says of itself when it starts.
 struct BoardIdentity {
@@ -24,8 +18,9 @@ struct BoardIdentity {
   ResetCause reset_cause = ResetCause::unknown;
   CrashRecord crash{};                     ///< what is left of the run before
   RetainedCount* lock_attempts = nullptr;  ///< where WriteLock counts over resets; null: nowhere
-  /// Of the supply, that the current controllers may use: what the board's bridge can give.
-  float modulation_limit = MotorControlConfig{}.modulation_limit;
+  /// Of the supply, that the current controllers may use: what the board's bridge can give. No default: a
+  /// board that did not say it would drive no current.
+  float modulation_limit;
 };
 
 }  // namespace kmax::firmware

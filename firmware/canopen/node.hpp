@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "drivers/can_frame.hpp"
-#include "firmware/canopen/can_port.hpp"
+#include "firmware/board_interface/can_port.hpp"
 #include "firmware/canopen/emergency.hpp"
 #include "firmware/canopen/heartbeat_consumer.hpp"
 #include "firmware/canopen/lss_slave.hpp"

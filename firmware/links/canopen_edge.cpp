@@ -1,5 +1,7 @@
 #include "firmware/links/canopen_edge.hpp"
 
+#include "firmware/object_dictionary/firmware_version.hpp"
+
 namespace kmax::firmware {
 
 CanopenEdge::CanopenEdge(const Sources& sources)

@@ -5,7 +5,7 @@
 
 #include "drivers/can_frame.hpp"
 #include "firmware/board_interface/board_identity.hpp"
-#include "firmware/canopen/can_port.hpp"
+#include "firmware/board_interface/can_port.hpp"
 #include "firmware/canopen/node.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"

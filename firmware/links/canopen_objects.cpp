@@ -6,6 +6,7 @@
 #include "firmware/canopen/communication_rules.hpp"
 #include "firmware/canopen/copy_bytes.hpp"
 #include "firmware/canopen/node.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 
 namespace kmax::firmware {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "firmware/canopen/can_port.hpp"
+#include "firmware/board_interface/can_port.hpp"
 #include "firmware/canopen/emergency.hpp"
 #include "firmware/drive/fault.hpp"
 #include "firmware/object_dictionary/entry.hpp"

@@ -5,6 +5,7 @@
 
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/links/modbus_edge.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 
 namespace kmax::firmware::modbus {
 

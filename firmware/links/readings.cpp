@@ -4,6 +4,7 @@
 #include "firmware/drive/profile_readings.hpp"
 #include "firmware/drive/statusword.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 
 namespace kmax::firmware {
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "firmware/board_interface/flash_sectors.hpp"
 #include "firmware/parameters/crc32.hpp"
-#include "firmware/parameters/flash_sectors.hpp"
 
 /// The parameter store's format in flash, in words of 32 bits:
 ///

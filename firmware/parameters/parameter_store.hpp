@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "firmware/board_interface/flash_sectors.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
-#include "firmware/parameters/flash_sectors.hpp"
 #include "firmware/parameters/parameter_migration.hpp"
 #include "firmware/parameters/parameter_record.hpp"
 #include "firmware/parameters/persistent_parameters.hpp"

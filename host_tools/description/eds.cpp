@@ -13,6 +13,7 @@
 #include "firmware/canopen/pdo_mapping.hpp"
 #include "firmware/object_dictionary/cob_id.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 #include "host_tools/description/described_objects.hpp"
 
 namespace kmax::description {

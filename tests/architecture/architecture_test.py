@@ -31,10 +31,10 @@ FLOORS = {
 FOLDERS = {
     "firmware": [
         ["exchange", "object_dictionary"],
+        ["board_interface"],
         ["parameters", "capture"],
         ["canopen", "modbus"],
         ["drive"],
-        ["board_interface"],
         ["command"],
         ["links"],
         [""],

@@ -201,7 +201,7 @@ TEST_F(ApplicationStore, DefaultsOfTheLinkItselfTakeEffectAfterTheReply) {
 }
 
 TEST(ApplicationIdentity, ResetCauseAndCrashAreShown) {
-  firmware::BoardIdentity identity;
+  firmware::BoardIdentity identity{};
   identity.reset_cause = firmware::ResetCause::independent_watchdog;
   identity.crash = {3,          firmware::CrashCause::fault, 3, 0x0800'1234, 0x0800'5679, 0x8200, 0x4000'0000,
                     0x4003'0000};

@@ -1,5 +1,6 @@
 #include "firmware/application.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -4,7 +4,7 @@
 
 #include <bit>
 
-#include "firmware/canopen/can_port.hpp"
+#include "firmware/board_interface/can_port.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "tests/image/can_bench.hpp"
 

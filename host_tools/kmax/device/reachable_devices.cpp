@@ -7,6 +7,7 @@
 #include <map>
 
 #include "firmware/application.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/device/device_address.hpp"
 

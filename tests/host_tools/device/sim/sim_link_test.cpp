@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "firmware/capture/trace.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "firmware/application.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
