@@ -10,15 +10,13 @@ namespace kmax::firmware {
 
 Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
            const LinkStates& links, FaultLog& log, std::span<std::uint32_t> capture_memory)
-    : modulation_limit_(modulation_limit),
-      parameters_(parameters),
+    : parameters_(parameters),
       store_(store),
       links_(links),
       log_(log),
-      settings_(make_settings()),
-      tick_(settings_, capture_memory) {
+      settings_(modulation_limit, parameters.values()),
+      tick_(settings_.all(), capture_memory) {
   configure_thermal();
-  make_scales();
 }
 
 ArmedAxes Axes::armed() const {
@@ -31,61 +29,14 @@ ArmedAxes Axes::armed() const {
   return armed;
 }
 
-Axes::Settings Axes::make_settings() const {
-  const ParameterValues& values = parameters_.values();
-  Settings settings{.law = DeviceLaw<axis_count>::settings(values)};
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    AxisSetting& setting = settings.axis[axis];
-    setting.encoder_offset = values.whole<"encoder.offset">(axis);
-    setting.encoder_direction = values.whole<"encoder.direction">(axis);
-    setting.generation = generation_;
-    // Near the position by the new origin: the resampler starts from there.
-    const std::int64_t position = Axis::position_of(report_[axis].counted, setting);
-    setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
-    const Circumstances now = offered_[axis];
-    auto motor = motor_configuration(values, axis, now.winding_temperature, now.current_share);
-    motor.modulation_limit = modulation_limit_;
-    setting.motor = MotorControl::prepare(motor);
-    setting.compensation =
-        control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
-    setting.plausibility = control::MotionPlausibility<float>::prepare(
-        plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
-    setting.watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
-    setting.excitation = Excitation::prepare(excitation_configuration(values, axis));
-    setting.mode = values.choice<DriveMode, "drive.mode">(axis);
-    setting.commutated = now.commutated;
-    setting.supply_voltage_min = values.real<"supply.voltage_min">();
-    setting.supply_voltage_max = values.real<"supply.voltage_max">();
-  }
-  return settings;
-}
-
-void Axes::make_scales() {
-  const ParameterValues& values = parameters_.values();
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const double length = count_length(values, axis);
-    const double step =
-        control::resampler_step(static_cast<double>(values.real<"position.resolution">(axis)), length);
-    scale_[axis] = {length, static_cast<float>(step * length)};
-  }
-}
-
 void Axes::offer_settings_if_changed() {
-  std::array<Circumstances, axis_count> now;
+  AxesSettings::AllCircumstances now;
   for (std::size_t axis = 0; axis < axis_count; ++axis) now[axis] = circumstances_of(axis);
-  if (parameters_.changes() == offered_changes_ && now == offered_) return;
-  offered_ = now;
-  if (parameters_.changes() != offered_changes_) {
-    configure_thermal();
-    make_scales();
-  }
+  if (parameters_.changes() == offered_changes_ && now == settings_.circumstances()) return;
+  if (parameters_.changes() != offered_changes_) configure_thermal();
   offered_changes_ = parameters_.changes();
-  if (parameters_.restarting_changes() != offered_restarts_) {
-    offered_restarts_ = parameters_.restarting_changes();
-    ++generation_;
-  }
-  settings_ = make_settings();
-  tick_.offer(settings_);
+  settings_.make(parameters_.values(), parameters_.restarting_changes(), now, report_);
+  tick_.offer(settings_.all());
   tick_.trace_axis(static_cast<std::size_t>(parameters_.values().whole<"trace.axis">()),
                    static_cast<std::uint32_t>(parameters_.values().whole<"trace.interval">()));
 }
@@ -101,8 +52,8 @@ void Axes::judge_if_changed() {
 /// The tick works by the present settings, and knows of the axis' last disarming.
 bool Axes::settled(std::size_t of_axis) const {
   if (!tick_.settings_taken() || report_[of_axis].enabled) return false;
-  return std::ranges::all_of(report_,
-                             [this](const AxisReport& axis) { return axis.generation == generation_; });
+  return std::ranges::all_of(
+      report_, [this](const AxisReport& axis) { return axis.generation == settings_.generation(); });
 }
 
 /// What the hand does on this axis would be felt on one that another link has armed.
@@ -115,7 +66,7 @@ bool Axes::pushes_anothers_axis(std::size_t axis) const {
   return false;
 }
 
-Axes::Circumstances Axes::circumstances_of(std::size_t axis) const {
+AxesSettings::Circumstances Axes::circumstances_of(std::size_t axis) const {
   return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis)};
 }
 
@@ -143,7 +94,7 @@ Supervisor::Situation Axes::situation(std::size_t axis) {
           .commutation = commutation_[axis],
           .thermal = thermal_[axis],
           .report = report_[axis],
-          .setting = settings_.axis[axis],
+          .setting = settings_.of(axis),
           .silent_us = heard_us ? std::optional(modbus::elapsed_us(now_us_, *heard_us)) : std::nullopt,
           .power_stage_temperature = readings_.power_stage_temperature[axis],
           .supply_voltage = readings_.supply_voltage,
@@ -172,7 +123,7 @@ void Axes::log_trip(std::size_t axis) {
   if (fault == Fault::none) return;
   const Supervisor::Trip& trip = supervisors_[axis].last_trip();
   const TripRecord& record = trip.record;
-  const double position = static_cast<double>(record.position) * scale_[axis].count_length;
+  const double position = static_cast<double>(record.position) * scale(axis).count_length;
   // By TripNumber.
   log_.add_trip(
       axis, error_code_of(fault), record.tick,

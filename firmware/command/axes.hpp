@@ -8,14 +8,15 @@
 #include "firmware/command/fault_log.hpp"
 #include "firmware/command/link_states.hpp"
 #include "firmware/command/store_commands.hpp"
+#include "firmware/drive/axes_settings.hpp"
 #include "firmware/drive/axes_tick.hpp"
 #include "firmware/drive/stability_guard.hpp"
 #include "firmware/drive/supervisor.hpp"
 
 namespace kmax::firmware {
 
-/// All axes as the main loop has them: their tick, the settings that it works by, who commands each axis and
-/// what trips it.
+/// All axes as the main loop has them: their tick, when it gets new settings, who commands each axis and what
+/// trips it.
 ///
 /// In every poll begin_poll(), then what the hosts write, then act(). Main loop only, but for tick()'s ISR_
 /// functions. No failure; what goes wrong becomes a fault of an axis or a refusal.
@@ -24,12 +25,6 @@ class Axes {
   /// The main loop's rhythm.
   static constexpr std::uint32_t round_ticks = AxesTick<axis_count>::round_ticks;
   static constexpr std::uint32_t round_interval_us = round_ticks * 1'000'000 / tick_rate_hz;
-
-  /// What a count and a step of position.resolution are; to work it out takes a division in double.
-  struct Scale {
-    double count_length = 0.0;  ///< m
-    float resolution = 0.0f;    ///< m
-  };
 
   /// `modulation_limit`: see BoardIdentity. `capture_memory`: see AxesTick.
   Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
@@ -66,7 +61,7 @@ class Axes {
   /// The tick's, as it was when this poll began.
   const AxisReport& report(std::size_t axis) const { return report_[axis]; }
   const ThermalSupervisor& thermal(std::size_t axis) const { return thermal_[axis]; }
-  const Scale& scale(std::size_t axis) const { return scale_[axis]; }
+  const AxesSettings::Scale& scale(std::size_t axis) const { return settings_.scale(axis); }
   const BoardReadings& readings() const { return readings_; }
   /// By the present parameters.
   const GuardFinding& guard(std::size_t axis) {
@@ -84,28 +79,16 @@ class Axes {
   const AxesTick<axis_count>& tick() const { return tick_; }
 
  private:
-  using Settings = AxesTick<axis_count>::Settings;
-  /// What an axis' settings depend on beside the parameters.
-  struct Circumstances {
-    float current_share = 1.0f;         ///< of current.limit that the temperatures leave
-    float winding_temperature = 25.0f;  ///< degC, in steps
-    bool commutated = true;             ///< the rotor's angle is known
-    friend constexpr bool operator==(const Circumstances&, const Circumstances&) = default;
-  };
-
   // Rare: small code rather than fast code.
-  [[gnu::cold]] Settings make_settings() const;
-  [[gnu::cold]] void make_scales();
   [[gnu::cold]] void poll_temperatures();
   void configure_thermal();
   void judge_if_changed();
   [[gnu::cold]] void log_trip(std::size_t axis);
   bool settled(std::size_t axis) const;
   bool pushes_anothers_axis(std::size_t axis) const;
-  Circumstances circumstances_of(std::size_t axis) const;
+  AxesSettings::Circumstances circumstances_of(std::size_t axis) const;
   Supervisor::Situation situation(std::size_t axis);
 
-  const float modulation_limit_;
   ParameterAccess& parameters_;
   const StoreCommands& store_;
   const LinkStates& links_;
@@ -116,14 +99,11 @@ class Axes {
   std::array<Fault, axis_count> logged_{};  ///< the faults that there were when it was last looked
   std::array<ThermalSupervisor, axis_count> thermal_;
   std::array<Commutation, axis_count> commutation_;
-  std::array<Scale, axis_count> scale_{};
   std::array<GuardFinding, axis_count> guard_{};
   std::uint32_t judged_changes_ = 0;
-  // Before settings_, which is made from them.
-  std::array<Circumstances, axis_count> offered_{};
   std::array<AxisReport, axis_count> report_;
-  std::uint32_t offered_changes_ = 0, generation_ = 1, offered_restarts_ = 0;
-  Settings settings_;
+  std::uint32_t offered_changes_ = 0;
+  AxesSettings settings_;
   // Aligned, an address within it is one immediate: two instructions a tick less than at an odd place.
   alignas(64) AxesTick<axis_count> tick_;
 };
