@@ -39,9 +39,6 @@ struct TickOutput {
 /// current sample, serial().ISR_byte() and can().ISR_frame() from its receive interrupts, and everything else
 /// from its main loop.
 ///
-/// The axes' ticks never interrupt each other, and axis 0's comes first: it takes over new settings for
-/// all and counts the ticks. Half a tick apart or one right after the other makes no difference.
-///
 /// Contexts. The tick is the highest; the receive interrupts may be preempted by it; the main loop by both.
 /// What crosses: settings, enables and forces from the main loop to the tick (DoubleBuffer, atomics), reports
 /// and the trace back (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN
