@@ -91,7 +91,7 @@ Push push(Bench& bench, const MotorKnowledge& known, double voltage, double dura
   // The last tenth of the push.
   const std::size_t end = ticks / static_cast<std::size_t>(interval);
   const std::size_t begin = end - std::max<std::size_t>(1, end / 10);
-  const double lost = 2.0 * known.supply * known.pwm_frequency * known.dead_time;
+  const double lost = 2.0 * known.supply * known.electronics->pwm_hz() * known.dead_time;
   const double standing = (std::abs(voltage) - lost) / known.resistance;
   const double last = sign * bench::mean_of(current.subspan(begin, end - begin));
   result.missing = 1.0 - last / standing;
@@ -105,7 +105,7 @@ void find_direction_by_pushes(Calibration& run) {
   constexpr double enough_counts = 30.0, few_counts = 5.0;
   constexpr double turning_share = 0.3;               // of the current that is missing when the shaft turns
   constexpr double shortest = 0.002, longest = 0.25;  // s
-  const double lost = 2.0 * known.supply * known.pwm_frequency * known.dead_time;
+  const double lost = 2.0 * known.supply * known.electronics->pwm_hz() * known.dead_time;
   const double voltage = std::min(0.6 * known.current * known.resistance + lost, known.largest_voltage());
   Push forwards, backwards;
   for (double duration = shortest; duration <= longest; duration *= 1.5) {

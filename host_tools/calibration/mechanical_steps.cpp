@@ -27,7 +27,7 @@ BackEmfConfig back_emf_config(const MotorKnowledge& known) {
   config.inductance_d = known.inductance;
   config.resistance = known.resistance;
   config.resistance_error = known.resistance_error > 0.0 ? known.resistance_error : unknown;
-  const double volts = known.supply * known.pwm_frequency;
+  const double volts = known.supply * known.electronics->pwm_hz();
   config.dead_time_voltage = volts * known.dead_time;
   config.dead_time_voltage_error = known.dead_time_error > 0.0 ? volts * known.dead_time_error : unknown;
   config.dead_time_current = known.dead_time_band();

@@ -59,7 +59,7 @@ InducedVoltage induced_in_push(const Waveforms& seen, const MotorKnowledge& know
   if (length < 2) return {0.0, std::numeric_limits<double>::infinity()};
   const double direction = bench::mean_of(current.last(length)) < 0.0 ? -1.0 : 1.0;
   const double lost =
-      (known.brushed() ? 2.0 : 4.0 / 3.0) * known.supply * known.pwm_frequency * known.dead_time;
+      (known.brushed() ? 2.0 : 4.0 / 3.0) * known.supply * known.electronics->pwm_hz() * known.dead_time;
   std::vector<double> induced;
   for (std::size_t k = voltage.size() - length; k < voltage.size(); ++k)
     induced.push_back(direction * (voltage[k] - known.resistance * current[k]) - lost);

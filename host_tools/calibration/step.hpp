@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "board/odrive_v3/description.hpp"
 #include "firmware/drive/motor_control.hpp"
 #include "host_tools/bench/bench.hpp"
 #include "host_tools/calibration/estimate.hpp"
@@ -27,11 +28,12 @@ using bench::Waveforms;
 // What is known of the axis: at first what its parameters say, later what the steps have found.
 struct MotorKnowledge {
   firmware::MotorKind kind = firmware::MotorKind::dc;
-  double tick = 50e-6;             // s
-  double pwm_frequency = 20000.0;  // Hz
-  double supply = 0.0;             // V
-  double current_limit = 0.0;      // A
-  double transmission = 0.0;       // m per rad of the shaft
+  // Of the boards with a bridge the only one so far.
+  const board::BoardDescription* electronics = &board::odrive_v3::description;
+  double tick = 50e-6;         // s
+  double supply = 0.0;         // V
+  double current_limit = 0.0;  // A
+  double transmission = 0.0;   // m per rad of the shaft
   double counts_per_turn = 0.0;
   int direction = 1;  // encoder.direction
   int pole_pairs = 1;

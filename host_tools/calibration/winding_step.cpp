@@ -20,20 +20,20 @@ constexpr double seen_current = 0.05;        // A, from which a response is more
 
 // The pulse that acted at each sample, without the rounding of the timer's ticks being a part of the model's
 // error.
-std::vector<double> applied_brushed(const Waveforms& recording) {
+std::vector<double> applied_brushed(const MotorKnowledge& known, const Waveforms& recording) {
   std::vector<double> applied;
   const auto asked = recording.of("voltage"), supply = recording.of("supply");
   for (std::size_t i = 0; i < asked.size(); ++i)
-    applied.push_back(applied_brushed_voltage(asked[i], supply[i]));
+    applied.push_back(applied_brushed_voltage(*known.electronics, asked[i], supply[i]));
   return applied;
 }
 
-std::vector<double> applied_along(std::span<const double> along, double across, double angle, double supply,
-                                  bool wave_is_across) {
+std::vector<double> applied_along(const MotorKnowledge& known, std::span<const double> along, double across,
+                                  double angle, double supply, bool wave_is_across) {
   std::vector<double> applied;
   for (const double value : along) {
     const VoltageVector asked = wave_is_across ? VoltageVector{across, value} : VoltageVector{value, across};
-    const VoltageVector got = applied_vector(asked, angle, supply);
+    const VoltageVector got = applied_vector(*known.electronics, asked, angle, supply);
     applied.push_back(wave_is_across ? got.q : got.d);
   }
   return applied;
@@ -139,14 +139,14 @@ void search(Bench& bench, MotorKnowledge& known) {
 WindingFitConfig config_of(const MotorKnowledge& known) {
   WindingFitConfig config;
   config.tick = known.tick;
-  config.pwm_frequency = known.pwm_frequency;
+  config.pwm_frequency = known.electronics->pwm_hz();
   config.switching_legs = known.brushed() ? 2.0 : 4.0 / 3.0;
   return config;
 }
 
 // V that the dead time takes, as seconds of dead time.
 Estimate dead_time_of(const WindingFit& fit, const MotorKnowledge& known) {
-  const double volts = config_of(known).switching_legs * known.pwm_frequency * known.supply;
+  const double volts = config_of(known).switching_legs * known.electronics->pwm_hz() * known.supply;
   return {fit.dead_time_voltage.value / volts, fit.dead_time_voltage.standard_error / volts, "s"};
 }
 
@@ -160,9 +160,9 @@ WindingFit rough_fit(Bench& bench, const MotorKnowledge& known) {
   wave.duration = 0.2;
   const Waveforms seen = record(bench, wave, {{"voltage", "current", "supply"}, 1000, 1, 0.0});
   require_no_trip(seen);
-  const std::vector<double> applied = known.brushed()
-                                          ? applied_brushed(seen)
-                                          : applied_along(seen.of("voltage"), 0.0, 0.0, known.supply, false);
+  const std::vector<double> applied =
+      known.brushed() ? applied_brushed(known, seen)
+                      : applied_along(known, seen.of("voltage"), 0.0, 0.0, known.supply, false);
   const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
   WindingFitConfig config = config_of(known);
   config.motion = WindingMotion::free;
@@ -185,7 +185,7 @@ WindingFit fit_brushed(Bench& bench, const MotorKnowledge& known, const WindingF
       bench, wave,
       {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
   require_no_trip(seen);
-  const std::vector<double> applied = applied_brushed(seen);
+  const std::vector<double> applied = applied_brushed(known, seen);
   const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
   WindingFitConfig config = config_of(known);
   config.motion = WindingMotion::free;
@@ -200,7 +200,7 @@ WindingFit fit_along(Bench& bench, const MotorKnowledge& known, const WindingFit
       {{"voltage", "current", "supply"}, std::min(planned.samples, most_samples), 1, planned.settling});
   require_no_trip(seen);
   const std::vector<double> applied =
-      applied_along(seen.of("voltage"), 0.0, angle, bench::mean_of(seen.of("supply")), false);
+      applied_along(known, seen.of("voltage"), 0.0, angle, bench::mean_of(seen.of("supply")), false);
   const WindingRecord record{applied, seen.of("current"), seen.of("supply"), {}};
   return resolved(fit_winding({&record, 1}, config_of(known)));
 }
@@ -222,7 +222,7 @@ WindingFit fit_across(Bench& bench, const MotorKnowledge& known, const WindingFi
                            1,
                            planned.settling}));
     require_no_trip(seen.back());
-    applied.push_back(applied_along(seen.back().of("voltage_d"), wave.bias, angle,
+    applied.push_back(applied_along(known, seen.back().of("voltage_d"), wave.bias, angle,
                                     bench::mean_of(seen.back().of("supply")), true));
   }
   std::vector<WindingRecord> records;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/calibration/applied_voltage.hpp"
+#include "board/odrive_v3/description.hpp"
 #include "host_tools/simulation/motor_drive.hpp"
 
 namespace kmax::calibration::test {
@@ -140,7 +140,10 @@ class MotorBench {
   }
 
  private:
-  static double rounded(double duty) { return std::floor(duty * timer_steps + 0.5) / timer_steps; }
+  static double rounded(double duty) {
+    constexpr double steps = board::odrive_v3::description.half_period_ticks;
+    return std::floor(duty * steps + 0.5) / steps;
+  }
   double code(simulation::CurrentSensor::Channel channel) {
     return std::floor(drive_.current_pin(channel, true) / 3.3 * 4096.0);
   }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "board/odrive_v3/description.hpp"
 #include "host_tools/calibration/applied_voltage.hpp"
 #include "host_tools/calibration/winding_excitation.hpp"
 #include "tests/host_tools/calibration/motor_bench.hpp"
@@ -35,12 +36,12 @@ Record run(MotorBench& bench, const WindingExcitation& wave, bool across) {
     double current, applied;
     if (bench.motor().brushed()) {
       current = 0.5 * (sample.current_b - sample.current_c);
-      applied = applied_brushed_voltage(bias + alternation, sample.supply);
+      applied = applied_brushed_voltage(board::odrive_v3::description, bias + alternation, sample.supply);
       bench.tick_with_voltage(bias + alternation, sample.supply);
     } else {
       const VoltageVector asked{across ? bias : bias + alternation, across ? alternation : 0.0};
       const test::VectorCurrent vector = test::current_at(sample, 0.0);
-      const VoltageVector given = applied_vector(asked, 0.0, sample.supply);
+      const VoltageVector given = applied_vector(board::odrive_v3::description, asked, 0.0, sample.supply);
       current = across ? vector.q : vector.d;
       applied = across ? given.q : given.d;
       bench.tick_with_vector(asked.d, asked.q, 0.0, sample.supply);
