@@ -171,14 +171,14 @@ Cause source(const char* name, double volts, Fault fault, double ticks, Refusal 
           refusal};
 }
 
-Cause sensor(const char* name, double volts, Fault fault, double ticks, Refusal refusal) {
-  using simulation::CurrentSensor;
+using Channel = simulation::CurrentSensor::Channel;
+Cause sensor(const char* name, Channel channel, double volts, Fault fault, double ticks, Refusal refusal) {
   return {name,
-          [volts](Bench& b, std::size_t a) {
-            b.world.drive(a).current_sensor().set_stuck(CurrentSensor::Channel::b, volts);
+          [channel, volts](Bench& b, std::size_t a) {
+            b.world.drive(a).current_sensor().set_stuck(channel, volts);
           },
-          [](Bench& b, std::size_t a) {
-            b.world.drive(a).current_sensor().set_stuck(CurrentSensor::Channel::b, std::nullopt);
+          [channel](Bench& b, std::size_t a) {
+            b.world.drive(a).current_sensor().set_stuck(channel, std::nullopt);
           },
           Hits::axis,
           fault,
@@ -216,8 +216,11 @@ std::vector<Cause> causes() {
   return {
       silence,
       plug,
-      sensor("current sensor at its rail", 3.3, Fault::current_sense, tick, Refusal::current_sense_invalid),
-      sensor("current sensor at rest", 1.65, Fault::phase_open, slow_tick, Refusal::none),
+      sensor("current sensor at its rail", Channel::b, 3.3, Fault::current_sense, tick,
+             Refusal::current_sense_invalid),
+      sensor("current sensor C at its other rail", Channel::c, 0.0, Fault::current_sense, tick,
+             Refusal::current_sense_invalid),
+      sensor("current sensor at rest", Channel::b, 1.65, Fault::phase_open, slow_tick, Refusal::none),
       moment(
           "timer's break",
           [](Bench& b, std::size_t a) { b.board->pwm(a).clock_failure_break(b.board->now()); }, Hits::axis,
@@ -241,6 +244,8 @@ std::vector<Cause> causes() {
        [](Bench& b, std::size_t) { b.board->hold_fault_line(false); }, Hits::both, Fault::gate_driver, line,
        Refusal::gate_driver_fault},
       chip("gate driver: its supply too low", drivers::Drv8301Fault::gate_supply_under_voltage),
+      chip("gate driver: its supply too high", drivers::Drv8301Fault::gate_supply_over_voltage),
+      chip("gate driver: the motor's supply too low for it", drivers::Drv8301Fault::supply_under_voltage),
       chip("gate driver: too hot", drivers::Drv8301Fault::over_temperature),
       {"emergency stop open", [](Bench& b, std::size_t) { b.board->open_emergency_stop(true); },
        [](Bench& b, std::size_t) { b.board->open_emergency_stop(false); }, Hits::both, Fault::emergency_stop,
@@ -562,6 +567,12 @@ std::vector<Upset> upsets() {
       // It goes on from the internal oscillator, at full speed.
       {"crystal stops", [](Bench& b) { b.board->rcc().fail_crystal(b.board->now()); }, next_interrupt,
        ResetCause::software, "exception 2 came, which nobody handles"},
+      {"crystal does not start at the next start",
+       [](Bench& b) {
+         b.board->rcc().set_crystal_works(false);
+         b.board->pull_reset();
+       },
+       handler, ResetCause::pin, ""},
       // No power stage on a slow clock, and the axes say that they have no encoder.
       {"PLL does not lock at the next start",
        [](Bench& b) {
