@@ -391,9 +391,13 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
     return all == 0 ? std::string("-")
                     : fmt::format("{:.1f} %", 100.0 * static_cast<double>(part) / static_cast<double>(all));
   };
+  RatioResult all;
   for (const RatioResult& r : ratios) {
     const std::string ratio = fmt::format("{:g}", r.ratio);
     if (r.ratio > 1.0) {
+      all.unstable += r.unstable;
+      all.steady += r.steady;
+      all.found_in_time += r.found_in_time;
       found_table.rows.push_back({ratio, fmt::format("{}", r.unstable), fmt::format("{}", r.steady),
                                   fmt::format("{}", r.found_in_time), percent(r.found_in_time, r.steady),
                                   percent(r.found_in_time, r.unstable),
@@ -411,6 +415,11 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
           {ratio, fmt::format("{}", r.stable), fmt::format("{}", r.alarms), percent(r.alarms, r.stable)});
     }
   }
+  found.paragraphs.push_back(fmt::format(
+      "Of all {} touches with an onset, {} are found within 0.3 s of it, {}: {} of all {} unstable "
+      "ones.",
+      all.steady, all.found_in_time, percent(all.found_in_time, all.steady),
+      percent(all.found_in_time, all.unstable), all.unstable));
   found.tables.push_back(std::move(found_table));
   soft.tables.push_back(std::move(soft_table));
   calm.tables.push_back(std::move(calm_table));
