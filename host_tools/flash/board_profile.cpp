@@ -7,6 +7,7 @@ constexpr std::array<BoardProfile, 2> boards = {{
     {"odrive_v3",
      "ODrive v3.5 or v3.6",
      "target/stm32f4x.cfg",
+     &stm32f405_memory,
      "stm32f405/kmax-odrive_v3.elf",
      true,
      "disconnect the motors or make sure that nobody turns the shaft of motor 0; set the DIP switch SW1 to "
@@ -24,6 +25,7 @@ constexpr std::array<BoardProfile, 2> boards = {{
     {"generic_stm32f405",
      "another board with an STM32F405",
      "target/stm32f4x.cfg",
+     &stm32f405_memory,
      "",
      false,
      "set BOOT0 high and PB2 (BOOT1) low, then reset the board",

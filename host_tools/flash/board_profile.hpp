@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "host_tools/flash/chip_memory.hpp"
+
 // The ways to write a board's flash, and which of them a board has.
 
 namespace kmax::flash {
@@ -38,6 +40,7 @@ struct BoardProfile {
   std::string_view kind;  ///< as the configuration and --board call it
   std::string_view title;
   std::string_view openocd_target;  ///< the chip's configuration file of OpenOCD
+  const ChipMemory* memory;         ///< the chip's
   std::string_view image;  ///< of its firmware, PRESET/FILE below the build folder; empty: none is supplied
   bool boot0_is_switch;    ///< no GPIO line can start the ROM bootloader
   std::string_view to_bootloader;  ///< what a person does to start the ROM bootloader

@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "firmware/parameters/crc32.hpp"
-#include "host_tools/flash/chip_memory.hpp"
 
 namespace kmax::flash {
 namespace {
@@ -19,40 +20,43 @@ std::uint32_t word_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
          std::uint32_t{bytes[at + 3]} << 24U;
 }
 
-void check_place(const ElfSegment& segment, const std::string& name) {
+void check_place(const ElfSegment& segment, const std::string& name, const ChipMemory& memory) {
   const std::uint64_t end = std::uint64_t{segment.address} + segment.bytes.size();
   const std::string text =
       fmt::format("a segment at 0x{:08x}, {} bytes,", segment.address, segment.bytes.size());
-  if (segment.address < flash_begin || end > flash_end)
+  if (segment.address < memory.flash_begin() || end > memory.flash_end())
+    refuse(name, fmt::format("{} lies outside the flash, 0x{:08x} to 0x{:08x}", text, memory.flash_begin(),
+                             memory.flash_end() - 1));
+  if (segment.address < memory.parameters_end() && end > memory.parameters_begin())
     refuse(name,
-           fmt::format("{} lies outside the flash, 0x{:08x} to 0x{:08x}", text, flash_begin, flash_end - 1));
-  if (segment.address < parameters_end && end > parameters_begin)
-    refuse(name, fmt::format("{} covers the parameter sectors 1 and 2, 0x{:08x} to 0x{:08x}; an image never "
-                             "writes them, see board/stm32f405/linker.ld",
-                             text, parameters_begin, parameters_end - 1));
+           fmt::format("{} covers the parameter sectors {} and {}, 0x{:08x} to 0x{:08x}; an image never "
+                       "writes them, see board/stm32f405/linker.ld",
+                       text, memory.first_parameter_sector, memory.first_parameter_sector + 1,
+                       memory.parameters_begin(), memory.parameters_end() - 1));
   if (segment.address % 4 != 0) refuse(name, fmt::format("{} does not begin at a whole word", text));
 }
 
 /// An image may name the parameter sectors it was linked for.
-void check_parameter_symbols(const ElfImage& elf, const std::string& name) {
+void check_parameter_symbols(const ElfImage& elf, const std::string& name, const ChipMemory& memory) {
   const auto begin = elf.symbol("kmax_parameters_begin");
   const auto end = elf.symbol("kmax_parameters_end");
-  if ((begin && begin->address != parameters_begin) || (end && end->address != parameters_end))
+  if ((begin && begin->address != memory.parameters_begin()) ||
+      (end && end->address != memory.parameters_end()))
     refuse(name, fmt::format("was linked for parameters at 0x{:08x} to 0x{:08x}; this program keeps 0x{:08x} "
                              "to 0x{:08x}. Use the kmax of the same release",
-                             begin ? begin->address : 0, end ? end->address - 1 : 0, parameters_begin,
-                             parameters_end - 1));
+                             begin ? begin->address : 0, end ? end->address - 1 : 0,
+                             memory.parameters_begin(), memory.parameters_end() - 1));
 }
 
 /// PM0214, exception model, vector table: the first word is the stack pointer, the second the start address
 /// with the Thumb bit.
-void check_vectors(const std::vector<FlashPiece>& pieces, const std::string& name) {
+void check_vectors(const std::vector<FlashPiece>& pieces, const std::string& name, const ChipMemory& memory) {
   const FlashPiece& first = pieces.front();
-  if (first.address != flash_begin || first.bytes.size() < 8)
-    refuse(name, fmt::format("nothing is at 0x{:08x}, where the processor starts", flash_begin));
+  if (first.address != memory.flash_begin() || first.bytes.size() < 8)
+    refuse(name, fmt::format("nothing is at 0x{:08x}, where the processor starts", memory.flash_begin()));
   const std::uint32_t stack = word_at(first.bytes, 0), start = word_at(first.bytes, 4);
-  const bool in_memory =
-      (stack > 0x2000'0000 && stack <= 0x2002'0000) || (stack > 0x1000'0000 && stack <= 0x1001'0000);
+  const bool in_memory = std::ranges::any_of(
+      memory.ram, [stack](const Sector& ram) { return stack > ram.begin && stack <= ram.end(); });
   if (!in_memory || stack % 4 != 0)
     refuse(name, fmt::format("no vector table for the chip: its stack pointer is 0x{:08x}", stack));
   bool found = false;
@@ -77,31 +81,31 @@ std::uint32_t crc_of(const std::vector<std::uint8_t>& bytes) {
   return crc.value();
 }
 
-FlashImage FlashImage::load(const std::filesystem::path& elf) {
+FlashImage FlashImage::load(const std::filesystem::path& elf, const ChipMemory& memory) {
   try {
-    return from(ElfImage::load(elf), elf.string());
+    return from(ElfImage::load(elf), elf.string(), memory);
   } catch (const ElfError& error) {
     throw ImageError(error.what());
   }
 }
 
-FlashImage FlashImage::from(const ElfImage& elf, const std::string& name) {
+FlashImage FlashImage::from(const ElfImage& elf, const std::string& name, const ChipMemory& memory) {
   FlashImage image;
   for (const ElfSegment& segment : elf.segments()) {
-    check_place(segment, name);
+    check_place(segment, name, memory);
     if (!image.pieces_.empty() && segment.address < image.pieces_.back().end())
       refuse(name, fmt::format("two segments overlap at 0x{:08x}", segment.address));
-    // With check_place: never over the parameter sectors, which lie between sectors 0 and 3.
-    const bool joins = !image.pieces_.empty() &&
-                       *sector_of(segment.address) <= *sector_of(image.pieces_.back().end() - 1) + 1;
+    // With check_place: never over the parameter sectors, which lie between others.
+    const bool joins = !image.pieces_.empty() && *memory.sector_of(segment.address) <=
+                                                     *memory.sector_of(image.pieces_.back().end() - 1) + 1;
     if (!joins) image.pieces_.push_back({segment.address, {}});
     auto& bytes = image.pieces_.back().bytes;
     bytes.resize(segment.address - image.pieces_.back().address, erased);
     bytes.insert(bytes.end(), segment.bytes.begin(), segment.bytes.end());
     bytes.resize((bytes.size() + 3) / 4 * 4, erased);
   }
-  check_vectors(image.pieces_, name);
-  check_parameter_symbols(elf, name);
+  check_vectors(image.pieces_, name, memory);
+  check_parameter_symbols(elf, name, memory);
   return image;
 }
 

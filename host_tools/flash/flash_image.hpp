@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_tools/base/elf_image.hpp"
+#include "host_tools/flash/chip_memory.hpp"
 
 // What has to be written of a firmware image: its load segments, joined where they lie in the same or in
 // neighbouring sectors, padded with erased bytes to whole words.
@@ -37,8 +38,8 @@ class FlashImage {
   /// Throws ImageError: not an ELF image for ARM, touches the parameter sectors, lies outside flash, two
   /// segments overlap, does not open flash with a plausible vector table, or was linked for other parameter
   /// sectors.
-  static FlashImage load(const std::filesystem::path& elf);
-  static FlashImage from(const ElfImage& elf, const std::string& name);
+  static FlashImage load(const std::filesystem::path& elf, const ChipMemory& memory);
+  static FlashImage from(const ElfImage& elf, const std::string& name, const ChipMemory& memory);
 
   /// By address; the first holds the vector table.
   const std::vector<FlashPiece>& pieces() const { return pieces_; }

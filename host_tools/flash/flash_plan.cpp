@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <iterator>
 
-#include "host_tools/flash/chip_memory.hpp"
-
 namespace kmax::flash {
 namespace {
 
@@ -74,9 +72,10 @@ FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget
   Arguments write = openocd_adapter(method, target);
   const auto command = [&write](const std::string& text) { write.insert(write.end(), {"-c", text}); };
   command("reset halt");
-  command(
-      fmt::format("dump_image {} 0x{:08x} {}", parameters_before_file, parameters_begin, parameters_size));
-  command(fmt::format("flash erase_address 0x{:08x} {}", sectors[0].begin, sectors[0].size));
+  command(fmt::format("dump_image {} 0x{:08x} {}", parameters_before_file, target.memory->parameters_begin(),
+                      target.memory->parameters_size()));
+  command(fmt::format("flash erase_address 0x{:08x} {}", target.memory->sectors[0].begin,
+                      target.memory->sectors[0].size));
   for (const FlashPiece& piece : in_order_of_writing(image)) {
     command(fmt::format("flash write_image erase {} 0x{:08x} bin", piece.file_name(), piece.address));
     command(fmt::format("verify_image {} 0x{:08x} bin", piece.file_name(), piece.address));
@@ -84,7 +83,8 @@ FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget
   for (const FlashPiece& piece : image.pieces())
     command(
         fmt::format("dump_image {} 0x{:08x} {}", piece.read_file_name(), piece.address, piece.bytes.size()));
-  command(fmt::format("dump_image {} 0x{:08x} {}", parameters_after_file, parameters_begin, parameters_size));
+  command(fmt::format("dump_image {} 0x{:08x} {}", parameters_after_file, target.memory->parameters_begin(),
+                      target.memory->parameters_size()));
   command(set_brown_out_level);
   command("shutdown");
   return {{{"read the parameters, write and verify the image, read all back, set the brown-out level", write,
@@ -110,9 +110,11 @@ FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
   };
   FlashPlan plan;
   plan.steps.push_back(
-      {"read the parameters", read(parameters_begin, parameters_size, parameters_before_file), false});
-  plan.steps.push_back(
-      {"erase the vector table", dfu(fmt::format("0x{:08x}", flash_begin), "-D", blank_file), true});
+      {"read the parameters",
+       read(target.memory->parameters_begin(), target.memory->parameters_size(), parameters_before_file),
+       false});
+  plan.steps.push_back({"erase the vector table",
+                        dfu(fmt::format("0x{:08x}", target.memory->flash_begin()), "-D", blank_file), true});
   for (const FlashPiece& piece : in_order_of_writing(image))
     plan.steps.push_back(
         {"write " + said(piece), dfu(fmt::format("0x{:08x}", piece.address), "-D", piece.file_name()), true});
@@ -120,7 +122,9 @@ FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
     plan.steps.push_back(
         {"read back " + said(piece), read(piece.address, piece.bytes.size(), piece.read_file_name()), false});
   plan.steps.push_back(
-      {"read the parameters again", read(parameters_begin, parameters_size, parameters_after_file), false});
+      {"read the parameters again",
+       read(target.memory->parameters_begin(), target.memory->parameters_size(), parameters_after_file),
+       false});
   return plan;
 }
 
@@ -139,8 +143,11 @@ FlashPlan serial_plan(const FlashImage& image, const FlashTarget& target) {
   };
   FlashPlan plan;
   plan.steps.push_back({"read the parameters",
-                        tool({"-r", parameters_before_file}, parameters_begin, parameters_size), false});
-  plan.steps.push_back({"erase the vector table", tool({"-o"}, sectors[0].begin, sectors[0].size), true});
+                        tool({"-r", parameters_before_file}, target.memory->parameters_begin(),
+                             target.memory->parameters_size()),
+                        false});
+  plan.steps.push_back({"erase the vector table",
+                        tool({"-o"}, target.memory->sectors[0].begin, target.memory->sectors[0].size), true});
   for (const FlashPiece& piece : in_order_of_writing(image))
     plan.steps.push_back({"write and verify " + said(piece),
                           tool({"-w", piece.file_name(), "-v"}, piece.address, piece.bytes.size()), true});
@@ -148,7 +155,9 @@ FlashPlan serial_plan(const FlashImage& image, const FlashTarget& target) {
     plan.steps.push_back({"read back " + said(piece),
                           tool({"-r", piece.read_file_name()}, piece.address, piece.bytes.size()), false});
   plan.steps.push_back({"read the parameters again",
-                        tool({"-r", parameters_after_file}, parameters_begin, parameters_size), false});
+                        tool({"-r", parameters_after_file}, target.memory->parameters_begin(),
+                             target.memory->parameters_size()),
+                        false});
   return plan;
 }
 
@@ -170,29 +179,35 @@ FlashPlan image_plan(Method method, const FlashImage& image, const FlashTarget& 
 FlashPlan plan_flash(Method method, const FlashImage& image, const FlashTarget& target) {
   FlashPlan plan = image_plan(method, image, target);
   plan.achieved = "the image is written and verified";
+  plan.memory = target.memory;
   return plan;
 }
 
 FlashPlan plan_factory_reset(Method method, const FlashTarget& target) {
   constexpr const char* erases = "erase the stored parameters";
   constexpr const char* reads = "read back what is left of them";
-  FlashPlan plan{.steps = {}, .start = {}, .achieved = "the stored parameters are erased"};
-  const std::string area = fmt::format("0x{:08x}", parameters_begin);
+  FlashPlan plan{
+      .steps = {}, .start = {}, .achieved = "the stored parameters are erased", .memory = target.memory};
+  const std::string area = fmt::format("0x{:08x}", target.memory->parameters_begin());
   switch (method) {
     case Method::dfu:
-      for (const std::size_t sector : {1, 2})
+      for (const Sector& sector : target.memory->parameter_sectors())
         plan.steps.push_back(
-            {erases, dfu_call(target, fmt::format("0x{:08x}", sectors[sector].begin), "-D", blank_file),
-             true});
-      plan.steps.push_back(
-          {reads, dfu_call(target, fmt::format("{}:{}", area, parameters_size), "-U", parameters_after_file),
-           false});
+            {erases, dfu_call(target, fmt::format("0x{:08x}", sector.begin), "-D", blank_file), true});
+      plan.steps.push_back({reads,
+                            dfu_call(target, fmt::format("{}:{}", area, target.memory->parameters_size()),
+                                     "-U", parameters_after_file),
+                            false});
       return plan;
     case Method::serial:
-      plan.steps.push_back({erases, serial_call(target, {"-o"}, parameters_begin, parameters_size), true});
       plan.steps.push_back(
-          {reads, serial_call(target, {"-r", parameters_after_file}, parameters_begin, parameters_size),
-           false});
+          {erases,
+           serial_call(target, {"-o"}, target.memory->parameters_begin(), target.memory->parameters_size()),
+           true});
+      plan.steps.push_back({reads,
+                            serial_call(target, {"-r", parameters_after_file},
+                                        target.memory->parameters_begin(), target.memory->parameters_size()),
+                            false});
       return plan;
     case Method::openocd_gpio:
     case Method::openocd_stlink:
@@ -200,8 +215,9 @@ FlashPlan plan_factory_reset(Method method, const FlashTarget& target) {
   }
   Arguments erase = openocd_adapter(method, target);
   for (const std::string& text :
-       {std::string("reset halt"), fmt::format("flash erase_address {} {}", area, parameters_size),
-        fmt::format("dump_image {} {} {}", parameters_after_file, area, parameters_size),
+       {std::string("reset halt"),
+        fmt::format("flash erase_address {} {}", area, target.memory->parameters_size()),
+        fmt::format("dump_image {} {} {}", parameters_after_file, area, target.memory->parameters_size()),
         std::string("shutdown")})
     erase.insert(erase.end(), {"-c", text});
   plan.steps.push_back({fmt::format("{}, {}", erases, reads), erase, true});

@@ -35,8 +35,9 @@ struct Step {
 
 struct FlashPlan {
   std::vector<Step> steps;
-  std::vector<Step> start;  ///< after the comparison; empty where a reset line or a person does it
-  std::string achieved;     ///< what is so before the start, for people
+  std::vector<Step> start;             ///< after the comparison; empty where a reset line or a person does it
+  std::string achieved;                ///< what is so before the start, for people
+  const ChipMemory* memory = nullptr;  ///< FlashTarget's
 };
 
 /// A GPIO line as OpenOCD wants it.
@@ -47,8 +48,9 @@ struct AdapterLine {
 
 /// What a method needs to know beside the image.
 struct FlashTarget {
-  std::string program;         ///< path
-  std::string openocd_target;  ///< BoardProfile's
+  std::string program;                 ///< path
+  std::string openocd_target;          ///< BoardProfile's
+  const ChipMemory* memory = nullptr;  ///< BoardProfile's
   AdapterLine swdio{}, swclk{};
   std::optional<AdapterLine> reset{};  ///< NRST on a line
   unsigned adapter_kilohertz = 1000;

@@ -8,8 +8,6 @@
 #include <iterator>
 #include <vector>
 
-#include "host_tools/flash/chip_memory.hpp"
-
 namespace kmax::flash {
 namespace {
 
@@ -131,17 +129,17 @@ FlashReport write_and_verify(const FlashPlan& plan, const FlashImage& image, Wor
   for (const Step& step : plan.steps) {
     // A step that reads the parameters first has changed nothing before they are there.
     const auto state = [&] {
-      const bool began = step.changes_flash && content(saved).size() == parameters_size;
+      const bool began = step.changes_flash && content(saved).size() == plan.memory->parameters_size();
       return changed || began ? changed_state : std::string(untouched);
     };
     if (step.changes_flash && !changed && &step != &plan.steps.front())
-      run.read(parameters_before_file, parameters_size, untouched);
+      run.read(parameters_before_file, plan.memory->parameters_size(), untouched);
     run.step(step, state);
     changed = changed || step.changes_flash;
   }
 
-  const auto before = run.read(parameters_before_file, parameters_size, changed_state);
-  const auto after = run.read(parameters_after_file, parameters_size, changed_state);
+  const auto before = run.read(parameters_before_file, plan.memory->parameters_size(), changed_state);
+  const auto after = run.read(parameters_after_file, plan.memory->parameters_size(), changed_state);
   std::vector<std::uint8_t> all;
   for (const FlashPiece& piece : image.pieces()) {
     const auto found = run.read(piece.read_file_name(), piece.bytes.size(), changed_state);
@@ -166,7 +164,7 @@ FlashReport write_and_verify(const FlashPlan& plan, const FlashImage& image, Wor
     throw FlashError(fmt::format(
         "the image is in place, but the stored parameters CHANGED: at 0x{:08x} there is 0x{:02x} instead of "
         "0x{:02x}. What they were is in {}",
-        parameters_begin + at, after[at], before[at], saved.string()));
+        plan.memory->parameters_begin() + at, after[at], before[at], saved.string()));
   }
   return {crc, crc_of(after)};
 }
@@ -181,12 +179,12 @@ void erase_parameters(const FlashPlan& plan, WorkFolder& folder, const FlashHook
     run.step(step, [&] { return changed || step.changes_flash ? half_erased : std::string(untouched); });
     changed = changed || step.changes_flash;
   }
-  const auto after = run.read(parameters_after_file, parameters_size, half_erased);
+  const auto after = run.read(parameters_after_file, plan.memory->parameters_size(), half_erased);
   const auto left = std::ranges::find_if(after, [](std::uint8_t byte) { return byte != 0xFF; });
   if (left == after.end()) return;
   folder.keep();
   throw FlashError(fmt::format("the tool ended well, but at 0x{:08x} there is 0x{:02x} instead of 0xff: {}",
-                               parameters_begin + (left - after.begin()), *left, half_erased));
+                               plan.memory->parameters_begin() + (left - after.begin()), *left, half_erased));
 }
 
 void start_application(const FlashPlan& plan, WorkFolder& folder, const FlashHooks& hooks) {

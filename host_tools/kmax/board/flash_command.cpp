@@ -122,6 +122,7 @@ flash::FlashTarget target_of(Method method, const BoardProfile& board, const Fla
   const auto found = flash::find_program(program);
   target.program = found ? found->string() : program;
   target.openocd_target = board.openocd_target;
+  target.memory = board.memory;
   target.adapter_kilohertz = options.speed_khz;
   target.usb_serial = options.usb_serial;
   target.serial_port = config.serial_port.empty() ? "SERIAL_PORT" : config.serial_port;
@@ -238,7 +239,7 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const lines::LinesConfig config = read_lines_config(options.lines);
   const BoardProfile& board = chosen_board(options.board, config);
   std::optional<flash::FlashImage> image;
-  if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board));
+  if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board), *board.memory);
   const auto usb = flash::list_usb_devices(services.usb_devices);
   const auto verdicts = flash::judge_methods(board, config, usb);
   const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);

@@ -9,9 +9,13 @@
 
 namespace kmax::flash::flash_image_test {
 
+constexpr const ChipMemory& memory = stm32f405_memory;
+
 class FlashImageFile : public testing::Test {
  protected:
-  FlashImage load(const std::string& file) { return FlashImage::load(folder.write("image.elf", file)); }
+  FlashImage load(const std::string& file) {
+    return FlashImage::load(folder.write("image.elf", file), memory);
+  }
   std::string refusal(const std::string& file) {
     return host_tools_test::thrown_message<ImageError>([&] { load(file); });
   }
@@ -26,14 +30,14 @@ class FlashImageFile : public testing::Test {
 // RM0090, embedded flash memory interface, flash module organization (STM32F405xx/07xx): 4 sectors of 16
 // KiB, one of 64, seven of 128.
 TEST(ChipMemory, HasTheSectorsOfTheReferenceManual) {
-  EXPECT_EQ(sectors[3].begin, 0x0800'C000u);
-  EXPECT_EQ(sectors[4].begin, 0x0801'0000u);
-  EXPECT_EQ(sectors[5].begin, 0x0802'0000u);
-  EXPECT_EQ(sectors[11].begin, 0x080E'0000u);
-  EXPECT_EQ(sector_of(0x0800'FFFF), 3u);
-  EXPECT_EQ(sector_of(0x0801'0000), 4u);
-  EXPECT_EQ(sector_of(0x0810'0000), std::nullopt);
-  EXPECT_EQ(sector_of(0x07FF'FFFF), std::nullopt);
+  EXPECT_EQ(memory.sectors[3].begin, 0x0800'C000u);
+  EXPECT_EQ(memory.sectors[4].begin, 0x0801'0000u);
+  EXPECT_EQ(memory.sectors[5].begin, 0x0802'0000u);
+  EXPECT_EQ(memory.sectors[11].begin, 0x080E'0000u);
+  EXPECT_EQ(memory.sector_of(0x0800'FFFF), 3u);
+  EXPECT_EQ(memory.sector_of(0x0801'0000), 4u);
+  EXPECT_EQ(memory.sector_of(0x0810'0000), std::nullopt);
+  EXPECT_EQ(memory.sector_of(0x07FF'FFFF), std::nullopt);
 }
 
 TEST_F(FlashImageFile, SegmentsOfNeighbouringSectorsBecomeOnePiece) {
@@ -63,13 +67,14 @@ TEST_F(FlashImageFile, SectorsBetweenTwoPiecesAreLeftAlone) {
 
 // Whatever an image holds, its pieces stay away from the parameters and from each other's sectors.
 TEST_F(FlashImageFile, NoPieceSharesASectorWithAnotherOrWithTheParameters) {
-  for (std::uint32_t address = 0x0801'2000; address < flash_end - 0x100; address += 0x7FFC) {
+  for (std::uint32_t address = 0x0801'2000; address < memory.flash_end() - 0x100; address += 0x7FFC) {
     auto segments = made_image();
     segments.push_back({address, made_code(0x100)});
     const FlashImage image = load(made_elf(segments));
     std::vector<std::size_t> owned;
     for (const FlashPiece& piece : image.pieces()) {
-      for (auto sector = *sector_of(piece.address); sector <= *sector_of(piece.end() - 1); ++sector) {
+      for (auto sector = *memory.sector_of(piece.address); sector <= *memory.sector_of(piece.end() - 1);
+           ++sector) {
         EXPECT_NE(sector, 1u);
         EXPECT_NE(sector, 2u);
         for (const auto other : owned) EXPECT_NE(sector, other);
@@ -124,8 +129,9 @@ TEST_F(FlashImageFile, OneOfAnotherReleaseIsRefused) {
 
 TEST_F(FlashImageFile, WhatIsNoImageIsRefused) {
   EXPECT_CONTAINS(refusal(std::string("firmware")), "not an ELF file");
-  EXPECT_CONTAINS(host_tools_test::thrown_message<ImageError>([&] { FlashImage::load(folder / "none.elf"); }),
-                  "none.elf: cannot be read");
+  EXPECT_CONTAINS(
+      host_tools_test::thrown_message<ImageError>([&] { FlashImage::load(folder / "none.elf", memory); }),
+      "none.elf: cannot be read");
 }
 
 // The check value of CRC-32/ISO-HDLC is that of "123456789"; of its first eight letters zlib gives 9AE0DAAF.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "host_tools/flash/program.hpp"
 #include "tests/host_tools/flash/made_elf.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
@@ -19,9 +21,10 @@ class FlashPlanText : public testing::Test {
     return texts;
   }
   host_tools_test::TemporaryFolder folder;
-  FlashImage image = FlashImage::load(folder.write("image.elf", made_elf(made_image())));
+  FlashImage image = FlashImage::load(folder.write("image.elf", made_elf(made_image())), stm32f405_memory);
   FlashTarget target{.program = "tool",
                      .openocd_target = "target/chip.cfg",
+                     .memory = &stm32f405_memory,
                      .swdio = {.chip_number = 0, .offset = 24},
                      .swclk = {.chip_number = 1, .offset = 25},
                      .serial_port = "/dev/ttyS0"};
@@ -128,6 +131,24 @@ TEST_F(FlashPlanText, TheFirstStepsChangeNothingWhereStepsAreSeparate) {
     EXPECT_TRUE(plan.steps[1].changes_flash);
     EXPECT_FALSE(plan.steps.back().changes_flash);
   }
+}
+
+// Whatever is erased and kept is the target's, not one chip's.
+TEST_F(FlashPlanText, AnotherChipsMemoryKeepsItsParametersElsewhere) {
+  constexpr std::array<Sector, 4> sectors = {
+      {{0x0010'0000, 0x800}, {0x0010'0800, 0x800}, {0x0010'1000, 0x1000}, {0x0010'2000, 0x1000}}};
+  const ChipMemory other{sectors, 2, stm32f405_ram};
+  target.memory = &other;
+  for (const Method method : {Method::openocd_gpio, Method::serial, Method::dfu}) {
+    const FlashPlan reset = plan_factory_reset(method, target);
+    EXPECT_EQ(reset.memory, &other);
+    std::string all;
+    for (const Step& step : reset.steps) all += command_text(step.arguments) + "\n";
+    EXPECT_NE(all.find("0x00101000"), std::string::npos) << all;
+    EXPECT_NE(all.find("8192"), std::string::npos) << all;
+    EXPECT_EQ(all.find("0x0800"), std::string::npos) << all;
+  }
+  EXPECT_NE(steps(Method::serial)[1].find("0x00100000:2048"), std::string::npos) << steps(Method::serial)[1];
 }
 
 }  // namespace kmax::flash::flash_plan_test

@@ -20,6 +20,7 @@ class FlashRun : public testing::TestWithParam<Method> {
   }
   FlashTarget target() const {
     FlashTarget made;
+    made.memory = &stm32f405_memory;
     made.program = find_program(std::string(facts_of(GetParam()).program))->string();
     made.serial_port = "/dev/ttyUSB0";
     return made;
@@ -38,7 +39,8 @@ class FlashRun : public testing::TestWithParam<Method> {
   bool openocd() const { return GetParam() == Method::openocd_gpio || GetParam() == Method::openocd_stlink; }
 
   BoardWithTools board;
-  FlashImage image = FlashImage::load(board.folder.write("image.elf", made_elf(made_image())));
+  FlashImage image =
+      FlashImage::load(board.folder.write("image.elf", made_elf(made_image())), stm32f405_memory);
   FlashHooks hooks;
   std::string said;
   std::string before_;
@@ -58,7 +60,7 @@ TEST_P(FlashRun, PutsTheImageInPlaceAndKeepsAllElse) {
   EXPECT_EQ(report.image_crc, image.crc());
   const std::string after = board.flash();
   for (const FlashPiece& piece : image.pieces())
-    EXPECT_EQ(after.substr(piece.address - flash_begin, piece.bytes.size()),
+    EXPECT_EQ(after.substr(piece.address - stm32f405_memory.flash_begin(), piece.bytes.size()),
               std::string(piece.bytes.begin(), piece.bytes.end()));
   EXPECT_EQ(after.substr(0x4000, 0x8000), before_.substr(0x4000, 0x8000));
   EXPECT_EQ(after.substr(0x20000), before_.substr(0x20000)) << "sectors the image does not need";
