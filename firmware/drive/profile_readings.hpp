@@ -16,9 +16,12 @@ namespace kmax::firmware {
 /// profile.supported_modes: CiA 402 bit 9, and the manufacturer's bits for haptic and excitation.
 inline constexpr std::uint32_t supported_drive_modes = 1u << 9 | 1u << 16 | 1u << 17;
 
+/// profile.digital_inputs, CiA 402: the emergency stop is pressed or its line is open.
+inline constexpr std::uint32_t emergency_stop_input = 1u << 16;
+
 /// profile.digital_inputs. The board names one cause at a time, the emergency stop before all others.
 constexpr std::uint32_t digital_inputs_of(const AxisReport& report) {
-  return (report.condition == Fault::emergency_stop ? 1u << 16 : 0u) |
+  return (report.condition == Fault::emergency_stop ? emergency_stop_input : 0u) |
          (report.condition == Fault::gate_driver ? 1u << 17 : 0u) | (report.referenced ? 1u << 18 : 0u);
 }
 

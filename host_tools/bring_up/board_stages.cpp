@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "board/odrive_v3/voltage_variant.hpp"
+#include "firmware/drive/profile_readings.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/selftest/selftest.hpp"
@@ -15,26 +17,24 @@ using selftest::CheckResult;
 using selftest::Evidence;
 using selftest::Probe;
 using selftest::Verdict;
-using std::chrono::milliseconds;
 
 namespace {
-/// Whether the emergency stop's line is open, as CiA 402's digital inputs have it; nothing is armed for it.
+/// Whether the emergency stop's line is open; nothing is armed for it.
 bool stop_is_open(device::Device& device, std::size_t axis) {
-  constexpr std::uint32_t interlock = 1U << 16;
-  return (device.read(device::Parameter::of<"profile.digital_inputs">(axis)) & interlock) != 0;
+  return (device.read(device::Parameter::of<"profile.digital_inputs">(axis)) &
+          firmware::emergency_stop_input) != 0;
 }
 
-/// Looks every 20 ms, for as long as a person has patience.
 template <typename Seen>
 bool wait_for(device::Device& device, const Settings& settings, const Party& party, const char* text,
               Seen seen) {
-  const auto start = device.link().now();
-  while (std::chrono::duration<double>(device.link().now() - start).count() < settings.patience) {
-    party.progress(text);
-    if (seen()) return true;
-    device.link().wait(milliseconds(20));
-  }
-  return false;
+  return bench::wait_for_hand(device.link(), settings.patience, party.progress, text, seen);
+}
+
+/// What the probe has changed, as it was.
+void put_back(Probe& probe) {
+  const selftest::Restored restored = probe.restore();
+  if (!restored.in_order) throw device::DeviceError(restored.words);
 }
 
 /// The handle counts nothing for 0.3 s.
@@ -59,8 +59,7 @@ CheckResult check_stop(device::Device& device, const Settings& settings, const P
         "its line is open: release the button, or connect GPIO5 with GND of J3 by a wire; if that is "
         "done, check plug and cable");
   if (!settings.has_button) return check.pass("its line is closed, by a wire; nothing can stop the device");
-  party.person.ask("Keep a hand at the emergency stop: press it when asked to. Ready? Then");
-  party.progress("press the emergency stop");
+  party.person.ask("Put a hand on the emergency stop, without pressing it yet");
   if (!wait_for(device, settings, party, "press the emergency stop", open))
     return check.fail(
         "emergency stop",
@@ -100,15 +99,17 @@ CheckResult check_divider(double measured, double shown) {
   check.values = {{"measured_to_shown", ratio, "", 0.9, 1.1}};
   const std::string seen =
       fmt::format("the board measures {:.2f} V, the supply shows {:.2f} V", measured, shown);
-  constexpr double ratio_24 = 11.0, ratio_56 = 19.0;
+  using board::odrive_v3::VoltageVariant;
+  const double of_56_to_24 = board::odrive_v3::supply_divider_ratio(VoltageVariant::v56) /
+                             board::odrive_v3::supply_divider_ratio(VoltageVariant::v24);
   const auto near = [ratio](double other) { return std::abs(ratio / other - 1.0) < 0.1; };
   if (near(1.0)) return check.pass(seen);
-  if (near(ratio_56 / ratio_24))
+  if (near(of_56_to_24))
     return check.fail("voltage variant", seen +
                                              ": this is a board for 24 V that the firmware takes for one of "
                                              "56 V, since its memory does not say; build the image with "
                                              "-DKMAX_ODRIVE_VOLTAGE=24");
-  if (near(ratio_24 / ratio_56))
+  if (near(1.0 / of_56_to_24))
     return check.fail("voltage variant", seen +
                                              ": this is a board for 56 V that the firmware takes for one of "
                                              "24 V; build the image with -DKMAX_ODRIVE_VOLTAGE=56");
@@ -123,8 +124,7 @@ Evidence gather(device::Device& device, const Settings& settings, const Party& p
   selftest::SelfTestSettings test;
   test.axis = settings.axis;
   Evidence evidence = gather_evidence(probe, test);
-  const selftest::Restored restored = probe.restore();
-  if (!restored.in_order) throw device::DeviceError(restored.words);
+  put_back(probe);
   return evidence;
 }
 
@@ -219,8 +219,7 @@ StageResult try_logic(device::Device& device, const Settings& settings, const Pa
     party.progress("supply and temperature");
     evidence.supply = probe.read_supply(20);
     evidence.temperature = probe.bench().number("measured.temperature");
-    const selftest::Restored restored = probe.restore();
-    if (!restored.in_order) throw device::DeviceError(restored.words);
+    put_back(probe);
   }
   result.checks = {check_link(evidence), check_clock(device)};
   const auto supply = selftest::mean_and_deviation(evidence.supply, 0, evidence.supply.size());
@@ -257,11 +256,11 @@ StageResult try_motor(device::Device& device, const Settings& settings, const Pa
     Probe probe(device, settings.axis, party.progress);
     const selftest::HandSettings hand{.patience = settings.patience};
     result.checks.push_back(check_hand_motion(
-        probe, hand, [&](const std::string& text) { party.person.ask("When you are ready to " + text); }));
-    probe.restore();
+        probe, hand, [&](const std::string& text) { party.person.ask("Get ready to " + text); }));
+    put_back(probe);
   }
   if (!result.passed()) return result;
-  party.person.ask("Let go of the handle. To go on");
+  party.person.ask("Let go of the handle");
   if (!stands(device, settings, party)) {
     result.checks.push_back(
         CheckResult{"handle"}.fail("handle", "it does not come to rest: something moves it"));

@@ -47,8 +47,9 @@ void require_turn(const Report& report, const Settings& settings) {
 bool do_stage(Stage stage, device::Device& device, Report& report, const Settings& settings,
               const Party& party, const std::function<void(const Report&)>& keep) {
   const StageText& text = text_of(stage);
-  party.person.ask(fmt::format("Stage {}: {}.\nConnect: {}\nThis will happen: {}\nTo go on", text.name,
-                               text.title, text.connect, text.does));
+  party.person.ask(
+      fmt::format("Stage {}: {}.\nConnect: {}\nThis will happen: {}\nConnect it, look at it once more",
+                  text.name, text.title, text.connect, text.does));
   party.begins(text);
   StageResult result = run(stage, device, settings, party);
   result.stage = stage;

@@ -22,7 +22,7 @@ struct Settings {
 
 /// Whoever is at the board, and who hears of it.
 struct Party {
-  bench::Prompter& person;                           ///< told what to connect and to do
+  bench::Prompter& person;                           ///< shown what to connect, asked to do it
   std::function<void(const std::string&)> progress;  ///< often; what it throws ends the stage
   std::function<void(const StageText&)> begins;      ///< a stage, after the person has agreed
   std::function<void(const StageResult&)> ended;     ///< a stage; its result is in the report
@@ -35,7 +35,7 @@ class OutOfTurn : public std::runtime_error {
 };
 
 /// Leads through the stages, one after the other, until one fails or all have passed. Before each the person
-/// is told what to connect and what will be done, and asked to go on. `keep` gets the report after each.
+/// reads what to connect and what will be done, and agrees. `keep` gets the report after each.
 ///
 /// A stage ends with the axis disarmed and every parameter as it was; what the calibration found is saved,
 /// and the walls' stages leave the wall's place and stiffness that they ended with, unsaved.

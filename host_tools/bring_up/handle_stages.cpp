@@ -8,9 +8,7 @@
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/check/judgement.hpp"
-#include "host_tools/device/drive.hpp"
 #include "host_tools/device/value_text.hpp"
-#include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/device_rig.hpp"
 
 namespace kmax::bring_up {
@@ -62,8 +60,9 @@ class WallTrial {
     experiment::TouchPlan plan;
     plan.name = fmt::format("wall of {:.2f} N/mm", stiffness * 1e-3);
     plan.request = fmt::format(
-        "{}: take the handle; move it slowly to the wall, {:.0f} mm away, and press lightly "
-        "against it for 2 s",
+        "{}: take the handle, and be ready to move it slowly by {:.0f} mm, to where its position falls or, "
+        "with "
+        "wall.side -1, rises, and to press lightly against the wall for 2 s",
         plan.name, way_to_wall * 1e3);
     plan.hold_time = 2.0;
     return rig_

@@ -27,8 +27,8 @@ class TerminalPrompter final : public bench::Prompter {
   std::string advice_;
 };
 
-/// A line that nobody shall see: from standard input, where a terminal is told not to show what is typed and
-/// `prompt` is shown; from anything else it is read without a word. Errors: std::runtime_error when it is
+/// A line that nobody shall see: from standard input, where a terminal shows `prompt` and not what is
+/// typed; from anything else it is read without a word. Errors: std::runtime_error when it is
 /// interrupted; UsageError when standard input ends before a line.
 std::string hidden_line(Context& context, const std::string& prompt);
 

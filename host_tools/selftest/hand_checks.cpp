@@ -3,25 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
+#include "host_tools/bench/prompter.hpp"
 #include "host_tools/device/drive.hpp"
 
 namespace kmax::selftest {
 
-using std::chrono::milliseconds;
-
 namespace {
-/// Calls `seen` every 20 ms until it is true. False: patience is over.
 template <typename Seen>
 bool wait_for(Probe& probe, const HandSettings& settings, const char* text, Seen seen) {
-  const auto start = probe.device().link().now();
-  while (std::chrono::duration<double>(probe.device().link().now() - start).count() < settings.patience) {
-    probe.bench().progress(text);
-    if (seen()) return true;
-    probe.device().link().wait(milliseconds(20));
-  }
-  return false;
+  return bench::wait_for_hand(
+      probe.device().link(), settings.patience,
+      [&probe](const std::string& words) { probe.bench().progress(words); }, text, seen);
 }
 }  // namespace
 

@@ -1,7 +1,7 @@
 // Every fault that the virtual board can make, in every state of a drive, on both axes: the force is gone in
 // time, the axis says why, it cannot be armed while the cause lasts, and it can when the cause is gone and
 // the fault is cleared. What is measured is held against docs/fault_matrix.md. KMAX_WRITE_DOCS=1 in the
-// environment writes the page's rows anew.
+// environment writes the page's rows again.
 #include <gtest/gtest.h>
 
 #include <bit>

@@ -1,6 +1,7 @@
 // kmax bring-up.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -47,10 +48,25 @@ struct BringUpOptions {
   }
 };
 
-/// Agrees to everything; the moves of a hand are those of a simulated one.
-class NobodyAsked final : public bench::Prompter {
+/// Asks whoever is at the terminal, in lines that fit there; or nobody, as if all were agreed to.
+class StagePrompter final : public bench::Prompter {
  public:
-  void ask(const std::string& /*what_to_do*/) override {}
+  StagePrompter(TerminalPrompter* terminal, Progress& progress) : terminal_(terminal), progress_(progress) {}
+  void ask(const std::string& what_to_do) override {
+    if (terminal_ == nullptr) return;
+    progress_.make_room();
+    std::string text;
+    for (std::size_t begin = 0; begin <= what_to_do.size();) {
+      const std::size_t end = std::min(what_to_do.find('\n', begin), what_to_do.size());
+      text += (begin == 0 ? "" : "\n") + wrapped(what_to_do.substr(begin, end - begin), 72, 2);
+      begin = end + 1;
+    }
+    terminal_->ask(text);
+  }
+
+ private:
+  TerminalPrompter* terminal_;
+  Progress& progress_;
 };
 
 std::string range_text(const MeasuredValue& value) {
@@ -66,7 +82,8 @@ void print_result(Context& context, const bring_up::Report& before, std::size_t 
                   const StageResult& result) {
   for (const CheckResult& check : result.checks) {
     print(context.out, "  {:<22}{}\n", check.name, selftest::name_of(check.verdict));
-    if (check.verdict != selftest::Verdict::pass) print(context.out, "    {}\n", check.message);
+    if (check.verdict != selftest::Verdict::pass)
+      print(context.out, "    {}\n", wrapped(check.message, 72, 4));
     for (const MeasuredValue& value : check.values) {
       const auto was = before.number(axis, result.stage, check.name, value.name);
       print(context.out, "    {:<28}{:>12.5g} {:<8} {:<18}{}\n", value.name, value.value, value.unit,
@@ -127,23 +144,25 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
     if (interruption.requested()) throw bench::Interrupted("interrupted; 'kmax bring-up' goes on from here");
   };
   TerminalPrompter terminal(context, check, "somebody must be at the board; --yes asks nothing");
-  NobodyAsked nobody;
   Progress progress(context.messages());
+  StagePrompter prompter(options.yes ? nullptr : &terminal, progress);
   const auto keep = [&file](const bring_up::Report& now) { base::write_file(file, now.text()); };
-  const bring_up::Party party{
-      options.yes ? static_cast<bench::Prompter&>(nobody) : terminal,
-      [&](const std::string& text) {
-        check();
-        if (!text.empty()) progress.show(text);
-      },
-      [&](const StageText& text) { context.note(fmt::format("stage {}", text.name)); },
-      [&](const StageResult& result) {
-        if (context.json) return;
-        progress.make_room();
-        print(context.out, "{}: {}\n", bring_up::text_of(result.stage).name,
-              result.passed() ? "passed" : "FAILED");
-        print_result(context, before, settings.axis, result);
-      }};
+  const bring_up::Party party{prompter,
+                              [&](const std::string& text) {
+                                check();
+                                if (!text.empty()) progress.show(text);
+                              },
+                              [&](const StageText& text) {
+                                progress.make_room();
+                                context.note(fmt::format("stage {}", text.name));
+                              },
+                              [&](const StageResult& result) {
+                                if (context.json) return;
+                                progress.make_room();
+                                print(context.out, "{}: {}\n", bring_up::text_of(result.stage).name,
+                                      result.passed() ? "passed" : "FAILED");
+                                print_result(context, before, settings.axis, result);
+                              }};
   bool passed = false;
   try {
     passed = bring_up::bring_up(device, report, settings, party, keep);

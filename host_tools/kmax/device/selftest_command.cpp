@@ -59,24 +59,6 @@ void print_json(Context& context, const selftest::Report& report) {
                  {"conclusion", selftest::conclusion(report)}});
 }
 
-/// `text` in lines of at most `width`, the further ones indented.
-std::string wrapped(const std::string& text, std::size_t width, std::size_t indent) {
-  std::string out, line;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    std::size_t end = text.find(' ', begin);
-    if (end == std::string::npos) end = text.size();
-    const std::string word = text.substr(begin, end - begin);
-    if (!line.empty() && line.size() + 1 + word.size() > width) {
-      out += line + "\n" + std::string(indent, ' ');
-      line.clear();
-    }
-    line += (line.empty() ? "" : " ") + word;
-    begin = end + 1;
-  }
-  return out + line;
-}
-
 void print_table(Context& context, const selftest::Report& report) {
   constexpr std::size_t name_width = 23, verdict_width = 11, width = 108;
   constexpr std::size_t indent = name_width + verdict_width;

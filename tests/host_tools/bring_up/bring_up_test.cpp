@@ -15,7 +15,9 @@ using simulation::TemperatureSensor;
 /// A new board, on x86.
 struct StartedBoard {
   explicit StartedBoard(const std::string& scene)
-      : board(selftest::TestedAxis::opened(scene, false), 0),
+      : StartedBoard(selftest::TestedAxis::opened(scene, false)) {}
+  explicit StartedBoard(const simulation::Scene& scene)
+      : board(scene, 0),
         person(*board.device, board.drives(), [this](bool pressed) { press_stop(pressed); }) {
     board.link->before_tick = [this] { person.move_hand(); };
   }
@@ -200,6 +202,17 @@ TEST(BringUp, ExchangedLeadsAndLinesAreCuredByTheCalibration) {
     };
     EXPECT_TRUE(board.person.run()) << board.person.text();
   }
+}
+
+TEST(BringUp, ThreeResistorsInAStarAreALoad) {
+  simulation::Scene scene = selftest::TestedAxis::opened("gimbal_b", false);
+  auto& motor = std::get<simulation::SynchronousMotorConfig>(*scene.axes[0].motor);
+  motor.resistance = 4.7;
+  motor.inductance_d = motor.inductance_q = 10e-6;
+  motor.torque_constant = 1e-5;
+  StartedBoard board(scene);
+  EXPECT_FALSE(board.person.run()) << "they do not move";
+  EXPECT_EQ(board.person.report.next(0), Stage::motor) << board.person.text();
 }
 
 TEST(BringUp, WhoEndsItLeavesTheDeviceInOrder) {

@@ -38,7 +38,7 @@ class PersonAtTheBench final : public bench::Prompter {
     if (is("Stage load")) drives_.plant(0, Defect::motor_blocked);
     if (is("Stage motor")) drives_.mend(0, Defect::motor_blocked);
     if (is("Stage") && at_stage) at_stage(what_to_do);
-    if (is("When you are ready to move")) take_hand(Hand::swings);
+    if (is("Get ready to move")) take_hand(Hand::swings);
     if (is("wall of")) take_hand(Hand::presses);
   }
 
