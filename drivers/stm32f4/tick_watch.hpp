@@ -9,10 +9,11 @@
 // up, or be halted by a debugger, for whom timers and DMA go on. RM0090, Advanced-control timers, DMA
 // controller. No pin of the board is left for a break input.
 //
-//   each turn of TIM8     stream 1 puts the comparison of its channel 4 into the middle of the half period to
-//   come each tick             puts it out of reach again: one store no tick by then       stream 7 gives
-//   TIM1 a break and an event on channel 4, and that event's stream 4 writes
-//                         TIM8's BDTR without MOE
+// - Each turn of TIM8: stream 1 of DMA2 puts the comparison of its channel 4 into the middle of the half
+//   period to come.
+// - Each tick: one store puts it out of reach again.
+// - No tick by then: stream 7 gives TIM1 a break and an event on channel 4, and on that event stream 4 writes
+//   TIM8's BDTR without MOE.
 //
 // So the gates are off at most 25 us + 12.5 us after the last tick began, and stay off: MOE is cleared as by
 // a break, and nothing but `arm` sets it. Both timers' CC4IF say who did it

@@ -1,5 +1,5 @@
 #pragma once
-// The motors, handles, persons and the supply of a scene behind the power stage of a board:
+// The motors, handles, people and the supply of a scene behind the power stage of a board:
 // what the native board and the virtual board have in common.
 //
 // Time passes in advance() only, under the legs set last. An axis that the scene does not have, or has

@@ -25,7 +25,7 @@
 // 7. While the write lock is locked, as lock.state says, nothing changes that can be set, but what commands
 // an axis and what is recorded, over neither link; nor do the memory of the parameters, the bit rate and the
 // node ID in use, unless NMT resets the communication, and no log is erased. Locked is what has a code, after
-// every start, and only its code opens it, while no axis is armed. No value, nothing that is sent tells the
+// every start, and only its code opens it, while no axis is armed. No value, nothing that is sent contains the
 // code.
 //
 // Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
@@ -73,7 +73,7 @@ class SafetyOracle {
     if (whole && code_is_kept && !is_locked(values)) next.complain("not locked after a start", 0);
     *this = std::move(next);
   }
-  /// A code that is told by nothing but chance if the device does not tell it.
+  /// A code that appears by chance alone if the device does not reveal it.
   void expect_secret(std::uint32_t code) { secret_ = code; }
   /// Otherwise nothing of the lock is looked at, and lock.state need not be up to date.
   bool may_have_code() const { return any_code_ || !codes_.empty(); }
