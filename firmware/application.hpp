@@ -65,6 +65,8 @@ class Application {
 
   /// The result is valid until the axis' next tick.
   const AxisOutput& ISR_tick(std::size_t axis, const Tick::SlotInput& input);
+  /// In place of it, for an axis that the board does not have.
+  [[gnu::cold]] void ISR_pass(std::size_t axis);
   /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
     TickOutput output;

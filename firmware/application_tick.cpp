@@ -7,4 +7,8 @@ const AxisOutput& Application::ISR_tick(std::size_t axis, const Tick::SlotInput&
   return axes_.tick().ISR_tick(axis, input);
 }
 
+void Application::ISR_pass(std::size_t axis) {
+  axes_.tick().ISR_pass(axis);
+}
+
 }  // namespace kmax::firmware

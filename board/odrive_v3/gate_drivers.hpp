@@ -5,6 +5,7 @@
 
 #include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/pins.hpp"
+#include "board/power/power_stage.hpp"
 #include "drivers/cortex_m/cycle_counter.hpp"
 #include "drivers/current_sense.hpp"
 #include "drivers/drv8301.hpp"
@@ -21,22 +22,26 @@ class GateDrivers {
  public:
   explicit GateDrivers(ChipBus& bus) : bus_(bus) {}
 
-  /// Both control registers written and read back. False: the chip does not answer or does not keep them.
-  bool configure(std::size_t axis, drivers::CurrentSenseGain gain) {
+  /// Both control registers written and read back.
+  GateDriverAnswer configure(std::size_t axis, drivers::CurrentSenseGain gain) {
     // The tick's frame holds the bus for 25 us.
     bool claimed = bus_.claim();
     for (unsigned attempt = 0; attempt < 10 && !claimed; ++attempt) {
       delay_us(10);
       claimed = bus_.claim();
     }
-    if (!claimed) return false;
+    if (!claimed) return GateDriverAnswer::refused;
     Selected chip{bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
     drivers::Drv8301<Selected> driver{chip};
     drivers::Drv8301Config config;
     config.gain = gain;
+    using enum drivers::Drv8301Result;
     const drivers::Drv8301Result result = driver.configure(config);
+    // A line that nobody drives also ends what had begun well.
+    const bool silent = (result == stuck_high || result == stuck_low) && driver.probe() == result;
     bus_.release();
-    return result == drivers::Drv8301Result::ok;
+    if (result == ok) return GateDriverAnswer::accepted;
+    return silent ? GateDriverAnswer::silent : GateDriverAnswer::refused;
   }
 
  private:

@@ -216,7 +216,7 @@ void tick_without_power() {
       const std::uint32_t now = system_tick.now_us();
       if (!power_runs) tick_without_power();
       if (power_runs) {
-        firmware::BoardReadings readings = power->drives().readings();
+        firmware::BoardReadings readings = power->readings();
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
         application->set_readings(readings);
       }

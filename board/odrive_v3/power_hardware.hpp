@@ -84,7 +84,7 @@ class PowerHardware {
   bool fault_line_low() const { return !pin(pins::gate_driver_fault).read(); }
   /// The contact to ground is closed while all is well; an open line is pulled up.
   bool emergency_stop_open() const { return pin(pins::emergency_stop).read(); }
-  bool configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
+  GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
     return gate_drivers_.configure(axis, gain);
   }
   void show_healthy(bool healthy) { pin(pins::healthy).write(healthy); }

@@ -113,6 +113,8 @@ class Drives {
   template <typename Application, typename Stage>
   [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, Application& application,
                                               const Stage& stage) {
+    if (!in_service(axis)) [[unlikely]]
+      return ISR_pass(axis, application);
     const firmware::AxisInput input = ISR_measure(axis, stage);
     if constexpr (Application::needs_all_positions) {
       const auto inputs = ISR_beside_others(axis, input);
@@ -120,9 +122,18 @@ class Drives {
     } else {
       ISR_drive(axis, application.ISR_tick(axis, input), input.motor.supply_voltage, stage);
     }
-    if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
-      main_loop_due_.store(true, std::memory_order_relaxed);
+    ISR_end_round(axis, application);
   }
+
+  /// What goes on in place of an absent axis' tick: settings, the frame of the other axis' encoder, the
+  /// brake, and the round.
+  template <typename Application>
+  [[gnu::noinline, gnu::cold]] void ISR_pass(std::size_t axis, Application& application) {
+    ISR_pass(axis);
+    application.ISR_pass(axis);
+    ISR_end_round(axis, application);
+  }
+  [[gnu::cold]] void ISR_pass(std::size_t axis);
 
   /// The two parts of ISR_tick(), before and after the application's, for a board in which all axes are
   /// sampled together.
@@ -143,8 +154,15 @@ class Drives {
   /// brake are off then.
   bool ISR_ticks_have_stopped();
 
-  /// Main loop: what the parameters say, when no axis is armed.
-  void apply(const firmware::ParameterValues& values);
+  /// Main loop: what the parameters say, when no axis is armed; and which axes the board does not have.
+  void apply(const firmware::ParameterValues& values,
+             const std::array<bool, firmware::axis_count>& absent = {});
+  bool in_service(std::size_t axis) const { return !absent_[axis].load(std::memory_order_relaxed); }
+  std::array<bool, firmware::axis_count> in_service() const {
+    std::array<bool, firmware::axis_count> all{};
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) all[axis] = in_service(axis);
+    return all;
+  }
   /// Amplifier gain that the present current limits need.
   drivers::CurrentSenseGain gain() const { return gain_; }
 
@@ -213,6 +231,12 @@ class Drives {
     return axis;
   }
 
+  template <typename Application>
+  [[gnu::always_inline]] inline void ISR_end_round(std::size_t axis, const Application& application) {
+    if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
+      main_loop_due_.store(true, std::memory_order_relaxed);
+  }
+  [[gnu::always_inline]] inline void ISR_end_tick(std::size_t axis, float supply_voltage);
   Inputs ISR_beside_others(std::size_t axis, const firmware::AxisInput& input);
   [[gnu::always_inline]] inline Count ISR_read_count(std::size_t axis, const Settings& settings,
                                                      bool driving);
@@ -245,6 +269,7 @@ class Drives {
   std::atomic<bool> calibrating_{false}, main_loop_due_{false}, brake_inhibited_{false};
   bool ISR_brake_on_ = false;
   std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
+  std::array<std::atomic<bool>, firmware::axis_count> absent_{};
   /// An axis' tick sets both bits; who has seen one takes it back.
   static constexpr std::uint8_t for_the_clock = 1, for_the_main_loop = 2;
   std::array<std::atomic<std::uint8_t>, firmware::axis_count> ticked_{};
@@ -320,7 +345,7 @@ typename Drives<Hardware>::Inputs Drives<Hardware>::ISR_beside_others(std::size_
                        .reference_generation = input.reference_generation};
   Inputs inputs{};
   for (std::size_t other = 0; other < firmware::axis_count; ++other) {
-    if (!hardware_.has(other)) continue;
+    if (!hardware_.has(other) || !in_service(other)) continue;
     const Axis& of = axes_[other];
     const EncoderRole role = double_buffer_.ISR_current().role[other];
     const bool on_lines = role == EncoderRole::lines || role == EncoderRole::lines_beside_chip;
@@ -368,6 +393,21 @@ inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisO
     axis.arm_failed = !axis.driving;
     if (stage.condition() != firmware::Fault::none) bridge.disarm();
   }
+  ISR_end_tick(index, supply_voltage);
+}
+
+template <typename Hardware>
+void Drives<Hardware>::ISR_pass(std::size_t index) {
+  const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
+  const float supply = supply_.volts(hardware_.ISR_sample(index).supply);
+  hardware_.bridge(index).disarm();
+  axes_[index].driving = axes_[index].arm_failed = false;
+  if (settings.role[index] == EncoderRole::lines_beside_chip) ISR_begin_serial();
+  ISR_end_tick(index, supply);
+}
+
+template <typename Hardware>
+inline void Drives<Hardware>::ISR_end_tick(std::size_t index, float supply_voltage) {
   ticked_[index].store(for_the_clock | for_the_main_loop, std::memory_order_relaxed);
   if (index == first_axis()) {
     const Settings& settings = double_buffer_.ISR_current();
@@ -419,13 +459,14 @@ bool Drives<Hardware>::all_have_ticked() {
 }
 
 template <typename Hardware>
-void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
+void Drives<Hardware>::apply(const firmware::ParameterValues& values,
+                             const std::array<bool, firmware::axis_count>& absent) {
   Settings settings;
   float largest_current = 0.0f;
   // There is one chip: the first axis that asks for it has it.
   bool chip_asked_for = false, chip_moves = false;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    if (values.whole<"encoder.kind">(axis) == 1) {
+    if (values.whole<"encoder.kind">(axis) == 1 && !absent[axis]) {
       settings.role[axis] = chip_asked_for ? EncoderRole::missing : EncoderRole::chip;
       chip_asked_for = true;
     }
@@ -442,9 +483,10 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
     const auto role = settings.role[axis], role_before = settings_.role[axis];
     chip_moves = chip_moves || (role == EncoderRole::chip) != (role_before == EncoderRole::chip);
     const bool same = role == role_before && settings.quadrature[axis] == settings_.quadrature[axis];
-    settings.encoder_generation[axis] = settings_.encoder_generation[axis] + (same ? 0U : 1U);
+    const bool stays = in_service(axis) != absent[axis];
+    settings.encoder_generation[axis] = settings_.encoder_generation[axis] + (same && stays ? 0U : 1U);
     const float trip = firmware::over_current_factor * values.real<"current.limit">(axis);
-    if (trip > largest_current) largest_current = trip;
+    if (!absent[axis] && trip > largest_current) largest_current = trip;
     const auto motor = values.choice<firmware::MotorKind, "motor.kind">(axis);
     // A brushed motor lies between B and C.
     if (hardware_.has(axis))
@@ -455,6 +497,8 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values) {
   if (chip_moves) serial_encoder().restart_without_turns();
   settings_ = settings;
   double_buffer_.offer(settings_);
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+    absent_[axis].store(absent[axis], std::memory_order_relaxed);
   gain_ = drivers::gain_for_current(largest_current);
 }
 
@@ -475,7 +519,7 @@ template <typename Hardware>
 OffsetProgress Drives<Hardware>::offset_progress() {
   bool refused = false;
   for (std::size_t index = 0; index < firmware::axis_count; ++index) {
-    if (!hardware_.has(index)) continue;
+    if (!hardware_.has(index) || !in_service(index)) continue;
     for (const auto* offset : {&axes_[index].offset_b, &axes_[index].offset_c}) {
       if (offset->result() == drivers::OffsetResult::running) return OffsetProgress::running;
       refused = refused || offset->result() != drivers::OffsetResult::accepted;

@@ -14,8 +14,8 @@ concept MotorHardware = DriveHardware<Hardware> &&
   {hardware.set_gate_enable(level)};
   { constant.fault_line_low() } -> std::same_as<bool>;
   { constant.emergency_stop_open() } -> std::same_as<bool>;
-  /// Writes and reads back one gate driver; false: it does not answer or does not keep what is written.
-  { hardware.configure_gate_driver(axis, gain) } -> std::same_as<bool>;
+  /// Writes and reads back one gate driver.
+  { hardware.configure_gate_driver(axis, gain) } -> std::same_as<GateDriverAnswer>;
 };
 
 /// All that drives motors: the drives and the sequence of their power stage.
@@ -39,8 +39,12 @@ class Power {
     drives_.ISR_tick(axis, application, stage_);
   }
   /// The two parts of ISR_tick(), for a board in which all axes are sampled together.
-  firmware::AxisInput ISR_measure(std::size_t axis) { return drives_.ISR_measure(axis, stage_); }
+  firmware::AxisInput ISR_measure(std::size_t axis) {
+    if (!drives_.in_service(axis)) return {};
+    return drives_.ISR_measure(axis, stage_);
+  }
   void ISR_drive(std::size_t axis, const firmware::AxisOutput& output, float supply_voltage) {
+    if (!drives_.in_service(axis)) return drives_.ISR_pass(axis);
     drives_.ISR_drive(axis, output, supply_voltage, stage_);
   }
 
@@ -62,7 +66,16 @@ class Power {
   void take_parameters(const firmware::Application& application) {
     taken_changes_ = application.parameter_changes();
     taken_ = true;
-    drives_.apply(application.values());
+    std::array<bool, firmware::axis_count> absent = lines_.missing;
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      absent[axis] = absent[axis] || application.values().template whole<"drive.declared_absent">(axis) != 0;
+    drives_.apply(application.values(), absent);
+  }
+  /// Main loop: for the application.
+  firmware::BoardReadings readings() const {
+    firmware::BoardReadings readings = drives_.readings();
+    readings.gate_driver_missing = lines_.missing;
+    return readings;
   }
 
   /// Main loop, after the application's poll(), at least every few milliseconds: takes parameters over while
@@ -75,7 +88,11 @@ class Power {
     if (stage_.ready() && !was_ready_) drives_.serial_encoder().restart();
     was_ready_ = stage_.ready();
     if (!armed) {
-      if (!taken_ || application.parameter_changes() != taken_changes_) take_parameters(application);
+      const auto in_service = drives_.in_service();
+      if (!taken_ || application.parameter_changes() != taken_changes_ || lines_.found_missing)
+        take_parameters(application);
+      lines_.found_missing = false;
+      if (drives_.in_service() != in_service) stage_.restart(now_us);
       if (stage_.ready() && lines_.configured_gain != drives_.gain()) stage_.restart(now_us);
     }
     stage_.poll(now_us, armed);
@@ -87,7 +104,9 @@ class Power {
     void set_gate_enable(bool level) { drives.hardware().set_gate_enable(level); }
     bool fault_line_low() const { return drives.hardware().fault_line_low(); }
     bool emergency_stop_open() const { return drives.hardware().emergency_stop_open(); }
-    bool configure_gate_driver(std::size_t axis) {
+    bool in_service(std::size_t axis) const { return drives.in_service(axis) && !missing[axis]; }
+    void set_missing(std::size_t axis) { missing[axis] = found_missing = true; }
+    GateDriverAnswer configure_gate_driver(std::size_t axis) {
       configured_gain = drives.gain();
       return drives.hardware().configure_gate_driver(axis, configured_gain);
     }
@@ -96,6 +115,8 @@ class Power {
 
     Drives<Hardware>& drives;
     drivers::CurrentSenseGain configured_gain = drivers::CurrentSenseGain::x80;
+    std::array<bool, firmware::axis_count> missing{};
+    bool found_missing = false;  ///< and not yet taken over
   };
   static_assert(PowerStageHardware<Lines>);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <concepts>
 #include <cstdint>
@@ -11,6 +12,12 @@ namespace kmax::board {
 
 enum class OffsetProgress : std::uint8_t { running, accepted, refused };
 
+enum class GateDriverAnswer : std::uint8_t {
+  accepted,
+  silent,   ///< a line that nobody drives
+  refused,  ///< it does not keep what is written, or the bus was not to be had
+};
+
 /// What the power stage's sequence needs of the board. All calls come from the main loop.
 template <typename Hardware>
 concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool level) {
@@ -18,8 +25,12 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   {hardware.set_gate_enable(level)};
   { hardware.fault_line_low() } -> std::same_as<bool>;
   { hardware.emergency_stop_open() } -> std::same_as<bool>;
-  /// Writes and reads back one DRV8301; false: it does not answer or does not keep what is written.
-  { hardware.configure_gate_driver(axis) } -> std::same_as<bool>;
+  /// False: an axis that is left alone, and whose other functions here are not called.
+  { hardware.in_service(axis) } -> std::same_as<bool>;
+  /// Writes and reads back one DRV8301.
+  { hardware.configure_gate_driver(axis) } -> std::same_as<GateDriverAnswer>;
+  /// The axis' gate driver is not there: in_service() is false for it from now on.
+  {hardware.set_missing(axis)};
   /// Begins to average the current sensors' codes with the bridges off.
   {hardware.restart_offset_calibration()};
   { hardware.offset_progress() } -> std::same_as<OffsetProgress>;
@@ -30,9 +41,13 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 ///
 ///   resetting   EN_GATE low for 1 ms (20 us make a full reset)
 ///   waking      20 ms until the gate drivers' serial interface answers
-///   configuring both chips written and read back; a chip that fails sends all to `resetting` after 200 ms
+///   configuring the chips written and read back; one that fails sends all to `resetting` after 200 ms
 ///   measuring   offsets of the current sensors
 ///   ready
+///
+/// A board need not have all axes. A gate driver that has never answered since the start, three times while
+/// another accepted what was written, is not there, and the board goes on without its axis. One that has
+/// answered and is silent later has failed, and so has a board none of whose gate drivers answers.
 ///
 /// An edge of nFAULT takes ready to `resetting` as soon as no axis is armed: the driver's latched fault goes
 /// away with the reset, and comes back if its cause is still there. So the host's fault reset is all that a
@@ -46,6 +61,7 @@ template <PowerStageHardware Hardware>
 class PowerStage {
  public:
   static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000;
+  static constexpr std::uint8_t rounds_until_missing = 3;
 
   explicit PowerStage(Hardware& hardware) : hardware_(hardware) {}
 
@@ -100,6 +116,29 @@ class PowerStage {
     since_us_ = now_us;
   }
 
+  /// All axes in service; those that are found missing are no longer.
+  bool configure_gate_drivers() {
+    bool any = false, all = true;
+    std::array<bool, firmware::axis_count> silent{};
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (!hardware_.in_service(axis)) continue;
+      const GateDriverAnswer answer = hardware_.configure_gate_driver(axis);
+      silent[axis] = answer == GateDriverAnswer::silent && !has_answered_[axis];
+      has_answered_[axis] = has_answered_[axis] || answer != GateDriverAnswer::silent;
+      any = any || answer == GateDriverAnswer::accepted;
+      all = all && (answer == GateDriverAnswer::accepted || silent[axis]);
+    }
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (!silent[axis]) continue;
+      if (any && ++silent_rounds_[axis] >= rounds_until_missing) {
+        hardware_.set_missing(axis);
+      } else {
+        all = false;
+      }
+    }
+    return all;
+  }
+
   void advance(std::uint32_t now_us) {
     const std::uint32_t elapsed = now_us - since_us_;
     switch (state_) {
@@ -111,8 +150,7 @@ class PowerStage {
         if (elapsed < wake_us) return;
         // The drivers pull nFAULT while they start; an edge from then says nothing.
         fault_edge_.store(false, std::memory_order_relaxed);
-        for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-          if (hardware_.configure_gate_driver(axis)) continue;
+        if (!configure_gate_drivers()) {
           condition_.store(firmware::Fault::power_stage, std::memory_order_relaxed);
           return enter(State::waiting, now_us);
         }
@@ -146,6 +184,8 @@ class PowerStage {
   State state_ = State::resetting;
   std::uint32_t since_us_ = 0;
   bool started_ = false;
+  std::array<bool, firmware::axis_count> has_answered_{};
+  std::array<std::uint8_t, firmware::axis_count> silent_rounds_{};
   // Each flag is set by its interrupt and taken back by the main loop; the condition is the main loop's.
   std::atomic<bool> fault_edge_{false}, stop_edge_{false};
   std::atomic<firmware::Fault> condition_{firmware::Fault::power_stage};

@@ -7,6 +7,9 @@
 
 namespace kmax::firmware {
 
+/// Whether a board has an axis; in the numbers of drive.presence.
+enum class AxisPresence : std::uint8_t { present, no_answer, declared_absent };
+
 /// What a board measures slowly and counts, for a host to read and for the main loop's trips.
 struct BoardReadings {
   std::array<float, axis_count> power_stage_temperature = [] {
@@ -16,8 +19,9 @@ struct BoardReadings {
   }();                          ///< degC
   float supply_voltage = 0.0f;  ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
-  bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
-  bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
+  std::array<bool, axis_count> gate_driver_missing{};  ///< has not answered since the start
+  bool has_power_stage = false;                        ///< false: forces are ideal, and nothing is commutated
+  bool ticks_have_stopped = false;                     ///< no tick for a while: nobody else could say so
 };
 
 }  // namespace kmax::firmware

@@ -105,6 +105,7 @@ Supervisor::Situation Axes::situation(std::size_t axis) {
           .guard_failed = guard_[axis].verdict == GuardFinding::Verdict::fail,
           .store_busy = store_.keeper().busy(),
           .restarting = can.restart_asked,
+          .absent = presence(axis) != AxisPresence::present,
           .pushes_anothers_axis = pushes_anothers_axis(axis),
           .off_the_bus = can.is_off,
           .heartbeat_lost = can.heartbeat_lost};

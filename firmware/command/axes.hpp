@@ -63,6 +63,10 @@ class Axes {
   const ThermalSupervisor& thermal(std::size_t axis) const { return thermal_[axis]; }
   const AxesSettings::Scale& scale(std::size_t axis) const { return settings_.scale(axis); }
   const BoardReadings& readings() const { return readings_; }
+  AxisPresence presence(std::size_t axis) const {
+    if (parameters_.values().whole<"drive.declared_absent">(axis) != 0) return AxisPresence::declared_absent;
+    return readings_.gate_driver_missing[axis] ? AxisPresence::no_answer : AxisPresence::present;
+  }
   /// By the present parameters.
   const GuardFinding& guard(std::size_t axis) {
     judge_if_changed();

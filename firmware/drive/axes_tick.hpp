@@ -97,6 +97,13 @@ class AxesTick {
       return ISR_tick_at(axis, input, {});
     }
   }
+  /// In place of ISR_tick(), for an axis that the board does not have: settings and rounds go on.
+  void ISR_pass(std::size_t axis) {
+    const Settings& settings = ISR_begin(axis);
+    axes_[axis].ISR_pass(settings[axis], ticks_);
+    if (ISR_round_begins())
+      reports_[axis].ISR_publish([this, axis](AxisReport& report) { axes_[axis].ISR_fill(report); });
+  }
   /// What the slot of `axis` needs of samples that were all taken at the same time.
   static const SlotInput& ISR_slot_input(const Inputs& inputs, std::size_t axis) {
     if constexpr (needs_all_positions) {
@@ -117,6 +124,13 @@ class AxesTick {
  private:
   const Axis::Output& ISR_tick_at(std::size_t axis, const Axis::Input& input, const AxesPositions<axes>& at);
   AxesPositions<axes> ISR_positions(const Inputs& inputs) const;
+  [[gnu::always_inline]] inline const Settings& ISR_begin(std::size_t axis) {
+    if (axis != 0) return settings_.ISR_current();
+    const Settings& settings = settings_.ISR_take();
+    ++ticks_;
+    ISR_supervise_main_loop();
+    return settings;
+  }
   void ISR_supervise_main_loop();
   void ISR_trace(const control::HapticLoop<float>::Output& traced);
   // Rare, and kept out of the tick's one function, whose registers it would take.
@@ -146,11 +160,7 @@ template <std::size_t axes, typename Law>
 requires AxesLaw<Law, axes>
 const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axis::Input& input,
                                                      const AxesPositions<axes>& at) {
-  const Settings& settings = axis == 0 ? settings_.ISR_take() : settings_.ISR_current();
-  if (axis == 0) {
-    ++ticks_;
-    ISR_supervise_main_loop();
-  }
+  const Settings& settings = ISR_begin(axis);
   Axis& ticked = axes_[axis];
   const bool enable = enabled_[axis].load(std::memory_order_relaxed);
   if (main_loop_stands_ && enable) ticked.ISR_trip(Fault::main_loop);

@@ -113,6 +113,14 @@ class Axis {
   const Output& ISR_tick(const AxisSetting& setting, const Input& input, bool enable, Demand demand,
                          std::uint32_t tick);
 
+  /// In place of ISR_tick(), for an axis that the board does not have: no valid count, nothing driven.
+  void ISR_pass(const AxisSetting& setting, std::uint32_t tick) {
+    tick_ = tick;
+    generation_ = setting.generation;
+    state_ = changes_ = 0;
+    started_ = false;
+  }
+
   /// Where another axis' slot finds this one, which does not tick in it: counts, by this axis' last setting.
   /// Needs input.count_valid and a reference that this axis' own tick has taken over, see ISR_follows().
   std::int64_t ISR_position(std::uint32_t count, const AxisSetting& setting) const {

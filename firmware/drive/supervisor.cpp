@@ -65,6 +65,7 @@ constexpr std::uint32_t standing = tick_rate_hz / 20;
 Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) const {
   if (now.store_busy) return Refusal::store_busy;  // an erase stops the tick
   if (now.restarting) return Refusal::restarting;
+  if (now.absent) return Refusal::axis_absent;
   if (now.pushes_anothers_axis) return Refusal::other_commander;
   if (is_can(commander_) && now.heartbeat_lost) return Refusal::heartbeat_missing;
   if (now.report.condition != Fault::none) return refusal_for(now.report.condition);

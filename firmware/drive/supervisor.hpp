@@ -46,6 +46,7 @@ class Supervisor {
     bool enabled;                            ///< for the tick
     bool settled;  ///< the tick works by the present settings, and knows of the axis' last disarming
     bool ticks_have_stopped, commutation_known, guard_failed, store_busy, restarting;
+    bool absent;                       ///< the board does not have this axis
     bool pushes_anothers_axis;         ///< if it were armed: of one that another link has armed
     bool off_the_bus, heartbeat_lost;  ///< of CAN, whoever commands
   };

@@ -61,6 +61,7 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_whole<"drive.statusword">(statusword_of(status), axis);
   v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
   v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
+  v.set_whole<"drive.presence">(static_cast<std::uint32_t>(of_.axes.presence(axis)), axis);
   const bool faulty = machine.fault() != Fault::none;
 
   const double length = of_.axes.scale(axis).count_length;

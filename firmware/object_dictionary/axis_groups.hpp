@@ -94,6 +94,7 @@ inline constexpr NamedValue quick_stop_option[] = {{"0", 0}, {"6", 6}};
 inline constexpr NamedValue disable_drive[] = {{"0", 0}};
 inline constexpr NamedValue halt_option[] = {{"1", 1}};
 inline constexpr NamedValue abort_connection_option[] = {{"1", 1}};
+inline constexpr NamedValue presence[] = {{"present", 0}, {"no_answer", 1}, {"declared", 2}};
 inline constexpr NamedValue no_or_yes[] = {{"no", 0}, {"yes", 1}};
 inline constexpr NamedValue excitation_kind[] = {
     {"off", 0}, {"voltage", 1}, {"current", 2}, {"torque", 3}, {"position", 4}};

@@ -20,6 +20,9 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
     reading("drive.fault_value", group::drive_status, 4, float32, "",
             "The number that tripped the present fault."),
     reading("drive.fault_bound", group::drive_status, 5, float32, "", "The bound it passed."),
+    named_reading("drive.presence", group::drive_status, 6, names::presence,
+                  "Whether the board has this axis. no_answer: its gate driver has not answered since the "
+                  "start, while another axis' did; declared: drive.declared_absent is yes."),
 
     reading("measured.tick", group::measured, 1, unsigned32, "ticks",
             "Tick at which these values were taken."),

@@ -48,6 +48,7 @@ enum class Refusal : std::uint16_t {
   wrong_code = 36,
   code_waits = 37,
   no_code = 38,
+  axis_absent = 39,
 };
 
 struct RefusalText {
@@ -111,6 +112,9 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::code_waits,
      "after a wrong code no code is taken for a while, not even the right one; lock.wait says how long"},
     {Refusal::no_code, "no code is set, so there is nothing to lock with; 'kmax lock' sets one"},
+    {Refusal::axis_absent,
+     "the axis is absent: its gate driver has not answered since the start, or drive.declared_absent is yes; "
+     "'kmax state' tells which"},
 });
 
 constexpr std::string_view to_string(Refusal refusal) {

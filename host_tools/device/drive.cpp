@@ -78,14 +78,27 @@ std::string DriveStatus::fault_words() const {
   return words;
 }
 
+std::string presence_words(firmware::AxisPresence presence) {
+  switch (presence) {
+    case firmware::AxisPresence::present:
+      return "present";
+    case firmware::AxisPresence::no_answer:
+      return "absent: its gate driver does not answer";
+    case firmware::AxisPresence::declared_absent:
+      return "absent: drive.declared_absent is yes";
+  }
+  return "unknown";
+}
+
 DriveStatus Drive::status() {
-  const Parameter asked[] = {Parameter::of<"drive.statusword">(axis_),
-                             Parameter::of<"drive.error_code">(axis_), Parameter::of<"drive.refusal">(axis_),
-                             Parameter::of<"drive.fault_value">(axis_),
-                             Parameter::of<"drive.fault_bound">(axis_)};
+  const Parameter asked[] = {
+      Parameter::of<"drive.statusword">(axis_),  Parameter::of<"drive.error_code">(axis_),
+      Parameter::of<"drive.refusal">(axis_),     Parameter::of<"drive.fault_value">(axis_),
+      Parameter::of<"drive.fault_bound">(axis_), Parameter::of<"drive.presence">(axis_)};
   const auto raw = device_.read(asked);
   return {static_cast<std::uint16_t>(raw[0]), static_cast<std::uint16_t>(raw[1]),
-          static_cast<Refusal>(raw[2]), std::bit_cast<float>(raw[3]), std::bit_cast<float>(raw[4])};
+          static_cast<Refusal>(raw[2]),       std::bit_cast<float>(raw[3]),
+          std::bit_cast<float>(raw[4]),       static_cast<firmware::AxisPresence>(raw[5])};
 }
 
 firmware::GuardFinding Drive::guard() {

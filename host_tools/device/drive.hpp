@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "firmware/board_interface/board_readings.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/fault.hpp"
 #include "firmware/drive/stability_guard.hpp"
@@ -21,6 +22,7 @@ struct DriveStatus {
   std::uint16_t error_code = 0;
   firmware::Refusal refusal = firmware::Refusal::none;  ///< of the last attempt to arm
   float fault_value = 0, fault_bound = 0;
+  firmware::AxisPresence presence = firmware::AxisPresence::present;
 
   firmware::DriveState state() const { return firmware::statusword::state_of(statusword); }
   bool armed() const { return state() == firmware::DriveState::operation_enabled; }
@@ -32,6 +34,9 @@ struct DriveStatus {
   /// One or two sentences: what happened, the number that tripped it and its bound, what to check.
   std::string fault_words() const;
 };
+
+/// "absent: its gate driver does not answer"
+std::string presence_words(firmware::AxisPresence presence);
 
 /// Fault::none also for an error code that this program does not know.
 inline firmware::Fault fault_of(const DriveStatus& status) {

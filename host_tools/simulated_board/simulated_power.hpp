@@ -42,7 +42,7 @@ class SimulatedPower {
   }
   void advance(double duration);
 
-  firmware::BoardReadings readings() const { return power_.drives().readings(); }
+  firmware::BoardReadings readings() const { return power_.readings(); }
   /// The main loop.
   void poll(const firmware::Application& application, std::uint32_t now_us) {
     power_.poll(application, now_us);

@@ -64,10 +64,13 @@ bool SimulatedPowerHardware::supply_suffices() const {
   return drives_.supply().voltage() >= board::odrive_v3::description.gate_driver_supply_minimum;
 }
 
-bool SimulatedPowerHardware::configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
+board::GateDriverAnswer SimulatedPowerHardware::configure_gate_driver(std::size_t axis,
+                                                                      drivers::CurrentSenseGain gain) {
+  using enum board::GateDriverAnswer;
+  if (!supply_suffices() || drives_.planted(axis, simulation::Defect::gate_driver_missing)) return silent;
   if (drives_.has(axis))
     drives_.drive(axis).current_sensor().set_gain(static_cast<double>(drivers::gain_factor(gain)));
-  return supply_suffices();
+  return accepted;
 }
 
 }  // namespace kmax::simulated_board

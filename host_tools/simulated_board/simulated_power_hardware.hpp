@@ -78,7 +78,7 @@ class SimulatedPowerHardware {
   /// A fault, or a supply below what the gate drivers need.
   bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
-  bool configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
+  board::GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
 
  private:
   bool supply_suffices() const;

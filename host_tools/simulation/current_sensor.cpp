@@ -19,6 +19,11 @@ double CurrentSensor::sample(Channel channel, double shunt_current) {
   if (!std::isfinite(shunt_current))
     throw std::invalid_argument(fmt::format("shunt current = {} A: allowed is a number", shunt_current));
   const auto index = static_cast<std::size_t>(channel);
+  if (floating_) {
+    double& drift = drift_[index];
+    drift = std::clamp(drift + 0.02 * noise_[index].gaussian(), -0.8, 0.8);
+    return 0.5 * reference + drift + 0.05 * noise_[index].gaussian();
+  }
   double input = shorted_[index] ? 0.0 : config_.shunt * shunt_current;
   if (inverted_[index]) input = -input;
   if (config_.noise > 0.0) input += config_.noise * noise_[index].gaussian();

@@ -60,6 +60,9 @@ class CurrentSensor {
   void set_stuck(Channel channel, std::optional<double> volts) {
     stuck_[static_cast<std::size_t>(channel)] = volts;
   }
+  // Defect: no amplifier drives the pins. They drift about the middle, as inputs do that pick up their
+  // surroundings (a guess: 50 mV of noise, a drift that covers half of the range within 0.1 s).
+  void set_floating(bool floating) { floating_ = floating; }
 
   const CurrentSensorConfig& config() const { return config_; }
 
@@ -68,6 +71,8 @@ class CurrentSensor {
   std::array<bool, 2> shorted_{};
   std::array<bool, 2> inverted_{};
   std::array<std::optional<double>, 2> stuck_{};
+  bool floating_ = false;
+  std::array<double, 2> drift_{};  // V, of pins that float
   std::array<NoiseGenerator, 2> noise_;
 };
 

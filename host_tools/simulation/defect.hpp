@@ -22,6 +22,7 @@ enum class Defect : std::uint8_t {
   motor_blocked,       // the handle does not move
   current_b_inverted,  // the shunt's wires of leg B are exchanged
   current_c_inverted,
+  gate_driver_missing,  // it does not answer, and the converter's pins of the currents float
 };
 
 struct DefectName {
@@ -42,6 +43,7 @@ inline constexpr std::array defect_names{
     DefectName{Defect::motor_blocked, "motor_blocked"},
     DefectName{Defect::current_b_inverted, "current_b_inverted"},
     DefectName{Defect::current_c_inverted, "current_c_inverted"},
+    DefectName{Defect::gate_driver_missing, "gate_driver_missing"},
 };
 
 constexpr std::string_view name_of(Defect defect) {

@@ -120,6 +120,8 @@ void SceneDrives::set(std::size_t index, Defect defect, bool present) {
       return drive.current_sensor().invert(Channel::b, present);
     case Defect::current_c_inverted:
       return drive.current_sensor().invert(Channel::c, present);
+    case Defect::gate_driver_missing:
+      return drive.current_sensor().set_floating(present);
   }
 }
 

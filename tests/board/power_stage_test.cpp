@@ -9,7 +9,8 @@ using firmware::Fault;
 
 struct Hardware {
   bool gate = false, fault_low = false, stop_open = false;
-  bool answers[2] = {true, true};
+  GateDriverAnswer answers[2] = {GateDriverAnswer::accepted, GateDriverAnswer::accepted};
+  bool missing[2] = {};
   OffsetProgress offsets = OffsetProgress::accepted;
   int gate_rises = 0, configured = 0, calibrations = 0;
 
@@ -19,8 +20,11 @@ struct Hardware {
   }
   bool fault_line_low() const { return fault_low; }
   bool emergency_stop_open() const { return stop_open; }
-  bool configure_gate_driver(std::size_t axis) {
+  bool in_service(std::size_t axis) const { return !missing[axis]; }
+  void set_missing(std::size_t axis) { missing[axis] = true; }
+  GateDriverAnswer configure_gate_driver(std::size_t axis) {
     EXPECT_TRUE(gate) << "the chips do not answer while EN_GATE is low";
+    EXPECT_FALSE(missing[axis]);
     ++configured;
     return answers[axis];
   }
@@ -63,14 +67,60 @@ TEST_F(PowerStageTest, WaitsForTheOffsets) {
   EXPECT_TRUE(stage.ready());
 }
 
-TEST_F(PowerStageTest, AChipThatDoesNotAnswerIsTriedAgain) {
-  hardware.answers[1] = false;
-  run(1'000'000);
+TEST_F(PowerStageTest, ABoardWhoseChipsDoNotAnswerIsTriedAgain) {
+  hardware.answers[0] = hardware.answers[1] = GateDriverAnswer::silent;
+  run(3'000'000);
   EXPECT_EQ(stage.condition(), Fault::power_stage);
-  EXPECT_GE(hardware.gate_rises, 4);
-  hardware.answers[1] = true;
+  EXPECT_GE(hardware.gate_rises, 12);
+  EXPECT_FALSE(hardware.missing[0] || hardware.missing[1]) << "the supply is not there";
+  hardware.answers[0] = hardware.answers[1] = GateDriverAnswer::accepted;
   run(300'000);
   EXPECT_TRUE(stage.ready());
+}
+
+// Either of the two, and only when it has been silent three times beside one that answers.
+TEST_F(PowerStageTest, AChipThatHasNeverAnsweredIsMissingAndTheOtherGoesOn) {
+  for (const std::size_t axis : {0U, 1U}) {
+    Hardware board;
+    PowerStage<Hardware> other{board};
+    board.answers[axis] = GateDriverAnswer::silent;
+    for (std::uint32_t at = 0; at < 450'000; at += 100) {
+      other.poll(at, false);
+      EXPECT_FALSE(board.missing[axis]);
+      EXPECT_EQ(other.condition(), Fault::power_stage);
+    }
+    for (std::uint32_t at = 450'000; at < 500'000; at += 100) other.poll(at, false);
+    EXPECT_TRUE(board.missing[axis]);
+    EXPECT_FALSE(board.missing[1 - axis]);
+    EXPECT_TRUE(other.ready());
+    EXPECT_EQ(other.condition(), Fault::none);
+  }
+}
+
+TEST_F(PowerStageTest, AChipThatAnswersAtTheSecondTryIsNotMissing) {
+  hardware.answers[1] = GateDriverAnswer::silent;
+  run(300'000);
+  hardware.answers[1] = GateDriverAnswer::accepted;
+  run(300'000);
+  EXPECT_TRUE(stage.ready());
+  EXPECT_FALSE(hardware.missing[1]);
+}
+
+TEST_F(PowerStageTest, AChipThatHasAnsweredAndFallsSilentIsAFaultOfTheBoard) {
+  run(100'000);
+  ASSERT_TRUE(stage.ready());
+  hardware.answers[1] = GateDriverAnswer::silent;
+  stage.restart(now);
+  run(5'000'000);
+  EXPECT_FALSE(hardware.missing[1]);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
+}
+
+TEST_F(PowerStageTest, AChipThatAnswersAndKeepsNothingIsNotMissing) {
+  hardware.answers[1] = GateDriverAnswer::refused;
+  run(5'000'000);
+  EXPECT_FALSE(hardware.missing[1]);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
 }
 
 TEST_F(PowerStageTest, OffsetsOutOfBoundsAreNamedAndMeasuredAgain) {

@@ -69,6 +69,40 @@ TEST_F(ClosedLoop, HoldsTheHandlesAtAStiffWallOnBothAxes) {
   }
 }
 
+// A board of which one axis is populated: either of the two.
+TEST(ClosedLoopOfOneAxis, RendersWhileTheOtherAxisIsAbsentAndADriverThatDiesLaterIsAFault) {
+  for (const std::size_t there : {0U, 1U}) {
+    const std::size_t missing = 1 - there;
+    ImageBench bench(stiff_walls(), 2.0);
+    bench.world.drives().plant(missing, simulation::Defect::gate_driver_missing);
+    bench.start();
+    constexpr std::size_t presence = firmware::entry_of<"drive.presence">();
+    EXPECT_EQ(bench.reading(presence, there), 0);
+    EXPECT_EQ(bench.reading(presence, missing), 1) << "no_answer";
+    EXPECT_ANY_THROW(bench.master->arm(missing));
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.refusal">(), missing),
+              static_cast<unsigned>(firmware::Refusal::axis_absent));
+    bench.master->arm(there);
+    bench.board->run_for(1.5);
+    const auto& drive = bench.world.drive(there);
+    EXPECT_TRUE(bench.board->bridge_armed(there)) << text_of(bench.fault(there)).name;
+    EXPECT_FALSE(bench.board->bridge_armed(missing));
+    EXPECT_GT(drive.force(), 0.5);
+    EXPECT_NEAR(drive.force(), 3000.0 * (-0.02 - drive.handle().position()), 0.5);
+    EXPECT_EQ(bench.fault(missing), Fault::none);
+    EXPECT_EQ(bench.number("counters.missed_ticks"), 0U);
+
+    bench.world.drives().plant(there, simulation::Defect::gate_driver_missing);
+    bench.board->hold_fault_line(true);
+    bench.board->hold_fault_line(false);
+    bench.board->run_for(1.5);
+    EXPECT_FALSE(bench.board->bridge_armed(there));
+    EXPECT_EQ(bench.fault(there), Fault::gate_driver);
+    EXPECT_EQ(bench.reading(presence, there), 0) << "it has answered";
+    EXPECT_FALSE(bench.board->healthy());
+  }
+}
+
 TEST_F(ClosedLoop, TheDigitalInputsShowTheEmergencyStopAndTheGateDriversFaultLine) {
   press();
   EXPECT_EQ(digital_inputs(0) & 3U, 0U);

@@ -83,9 +83,9 @@ class MadeUpHardware {
   void set_gate_enable(bool) {}
   bool fault_line_low() const { return false; }
   bool emergency_stop_open() const { return false; }
-  bool configure_gate_driver(std::size_t, drivers::CurrentSenseGain gain) {
+  GateDriverAnswer configure_gate_driver(std::size_t, drivers::CurrentSenseGain gain) {
     gain_ = static_cast<double>(drivers::gain_factor(gain));
-    return true;
+    return GateDriverAnswer::accepted;
   }
 
   /// Lets the time pass, in s.
@@ -122,7 +122,7 @@ class MadeUpDevice {
     power.ISR_drive(axis, output, static_cast<float>(MadeUpHardware::supply));
   }
   void advance(double duration) { power.hardware().advance(duration); }
-  firmware::BoardReadings readings() { return power.drives().readings(); }
+  firmware::BoardReadings readings() { return power.readings(); }
   void poll(const firmware::Application& application, std::uint32_t now_us) {
     power.poll(application, now_us);
   }

@@ -178,7 +178,7 @@ TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
     power.hardware().advance(50e-6);
     if (!power.drives().main_loop_due()) continue;
     ++due;
-    application.set_readings(power.drives().readings());
+    application.set_readings(power.readings());
     application.poll(static_cast<std::uint32_t>(tick) * 50);
     power.poll(application, static_cast<std::uint32_t>(tick) * 50);
   }

@@ -59,6 +59,8 @@ Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding
   return {{"axis", axis},
           {"state", std::string(device::name_of(status.state()))},
           {"armed", status.armed()},
+          {"present", status.presence == firmware::AxisPresence::present},
+          {"presence", device::presence_words(status.presence)},
           {"statusword", status.statusword},
           {"warning", status.warning()},
           {"stability_check", guard_json(guard)},
@@ -67,6 +69,8 @@ Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding
 }
 
 std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
+  if (status.presence != firmware::AxisPresence::present)
+    return fmt::format("axis {}: {}", axis, device::presence_words(status.presence));
   std::string line = fmt::format("axis {}: {}", axis, device::to_string(status.state()));
   if (status.armed()) line += " (armed: force is on)";
   if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";

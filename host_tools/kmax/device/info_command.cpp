@@ -6,6 +6,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/crash_words.hpp"
+#include "host_tools/device/drive.hpp"
 #include "host_tools/device/lock.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -81,6 +82,12 @@ int run_info(Context& context) {
   const device::StoreStatus store = device::Store(device).status();
   const device::LockStatus lock = device::Lock(device).status();
 
+  std::vector<std::string> presences;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const auto presence = device.read(Parameter::of<"drive.presence">(axis));
+    presences.push_back(device::presence_words(static_cast<firmware::AxisPresence>(presence)));
+  }
+
   if (context.json) {
     Json identity = Json::object();
     for (const auto& [name, text] : texts) identity[name] = text;
@@ -95,6 +102,7 @@ int run_info(Context& context) {
     document["crash"] = crash.empty() ? Json(nullptr) : Json(crash);
     document["store"] = store_json(store);
     document["lock"] = lock_json(lock);
+    document["axes"] = presences;
     context.print(document);
     return done;
   }
@@ -113,6 +121,8 @@ int run_info(Context& context) {
   for (const auto& [name, text] : texts) line(labels.contains(name) ? labels.at(name) : name, text);
   for (const auto& [name, text] : store_lines(store)) line(name, text);
   line("write lock", device::lock_words(lock));
+  for (std::size_t axis = 0; axis < presences.size(); ++axis)
+    line(fmt::format("axis {}", axis), presences[axis]);
   if (!crash.empty()) line("last crash", crash);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (is_about_crash(parameters[i])) continue;  // said in words above

@@ -30,6 +30,8 @@ class BoardWorld {
   virtual void set_bridge(std::size_t axis, const std::array<PwmLegOutput, 3>& legs, BoardTime now) = 0;
   /// The gate driver's shunt amplifiers: V/V, and whether their inputs are shorted to show the offset.
   virtual void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) = 0;
+  /// The axis' gate driver is on the board.
+  virtual bool has_gate_driver(std::size_t /*axis*/) const { return true; }
   /// V at the motor supply's terminals, which also feeds the gate drivers.
   virtual double supply_voltage() const = 0;
   /// The brake resistor is switched.

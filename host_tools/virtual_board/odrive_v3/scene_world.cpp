@@ -37,6 +37,10 @@ void SceneWorld::set_amplifiers(std::size_t axis, double gain, bool shorted, Boa
   sensor.short_inputs(CurrentSensor::Channel::c, shorted);
 }
 
+bool SceneWorld::has_gate_driver(std::size_t axis) const {
+  return !drives_.planted(axis, simulation::Defect::gate_driver_missing);
+}
+
 void SceneWorld::set_brake(bool on, BoardTime now) {
   advance_to(now);
   drives_.supply().set_brake(on ? 1.0 : 0.0);

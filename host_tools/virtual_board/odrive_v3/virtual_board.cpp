@@ -275,6 +275,7 @@ void VirtualBoard::look_at_world(BoardTime now) {
   for (std::size_t axis = 0; axis < encoders_.size(); ++axis) {
     const EncoderSignals signals = world_->encoder(axis, now);
     encoders_[axis].set_encoder_count(signals.edges);
+    gate_drivers_[axis].set_fitted(world_->has_gate_driver(axis));
     const auto index = axis == 0 ? pins::encoder0_index : pins::encoder1_index;
     if (port(index.port).level(index.number) != signals.index)
       port(index.port).drive(index.number, signals.index ? PinDrive::high : PinDrive::low, now);

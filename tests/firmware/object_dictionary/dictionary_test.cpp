@@ -115,6 +115,7 @@ const std::vector<Word> vocabulary = {
     {"instability.amplitude", "m"},
     {"temperature.limit", "degC"},
     {"velocity.limit", "m/s"},
+    {"drive.declared_absent", "", {"no", "yes"}},
     {"link.timeout", "s"},
     {"link.loss", "", {"limp", "ramp", "damp"}},
     {"node.id", ""},

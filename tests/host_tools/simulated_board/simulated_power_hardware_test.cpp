@@ -41,7 +41,7 @@ struct Plant {
     world.advance(0.01);
   }
   void calibrate() {
-    EXPECT_TRUE(drives.hardware().configure_gate_driver(0, drives.gain()));
+    EXPECT_EQ(drives.hardware().configure_gate_driver(0, drives.gain()), board::GateDriverAnswer::accepted);
     drives.restart_offset_calibration();
     for (int n = 0; n < 1024; ++n) {
       EXPECT_EQ(drives.offset_progress(), OffsetProgress::running);
@@ -92,7 +92,8 @@ TEST(SimulatedPowerHardware, OffsetsAreMeasuredAndCurrentsReadInSteps) {
 
 TEST(SimulatedPowerHardware, OffsetsAreRefusedWhileACurrentChanges) {
   Plant plant("dc_coreless_a");
-  ASSERT_TRUE(plant.drives.hardware().configure_gate_driver(0, plant.drives.gain()));
+  ASSERT_EQ(plant.drives.hardware().configure_gate_driver(0, plant.drives.gain()),
+            board::GateDriverAnswer::accepted);
   plant.drives.restart_offset_calibration();
   plant.world.plant(0, Defect::motor_blocked);
   for (int n = 0; n < 1024; ++n) {
@@ -126,7 +127,8 @@ TEST(SimulatedPowerHardware, GateDriversNeedTheirSupply) {
   EXPECT_FALSE(hardware.fault_line_low());
   plant.world.supply().set_voltage(5.0);
   EXPECT_TRUE(hardware.fault_line_low());
-  EXPECT_FALSE(hardware.configure_gate_driver(0, drivers::CurrentSenseGain::x80));
+  EXPECT_EQ(hardware.configure_gate_driver(0, drivers::CurrentSenseGain::x80),
+            board::GateDriverAnswer::silent);
   plant.world.supply().set_voltage(24.0);
   hardware.set_gate_driver_fault(true);
   EXPECT_TRUE(hardware.fault_line_low());

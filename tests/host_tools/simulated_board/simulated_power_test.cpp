@@ -105,6 +105,67 @@ TEST(SimulatedPower, IsReadyWhenTheOffsetsAreMeasured) {
   EXPECT_TRUE(bench.arm());
 }
 
+simulation::Scene both_axes(std::size_t missing) {
+  simulation::Scene scene = open_scene("motor_axes");
+  scene.axes[missing].defects.push_back(Defect::gate_driver_missing);
+  return scene;
+}
+
+// Its converter's pins float, so its offsets would never be accepted; the other axis renders all the same.
+TEST(SimulatedPower, AnAxisWhoseGateDriverNeverAnswersIsAbsentAndTheOtherRenders) {
+  for (const std::size_t missing : {0U, 1U}) {
+    const std::size_t there = 1 - missing;
+    MotorBench bench(both_axes(missing));
+    bench.set<"wall.law">(0, missing);
+    bench.run(0.4);
+    EXPECT_FALSE(bench.arm(there));
+    EXPECT_EQ(bench.application().refusal(there), Refusal::power_stage_not_ready) << "it is still tried";
+    bench.run(0.3);
+    EXPECT_FALSE(bench.arm(missing));
+    EXPECT_EQ(bench.application().refusal(missing), Refusal::axis_absent);
+    if (there == 1) bench.set<"motor.calibrated">(1, there);
+    ASSERT_TRUE(bench.arm(there)) << firmware::to_string(bench.application().refusal(there));
+    bench.run(1.0);
+    EXPECT_TRUE(bench.armed(there));
+    EXPECT_GT(bench.report(there).haptic.force, 0.3f) << "the wall";
+    EXPECT_EQ(bench.application().fault(missing), Fault::none);
+    bench.application().refresh_readings();
+    EXPECT_EQ(bench.application().values().whole<"drive.presence">(missing), 1);
+    EXPECT_EQ(bench.application().values().whole<"drive.presence">(there), 0);
+  }
+}
+
+TEST(SimulatedPower, AGateDriverThatFallsSilentLaterIsAFaultOfTheBoard) {
+  MotorBench bench(open_scene("motor_axes"));
+  bench.run(0.3);
+  bench.drives().plant(1, Defect::gate_driver_missing);
+  bench.power().set_gate_driver_fault(true);
+  bench.power().set_gate_driver_fault(false);
+  bench.run(2.0);
+  for (const std::size_t axis : {0U, 1U}) {
+    EXPECT_FALSE(bench.arm(axis));
+    EXPECT_EQ(bench.application().refusal(axis), Refusal::power_stage_not_ready);
+  }
+}
+
+TEST(SimulatedPower, AnAxisIsDeclaredAbsentAndTakenBackWhileNothingIsArmed) {
+  MotorBench bench(open_scene("motor_axes"));
+  bench.run(0.3);
+  ASSERT_TRUE(bench.arm(0));
+  EXPECT_EQ(bench.set<"drive.declared_absent">(1, 0), Refusal::while_armed);
+  bench.disarm(0);
+  ASSERT_EQ(bench.set<"drive.declared_absent">(1, 0), Refusal::none);
+  bench.run(0.3);
+  EXPECT_FALSE(bench.arm(0));
+  EXPECT_EQ(bench.application().refusal(0), Refusal::axis_absent);
+  ASSERT_EQ(bench.set<"drive.declared_absent">(0, 0), Refusal::none);
+  bench.run(200e-6);
+  EXPECT_FALSE(bench.arm(0));
+  EXPECT_EQ(bench.application().refusal(0), Refusal::power_stage_not_ready) << "its driver is written anew";
+  bench.run(0.3);
+  EXPECT_TRUE(bench.arm(0)) << firmware::to_string(bench.application().refusal(0));
+}
+
 TEST(SimulatedPower, AnotherGainIsTakenThroughTheWholeSequence) {
   MotorBench bench(identified("drone"));
   bench.set<"wall.law">(0);
