@@ -150,8 +150,9 @@ TEST(SimulatedPower, AGateDriverThatFallsSilentLaterIsAFaultOfTheBoard) {
 
 TEST(SimulatedPower, AnAxisIsDeclaredAbsentAndTakenBackWhileNothingIsArmed) {
   MotorBench bench(open_scene("motor_axes"));
+  bench.set<"wall.law">(0, 0);
   bench.run(0.3);
-  ASSERT_TRUE(bench.arm(0));
+  ASSERT_TRUE(bench.arm(0)) << firmware::to_string(bench.application().refusal(0));
   EXPECT_EQ(bench.set<"drive.declared_absent">(1, 0), Refusal::while_armed);
   bench.disarm(0);
   ASSERT_EQ(bench.set<"drive.declared_absent">(1, 0), Refusal::none);
