@@ -6,7 +6,7 @@
 
 #include "drivers/drv8301_registers.hpp"
 
-// DRV8301 gate driver over SPI: presence and configuration. DRV8301 data sheet, sections SPI
+// DRV8301 gate driver over SPI: presence, configuration and faults. DRV8301 data sheet, sections SPI
 // communication and Register maps.
 //
 // Not here: EN_GATE and nFAULT, which belong to the board. The chip answers from 10 ms after EN_GATE has
@@ -72,6 +72,20 @@ class Drv8301 {
     if (reply.result != Drv8301Result::ok) return reply.result;
     return (reply.data & drv8301::status_2_device_mask) == drv8301::device_id ? Drv8301Result::ok
                                                                               : Drv8301Result::wrong_device;
+  }
+
+  /// Bits of Drv8301Fault; none: it does not answer. What is over is 0 at the next look.
+  std::optional<std::uint16_t> faults() {
+    const Reply second = read(Drv8301Register::status_2);
+    if (second.result != Drv8301Result::ok ||
+        (second.data & drv8301::status_2_device_mask) != drv8301::device_id)
+      return std::nullopt;
+    // All zeros are this register's reply when nothing is wrong; the one before showed that the chip answers.
+    const Reply first = read(Drv8301Register::status_1);
+    if (first.result != Drv8301Result::ok && first.result != Drv8301Result::stuck_low) return std::nullopt;
+    const bool over_voltage = (second.data & drv8301::status_2_gate_supply_over_voltage) != 0;
+    return static_cast<std::uint16_t>(
+        first.data | (over_voltage ? static_cast<unsigned>(Drv8301Fault::gate_supply_over_voltage) : 0U));
   }
 
   /// Both control registers, amplifiers measuring. The last look is at control 1 again: a write that was

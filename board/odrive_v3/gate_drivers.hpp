@@ -24,14 +24,8 @@ class GateDrivers {
 
   /// Both control registers written and read back.
   GateDriverAnswer configure(std::size_t axis, drivers::CurrentSenseGain gain) {
-    // The tick's frame holds the bus for 25 us.
-    bool claimed = bus_.claim();
-    for (unsigned attempt = 0; attempt < 10 && !claimed; ++attempt) {
-      delay_us(10);
-      claimed = bus_.claim();
-    }
-    if (!claimed) return GateDriverAnswer::refused;
-    Selected chip{bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
+    if (!claim()) return GateDriverAnswer::refused;
+    Selected chip = select(axis);
     drivers::Drv8301<Selected> driver{chip};
     drivers::Drv8301Config config;
     config.gain = gain;
@@ -44,7 +38,27 @@ class GateDrivers {
     return silent ? GateDriverAnswer::silent : GateDriverAnswer::refused;
   }
 
+  /// In the bits of drive.gate_driver_faults, which are the chip's own (drivers::Drv8301Fault).
+  std::uint16_t read_faults(std::size_t axis) {
+    constexpr std::uint16_t no_answer = 4096;
+    if (!claim()) return no_answer;
+    Selected chip = select(axis);
+    const std::optional<std::uint16_t> faults = drivers::Drv8301<Selected>{chip}.faults();
+    bus_.release();
+    return faults.value_or(no_answer);
+  }
+
  private:
+  bool claim() {
+    // The tick's frame holds the bus for 25 us.
+    bool claimed = bus_.claim();
+    for (unsigned attempt = 0; attempt < 10 && !claimed; ++attempt) {
+      delay_us(10);
+      claimed = bus_.claim();
+    }
+    return claimed;
+  }
+
   static void delay_us(std::uint32_t microseconds) {
     // By the cycle counter; longer on a slower clock, which these delays may be.
     constexpr std::uint32_t cycles_per_us = description.core_clock_hz / 1'000'000;
@@ -70,6 +84,10 @@ class GateDrivers {
     ChipBus& bus_;
     drivers::stm32f4::GpioPin<> pin_;
   };
+
+  Selected select(std::size_t axis) {
+    return {bus_, axis == 0 ? pins::gate_driver0_select : pins::gate_driver1_select};
+  }
 
   ChipBus& bus_;
 };

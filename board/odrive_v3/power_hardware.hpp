@@ -87,6 +87,7 @@ class PowerHardware {
   GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain) {
     return gate_drivers_.configure(axis, gain);
   }
+  std::uint16_t read_gate_driver_faults(std::size_t axis) { return gate_drivers_.read_faults(axis); }
   void show_healthy(bool healthy) { pin(pins::healthy).write(healthy); }
 
  private:

@@ -345,7 +345,7 @@ typename Drives<Hardware>::Inputs Drives<Hardware>::ISR_beside_others(std::size_
                        .reference_generation = input.reference_generation};
   Inputs inputs{};
   for (std::size_t other = 0; other < firmware::axis_count; ++other) {
-    if (!hardware_.has(other) || !in_service(other)) continue;
+    if (!hardware_.has(other)) continue;
     const Axis& of = axes_[other];
     const EncoderRole role = double_buffer_.ISR_current().role[other];
     const bool on_lines = role == EncoderRole::lines || role == EncoderRole::lines_beside_chip;
@@ -402,6 +402,7 @@ void Drives<Hardware>::ISR_pass(std::size_t index) {
   const float supply = supply_.volts(hardware_.ISR_sample(index).supply);
   hardware_.bridge(index).disarm();
   axes_[index].driving = axes_[index].arm_failed = false;
+  axes_[index].count = {};  // for the other axes
   if (settings.role[index] == EncoderRole::lines_beside_chip) ISR_begin_serial();
   ISR_end_tick(index, supply);
 }

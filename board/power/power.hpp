@@ -16,6 +16,8 @@ concept MotorHardware = DriveHardware<Hardware> &&
   { constant.emergency_stop_open() } -> std::same_as<bool>;
   /// Writes and reads back one gate driver.
   { hardware.configure_gate_driver(axis, gain) } -> std::same_as<GateDriverAnswer>;
+  /// In the bits of drive.gate_driver_faults.
+  { hardware.read_gate_driver_faults(axis) } -> std::same_as<std::uint16_t>;
 };
 
 /// All that drives motors: the drives and the sequence of their power stage.
@@ -75,6 +77,7 @@ class Power {
   firmware::BoardReadings readings() const {
     firmware::BoardReadings readings = drives_.readings();
     readings.gate_driver_missing = lines_.missing;
+    readings.gate_driver_faults = lines_.faults;
     return readings;
   }
 
@@ -110,12 +113,16 @@ class Power {
       configured_gain = drives.gain();
       return drives.hardware().configure_gate_driver(axis, configured_gain);
     }
+    void note_gate_driver_faults(std::size_t axis) {
+      faults[axis] = drives.hardware().read_gate_driver_faults(axis);
+    }
     void restart_offset_calibration() { drives.restart_offset_calibration(); }
     OffsetProgress offset_progress() { return drives.offset_progress(); }
 
     Drives<Hardware>& drives;
     drivers::CurrentSenseGain configured_gain = drivers::CurrentSenseGain::x80;
     std::array<bool, firmware::axis_count> missing{};
+    std::array<std::uint16_t, firmware::axis_count> faults{};
     bool found_missing = false;  ///< and not yet taken over
   };
   static_assert(PowerStageHardware<Lines>);

@@ -29,6 +29,8 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   { hardware.in_service(axis) } -> std::same_as<bool>;
   /// Writes and reads back one DRV8301.
   { hardware.configure_gate_driver(axis) } -> std::same_as<GateDriverAnswer>;
+  /// Notes for the host what the axis' gate driver says of its faults, which a reset by EN_GATE wipes out.
+  {hardware.note_gate_driver_faults(axis)};
   /// The axis' gate driver is not there: in_service() is false for it from now on.
   {hardware.set_missing(axis)};
   /// Begins to average the current sensors' codes with the bridges off.
@@ -90,6 +92,9 @@ class PowerStage {
     }
     const bool fault = fault_edge_.load(std::memory_order_relaxed) || hardware_.fault_line_low();
     if (state_ == State::ready && fault) {
+      // Once: a look at the faults takes those back whose cause is over.
+      if (condition_.load(std::memory_order_relaxed) != firmware::Fault::gate_driver)
+        note_gate_driver_faults();
       condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
       if (!any_armed) begin_reset(now_us, firmware::Fault::gate_driver);
       return;
@@ -114,6 +119,12 @@ class PowerStage {
   void enter(State state, std::uint32_t now_us) {
     state_ = state;
     since_us_ = now_us;
+  }
+
+  void note_gate_driver_faults() {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (hardware_.in_service(axis)) hardware_.note_gate_driver_faults(axis);
+    }
   }
 
   /// All axes in service; those that are found missing are no longer.
@@ -155,6 +166,7 @@ class PowerStage {
           return enter(State::waiting, now_us);
         }
         if (hardware_.fault_line_low()) {
+          note_gate_driver_faults();
           condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
           return enter(State::waiting, now_us);
         }

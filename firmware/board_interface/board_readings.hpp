@@ -20,8 +20,10 @@ struct BoardReadings {
   float supply_voltage = 0.0f;  ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
   std::array<bool, axis_count> gate_driver_missing{};  ///< has not answered since the start
-  bool has_power_stage = false;                        ///< false: forces are ideal, and nothing is commutated
-  bool ticks_have_stopped = false;                     ///< no tick for a while: nobody else could say so
+  /// What the axis' gate driver said when its fault line last fell, in the bits of drive.gate_driver_faults.
+  std::array<std::uint16_t, axis_count> gate_driver_faults{};
+  bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
+  bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
 };
 
 }  // namespace kmax::firmware

@@ -100,7 +100,7 @@ class AxesTick {
   /// In place of ISR_tick(), for an axis that the board does not have: settings and rounds go on.
   void ISR_pass(std::size_t axis) {
     const Settings& settings = ISR_begin(axis);
-    axes_[axis].ISR_pass(settings[axis], ticks_);
+    axes_[axis].ISR_pass(settings.axis[axis], ticks_);
     if (ISR_round_begins())
       reports_[axis].ISR_publish([this, axis](AxisReport& report) { axes_[axis].ISR_fill(report); });
   }

@@ -259,8 +259,9 @@ void Axis::ISR_fill(AxisReport& report) const {
   report.count_valid = (state_ & count_valid_bit) != 0;
   report.referenced = (state_ & referenced_bit) != 0;
   report.alarms = loop_.detector().alarms();
-  report.last_alarm = loop_.detector().last_alarm();
   report.softening = loop_.softening();
+  if (report.alarms != 0) [[unlikely]]
+    report.last_alarm = loop_.detector().last_alarm();
   if (trip_ != Fault::none) [[unlikely]] {
     report.trip = record_;
     report.fault_value = record_.value;

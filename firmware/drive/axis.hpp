@@ -63,8 +63,8 @@ struct AxisReport {
   std::uint32_t reference_generation = 0;  ///< of the counts
   std::uint32_t armed_samples = 0, limited_samples = 0;
   std::uint32_t alarms = 0;  ///< since arming: so often the wall was called unstable
-  control::InstabilityDetector<float>::Alarm last_alarm{};
-  float softening = 1.0f;         ///< factor on the wall's force
+  control::InstabilityDetector<float>::Alarm last_alarm{};  ///< only while there are `alarms`
+  float softening = 1.0f;                                   ///< factor on the wall's force
   float force = 0.0f;             ///< N asked for with all that is added; 0 unless driven
   Fault fault = Fault::none;      ///< kept until the axis has been disabled
   Fault condition = Fault::none;  ///< of the board: what would keep the axis from being driven now

@@ -62,6 +62,7 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
   v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
   v.set_whole<"drive.presence">(static_cast<std::uint32_t>(of_.axes.presence(axis)), axis);
+  v.set_whole<"drive.gate_driver_faults">(of_.axes.readings().gate_driver_faults[axis], axis);
   const bool faulty = machine.fault() != Fault::none;
 
   const double length = of_.axes.scale(axis).count_length;
@@ -111,9 +112,10 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_real<"guard.bound">(guard.bound, axis);
 
   v.set_whole<"instability.alarms">(report.alarms, axis);
-  v.set_real<"instability.last_force">(report.last_alarm.force, axis);
-  v.set_real<"instability.last_amplitude">(report.last_alarm.displacement, axis);
-  v.set_real<"instability.last_frequency">(report.last_alarm.frequency, axis);
+  const auto alarm = report.alarms != 0 ? report.last_alarm : decltype(report.last_alarm){};
+  v.set_real<"instability.last_force">(alarm.force, axis);
+  v.set_real<"instability.last_amplitude">(alarm.displacement, axis);
+  v.set_real<"instability.last_frequency">(alarm.frequency, axis);
   v.set_real<"instability.softening">(report.softening, axis);
 }
 

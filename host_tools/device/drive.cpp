@@ -74,6 +74,8 @@ std::string DriveStatus::fault_words() const {
   if (!text->unit.empty())
     words += fmt::format(" ({} {}, bound {} {})", number_text(fault_value), text->unit,
                          number_text(fault_bound), text->unit);
+  if (gate_driver_faults)
+    words += fmt::format("; this axis' driver says: {}", gate_driver_words(*gate_driver_faults));
   if (!text->check.empty()) words += fmt::format("; {}", text->check);
   return words;
 }
@@ -90,15 +92,47 @@ std::string presence_words(firmware::AxisPresence presence) {
   return "unknown";
 }
 
+std::string gate_driver_words(std::uint16_t faults) {
+  // By bit; see drive.gate_driver_faults. What is empty says only that there is a fault.
+  constexpr std::string_view texts[] = {"phase C, low side: too much current",
+                                        "phase C, high side: too much current",
+                                        "phase B, low side: too much current",
+                                        "phase B, high side: too much current",
+                                        "phase A, low side: too much current",
+                                        "phase A, high side: too much current",
+                                        "hot",
+                                        "too hot",
+                                        "the motor supply is too low for it",
+                                        "its gate supply is too low",
+                                        "",
+                                        "its gate supply is too high",
+                                        "it does not answer"};
+  std::string words;
+  for (std::size_t bit = 0; bit < std::size(texts); ++bit) {
+    if ((faults >> bit & 1U) == 0 || texts[bit].empty()) continue;
+    words += fmt::format("{}{}", words.empty() ? "" : "; ", texts[bit]);
+  }
+  if (!words.empty()) return words;
+  return faults != 0 ? "a fault without a cause" : "nothing, so it was another axis' driver or interference";
+}
+
 DriveStatus Drive::status() {
-  const Parameter asked[] = {
-      Parameter::of<"drive.statusword">(axis_),  Parameter::of<"drive.error_code">(axis_),
-      Parameter::of<"drive.refusal">(axis_),     Parameter::of<"drive.fault_value">(axis_),
-      Parameter::of<"drive.fault_bound">(axis_), Parameter::of<"drive.presence">(axis_)};
+  const Parameter asked[] = {Parameter::of<"drive.statusword">(axis_),
+                             Parameter::of<"drive.error_code">(axis_), Parameter::of<"drive.refusal">(axis_),
+                             Parameter::of<"drive.fault_value">(axis_),
+                             Parameter::of<"drive.fault_bound">(axis_)};
   const auto raw = device_.read(asked);
-  return {static_cast<std::uint16_t>(raw[0]), static_cast<std::uint16_t>(raw[1]),
-          static_cast<Refusal>(raw[2]),       std::bit_cast<float>(raw[3]),
-          std::bit_cast<float>(raw[4]),       static_cast<firmware::AxisPresence>(raw[5])};
+  DriveStatus status{static_cast<std::uint16_t>(raw[0]), static_cast<std::uint16_t>(raw[1]),
+                     static_cast<Refusal>(raw[2]), std::bit_cast<float>(raw[3]),
+                     std::bit_cast<float>(raw[4])};
+  if (fault_of(status) == firmware::Fault::gate_driver)
+    status.gate_driver_faults =
+        static_cast<std::uint16_t>(device_.read(Parameter::of<"drive.gate_driver_faults">(axis_)));
+  return status;
+}
+
+firmware::AxisPresence Drive::presence() {
+  return static_cast<firmware::AxisPresence>(device_.read(Parameter::of<"drive.presence">(axis_)));
 }
 
 firmware::GuardFinding Drive::guard() {

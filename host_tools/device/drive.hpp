@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,7 +23,8 @@ struct DriveStatus {
   std::uint16_t error_code = 0;
   firmware::Refusal refusal = firmware::Refusal::none;  ///< of the last attempt to arm
   float fault_value = 0, fault_bound = 0;
-  firmware::AxisPresence presence = firmware::AxisPresence::present;
+  /// Of a fault of the gate drivers, see drive.gate_driver_faults.
+  std::optional<std::uint16_t> gate_driver_faults = std::nullopt;
 
   firmware::DriveState state() const { return firmware::statusword::state_of(statusword); }
   bool armed() const { return state() == firmware::DriveState::operation_enabled; }
@@ -37,6 +39,8 @@ struct DriveStatus {
 
 /// "absent: its gate driver does not answer"
 std::string presence_words(firmware::AxisPresence presence);
+/// "phase B, low side: too much current", from the bits of drive.gate_driver_faults
+std::string gate_driver_words(std::uint16_t faults);
 
 /// Fault::none also for an error code that this program does not know.
 inline firmware::Fault fault_of(const DriveStatus& status) {
@@ -54,6 +58,7 @@ class Drive {
   Drive(Device& device, std::size_t axis) : device_(device), axis_(axis) {}
 
   DriveStatus status();
+  firmware::AxisPresence presence();
 
   /// What the device's stability check says of the present parameters (guard_words.hpp says it in words).
   firmware::GuardFinding guard();

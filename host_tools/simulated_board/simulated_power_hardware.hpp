@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "board/power/power.hpp"
+#include "drivers/drv8301_registers.hpp"
 #include "host_tools/simulated_board/simulated_bridge.hpp"
 #include "host_tools/simulation/scene_drives.hpp"
 
@@ -79,6 +80,11 @@ class SimulatedPowerHardware {
   bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
   board::GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
+  /// Of a planted fault it knows no phase; a supply that is too low is told.
+  std::uint16_t read_gate_driver_faults(std::size_t) const {
+    using enum drivers::Drv8301Fault;
+    return static_cast<std::uint16_t>(supply_suffices() ? fault : supply_under_voltage);
+  }
 
  private:
   bool supply_suffices() const;

@@ -156,4 +156,26 @@ TEST(Drv8301, ControlWords) {
   static_assert(drv8301_control_2({.gain = CurrentSenseGain::x10}) == 0);
 }
 
+// The faults as the chip keeps them, those of its second register above; at the next look what is over is
+// gone.
+TEST(Drv8301, TellsItsFaultsOnceAndGateSupplyOverVoltageAboveThem) {
+  Bench bench;
+  EXPECT_EQ(bench.driver.faults(), 0);
+  bench.chip.registers[0] = 0x404;  // FAULT and FETLB_OC
+  EXPECT_EQ(bench.driver.faults(), static_cast<unsigned>(Drv8301Fault::over_current_b_low) |
+                                       static_cast<unsigned>(Drv8301Fault::fault));
+  EXPECT_EQ(bench.driver.faults(), 0);
+  bench.chip.registers[1] = 0x081;  // GVDD_OV
+  EXPECT_EQ(bench.driver.faults(), static_cast<unsigned>(Drv8301Fault::gate_supply_over_voltage));
+}
+
+TEST(Drv8301, AChipThatIsNoneHasNoFaultsToTell) {
+  Bench high, low, other, dead;
+  high.chip.disturb_all(0xFFFF, 0xFFFF);
+  low.chip.disturb_all(0, 0);
+  other.chip.registers[1] = 2;
+  dead.chip.dead = true;
+  for (Bench* bench : {&high, &low, &other, &dead}) EXPECT_FALSE(bench->driver.faults());
+}
+
 }  // namespace kmax::drivers::drv8301_test

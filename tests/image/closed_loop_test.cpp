@@ -103,6 +103,33 @@ TEST(ClosedLoopOfOneAxis, RendersWhileTheOtherAxisIsAbsentAndADriverThatDiesLate
   }
 }
 
+// Which transistor it was is asked of the drivers before the reset that lets them forget it.
+TEST_F(ClosedLoop, AGateDriverThatTripsSaysWhichTransistorItWas) {
+  constexpr std::size_t faults = firmware::entry_of<"drive.gate_driver_faults">();
+  for (unsigned bit = 0; bit < 6; ++bit) {
+    const std::size_t axis = bit % 2;
+    bench.board->gate_driver(axis).over_current(static_cast<drivers::Drv8301Fault>(1U << bit),
+                                                bench.board->now());
+    bench.board->run_for(0.005);
+    EXPECT_EQ(bench.fault(axis), Fault::gate_driver);
+    EXPECT_EQ(bench.reading(faults, axis), 1U << bit | static_cast<unsigned>(drivers::Drv8301Fault::fault));
+    EXPECT_EQ(bench.reading(faults, 1 - axis), 0U);
+    bench.board->run_for(0.3);
+    EXPECT_EQ(bench.reading(faults, axis) & 0x3FU, 1U << bit) << "still told after the reset";
+  }
+}
+
+// nFAULT is pulled by nobody who admits it.
+TEST_F(ClosedLoop, InterferenceOnTheFaultLineIsNobodysFault) {
+  bench.board->hold_fault_line(true);
+  bench.board->hold_fault_line(false);
+  bench.board->run_for(0.005);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    EXPECT_EQ(bench.fault(axis), Fault::gate_driver);
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.gate_driver_faults">(), axis), 0U);
+  }
+}
+
 TEST_F(ClosedLoop, TheDigitalInputsShowTheEmergencyStopAndTheGateDriversFaultLine) {
   press();
   EXPECT_EQ(digital_inputs(0) & 3U, 0U);

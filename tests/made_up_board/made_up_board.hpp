@@ -87,6 +87,7 @@ class MadeUpHardware {
     gain_ = static_cast<double>(drivers::gain_factor(gain));
     return GateDriverAnswer::accepted;
   }
+  std::uint16_t read_gate_driver_faults(std::size_t) const { return 0; }
 
   /// Lets the time pass, in s.
   void advance(double duration) {

@@ -21,6 +21,7 @@ using device::Device;
 using device::DeviceError;
 using device::Drive;
 using device::DriveStatus;
+using firmware::AxisPresence;
 using firmware::DriveState;
 using firmware::GuardFinding;
 using firmware::Refusal;
@@ -31,12 +32,15 @@ Json fault_json(const DriveStatus& status) {
   if (!status.faulty()) return nullptr;
   const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
   const bool has_number = text != nullptr && !text->unit.empty();
-  return {{"name", text != nullptr ? std::string(text->name) : "unknown"},
-          {"error_code", status.error_code},
-          {"value", has_number ? Json(device::shortest_double(status.fault_value)) : Json(nullptr)},
-          {"bound", has_number ? Json(device::shortest_double(status.fault_bound)) : Json(nullptr)},
-          {"unit", has_number ? std::string(text->unit) : ""},
-          {"message", status.fault_words()}};
+  return {
+      {"name", text != nullptr ? std::string(text->name) : "unknown"},
+      {"error_code", status.error_code},
+      {"value", has_number ? Json(device::shortest_double(status.fault_value)) : Json(nullptr)},
+      {"bound", has_number ? Json(device::shortest_double(status.fault_bound)) : Json(nullptr)},
+      {"unit", has_number ? std::string(text->unit) : ""},
+      {"gate_driver", status.gate_driver_faults ? Json(device::gate_driver_words(*status.gate_driver_faults))
+                                                : Json(nullptr)},
+      {"message", status.fault_words()}};
 }
 
 Json guard_json(const GuardFinding& guard) {
@@ -54,13 +58,14 @@ Json guard_json(const GuardFinding& guard) {
           {"message", device::guard_words(guard)}};
 }
 
-Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
+Json status_json(std::size_t axis, AxisPresence presence, const DriveStatus& status,
+                 const GuardFinding& guard) {
   const bool refused = status.refusal != Refusal::none;
   return {{"axis", axis},
           {"state", std::string(device::name_of(status.state()))},
           {"armed", status.armed()},
-          {"present", status.presence == firmware::AxisPresence::present},
-          {"presence", device::presence_words(status.presence)},
+          {"present", presence == AxisPresence::present},
+          {"presence", device::presence_words(presence)},
           {"statusword", status.statusword},
           {"warning", status.warning()},
           {"stability_check", guard_json(guard)},
@@ -69,8 +74,6 @@ Json status_json(std::size_t axis, const DriveStatus& status, const GuardFinding
 }
 
 std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
-  if (status.presence != firmware::AxisPresence::present)
-    return fmt::format("axis {}: {}", axis, device::presence_words(status.presence));
   std::string line = fmt::format("axis {}: {}", axis, device::to_string(status.state()));
   if (status.armed()) line += " (armed: force is on)";
   if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";
@@ -88,11 +91,15 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
   Json list = Json::array();
   for (const std::size_t axis : axes) {
     Drive drive(device, axis);
+    const AxisPresence presence = drive.presence();
     const DriveStatus status = drive.status();
     if (context.json) {
-      list.push_back(status_json(axis, status, drive.guard()));
+      list.push_back(status_json(axis, presence, status, drive.guard()));
     } else {
-      print(context.out, "{}\n", status_line(axis, status, drive.guard()));
+      const std::string words = presence == AxisPresence::present
+                                    ? status_line(axis, status, drive.guard())
+                                    : fmt::format("axis {}: {}", axis, device::presence_words(presence));
+      print(context.out, "{}\n", words);
     }
   }
   if (context.json) context.print({{"axes", list}});
@@ -201,7 +208,8 @@ int run_arm(Context& context, const ArmOptions& options) {
     // Ctrl-C while it was being armed was meant to end that.
     if (!holding && interruption.requested()) throw std::runtime_error("interrupted");
     if (context.json)
-      context.print({{"axes", Json::array({status_json(drive.axis(), status, drive.guard())})}});
+      context.print(
+          {{"axes", Json::array({status_json(drive.axis(), AxisPresence::present, status, drive.guard())})}});
   } catch (const std::exception&) {
     disarm_after_failure(context, drive, timeout);
     throw;

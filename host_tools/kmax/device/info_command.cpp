@@ -83,10 +83,8 @@ int run_info(Context& context) {
   const device::LockStatus lock = device::Lock(device).status();
 
   std::vector<std::string> presences;
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    const auto presence = device.read(Parameter::of<"drive.presence">(axis));
-    presences.push_back(device::presence_words(static_cast<firmware::AxisPresence>(presence)));
-  }
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+    presences.push_back(device::presence_words(device::Drive(device, axis).presence()));
 
   if (context.json) {
     Json identity = Json::object();

@@ -124,6 +124,18 @@ TEST_F(DriveTest, AFaultIsToldWithItsNumbersAndWhatToCheck) {
   EXPECT_CONTAINS(message, "kmax clear");
 }
 
+TEST_F(DriveTest, AFaultOfTheGateDriversIsToldWithWhatTheDriverSays) {
+  fake->trip(1, Fault::gate_driver, 0, 0);
+  EXPECT_CONTAINS(drive.status().fault_words(), "this axis' driver says: nothing");
+  DriveStatus status = drive.status();
+  status.gate_driver_faults = 0x404;
+  EXPECT_CONTAINS(status.fault_words(), "this axis' driver says: phase B, low side: too much current");
+  EXPECT_EQ(gate_driver_words(0x120),
+            "phase A, high side: too much current; the motor supply is too low for it");
+  EXPECT_EQ(gate_driver_words(0x400), "a fault without a cause");
+  EXPECT_EQ(gate_driver_words(0x1000), "it does not answer");
+}
+
 TEST_F(DriveTest, AnUnknownErrorCodeIsShownAsANumber) {
   DriveStatus status;
   status.error_code = 0x7777;
