@@ -1,6 +1,7 @@
 // Composition root of the ODrive v3.6: names the peripherals, gives them their pins and priorities, and hands
 // time, bytes, counts and currents to the application.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -174,6 +175,21 @@ void poll_power(std::uint32_t now_us) {
   cortex::reset_core();
 }
 
+/// Cycles that the longest interrupt has taken which ended a sleep, with those behind it that did not let the
+/// core back: the longest tick, as it really is, without an instruction of its own for it.
+std::uint32_t longest_tick = 0;
+
+/// Until the next interrupt. It is taken a few cycles after it has woken the core, by whose counter it is
+/// timed.
+void sleep() {
+  const cortex::CycleCounter counter{cortex::dwt(), cortex::core_debug()};
+  cortex::mask_interrupts();
+  cortex::wait_for_interrupt();
+  const std::uint32_t awake = counter.now();
+  cortex::unmask_interrupts();
+  longest_tick = std::max(longest_tick, counter.since(awake));
+}
+
 /// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on
 /// a slow clock a tick takes longer than the characters of the serial line, and they would be lost.
 void tick_without_power() {
@@ -217,6 +233,7 @@ void tick_without_power() {
       if (!power_runs) tick_without_power();
       if (power_runs) {
         firmware::BoardReadings readings = power->readings();
+        readings.longest_tick = longest_tick;
         readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
         application->set_readings(readings);
       }
@@ -229,7 +246,7 @@ void tick_without_power() {
     }
     // What has come meanwhile does not wait; what comes between the look above and here does, for the next
     // interrupt, at most half a tick.
-    if (!due) cortex::wait_for_interrupt();
+    if (!due) sleep();
   }
 }
 

@@ -25,7 +25,24 @@ inline void instruction_synchronization_barrier() {
 #endif
 }
 
-/// Sleeps until an interrupt is pending. Returns at once when one already is.
+/// No interrupt is taken between the two, but for the NMI (PM0214, CPS); what comes meanwhile is taken within
+/// unmask_interrupts().
+inline void mask_interrupts() {
+#if defined(__arm__)
+  asm volatile("cpsid i" ::: "memory");
+#else
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+#endif
+}
+inline void unmask_interrupts() {
+#if defined(__arm__)
+  asm volatile("cpsie i\n\tisb" ::: "memory");
+#else
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+#endif
+}
+
+/// Sleeps until an interrupt is pending, masked or not. Returns at once when one already is.
 inline void wait_for_interrupt() {
 #if defined(__arm__)
   asm volatile("dsb\n\twfi" ::: "memory");

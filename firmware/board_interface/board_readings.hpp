@@ -19,6 +19,7 @@ struct BoardReadings {
   }();                          ///< degC
   float supply_voltage = 0.0f;  ///< V; 0: not measured
   std::uint32_t missed_ticks = 0;
+  std::uint32_t longest_tick = 0;                      ///< cycles; 0: not measured
   std::array<bool, axis_count> gate_driver_missing{};  ///< has not answered since the start
   /// What the axis' gate driver said when its fault line last fell, in the bits of drive.gate_driver_faults.
   std::array<std::uint16_t, axis_count> gate_driver_faults{};

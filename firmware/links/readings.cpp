@@ -161,6 +161,7 @@ void Readings::refresh_device() {
   v.set_whole<"info.tick">(of_.axes.report(0).tick);
 
   v.set_whole<"counters.missed_ticks">(of_.axes.readings().missed_ticks);
+  v.set_whole<"counters.longest_tick">(of_.axes.readings().longest_tick);
   v.set_real<"supply.voltage">(of_.axes.readings().supply_voltage);
 
   publish_crash();

@@ -174,6 +174,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "Serial bytes lost between interrupt and main loop."),
     reading("counters.missed_ticks", group::counters, 10, Type::unsigned32, "ticks",
             "Control ticks that came late or were lost."),
+    reading(
+        "counters.longest_tick", group::counters, 11, Type::unsigned32, "",
+        "Cycles of info.core_clock that the longest tick of an axis has taken since the start, by the core's "
+        "own counter, entry and return included, and whatever interrupts came with it. 0: not measured."),
 
     reading("refusal.reason", group::refusal, 1, Type::unsigned16, "",
             "Why the last write was refused; 0: it was not."),

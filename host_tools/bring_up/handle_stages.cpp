@@ -148,6 +148,26 @@ double stiffest(device::Device& device, std::size_t axis, double most) {
   }
   return stable;
 }
+
+/// The longest tick so far against the half of the PWM's period that it has, and against our model of the
+/// processor, whose waits for flash and buses nobody has compared with a board yet (docs/virtual_board.md).
+CheckResult check_tick(device::Device& device) {
+  constexpr double modelled = 2800.0;  ///< cycles, at most, waits included
+  constexpr double share = 0.9;        ///< of the time there is
+  CheckResult check{"time of the tick"};
+  const double cycles = device.read_number("counters.longest_tick");
+  if (cycles == 0.0) return check.not_judged("this board does not measure it");
+  const double room =
+      share * device.read_number("info.core_clock") / firmware::tick_rate_hz / firmware::axis_count;
+  check.values = {{"longest_tick", cycles, "cycles", 0.0, room}};
+  const std::string seen = fmt::format("{:.0f} cycles; the model says at most {:.0f}", cycles, modelled);
+  if (cycles > room)
+    return check.fail("control tick",
+                      fmt::format("{}; {:.0f} are allowed: report it with this report's file, "
+                                  "and set a lower haptic.rate until then",
+                                  seen, room));
+  return check.pass(seen);
+}
 }  // namespace
 
 StageResult try_calibration(device::Device& device, const Settings& settings, const Party& party) {
@@ -183,7 +203,7 @@ StageResult try_stiffer(device::Device& device, const Settings& settings, const 
   }
   result.checks = {judged.pass(fmt::format("{:.2f} N/mm, of {:.2f} N/mm asked for", stable * 1e-3,
                                            settings.stiffness * 1e-3)),
-                   WallTrial(device, settings, party, 3.0).touch(stable)};
+                   WallTrial(device, settings, party, 3.0).touch(stable), check_tick(device)};
   if (result.passed())
     device.apply(
         device::parse_assignments({fmt::format("axis{}.wall.stiffness={:.1f}", settings.axis, stable)}));

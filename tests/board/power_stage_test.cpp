@@ -13,6 +13,7 @@ struct Hardware {
   bool missing[2] = {};
   OffsetProgress offsets = OffsetProgress::accepted;
   int gate_rises = 0, configured = 0, calibrations = 0;
+  int looks[2] = {};
 
   void set_gate_enable(bool level) {
     gate_rises += level && !gate ? 1 : 0;
@@ -22,6 +23,11 @@ struct Hardware {
   bool emergency_stop_open() const { return stop_open; }
   bool in_service(std::size_t axis) const { return !missing[axis]; }
   void set_missing(std::size_t axis) { missing[axis] = true; }
+  void note_gate_driver_faults(std::size_t axis) {
+    EXPECT_TRUE(gate) << "a reset has wiped them out";
+    EXPECT_FALSE(missing[axis]);
+    ++looks[axis];
+  }
   GateDriverAnswer configure_gate_driver(std::size_t axis) {
     EXPECT_TRUE(gate) << "the chips do not answer while EN_GATE is low";
     EXPECT_FALSE(missing[axis]);
@@ -121,6 +127,29 @@ TEST_F(PowerStageTest, AChipThatAnswersAndKeepsNothingIsNotMissing) {
   run(5'000'000);
   EXPECT_FALSE(hardware.missing[1]);
   EXPECT_EQ(stage.condition(), Fault::power_stage);
+}
+
+// A look takes back what it shows: there is one for each fall of the line, before the reset.
+TEST_F(PowerStageTest, TheDriversAreAskedOnceWhyTheLineFellWhoeverIsArmed) {
+  run(100'000);
+  ASSERT_TRUE(stage.ready());
+  EXPECT_EQ(hardware.looks[0] + hardware.looks[1], 0);
+  for (const bool armed : {true, false}) {
+    hardware.looks[0] = hardware.looks[1] = 0;
+    stage.ISR_fault_line();
+    for (int i = 0; i < 5; ++i) stage.poll(now += 100, armed);
+    run(100'000);
+    EXPECT_TRUE(stage.ready());
+    EXPECT_EQ(hardware.looks[0], 1);
+    EXPECT_EQ(hardware.looks[1], 1);
+  }
+}
+
+TEST_F(PowerStageTest, ALineThatStaysLowIsAskedAboutAtEachTryToStart) {
+  hardware.fault_low = true;
+  run(1'000'000);
+  EXPECT_EQ(hardware.looks[0], hardware.gate_rises);
+  EXPECT_GE(hardware.looks[1], 4);
 }
 
 TEST_F(PowerStageTest, OffsetsOutOfBoundsAreNamedAndMeasuredAgain) {
