@@ -34,8 +34,8 @@ SimulatedPowerHardware::SimulatedPowerHardware(simulation::SceneDrives& drives)
 const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::size_t axis) {
   simulation::MotorDrive& drive = drives_.drive(axis);
   supply_code_ = converter_code(drives_.supply().pin_voltage());
-  samples_[axis].phase_b = converter_code(drive.current_pin(Channel::b, true));
-  samples_[axis].phase_c = converter_code(drive.current_pin(Channel::c, true));
+  samples_[axis].phase_b = converter_code(drive.current_pin(Channel::b));
+  samples_[axis].phase_c = converter_code(drive.current_pin(Channel::c));
   samples_[axis].supply = supply_code_;
   return samples_[axis];
 }

@@ -2,11 +2,16 @@
 // The current sensors of one axis: shunts between the lower FETs of the legs B and C and ground, an amplifier
 // each, and what the converter's pins then see. Leg A has none.
 //
-//   pin = 1.65 V + offset + gain x (shunt x current + noise), bounded to 0 .. 3.3 V
+//   pin = 1.65 V + offset + gain x (drift x (T - 25 degC) + driven + (1 + gain error) x shunt x current +
+//         noise), bounded to 0 .. 3.3 V
 //
 // Current into the motor reads above the middle. It passes the shunt only while the lower FET or its diode
-// conducts; at other times the shunt's voltage is 0. The amplifier's filter and settling time (about 1 us)
-// are not modelled: sample well after the edges. Quantization is the converter's, not done here.
+// conducts; at other times the shunt's voltage is 0. Quantization is the converter's, not done here.
+//
+// Settling: after the lower FET's command changes, nothing happens for `delay`; then the shunt's voltage
+// steps, and passes the filter before the amplifier and the amplifier, two low-passes one after the other.
+// What is left of the step after 1.5, 2.5 and 3.75 us (half of the low side's time at a duty of 0.94, 0.90
+// and 0.85), of which the dead time of 0.125 us is lost: 20, 3 and 0.3 % at a gain of 80.
 //
 // The noise is the amplifier's own, referred to its input, so it grows with the gain; it is white from sample
 // to sample and the same for the same seed on every machine (noise_generator.hpp).
@@ -20,13 +25,27 @@
 
 namespace kmax::simulation {
 
-// Defaults: ODrive v3.6, DRV8301 at its gain of 40 V/V; no defects.
+// Defaults: ODrive v3.6, DRV8301 at its gain of 40 V/V; no defects. The filter is the schematic's (ODrive
+// v3.5: 120 ohm and 2.2 nF before the amplifier, 22 ohm and 2.2 nF behind it, whose 48 ns are in the delay),
+// the settling the DRV8301's (0.3, 0.6, 1.2 and 2.4 us to 1 % at its gains). Guesses: the drift, and what the
+// gate driver takes of the delay, 130 ns. Of the worst board, also by guess: offset 4 mV x gain, driven
+// 0.1 mV, gains that differ by 6 %.
 struct CurrentSensorConfig {
   double shunt = 0.5e-3;  // ohm
   double gain = 40.0;     // V/V, until set_gain()
   double noise = 0.0;     // V at the amplifier's input, standard deviation; 10 uV is 20 mA with 0.5 mOhm
   double offset_b = 0.0;  // V at the pin
   double offset_c = 0.0;  // V at the pin
+  // V at the amplifier's input.
+  double drift_b = 10e-6;  // per degC of the board above 25 degC
+  double drift_c = 10e-6;
+  double driven_b = 0.0;  // while the bridge is driven
+  double driven_c = 0.0;
+  double gain_error_b = 0.0;  // share
+  double gain_error_c = 0.0;
+  double filter = 0.264e-6;   // s, time constant
+  double settling = 0.03e-6;  // s per V/V, of the amplifier to 1 %; 0 with a filter of 0: at once
+  double delay = 0.178e-6;    // s
 };
 
 inline constexpr std::array current_sensor_fields{
@@ -35,6 +54,15 @@ inline constexpr std::array current_sensor_fields{
     ModelField<CurrentSensorConfig>{"noise", &CurrentSensorConfig::noise, 0.0, 1.0, "V"},
     ModelField<CurrentSensorConfig>{"offset_b", &CurrentSensorConfig::offset_b, -1.65, 1.65, "V"},
     ModelField<CurrentSensorConfig>{"offset_c", &CurrentSensorConfig::offset_c, -1.65, 1.65, "V"},
+    ModelField<CurrentSensorConfig>{"drift_b", &CurrentSensorConfig::drift_b, -1e-3, 1e-3, "V/degC"},
+    ModelField<CurrentSensorConfig>{"drift_c", &CurrentSensorConfig::drift_c, -1e-3, 1e-3, "V/degC"},
+    ModelField<CurrentSensorConfig>{"driven_b", &CurrentSensorConfig::driven_b, -0.1, 0.1, "V"},
+    ModelField<CurrentSensorConfig>{"driven_c", &CurrentSensorConfig::driven_c, -0.1, 0.1, "V"},
+    ModelField<CurrentSensorConfig>{"gain_error_b", &CurrentSensorConfig::gain_error_b, -0.5, 0.5, ""},
+    ModelField<CurrentSensorConfig>{"gain_error_c", &CurrentSensorConfig::gain_error_c, -0.5, 0.5, ""},
+    ModelField<CurrentSensorConfig>{"filter", &CurrentSensorConfig::filter, 0.0, 1e-5, "s"},
+    ModelField<CurrentSensorConfig>{"settling", &CurrentSensorConfig::settling, 0.0, 1e-6, "s"},
+    ModelField<CurrentSensorConfig>{"delay", &CurrentSensorConfig::delay, 0.0, 1e-5, "s"},
 };
 
 class CurrentSensor {
@@ -45,9 +73,19 @@ class CurrentSensor {
   // Throws std::invalid_argument.
   explicit CurrentSensor(const CurrentSensorConfig& config = {}, std::uint64_t seed = 1);
 
+  // When in the PWM period; each has noise of its own.
+  enum class Half : std::uint8_t { low_sides, high_sides };
+
   // V at the converter's pin. `shunt_current`: A, 0 while nothing conducts below. Every call is one sample:
   // it draws new noise. A current that is not finite throws std::invalid_argument.
-  double sample(Channel channel, double shunt_current);
+  double sample(Channel channel, double shunt_current, Half half = Half::low_sides);
+  // Share of a step of the shunt's voltage that the pin does not show yet, `seconds` after the command of the
+  // lower FET; 1 before.
+  double left_after(double seconds) const;
+
+  // Of the board, degC.
+  void set_temperature(double celsius) { temperature_ = celsius; }
+  void set_driven(bool driven) { driven_ = driven; }
 
   // The gate driver's settings. Throws std::invalid_argument for a gain outside the range of the table.
   void set_gain(double gain);
@@ -73,7 +111,9 @@ class CurrentSensor {
   std::array<std::optional<double>, 2> stuck_{};
   bool floating_ = false;
   std::array<double, 2> drift_{};  // V, of pins that float
-  std::array<NoiseGenerator, 2> noise_;
+  double temperature_ = 25.0;
+  bool driven_ = false;
+  std::array<NoiseGenerator, 4> noise_;
 };
 
 }  // namespace kmax::simulation

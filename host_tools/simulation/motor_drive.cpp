@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -58,18 +59,22 @@ void MotorDrive::advance(double duration, const InverterCommand& command, Supply
     encoder_.update(coupling_.disc());
   }
   mean_torque_ = torque_sum / pieces;
-  for (std::size_t k = 0; k < terminal_count; ++k) leg_on_[k] = command.legs[k].enabled;
+  command_ = command;
   if (handle_.clipped_samples() != 0) {
     throw std::logic_error(
         "motor drive: the handle clipped the motor's force; give its device force_limit = 0");
   }
 }
 
-double MotorDrive::current_pin(CurrentSensor::Channel channel, bool lower_fet_on) {
+double MotorDrive::current_pin(CurrentSensor::Channel channel, CurrentSensor::Half half) {
   const std::size_t leg = channel == CurrentSensor::Channel::b ? terminal_b : terminal_c;
   const double current = leg_currents()[leg];
-  const bool below = leg_on_[leg] ? lower_fet_on : current > 0.0;
-  return sensor_.sample(channel, below ? current : 0.0);
+  const auto [enabled, duty] = command_.legs[leg];
+  if (!enabled) return sensor_.sample(channel, std::max(current, 0.0), half);
+  const bool low = half == CurrentSensor::Half::low_sides;
+  const double since = 0.5 * (low ? 1.0 - duty : duty) / command_.pwm_frequency - command_.dead_time;
+  const double left = sensor_.left_after(since);
+  return sensor_.sample(channel, current * (low ? 1.0 - left : left), half);
 }
 
 void MotorDrive::open_terminal(std::size_t terminal, bool open) {

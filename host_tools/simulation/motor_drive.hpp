@@ -63,10 +63,11 @@ class MotorDrive {
   // then.
   void advance(double duration, const InverterCommand& command, Supply& supply);
 
-  // V at the converter's pin of leg B or C now; one sample of noise. `lower_fet_on`: at this moment of the
-  // PWM period. A leg that is off shows the current of its lower diode. The current is the mean of the PWM
-  // period.
-  double current_pin(CurrentSensor::Channel channel, bool lower_fet_on);
+  // V at the converter's pin of leg B or C now, in the middle of that half of the PWM period; one sample of
+  // noise. A leg that is off shows the current of its lower diode. The current is the mean of the PWM period,
+  // as far as the amplifier has settled since the leg's last edge.
+  double current_pin(CurrentSensor::Channel channel,
+                     CurrentSensor::Half half = CurrentSensor::Half::low_sides);
 
   // The person on the handle, the motion, what blocks it.
   CoupledHandle& handle() { return handle_; }
@@ -115,7 +116,7 @@ class MotorDrive {
   double transmission_;
   std::array<std::size_t, terminal_count> leg_of_{terminal_a, terminal_b, terminal_c};  // of each terminal
   bool blocked_ = false, held_ = false;
-  std::array<bool, terminal_count> leg_on_{};
+  InverterCommand command_;    // of the last advance
   double acceleration_ = 0.0;  // m/s2, of the last piece
   double background_force_ = 0.0;
   double push_ = 0.0, push_damping_ = 0.0;

@@ -72,7 +72,10 @@ void SceneDrives::advance(double duration) {
   while (left > 0.0) {
     const double step = std::min(left, longest_step);
     for (Axis& axis : axes_) {
-      if (axis.drive) axis.drive->advance(step, axis.command, supply_);
+      if (!axis.drive) continue;
+      axis.drive->current_sensor().set_temperature(axis.temperature.temperature());
+      axis.drive->current_sensor().set_driven(driven(axis.command));
+      axis.drive->advance(step, axis.command, supply_);
     }
     supply_.advance(step);
     left -= step;

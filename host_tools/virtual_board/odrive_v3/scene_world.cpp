@@ -48,7 +48,7 @@ void SceneWorld::set_brake(bool on, BoardTime now) {
 
 double SceneWorld::current_pin(std::size_t axis, CurrentSensor::Channel channel) {
   if (!drives_.has(axis)) return CurrentSensor::reference / 2.0;
-  return drives_.drive(axis).current_pin(channel, true);
+  return drives_.drive(axis).current_pin(channel);
 }
 
 double SceneWorld::analogue(unsigned channel, BoardTime now) {

@@ -145,7 +145,7 @@ class MotorBench {
     return std::floor(duty * steps + 0.5) / steps;
   }
   double code(simulation::CurrentSensor::Channel channel) {
-    return std::floor(drive_.current_pin(channel, true) / 3.3 * 4096.0);
+    return std::floor(drive_.current_pin(channel) / 3.3 * 4096.0);
   }
   void advance() {
     drive_.advance(0.5 * tick, command_, supply_);

@@ -80,7 +80,7 @@ class SpinOut {
     simulation::Supply supply = scene_.make_supply();
     drive.current_sensor().set_gain(40.0);
     const auto pin = [&](simulation::CurrentSensor::Channel channel) {
-      return converter_code(drive.current_pin(channel, true)) * 3.3 / 4096.0;
+      return converter_code(drive.current_pin(channel)) * 3.3 / 4096.0;
     };
     using Channel = simulation::CurrentSensor::Channel;
     double zero_b = 0.0, zero_c = 0.0;

@@ -79,6 +79,60 @@ TEST(CurrentSensor, AnInvertedChannelReadsTheOtherSignAndKeepsItsOffset) {
   EXPECT_NEAR(sensor.sample(Channel::b, 5.0), 1.65 + 0.01 + 0.1, 1e-12);
 }
 
+// An independent integration of the two low-passes, and the figures of the header.
+TEST(CurrentSensor, SettlesAsItsTwoLowPassesDo) {
+  for (const double gain : {10.0, 20.0, 40.0, 40.528, 80.0}) {
+    const CurrentSensor sensor({.gain = gain});
+    const double amplifier = 0.03e-6 * gain / std::log(100.0);
+    EXPECT_EQ(sensor.left_after(0.17e-6), 1.0);
+    double filtered = 0.0, shown = 0.0;
+    constexpr double step = 1e-10;
+    for (int n = 1; n <= 30'000; ++n) {
+      const double before = filtered;
+      filtered += (1.0 - filtered) * (1.0 - std::exp(-step / 0.264e-6));
+      shown += (0.5 * (before + filtered) - shown) * (1.0 - std::exp(-step / amplifier));
+      if (n % 1000 == 0) {
+        ASSERT_NEAR(sensor.left_after(0.178e-6 + n * step), 1.0 - shown, 1e-3) << gain << " " << n;
+      }
+    }
+  }
+  const CurrentSensor finest({.gain = 80.0});
+  const double dead = 0.125e-6;
+  EXPECT_NEAR(finest.left_after(1.5e-6 - dead), 0.20, 0.01);
+  EXPECT_NEAR(finest.left_after(2.5e-6 - dead), 0.03, 0.002);
+  EXPECT_NEAR(finest.left_after(3.75e-6 - dead), 0.003, 0.0005);
+  EXPECT_EQ(CurrentSensor({.filter = 0.0, .settling = 0.0}).left_after(-1e-6), 0.0) << "at once";
+  EXPECT_NEAR(CurrentSensor({.filter = 0.0, .settling = 0.03e-6, .delay = 0.0}).left_after(1.2e-6), 0.01,
+              1e-9);
+}
+
+TEST(CurrentSensor, DriftDrivenOffsetAndGainErrorAreReferredToTheInput) {
+  CurrentSensor sensor({.gain = 80.0,
+                        .drift_b = 10e-6,
+                        .drift_c = -20e-6,
+                        .driven_b = 1e-4,
+                        .driven_c = -2e-4,
+                        .gain_error_b = 0.05,
+                        .gain_error_c = -0.01});
+  EXPECT_NEAR(sensor.sample(Channel::b, 10.0), 1.65 + 0.4 * 1.05, 1e-12);
+  EXPECT_NEAR(sensor.sample(Channel::c, 10.0), 1.65 + 0.4 * 0.99, 1e-12);
+  sensor.set_temperature(75.0);
+  EXPECT_NEAR(sensor.sample(Channel::b, 0.0), 1.65 + 80 * 500e-6, 1e-12);
+  EXPECT_NEAR(sensor.sample(Channel::c, 0.0), 1.65 - 80 * 1000e-6, 1e-12);
+  sensor.set_driven(true);
+  EXPECT_NEAR(sensor.sample(Channel::b, 0.0), 1.65 + 80 * 600e-6, 1e-12);
+  EXPECT_NEAR(sensor.sample(Channel::c, 0.0), 1.65 - 80 * 1200e-6, 1e-12);
+}
+
+TEST(CurrentSensor, TheHalvesOfThePeriodHaveNoiseOfTheirOwn) {
+  CurrentSensor one({.noise = 10e-6}, 7), two({.noise = 10e-6}, 7);
+  for (int n = 0; n < 100; ++n) {
+    EXPECT_EQ(one.sample(Channel::b, 0.0), two.sample(Channel::b, 0.0));
+    EXPECT_NE(one.sample(Channel::b, 0.0, CurrentSensor::Half::high_sides), two.sample(Channel::b, 0.0));
+    static_cast<void>(one.sample(Channel::b, 0.0));
+  }
+}
+
 TEST(CurrentSensor, RefusesWhatIsNotANumberOrNoSensor) {
   CurrentSensor sensor;
   EXPECT_THROW(sensor.sample(Channel::b, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);

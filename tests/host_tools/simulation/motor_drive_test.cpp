@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -207,7 +208,7 @@ TEST_F(MotorDriveTest, SwappedWiresExchangeWhatTheLegsSee) {
   EXPECT_EQ(drive.leg_currents()[terminal_b], drive.currents()[terminal_b]);
   EXPECT_EQ(drive.leg_currents()[terminal_c], drive.currents()[terminal_a]);
   EXPECT_GT(drive.leg_currents()[terminal_a], 1.0) << "the leg with the highest voltage feeds the motor";
-  EXPECT_NEAR(drive.current_pin(Channel::c, true), 1.65 + 0.02 * drive.currents()[terminal_a], 1e-12);
+  EXPECT_NEAR(drive.current_pin(Channel::c), 1.65 + 0.02 * drive.currents()[terminal_a], 1e-12);
   EXPECT_THROW(drive.swap_terminals(terminal_a, 3), std::out_of_range);
 }
 
@@ -260,14 +261,41 @@ TEST_F(MotorDriveTest, ThePinsShowTheCurrentWhileSomethingConductsBelow) {
   run(forwards, 0.01);
   const double current = drive.currents()[terminal_b];
   ASSERT_GT(current, 4.0);
-  EXPECT_NEAR(drive.current_pin(Channel::b, true), 1.65 + 0.02 * current, 1e-12);
-  EXPECT_NEAR(drive.current_pin(Channel::c, true), 1.65 - 0.02 * current, 1e-12);
-  EXPECT_EQ(drive.current_pin(Channel::b, false), 1.65);
+  EXPECT_NEAR(drive.current_pin(Channel::b), 1.65 + 0.02 * current, 1e-12);
+  EXPECT_NEAR(drive.current_pin(Channel::c), 1.65 - 0.02 * current, 1e-12);
+  EXPECT_EQ(drive.current_pin(Channel::b, CurrentSensor::Half::high_sides), 1.65);
   // Off: B's current comes up through the lower diode and its shunt, C's goes to the upper rail.
   drive.advance(5e-6, InverterCommand{}, supply);
   ASSERT_GT(drive.currents()[terminal_b], 1.0);
-  EXPECT_GT(drive.current_pin(Channel::b, false), 1.66);
-  EXPECT_EQ(drive.current_pin(Channel::c, true), 1.65);
+  EXPECT_GT(drive.current_pin(Channel::b, CurrentSensor::Half::high_sides), 1.66);
+  EXPECT_EQ(drive.current_pin(Channel::c), 1.65);
+}
+
+// At the largest duty the lower FET has hardly conducted when the pin is read, and at the smallest the upper
+// one; a middle duty is settled.
+TEST_F(MotorDriveTest, ThePinsShowWhatTheAmplifierHasSettledTo) {
+  MotorDriveConfig config = config_of(BrushedDcMotorConfig{});
+  config.current_sensor.gain = 80.0;
+  drive = MotorDrive(config, CoupledHandle(frictionless()));
+  drive.block(true);
+  const auto shown = [&](double duty, Channel channel, CurrentSensor::Half half) {
+    InverterCommand command = duties(0.0, duty, duty - 0.05);
+    if (channel == Channel::c) std::swap(command.legs[1], command.legs[2]);
+    command.dead_time = 125e-9;
+    drive.advance(10e-9, command, supply);
+    const std::size_t leg = channel == Channel::b ? terminal_b : terminal_c;
+    return (drive.current_pin(channel, half) - 1.65) / (0.04 * drive.leg_currents()[leg]);
+  };
+  run(duties(0.0, 0.55, 0.45), 0.01);
+  using Half = CurrentSensor::Half;
+  for (const Channel channel : {Channel::b, Channel::c}) {
+    EXPECT_NEAR(shown(0.94, channel, Half::low_sides), 0.80, 0.01);
+    EXPECT_NEAR(shown(0.90, channel, Half::low_sides), 0.97, 0.002);
+    EXPECT_NEAR(shown(0.50, channel, Half::low_sides), 1.0, 1e-6);
+    EXPECT_NEAR(shown(0.50, channel, Half::high_sides), 0.0, 1e-6);
+    EXPECT_NEAR(shown(0.10, channel, Half::high_sides), 0.03, 0.002);
+    EXPECT_NEAR(shown(1.0, channel, Half::low_sides), 0.0, 1e-6) << "never on";
+  }
 }
 
 TEST_F(MotorDriveTest, BrakingPumpsTheSupplyUp) {
@@ -325,7 +353,7 @@ TEST_F(MotorDriveTest, TheSameSeedGivesTheSameRun) {
     Bench bench{MotorDrive(config, CoupledHandle(frictionless()))};
     double sum = 0.0;
     for (int n = 0; n < 2000; ++n) {
-      const double pin = bench.drive.current_pin(Channel::b, true);
+      const double pin = bench.drive.current_pin(Channel::b);
       sum += pin * (n + 1) + static_cast<double>(bench.drive.encoder().edges());
       bench.run(duties(0.0, pin > 1.65 ? 0.55 : 0.6, 0.4), interval);
     }

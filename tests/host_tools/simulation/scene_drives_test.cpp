@@ -139,7 +139,7 @@ TEST(Defects, SwappedPhasesTurnTheForceRound) {
   EXPECT_GT(good.drive(0).force(), 2.0);
   EXPECT_EQ(bad.drive(0).force(), -good.drive(0).force());
   // The board measures its legs.
-  EXPECT_EQ(bad.drive(0).current_pin(Channel::b, true), good.drive(0).current_pin(Channel::b, true));
+  EXPECT_EQ(bad.drive(0).current_pin(Channel::b), good.drive(0).current_pin(Channel::b));
   bad.mend(0, Defect::phases_swapped);
   run(bad, brushed(0.52, 0.48), 0.01);
   EXPECT_NEAR(bad.drive(0).force(), good.drive(0).force(), 1e-6);
@@ -231,17 +231,17 @@ TEST(Defects, OfSupplyMotorAndSensors) {
   blocked.plant(0, Defect::motor_blocked);
   run(blocked, brushed(0.6, 0.4), 0.05);
   EXPECT_EQ(blocked.drive(0).handle().position(), 0.0) << "driving lets go the hand, not the jam";
-  const double b = blocked.drive(0).current_pin(Channel::b, true) - 1.65;
-  const double c = blocked.drive(0).current_pin(Channel::c, true) - 1.65;
+  const double b = blocked.drive(0).current_pin(Channel::b) - 1.65;
+  const double c = blocked.drive(0).current_pin(Channel::c) - 1.65;
   ASSERT_GT(b, 0.05);
   ASSERT_LT(c, -0.05);
   blocked.plant(0, Defect::current_b_inverted);
-  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::b, true) - 1.65, -b, 1e-12);
-  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::c, true) - 1.65, c, 1e-12);
+  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::b) - 1.65, -b, 1e-12);
+  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::c) - 1.65, c, 1e-12);
   blocked.plant(0, Defect::current_c_inverted);
   blocked.mend(0, Defect::current_b_inverted);
-  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::b, true) - 1.65, b, 1e-12);
-  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::c, true) - 1.65, -c, 1e-12);
+  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::b) - 1.65, b, 1e-12);
+  EXPECT_NEAR(blocked.drive(0).current_pin(Channel::c) - 1.65, -c, 1e-12);
   blocked.mend(0, Defect::motor_blocked);
   run(blocked, brushed(0.6, 0.4), 0.01);
   EXPECT_GT(blocked.drive(0).handle().position(), 0.0);

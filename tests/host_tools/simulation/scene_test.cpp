@@ -241,9 +241,9 @@ TEST(SceneMotor, ADriveHasNoForceLimitAndItsOwnSeed) {
   EXPECT_NE(other.synchronous_motor(), nullptr);
   using Channel = CurrentSensor::Channel;
   MotorDrive first = scene.make_drive(0);
-  const double pin = first.current_pin(Channel::b, true) - 0.006;
-  EXPECT_EQ(pin, same.current_pin(Channel::b, true) - 0.006);
-  EXPECT_NE(pin, other.current_pin(Channel::b, true) + 0.003);
+  const double pin = first.current_pin(Channel::b) - 0.006;
+  EXPECT_EQ(pin, same.current_pin(Channel::b) - 0.006);
+  EXPECT_NE(pin, other.current_pin(Channel::b) + 0.003);
   EXPECT_THROW(scene.make_drive(2), std::out_of_range);
 }
 

@@ -73,8 +73,8 @@ class OnDrives {
             Record& record) {
     using Channel = simulation::CurrentSensor::Channel;
     using simulated_board::converter_code;
-    record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::b, true)));
-    record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::c, true)));
+    record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::b)));
+    record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::c)));
     record.codes.push_back(converter_code(drives.supply().pin_voltage()));
     const bool serial = drives.encoder_kind(0) == simulation::EncoderKind::as5047p;
     record.codes.push_back(serial ? 0U : static_cast<std::uint32_t>(drives.drive(0).encoder().edges()));
