@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -7,13 +9,15 @@ namespace kmax::board {
 
 /// What code above a board must know of its chip and its power stage: data, written once per board.
 struct BoardDescription {
-  std::string_view name;              ///< as info.board_name says
-  std::uint32_t core_clock_hz;        ///< with which alone the power stage runs
-  std::uint32_t timer_clock_hz;       ///< of the PWM
-  std::uint16_t half_period_ticks;    ///< steps from no duty to all of it
-  std::uint16_t dead_time_ticks;      ///< between the two switches of a leg
-  std::uint16_t minimum_low_ticks;    ///< for which a low side must stay on, so that its shunt can be read
-  float modulation_limit;             ///< of the supply, for the current controllers; below largest_duty()
+  std::string_view name;            ///< as info.board_name says
+  std::uint32_t core_clock_hz;      ///< with which alone the power stage runs
+  std::uint32_t timer_clock_hz;     ///< of the PWM
+  std::uint16_t half_period_ticks;  ///< steps from no duty to all of it
+  std::uint16_t dead_time_ticks;    ///< between the two switches of a leg
+  std::uint16_t minimum_low_ticks;  ///< for which a low side must stay on, so that its shunt can be read
+  /// Of the supply, for the current controllers, by the amplifiers' gain (drivers::CurrentSenseGain); below
+  /// largest_duty().
+  std::array<float, 4> modulation_limit;
   double supply_ratio;                ///< of the supply to the voltage at the converter's pin
   double gate_driver_supply_minimum;  ///< V; below it the gate drivers report a fault
   double brake_pulse;                 ///< s, for which a tick switches the brake resistor on
@@ -26,7 +30,8 @@ struct BoardDescription {
   }
   /// Else what the current controllers ask for would be cut off, and they would not know.
   constexpr bool modulation_fits() const {
-    return 0.5 + 0.5 * static_cast<double>(modulation_limit) <= largest_duty() + 1e-6;
+    return 0.5 + 0.5 * static_cast<double>(*std::ranges::max_element(modulation_limit)) <=
+           largest_duty() + 1e-6;
   }
 };
 

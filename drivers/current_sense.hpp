@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 // Phase current from the code of a shunt amplifier: low-side shunt, amplifier with a mid-point output,
@@ -11,6 +13,9 @@
 // into the motor.
 //
 //   current = (code - offset) * reference / (4096 * gain * shunt)
+//
+// The offset may be 4 mV at the amplifier's input (DRV8301; a guess from memory of its data sheet, ODrive
+// accepts 3 mV) and drifts with the temperature, so it is measured (OffsetCalibration) and then followed.
 //
 // Range and resolution with 0.5 mOhm and 3.3 V, amplifier used within +-1.35 V of its middle:
 //   gain 10: +-270 A, 161 mA per code    gain 40: +-67.5 A, 40.3 mA per code
@@ -46,6 +51,13 @@ class CurrentSense {
 
   /// The code at zero current, from OffsetCalibration.
   constexpr void set_offset(float code) { offset_ = code; }
+  /// Once a millisecond, with a code that no current made: with 0.26 s after the temperature, and at most 62
+  /// codes a second, so that a few codes of something else do no harm.
+  constexpr void follow(std::uint16_t code) {
+    constexpr float share = 1.0F / 256.0F, most = 16.0F;
+    const float off = static_cast<float>(code) - offset_;
+    offset_ += share * (off > most ? most : off < -most ? -most : off);
+  }
   constexpr float offset() const { return offset_; }
 
   /// A, positive into the motor. One conversion, one subtraction, one multiplication.
@@ -73,20 +85,46 @@ class CurrentSense {
   float offset_ = middle_code;
 };
 
-/// The largest gain, and so the finest step, with which this current (A) is read without saturation; x10 when
-/// none is. Not for the interrupt path.
-constexpr CurrentSenseGain gain_for_current(float largest_current) {
-  for (unsigned code = static_cast<unsigned>(CurrentSenseGain::x80); code > 0; --code) {
-    const auto gain = static_cast<CurrentSenseGain>(code);
-    if (CurrentSense{{.gain = gain}}.range() >= largest_current) return gain;
+namespace detail {
+/// By gain, as CurrentSenseGain counts them; made by the compiler.
+inline constexpr std::size_t gains = 4;
+inline constexpr auto offset_window = [] {
+  constexpr float input_offset_volt = 0.004F, codes_per_volt = 4096.0F / CurrentSenseConfig{}.reference_volt;
+  std::array<std::uint16_t, gains> codes{};
+  for (unsigned gain = 0; gain < gains; ++gain) {
+    const float off = input_offset_volt * gain_factor(static_cast<CurrentSenseGain>(gain)) * codes_per_volt;
+    codes[gain] = static_cast<std::uint16_t>(off + 15.5F);
   }
-  return CurrentSenseGain::x10;
+  return codes;
+}();
+inline constexpr auto sure_range = [] {
+  std::array<float, gains> amperes{};
+  for (unsigned gain = 0; gain < gains; ++gain) {
+    CurrentSense sense{{.gain = static_cast<CurrentSenseGain>(gain)}};
+    sense.set_offset(CurrentSense::middle_code + static_cast<float>(offset_window[gain]));
+    amperes[gain] = sense.range();
+  }
+  return amperes;
+}();
+}  // namespace detail
+
+/// How far the code at zero current may lie from the middle: 4 mV at the amplifier's input, and 15 codes that
+/// the middle of the reference and the converter may be off by. 64, 114, 213 and 412 codes.
+constexpr std::uint16_t offset_window(CurrentSenseGain gain) {
+  return detail::offset_window[static_cast<std::size_t>(gain)];
+}
+
+/// The largest gain, and so the finest step, with which this current (A) is read without saturation, whatever
+/// the offset; x10 when none is.
+constexpr CurrentSenseGain gain_for_current(float largest_current) {
+  std::size_t gain = detail::gains - 1;
+  while (gain > 0 && !(detail::sure_range[gain] >= largest_current)) --gain;
+  return static_cast<CurrentSenseGain>(gain);
 }
 
 struct OffsetCalibrationConfig {
   std::uint8_t log2_samples = 10;  // 1024 samples: 51 ms at 20 kHz; 0 to 16
-  // How far the mean may lie from the mid-point: 205 codes are 5 % of full scale, 165 mV at the amplifier.
-  std::uint16_t window = 205;
+  std::uint16_t window = offset_window(CurrentSenseGain::x40);
   // Largest minus smallest code: more means that current flowed, or that the input is open.
   std::uint16_t largest_spread = 64;
 };
@@ -116,6 +154,11 @@ class OffsetCalibration {
     smallest_ = 0xFFFF;
     largest_ = 0;
     result_ = OffsetResult::running;
+  }
+
+  constexpr void restart(std::uint16_t window) {
+    config_.window = window;
+    restart();
   }
 
   /// Once per sample of the phase; without effect when the result stands.

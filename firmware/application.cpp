@@ -7,7 +7,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
     : board_(board),
       lock_(parameters_, store_, board.lock_attempts),
       log_(log_memory, board.reset_cause, board.crash),
-      axes_(board.modulation_limit, parameters_, store_, links_, log_, capture_memory),
+      axes_(parameters_, store_, links_, log_, capture_memory),
       readings_({.board = board_,
                  .parameters = parameters_,
                  .store = store_,

@@ -132,13 +132,11 @@ class NativeBoard {
   }
 
   void start(firmware::ResetCause cause) {
-    // Its bridges give what those of odrive_v3 do.
     application_.emplace(firmware::BoardIdentity{.board_name = "native",
                                                  .serial_number = 1,
                                                  .core_clock_hz = 0,
                                                  .clock_source = 4,
-                                                 .reset_cause = cause,
-                                                 .modulation_limit = 0.88f},
+                                                 .reset_cause = cause},
                          capture_memory_, log_memory_);
     if (prepare_) prepare_(*application_);
   }

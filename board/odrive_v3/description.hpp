@@ -16,7 +16,9 @@ inline constexpr BoardDescription description{
     .half_period_ticks = pwm_config.half_period_ticks,
     .dead_time_ticks = drivers::stm32f4::dead_time_ticks(pwm_config.dead_time_code),
     .minimum_low_ticks = pwm_config.minimum_low_ticks,
-    .modulation_limit = 0.88f,  // leaves the low sides on for 6 % of the period
+    // Leaves the low sides on for 3.1 us at a gain of 10, 3.25, 4 and 6 us at 80. Half of that is before the
+    // sample, and in it the amplifiers settle to 1.3 % (host_tools/simulation/current_sensor.hpp).
+    .modulation_limit = {0.875f, 0.87f, 0.84f, 0.76f},
     .supply_ratio = 11.0,
     // DRV8301 data sheet, PVDD under-voltage.
     .gate_driver_supply_minimum = 5.9,

@@ -102,7 +102,6 @@ firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
   identity.board_name = description.name;
   identity.serial_number = serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
-  identity.modulation_limit = description.modulation_limit;
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.brown_out_level =
       static_cast<std::uint8_t>(stm32::flash_optcr::BrownOutLevel::read(stm32::flash().optcr));

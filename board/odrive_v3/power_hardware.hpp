@@ -18,7 +18,7 @@ namespace kmax::board::odrive_v3 {
 
 /// Timers, converters, lines and gate drivers of both axes (board::MotorHardware).
 ///
-/// The conversions' interrupt comes 0.7 us after the middle of an axis' low-side window, the two axes' every
+/// The conversions' interrupt comes 1.4 us after the middle of an axis' low-side window, the two axes' every
 /// 25 us in turn: TIM1 counts up after its underflow (axis 0), down after its overflow (axis 1). A duty is
 /// active from the timer's next turn on, 25 us after the sample.
 ///
@@ -63,6 +63,12 @@ class PowerHardware {
   auto& bridge(std::size_t axis) { return axis == 0 ? bridge0_ : bridge1_; }
   const drivers::stm32f4::CurrentSample& ISR_sample(std::size_t axis) {
     return sampling_.ISR_read(static_cast<unsigned>(axis));
+  }
+  drivers::stm32f4::ZeroCurrentCodes zero_current(std::size_t axis) const {
+    return sampling_.zero_current(static_cast<unsigned>(axis));
+  }
+  static constexpr float modulation_limit(drivers::CurrentSenseGain gain) {
+    return description.modulation_limit[static_cast<std::size_t>(gain)];
   }
   std::uint16_t ISR_counter(std::size_t axis) const {
     return axis == 0 ? encoder0_.count() : encoder1_.count();

@@ -42,6 +42,15 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   { hardware.ISR_sample(axis).supply } -> std::convertible_to<std::uint16_t>;
   { hardware.ISR_sample(axis).slow_age } -> std::convertible_to<std::uint8_t>;
 
+  /// Any context: the last codes of the same pins while the axis' high sides conduct, or all its switches are
+  /// off. The amplifiers have settled then as far as they have at the other end of the period, since duties
+  /// lie as far above 0 as below 1.
+  { hardware.zero_current(axis).phase_b } -> std::convertible_to<std::uint16_t>;
+  { hardware.zero_current(axis).phase_c } -> std::convertible_to<std::uint16_t>;
+  /// Of the supply, that the current controllers may use: so that an amplifier of this gain has settled when
+  /// it is sampled.
+  { constant.modulation_limit(drivers::CurrentSenseGain::x80) } -> std::same_as<float>;
+
   /// The free-running counter of the axis' quadrature lines, and its index line at the same moment.
   { constant.ISR_counter(axis) } -> std::unsigned_integral;
   { constant.ISR_index_line(axis) } -> std::same_as<bool>;
@@ -169,6 +178,9 @@ class Drives {
   /// Main loop, with the bridges off: the current sensors' zero. Ticks must run.
   void restart_offset_calibration();
   OffsetProgress offset_progress();
+  /// Main loop, once a millisecond, also while driven: the sensors' zero goes with the board's temperature,
+  /// and with what driving does to it. False: a zero is where no sound amplifier has it.
+  bool follow_offsets();
 
   /// Main loop: for the application.
   firmware::BoardReadings readings() const;
@@ -509,8 +521,8 @@ void Drives<Hardware>::restart_offset_calibration() {
   std::atomic_signal_fence(std::memory_order_seq_cst);
   for (Axis& axis : axes_) {
     axis.sense_b = axis.sense_c = drivers::CurrentSense{{.gain = gain_}};
-    axis.offset_b.restart();
-    axis.offset_c.restart();
+    axis.offset_b.restart(drivers::offset_window(gain_));
+    axis.offset_c.restart(drivers::offset_window(gain_));
   }
   std::atomic_signal_fence(std::memory_order_seq_cst);
   calibrating_.store(true, std::memory_order_relaxed);
@@ -536,6 +548,24 @@ OffsetProgress Drives<Hardware>::offset_progress() {
 }
 
 template <typename Hardware>
+bool Drives<Hardware>::follow_offsets() {
+  const auto window = static_cast<float>(drivers::offset_window(gain_));
+  bool within = true;
+  for (std::size_t index = 0; index < firmware::axis_count; ++index) {
+    if (!hardware_.has(index)) continue;
+    Axis& axis = axes_[index];
+    const auto codes = hardware_.zero_current(index);
+    axis.sense_b.follow(codes.phase_b);
+    axis.sense_c.follow(codes.phase_c);
+    for (const auto* sense : {&axis.sense_b, &axis.sense_c}) {
+      const float off = sense->offset() - drivers::CurrentSense::middle_code;
+      within = within && off <= window && off >= -window;
+    }
+  }
+  return within;
+}
+
+template <typename Hardware>
 firmware::BoardReadings Drives<Hardware>::readings() const {
   firmware::BoardReadings readings;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
@@ -544,6 +574,7 @@ firmware::BoardReadings Drives<Hardware>::readings() const {
         reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
   }
   readings.has_power_stage = true;
+  readings.modulation_limit = hardware_.modulation_limit(gain_);
   readings.supply_voltage = supply_.volts(hardware_.supply_code());
   readings.missed_ticks = hardware_.missed_ticks();
   return readings;

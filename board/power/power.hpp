@@ -118,6 +118,7 @@ class Power {
     }
     void restart_offset_calibration() { drives.restart_offset_calibration(); }
     OffsetProgress offset_progress() { return drives.offset_progress(); }
+    bool follow_offsets() { return drives.follow_offsets(); }
 
     Drives<Hardware>& drives;
     drivers::CurrentSenseGain configured_gain = drivers::CurrentSenseGain::x80;

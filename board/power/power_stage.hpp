@@ -36,6 +36,8 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   /// Begins to average the current sensors' codes with the bridges off.
   {hardware.restart_offset_calibration()};
   { hardware.offset_progress() } -> std::same_as<OffsetProgress>;
+  /// Once a millisecond from then on. False: an offset has left its window.
+  { hardware.follow_offsets() } -> std::same_as<bool>;
 };
 
 /// From power-up to bridges that may be armed, and back again after a fault. Bridges are off all the while;
@@ -45,7 +47,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 ///   waking      20 ms until the gate drivers' serial interface answers
 ///   configuring the chips written and read back; one that fails sends all to `resetting` after 200 ms
 ///   measuring   offsets of the current sensors
-///   ready
+///   ready       the offsets are followed; one that leaves its window takes all to `resetting` after 200 ms
 ///
 /// A board need not have all axes. A gate driver that has never answered since the start, three times while
 /// another accepted what was written, is not there, and the board goes on without its axis. One that has
@@ -62,7 +64,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 template <PowerStageHardware Hardware>
 class PowerStage {
  public:
-  static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000;
+  static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000, follow_us = 1'000;
   static constexpr std::uint8_t rounds_until_missing = 3;
 
   explicit PowerStage(Hardware& hardware) : hardware_(hardware) {}
@@ -180,16 +182,22 @@ class PowerStage {
             condition_.store(firmware::Fault::none, std::memory_order_relaxed);
             return enter(State::ready, now_us);
           case OffsetProgress::refused:
-            condition_.store(firmware::Fault::current_sense, std::memory_order_relaxed);
-            return enter(State::waiting, now_us);
+            return refuse_offsets(now_us);
         }
         return;
       case State::waiting:
         if (elapsed >= retry_us) begin_reset(now_us, condition_.load(std::memory_order_relaxed));
         return;
       case State::ready:
+        if (elapsed < follow_us) return;
+        since_us_ = now_us;
+        if (!hardware_.follow_offsets()) refuse_offsets(now_us);
         return;
     }
+  }
+  void refuse_offsets(std::uint32_t now_us) {
+    condition_.store(firmware::Fault::current_sense, std::memory_order_relaxed);
+    enter(State::waiting, now_us);
   }
 
   Hardware& hardware_;

@@ -28,8 +28,7 @@ std::optional<odrive_v3::SerialLine> serial;
 [[noreturn]] void run() {
   application.emplace(firmware::BoardIdentity{.board_name = "qemu",
                                               .core_clock_hz = clocks.core_hz,
-                                              .clock_source = static_cast<std::uint8_t>(clocks.source),
-                                              .modulation_limit = odrive_v3::description.modulation_limit});
+                                              .clock_source = static_cast<std::uint8_t>(clocks.source)});
   odrive_v3::priority::set_all(interrupts);
   if (!system_tick.start(clocks.core_hz, 1'000)) drivers::cortex_m::stop_on_unexpected_interrupt();
   serial.emplace(interrupts, clocks.apb1_hz);

@@ -10,16 +10,17 @@
 // TIM1's update event (TRGO, at underflow and at overflow, every 25 us at 20 kHz PWM) starts the injected
 // groups of all three converters at the same instant. Underflow is the sampling point of axis 0, overflow
 // that of axis 1, whose timer runs half a period later. ADC2 converts phase B and ADC3 phase C of one axis
-// per trigger; the interrupt that reads them writes the lists of the other axis before the next trigger. ADC1
-// converts the slow quantities on every trigger. The interrupt is ADC2's end of sequence alone.
+// per trigger, and then the same of the other axis, whose high sides conduct: no current passes its shunts,
+// and the codes are its amplifiers' offsets. The interrupt that reads them writes the lists of the other axis
+// before the next trigger. ADC1 converts the slow quantities on every trigger. The interrupt is ADC2's end of
+// sequence alone.
 //
 // Budget at ADCCLK = 84 MHz / 4 = 21 MHz, a conversion takes its sampling time plus 12 cycles:
-//   currents  3 + 12 = 15 cycles = 0.71 us; the window of the low sides must hold from the trigger for the
-//   sampling
-//             time, 0.14 us, and the interrupt starts 0.71 us after the trigger
-//   ADC1      4 x (28 + 12) = 160 cycles = 7.6 us, so its results are of the trigger before in an interrupt
-//   that
-//             comes in time (it may come up to 24 us late and still be counted as in time by the lists)
+//   currents  2 x (3 + 12) = 30 cycles = 1.43 us; the low sides must conduct for the sampling time, 0.14 us,
+//             the other axis' high sides for 0.86 us, and the interrupt starts 1.43 us after the trigger
+//   ADC1      3 x (28 + 12) = 120 cycles = 5.7 us, so in an interrupt that comes in time its results are of
+//             the trigger before, the supply's perhaps of this one (it may come up to 23 us late and still be
+//             counted as in time by the lists)
 // 28 cycles for the slow ones: the sampling capacitor (4 pF) pulls the 270 pF at the voltage divider's tap
 // down by up to 61 codes when the channel changes; that recovers with 909 Ohm x 274 pF = 0.25 us, to half a
 // code in 1.2 us = 25 cycles. The thermistors' 2.2 uF need less. Three cycles for the currents are the
@@ -46,7 +47,7 @@
 // Order: `configure` (timers' trigger still off or not), wait adc_stabilization_us, `start`. The converters'
 // clocks, the pins (analog mode) and the NVIC are the composition root's.
 //
-// Cost of ISR_read: 10 loads and 5 stores on APB2, no loop longer than four, no division.
+// Cost of ISR_read: 11 loads and 5 stores on APB2, no loop longer than four, no division.
 
 namespace kmax::drivers::stm32f4 {
 
@@ -59,7 +60,6 @@ struct CurrentSamplingConfig {
   std::array<Phases, 2> axes{{{10, 11}, {13, 12}}};  // PC0, PC1; PC3, PC2
   std::uint8_t supply = 6;                           // PA6
   std::array<std::uint8_t, 2> temperatures{15, 4};   // power stage of axis 0 (PC5), axis 1 (PA4)
-  std::uint8_t auxiliary_temperature = 5;            // PA5
   std::uint8_t current_sampling_code = 0;            // index into adc_sampling_cycles: 3 cycles
   std::uint8_t slow_sampling_code = 2;               // 28 cycles
 };
@@ -71,10 +71,14 @@ struct CurrentSample {
   std::uint16_t phase_c = 0;
   std::uint16_t supply = 0;
   std::array<std::uint16_t, 2> temperatures{};
-  std::uint16_t auxiliary_temperature = 0;
   /// Reads since ADC1 finished a sequence: 0 normally, 1 after a late interrupt, more means that ADC1 stands
   /// still and the slow codes are old. Stays at 255.
   std::uint8_t slow_age = 0;
+};
+
+/// Codes of an axis' amplifiers while no current passes their shunts.
+struct ZeroCurrentCodes {
+  std::uint16_t phase_b = 0, phase_c = 0;
 };
 
 struct CurrentSamplingCounters {
@@ -90,9 +94,9 @@ class CurrentSampling {
   constexpr CurrentSampling(Adc& adc1, Adc& adc2, Adc& adc3, Common& common,
                             const CurrentSamplingConfig& config = {})
       : adc1_(adc1), adc2_(adc2), adc3_(adc3), common_(common), config_(config) {
-    for (unsigned axis = 0; axis < 2; ++axis) {
-      lists_[axis] = {list_of<1>({config.axes[axis].b}), list_of<1>({config.axes[axis].c})};
-    }
+    const auto &first = config.axes[0], &second = config.axes[1];
+    lists_ = {{{pair_of(first.b, second.b), pair_of(first.c, second.c)},
+               {pair_of(second.b, first.b), pair_of(second.c, first.c)}}};
   }
 
   /// Turns the converters on with their triggers off. False, and nothing touched, when the ADC clock would be
@@ -102,16 +106,15 @@ class CurrentSampling {
     stop();
     common_.ccr = adc_ccr::Prescaler::bits(prescaler / 2 - 1);
     adc1_.cr1 = adc_cr1::Scan::mask;
-    adc2_.cr1 = adc_cr1::InjectedEndInterrupt::mask;
-    adc3_.cr1 = 0;
-    const std::array<std::uint8_t, 4> slow{config_.supply, config_.temperatures[0], config_.temperatures[1],
-                                           config_.auxiliary_temperature};
+    adc2_.cr1 = adc_cr1::Scan::mask | adc_cr1::InjectedEndInterrupt::mask;
+    adc3_.cr1 = adc_cr1::Scan::mask;
+    const std::array<std::uint8_t, 3> slow{config_.supply, config_.temperatures[0], config_.temperatures[1]};
     set_sampling_times(adc1_, slow, config_.slow_sampling_code);
     set_sampling_times(adc2_, std::array{config_.axes[0].b, config_.axes[1].b},
                        config_.current_sampling_code);
     set_sampling_times(adc3_, std::array{config_.axes[0].c, config_.axes[1].c},
                        config_.current_sampling_code);
-    adc1_.jsqr = list_of<4>(slow);
+    adc1_.jsqr = list_of<3>(slow);
     for (Adc* each : {&adc1_, &adc2_, &adc3_}) each->cr2 = adc_cr2::On::mask;
     return true;
   }
@@ -152,6 +155,8 @@ class CurrentSampling {
     adc3_.sr = flags_cleared;
     latest_.phase_b = code(adc2_.jdr[0]);
     latest_.phase_c = code(adc3_.jdr[0]);
+    // Also of a trigger out of step, whose codes a current may have made: who follows them must be slow.
+    zero_current_[axis ^ 1U] = {code(adc2_.jdr[1]), code(adc3_.jdr[1])};
     const unsigned converted_axis = axis_in_force_;
     arm_lists(axis ^ 1U);
     const bool disturbed = (static_cast<std::uint32_t>(adc2_.sr) &
@@ -175,6 +180,8 @@ class CurrentSampling {
   /// Written by the interrupt; each is a half-word that another context may read, of different triggers.
   /// Zeros before the first.
   const CurrentSample& latest() const { return latest_; }
+  /// Likewise. Zeros before the other axis' first read.
+  const ZeroCurrentCodes& zero_current(unsigned axis) const { return zero_current_[axis]; }
   /// Written by the interrupt; each is a word that another context may read.
   const CurrentSamplingCounters& counters() const { return counters_; }
 
@@ -198,11 +205,16 @@ class CurrentSampling {
     return word;
   }
 
+  static constexpr std::uint32_t pair_of(std::uint32_t first, std::uint32_t second) {
+    return adc_jsqr::LastIndex::bits(1) | first << adc_jsqr::position(0, 2) |
+           second << adc_jsqr::position(1, 2);
+  }
+
   bool channels_reachable() const {
     bool all = config_.current_sampling_code < 8 && config_.slow_sampling_code < 8;
     for (const auto& axis : config_.axes) all = all && adc_reaches(2, axis.b) && adc_reaches(3, axis.c);
     for (const std::uint8_t channel : config_.temperatures) all = all && adc_reaches(1, channel);
-    return all && adc_reaches(1, config_.supply) && adc_reaches(1, config_.auxiliary_temperature);
+    return all && adc_reaches(1, config_.supply);
   }
 
   template <std::size_t count>
@@ -237,7 +249,6 @@ class CurrentSampling {
     adc1_.sr = flags_cleared;
     latest_.supply = code(adc1_.jdr[0]);
     latest_.temperatures = {code(adc1_.jdr[1]), code(adc1_.jdr[2])};
-    latest_.auxiliary_temperature = code(adc1_.jdr[3]);
     latest_.slow_age = 0;
   }
 
@@ -250,6 +261,7 @@ class CurrentSampling {
   unsigned axis_in_force_ = none;
   unsigned last_axis_ = none;
   CurrentSample latest_{};
+  std::array<ZeroCurrentCodes, 2> zero_current_{};
   CurrentSamplingCounters counters_{};
 };
 

@@ -13,8 +13,8 @@
 // PWM mode 2 turns the high side on while the counter is above CCR, which gives a duty of exactly (ARR - CCR)
 // / ARR and centres the low-side window, 2 * CCR ticks, on the underflow. The shunts lie below the low sides,
 // so the underflow is where currents are sampled. `minimum_low_ticks` keeps CCR from falling below the time
-// from the low side's command to a settled amplifier (dead time, switching, 0.6 us at gain 20 or 1.2 us at
-// gain 40 of the DRV8301); it also recharges the bootstrap. Default 252 ticks = 1.5 us: greatest duty 0.94.
+// that recharges the bootstrap, and from the low side's command to a settled amplifier of the lowest gain; of
+// a higher one it is the caller who leaves more. Default 252 ticks = 1.5 us: greatest duty 0.94.
 //
 // Registers are preloaded: a duty becomes active at the next over- or underflow (RCR = 0), at most half a
 // period later, all three legs together. Three stores are not one: a call that straddles that instant gives

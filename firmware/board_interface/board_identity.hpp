@@ -18,9 +18,6 @@ struct BoardIdentity {
   ResetCause reset_cause = ResetCause::unknown;
   CrashRecord crash{};                     ///< what is left of the run before
   RetainedCount* lock_attempts = nullptr;  ///< where WriteLock counts over resets; null: nowhere
-  /// Of the supply, that the current controllers may use: what the board's bridge can give. No default: a
-  /// board that did not say it would drive no current.
-  float modulation_limit;
 };
 
 }  // namespace kmax::firmware

@@ -18,6 +18,9 @@ struct BoardReadings {
     return at_room_temperature;
   }();                          ///< degC
   float supply_voltage = 0.0f;  ///< V; 0: not measured
+  /// Of the supply, that the current controllers may use: what the board's bridge can give, and its current
+  /// sensors can follow. A board that does not say it drives no current.
+  float modulation_limit = 0.0f;
   std::uint32_t missed_ticks = 0;
   std::uint32_t longest_tick = 0;                      ///< cycles; 0: not measured
   std::array<bool, axis_count> gate_driver_missing{};  ///< has not answered since the start

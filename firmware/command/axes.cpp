@@ -8,13 +8,13 @@
 
 namespace kmax::firmware {
 
-Axes::Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
-           const LinkStates& links, FaultLog& log, std::span<std::uint32_t> capture_memory)
+Axes::Axes(ParameterAccess& parameters, const StoreCommands& store, const LinkStates& links, FaultLog& log,
+           std::span<std::uint32_t> capture_memory)
     : parameters_(parameters),
       store_(store),
       links_(links),
       log_(log),
-      settings_(modulation_limit, parameters.values()),
+      settings_(parameters.values()),
       tick_(settings_.all(), capture_memory) {
   configure_thermal();
 }
@@ -67,7 +67,8 @@ bool Axes::pushes_anothers_axis(std::size_t axis) const {
 }
 
 AxesSettings::Circumstances Axes::circumstances_of(std::size_t axis) const {
-  return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis)};
+  return {thermal_[axis].allowance(), thermal_[axis].resistance_temperature(), commutation_known(axis),
+          readings_.modulation_limit};
 }
 
 void Axes::configure_thermal() {

@@ -26,9 +26,9 @@ class Axes {
   static constexpr std::uint32_t round_ticks = AxesTick<axis_count>::round_ticks;
   static constexpr std::uint32_t round_interval_us = round_ticks * 1'000'000 / tick_rate_hz;
 
-  /// `modulation_limit`: see BoardIdentity. `capture_memory`: see AxesTick.
-  Axes(float modulation_limit, ParameterAccess& parameters, const StoreCommands& store,
-       const LinkStates& links, FaultLog& log, std::span<std::uint32_t> capture_memory);
+  /// `capture_memory`: see AxesTick.
+  Axes(ParameterAccess& parameters, const StoreCommands& store, const LinkStates& links, FaultLog& log,
+       std::span<std::uint32_t> capture_memory);
   Axes(const Axes&) = delete;
   Axes& operator=(const Axes&) = delete;
 

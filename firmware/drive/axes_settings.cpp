@@ -4,11 +4,6 @@
 
 namespace kmax::firmware {
 
-AxesSettings::AxesSettings(float modulation_limit, const ParameterValues& values)
-    : modulation_limit_(modulation_limit) {
-  make(values, 0, {}, {});
-}
-
 void AxesSettings::make(const ParameterValues& values, std::uint32_t restarts, const AllCircumstances& now,
                         const std::array<AxisReport, axis_count>& reports) {
   circumstances_ = now;
@@ -27,7 +22,7 @@ void AxesSettings::make(const ParameterValues& values, std::uint32_t restarts, c
     const std::int64_t position = Axis::position_of(reports[axis].counted, setting);
     setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, axis), position);
     auto motor = motor_configuration(values, axis, now[axis].winding_temperature, now[axis].current_share);
-    motor.modulation_limit = modulation_limit_;
+    motor.modulation_limit = now[axis].modulation_limit;
     setting.motor = MotorControl::prepare(motor);
     setting.compensation =
         control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));

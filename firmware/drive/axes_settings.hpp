@@ -21,6 +21,7 @@ class AxesSettings {
     float current_share = 1.0f;         ///< of current.limit that the temperatures leave
     float winding_temperature = 25.0f;  ///< degC, in steps
     bool commutated = true;             ///< the rotor's angle is known
+    float modulation_limit = 0.0f;      ///< see BoardReadings
     friend constexpr bool operator==(const Circumstances&, const Circumstances&) = default;
   };
   using AllCircumstances = std::array<Circumstances, axis_count>;
@@ -31,8 +32,8 @@ class AxesSettings {
     float resolution = 0.0f;    ///< m
   };
 
-  /// For axes that stand at their counters' zero. `modulation_limit`: see BoardIdentity.
-  AxesSettings(float modulation_limit, const ParameterValues& values);
+  /// For axes that stand at their counters' zero.
+  explicit AxesSettings(const ParameterValues& values) { make(values, 0, {}, {}); }
 
   /// `restarts`: how often a parameter has changed that restarts the estimators. `reports`: where the axes
   /// are.
@@ -48,7 +49,6 @@ class AxesSettings {
   std::uint32_t generation() const { return settings_.axis[0].generation; }
 
  private:
-  float modulation_limit_;
   Settings settings_{};
   std::array<Scale, axis_count> scale_{};
   AllCircumstances circumstances_{};

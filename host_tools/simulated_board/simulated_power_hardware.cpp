@@ -40,6 +40,13 @@ const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::si
   return samples_[axis];
 }
 
+drivers::stm32f4::ZeroCurrentCodes SimulatedPowerHardware::zero_current(std::size_t axis) {
+  constexpr auto half = simulation::CurrentSensor::Half::high_sides;
+  simulation::MotorDrive& drive = drives_.drive(axis);
+  return {converter_code(drive.current_pin(Channel::b, half)),
+          converter_code(drive.current_pin(Channel::c, half))};
+}
+
 std::uint32_t SimulatedPowerHardware::ISR_counter(std::size_t axis) const {
   if (drives_.encoder_kind(axis) == simulation::EncoderKind::as5047p) return 0;
   return static_cast<std::uint32_t>(drives_.drive(axis).encoder().edges());

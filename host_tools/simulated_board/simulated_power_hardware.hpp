@@ -9,6 +9,7 @@
 
 #include "board/power/power.hpp"
 #include "drivers/drv8301_registers.hpp"
+#include "drivers/stm32f4/current_sampling.hpp"
 #include "host_tools/simulated_board/simulated_bridge.hpp"
 #include "host_tools/simulation/scene_drives.hpp"
 
@@ -66,6 +67,10 @@ class SimulatedPowerHardware {
   drivers::stm32f4::ThreePhasePwm<>& bridge(std::size_t axis) { return bridges_[axis].pwm(); }
   /// Converts the currents of an axis that has a motor, and the supply; once in a tick.
   const Sample& ISR_sample(std::size_t axis);
+  drivers::stm32f4::ZeroCurrentCodes zero_current(std::size_t axis);
+  static constexpr float modulation_limit(drivers::CurrentSenseGain gain) {
+    return board::odrive_v3::description.modulation_limit[static_cast<std::size_t>(gain)];
+  }
   std::uint32_t ISR_counter(std::size_t axis) const;
   bool ISR_index_line(std::size_t axis) const;
   SimulatedSerialEncoder& serial_encoder() { return serial_encoder_; }

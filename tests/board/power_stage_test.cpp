@@ -12,7 +12,8 @@ struct Hardware {
   GateDriverAnswer answers[2] = {GateDriverAnswer::accepted, GateDriverAnswer::accepted};
   bool missing[2] = {};
   OffsetProgress offsets = OffsetProgress::accepted;
-  int gate_rises = 0, configured = 0, calibrations = 0;
+  bool offsets_hold = true;
+  int gate_rises = 0, configured = 0, calibrations = 0, followed = 0;
   int looks[2] = {};
 
   void set_gate_enable(bool level) {
@@ -36,6 +37,10 @@ struct Hardware {
   }
   void restart_offset_calibration() { ++calibrations; }
   OffsetProgress offset_progress() const { return offsets; }
+  bool follow_offsets() {
+    ++followed;
+    return offsets_hold;
+  }
 };
 
 class PowerStageTest : public testing::Test {
@@ -61,6 +66,22 @@ TEST_F(PowerStageTest, WaitsForTheChipsBeforeItWritesToThem) {
   run(500);
   EXPECT_EQ(hardware.configured, 2);
   EXPECT_TRUE(stage.ready());
+  EXPECT_EQ(stage.condition(), Fault::none);
+}
+
+TEST_F(PowerStageTest, FollowsTheOffsetsEachMillisecondFromThenOnAlsoWhileArmed) {
+  run(21'000);
+  EXPECT_EQ(hardware.followed, 0);
+  run(1'000'000, true);
+  EXPECT_NEAR(hardware.followed, 1000, 2);
+  hardware.offsets_hold = false;
+  run(1'100, true);
+  EXPECT_EQ(stage.condition(), Fault::current_sense);
+  EXPECT_TRUE(hardware.gate) << "until nobody drives any more, and its reason can be read";
+  hardware.offsets_hold = true;
+  const int calibrations = hardware.calibrations;
+  run(250'000);
+  EXPECT_EQ(hardware.calibrations, calibrations + 1);
   EXPECT_EQ(stage.condition(), Fault::none);
 }
 

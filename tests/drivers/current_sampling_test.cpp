@@ -53,13 +53,13 @@ TEST(CurrentSampling, ConfiguresAsTheManualWantsIt) {
   Board board;
   ASSERT_TRUE(board.sampling.configure(apb2));
   EXPECT_EQ(board.common.ccr.value, 1U << 16) << "84 MHz / 4";
-  EXPECT_EQ(board.adc1.cr1.value, 1U << 8) << "SCAN for four conversions, no interrupt";
-  EXPECT_EQ(board.adc2.cr1.value, 1U << 7) << "JEOCIE";
-  EXPECT_EQ(board.adc3.cr1.value, 0U);
-  // Four: JL = 3, JSQ1 = 6 (supply), JSQ2 = 15, JSQ3 = 4, JSQ4 = 5.
-  EXPECT_EQ(board.adc1.jsqr.value, 3U << 20 | 5U << 15 | 4U << 10 | 15U << 5 | 6U);
-  // 28 cycles (2): channels 4, 5, 6 in SMPR2, channel 15 in SMPR1.
-  EXPECT_EQ(board.adc1.smpr2.value, 2U << 12 | 2U << 15 | 2U << 18);
+  EXPECT_EQ(board.adc1.cr1.value, 1U << 8) << "SCAN for three conversions, no interrupt";
+  EXPECT_EQ(board.adc2.cr1.value, 1U << 7 | 1U << 8) << "JEOCIE, SCAN for two";
+  EXPECT_EQ(board.adc3.cr1.value, 1U << 8);
+  // Three: JL = 2, JSQ2 = 6 (supply), JSQ3 = 15, JSQ4 = 4.
+  EXPECT_EQ(board.adc1.jsqr.value, 2U << 20 | 4U << 15 | 15U << 10 | 6U << 5);
+  // 28 cycles (2): channels 4 and 6 in SMPR2, channel 15 in SMPR1.
+  EXPECT_EQ(board.adc1.smpr2.value, 2U << 12 | 2U << 18);
   EXPECT_EQ(board.adc1.smpr1.value, 2U << 15);
   EXPECT_EQ(board.adc2.smpr1.value | board.adc2.smpr2.value | board.adc3.smpr1.value | board.adc3.smpr2.value,
             0U);
@@ -80,8 +80,9 @@ TEST(CurrentSampling, StartArmsTheListOfTheFirstAxisAndThenTheTriggers) {
     board.adc2.flags = jeoc | jstrt;
     board.sampling.start(axis);
     EXPECT_EQ(order, "ll132");
-    EXPECT_EQ(board.adc2.jsqr.value, (axis == 0 ? 10U : 13U) << 15) << "one conversion is JSQ4";
-    EXPECT_EQ(board.adc3.jsqr.value, (axis == 0 ? 11U : 12U) << 15);
+    const auto list = [](unsigned own, unsigned other) { return 1U << 20 | other << 15 | own << 10; };
+    EXPECT_EQ(board.adc2.jsqr.value, axis == 0 ? list(10, 13) : list(13, 10)) << "two are JSQ3 and JSQ4";
+    EXPECT_EQ(board.adc3.jsqr.value, axis == 0 ? list(11, 12) : list(12, 11));
     EXPECT_EQ(board.adc2.flags, 0U) << "a conversion from before is forgotten";
     for (const FakeAdc* each : {&board.adc1, &board.adc2, &board.adc3}) {
       EXPECT_EQ(each->cr2.value, 1U | 1U << 16 | 1U << 20) << "ADON, JEXTSEL T1_TRGO, JEXTEN rising";
@@ -161,8 +162,8 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   Started board;
   board.trigger(1, 2);
   EXPECT_EQ(board.sampling.ISR_read(0).slow_age, 1U);
-  const std::uint16_t codes[] = {1111, 2222, 3333, 444};
-  for (unsigned i = 0; i < 4; ++i) board.adc1.jdr[i].value = codes[i];
+  const std::uint16_t codes[] = {1111, 2222, 3333};
+  for (unsigned i = 0; i < 3; ++i) board.adc1.jdr[i].value = codes[i];
   board.adc1.flags = jeoc | jstrt;
   board.trigger(1, 2);
   CurrentSample sample = board.sampling.ISR_read(1);
@@ -170,7 +171,6 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   EXPECT_EQ(sample.supply, 1111);
   EXPECT_EQ(sample.temperatures[0], 2222);
   EXPECT_EQ(sample.temperatures[1], 3333);
-  EXPECT_EQ(sample.auxiliary_temperature, 444);
   EXPECT_EQ(board.sampling.latest().supply, 1111) << "for another context";
   EXPECT_EQ(board.sampling.latest().temperatures[1], 3333);
   board.adc1.jdr[0].value = 9;  // a new sequence is under way

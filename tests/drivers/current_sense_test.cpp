@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -90,13 +91,54 @@ TEST(OffsetCalibration, TakesExactlyItsSamples) {
 TEST(CurrentSense, TheGainIsTheLargestThatReadsTheCurrent) {
   EXPECT_EQ(gain_for_current(0.0F), CurrentSenseGain::x80);
   for (const auto gain : {CurrentSenseGain::x80, CurrentSenseGain::x40, CurrentSenseGain::x20}) {
-    const float range = CurrentSense{{.gain = gain}}.range();
+    CurrentSense worst{{.gain = gain}};
+    worst.set_offset(2048.0F + static_cast<float>(offset_window(gain)));
+    const float range = worst.range();
+    worst.set_offset(2048.0F - static_cast<float>(offset_window(gain)));
+    EXPECT_GE(worst.range(), range);
     EXPECT_EQ(gain_for_current(range), gain);
     EXPECT_EQ(gain_for_current(range * 1.0001F),
               static_cast<CurrentSenseGain>(static_cast<unsigned>(gain) - 1));
   }
   EXPECT_EQ(gain_for_current(1e6F), CurrentSenseGain::x10) << "beyond all of them";
   EXPECT_EQ(gain_for_current(std::numeric_limits<float>::quiet_NaN()), CurrentSenseGain::x10);
+}
+
+TEST(CurrentSense, TheWindowOfTheOffsetIsThatOfTheAmplifiersInput) {
+  for (const auto gain :
+       {CurrentSenseGain::x10, CurrentSenseGain::x20, CurrentSenseGain::x40, CurrentSenseGain::x80}) {
+    const double volt_at_the_input =
+        offset_window(gain) * 3.3 / 4096 / static_cast<double>(gain_factor(gain));
+    EXPECT_GT(volt_at_the_input, 4.0e-3);
+    EXPECT_LT(volt_at_the_input, 4.0e-3 + 16 * 3.3 / 4096 / static_cast<double>(gain_factor(gain)));
+  }
+}
+
+TEST(CurrentSense, FollowsItsZeroSlowly) {
+  CurrentSense sense;
+  sense.set_offset(2100.0F);
+  sense.follow(2110);
+  EXPECT_NEAR(sense.offset(), 2100.0F + 10.0F / 256.0F, 1e-3F);
+  for (int n = 0; n < 2000; ++n) sense.follow(2110);
+  EXPECT_NEAR(sense.offset(), 2110.0F, 0.05F) << "as near as a float of that size goes";
+}
+
+// Whatever the codes are: between them and where it was, and not faster than 62 codes a second.
+RC_GTEST_PROP(CurrentSense, FollowsNoFurtherThanItsCodesAndNoFasterThanItMay, ()) {
+  const auto first = *rc::gen::inRange<std::uint16_t>(0, 4096);
+  const auto codes = *rc::gen::nonEmpty(
+      rc::gen::container<std::vector<std::uint16_t>>(rc::gen::inRange<std::uint16_t>(0, 4096)));
+  CurrentSense sense;
+  sense.set_offset(first);
+  float low = first, high = first;
+  for (const std::uint16_t code : codes) {
+    low = std::min(low, static_cast<float>(code));
+    high = std::max(high, static_cast<float>(code));
+    const float before = sense.offset();
+    sense.follow(code);
+    RC_ASSERT(std::abs(sense.offset() - before) <= 0.0626F);
+    RC_ASSERT(sense.offset() >= low && sense.offset() <= high);
+  }
 }
 
 TEST(OffsetCalibration, WindowIsInclusiveOnBothSides) {

@@ -72,6 +72,8 @@ class MadeUpHardware {
     samples_[axis].phase_c = static_cast<std::uint16_t>(2048 - code);
     return samples_[axis];
   }
+  Sample zero_current(std::size_t) const { return {}; }
+  float modulation_limit(drivers::CurrentSenseGain) const { return 0.88f; }
   std::uint16_t ISR_counter(std::size_t axis) const { return counters[axis]; }
   bool ISR_index_line(std::size_t) const { return false; }
   void set_brake(bool on) { brake_on = on; }

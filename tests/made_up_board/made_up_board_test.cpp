@@ -168,7 +168,7 @@ TEST_F(MadeUpBoard, TicksOfAllThreeAreCountedAndMissed) {
 
 // The ticks one after the other as a chip's interrupts come, without anything else of a board.
 TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
-  firmware::Application application{{.board_name = "made_up", .modulation_limit = 0.88f}};
+  firmware::Application application{{.board_name = "made_up"}};
   Power<MadeUpHardware> power{MadeUpHardware::supply_ratio};
   power.take_parameters(application);
   int due = 0;

@@ -36,6 +36,9 @@ class BoardWorld {
   virtual double supply_voltage() const = 0;
   /// The brake resistor is switched.
   virtual void set_brake(bool on, BoardTime now) = 0;
+  /// The counter of this axis' PWM is at its underflow, the other's at its overflow: until the next call the
+  /// low sides of the one conduct, the high sides of the other, as far as they are driven.
+  virtual void set_low_sides(std::size_t /*axis*/) {}
   /// Volts at an analogue pin, by the number of its ADC channel.
   virtual double analogue(unsigned channel, BoardTime now) = 0;
   /// Asked after every sampling instant of the axis and whenever else the board likes.

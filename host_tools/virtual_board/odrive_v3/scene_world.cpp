@@ -48,7 +48,8 @@ void SceneWorld::set_brake(bool on, BoardTime now) {
 
 double SceneWorld::current_pin(std::size_t axis, CurrentSensor::Channel channel) {
   if (!drives_.has(axis)) return CurrentSensor::reference / 2.0;
-  return drives_.drive(axis).current_pin(channel);
+  using enum CurrentSensor::Half;
+  return drives_.drive(axis).current_pin(channel, axis == low_sides_of_ ? low_sides : high_sides);
 }
 
 double SceneWorld::analogue(unsigned channel, BoardTime now) {
@@ -60,7 +61,6 @@ double SceneWorld::analogue(unsigned channel, BoardTime now) {
     if (channel == wiring.temperatures[axis]) return drives_.temperature(axis).pin_voltage();
   }
   if (channel == wiring.supply) return drives_.supply().pin_voltage();
-  if (channel == wiring.auxiliary_temperature) return drives_.temperature(0).pin_voltage();
   return 0.0;
 }
 

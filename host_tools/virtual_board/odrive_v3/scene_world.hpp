@@ -25,6 +25,7 @@ class SceneWorld : public BoardWorld {
   void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) override;
   double supply_voltage() const override { return drives_.supply().voltage(); }
   void set_brake(bool on, BoardTime now) override;
+  void set_low_sides(std::size_t axis) override { low_sides_of_ = axis; }
   double analogue(unsigned channel, BoardTime now) override;
   EncoderSignals encoder(std::size_t axis, BoardTime now) override;
   SerialEncoderState serial_encoder(BoardTime now) override;
@@ -45,6 +46,7 @@ class SceneWorld : public BoardWorld {
 
   simulation::SceneDrives drives_;
   BoardTime time_ = 0;
+  std::size_t low_sides_of_ = 0;
 };
 
 }  // namespace kmax::virtual_board

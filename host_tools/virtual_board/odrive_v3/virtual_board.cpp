@@ -120,6 +120,7 @@ void VirtualBoard::wire() {
   });
   pwm_[0].on_trigger_output([this](BoardTime now) {
     pwm_[1].trigger_input(now);
+    if (world_ != nullptr) world_->set_low_sides(pwm_[0].counting_down() ? 1 : 0);
     look_at_world(now);
     adc_.trigger_injected(now);
   });

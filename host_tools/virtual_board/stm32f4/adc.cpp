@@ -233,7 +233,7 @@ bool AdcModel::Converter::interrupts() const {
 BoardTime AdcModel::Converter::next_event() const {
   if (!running) return never;
   // A clock that became slower in between moves the end of the group behind what was reckoned.
-  const bool to_hold = count_ == 1 && !injected_.held;
+  const bool to_hold = count_ <= 2 && index_ == 0 && !injected_.held;
   return to_hold ? injected_.held_at : std::max(group_ends_at_, injected_.ends_at);
 }
 

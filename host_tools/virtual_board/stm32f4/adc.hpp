@@ -25,14 +25,14 @@ namespace kmax::virtual_board {
 /// ADON; a list of several without SCAN; a channel that the converter cannot reach; changing a sampling time
 /// while a conversion runs.
 ///
-/// Cost: a trigger that starts one conversion each on ADC2 and ADC3 and four on ADC1 makes three events: both
-/// holds, both ends, the end of the four. No allocation.
+/// Cost: a trigger that starts two conversions each on ADC2 and ADC3 and three on ADC1 makes three events:
+/// both first holds, both ends, the end of the three. No allocation.
 class AdcModel final : public Peripheral {
  public:
   /// Volts at a channel's pin (0 to 15) at an instant. Channel numbers mean the same pin on all converters. A
-  /// group of one is asked at the very instant, a group of several when it ends or the firmware looks, that
-  /// is with instants of up to one group's length ago: a world that keeps no past may answer with the present
-  /// for what is that slow.
+  /// group of one or two is asked for the first at the very instant; else it is asked when the group ends or
+  /// the firmware looks, that is with instants of up to one group's length ago: a world that keeps no past
+  /// may answer with the present for what is that slow.
   using Input = std::function<double(unsigned channel, BoardTime instant)>;
 
   AdcModel(const BoardClocks& clocks, InterruptLines& interrupts, Input volts);

@@ -97,6 +97,7 @@ class AdvancedTimerModel final : public RegisterBlock<AdvancedTimerModel> {
   /// Legs A, B, C. The caller must have advanced the timer to the present.
   const std::array<PwmLegOutput, 3>& outputs() const { return outputs_; }
   bool moe() const;
+  bool counting_down() const { return counter_.down(); }
 
  private:
   static const RegisterTable<AdvancedTimerModel>& registers();

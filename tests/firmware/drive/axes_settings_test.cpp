@@ -4,25 +4,25 @@
 
 namespace kmax::firmware::axes_settings_test {
 
-constexpr float board_limit = 0.5f;
-
 TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
   ParameterValues values;
   values.set_whole<"encoder.direction">(-1, 1);
   values.set_real<"supply.voltage_max">(31.0f);
-  const AxesSettings settings(board_limit, values);
+  AxesSettings settings(values);
+  EXPECT_EQ(settings.of(0).motor.dc.share_limit, 0.0f) << "the board has not said what it can give";
+  constexpr AxesSettings::Circumstances board{.modulation_limit = 0.5f};
+  settings.make(values, 0, {board, board}, {});
   EXPECT_EQ(settings.of(0).encoder_direction, 1);
   EXPECT_EQ(settings.of(1).encoder_direction, -1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     EXPECT_EQ(settings.of(axis).supply_voltage_max, 31.0f);
-    EXPECT_EQ(settings.of(axis).motor.dc.share_limit, 0.5f * board_limit)
-        << "what the board's bridge can give";
+    EXPECT_EQ(settings.of(axis).motor.dc.share_limit, 0.25f) << "what the board's bridge can give";
   }
 }
 
 TEST(AxesSettings, ARestartGivesAllAxesTheSameNewGeneration) {
   const ParameterValues values;
-  AxesSettings settings(board_limit, values);
+  AxesSettings settings(values);
   const std::uint32_t first = settings.generation();
   EXPECT_NE(first, AxisReport{}.generation) << "an axis that has not ticked yet has not taken them";
   settings.make(values, 0, {}, {});
@@ -35,7 +35,7 @@ TEST(AxesSettings, ARestartGivesAllAxesTheSameNewGeneration) {
 
 TEST(AxesSettings, TheCircumstancesOfAnAxisActOnThatAxisAlone) {
   const ParameterValues values;
-  AxesSettings settings(board_limit, values);
+  AxesSettings settings(values);
   const float full = settings.of(0).motor.transmission.current_limit;
   AxesSettings::AllCircumstances now;
   now[1] = {.current_share = 0.25f, .winding_temperature = 90.0f, .commutated = false};
@@ -49,7 +49,7 @@ TEST(AxesSettings, TheCircumstancesOfAnAxisActOnThatAxisAlone) {
 
 TEST(AxesSettings, TheScaleIsAWholeNumberOfResamplersSteps) {
   ParameterValues values;
-  AxesSettings settings(board_limit, values);
+  AxesSettings settings(values);
   const double count = settings.scale(1).count_length;
   EXPECT_GT(count, 0.0);
   values.set_real<"position.resolution">(static_cast<float>(10.0 * count), 1);

@@ -198,6 +198,29 @@ TEST(SimulatedPowerHardware, AnUnpluggedCableLooksLikeRestUnlessAnIndexIsWatched
   EXPECT_FALSE(serial.turn_for(50e-6).count_valid);
 }
 
+TEST(SimulatedPowerHardware, TheAmplifiersSettleWithinWhatTheBoardAllowsTheDuties) {
+  for (const auto gain : {drivers::CurrentSenseGain::x10, drivers::CurrentSenseGain::x20,
+                          drivers::CurrentSenseGain::x40, drivers::CurrentSenseGain::x80}) {
+    constexpr const board::BoardDescription& board = board::odrive_v3::description;
+    const simulation::CurrentSensor sensor({.gain = static_cast<double>(drivers::gain_factor(gain))});
+    const double duty = 0.5 + 0.5 * static_cast<double>(SimulatedPowerHardware::modulation_limit(gain));
+    EXPECT_LE(duty, board.largest_duty());
+    const double left = sensor.left_after(0.5 * (1.0 - duty) / board.pwm_hz() - board.dead_time());
+    EXPECT_LT(left, 0.0135) << drivers::gain_factor(gain);
+    EXPECT_GT(left, 0.008) << "or more voltage could be used";
+  }
+}
+
+TEST(SimulatedPowerHardware, TheCodesAtZeroCurrentAreTheOffsetsWhateverFlows) {
+  Plant plant("dc_coreless_a");
+  plant.set<"current.limit">(3.0);
+  plant.calibrate();
+  plant.blocked_current(0.2);
+  const auto codes = plant.drives.hardware().zero_current(0);
+  EXPECT_NEAR(codes.phase_b, 2048 + 0.006 * 4096 / 3.3, 2.5);
+  EXPECT_NEAR(codes.phase_c, 2048 - 0.004 * 4096 / 3.3, 2.5);
+}
+
 TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
   EXPECT_EQ(converter_code(0.0), 0);
   EXPECT_EQ(converter_code(1.65), 2048);

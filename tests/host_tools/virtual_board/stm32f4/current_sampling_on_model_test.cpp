@@ -68,21 +68,23 @@ TEST(CurrentSamplingOnModel, ThousandsOfTriggersNeverSwapTheAxes) {
   Board board;
   for (unsigned n = 0; n < 10'000; ++n) {
     board.trigger(n);
-    board.run(15 * 16 - 1);
+    board.run(30 * 16 - 1);
     ASSERT_FALSE(board.interrupts.level(Interrupt::adc)) << n;
     board.run(1);
-    ASSERT_TRUE(board.interrupts.level(Interrupt::adc)) << "0.71 us after the trigger";
+    ASSERT_TRUE(board.interrupts.level(Interrupt::adc)) << "1.43 us after the trigger";
     board.run(168);  // entry of the handler
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n));
+    const unsigned other = (n + 1) % 2;
+    ASSERT_EQ(board.sampling.zero_current(other).phase_b, board.expected(Board::phase_b[other], n));
+    ASSERT_EQ(board.sampling.zero_current(other).phase_c, board.expected(Board::phase_c[other], n));
     ASSERT_FALSE(board.interrupts.level(Interrupt::adc));
     if (n == 0) continue;
-    // The slow ones are those of the trigger before.
+    // The slow ones are those of the trigger before; the first has just been converted anew.
     ASSERT_EQ(sample.slow_age, 0U);
-    ASSERT_EQ(sample.supply, board.expected(6, n - 1));
+    ASSERT_EQ(sample.supply, board.expected(6, n));
     ASSERT_EQ(sample.temperatures[0], board.expected(15, n - 1));
     ASSERT_EQ(sample.temperatures[1], board.expected(4, n - 1));
-    ASSERT_EQ(sample.auxiliary_temperature, board.expected(5, n - 1));
   }
   const auto& counters = board.sampling.counters();
   EXPECT_EQ(counters.axis_mismatches + counters.overruns + counters.missing_phase_c + counters.spurious, 0U);
@@ -98,7 +100,7 @@ TEST(CurrentSamplingOnModel, InterruptThatIsLateButInTimeLosesNothing) {
   Board board;
   for (unsigned n = 0; n < 1000; ++n) {
     board.trigger(n);
-    board.run((n % 3 == 0 ? 24 * units_per_microsecond : units_per_microsecond));
+    board.run((n % 3 == 0 ? 24 * units_per_microsecond : 2 * units_per_microsecond));
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n));
     ASSERT_LE(sample.slow_age, 1U);
@@ -112,7 +114,7 @@ TEST(CurrentSamplingOnModel, InterruptAfterTheNextTriggerIsCountedAndNothingWron
     Board board;
     for (unsigned n = 0; n < 4; ++n) {
       board.trigger(n);
-      board.run(units_per_microsecond);
+      board.run(2 * units_per_microsecond);
       board.sampling.ISR_read(n % 2);
     }
     board.trigger(4);
@@ -128,7 +130,7 @@ TEST(CurrentSamplingOnModel, InterruptAfterTheNextTriggerIsCountedAndNothingWron
     }
     for (unsigned n = 6; n < 12; ++n) {
       board.trigger(n);
-      board.run(units_per_microsecond);
+      board.run(2 * units_per_microsecond);
       const CurrentSample sample = board.sampling.ISR_read(n % 2);
       ASSERT_NO_FATAL_FAILURE(expect_sample_of(board, sample, n)) << late;
     }
@@ -144,7 +146,7 @@ RC_GTEST_PROP(CurrentSamplingOnModel, ValidMeansRight, ()) {
   int last = -1;
   for (unsigned n = 0; n < served.size(); ++n) {
     board.trigger(n);
-    board.run(units_per_microsecond);
+    board.run(2 * units_per_microsecond);
     if (!served[n]) continue;
     const CurrentSample sample = board.sampling.ISR_read(n % 2);
     if (sample.valid) {
@@ -160,12 +162,12 @@ RC_GTEST_PROP(CurrentSamplingOnModel, ValidMeansRight, ()) {
 TEST(CurrentSamplingOnModel, StartedAtTheWrongPhaseHealsWithTheSecondSample) {
   Board board;
   board.trigger(1);  // axis 1 comes first, the list of axis 0 is in force
-  board.run(units_per_microsecond);
+  board.run(2 * units_per_microsecond);
   EXPECT_FALSE(board.sampling.ISR_read(1).valid);
   EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
   EXPECT_EQ(board.sampling.counters().overruns, 0U);
   board.trigger(2);
-  board.run(units_per_microsecond);
+  board.run(2 * units_per_microsecond);
   expect_sample_of(board, board.sampling.ISR_read(0), 2);
 }
 
@@ -177,7 +179,7 @@ TEST(CurrentSamplingOnModel, StopIsQuietAndStartComesBack) {
   EXPECT_FALSE(board.interrupts.level(Interrupt::adc));
   board.sampling.start(1);
   board.trigger(1);
-  board.run(units_per_microsecond);
+  board.run(2 * units_per_microsecond);
   expect_sample_of(board, board.sampling.ISR_read(1), 1);
 }
 
