@@ -47,10 +47,11 @@ enum class PhaseSum : std::uint8_t {
 ///
 /// Sum: |a + b + c| above 10 % of current_limit plus 0.25 A in more than `patience` samples in a row, at any
 /// speed. Current then leaks to ground or the supply, or a sensor shows what does not flow. The 10 % leave
-/// room for shunts and amplifiers of 3 % each at over_current, the 0.25 A for converter steps and offsets. It
-/// says something where every conductor that is driven has a sensor: give a DC motor on legs B and C as {0,
-/// b, c}, three sensors as they are. Where the third is worked out, {-(b + c), b, c}, the sum is zero and
-/// this never speaks: PhaseSum::implied leaves it out.
+/// room for sensors that differ by 6 % and have settled to 1.3 %, also above the limit, the 0.25 A for
+/// converter steps and what is left of offsets, which must be followed as they drift. It says something where
+/// every conductor that is driven has a sensor: give a DC motor on legs B and C as {0, b, c}, three sensors
+/// as they are. Where the third is worked out, {-(b + c), b, c}, the sum is zero and this never speaks:
+/// PhaseSum::implied leaves it out.
 ///
 /// A NaN counts as over-current. Magnitudes are compared as the integers that their bits make, sign off: the
 /// same order, a NaN above infinity, and fewer instructions. Cost, executed on a Cortex-M4F in a good sample:

@@ -336,14 +336,13 @@ TEST(SimulatedPower, TheBrakeResistorIsOffWhileASaveIsUnderWay) {
   EXPECT_FALSE(brakes_for());
 }
 
-/// A blocked brushed motor at a gain of 80 whose wall asks for `force`, N; A with 2.35 N/A.
+/// A blocked motor at a gain of 80 whose wall asks for `force`, N.
 struct SenseBench : MotorBench {
   explicit SenseBench(const simulation::CurrentSensorConfig& sensor, double force = 2.0,
-                      double resistance = 2.3)
-      : MotorBench(scene_of(sensor, resistance)) {
+                      double resistance = 2.3, const char* name = "dc_coreless_a")
+      : MotorBench(scene_of(sensor, resistance, name)) {
     drives().plant(0, Defect::motor_blocked);
     set<"current.limit">(5.0);
-    set<"motor.resistance">(resistance);
     set<"force.limit">(20.0);
     prepare_wall(force < 0.0 ? -1.0 : 1.0);
     EXPECT_EQ(power().gain(), drivers::CurrentSenseGain::x80);
@@ -360,21 +359,26 @@ struct SenseBench : MotorBench {
     }
   }
   double current() { return drive().currents()[simulation::terminal_b]; }
-  /// What the firmware measures, less the truth; the mean of 0.1 s.
+  /// A, what the firmware measures, less what makes the force; the mean of 0.1 s.
   double error() {
+    const double newton_per_ampere =
+        static_cast<double>(application().values().real<"motor.torque_constant">(0)) /
+        drive().encoder().config().transmission;
     double sum = 0.0;
     for (int n = 0; n < 2000; ++n) {
       tick();
-      sum += static_cast<double>(report().motor.current) - current();
+      sum += static_cast<double>(report().motor.current) - current_force() / newton_per_ampere;
     }
     return sum / 2000;
   }
 
  private:
-  static simulation::Scene scene_of(const simulation::CurrentSensorConfig& sensor, double resistance) {
-    simulation::Scene scene = identified("dc_coreless_a");
+  static simulation::Scene scene_of(const simulation::CurrentSensorConfig& sensor, double resistance,
+                                    const char* name) {
+    simulation::Scene scene = identified(name);
     scene.axes[0].current_sensor = sensor;
-    std::get<simulation::BrushedDcMotorConfig>(*scene.axes[0].motor).resistance = resistance;
+    if (auto* brushed = std::get_if<simulation::BrushedDcMotorConfig>(&*scene.axes[0].motor))
+      brushed->resistance = resistance;
     return scene;
   }
 };
@@ -407,6 +411,10 @@ TEST(CurrentAmplifiers, ABoardThatWarmsUpKeepsItsForceAndDoesNotTrip) {
     EXPECT_NEAR(bench.error(), 0.0, 0.02) << "a code; the drift alone is 0.8 A";
     EXPECT_NEAR(bench.current_force(), 2.0, 0.06);
   }
+  SenseBench synchronous({}, 2.0, 0.0, "gimbal_a");
+  synchronous.heat(25.0, 65.0, 2.0);
+  ASSERT_TRUE(synchronous.armed());
+  EXPECT_NEAR(synchronous.error(), 0.0, 0.02);
 }
 
 // All at once, and at the largest current.
