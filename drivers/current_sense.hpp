@@ -14,7 +14,7 @@
 //
 //   current = (code - offset) * reference / (4096 * gain * shunt)
 //
-// The offset may be 4 mV at the amplifier's input (DRV8301; a guess from memory of its data sheet, ODrive
+// The offset may be 4 mV at the amplifier's input (DRV8301; a guess, its data sheet was not at hand; ODrive
 // accepts 3 mV) and drifts with the temperature, so it is measured (OffsetCalibration) and then followed.
 //
 // Range and resolution with 0.5 mOhm and 3.3 V, amplifier used within +-1.35 V of its middle:
