@@ -552,7 +552,7 @@ bool Drives<Hardware>::follow_offsets() {
   const auto window = static_cast<float>(drivers::offset_window(gain_));
   bool within = true;
   for (std::size_t index = 0; index < firmware::axis_count; ++index) {
-    if (!hardware_.has(index)) continue;
+    if (!hardware_.has(index) || !in_service(index)) continue;
     Axis& axis = axes_[index];
     const auto codes = hardware_.zero_current(index);
     axis.sense_b.follow(codes.phase_b);
