@@ -53,7 +53,7 @@ class CurrentSense {
   constexpr void set_offset(float code) { offset_ = code; }
   /// Once a millisecond, with a code that no current made: with 0.26 s after the temperature, and at most 62
   /// codes a second, so that a few codes of something else do no harm.
-  constexpr void follow(std::uint16_t code) {
+  constexpr void follow(std::uint32_t code) {
     constexpr float share = 1.0F / 256.0F, most = 16.0F;
     const float off = static_cast<float>(code) - offset_;
     offset_ += share * (off > most ? most : off < -most ? -most : off);

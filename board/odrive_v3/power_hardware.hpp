@@ -81,7 +81,9 @@ class PowerHardware {
   void set_brake(bool on) { on ? brake_.start() : brake_.stop(); }
 
   std::uint16_t supply_code() const { return sampling_.latest().supply; }
-  std::uint16_t temperature_code(std::size_t axis) const { return sampling_.latest().temperatures[axis]; }
+  std::uint16_t temperature_code(std::size_t axis) const {
+    return sampling_.temperature(static_cast<unsigned>(axis));
+  }
   std::uint32_t missed_ticks() const {
     return sampling_.counters().overruns + sampling_.counters().axis_mismatches;
   }

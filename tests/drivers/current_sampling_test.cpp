@@ -169,10 +169,9 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   CurrentSample sample = board.sampling.ISR_read(1);
   EXPECT_EQ(sample.slow_age, 0U);
   EXPECT_EQ(sample.supply, 1111);
-  EXPECT_EQ(sample.temperatures[0], 2222);
-  EXPECT_EQ(sample.temperatures[1], 3333);
+  EXPECT_EQ(board.sampling.temperature(0), 2222);
+  EXPECT_EQ(board.sampling.temperature(1), 3333);
   EXPECT_EQ(board.sampling.latest().supply, 1111) << "for another context";
-  EXPECT_EQ(board.sampling.latest().temperatures[1], 3333);
   board.adc1.jdr[0].value = 9;  // a new sequence is under way
   for (unsigned i = 0; i < 600; ++i) {
     board.trigger(1, 2);

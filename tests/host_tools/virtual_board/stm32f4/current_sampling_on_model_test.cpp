@@ -83,8 +83,8 @@ TEST(CurrentSamplingOnModel, ThousandsOfTriggersNeverSwapTheAxes) {
     // The slow ones are those of the trigger before; the first has just been converted anew.
     ASSERT_EQ(sample.slow_age, 0U);
     ASSERT_EQ(sample.supply, board.expected(6, n));
-    ASSERT_EQ(sample.temperatures[0], board.expected(15, n - 1));
-    ASSERT_EQ(sample.temperatures[1], board.expected(4, n - 1));
+    ASSERT_EQ(board.sampling.temperature(0), board.expected(15, n - 1));
+    ASSERT_EQ(board.sampling.temperature(1), board.expected(4, n - 1));
   }
   const auto& counters = board.sampling.counters();
   EXPECT_EQ(counters.axis_mismatches + counters.overruns + counters.missing_phase_c + counters.spurious, 0U);
