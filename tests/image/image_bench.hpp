@@ -52,7 +52,10 @@ class ImageBench {
   explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
                       const std::string& scene_name = "motor_axes",
                       const virtual_board::VirtualBoardConfig& config = {})
-      : scene(with(simulated_board::open_scene(scene_name), parameters, push)), world(scene) {
+      : ImageBench(simulated_board::open_scene(scene_name), parameters, push, config) {}
+  explicit ImageBench(const simulation::Scene& base, const Parameters& parameters = {}, double push = 0.0,
+                      const virtual_board::VirtualBoardConfig& config = {})
+      : scene(with(base, parameters, push)), world(scene) {
     board = board_for_24_v(&world, config);
     virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
     master = std::make_unique<virtual_board::BoardLink>(*board);

@@ -35,6 +35,7 @@ class WatchedLink final : public link::FrameLink {
   std::string description() const override { return "sim"; }
 
   simulated_board::SimulatedDevice& hardware() { return board_.device(); }
+  firmware::Application& application() { return board_.board().application(); }
   double position() { return hardware().handle(axis_).position(); }
   double largest_displacement() const { return largest_; }
   /// Loses every n-th message; 0: none.

@@ -1,0 +1,318 @@
+// Boards as they come: parts drawn at random from what they are known or guessed to be, each calibrated,
+// tested, pressed against walls while it warms up, stopped and saved. Nothing may trip without a cause, and
+// nothing that must may fail to. The same seed draws the same boards.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "host_tools/calibration/procedure.hpp"
+#include "host_tools/device/store.hpp"
+#include "tests/host_tools/selftest/tested_axis.hpp"
+#include "tests/image/image_bench.hpp"
+
+namespace kmax::soak {
+namespace {
+
+using simulation::Scene;
+using tests::ImageBench;
+
+/// One board, by its number.
+class Draw {
+ public:
+  Draw(unsigned seed, unsigned number) : random_(seed * 100'003U + number) {}
+
+  Scene board() {
+    const auto& scenes = host_tools_test::motor_scenes;
+    Scene scene = selftest::TestedAxis::opened(scenes[random_() % std::size(scenes)], false);
+    scene.seed = random_();
+    simulation::SceneAxis& axis = scene.axes[0];
+    simulation::CurrentSensorConfig& sensor = axis.current_sensor;
+    sensor.offset_b = between(-0.03, 0.03);
+    sensor.offset_c = between(-0.03, 0.03);
+    sensor.noise = between(2e-6, 10e-6);
+    if (scene.supply) {
+      scene.supply->voltage *= between(0.9, 1.03);
+      scene.supply->resistance *= between(0.5, 3.0);
+      scene.supply->capacitance *= between(0.7, 1.3);
+    }
+    axis.device.mass *= between(0.8, 1.3);
+    axis.device.damping *= between(0.5, 2.0);
+    axis.device.friction *= between(0.5, 1.5);
+    return scene;
+  }
+  double between(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_()) / 4294967295.0;
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+struct ForceError {
+  double sum = 0.0, worst = 0.0;
+  unsigned windows = 0;
+
+  void add(double error) {
+    sum += std::abs(error);
+    worst = std::max(worst, std::abs(error));
+    ++windows;
+  }
+  double mean() const { return windows == 0 ? 0.0 : sum / windows; }
+};
+
+[[noreturn]] void wrong(const std::string& what) {
+  throw std::runtime_error(what);
+}
+
+/// A hand that leans on the handle for two seconds and lets go for one, with another force each time.
+double hand_force(double seconds, double most) {
+  const double turn = std::floor(seconds / 3.0);
+  return seconds - 3.0 * turn < 2.0 ? -most * (0.3 + 0.7 * std::fmod(0.618 * (turn + 1.0), 1.0)) : 0.3 * most;
+}
+
+class NativeRun {
+ public:
+  NativeRun(const Scene& scene, double contact, double hottest)
+      : board_(scene, 0), contact_(contact), hottest_(hottest) {}
+
+  void run() {
+    calibrate();
+    test();
+    for (const char* law : {"plain", "adaptive"}) press(law);
+    stop();
+    save();
+    throw_it();  // last: a synchronous motor's angle is in doubt behind it
+  }
+  const ForceError& error() const { return error_; }
+
+ private:
+  device::Device& device() { return *board_.device; }
+  simulation::MotorDrive& drive() { return board_.drives().drive(0); }
+  device::Drive axis() { return {device(), 0}; }
+  void set(const std::vector<std::string>& texts) { device().apply(device::parse_assignments(texts)); }
+  void wait(double seconds) {
+    board_.link->wait(std::chrono::microseconds(std::llround(seconds * 20e3) * 50));
+  }
+
+  void calibrate() {
+    const auto report = calibration::calibrate(device(), {}, nullptr, [](const std::string&) {});
+    for (const calibration::StepReport& step : report.steps) {
+      if (step.failure) wrong(fmt::format("calibrate: {}: {}", step.name, step.failure->words));
+    }
+  }
+  /// Up to three times, as the guided start does: a handle that friction held beside a detent of the motor's
+  /// cogging is shaken loose by the pulses, and finds its place.
+  void test() {
+    for (int tries = 1;; ++tries) {
+      const selftest::Report report = board_.run();
+      const selftest::CheckResult* failure = report.first_failure();
+      if (failure == nullptr) return;
+      if (failure->part != "handle" || tries == 3)
+        wrong(fmt::format("self-test: {}: {}", failure->part, failure->message));
+      wait(1.0);
+    }
+  }
+
+  /// Half of the contact, while the board warms up.
+  void press(const std::string& law) {
+    const double here = device().read_number("measured.position");
+    set({"wall.law=" + law, fmt::format("wall.position={:.5f}", here - 0.003), "wall.stiffness=800",
+         "wall.damping=0", "wall.side=1", "force.ramp_time=0.05", "link.timeout=0"});
+    axis().arm();
+    const double half = contact_ / 2.0;
+    double time = 0.0, made = 0.0, asked = 0.0;
+    unsigned ticks = 0;
+    bool stood = false;
+    board_.link->before_tick = [&] {
+      time += 50e-6;
+      drive().push(hand_force(time, 1.5), 8.0);
+      const firmware::AxisReport report = board_.link->application().ISR_report(0);
+      made += drive().force();
+      asked += static_cast<double>(report.force);
+      if (++ticks < 400) return;
+      const double share = (law == "plain" ? 0.0 : 0.5) + 0.5 * std::min(1.0, time / half);
+      board_.drives().temperature(0).set_temperature(25.0 + share * (hottest_ - 25.0));
+      // Cogging is no error of the force that is made, and stands still where the handle does.
+      const bool stands = report.haptic.inside && std::abs(drive().handle().velocity()) < 1e-4;
+      if (stands && stood) error_.add((made - asked) / ticks - cogging());
+      stood = stands;
+      made = asked = 0.0;
+      ticks = 0;
+    };
+    for (double done = 0.0; done < half; done += 3.0) {
+      wait(std::min(3.0, half - done));
+      const auto status = axis().status();
+      if (!status.armed()) wrong(fmt::format("{} wall, {:.0f} s: {}", law, done, status.fault_words()));
+    }
+    board_.link->before_tick = nullptr;
+    drive().push(0.0, 8.0);
+    axis().disarm();
+  }
+  double cogging() {
+    const auto* motor = drive().synchronous_motor();
+    return motor == nullptr
+               ? 0.0
+               : motor->cogging_torque(drive().shaft_angle()) / drive().encoder().config().transmission;
+  }
+
+  /// In front of the wall, where nothing pushes.
+  void arm() {
+    drive().push(0.5, 20.0);
+    wait(1.0);
+    drive().push(0.0, 8.0);
+    wait(0.2);
+    axis().arm();
+  }
+  void expect_trip(firmware::Fault cause, const char* what, double within) {
+    wait(within);
+    const auto status = axis().status();
+    if (status.armed() || device::fault_of(status) != cause)
+      wrong(fmt::format("{}: state {}, {}", what, device::to_string(status.state()), status.fault_words()));
+  }
+  void stop() {
+    arm();
+    wait(0.1);
+    board_.link->hardware().power().press_emergency_stop(true);
+    expect_trip(firmware::Fault::emergency_stop, "the emergency stop", 0.001);
+    board_.link->hardware().power().press_emergency_stop(false);
+    wait(0.05);
+    axis().clear();
+  }
+  /// Out of the wall, with more than device.hand_force.
+  void throw_it() {
+    arm();
+    drive().push(20.0, 0.0);
+    expect_trip(firmware::Fault::spin_out, "a throw", 0.012);
+  }
+  /// Until the flash has been erased once more.
+  void save() {
+    const double before = device().read_number("store.erases");
+    for (int i = 0; i < 40 && device().read_number("store.erases") == before; ++i) {
+      set({fmt::format("wall.stiffness={}", 500 + i)});
+      device::Store(device()).save();
+    }
+    arm();
+    wait(0.1);
+    if (!axis().status().armed()) wrong("not armed after a save: " + axis().status().fault_words());
+    axis().disarm();
+  }
+
+  selftest::TestedAxis board_;
+  double contact_, hottest_;
+  ForceError error_;
+};
+
+/// The image with the same parts, told of its motor: pressed for as long.
+ForceError run_image(Scene scene, double contact, double hottest) {
+  scene.identified = true;
+  ImageBench bench(scene, {{"wall.law", std::string("adaptive")},
+                           {"wall.position", -0.003},
+                           {"wall.stiffness", 800.0},
+                           {"link.timeout", 0.0}});
+  bench.start();
+  bench.master->arm(0);
+  ForceError error;
+  simulation::MotorDrive& drive = bench.world.drive(0);
+  const double steps = contact / 0.02;
+  for (double step = 0.0; step < steps; ++step) {
+    drive.push(hand_force(step * 0.02, 1.5), 8.0);
+    bench.world.drives().temperature(0).set_temperature(25.0 + step / steps * (hottest - 25.0));
+    bench.board->run_for(0.02);
+    if (!bench.board->bridge_armed(0))
+      wrong(fmt::format("image, {:.1f} s: {}", step * 0.02, text_of(bench.fault(0)).what));
+    const double depth = -0.003 - drive.handle().position();
+    if (depth > 1e-4 && std::abs(drive.handle().velocity()) < 1e-4)
+      error.add(drive.force() - static_cast<double>(std::bit_cast<float>(bench.number("measured.force"))));
+  }
+  return error;
+}
+
+struct Result {
+  unsigned number;
+  ForceError error;
+};
+
+int run(unsigned boards, unsigned seed, double contact, unsigned on_image) {
+  std::vector<Result> results;
+  unsigned failures = 0;
+  ForceError all;
+  for (unsigned number = 0; number < boards; ++number) {
+    Draw draw(seed, number);
+    const Scene scene = draw.board();
+    // It warms up by a degree in a second at most.
+    const double hottest = std::min(draw.between(35.0, 70.0), 25.0 + contact);
+    try {
+      NativeRun native(scene, contact, hottest);
+      native.run();
+      fmt::print("{:4} {:14} {:.4f} N mean, {:.4f} N worst\n", number, scene.name, native.error().mean(),
+                 native.error().worst);
+      all.sum += native.error().mean();
+      all.worst = std::max(all.worst, native.error().worst);
+      results.push_back({number, native.error()});
+    } catch (const std::exception& error) {
+      ++failures;
+      fmt::print("{:4} {:14} FAILED {}\n", number, scene.name, error.what());
+    }
+    std::fflush(stdout);
+  }
+  std::ranges::sort(results, [](const Result& a, const Result& b) { return a.error.worst > b.error.worst; });
+  for (std::size_t i = 0; i < std::min<std::size_t>(on_image, results.size()); ++i) {
+    Draw draw(seed, results[i].number);
+    const Scene scene = draw.board();
+    try {
+      const ForceError error = run_image(scene, 20.0, 45.0);
+      fmt::print("image {:4} {:14} {:.4f} N mean, {:.4f} N worst\n", results[i].number, scene.name,
+                 error.mean(), error.worst);
+    } catch (const std::exception& error) {
+      ++failures;
+      fmt::print("image {:4} {:14} FAILED {}\n", results[i].number, scene.name, error.what());
+    }
+    std::fflush(stdout);
+  }
+  fmt::print("{} boards, {} failures; force error at the handle {:.4f} N mean, {:.4f} N worst\n", boards,
+             failures, results.empty() ? 0.0 : all.sum / static_cast<double>(results.size()), all.worst);
+  return failures == 0 && !results.empty() ? 0 : 1;
+}
+
+constexpr const char* usage =
+    "usage: random_boards [--boards N] [--seed S] [--contact SECONDS] [--image N]\n"
+    "  --boards N  200 by default; --contact 600 s each, half of it at each of two walls\n"
+    "  --image N   the N worst of them, 20 s each, by the image on the virtual board; 0 by default\n"
+    "Exit code 0: no false trip and none missed; 1: one, which the same seed does again; 2: wrong usage.\n";
+
+template <typename Number>
+bool parse(const char* text, Number& number) {
+  const char* end = text + std::strlen(text);
+  const auto [stop, error] = std::from_chars(text, end, number);
+  return error == std::errc{} && stop == end && number >= Number{};
+}
+
+}  // namespace
+}  // namespace kmax::soak
+
+int main(int count, char** arguments) {
+  using namespace kmax::soak;
+  unsigned boards = 200, seed = 1, on_image = 0;
+  double contact = 600.0;
+  for (int i = 1; i < count; i += 2) {
+    const std::string name = arguments[i];
+    const char* value = i + 1 < count ? arguments[i + 1] : "";
+    const bool taken = name == "--boards"    ? parse(value, boards)
+                       : name == "--seed"    ? parse(value, seed)
+                       : name == "--contact" ? parse(value, contact)
+                       : name == "--image"   ? parse(value, on_image)
+                                             : false;
+    if (!taken) {
+      fmt::print(stderr, "random_boards: '{}' '{}' is not understood\n{}", name, value, usage);
+      return 2;
+    }
+  }
+  return run(boards, seed, contact, on_image);
+}
