@@ -16,9 +16,9 @@ enum class InterferenceMode : std::uint8_t {
 template <typename Scalar>
 struct InterferenceConfig {
   InterferenceMode mode = InterferenceMode::none;
-  Scalar force = Scalar(0);             ///< F_I, N
-  Scalar background_force = Scalar(0);  ///< F_B, N; the paper keeps F_B <= F_I
-  Scalar onset_time = Scalar(0);        ///< t_0, s after contact; parallel mode only
+  Scalar force{};             ///< F_I, N
+  Scalar background_force{};  ///< F_B, N; the paper keeps F_B <= F_I
+  Scalar onset_time{};        ///< t_0, s after contact; parallel mode only
 };
 
 /// Eqs. 2 and 4 of paper 1, without the wall's own force. Normal forces are positive outwards.

@@ -112,24 +112,24 @@ class Drv8301 {
  private:
   struct Reply {
     Drv8301Result result = Drv8301Result::ok;
-    std::uint16_t data = 0;
+    std::uint16_t data{};
   };
 
   std::uint16_t control_1() const { return drv8301_control_1(config_); }
   std::uint16_t control_2() const { return drv8301_control_2(config_); }
 
   static Reply decode(Drv8301Register asked, std::optional<std::uint16_t> word) {
-    if (!word) return {Drv8301Result::bus_time_out, 0};
-    if (*word == 0xFFFF) return {Drv8301Result::stuck_high, 0};
-    if (*word == 0) return {Drv8301Result::stuck_low, 0};
-    if (drv8301::address_of(*word) != static_cast<unsigned>(asked)) return {Drv8301Result::wrong_address, 0};
+    if (!word) return {Drv8301Result::bus_time_out};
+    if (*word == 0xFFFF) return {Drv8301Result::stuck_high};
+    if (*word == 0) return {Drv8301Result::stuck_low};
+    if (drv8301::address_of(*word) != static_cast<unsigned>(asked)) return {Drv8301Result::wrong_address};
     return {Drv8301Result::ok, static_cast<std::uint16_t>(*word & drv8301::data_mask)};
   }
 
   /// Asked twice: the reply to the first comes with the second.
   Reply read(Drv8301Register address) {
     const std::uint16_t word = drv8301::read_word(address);
-    if (!exchange_selected(chip_, word)) return {Drv8301Result::bus_time_out, 0};
+    if (!exchange_selected(chip_, word)) return {Drv8301Result::bus_time_out};
     return decode(address, exchange_selected(chip_, word));
   }
 

@@ -107,7 +107,7 @@ class CurrentSampling {
     adc1_.cr1 = adc_cr1::Scan::mask;
     adc2_.cr1 = adc_cr1::Scan::mask | adc_cr1::InjectedEndInterrupt::mask;
     adc3_.cr1 = adc_cr1::Scan::mask;
-    const std::array<std::uint8_t, 3> slow{config_.supply, config_.temperatures[0], config_.temperatures[1]};
+    const auto slow = slow_channels();
     set_sampling_times(adc1_, slow, config_.slow_sampling_code);
     set_sampling_times(adc2_, std::array{config_.axes[0].b, config_.axes[1].b},
                        config_.current_sampling_code);
@@ -212,11 +212,16 @@ class CurrentSampling {
            second << adc_jsqr::position(1, 2);
   }
 
+  /// As ADC1 converts them.
+  std::array<std::uint8_t, 3> slow_channels() const {
+    return {config_.supply, config_.temperatures[0], config_.temperatures[1]};
+  }
+
   bool channels_reachable() const {
     bool all = config_.current_sampling_code < 8 && config_.slow_sampling_code < 8;
     for (const auto& axis : config_.axes) all = all && adc_reaches(2, axis.b) && adc_reaches(3, axis.c);
-    for (const std::uint8_t channel : config_.temperatures) all = all && adc_reaches(1, channel);
-    return all && adc_reaches(1, config_.supply);
+    for (const std::uint8_t channel : slow_channels()) all = all && adc_reaches(1, channel);
+    return all;
   }
 
   template <std::size_t count>

@@ -14,6 +14,7 @@
 #include "firmware/canopen/sdo_server.hpp"
 #include "firmware/canopen/sync.hpp"
 #include "firmware/canopen/tpdo.hpp"
+#include "firmware/object_dictionary/special_objects.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 
 namespace kmax::firmware::canopen {
@@ -184,7 +185,7 @@ class Node {
   std::uint32_t identity_conflicts() const { return identity_conflicts_; }
 
  private:
-  using Server = SdoServer<ServedObjects<Objects>>;
+  using Server = SdoServer<ServedObjects<Objects>, scratch_bytes>;
 
   /// As it was stored when the node last started: what LSS has given since may differ.
   struct Identity {

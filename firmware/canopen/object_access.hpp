@@ -16,8 +16,7 @@ struct ObjectAddress {
 
 /// What an object is before it is written: its length range in bytes; a number has one length.
 struct WriteBounds {
-  std::uint32_t shortest = 0;
-  std::uint32_t longest = 0;
+  std::uint32_t shortest{}, longest{};
 };
 
 /// The objects behind an SDO server. All checks in CiA 301's order: index, sub-index, access, length, range.

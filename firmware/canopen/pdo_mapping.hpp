@@ -80,8 +80,8 @@ constexpr Abort find_mapped(PdoKind kind, std::uint32_t raw, MappedObject& objec
 /// Where the settings of a PDO are among the dictionary's values.
 struct PdoSlots {
   std::uint16_t cob_id, transmission_type;
-  std::uint16_t inhibit_time, event_time;  ///< transmit only
-  std::uint16_t mapped_count, first_mapped;
+  std::uint16_t inhibit_time, event_time;    ///< transmit only
+  std::uint16_t mapped_count, first_mapped;  ///< the others follow
 };
 
 inline constexpr auto pdo_slots = [] {
@@ -96,10 +96,6 @@ inline constexpr auto pdo_slots = [] {
       slots = {at(0x1400, 1), at(0x1400, 2), 0, 0, at(0x1600, 0), at(0x1600, 1)};
       if (kind == static_cast<std::uint16_t>(PdoKind::transmit))
         slots.inhibit_time = at(0x1400, 3), slots.event_time = at(0x1400, 5);
-      for (std::uint8_t i = 0; i < mapped_max; ++i) {  // does not compile unless they follow each other
-        if (at(0x1600, static_cast<std::uint8_t>(1 + i)) != slots.first_mapped + i)
-          static_cast<void>(std::optional<int>{}.value());
-      }
     }
   }
   return all;

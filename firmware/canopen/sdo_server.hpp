@@ -79,7 +79,8 @@ struct SdoCounters {
   std::uint32_t segments_repeated = 0;  ///< segments of a block download that came again
 };
 
-template <ObjectAccess Objects, std::size_t buffer_size = 2048>
+/// `buffer_size`: the longest value that can be written.
+template <ObjectAccess Objects, std::size_t buffer_size>
 class SdoServer {
   static_assert(buffer_size >= SdoSource<Objects>::window_size);
 

@@ -40,14 +40,14 @@ struct AxisSetting {
 /// What was when a trip happened. Before the motor was commanded in that tick (any fault but those of motor
 /// and motion), force and currents are those of the tick before: the last ones under force.
 struct TripRecord {
-  std::int64_t position = 0;  ///< counts, offset and direction applied
-  std::uint32_t tick = 0;
-  float velocity = 0.0f;           ///< m/s
-  float force = 0.0f;              ///< N, asked for
-  float current = 0.0f;            ///< A
-  float current_reference = 0.0f;  ///< A
-  float supply = 0.0f;             ///< V; 0 on a board that has none
-  float value = 0.0f;              ///< what the fault is about, in the unit that fault.hpp gives
+  std::int64_t position{};  ///< counts, offset and direction applied
+  std::uint32_t tick{};
+  float velocity{};           ///< m/s
+  float force{};              ///< N, asked for
+  float current{};            ///< A
+  float current_reference{};  ///< A
+  float supply{};             ///< V; 0 on a board that has none
+  float value{};              ///< what the fault is about, in the unit that fault.hpp gives
   Fault fault = Fault::none;
 };
 

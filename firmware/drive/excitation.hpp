@@ -20,24 +20,24 @@ enum class AlternationAxis : std::uint8_t { along = 0, across = 1 };
 
 struct ExcitationConfig {
   ExcitationKind kind = ExcitationKind::off;
-  std::uint32_t run = 0;          ///< another number starts it
-  float bias = 0.0f;              ///< V or A
-  float alternation = 0.0f;       ///< V or A, amplitude of the square wave; its first half is positive
-  std::uint32_t half_period = 0;  ///< ticks; 0: no square wave
+  std::uint32_t run{};          ///< another number starts it
+  float bias{};                 ///< V or A
+  float alternation{};          ///< V or A, amplitude of the square wave; its first half is positive
+  std::uint32_t half_period{};  ///< ticks; 0: no square wave
   AlternationAxis alternation_axis = AlternationAxis::along;
-  float angle = 0.0f;        ///< rad, electrical
-  float angle_rate = 0.0f;   ///< rad/s, electrical, at most half a turn per tick
-  float angle_span = 0.0f;   ///< rad, >= 0: the vector stands after having turned this far; 0: it never turns
-  float ramp = 0.05f;        ///< s, >= 0: bias and alternation come up over this time
-  float duration = 1.0f;     ///< s, >= 0; 0: nothing is excited
-  float travel = 0.001f;     ///< m, >= 0, for the axis' trip
-  float stiffness = 200.0f;  ///< N/m, >= 0
-  float damping = 2.0f;      ///< N s/m, >= 0
-  float speed = 0.005f;      ///< m/s, >= 0, of the moving point
-  float stroke = 0.0f;       ///< m, signed
-  float force_limit = 3.3f;  ///< N, >= 0: bound of kind position
-  double count_length = 1e-6;  ///< m per encoder count, > 0
-  float tick_rate = 20000.0f;  ///< Hz, > 0
+  float angle{};          ///< rad, electrical
+  float angle_rate{};     ///< rad/s, electrical, at most half a turn per tick
+  float angle_span{};     ///< rad, >= 0: the vector stands after having turned this far; 0: it never turns
+  float ramp{};           ///< s, >= 0: bias and alternation come up over this time
+  float duration{};       ///< s, >= 0; 0: nothing is excited
+  float travel{};         ///< m, >= 0, for the axis' trip
+  float stiffness{};      ///< N/m, >= 0
+  float damping{};        ///< N s/m, >= 0
+  float speed{};          ///< m/s, >= 0, of the moving point
+  float stroke{};         ///< m, signed
+  float force_limit{};    ///< N, >= 0: bound of kind position
+  double count_length{};  ///< m per encoder count, > 0
+  float tick_rate{};      ///< Hz, > 0
 };
 
 /// What the motor is asked for instead of a wall's force: for identification and self-test.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "control/finite.hpp"
 #include "firmware/drive/axis.hpp"
@@ -25,16 +26,8 @@ constexpr std::uint32_t digital_inputs_of(const AxisReport& report) {
          (report.condition == Fault::gate_driver ? 1u << 17 : 0u) | (report.referenced ? 1u << 18 : 0u);
 }
 
-/// The nearest whole number, as the pattern of a value of 16 bits with its sign; what is beyond stays at the
+/// The nearest whole number, as the pattern of a value of 32 bits with its sign; what is beyond stays at the
 /// end of the range, and what is not a number is 0.
-constexpr std::uint32_t integer16_of(float value) {
-  if (!(value == value)) return 0;
-  if (value >= 32767.0f) return 32767;
-  if (value <= -32768.0f) return static_cast<std::uint32_t>(-32768);
-  return static_cast<std::uint32_t>(static_cast<std::int32_t>(value < 0.0f ? value - 0.5f : value + 0.5f));
-}
-
-/// Likewise for 32 bits.
 constexpr std::uint32_t integer32_of(float value) {
   if (!(value == value)) return 0;
   if (value >= 2147483648.0f) return 0x7FFF'FFFFu;
@@ -42,6 +35,14 @@ constexpr std::uint32_t integer32_of(float value) {
   // From 2^23 on all floats are whole, and a half would be rounded itself.
   const float half = control::magnitude(value) < 8388608.0f ? 0.5f : 0.0f;
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(value < 0.0f ? value - half : value + half));
+}
+
+/// Likewise for 16 bits.
+constexpr std::uint32_t integer16_of(float value) {
+  constexpr std::int32_t lowest = std::numeric_limits<std::int16_t>::min(),
+                         highest = std::numeric_limits<std::int16_t>::max();
+  return static_cast<std::uint32_t>(
+      std::clamp(static_cast<std::int32_t>(integer32_of(value)), lowest, highest));
 }
 
 /// counts/s from m/s, as exact as float: what is read is an estimate, and division in double is a program of

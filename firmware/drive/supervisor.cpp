@@ -113,7 +113,7 @@ void Supervisor::begin_reaction(const Situation& now, std::size_t axis) {
   const auto kind = now.values.choice<LinkLoss, "link.loss">();
   if (kind == LinkLoss::limp || mode_of(now.values, axis) == DriveMode::excitation) return;
   const float ramp = now.values.real<"force.ramp_time">(axis) * static_cast<float>(tick_rate_hz);
-  reaction_ = Reaction{kind, now.report.tick, now.report.tick, ramp, 1.0f};
+  reaction_ = Reaction{kind, now.report.tick, now.report.tick, ramp};
   go_on_with_reaction(now);
 }
 

@@ -124,7 +124,7 @@ class Supervisor {
     LinkLoss kind;
     std::uint32_t began, moved_last;
     float ramp;  ///< ticks, as it was then
-    float share;
+    float share{};
   };
 
   AxisStateMachine machine_;

@@ -96,6 +96,19 @@ TEST_F(OnCan, ListensToAllThatItReceives) {
         << identifier;
 }
 
+TEST_F(OnCan, ListensToTheNodesThatItWatches) {
+  EXPECT_EQ(write(0x1016, 1, 1U << 16 | 100, 4), 0U);
+  EXPECT_EQ(write(0x1016, 2, 0x7FU << 16 | 100, 4), 0U);
+  EXPECT_EQ(write(0x1016, 3, 5U << 16, 4), 0U) << "without a time it is not watched";
+  const auto settings = bench.application().can().settings();
+  const auto heard_of = [&settings](int node) {
+    const auto begin = settings.identifiers.begin();
+    return std::count(begin, begin + settings.identifier_count, 0x700 + node);
+  };
+  for (int node = 0; node < 0x80; ++node)
+    EXPECT_EQ(heard_of(node), node == 1 ? 2 : node == 0x7F ? 1 : 0) << node;
+}
+
 TEST_F(OnCan, PdosBeginWithTheNextRoundButOne) {
   heard.clear();
   bench.board().receive_can(std::array{drivers::CanFrame{.identifier = 0, .length = 2, .data = {1, 1}}});
@@ -237,6 +250,8 @@ TEST_F(OnCan, ResetCommunicationBringsBackWhatWasSaved) {
 TEST_F(OnCan, SavingTheSameAgainDoesNotWearTheFlash) {
   EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);
   run_ms(500);
+  const firmware::Entry& state = firmware::entry_at(firmware::entry_of<"store.state">());
+  EXPECT_EQ(read(state.index(), state.object_subindex()), 2U) << "saved, read alone";
   const double sequence = bench.get("store.sequence");
   for (int i = 0; i < 20; ++i) {
     EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);

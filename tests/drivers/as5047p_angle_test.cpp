@@ -198,6 +198,17 @@ TEST(As5047pAngle, LineStuckLowFromTheStartNeverBecomesValid) {
   for (int i = 0; i < 1000; ++i) ASSERT_FALSE(high.tick(0).valid);
 }
 
+// The zeros before it belong to nobody then: three frames have to agree from there on.
+TEST(As5047pAngle, AProbeThatFailsBeforeTheStartBeginsItAgain) {
+  Encoder encoder;
+  encoder.diagnostics = 0x80;  // LF = 0
+  while (encoder.commands.empty() || (encoder.commands.back() & 0x3FFF) != 0x3FFC) {
+    ASSERT_LT(encoder.commands.size(), 100U);
+    EXPECT_FALSE(encoder.tick(0).valid);
+  }
+  for (const bool valid : {false, false, false, true}) EXPECT_EQ(encoder.tick(100).valid, valid);
+}
+
 TEST(As5047pAngle, MagnetThatReallyStandsAtZeroIsProbedAndStays) {
   Encoder encoder;
   for (int i = 0; i < 1000; ++i) encoder.tick(0);

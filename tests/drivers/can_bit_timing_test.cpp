@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace kmax::drivers::stm32f4::can_bit_timing_test {
@@ -38,6 +39,30 @@ TEST(CanBitTiming, NothingBetterExists) {
           const double error = std::abs(made - rate) / rate * 1e6;
           ASSERT_GE(error * 1.01 + 2, solution.rate_error_ppm) << clock << " " << rate;
         }
+      }
+    }
+  }
+}
+
+// Wherever the rate can be had exactly: of all timings that do, none samples nearer to where it is wanted.
+TEST(CanBitTiming, NoExactTimingSamplesNearer) {
+  const auto off = [](unsigned a, unsigned b) { return a > b ? a - b : b - a; };
+  for (const std::uint32_t clock : {16'000'000U, 36'000'000U, 42'000'000U}) {
+    for (const std::uint32_t rate : {125'000U, 250'000U, 500'000U, 1'000'000U}) {
+      for (const std::uint16_t goal :
+           std::initializer_list<std::uint16_t>{500, 600, 667, 750, 810, 875, 950}) {
+        const auto solution = solve_can_bit_timing(clock, rate, {.sample_point_permille = goal});
+        unsigned least = 1000;
+        for (std::uint32_t segment_1 = 1; segment_1 <= 16; ++segment_1) {
+          for (std::uint32_t segment_2 = 1; segment_2 <= 8; ++segment_2) {
+            const std::uint32_t quanta = 1 + segment_1 + segment_2;
+            if (clock % (rate * quanta) == 0 && clock / (rate * quanta) <= 1024)
+              least = std::min(least, off(1000 * (1 + segment_1) / quanta, goal));
+          }
+        }
+        EXPECT_EQ(solution.rate_error_ppm, 0U);
+        EXPECT_LE(off(solution.sample_error_permille, least), 1U) << clock << ' ' << rate << ' ' << goal;
+        EXPECT_LE(off(off(solution.timing.sample_point_permille(), goal), least), 1U) << clock << ' ' << rate;
       }
     }
   }

@@ -212,6 +212,45 @@ TEST(Can, ReceiveIsBoundedWhenTheFifoNeverEmpties) {
   EXPECT_EQ(frames, 3U);
 }
 
+// RM0090: identifier 31:21 or 31:3, IDE 2, RTR 1; filter index 15:8, length 3:0; FMP 1:0, FULL 3, FOVR 4,
+// RFOM 5.
+TEST(Can, EachFifoHandsItsFramesOut) {
+  const std::array<std::uint8_t, 8> bytes{0x81, 0x42, 0x23, 0x14, 0xF5, 0xE6, 0xD7, 0xC8};
+  for (const unsigned fifo : {0U, 1U}) {
+    for (const bool extended : {false, true}) {
+      for (const bool remote : {false, true}) {
+        Bench bench;
+        std::uint32_t pending = 2 | 1U << 4;  // and one was lost
+        bench.can.rfr[fifo].on_read = [&](std::uint32_t) { return pending; };
+        bench.can.rfr[fifo].on_write = [&](std::uint32_t word) {
+          pending &= ~(word & 0x18);
+          if ((word & 0x20) != 0) --pending;
+        };
+        FakeReceiveMailbox& front = bench.can.fifo[fifo];
+        front.rir.value = (extended ? 0x12345678U << 3 | 4U : 0x5A5U << 21) | (remote ? 2U : 0U);
+        front.rdtr.value = 0xABCD'0907;
+        front.rdlr.value = 0x1423'4281;
+        front.rdhr.value = 0xC8D7'E6F5;
+        unsigned frames = 0;
+        bench.driver.ISR_receive(fifo, [&](const CanFrame& frame, std::uint8_t filter) {
+          EXPECT_EQ(frame.identifier, extended ? 0x12345678U : 0x5A5U);
+          EXPECT_EQ(frame.extended, extended);
+          EXPECT_EQ(frame.remote, remote);
+          EXPECT_EQ(frame.length, 7);
+          EXPECT_EQ(frame.data, bytes);
+          EXPECT_EQ(filter, 9);
+          ++frames;
+        });
+        EXPECT_EQ(frames, 2U);
+        EXPECT_EQ(pending, 0U);
+        EXPECT_EQ(bench.driver.receive_counters().received, 2U);
+        EXPECT_EQ(bench.driver.receive_counters().overruns, 1U);
+        EXPECT_EQ(bench.can.rfr[1 - fifo].reads, 0U);
+      }
+    }
+  }
+}
+
 TEST(Can, ErrorsByName) {
   Bench bench;
   bench.can.esr.value = 0x2A90'0033;

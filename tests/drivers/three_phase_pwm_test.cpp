@@ -24,19 +24,24 @@ TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
   timer.dier = 0xFFFF;
   timer.smcr = 6;
   timer.rcr = 3;
+  timer.psc = 3;
+  timer.sr = 0xFFFF;
   ThreePhasePwm<> pwm{timer};
   ASSERT_TRUE(pwm.configure());
   EXPECT_EQ(timer.cr1, 1U << 2 | 3U << 5 | 1U << 7) << "URS, CMS = 3, ARPE, stopped";
-  EXPECT_EQ(timer.cr2 & 0x7F00U, 0U) << "all idle levels 0";
+  EXPECT_EQ(timer.cr2, 1U << 4) << "all idle levels 0, TRGO shows CEN";
   EXPECT_EQ(timer.dier, 0U);
   EXPECT_EQ(timer.smcr, 0U);
   EXPECT_EQ(timer.rcr, 0U) << "an update at each turn";
+  EXPECT_EQ(timer.psc, 0U);
+  EXPECT_EQ(timer.sr, 0U);
+  EXPECT_EQ(timer.egr, 1U) << "UG";
   EXPECT_EQ(timer.ccmr[0], 0x7878U) << "PWM mode 2, preloaded";
   EXPECT_EQ(timer.ccmr[1], 0x0078U);
   EXPECT_EQ(timer.ccer, 0x555U);
   EXPECT_EQ(timer.arr, 4200U);
   for (unsigned leg = 0; leg < 3; ++leg) EXPECT_EQ(timer.ccr[leg], 4200U) << "duty 0";
-  EXPECT_GT(timer.ccr[3], 4200U) << "no comparison of channel 4";
+  EXPECT_EQ(timer.ccr[3], 0xFFFFU) << "no comparison of channel 4";
   EXPECT_EQ(timer.bdtr, disarmed);
   EXPECT_FALSE(pwm.armed());
 }

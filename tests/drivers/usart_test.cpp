@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "tests/drivers/fake_register.hpp"
 
@@ -78,6 +80,76 @@ TEST(Usart, ImpossibleBaudRateTouchesNothing) {
   EXPECT_FALSE(usart.configure({.baud_rate = 300}, apb1));
   EXPECT_EQ(registers.cr1, 0x1234U);
   EXPECT_EQ(registers.brr, 0x55U);
+}
+
+struct FakeUsart {
+  FakeRegister sr, dr, brr, cr1, cr2, cr3;
+};
+
+// RM0090, status register: PE 0, FE 1, NF 2, ORE 3, RXNE 5, TC 6, TXE 7.
+TEST(Usart, EveryStatusGivesTheByteAndItsErrors) {
+  for (std::uint32_t status = 0; status < 0x100; ++status) {
+    FakeUsart registers;
+    Usart usart{registers};
+    registers.sr.value = status;
+    registers.dr.value = 0x1A5;  // with the parity bit
+    const UsartEvent event = usart.ISR_serve();
+    const bool received = (status & 0x20) != 0, read = (status & 0x28) != 0;
+    EXPECT_EQ(event.received, received) << status;
+    EXPECT_EQ(event.byte, received ? 0xA5 : 0) << status;
+    EXPECT_EQ(event.line_error, read && (status & 0x0F) != 0) << status;
+    EXPECT_EQ(registers.dr.reads, read ? 1U : 0U) << status;
+    EXPECT_FALSE(event.transmission_complete) << "nothing is being sent";
+    EXPECT_TRUE(registers.dr.writes.empty() && registers.cr1.writes.empty()) << status;
+  }
+}
+
+TEST(Usart, SendsByteByByteAndIsDoneWithTheLastStopBit) {
+  constexpr std::uint32_t tcie = 1U << 6, txeie = 1U << 7, tc = 1U << 6, txe = 1U << 7;
+  FakeUsart registers;
+  Usart usart{registers};
+  ASSERT_TRUE(usart.configure({}, apb1));
+  const std::uint32_t idle = registers.cr1.value;
+  const std::array<std::uint8_t, 3> bytes{0x81, 0x00, 0xFF};
+  for (int round = 0; round < 2; ++round) {
+    registers.dr.writes.clear();
+    EXPECT_FALSE(usart.transmit({}));
+    EXPECT_FALSE(usart.transmitting());
+    ASSERT_TRUE(usart.transmit(bytes));
+    EXPECT_FALSE(usart.transmit(bytes)) << "one after the other";
+    for (std::size_t sent = 0; sent < 3; ++sent) {
+      EXPECT_EQ(registers.cr1.value, idle | txeie);
+      registers.sr.value = tc;
+      EXPECT_FALSE(usart.ISR_serve().transmission_complete);
+      EXPECT_EQ(registers.dr.writes.size(), sent) << "the register is full still";
+      registers.sr.value = tc | txe;
+      EXPECT_FALSE(usart.ISR_serve().transmission_complete) << "TC of the byte before";
+      EXPECT_EQ(registers.dr.writes.size(), sent + 1);
+    }
+    EXPECT_EQ(registers.dr.writes, std::vector<std::uint32_t>(bytes.begin(), bytes.end()));
+    EXPECT_EQ(registers.cr1.value, idle | tcie);
+    registers.sr.value = txe;
+    EXPECT_FALSE(usart.ISR_serve().transmission_complete) << "the last byte is on its way";
+    EXPECT_TRUE(usart.transmitting());
+    registers.sr.value = tc | txe;
+    EXPECT_TRUE(usart.ISR_serve().transmission_complete);
+    EXPECT_EQ(registers.cr1.value, idle);
+    EXPECT_FALSE(usart.transmitting());
+  }
+}
+
+TEST(Usart, ConfiguringDropsWhatIsBeingSentAndWhatHasComeIn) {
+  FakeUsart registers;
+  Usart usart{registers};
+  const std::array<std::uint8_t, 2> bytes{1, 2};
+  ASSERT_TRUE(usart.transmit(bytes));
+  ASSERT_TRUE(usart.configure({}, apb1));
+  EXPECT_FALSE(usart.transmitting());
+  EXPECT_EQ(registers.sr.reads, 1U);
+  EXPECT_EQ(registers.dr.reads, 1U);
+  registers.sr.value = 0xC0;
+  EXPECT_FALSE(usart.ISR_serve().transmission_complete);
+  EXPECT_TRUE(registers.dr.writes.empty());
 }
 
 }  // namespace kmax::drivers::stm32f4::usart_test

@@ -29,8 +29,17 @@ TEST(Application, IdentifiesItself) {
   EXPECT_EQ(bench.get("info.serial_number"), 1);
   EXPECT_EQ(bench.get("info.uptime"), 2);
   EXPECT_NEAR(bench.get("info.tick"), static_cast<double>(bench.device.tick), 120);
-  const Bytes objects = bench.request({43, 14, 1, 0});
-  EXPECT_NE(std::string(objects.begin(), objects.end()).find("Kmax"), std::string::npos);
+  const auto object = [&bench](std::uint8_t number) {
+    const Bytes reply =
+        bench.request({43, 14, 4, number});  // function, 14, code, conformity, 0, 0, 1, number, length
+    return reply.size() < 9 ? "none" : std::string(reply.begin() + 9, reply.end());
+  };
+  EXPECT_EQ(object(0), "Kmax");
+  EXPECT_EQ(object(1), "kmax-haptic-controller");
+  EXPECT_EQ(object(2), firmware::firmware_version_text);
+  EXPECT_EQ(object(4), "Kmax haptic device controller");
+  EXPECT_EQ(object(5), "native");
+  for (const std::uint8_t other : Bytes{3, 6, 0x80}) EXPECT_EQ(object(other), "none");
 }
 
 TEST(Application, EveryRegisterOfTheDictionaryCanBeReadOverTheLineAndStartsAsItsDefault) {

@@ -126,8 +126,8 @@ TEST(PdoMapping, TheSettingsAreWhereTheStandardHasThem) {
       EXPECT_EQ(slot_at({communication, 1}), slots.cob_id);
       EXPECT_EQ(slot_at({communication, 2}), slots.transmission_type);
       EXPECT_EQ(slot_at({mapping, 0}), slots.mapped_count);
-      EXPECT_EQ(slot_at({mapping, 1}), slots.first_mapped);
-      EXPECT_EQ(slot_at({mapping, 8}), slots.first_mapped + 7U);
+      for (std::uint8_t i = 0; i < 8; ++i)
+        EXPECT_EQ(slot_at({mapping, static_cast<std::uint8_t>(1 + i)}), slots.first_mapped + i);
       if (kind == receive) continue;
       EXPECT_EQ(slot_at({communication, 3}), slots.inhibit_time);
       EXPECT_EQ(slot_at({communication, 5}), slots.event_time);

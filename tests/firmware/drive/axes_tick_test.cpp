@@ -226,6 +226,35 @@ TEST_F(TorqueMode, TripsAsAWallDoes) {
   EXPECT_EQ(tick.ISR_report(1).fault, Fault::not_finite);
 }
 
+TEST(AxesTick, CountsItsTicksFromOneAndCapturesTheFlagsOfEach) {
+  ParameterValues values = micrometre_counts();
+  values.set_real<"force.limit">(0.01f);
+  std::array<std::uint32_t, 7> memory{};
+  AxesTick<2> tick(settings_of<2>(values), memory);
+  ASSERT_TRUE(tick.capture().arm({.channels = {CaptureChannel::flags}, .samples = 7}));
+  struct Tick {
+    Axis::Input input;
+    bool enable;
+    std::uint32_t flags;
+  };
+  const std::uint32_t valid = 1U << 6, armed = 1U << 4, inside = 1U << 0, limited = 1U << 1;
+  const Tick ticks[] = {{at(1000), false, valid},
+                        {at(1000), true, valid | armed},
+                        {at(-5), true, valid | armed | inside},
+                        {at(-50), true, valid | armed | inside | limited},
+                        {at(-50, false), true, inside | static_cast<std::uint32_t>(Fault::encoder) << 8},
+                        {at(-50, false), false, inside},
+                        {at(1000), false, valid}};
+  std::uint32_t number = 0;
+  for (const Tick& one : ticks) {
+    tick.enable(0, one.enable);
+    (void)tick.ISR_tick(0, one.input);
+    EXPECT_EQ(tick.ISR_report(0).tick, ++number);
+  }
+  ASSERT_TRUE(tick.capture().readable());
+  for (std::uint32_t i = 0; i < 7; ++i) EXPECT_EQ(tick.capture().value_at(i), ticks[i].flags) << i;
+}
+
 TEST(AxesTick, TripsEveryEnabledAxisWhenTheMainLoopStands) {
   AxesTick<3> tick(settings_of<3>(micrometre_counts()));
   tick.enable(1, true);

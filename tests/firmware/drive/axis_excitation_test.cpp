@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "firmware/drive/axis.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 
 namespace kmax::firmware::axis_excitation_test {
 namespace {
@@ -38,7 +39,7 @@ AxisSetting setting_of(DriveMode mode) {
 }
 
 ExcitationConfig excitation_of(ExcitationKind kind) {
-  ExcitationConfig config;
+  ExcitationConfig config = excitation_configuration({}, 0);
   config.kind = kind;
   config.bias = 1.0f;
   config.ramp = 0.0f;

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "firmware/drive/axis.hpp"
+#include "firmware/drive/haptic_configuration.hpp"
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::firmware::axis_motion_test {
@@ -103,7 +104,7 @@ AxisSetting setting_of(MotorKind kind, DriveMode mode, double electrical_offset 
 }
 
 ExcitationConfig excitation_of(ExcitationKind kind) {
-  ExcitationConfig config;
+  ExcitationConfig config = excitation_configuration({}, 0);
   config.kind = kind;
   config.travel = 0.05f;
   config.duration = 10.0f;

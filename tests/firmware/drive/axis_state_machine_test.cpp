@@ -227,6 +227,28 @@ TEST(AxisStateMachine, EndOfInitialisationAndOfReactionActOnlyInTheirState) {
   }
 }
 
+TEST(Controlword, BitsOfBothWordsAreTheStandards) {
+  EXPECT_EQ(controlword::switch_on, 0x0001);
+  EXPECT_EQ(controlword::enable_voltage, 0x0002);
+  EXPECT_EQ(controlword::quick_stop, 0x0004);
+  EXPECT_EQ(controlword::enable_operation, 0x0008);
+  EXPECT_EQ(controlword::fault_reset, 0x0080);
+  EXPECT_EQ(controlword::halt, 0x0100);
+  EXPECT_EQ(statusword::voltage_enabled, 0x0010);
+  EXPECT_EQ(statusword::warning, 0x0080);
+  EXPECT_EQ(statusword::remote, 0x0200);
+  EXPECT_EQ(statusword::target_reached, 0x0400);
+  EXPECT_EQ(statusword::internal_limit_active, 0x0800);
+  EXPECT_EQ(statusword::follows_command_value, 0x1000);
+}
+
+TEST(Controlword, WhatAsksForOperationAndWhatHalts) {
+  for (unsigned word = 0; word <= 0xFFFF; ++word) {
+    ASSERT_EQ(asks_for_operation(static_cast<std::uint16_t>(word)), (word & 0x8F) == 0x0F) << word;
+    ASSERT_EQ(halted(static_cast<std::uint16_t>(word)), (word & 0x100) != 0) << word;
+  }
+}
+
 TEST(Statusword, MasksOfTheStandardTellEveryStateWhateverTheOtherBits) {
   struct Pattern {
     DriveState state;

@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "firmware/drive/haptic_configuration.hpp"
+
 namespace kmax::firmware::excitation_test {
 namespace {
 
@@ -14,7 +16,8 @@ constexpr double turn = 6.283185307179586;
 constexpr double tick = 5e-5;
 
 ExcitationConfig of_kind(ExcitationKind kind) {
-  ExcitationConfig config;
+  ExcitationConfig config = excitation_configuration({}, 0);
+  config.count_length = 1e-6;
   config.kind = kind;
   config.bias = 2.0f;
   config.ramp = 0.0f;

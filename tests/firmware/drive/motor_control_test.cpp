@@ -64,10 +64,10 @@ TEST(MotorControl, ReferenceIsBoundedAndSaysSo) {
 
 TEST(MotorControl, NotDrivingMakesNothingButTellsTheCurrent) {
   MotorControl motor;
-  const auto out = update(motor, MotorControl::prepare(dc()), measured(0.4f, -0.6f), 3.0f, 0, 0.0f, false);
+  const auto out = update(motor, MotorControl::prepare(dc()), measured(0.4f, -0.85f), 3.0f, 0, 0.0f, false);
   EXPECT_EQ(out.current_reference, 0.0f);
   EXPECT_EQ(out.duty_b, 0.5f);
-  EXPECT_FLOAT_EQ(out.current, 0.5f);
+  EXPECT_FLOAT_EQ(out.current, 0.625f);
 }
 
 // Legs B and C carry a DC motor: more force along +x needs more current out of B.

@@ -78,6 +78,11 @@ TEST(Statusword, OfADriveThatDoesNothingIsTheStatesPattern) {
   EXPECT_EQ(statusword_of({}), 0x0200);
   EXPECT_EQ(statusword_of({.state = switch_on_disabled, .supplied = true}), 0x0240);
   EXPECT_EQ(statusword_of({.state = fault}), 0x0208);
+  EXPECT_EQ(statusword_of({.power_stage_on = true}), 0x0200);
+  EXPECT_EQ(statusword_of({.state = operation_enabled}), 0x0227);
+  EXPECT_EQ(statusword_of({.state = operation_enabled, .mode = DriveMode::excitation}), 0x0227);
+  EXPECT_EQ(statusword_of({.state = operation_enabled, .mode = DriveMode::torque}), 0x1227);
+  EXPECT_EQ(statusword_of({.state = operation_enabled, .mode = DriveMode::torque, .halted = true}), 0x0227);
 }
 
 }  // namespace

@@ -320,6 +320,14 @@ TEST(RtuPort, ABroadcastWriteIsNotTakenForARepetition) {
   EXPECT_EQ(client.bank.holding[2], 0x1234) << "broadcasts are not tagged";
 }
 
+TEST(RtuPort, ANewPortHasCountedNothing) {
+  const RtuClient client;
+  const RtuPortCounters& counted = client.port.counters();
+  for (const std::uint32_t number :
+       {counted.other_units, counted.requests, counted.broadcasts, counted.replies, counted.exceptions})
+    EXPECT_EQ(number, 0U);
+}
+
 TEST(RtuPort, DiagnosticsCountWhatTheLineCarried) {
   RtuClient client;
   const auto count = [&client](std::uint8_t which) {

@@ -45,6 +45,15 @@ TEST(Entry, PatternsOfTheEdgesOfEveryType) {
             static_cast<double>(std::numeric_limits<float>::max()));
 }
 
+RC_GTEST_PROP(Entry, AShorterValueIsExtendedByItsSign, (std::uint32_t bits)) {
+  RC_ASSERT(extended(Type::unsigned8, bits) == static_cast<std::uint8_t>(bits));
+  RC_ASSERT(extended(Type::unsigned16, bits) == static_cast<std::uint16_t>(bits));
+  RC_ASSERT(extended(Type::integer8, bits) == static_cast<std::uint32_t>(static_cast<std::int8_t>(bits)));
+  RC_ASSERT(extended(Type::integer16, bits) == static_cast<std::uint32_t>(static_cast<std::int16_t>(bits)));
+  for (const Type type : {Type::unsigned32, Type::integer32, Type::float32})
+    RC_ASSERT(extended(type, bits) == bits);
+}
+
 RC_GTEST_PROP(Entry, PatternAndNumberAreInverse, (std::uint32_t bits)) {
   for (const Type type : {Type::unsigned32, Type::integer32})
     RC_ASSERT(raw_from_number(type, number_from_raw(type, bits)) == bits);

@@ -498,7 +498,7 @@ class Node {
   std::function<bool(int)> loses_;
   host_tools_test::TemporaryFolder folder_;
   UnixCanHub hub_{(folder_ / "bus").string()};
-  firmware::canopen::SdoServer<Objects> server_{objects};
+  firmware::canopen::SdoServer<Objects, 2048> server_{objects};
   std::unique_ptr<CanPort> port_;
   std::optional<SdoClient> client_;
   std::atomic<bool> done_ = false;
