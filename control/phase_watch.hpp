@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <type_traits>
@@ -78,7 +79,7 @@ class PhaseWatch {
     const Scalar samples = Scalar(5) * config.rate / config.bandwidth;
     const Scalar least = config.rate / Scalar(1000);
     const Scalar most = Scalar(1e9);
-    c.patience = static_cast<std::uint32_t>(samples < least ? least : samples > most ? most : samples);
+    c.patience = static_cast<std::uint32_t>(std::clamp(samples, least, most));
     return c;
   }
 

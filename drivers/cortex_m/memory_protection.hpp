@@ -22,7 +22,7 @@ enum class MemoryKind : std::uint8_t { flash, ram, peripherals };
 
 struct ProtectedRegion {
   std::uint32_t base;  ///< a multiple of its size
-  unsigned size_log2;  ///< 5 (32 bytes) to 32
+  unsigned size_log2;  ///< 5 (32 bytes) to 31
   MemoryRights rights;
   MemoryKind kind;
   std::uint8_t left_out = 0;  ///< bit n: the region's n-th eighth does not belong to it; from 256 bytes on

@@ -146,6 +146,29 @@ TEST(SaturationDepth, PaperOnesStiffestWallSaturatesWithinThreeCounts) {
   EXPECT_GT(saturation_depth(3580.0, 0.0, 3.3), saturation_quanta * 55e-6);
 }
 
+TEST(ClosedFormCriteria, AtItsBoundASpeedPassesAndASlopeDoesNot) {
+  StabilityCase<double> c = held_case;
+  c.stiffness = 1024.0, c.period = 1.0 / 1024.0, c.detection_share = 0.5;
+  c.operator_force = 1.0, c.operator_speed = 2.0;
+  const auto speed = judge_closed_form(Criterion::resolution_speed, c);
+  EXPECT_EQ(speed.value, speed.bound);
+  EXPECT_TRUE(speed.pass);
+  c.period = c.damping = 1.0, c.delay = 0.5, c.wall_damping = 0.0;
+  c.magnetic_coefficient = 0.5, c.magnetic_length = 1.0;
+  const auto slope = judge_closed_form(Criterion::field_slope, c);
+  EXPECT_EQ(slope.value, slope.bound);
+  EXPECT_FALSE(slope.pass);
+}
+
+// Of guard.criterion, and the bits of guard.failed.
+TEST(ClosedFormCriteria, NumbersOfTheCriteriaStay) {
+  using enum Criterion;
+  int number = 0;
+  for (const Criterion one : {colgate, gil, sampled_eigenvalues, abbott_okamura, diolaiti, resolution,
+                              resolution_speed, field_slope, saturation_depth})
+    EXPECT_EQ(static_cast<int>(one), number++);
+}
+
 TEST(SaturationDepth, Limits) {
   EXPECT_EQ(saturation_depth(1000.0, 4.0, 3.3), 0.0);
   EXPECT_EQ(saturation_depth(1000.0, 3.3, 3.3), 0.0);

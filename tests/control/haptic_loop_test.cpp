@@ -234,6 +234,14 @@ TEST(HapticLoop, FloatFollowsDoubleThroughAContact) {
 }
 
 // A wall of 5 N/mm, and counts of a handle that swings in it by 0.2 mm, the force by 1 N, at 50 Hz.
+// Of instability.action.
+TEST(HapticLoop, NumbersOfTheActionsStay) {
+  using enum InstabilityAction;
+  int number = 0;
+  for (const InstabilityAction one : {off, warn, soften, InstabilityAction::trip})
+    EXPECT_EQ(static_cast<int>(one), number++);
+}
+
 HapticLoopConfig<float> watched_wall(InstabilityAction action) {
   auto config = plain_wall<float>();
   config.wall.stiffness = 5000.0f;

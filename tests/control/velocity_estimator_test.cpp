@@ -246,4 +246,12 @@ RC_GTEST_PROP(VelocityEstimator, EveryOutputIsFinite, (const std::vector<std::in
   }
 }
 
+// Of velocity.estimator.
+TEST(VelocityEstimator, NumbersOfTheKindsStay) {
+  using enum VelocityEstimatorKind;
+  int number = 0;
+  for (const VelocityEstimatorKind one : {difference, low_pass, foaw, foaw_end_fit, tracking})
+    EXPECT_EQ(static_cast<int>(one), number++);
+}
+
 }  // namespace kmax::control::velocity_estimator_test

@@ -29,6 +29,8 @@ TEST(ProtectedRegion, IsAlignedToItsSizeAndHasEighthsFrom256Bytes_Rbar) {
   EXPECT_FALSE(region(0x2000'0000, 4, 0).valid());
   EXPECT_FALSE(region(0x2000'0000, 7, 1).valid());
   EXPECT_TRUE(region(0x2000'0000, 8, 1).valid());
+  EXPECT_TRUE(region(0x8000'0000, 31, 0).valid());
+  EXPECT_FALSE(region(0, 32, 0).valid());
 }
 
 TEST(ProtectMemory, EnablesTheUnitWithoutTheDefaultMap_Ctrl) {

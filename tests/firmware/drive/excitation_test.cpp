@@ -44,6 +44,16 @@ class ExcitationTest : public testing::Test {
   Excitation excitation;
 };
 
+// Of excitation.kind and excitation.alternation_axis.
+TEST_F(ExcitationTest, NumbersOfTheKindsStay) {
+  using enum ExcitationKind;
+  int number = 0;
+  for (const ExcitationKind kind : {off, voltage, current, torque, position})
+    EXPECT_EQ(static_cast<int>(kind), number++);
+  EXPECT_EQ(static_cast<int>(AlternationAxis::along), 0);
+  EXPECT_EQ(static_cast<int>(AlternationAxis::across), 1);
+}
+
 TEST_F(ExcitationTest, SquareWaveOfHalfPeriodOneTickChangesInEveryTick) {
   auto config = of_kind(ExcitationKind::voltage);
   config.alternation = 0.5f;
