@@ -93,6 +93,49 @@ class Image(unittest.TestCase):
         self.assertEqual(values(self.board, name + "force"), [0])
 
 
+class Bench(unittest.TestCase):
+    """A hand, plugs and a button, from a named pipe."""
+
+    def test_what_is_done_at_the_bench_is_seen_by_the_board(self):
+        with tempfile.TemporaryDirectory() as folder:
+            pipe = Path(folder) / "bench"
+            with VirtualBoard("--scene", "dc_coreless_a", "--bench", str(pipe)) as board:
+                def do(line):
+                    pipe.write_text(line + "\n")
+
+                def until(parameter, good):
+                    end = time.monotonic() + PATIENCE
+                    while not good(value := values(board, parameter)[0]):
+                        self.assertLess(time.monotonic(), end, f"{parameter} is {value}")
+
+                begin = values(board, "measured.position")[0]
+                do("push 0 0.5")
+                until("measured.position", lambda now: now > begin + 0.002)
+                do("push 0 -0.5")
+                until("measured.velocity", lambda now: now < -0.001)
+                do("release 0")
+                until("measured.velocity", lambda now: now == 0)
+                do("swing 0 1")
+                until("measured.velocity", lambda now: now > 0.01)
+                until("measured.velocity", lambda now: now < -0.01)
+                do("release 0")
+                do("stop open")
+                until("profile.digital_inputs", lambda now: int(now) & 1 << 16)
+                do("stop closed")
+                until("profile.digital_inputs", lambda now: not int(now) & 1 << 16)
+                for line in ("push 1 1", "push 0 1e3", "push 0", "plant 0 luck", "stop", "dance"):
+                    do(line)
+            self.assertFalse(pipe.exists())
+            self.assertEqual(board.errors.count("kmax-board: bench: "), 6, board.errors)
+            self.assertIn("'plant 0 luck': defect luck: allowed are phase_a_open", board.errors)
+
+    def test_a_pipe_that_is_a_file_is_refused_and_left_alone(self):
+        with tempfile.NamedTemporaryFile("w") as file:
+            done = kmax_board(ELF, "--bench", file.name, "--duration", "0.1")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("no named pipe", done.stderr)
+
+
 class Store(unittest.TestCase):
     def test_what_is_saved_is_there_after_a_restart_and_the_rest_is_not(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -23,7 +23,7 @@ namespace {
 using namespace kmax;
 
 struct Options {
-  std::string elf, serial, can, gpio, scene = "motor_axes", store;
+  std::string elf, serial, can, gpio, bench, scene = "motor_axes", store;
   double duration = 0.0;
   int volts = 24;
   bool free_running = false, budget = false, json = false;
@@ -68,10 +68,9 @@ int run(const Options& options) {
     return cli::wrong_usage;
   }
   if (!world.has_drive(0) && !world.has_drive(1)) {
-    fmt::print(
-        stderr,
-        "kmax-board: scene '{}' has no motors: the board's connectors are open, and it will refuse to arm\n",
-        scene.name);
+    fmt::print(stderr,
+               "kmax-board: scene '{}' has no motors: the board's connectors are open, and no handle moves\n",
+               scene.name);
   }
   virtual_board::VirtualBoardConfig config;
   config.identity.volts = static_cast<std::uint8_t>(options.volts);
@@ -98,14 +97,17 @@ int run(const Options& options) {
   }
   if (!options.gpio.empty())
     gpio.emplace(board, options.gpio, [](const std::string& text) { fmt::print(stderr, "{}\n", text); });
+  std::optional<virtual_board::BenchPipe> bench;
+  if (!options.bench.empty()) bench.emplace(options.bench, board, world);
   if (!addresses.empty()) {
     fmt::print("{} on the virtual board with scene '{}', as {}\nset KMAX_DEVICE to that; Ctrl-C ends\n",
                options.elf, scene.name, fmt::join(addresses, " and "));
     std::cout.flush();
   }
-  const auto report = virtual_board::run_board(
-      board, {line ? &*line : nullptr, can ? &*can : nullptr}, gpio ? &*gpio : nullptr, options.duration,
-      options.free_running, [&] { return interruption.requested(); });
+  const auto report =
+      virtual_board::run_board(board, {line ? &*line : nullptr, can ? &*can : nullptr},
+                               gpio ? &*gpio : nullptr, bench ? &*bench : nullptr, options.duration,
+                               options.free_running, [&] { return interruption.requested(); });
   fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", report.simulated_s,
              board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
   if (report.behind_s > 0.0)
@@ -142,6 +144,12 @@ int main(int argc, char** argv) {
          "--gpio", options.gpio,
          "Simulated GPIO chip (gpio-sim) whose lines 0 to 4 are NRST, BOOT0, ESTOP, FAULT and HEALTHY")
       ->type_name("CHIP");
+  app.add_option(
+         "--bench", options.bench,
+         "Named pipe that takes what a person at the bench does, a line each: push AXIS NEWTON, swing "
+         "AXIS NEWTON, release AXIS, unplug AXIS, plug AXIS, plant AXIS DEFECT, mend AXIS DEFECT, stop "
+         "open, stop closed; made if missing")
+      ->type_name("PIPE");
   app.add_option("--scene", options.scene,
                  "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
                  "connector, its position stays 0")

@@ -51,8 +51,8 @@ class CanBridge {
 
 }  // namespace
 
-PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, double duration_s,
-                     bool free_running, const std::function<bool()>& stop) {
+PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, BenchPipe* bench,
+                     double duration_s, bool free_running, const std::function<bool()>& stop) {
   PaceReport report;
   std::optional<CanBridge> can;
   if (host.can != nullptr) can.emplace(board, *host.can);
@@ -67,6 +67,7 @@ PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridg
       if (!received.empty()) board.receive(received);
     }
     if (can) can->exchange();
+    if (bench != nullptr) bench->exchange();
     const bool runs = gpio == nullptr || gpio->exchange();
     if (!free_running) {
       const auto now = Clock::now();
