@@ -71,24 +71,24 @@ class Excitation {
   struct Coefficients {
     ExcitationKind kind = ExcitationKind::off;
     bool across = false;
-    std::uint32_t run = 0;
-    std::uint32_t duration = 0;       ///< ticks
-    std::uint32_t ramp_ticks = 0;     ///< ticks
-    std::uint32_t half_period = 0;    ///< ticks
-    std::uint32_t travel_counts = 0;  ///< for the axis' trip: farther than this
-    float ramp_step = 0.0f;           ///< per tick
-    float bias = 0.0f, alternation = 0.0f;
-    control::TurnFraction angle = 0;
-    std::int32_t angle_step = 0;    ///< 2^-32 turns per tick
-    std::int64_t angle_span = 0;    ///< 2^-32 turns
-    float electrical_speed = 0.0f;  ///< rad/s
-    float stiffness = 0.0f;         ///< N per 2^-8 counts
-    float damping = 0.0f;           ///< N s/m
-    float speed = 0.0f;             ///< m/s
-    float force_limit = 0.0f;       ///< N
-    float count_length = 0.0f;      ///< m
-    std::int64_t stroke = 0;        ///< 2^-32 counts
-    std::int64_t point_step = 0;    ///< 2^-32 counts per tick, >= 0
+    std::uint32_t run{};
+    std::uint32_t duration{};       ///< ticks
+    std::uint32_t ramp_ticks{};     ///< ticks
+    std::uint32_t half_period{};    ///< ticks
+    std::uint32_t travel_counts{};  ///< for the axis' trip: farther than this
+    float ramp_step{};              ///< per tick
+    float bias{}, alternation{};
+    control::TurnFraction angle{};
+    std::int32_t angle_step{};  ///< 2^-32 turns per tick
+    std::int64_t angle_span{};  ///< 2^-32 turns
+    float electrical_speed{};   ///< rad/s
+    float stiffness{};          ///< N per 2^-8 counts
+    float damping{};            ///< N s/m
+    float speed{};              ///< m/s
+    float force_limit{};        ///< N
+    float count_length{};       ///< m
+    std::int64_t stroke{};      ///< 2^-32 counts
+    std::int64_t point_step{};  ///< 2^-32 counts per tick, >= 0
   };
 
   struct Output {

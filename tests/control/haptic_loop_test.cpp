@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "firmware/object_dictionary/axis_groups.hpp"
 
@@ -234,6 +235,18 @@ TEST(HapticLoop, FloatFollowsDoubleThroughAContact) {
 }
 
 // A wall of 5 N/mm, and counts of a handle that swings in it by 0.2 mm, the force by 1 N, at 50 Hz.
+TEST(HapticLoop, ForcesThatOverflowTogetherStayOnTheirSide) {
+  for (const int side : {1, -1}) {
+    auto config = plain_wall<float>();
+    config.wall.stiffness = 3e38f;
+    config.count_length = 1.0;
+    config.wall_side = side;
+    const float out = static_cast<float>(side), most = std::numeric_limits<float>::max();
+    EXPECT_EQ(Loop<float>(config).at(-10 * side, true, out * most).force, out * 1e6f);
+    EXPECT_EQ(Loop<float>(config).at(-10 * side, true, -out * most).force, 0.0f);
+  }
+}
+
 // Of instability.action.
 TEST(HapticLoop, NumbersOfTheActionsStay) {
   using enum InstabilityAction;

@@ -88,6 +88,22 @@ TEST_F(WhileArmed, NothingThatProtectsIsTakenAwayOverAnyLink) {
   EXPECT_EQ(registers.changes(), 0u);
 }
 
+TEST_F(WhileArmed, AnotherLinkMayDisarmAndNotArmAgain) {
+  const ParameterValues values;
+  for (const std::size_t axis : {0U, 1U}) {
+    for (const Link by : {Link::serial, Link::can, Link::local}) {
+      const bool is_anothers = axis == 0 && by == Link::serial;
+      for (std::uint32_t word = 0; word < 0x200; ++word) {
+        const SlotValue wanted{static_cast<std::uint16_t>(slot_of(entry_of<"drive.controlword">(), axis)),
+                               word};
+        EXPECT_EQ(armed_change_refusal(values, wanted, by, only(0, Link::can)),
+                  is_anothers && (word & 0x8F) == 0x0F ? Refusal::other_commander : Refusal::none)
+            << axis << ' ' << static_cast<int>(by) << ' ' << word;
+      }
+    }
+  }
+}
+
 TEST_F(WhileArmed, ABoundThatIsOffCanBeSwitchedOnAndNotOffAgain) {
   ASSERT_EQ(set("velocity.limit", 0), Refusal::none);
   EXPECT_EQ(set_armed("velocity.limit", 1000), Refusal::none);

@@ -34,6 +34,23 @@ TEST(ParameterRules, RatesThatDoNotDivideAreRefusedAndNamed) {
   }
 }
 
+TEST(ParameterRules, ACompensationStaysBelowTheFriction) {
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    ParameterValues values;
+    values.set_real<"guard.friction">(0.5f, axis);
+    for (const float limit : {0.0f, 0.25f, std::nextafter(0.5f, 0.0f), 0.5f, 3.0f}) {
+      values.set_real<"compensation.limit">(limit, axis);
+      const BrokenRule broken = check_rules(values);
+      EXPECT_EQ(broken.refusal, limit < 0.5f ? Refusal::none : Refusal::compensation_beyond_friction)
+          << limit;
+      EXPECT_EQ(broken.slot, limit < 0.5f ? 0 : slot_of(entry_of<"compensation.limit">(), axis));
+    }
+    values.set_real<"guard.friction">(0.0f, axis);
+    values.set_real<"compensation.limit">(0.0f, axis);
+    EXPECT_EQ(check_rules(values).refusal, Refusal::none) << "off";
+  }
+}
+
 TEST(ParameterRules, IntervalsMayBeAPointButNotTurnedRound) {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     ParameterValues values;
