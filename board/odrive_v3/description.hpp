@@ -8,7 +8,7 @@ namespace kmax::board::odrive_v3 {
 
 inline constexpr drivers::stm32f4::ThreePhasePwmConfig pwm_config{};
 
-/// The board for 24 V; that for 56 V differs in the divider alone (voltage_variant.hpp).
+/// The board for 24 V; that for 56 V differs in divider and ratings (voltage_variant.hpp).
 inline constexpr BoardDescription description{
     .name = "odrive_v3",
     .core_clock_hz = 168'000'000,

@@ -6,8 +6,8 @@
 
 #include "drivers/stm32f4/registers/system_memory.hpp"
 
-// The ODrive v3.6 was sold for 24 V and for 56 V. They differ in FETs and in the divider of the supply
-// measurement, and in nothing that firmware could measure: the maker wrote the voltage into the
+// The ODrive v3.6 was sold for 24 V and for 56 V. They differ in FETs, capacitors and the divider of the
+// supply measurement, and in nothing that firmware could measure: the maker wrote the voltage into the
 // one-time-programmable area.
 
 namespace kmax::board::odrive_v3 {
@@ -49,6 +49,36 @@ inline constexpr VoltageVariant variant_of_blank_board =
 /// Ratio of supply to the voltage at the converter's pin: 10 kOhm or 18 kOhm over 1 kOhm.
 constexpr float supply_divider_ratio(VoltageVariant variant) {
   return variant == VoltageVariant::v24 ? 11.0f : 19.0f;
+}
+
+/// The variant that has this divider.
+constexpr std::optional<VoltageVariant> variant_with_divider(double ratio) {
+  for (const VoltageVariant variant : {VoltageVariant::v24, VoltageVariant::v56}) {
+    if (ratio == static_cast<double>(supply_divider_ratio(variant))) return variant;
+  }
+  return std::nullopt;
+}
+
+/// What a variant is sold for and what its parts bear, V. Parts list of v3.4 for the MOSFETs (NTMFS4935N,
+/// NTMFS5C628NL) and the 25 V capacitors; those of the 56 V board are from memory.
+struct PartRatings {
+  float supply, capacitors, mosfets;
+
+  /// What an aluminium capacitor bears for seconds, as when a motor brakes (IEC 60384-4: 1.15 x rated).
+  constexpr float capacitor_surge() const { return 1.15f * capacitors; }
+  constexpr float weakest() const { return capacitor_surge() < mosfets ? capacitor_surge() : mosfets; }
+};
+constexpr PartRatings part_ratings(VoltageVariant variant) {
+  return variant == VoltageVariant::v24 ? PartRatings{24.0f, 25.0f, 30.0f} : PartRatings{56.0f, 63.0f, 60.0f};
+}
+
+/// V, at which the drive trips whatever its parameters say: 7 % above the nominal supply, where the vendor's
+/// firmware does (25.7 and 59.9 V), but so far below the weakest part that what is returned until the bridges
+/// are off does not reach it: 40 A into 1 mF for the 50 us of a tick, 2 V.
+constexpr float supply_ceiling(VoltageVariant variant) {
+  const PartRatings parts = part_ratings(variant);
+  const float of_vendor = 1.07f * parts.supply, of_parts = parts.weakest() - 2.0f;
+  return of_vendor < of_parts ? of_vendor : of_parts;
 }
 
 }  // namespace kmax::board::odrive_v3

@@ -65,7 +65,8 @@ struct EncoderConfig {
   double dropout_probability = 0.0;       // of every edge, to be lost
   double edge_noise = 0.0;                // counts, standard deviation of where an edge is seen
   EncoderKind kind = EncoderKind::quadrature;
-  bool reversed = false;  // counts fall while the handle's position grows
+  bool reversed = false;        // counts fall while the handle's position grows
+  bool select_filtered = true;  // of an AS5047P: the solder jumper J20 beside GPIO7 is open
 
   double count_length() const { return simulation::count_length(counts_per_turn, transmission); }
 };

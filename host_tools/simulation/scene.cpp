@@ -180,10 +180,18 @@ void read_encoder_table(const SceneTables& tables, const toml::table& table, con
                         SceneAxis& axis) {
   const toml::table* encoder = tables.part(table, prefix, "encoder");
   if (encoder == nullptr) return;
-  tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder, {"kind", "reversed"});
+  tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder,
+                    {"kind", "reversed", "select_filtered"});
   tables.read_truth(*encoder, prefix + "encoder.", "reversed", axis.encoder.reversed);
+  tables.read_truth(*encoder, prefix + "encoder.", "select_filtered", axis.encoder.select_filtered);
   const auto kind = tables.read_choice(*encoder, prefix + "encoder.", "kind", encoder_kinds);
   if (kind) axis.encoder.kind = static_cast<EncoderKind>(*kind);
+  if (!axis.encoder.select_filtered && axis.encoder.kind != EncoderKind::as5047p)
+    tables.fail(
+        encoder->get("select_filtered")->source(),
+        fmt::format("{0}encoder.select_filtered = false: only an AS5047P has a select; allowed is that "
+                    "with {0}encoder.kind = \"as5047p\"",
+                    prefix));
   if (!(axis.encoder.count_length() >= 1e-12)) {
     tables.fail(encoder->source(), fmt::format("{}encoder: {} m per count; allowed is 1e-12 m or more",
                                                prefix, axis.encoder.count_length()));
@@ -232,8 +240,23 @@ void read_supply_table(const SceneTables& tables, const toml::table& root, Scene
   const toml::table* supply = tables.part(root, "", "supply");
   if (supply == nullptr) return;
   SupplyConfig& config = scene.supply.emplace();
-  tables.read_model(*supply, "supply.", supply_fields, config, {"absorbs"});
+  tables.read_model(*supply, "supply.", supply_fields, config, {"absorbs", "part_ratings"});
   tables.read_truth(*supply, "supply.", "absorbs", config.absorbs);
+  tables.read_truth(*supply, "supply.", "part_ratings", config.part_ratings);
+}
+
+void read_spikes_table(const SceneTables& tables, const toml::table& root, Scene& scene) {
+  const toml::table* table = tables.part(root, "", "spikes");
+  if (table == nullptr) return;
+  SpikesConfig& spikes = scene.spikes.emplace();
+  const std::pair<const char*, bool*> truths[] = {{"at_samples", &spikes.at_samples},
+                                                  {"index", &spikes.index},
+                                                  {"emergency_stop", &spikes.emergency_stop},
+                                                  {"fault_line", &spikes.fault_line},
+                                                  {"encoder", &spikes.encoder}};
+  tables.read_model(*table, "spikes.", spikes_fields, spikes,
+                    {"at_samples", "index", "emergency_stop", "fault_line", "encoder"});
+  for (const auto& [name, value] : truths) tables.read_truth(*table, "spikes.", name, *value);
 }
 
 class SceneReader : private SceneTables {
@@ -249,7 +272,7 @@ class SceneReader : private SceneTables {
     std::vector<std::string_view> known{
         "name",     "description", "duration",       "seed",       "identified",  "device",
         "operator", "motion",      "encoder",        "parameters", "measurement", "structure",
-        "motor",    "inverter",    "current_sensor", "supply",     "integrator"};
+        "motor",    "inverter",    "current_sensor", "supply",     "integrator",  "spikes"};
     known.insert(known.end(), further_axes.begin(), further_axes.end());
     require_known(root, "", known);
     Scene scene;
@@ -274,6 +297,7 @@ class SceneReader : private SceneTables {
       scene.axes.push_back(read_axis(*table, name + ".", scene));
     }
     read_supply_table(*this, root, scene);
+    read_spikes_table(*this, root, scene);
     read_integrator_table(*this, root, scene);
     return scene;
   }

@@ -17,8 +17,9 @@
 //                                   person stays at the start
 //   [motion]                        intended_motion.hpp; needs [operator]
 //   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p", and
-//                                   reversed = true: it counts downwards. Without a motor: a count, without
-//                                   index, chip or mounting, but with noise and dropouts if asked for
+//                                   reversed = true: it counts downwards; select_filtered = false: an
+//                                   AS5047P's select passes no filter (jumper J20). Without a motor: a count,
+//                                   without index, chip or mounting, but with noise and dropouts if asked for
 //   [motor]                         kind = "ideal" (as without the table: a force source with the device's
 //                                   force limit), "dc" (brushed_dc_motor.hpp) or "pmsm"
 //                                   (synchronous_motor.hpp; also inductance for inductance_d and
@@ -29,7 +30,12 @@
 //                                   "semi_implicit_euler", "rk4" or "adaptive", with substeps or tolerance
 //                                   where the kind has them. Of the mechanical parts: circuits are always
 //                                   solved exactly
-//   [supply]                        supply.hpp, one for all axes
+//   [supply]                        supply.hpp, one for all axes; its divider_ratio says which variant of the
+//                                   board it is, 11 that for 24 V and 19 that for 56 V. part_ratings = false:
+//                                   its parts bear everything
+//   [spikes]                        spikes.hpp: interference on the lines of a virtual board. Also
+//   at_samples, index,
+//                                   emergency_stop, fault_line, encoder = true or false
 //   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
 //   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
 //   [axis1.device] [axis1.structure] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor]
@@ -62,6 +68,7 @@
 #include "host_tools/simulation/intended_motion.hpp"
 #include "host_tools/simulation/motor_drive.hpp"
 #include "host_tools/simulation/operator_model.hpp"
+#include "host_tools/simulation/spikes.hpp"
 #include "host_tools/simulation/supply.hpp"
 
 namespace kmax::simulation {
@@ -111,6 +118,7 @@ struct Scene {
   std::vector<SceneParameter> parameters;
   Measurement measurement;
   std::optional<SupplyConfig> supply;
+  std::optional<SpikesConfig> spikes;
   IntegratorConfig integrator;
 
   // A seed of its own for the noise of that axis, made from the scene's.

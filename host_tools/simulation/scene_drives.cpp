@@ -14,6 +14,7 @@ namespace {
 constexpr double longest_step = 0.01;  // s, that a circuit takes at a time
 constexpr double slipping_share = 1.0 / 3.0;
 constexpr double low_supply = 0.5;  // of the source's voltage
+constexpr double noticed = 50e-6;   // s without force, by a person
 
 bool driven(const InverterCommand& command) {
   return std::any_of(command.legs.begin(), command.legs.end(),
@@ -56,7 +57,8 @@ const MotorDrive& SceneDrives::drive(std::size_t axis) const {
 
 void SceneDrives::set_bridge(std::size_t index, const InverterCommand& command) {
   Axis& axis = axes_.at(index);
-  const bool begins = driven(command) && !driven(axis.command);
+  const bool begins = driven(command) && axis.undriven > noticed;
+  if (driven(command)) axis.undriven = 0.0;
   axis.command = command;
   if (!axis.drive || !begins) return;
   if (axis.drive->handle().has_operator()) {
@@ -76,10 +78,29 @@ void SceneDrives::advance(double duration) {
       axis.drive->current_sensor().set_temperature(axis.temperature.temperature());
       axis.drive->current_sensor().set_driven(driven(axis.command));
       axis.drive->advance(step, axis.command, supply_);
+      if (!driven(axis.command)) axis.undriven += step;
     }
     supply_.advance(step);
+    if (supply_.config().part_ratings) look_at_parts();
     left -= step;
   }
+}
+
+void SceneDrives::look_at_parts() const {
+  const auto variant = this->variant();
+  if (!variant) return;
+  const auto parts = board::odrive_v3::part_ratings(*variant);
+  const double volts = supply_.voltage();
+  if (volts <= static_cast<double>(parts.weakest())) return;
+  const auto refuse = [&](std::string_view what, float rated, float borne) {
+    throw PartBroken(fmt::format(
+        "the supply reached {:.2f} V: the {} of the {:.0f} V board are rated for {:.0f} V and bear "
+        "{:.4g} V; they are broken now (part_ratings = false in [supply] goes on)",
+        volts, what, parts.supply, rated, borne));
+  };
+  if (parts.capacitor_surge() <= parts.mosfets)
+    refuse("capacitors", parts.capacitors, parts.capacitor_surge());
+  refuse("MOSFETs", parts.mosfets, parts.mosfets);
 }
 
 std::int64_t SceneDrives::serial_angle(std::size_t axis) const {

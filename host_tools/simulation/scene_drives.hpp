@@ -6,8 +6,8 @@
 // without a motor, is an open connector.
 //
 // A person who has a motion begins the approach whenever the axis begins to be driven, as one would who was
-// told "now". A handle that nobody holds stays at its start until its axis is driven for the first time, and
-// is let go then.
+// told "now"; a pause of microseconds is none. A handle that nobody holds stays at its start until its axis
+// is driven for the first time, and is let go then.
 //
 // Defects may be planted and mended at any time; finer ones (a share of slip, edges lost in the cable) are
 // set on the parts themselves: drive(axis).encoder_coupling(), supply(), temperature(axis).
@@ -16,13 +16,20 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 
+#include "board/odrive_v3/voltage_variant.hpp"
 #include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/simulation/temperature_sensor.hpp"
 
 namespace kmax::simulation {
+
+class PartBroken : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 class SceneDrives {
  public:
@@ -39,6 +46,10 @@ class SceneDrives {
   const MotorDrive& drive(std::size_t axis) const;
   Supply& supply() { return supply_; }
   const Supply& supply() const { return supply_; }
+  // Of the board behind them; none for a divider that no board has.
+  std::optional<board::odrive_v3::VoltageVariant> variant() const {
+    return board::odrive_v3::variant_with_divider(supply_.config().divider_ratio);
+  }
   TemperatureSensor& temperature(std::size_t axis) { return axes_.at(axis).temperature; }
   const TemperatureSensor& temperature(std::size_t axis) const { return axes_.at(axis).temperature; }
 
@@ -46,7 +57,8 @@ class SceneDrives {
   void set_bridge(std::size_t axis, const InverterCommand& command);
   const InverterCommand& bridge(std::size_t axis) const { return axes_.at(axis).command; }
 
-  // s, above 0; in steps of at most 10 ms.
+  // s, above 0; in steps of at most 10 ms. Throws PartBroken when the supply exceeds what a part of the board
+  // bears, whose variant the supply's divider tells (board/odrive_v3/voltage_variant.hpp).
   void advance(double duration);
 
   EncoderKind encoder_kind(std::size_t axis) const { return axes_.at(axis).encoder_kind; }
@@ -70,9 +82,11 @@ class SceneDrives {
     std::array<bool, defect_names.size()> defects{};
     bool moves = false;  // somebody holds it who has a motion
     bool let_go = false;
+    double undriven = 1.0;  // s
   };
 
   void set(std::size_t axis, Defect defect, bool present);
+  void look_at_parts() const;
 
   std::array<Axis, firmware::axis_count> axes_;
   Supply supply_;

@@ -30,6 +30,7 @@ struct SupplyConfig {
   double brake_resistance = 2.0;  // ohm
   double divider_ratio = 11.0;    // bus voltage per voltage at the converter's pin
   bool absorbs = false;           // the source takes current back
+  bool part_ratings = true;       // the board's parts break (SceneDrives)
 };
 
 inline constexpr std::array supply_fields{

@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "firmware/parameters/parameter_values.hpp"
+
 namespace kmax::board::odrive_v3::voltage_variant_test {
 namespace {
 
@@ -56,4 +58,16 @@ TEST(VoltageVariant, BlankBoardsGetTheDividerThatReadsHigh) {
 }
 
 }  // namespace
+TEST(VoltageVariant, TheCeilingIsWhereTheVendorTripsAndBelowTheWeakestPart) {
+  EXPECT_NEAR(supply_ceiling(VoltageVariant::v24), 25.68f, 1e-4f);
+  EXPECT_NEAR(supply_ceiling(VoltageVariant::v56), 58.0f, 1e-4f) << "its MOSFETs bear 60 V";
+  for (const VoltageVariant variant : {VoltageVariant::v24, VoltageVariant::v56}) {
+    EXPECT_GE(supply_ceiling(variant), 1.03f * part_ratings(variant).supply) << "a supply's tolerance";
+    EXPECT_GE(supply_ceiling(variant), firmware::ParameterValues{}.real<"supply.voltage_max">())
+        << "no board refuses the default";
+    EXPECT_EQ(variant_with_divider(static_cast<double>(supply_divider_ratio(variant))), variant);
+  }
+  EXPECT_EQ(variant_with_divider(15.0), std::nullopt);
+}
+
 }  // namespace kmax::board::odrive_v3::voltage_variant_test

@@ -37,18 +37,11 @@ class Bench : public ImageBench {
     start();
     for (std::size_t axis = 0; axis < axes; ++axis) write("drive.mode", axis, 2);
   }
-  void write(std::string_view name, std::size_t axis, unsigned value) {
-    master->write_register(firmware::register_address(firmware::find_entry(name), axis),
-                           static_cast<std::uint16_t>(value));
-  }
   /// Clears what there is, and drives both axes with 2.5 N against the hands, the brake on.
   void drive() {
     for (std::size_t axis = 0; axis < axes; ++axis) {
       for (const unsigned word : {0x00, 0x80, 0x06, 0x0F}) write("drive.controlword", axis, word);
-      const auto bits = std::bit_cast<std::uint32_t>(2.5f);
-      master->write_holding(
-          firmware::register_address(firmware::find_entry("profile.target_force"), axis),
-          std::array{static_cast<std::uint16_t>(bits >> 16), static_cast<std::uint16_t>(bits)});
+      write_real("profile.target_force", axis, 2.5f);
     }
     board->run_for(0.003);
     for (std::size_t axis = 0; axis < axes; ++axis)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <bit>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -52,10 +54,9 @@ class ImageBench {
   explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
                       const std::string& scene_name = "motor_axes",
                       const virtual_board::VirtualBoardConfig& config = {})
-      : ImageBench(simulated_board::open_scene(scene_name), parameters, push, config) {}
-  explicit ImageBench(const simulation::Scene& base, const Parameters& parameters = {}, double push = 0.0,
-                      const virtual_board::VirtualBoardConfig& config = {})
-      : scene(with(base, parameters, push)), world(scene) {
+      : ImageBench(with(simulated_board::open_scene(scene_name), parameters, push), config) {}
+  explicit ImageBench(simulation::Scene of, const virtual_board::VirtualBoardConfig& config = {})
+      : scene(std::move(of)), world(scene) {
     board = board_for_24_v(&world, config);
     virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
     master = std::make_unique<virtual_board::BoardLink>(*board);
@@ -67,6 +68,16 @@ class ImageBench {
     if (!board->healthy()) throw std::runtime_error("the power stage does not become ready");
   }
 
+  void write(std::string_view name, std::size_t axis, unsigned value) {
+    master->write_register(firmware::register_address(firmware::find_entry(name), axis),
+                           static_cast<std::uint16_t>(value));
+  }
+  void write_real(std::string_view name, std::size_t axis, float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    master->write_holding(
+        firmware::register_address(firmware::find_entry(name), axis),
+        std::array{static_cast<std::uint16_t>(bits >> 16), static_cast<std::uint16_t>(bits)});
+  }
   std::uint16_t reading(std::size_t entry, std::size_t axis) {
     return master->read_input(firmware::register_address(entry, axis), 1)[0];
   }
@@ -99,7 +110,7 @@ class ImageBench {
   std::unique_ptr<virtual_board::VirtualBoard> board;
   std::unique_ptr<virtual_board::BoardLink> master;
 
- private:
+ protected:
   static simulation::Scene with(simulation::Scene scene, const Parameters& parameters, double push) {
     for (simulation::SceneAxis& axis : scene.axes) {
       if (push > 0.0 && axis.motion) axis.motion->push_force = push;

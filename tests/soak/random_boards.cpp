@@ -212,10 +212,12 @@ class NativeRun {
 /// The image with the same parts, told of its motor: pressed for as long.
 ForceError run_image(Scene scene, double contact, double hottest) {
   scene.identified = true;
-  ImageBench bench(scene, {{"wall.law", std::string("adaptive")},
-                           {"wall.position", -0.003},
-                           {"wall.stiffness", 800.0},
-                           {"link.timeout", 0.0}});
+  const std::pair<const char*, simulation::ParameterValue> told[] = {{"wall.law", std::string("adaptive")},
+                                                                     {"wall.position", -0.003},
+                                                                     {"wall.stiffness", 800.0},
+                                                                     {"link.timeout", 0.0}};
+  for (const auto& [name, value] : told) scene.parameters.push_back({name, value, "random_boards"});
+  ImageBench bench(scene);
   bench.start();
   bench.master->arm(0);
   ForceError error;

@@ -11,16 +11,30 @@ namespace kmax::virtual_board {
 namespace as5047p = drivers::as5047p;
 using drivers::As5047pRegister;
 
-void As5047pChip::select(bool level) {
+void As5047pChip::select(bool level, BoardTime now) {
   const bool selected = !level;
   if (selected == selected_) return;
+  const auto units = [](double s) {
+    return static_cast<BoardTime>(s * static_cast<double>(units_per_second));
+  };
+  const BoardTime here = now + units(1.2 * timing_.filter);
+  if (selected) {
+    const bool paused = released_at_ == 0 || here >= released_at_ + units(timing_.set_up);
+    ready_at_ = paused ? here + units(timing_.set_up) : never;
+  } else {
+    released_at_ = here;
+  }
   if (!selected && frames_in_select_ != 1) errors_ |= as5047p::framing_error;
   selected_ = selected;
   frames_in_select_ = 0;
 }
 
-std::optional<std::uint16_t> As5047pChip::exchange(std::uint16_t mosi, BoardTime now) {
+std::optional<std::uint16_t> As5047pChip::exchange(std::uint16_t mosi, BoardTime now, BoardTime began) {
   if (!selected_ || !fitted_) return std::nullopt;
+  if (began < ready_at_) {
+    ++late_selects_;
+    return std::nullopt;
+  }
   ++frames_in_select_;
   return std::exchange(reply_, answer(mosi, now));
 }

@@ -3,7 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
+#include "host_tools/simulation/spikes.hpp"
 #include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 
@@ -43,6 +45,10 @@ class BoardWorld {
   virtual double analogue(unsigned channel, BoardTime now) = 0;
   /// Asked after every sampling instant of the axis and whenever else the board likes.
   virtual EncoderSignals encoder(std::size_t axis, BoardTime now) = 0;
+  /// Interference on the lines.
+  virtual std::optional<simulation::SpikesConfig> spikes() const { return std::nullopt; }
+  /// The AS5047P's select passes the filter of GPIO7: its solder jumper is open.
+  virtual bool select_filtered() const { return true; }
   virtual SerialEncoderState serial_encoder(BoardTime /*now*/) { return {}; }
 };
 

@@ -7,7 +7,10 @@ namespace kmax::virtual_board {
 using simulation::CurrentSensor;
 using simulation::EncoderKind;
 
-SceneWorld::SceneWorld(const simulation::Scene& scene) : drives_(scene) {}
+SceneWorld::SceneWorld(const simulation::Scene& scene) : drives_(scene), spikes_(scene.spikes) {
+  for (const simulation::SceneAxis& axis : scene.axes)
+    select_filtered_ = select_filtered_ && axis.encoder.select_filtered;
+}
 
 void SceneWorld::advance_to(BoardTime now) {
   if (now <= time_) return;

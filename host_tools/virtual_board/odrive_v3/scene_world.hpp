@@ -39,12 +39,16 @@ class SceneWorld : public BoardWorld {
   simulation::TemperatureSensor& temperature(std::size_t axis) { return drives_.temperature(axis); }
   /// Pulls the plug of an axis' encoder, or puts it back.
   void connect_encoder(std::size_t axis, bool connected);
+  std::optional<simulation::SpikesConfig> spikes() const override { return spikes_; }
+  bool select_filtered() const override { return select_filtered_; }
 
  private:
   void advance_to(BoardTime now);
   double current_pin(std::size_t axis, simulation::CurrentSensor::Channel channel);
 
   simulation::SceneDrives drives_;
+  std::optional<simulation::SpikesConfig> spikes_;
+  bool select_filtered_ = true;
   BoardTime time_ = 0;
   std::size_t low_sides_of_ = 0;
 };

@@ -41,6 +41,9 @@ VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const Virtu
   processor_.name_functions_by([this](std::uint32_t address) { return image_.function_at(address); });
   attach_peripherals(config);
   wire();
+  if (world_ == nullptr) return;
+  spikes_.configure(world_->spikes());
+  if (!world_->select_filtered()) serial_encoder_.set_select_timing({.filter = 0.0});
   reset(ResetCause::power_on);
   set_board_resistors();
 }
@@ -138,6 +141,7 @@ void VirtualBoard::wire() {
   chip_events_.on_brake_change([this](BoardTime now) {
     if (world_ != nullptr) world_->set_brake(brake_.on(), now);
   });
+  spikes_.on_change([this](LineSpikes::Line line, BoardTime now) { show_spike(line, now); });
   rcc_.on_clock_failure([this](BoardTime now) {
     for (auto& timer : pwm_) timer.clock_failure_break(now);
   });
@@ -173,7 +177,7 @@ std::uint16_t VirtualBoard::exchange(std::uint16_t word, BoardTime now) {
   std::uint16_t wire = 0xFFFF;
   for (Drv8301Chip& driver : gate_drivers_) wire &= driver.exchange(word, now).value_or(0xFFFF);
   if (world_ != nullptr) serial_encoder_.set_fitted(world_->serial_encoder(now).fitted);
-  wire &= serial_encoder_.exchange(word, now).value_or(0xFFFF);
+  wire &= serial_encoder_.exchange(word, now, spi3_.frame_began()).value_or(0xFFFF);
   for (std::size_t axis = 0; axis < gate_drivers_.size() && world_ != nullptr; ++axis) {
     world_->set_amplifiers(axis, drivers::gain_factor(gate_drivers_[axis].gain()),
                            gate_drivers_[axis].calibrating(), now);
@@ -229,7 +233,8 @@ void VirtualBoard::set_frozen(bool halted, BoardTime now) {
 }
 
 void VirtualBoard::show_fault_line(BoardTime now) {
-  const bool low = fault_line_held_ || !gate_drivers_[0].fault_output() || !gate_drivers_[1].fault_output();
+  const bool low = fault_line_held_ || spikes_.on(LineSpikes::fault_line) ||
+                   !gate_drivers_[0].fault_output() || !gate_drivers_[1].fault_output();
   port(pins::gate_driver_fault.port)
       .drive(pins::gate_driver_fault.number, low ? PinDrive::low : PinDrive::floating, now);
 }
@@ -253,7 +258,7 @@ void VirtualBoard::wire_pins() {
       if (pin == pins::brake_high_side || pin == pins::gate_enable) show_brake(now);
       if (pin == pins::gate_driver0_select) gate_drivers_[0].select(output != PinOutput::low, now);
       if (pin == pins::gate_driver1_select) gate_drivers_[1].select(output != PinOutput::low, now);
-      if (pin == pins::encoder_select) serial_encoder_.select(output != PinOutput::low);
+      if (pin == pins::encoder_select) serial_encoder_.select(output != PinOutput::low, now);
     });
   }
 }
@@ -275,12 +280,12 @@ void VirtualBoard::look_at_world(BoardTime now) {
   if (world_ == nullptr) return;
   for (std::size_t axis = 0; axis < encoders_.size(); ++axis) {
     const EncoderSignals signals = world_->encoder(axis, now);
-    encoders_[axis].set_encoder_count(signals.edges);
+    encoders_[axis].set_encoder_count(signals.edges + false_edges_[axis]);
     gate_drivers_[axis].set_fitted(world_->has_gate_driver(axis));
-    const auto index = axis == 0 ? pins::encoder0_index : pins::encoder1_index;
-    if (port(index.port).level(index.number) != signals.index)
-      port(index.port).drive(index.number, signals.index ? PinDrive::high : PinDrive::low, now);
+    index_[axis] = signals.index;
+    show_index(axis, now);
   }
+  draw_spikes(now);
   look_at_logic_supply();
   // DRV8301 data sheet, protection: PVDD under-voltage at 5.9 V.
   constexpr double lowest_supply = 5.9;
@@ -289,6 +294,53 @@ void VirtualBoard::look_at_world(BoardTime now) {
   supply_was_low_ = too_low;
   for (Drv8301Chip& driver : gate_drivers_)
     driver.set_condition(drivers::Drv8301Fault::supply_under_voltage, too_low, now);
+}
+
+void VirtualBoard::show_index(std::size_t axis, BoardTime now) {
+  const auto pin = axis == 0 ? pins::encoder0_index : pins::encoder1_index;
+  const bool level = index_[axis] || spikes_.on(axis == 0 ? LineSpikes::index_0 : LineSpikes::index_1);
+  if (port(pin.port).level(pin.number) != level)
+    port(pin.port).drive(pin.number, level ? PinDrive::high : PinDrive::low, now);
+}
+
+void VirtualBoard::show_emergency_stop(BoardTime now) {
+  const bool open = emergency_stop_open_ || spikes_.on(LineSpikes::emergency_stop);
+  port(pins::emergency_stop.port)
+      .drive(pins::emergency_stop.number, open ? PinDrive::floating : PinDrive::low, now);
+}
+
+void VirtualBoard::show_spike(LineSpikes::Line line, BoardTime now) {
+  switch (line) {
+    case LineSpikes::index_0:
+    case LineSpikes::index_1:
+      return show_index(line == LineSpikes::index_0 ? 0 : 1, now);
+    case LineSpikes::emergency_stop:
+      return show_emergency_stop(now);
+    case LineSpikes::fault_line:
+      return show_fault_line(now);
+    case LineSpikes::encoder_0:
+    case LineSpikes::encoder_1: {
+      // Both lines rise and fall one after the other.
+      const std::size_t axis = line == LineSpikes::encoder_0 ? 0 : 1;
+      if (spikes_.on(line) && world_->spikes()->width > encoders_[axis].input_filter())
+        false_edges_[axis] += 4;
+      return;
+    }
+    case LineSpikes::line_count:
+      return;
+  }
+}
+
+// The edges of a leg are (1 - duty) and (1 + duty) half periods after its axis' conversion, and the other
+// axis' conversion is one half period later.
+void VirtualBoard::draw_spikes(BoardTime now) {
+  if (!pwm_[0].moe() && !pwm_[1].moe()) return;
+  spikes_.draw(now, [this](double choice) {
+    constexpr double half_period = 25e-6;
+    const auto which = static_cast<std::size_t>(choice * 12.0);
+    const double duty = pwm_[which % 2].outputs()[which / 2 % 3].high_duty;
+    return half_period * (which < 6 ? duty : 1.0 - duty);
+  });
 }
 
 /// Volts, behind the gate driver's buck converter and a linear regulator; what they lose when the supply gets
@@ -404,8 +456,8 @@ std::vector<std::uint8_t> VirtualBoard::transmitted() {
 }
 
 void VirtualBoard::open_emergency_stop(bool open) {
-  port(pins::emergency_stop.port)
-      .drive(pins::emergency_stop.number, open ? PinDrive::floating : PinDrive::low, now());
+  emergency_stop_open_ = open;
+  show_emergency_stop(now());
 }
 
 bool VirtualBoard::healthy() const {

@@ -17,6 +17,7 @@
 #include "host_tools/virtual_board/odrive_v3/board_world.hpp"
 #include "host_tools/virtual_board/odrive_v3/brake_driver.hpp"
 #include "host_tools/virtual_board/odrive_v3/drv8301_chip.hpp"
+#include "host_tools/virtual_board/odrive_v3/line_spikes.hpp"
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
 #include "host_tools/virtual_board/stm32f4/advanced_timer.hpp"
 #include "host_tools/virtual_board/stm32f4/can_bus.hpp"
@@ -56,16 +57,19 @@ class OffTheBus : public Peripheral {
   }
 };
 
-/// The gate drivers wake some time after EN_GATE; the brake's driver starves.
+/// The gate drivers wake some time after EN_GATE; the brake's driver starves; spikes begin and end.
 class ChipEvents final : public OffTheBus {
  public:
-  ChipEvents(std::array<Drv8301Chip, 2>& chips, BrakeDriver& brake) : chips_(chips), brake_(brake) {}
+  ChipEvents(std::array<Drv8301Chip, 2>& chips, BrakeDriver& brake, LineSpikes& spikes)
+      : chips_(chips), brake_(brake), spikes_(spikes) {}
   void advance(BoardTime now) override {
     for (Drv8301Chip& chip : chips_) chip.advance(now);
     if (brake_.advance(now) && brake_change_) brake_change_(now);
+    spikes_.advance(now);
   }
   BoardTime next_event() const override {
-    return std::min({chips_[0].next_event(), chips_[1].next_event(), brake_.next_event()});
+    return std::min(
+        {chips_[0].next_event(), chips_[1].next_event(), brake_.next_event(), spikes_.next_event()});
   }
   void reset(BoardTime /*now*/) override {}
   void on_brake_change(std::function<void(BoardTime)> listener) { brake_change_ = std::move(listener); }
@@ -73,6 +77,7 @@ class ChipEvents final : public OffTheBus {
  private:
   std::array<Drv8301Chip, 2>& chips_;
   BrakeDriver& brake_;
+  LineSpikes& spikes_;
   std::function<void(BoardTime)> brake_change_;
 };
 
@@ -147,6 +152,8 @@ class VirtualBoard {
   /// A gate signal of an axis is active or will be within the PWM period: its bridge drives the motor's
   /// wires.
   bool gates_active(std::size_t axis) const;
+  /// Since power-up, on all lines.
+  std::uint64_t spikes() const { return spikes_.begun(); }
   /// The brake's driver.
   const BrakeDriver& brake() const { return brake_; }
   std::uint64_t resets() const { return resets_; }
@@ -169,6 +176,7 @@ class VirtualBoard {
   AdcModel& adc() { return adc_; }
   DbgmcuModel& debug_support() { return dbgmcu_; }
   DmaModel& dma() { return dma2_; }
+  const As5047pChip& serial_encoder() const { return serial_encoder_; }
   Drv8301Chip& gate_driver(std::size_t axis) { return gate_drivers_[axis]; }
   GpioPortModel& port(drivers::stm32f4::GpioPort port) { return ports_[static_cast<std::size_t>(port)]; }
 
@@ -187,6 +195,10 @@ class VirtualBoard {
   void show_bridge(std::size_t axis, BoardTime now);
   void show_brake(BoardTime now);
   void show_fault_line(BoardTime now);
+  void show_emergency_stop(BoardTime now);
+  void show_index(std::size_t axis, BoardTime now);
+  void show_spike(LineSpikes::Line line, BoardTime now);
+  void draw_spikes(BoardTime now);
   std::uint16_t exchange(std::uint16_t word, BoardTime now);
   void look_at_world(BoardTime now);
   [[noreturn]] void fail() const;
@@ -228,7 +240,8 @@ class VirtualBoard {
   As5047pChip serial_encoder_{
       [this](BoardTime now) { return world_ != nullptr ? world_->serial_encoder(now).angle : 0; }};
   BrakeDriver brake_;
-  ChipEvents chip_events_{gate_drivers_, brake_};
+  LineSpikes spikes_;
+  ChipEvents chip_events_{gate_drivers_, brake_, spikes_};
   FlashStall flash_stall_{flash_, processor_};
   std::vector<Peripheral*> peripherals_;  ///< all but the core's
 
@@ -238,6 +251,9 @@ class VirtualBoard {
   bool browned_out_ = false;
   bool watchdog_fired_ = false;
   bool fault_line_held_ = false;
+  bool emergency_stop_open_ = false;
+  std::array<bool, 2> index_{};                ///< levels that the encoders give
+  std::array<std::int64_t, 2> false_edges_{};  ///< counted by spikes
   bool supply_was_low_ = false;
   std::uint64_t resets_ = 0;
 };

@@ -50,6 +50,28 @@ bool GeneralTimerModel::encoder_mode() const {
   return timer_smcr::SlaveMode::of(smcr_) == timer_smcr::slave_encoder_both_inputs;
 }
 
+// RM0090, TIMx_CCMR1, IC1F: clocks from one sample to the next, and how many must agree.
+double GeneralTimerModel::input_filter() const {
+  constexpr std::array<std::array<int, 2>, 16> filters{{{1, 0},
+                                                        {1, 2},
+                                                        {1, 4},
+                                                        {1, 8},
+                                                        {2, 6},
+                                                        {2, 8},
+                                                        {4, 6},
+                                                        {4, 8},
+                                                        {8, 6},
+                                                        {8, 8},
+                                                        {16, 5},
+                                                        {16, 6},
+                                                        {16, 8},
+                                                        {32, 5},
+                                                        {32, 6},
+                                                        {32, 8}}};
+  const auto [interval, samples] = filters.at(timer_ccmr::InputFilter<1>::of(ccmr_));
+  return interval * samples / 84e6;
+}
+
 void GeneralTimerModel::set_encoder_count(std::int64_t edges) {
   // Modulo 2^64, so that no difference overflows.
   const auto moved =

@@ -13,8 +13,8 @@ enum class GeneralTimer : std::uint8_t { tim2, tim3, tim4, tim5 };
 /// count 32 bits, TIM3 and TIM4 16.
 ///
 /// Modelled: encoder interface mode 3 (all edges of both inputs) with the direction by CC1P and CC2P, between
-/// 0 and ARR; update event at the wrap with its flag; UG and URS. Input filters are accepted and delay
-/// nothing (silicon: 143 ns with ICxF = 4 at 84 MHz).
+/// 0 and ARR; update event at the wrap with its flag; UG and URS. Input filters delay nothing (silicon: 143
+/// ns with ICxF = 4 at 84 MHz); whoever makes short pulses asks for them.
 ///
 /// Refused, since no driver uses it: counting by the clock, encoder modes 1 and 2 and all other slave modes,
 /// a prescaler, interrupts and DMA, capture and compare channels, changing the inputs while counting.
@@ -27,6 +27,8 @@ class GeneralTimerModel final : public RegisterBlock<GeneralTimerModel> {
   /// Edges of A and B together since some origin of the world's choice, upwards when A leads. The counter
   /// follows the changes while it is in encoder mode and runs. Its cost does not depend on how far it moved.
   void set_encoder_count(std::int64_t edges);
+  /// s, at the timers' 84 MHz: shorter pulses of A and B are not counted.
+  double input_filter() const;
 
  private:
   static const RegisterTable<GeneralTimerModel>& registers();

@@ -89,7 +89,7 @@ void SpiModel::begin_frame(BoardTime start) {
   shift_ = buffer_;
   shifting_ = true;
   sampled_ = false;
-  begins_at_ = start;
+  begins_at_ = began_at_ = start;
   ends_at_ = start + bits_per_frame * bit_time();
   sampled_at_ = ends_at_ - bit_time() / 2;
 }

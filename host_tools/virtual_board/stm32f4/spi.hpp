@@ -29,6 +29,8 @@ class SpiModel final : public RegisterBlock<SpiModel> {
   explicit SpiModel(const BoardClocks& clocks) : RegisterBlock("SPI3", registers()), clocks_(clocks) {}
   /// Must be set before the first frame.
   void on_frame(Wire wire) { wire_ = std::move(wire); }
+  /// The frame under way, or the last one.
+  BoardTime frame_began() const { return began_at_; }
 
   void advance(BoardTime now) override;
   BoardTime next_event() const override { return next_event_; }
@@ -56,7 +58,7 @@ class SpiModel final : public RegisterBlock<SpiModel> {
   bool shifting_ = false;
   bool sampled_ = false;  ///< the last bit of the frame under way has been sampled
   std::uint16_t shift_ = 0;
-  BoardTime begins_at_ = 0, sampled_at_ = 0, ends_at_ = 0;
+  BoardTime began_at_ = 0, begins_at_ = 0, sampled_at_ = 0, ends_at_ = 0;
   bool received_ = false;
   std::uint16_t received_word_ = 0;
   bool overrun_ = false;

@@ -116,7 +116,7 @@ const std::vector<Planted>& planted() {
   static const std::vector<Planted> all = {
       {"no motor supply", dc, Stage::logic, "supply", supply_of(0.0)},
       {"supply too low", dc, Stage::logic, "supply", supply_of(11.0)},
-      {"supply too high", dc, Stage::logic, "supply", supply_of(35.0)},
+      {"supply too high", dc, Stage::logic, "supply", supply_of(27.0)},
       {"board for 24 V taken for one of 56 V", dc, Stage::logic, "voltage variant", supply_of(20.8),
        with([](Settings& s) { s.supply = 12.0; })},
       {"board for 56 V taken for one of 24 V", dc, Stage::logic, "voltage variant", supply_of(20.0),

@@ -3,15 +3,19 @@
 
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "host_tools/virtual_board/peripheral.hpp"
 
 namespace kmax::virtual_board::as5047p_chip_test {
 
 struct Bench {
   unsigned frame(unsigned word) {
-    chip.select(false);
-    const auto reply = chip.exchange(static_cast<std::uint16_t>(word), now);
-    chip.select(true);
+    now += 10 * units_per_microsecond;
+    chip.select(false, now);
+    now += 10 * units_per_microsecond;
+    const auto reply = chip.exchange(static_cast<std::uint16_t>(word), now, now);
+    chip.select(true, now);
     EXPECT_TRUE(reply.has_value());
     EXPECT_EQ(__builtin_popcount(*reply) % 2, 0);
     return *reply;
@@ -43,8 +47,8 @@ TEST(As5047pChip, ErrorsStayUntilErrflIsRead) {
   bench.frame(0x4001);
   EXPECT_EQ(bench.frame(0xC000) & 0x3FFFU, 0x0002U) << "INVCOMM";
 
-  bench.chip.select(false);
-  bench.chip.select(true);
+  bench.chip.select(false, 0);
+  bench.chip.select(true, 0);
   bench.frame(0x4001);
   EXPECT_EQ(bench.frame(0xC000) & 0x3FFFU, 0x0001U) << "FRERR: a select without a frame";
 }
@@ -58,17 +62,42 @@ TEST(As5047pChip, DiagnosticsAndMagnitude) {
 
 TEST(As5047pChip, DrivesNothingWhenNotSelectedOrNotThere) {
   Bench bench;
-  EXPECT_EQ(bench.chip.exchange(0xFFFF, 0), std::nullopt);
+  EXPECT_EQ(bench.chip.exchange(0xFFFF, 0, 0), std::nullopt);
   bench.chip.set_fitted(false);
-  bench.chip.select(false);
-  EXPECT_EQ(bench.chip.exchange(0xFFFF, 0), std::nullopt);
+  bench.chip.select(false, 0);
+  EXPECT_EQ(bench.chip.exchange(0xFFFF, 0, 0), std::nullopt);
+}
+
+// 3.3 kohm and 102 pF take 0.40 us to the threshold, the chip 0.35 us from there to the first clock.
+TEST(As5047pChip, AFrameWhoseSelectCameLateIsNotItsOwn) {
+  for (const auto& [filter, before_ns, taken] :
+       {std::tuple{true, 700, false}, {true, 780, true}, {false, 340, false}, {false, 360, true}}) {
+    Bench bench;
+    if (!filter) bench.chip.set_select_timing({.filter = 0.0});
+    bench.frame(0xFFFF);
+    bench.now += units_per_microsecond * 10;
+    bench.chip.select(false, bench.now);
+    const BoardTime began = bench.now + units_per_microsecond * before_ns / 1000;
+    EXPECT_EQ(bench.chip.exchange(0xFFFF, began + units_per_microsecond, began).has_value(), taken)
+        << before_ns;
+    EXPECT_EQ(bench.chip.late_selects(), taken ? 0U : 1U);
+  }
+}
+
+TEST(As5047pChip, ASelectAfterTooShortAPauseIsNone) {
+  Bench bench;
+  bench.frame(0xFFFF);
+  bench.chip.select(false, bench.now + units_per_microsecond * 300 / 1000);
+  bench.now += units_per_microsecond * 20;
+  EXPECT_FALSE(bench.chip.exchange(0xFFFF, bench.now, bench.now).has_value());
 }
 
 TEST(As5047pChip, RefusesWrites) {
   Bench bench;
-  bench.chip.select(false);
-  EXPECT_THROW(bench.chip.exchange(0x8016, 0), RefusedAccess);
-  EXPECT_THROW(bench.chip.exchange(0xC003, 0), RefusedAccess) << "PROG";
+  bench.chip.select(false, 0);
+  EXPECT_THROW(bench.chip.exchange(0x8016, units_per_microsecond, units_per_microsecond), RefusedAccess);
+  EXPECT_THROW(bench.chip.exchange(0xC003, units_per_microsecond, units_per_microsecond), RefusedAccess)
+      << "PROG";
 }
 
 }  // namespace kmax::virtual_board::as5047p_chip_test

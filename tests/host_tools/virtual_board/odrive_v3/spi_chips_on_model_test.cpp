@@ -34,7 +34,7 @@ struct SpiBench : testing::ModelBench {
     for (Drv8301Chip* chip : {&gate_driver_0, &gate_driver_1}) {
       if (const auto reply = chip->exchange(mosi, at)) miso &= *reply;
     }
-    if (const auto reply = encoder.exchange(mosi, at)) miso &= *reply;
+    if (const auto reply = encoder.exchange(mosi, at, model.frame_began())) miso &= *reply;
     return miso;
   }
 
@@ -125,14 +125,15 @@ TEST(SpiChipsOnModel, SplitTransferRunsWhileTheTickWorks) {
   std::uint32_t begin = 0;
   for (int tick = 0; tick < 2000; ++tick) {
     ASSERT_TRUE(board.master.claim());
-    board.encoder.select(false);
+    board.encoder.select(false, board.now);
+    board.run(1 * us);
     const BoardTime called = board.now;
     ASSERT_TRUE(board.master.start(angle.ISR_command()));
     EXPECT_LT(board.now - called, units_per_microsecond / 2) << "nobody waits";
     EXPECT_FALSE(board.master.ready());
     board.run(7 * us);  // the other axis is computed
     ASSERT_TRUE(board.master.ready());
-    board.encoder.select(true);
+    board.encoder.select(true, board.now);
     const auto word = board.master.finish();
     board.master.release();
     ASSERT_TRUE(word.has_value());
