@@ -131,12 +131,18 @@ class NativeBoard {
     }
   }
 
+  float supply_ceiling() const {
+    if constexpr (requires { device_.supply_ceiling(); }) return device_.supply_ceiling();
+    return 0.0f;
+  }
+
   void start(firmware::ResetCause cause) {
     application_.emplace(firmware::BoardIdentity{.board_name = "native",
                                                  .serial_number = 1,
                                                  .core_clock_hz = 0,
                                                  .clock_source = 4,
-                                                 .reset_cause = cause},
+                                                 .reset_cause = cause,
+                                                 .supply_ceiling = supply_ceiling()},
                          capture_memory_, log_memory_);
     if (prepare_) prepare_(*application_);
   }

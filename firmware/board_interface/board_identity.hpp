@@ -18,6 +18,7 @@ struct BoardIdentity {
   ResetCause reset_cause = ResetCause::unknown;
   CrashRecord crash{};                     ///< what is left of the run before
   RetainedCount* lock_attempts = nullptr;  ///< where WriteLock counts over resets; null: nowhere
+  float supply_ceiling = 0.0f;             ///< V, as supply.ceiling says
 };
 
 }  // namespace kmax::firmware

@@ -33,7 +33,7 @@ void AxesSettings::make(const ParameterValues& values, std::uint32_t restarts, c
     setting.mode = values.choice<DriveMode, "drive.mode">(axis);
     setting.commutated = now[axis].commutated;
     setting.supply_voltage_min = values.real<"supply.voltage_min">();
-    setting.supply_voltage_max = values.real<"supply.voltage_max">();
+    setting.supply_voltage_max = highest_supply(values);
   }
 }
 

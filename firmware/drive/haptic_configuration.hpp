@@ -18,6 +18,12 @@ constexpr double count_length(const ParameterValues& values, std::size_t axis) {
          static_cast<double>(static_cast<std::uint32_t>(values.whole<"encoder.counts_per_turn">(axis)));
 }
 
+/// V, above which the supply trips an armed axis, whatever the parameter says.
+constexpr float highest_supply(const ParameterValues& v) {
+  const float asked = v.real<"supply.voltage_max">(), ceiling = v.real<"supply.ceiling">();
+  return ceiling > 0.0f && ceiling < asked ? ceiling : asked;
+}
+
 /// The wall law's part of the parameters, also what `kmax wall` evaluates.
 template <typename Scalar>
 constexpr control::WallLawConfig<Scalar> wall_configuration(const ParameterValues& v, std::size_t axis) {

@@ -35,7 +35,7 @@ float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) 
     case Fault::under_voltage:
       return values.real<"supply.voltage_min">();
     case Fault::over_voltage:
-      return values.real<"supply.voltage_max">();
+      return now.setting.supply_voltage_max;
     case Fault::over_current:
       return over_current_factor * values.real<"current.limit">(axis);
     case Fault::current_sum:

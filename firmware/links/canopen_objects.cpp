@@ -36,6 +36,7 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
       return Abort::value_range;
     case Refusal::adaptive_interval_empty:
     case Refusal::supply_interval_empty:
+    case Refusal::supply_above_ceiling:
       return Abort::maximum_below_minimum;
     case Refusal::rate_does_not_divide:
     case Refusal::compensation_beyond_friction:

@@ -157,6 +157,7 @@ void Readings::refresh_device() {
   v.set_whole<"info.core_clock">(of_.board.core_clock_hz);
   v.set_whole<"info.clock_source">(of_.board.clock_source);
   v.set_whole<"info.brown_out_level">(of_.board.brown_out_level);
+  v.set_real<"supply.ceiling">(of_.board.supply_ceiling);
   v.set_whole<"info.uptime">(of_.axes.log().uptime_s());
   v.set_whole<"info.tick">(of_.axes.report(0).tick);
 

@@ -74,8 +74,8 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     real("supply.voltage_min", group::supply, 1, "V", 0, 100, 8,
          "Trip level of the supply, low: an armed axis loses its force at once.")
         .only_higher(),
-    real("supply.voltage_max", group::supply, 2, "V", 0, 100, 26,
-         "Trip level of the supply, high: an armed axis loses its force at once.")
+    real("supply.voltage_max", group::supply, 2, "V", 0, 100, 25.5,
+         "Trip level of the supply, high: an armed axis loses its force at once. Not above supply.ceiling.")
         .only_lower(),
     real("supply.brake_voltage", group::supply, 3, "V", 0, 100, 0,
          "Supply voltage from which the brake resistor is switched on; 0: none is fitted.")
@@ -187,6 +187,9 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
 
     reading("supply.voltage", group::supply_state, 1, Type::float32, "V",
             "Supply of the power stage, measured; 0 on a board that does not measure it."),
+    reading("supply.ceiling", group::supply_state, 2, Type::float32, "V",
+            "The highest supply.voltage_max that the board's capacitors and MOSFETs allow; 0: not known. A "
+            "stored value above it is not taken over."),
 
     whole("store.command", group::store, 1, Type::unsigned16, "", 0, 2, 0,
           "1 saves all persistent parameters; 2 sets all of them to their defaults, which only the next save "

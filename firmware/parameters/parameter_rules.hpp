@@ -27,6 +27,9 @@ constexpr BrokenRule check_rules(const ParameterValues& values) {
   }
   if (!(values.real<"supply.voltage_min">() < values.real<"supply.voltage_max">()))
     return {Refusal::supply_interval_empty, slot_of(entry_of<"supply.voltage_min">(), 0)};
+  const float ceiling = values.real<"supply.ceiling">();
+  if (ceiling > 0.0f && values.real<"supply.voltage_max">() > ceiling)
+    return {Refusal::supply_above_ceiling, slot_of(entry_of<"supply.voltage_max">(), 0)};
   return {};
 }
 

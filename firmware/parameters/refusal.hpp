@@ -49,6 +49,7 @@ enum class Refusal : std::uint16_t {
   code_waits = 37,
   no_code = 38,
   axis_absent = 39,
+  supply_above_ceiling = 40,
 };
 
 struct RefusalText {
@@ -115,6 +116,8 @@ inline constexpr std::array refusal_texts = std::to_array<RefusalText>({
     {Refusal::axis_absent,
      "the axis is absent: its gate driver has not answered since the start, or drive.declared_absent is yes; "
      "'kmax state' tells which"},
+    {Refusal::supply_above_ceiling,
+     "supply.voltage_max must not exceed supply.ceiling, which the board's capacitors and MOSFETs bear"},
 });
 
 constexpr std::string_view to_string(Refusal refusal) {

@@ -38,7 +38,8 @@ bool is_about_values(Refusal reason) {
                                       Refusal::not_finite,
                                       Refusal::rate_does_not_divide,
                                       Refusal::adaptive_interval_empty,
-                                      Refusal::supply_interval_empty};
+                                      Refusal::supply_interval_empty,
+                                      Refusal::supply_above_ceiling};
   return std::ranges::find(about_values, reason) != std::end(about_values);
 }
 
@@ -271,6 +272,10 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
       about += fmt::format(" (allowed: {})", allowed_text(*owner));
     about += ": ";
     if (report.reason == Refusal::guard_refused) numbers = guard_numbers(*this, assignments, owner->axis());
+    if (report.reason == Refusal::supply_above_ceiling) {
+      constexpr Parameter ceiling = Parameter::of<"supply.ceiling">();
+      numbers = fmt::format(", of {}", value_with_unit(ceiling, read(ceiling)));
+    }
     if (report.reason == Refusal::only_tightens) numbers = direction_words(*this, *owner);
   }
   const std::string message = fmt::format("{}the device refused: {}{}; {}", about, to_string(report.reason),

@@ -39,6 +39,7 @@ class SimulatedDevice {
   void set_background_force(std::size_t axis, float force);
   void advance(double duration);
   firmware::BoardReadings readings() const { return power_ ? power_->readings() : firmware::BoardReadings{}; }
+  float supply_ceiling() const { return power_ ? power_->supply_ceiling() : 0.0f; }
   void poll(const firmware::Application& application, std::uint32_t now_us) {
     if (power_) power_->poll(application, now_us);
   }

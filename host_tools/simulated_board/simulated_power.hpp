@@ -27,6 +27,12 @@ class SimulatedPower {
   simulation::SceneDrives& drives() { return drives_; }
   const simulation::SceneDrives& drives() const { return drives_; }
 
+  /// V, that of the board whose supply this is; 0: of none that is known.
+  float supply_ceiling() const {
+    const auto variant = drives_.variant();
+    return variant ? board::odrive_v3::supply_ceiling(*variant) : 0.0f;
+  }
+
   /// Pressed, it counts until it is released and no axis is armed.
   void press_emergency_stop(bool pressed);
   /// nFAULT of the gate drivers, held low until it is taken away.

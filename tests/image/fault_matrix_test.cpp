@@ -4,7 +4,6 @@
 // environment writes the page's rows again.
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
@@ -42,16 +41,6 @@ class Bench : public ImageBench {
   }
   void cycle_power() { board->cycle_power(); }
 
-  void write(std::string_view name, std::size_t axis, unsigned value) {
-    master->write_register(firmware::register_address(firmware::find_entry(name), axis),
-                           static_cast<std::uint16_t>(value));
-  }
-  void write_real(std::string_view name, std::size_t axis, float value) {
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    master->write_holding(
-        firmware::register_address(firmware::find_entry(name), axis),
-        std::array{static_cast<std::uint16_t>(bits >> 16), static_cast<std::uint16_t>(bits)});
-  }
   void command(std::size_t axis, unsigned word) { write("drive.controlword", axis, word); }
   DriveState state(std::size_t axis) {
     return firmware::statusword::state_of(reading(firmware::entry_of<"drive.statusword">(), axis));
@@ -252,7 +241,7 @@ std::vector<Cause> causes() {
        line, Refusal::emergency_stop},
       source("supply at 9 V", 9.0, Fault::under_voltage, supply_tick, Refusal::supply_out_of_range),
       source("supply at 5 V", 5.0, Fault::gate_driver, supply_tick, Refusal::gate_driver_fault),
-      source("supply at 30 V", 30.0, Fault::over_voltage, supply_tick, Refusal::supply_out_of_range),
+      source("supply at 27 V", 27.0, Fault::over_voltage, supply_tick, Refusal::supply_out_of_range),
   };
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace kmax::firmware::axes_settings_test {
 
 TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
@@ -17,6 +19,15 @@ TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     EXPECT_EQ(settings.of(axis).supply_voltage_max, 31.0f);
     EXPECT_EQ(settings.of(axis).motor.dc.share_limit, 0.25f) << "what the board's bridge can give";
+  }
+}
+
+TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
+  for (const auto& [ceiling, trips_above] : {std::pair{0.0f, 31.0f}, {25.68f, 25.68f}, {58.0f, 31.0f}}) {
+    ParameterValues values;
+    values.set_real<"supply.voltage_max">(31.0f);
+    values.set_real<"supply.ceiling">(ceiling);
+    EXPECT_EQ(AxesSettings(board_limit, values).of(1).supply_voltage_max, trips_above);
   }
 }
 

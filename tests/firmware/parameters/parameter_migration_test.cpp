@@ -185,6 +185,19 @@ TEST(ParameterMigration, RulesBetweenParametersHoldAfterwards) {
   EXPECT_EQ(taken.report.migration.defaulted, 2);
 }
 
+TEST(ParameterMigration, ALimitOfTheSupplyThatTheBoardsPartsDoNotBearIsNotTakenOver) {
+  ParameterValues board;
+  board.set_real<"supply.ceiling">(25.68f);
+  for (const auto& [stored, taken_over] : {std::pair{28.0f, 25.5f}, {25.6f, 25.6f}}) {
+    std::vector<Pair> pairs = pairs_of(ParameterValues{});
+    pair_of(pairs, identity<"supply.voltage_max">()).value = bits(stored);
+    const Taken taken = take(pairs, board);
+    EXPECT_EQ(taken.values.real<"supply.voltage_max">(), taken_over);
+    EXPECT_EQ(taken.report.migration.first_defaulted[0],
+              stored == taken_over ? 0U : identity<"supply.voltage_max">());
+  }
+}
+
 TEST(ParameterMigration, TheLargestSetThatFitsASector) {
   constexpr std::size_t count_max = (FakeFlash::words_per_sector - record::length_of(0)) / 2;
   std::vector<Pair> pairs = pairs_of(some_values(1));

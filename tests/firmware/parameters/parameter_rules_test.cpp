@@ -61,10 +61,24 @@ TEST(ParameterRules, IntervalsMayBeAPointButNotTurnedRound) {
     EXPECT_EQ(check_rules(values).slot, slot_of(adaptive_min_entry, axis));
   }
   ParameterValues values;
+  values.set_real<"supply.voltage_max">(26.0f);
   values.set_real<"supply.voltage_min">(26.0f);
   EXPECT_EQ(check_rules(values).refusal, Refusal::supply_interval_empty) << "no voltage would be allowed";
   EXPECT_EQ(check_rules(values).slot, slot_of(supply_min_entry, 0));
   values.set_real<"supply.voltage_min">(std::nextafter(26.0f, 0.0f));
+  EXPECT_EQ(check_rules(values).refusal, Refusal::none);
+}
+
+TEST(ParameterRules, TheSupplysLimitIsAtMostWhatTheBoardsPartsBear) {
+  ParameterValues values;
+  values.set_real<"supply.voltage_max">(100.0f);
+  EXPECT_EQ(check_rules(values).refusal, Refusal::none) << "nothing is known of the board";
+  values.set_real<"supply.ceiling">(25.68f);
+  EXPECT_EQ(check_rules(values).refusal, Refusal::supply_above_ceiling);
+  EXPECT_EQ(check_rules(values).slot, slot_of(entry_of<"supply.voltage_max">(), 0));
+  values.set_real<"supply.voltage_max">(std::nextafter(25.68f, 26.0f));
+  EXPECT_EQ(check_rules(values).refusal, Refusal::supply_above_ceiling);
+  values.set_real<"supply.voltage_max">(25.68f);
   EXPECT_EQ(check_rules(values).refusal, Refusal::none);
 }
 
