@@ -26,10 +26,14 @@ struct QuadratureIndexConfig {
 ///   line never fallen yet          wrong when it has been high over more than `widest` counts
 ///   fallen without a full crossing wrong when farther than `widest` + `tolerance` from where it was high
 ///   learned                        wrong when more than `tolerance` beyond the index, whose width is known
-/// The last two find a cable that comes off at the first look. One that comes off before the line has once
-/// been high and fallen is not seen, and neither is one that comes off on the index.
+/// The last two need `looks_to_doubt` looks in a row: one is interference. They find a cable that comes off
+/// at the last of these. One that comes off before the line has once been high and fallen is not seen, and
+/// neither is one that comes off on the index.
 ///
 /// Once wrong it stays wrong until reset(): edges have been lost, and with them the position.
+///
+/// Until the index is learned, a line that has just become high must be proved so (is_new(), line_look.hpp):
+/// interference would teach a place where no index is.
 ///
 /// Cost: about 10 Cortex-M4 instructions while the line is low, 30 (one division) while it is high.
 class QuadratureIndexWatch {
@@ -44,6 +48,7 @@ class QuadratureIndexWatch {
     if (!index_line) {
       if (high_) [[unlikely]] {
         high_ = false;
+        doubts_ = 0;
         if (!learned_ && !failed_) learn(count);
       }
       low_at_ = count;
@@ -53,10 +58,14 @@ class QuadratureIndexWatch {
     if (!learned_) [[unlikely]]
       extend(count);
     high_ = true;
-    if (zone_known_ && distance_from(index_, count) > reach_) failed_ = true;
+    if (zone_known_ && distance_from(index_, count) > reach_ && ++doubts_ >= looks_to_doubt) failed_ = true;
     return !failed_;
   }
 
+  static constexpr unsigned looks_to_doubt = 3;
+
+  /// A high line would be news from which the index is learned.
+  constexpr bool is_new() const { return !learned_ && !high_; }
   constexpr bool learned() const { return learned_; }
 
   /// Count at which the middle of the index is, once learned.
@@ -139,6 +148,7 @@ class QuadratureIndexWatch {
   std::uint32_t low_at_ = 0;               ///< of the last low look
   std::uint32_t rose_at_ = 0;              ///< of the last low look before the line rose
   std::int32_t lowest_ = 0, highest_ = 0;  ///< from rose_at_: counts with a high line
+  unsigned doubts_ = 0;                    ///< high looks in a row where no index is
   bool learned_ = false, failed_ = false, high_ = false;
   bool low_seen_ = false, from_low_ = false, zone_known_ = false;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "drivers/line_look.hpp"
 #include "drivers/quadrature_index_watch.hpp"
 
 namespace kmax::drivers {
@@ -52,14 +53,15 @@ class ReferencedQuadratureCounter {
   }
 
   /// Once per tick. `counter`: the timer's. `index_line`: a function that gives the line's level at the same
-  /// moment, asked only where there is one.
+  /// moment, asked only where there is one, and several times where it has just become high.
   template <std::predicate Line>
   constexpr Reading ISR_read(Counter counter, Line&& index_line, bool driving) {
     count_ = ISR_peek(counter);
     counter_ = counter;
     bool valid = true;
     if (config_.has_index) {
-      valid = index_.ISR_plausible(count_, index_line());
+      const bool high = index_line() && (!index_.is_new() || ISR_stays(index_line));
+      valid = index_.ISR_plausible(count_, high);
       if (index_.learned() && config_.from_index && !referenced_ && !driving) [[unlikely]]
         refer_to_index();
     }

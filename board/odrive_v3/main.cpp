@@ -97,11 +97,12 @@ VoltageVariant voltage_variant() {
   return voltage_variant_from_otp([otp](std::size_t i) { return otp[i]; }).value_or(variant_of_blank_board);
 }
 
-firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks) {
+firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks, VoltageVariant variant) {
   firmware::BoardIdentity identity{};
   identity.board_name = description.name;
   identity.serial_number = serial_number_from_unique_id();
   identity.core_clock_hz = clocks.core_hz;
+  identity.supply_ceiling = supply_ceiling(variant);
   identity.clock_source = static_cast<std::uint8_t>(clocks.source);
   identity.brown_out_level =
       static_cast<std::uint8_t>(stm32::flash_optcr::BrownOutLevel::read(stm32::flash().optcr));
@@ -200,7 +201,8 @@ void tick_without_power() {
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
-  application.emplace(identity(clocks), capture_memory, log_memory);
+  const VoltageVariant variant = voltage_variant();
+  application.emplace(identity(clocks, variant), capture_memory, log_memory);
   application->attach_store(firmware::AnyFlashSectors::of(parameter_flash));
 
   priority::set_all(interrupts);
@@ -220,7 +222,7 @@ void tick_without_power() {
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
   // say that they have no encoder.
   if (clocks.source != stm32::ClockSource::unresponsive && clocks.core_hz == description.core_clock_hz) {
-    power.emplace(supply_divider_ratio(voltage_variant()), chip_bus);
+    power.emplace(supply_divider_ratio(variant), chip_bus);
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) cortex::stop_on_unexpected_interrupt();
   }
   for (;;) {
@@ -272,14 +274,14 @@ void ISR_adc() {
 
 void ISR_exti2() {
   using namespace kmax::board;
-  power->ISR_fault_line();
   static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::gate_driver_fault.number));
+  power->ISR_fault_line();
 }
 
 void ISR_exti4() {
   using namespace kmax::board;
-  power->ISR_emergency_stop();
   static_cast<void>(line_interrupts.ISR_take(odrive_v3::pins::emergency_stop.number));
+  power->ISR_emergency_stop();
 }
 
 void ISR_system_tick() {

@@ -73,6 +73,8 @@ struct NoSerialEncoder {
     std::uint32_t reference_generation = 0;
   };
   static Sample ISR_take() { return {}; }
+  static void ISR_select() {}
+  static constexpr bool ISR_selected() { return false; }
   static void ISR_begin() {}
   static bool under_way() { return false; }
   static void ISR_abandon() {}
@@ -87,7 +89,7 @@ struct NoSerialEncoder {
 ///   1  currents and supply are read
 ///   2  the encoder's counter and its index line, or the frame that the other axis' tick has begun
 ///   3  the application's tick: force, current reference, duty, trips
-///   4  the duty is written
+///   4  the duty is written, and a frame begun whose chip has been selected since 2
 ///   5  the brake, if there is one, in the first axis' tick
 ///
 /// A tick that may not drive disarms the bridge. It is armed only when an axis begins to drive, and the power
@@ -138,11 +140,14 @@ class Drives {
   /// brake, and the round.
   template <typename Application>
   [[gnu::noinline, gnu::cold]] void ISR_pass(std::size_t axis, Application& application) {
-    ISR_pass(axis);
+    ISR_begin_pass(axis);
     application.ISR_pass(axis);
+    ISR_end_pass(axis);
     ISR_end_round(axis, application);
   }
-  [[gnu::cold]] void ISR_pass(std::size_t axis);
+  /// The two parts of it that come before and after the application's.
+  [[gnu::cold]] void ISR_begin_pass(std::size_t axis);
+  [[gnu::cold]] void ISR_end_pass(std::size_t axis);
 
   /// The two parts of ISR_tick(), before and after the application's, for a board in which all axes are
   /// sampled together.
@@ -152,10 +157,25 @@ class Drives {
   [[gnu::always_inline]] inline void ISR_drive(std::size_t axis, const firmware::AxisOutput& output,
                                                float supply_voltage, const Stage& stage);
 
-  /// The line interrupts: all bridges off, nothing else.
-  void ISR_disarm() {
+  using Bridges = std::array<bool, firmware::axis_count>;
+  /// All bridges off, nothing else. Those that were armed.
+  Bridges ISR_disarm() {
+    Bridges armed{};
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-      if (hardware_.has(axis)) hardware_.bridge(axis).disarm();
+      if (!hardware_.has(axis)) continue;
+      armed[axis] = hardware_.bridge(axis).armed();
+      hardware_.bridge(axis).disarm();
+    }
+    return armed;
+  }
+  /// The line interrupts, when nothing was meant: gives back what the above has taken. A bridge that does not
+  /// come back, or that the missing ticks had taken meanwhile, is found fallen by its axis' tick. The sample
+  /// may have been taken with the bridge off: then it shows no current, as an open phase does.
+  void ISR_arm_again(const Bridges& armed) {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (!armed[axis] || ISR_ticks_stayed_away(axis)) continue;
+      unusual_.fetch_or(static_cast<std::uint8_t>(spoilt << axis), std::memory_order_relaxed);
+      static_cast<void>(hardware_.bridge(axis).arm());
     }
   }
 
@@ -211,9 +231,9 @@ class Drives {
   /// What an axis' tick does for its count.
   enum class EncoderRole : std::uint8_t {
     lines,              ///< quadrature
-    lines_beside_chip,  ///< the same, and begins the frame for the axis whose encoder is the AS5047P
+    lines_beside_chip,  ///< the same, and makes the frame for the axis whose encoder is the AS5047P
     chip,               ///< takes that frame
-    missing,            ///< asks for that chip too and has none; begins the frame like the one above
+    missing,            ///< asks for that chip too and has none; makes the frame like the one above
   };
 
   /// What the tick works by; made in the main loop.
@@ -230,9 +250,11 @@ class Drives {
     drivers::CurrentSense sense_b{}, sense_c{};
     drivers::OffsetCalibration offset_b{}, offset_c{};
     Counter counter{};
-    std::uint32_t encoder_generation = 0;  ///< of the settings that have been taken over
+    std::uint32_t encoder_generation = 0;      ///< of the settings that have been taken over
+    float current_b = 0.0f, current_c = 0.0f;  ///< A, of its last tick
     bool driving = false, arm_failed = false;
-    Count count{};  ///< of its last tick; kept where a law needs all positions
+    std::uint8_t held = 0;  ///< ticks in a row, at the last one of which they were those of the tick before
+    Count count{};          ///< of its last tick; kept where a law needs all positions
   };
   using Inputs = std::array<firmware::AxisInput, firmware::axis_count>;
 
@@ -254,21 +276,37 @@ class Drives {
                                                      bool driving);
   void ISR_brake(const control::BrakeChopper::Coefficients& coefficients, float supply_voltage);
   // Rare, and kept out of the tick's one function, whose registers they would take.
-  /// Ticks stayed away, where the board has a watch for that; else the timer's break input.
-  [[gnu::noinline, gnu::cold]] firmware::Fault ISR_why_fallen(std::size_t axis) {
-    if constexpr (requires { hardware_.bridge(axis).ISR_ticks_stayed_away(); }) {
-      if (hardware_.bridge(axis).ISR_ticks_stayed_away()) return firmware::Fault::tick_missed;
-    }
-    return firmware::Fault::power_stage;
+  /// Where the board has a watch for that.
+  bool ISR_ticks_stayed_away(std::size_t axis) {
+    if constexpr (requires { hardware_.bridge(axis).ISR_ticks_stayed_away(); })
+      return hardware_.bridge(axis).ISR_ticks_stayed_away();
+    return false;
   }
+  /// If it was not the ticks, it was the timer's break input.
+  [[gnu::noinline, gnu::cold]] firmware::Fault ISR_why_fallen(std::size_t axis) {
+    return ISR_ticks_stayed_away(axis) ? firmware::Fault::tick_missed : firmware::Fault::power_stage;
+  }
+  /// True: the currents of the tick before are to be taken, a few times in a row at most.
   template <typename Sample>
-  [[gnu::noinline, gnu::cold]] void ISR_calibrate(Axis& axis, const Sample& sample) {
-    if (!sample.valid) return;
-    axis.offset_b.ISR_add(sample.phase_b);
-    axis.offset_c.ISR_add(sample.phase_c);
+  [[gnu::noinline, gnu::cold]] bool ISR_take_unusual(std::size_t index, const Sample& sample) {
+    Axis& axis = axes_[index];
+    const auto own = static_cast<std::uint8_t>((spoilt | was_held) << index);
+    const std::uint8_t unusual =
+        unusual_.fetch_and(static_cast<std::uint8_t>(~own), std::memory_order_relaxed);
+    if ((unusual & calibrating) != 0 && sample.valid) {
+      axis.offset_b.ISR_add(sample.phase_b);
+      axis.offset_c.ISR_add(sample.phase_c);
+    }
+    if ((unusual & spoilt << index) == 0) return false;
+    if ((unusual & was_held << index) == 0) axis.held = 0;
+    if (axis.held == longest_held) return false;
+    ++axis.held;
+    unusual_.fetch_or(static_cast<std::uint8_t>(was_held << index), std::memory_order_relaxed);
+    return true;
   }
   [[gnu::noinline, gnu::cold]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
   [[gnu::noinline]] Count ISR_take_serial();
+  [[gnu::noinline]] void ISR_select_serial() { serial_encoder().ISR_select(); }
   [[gnu::noinline]] void ISR_begin_serial() { serial_encoder().ISR_begin(); }
 
   Hardware hardware_;
@@ -278,7 +316,13 @@ class Drives {
   control::BrakeChopper brake_;
   Settings settings_{};
   firmware::DoubleBuffer<Settings> double_buffer_{Settings{}};
-  std::atomic<bool> calibrating_{false}, main_loop_due_{false}, brake_inhibited_{false};
+  std::atomic<bool> main_loop_due_{false}, brake_inhibited_{false};
+  /// What a tick rarely has to look after: offsets that are measured; and, of each axis, a sample that is not
+  /// to be believed, and that the one before was not.
+  static constexpr std::uint8_t calibrating = 1, spoilt = 1U << 1, was_held = 1U << 4;
+  static_assert(firmware::axis_count <= 3);
+  static constexpr std::uint8_t longest_held = 3;
+  std::atomic<std::uint8_t> unusual_{0};
   bool ISR_brake_on_ = false;
   std::uint32_t ISR_braking_for_ = 0, ISR_silent_calls_ = 0;
   std::array<std::atomic<bool>, firmware::axis_count> absent_{};
@@ -307,10 +351,15 @@ inline firmware::AxisInput Drives<Hardware>::ISR_measure(std::size_t index, cons
     // below.
     condition = firmware::Fault::current_sense;
   }
-  if (calibrating_.load(std::memory_order_relaxed)) [[unlikely]]
-    ISR_calibrate(axis, sample);
-  const float current_b = axis.sense_b.ISR_amperes(phase_b);
-  const float current_c = axis.sense_c.ISR_amperes(phase_c);
+  float current_b = axis.sense_b.ISR_amperes(phase_b), current_c = axis.sense_c.ISR_amperes(phase_c);
+  if (unusual_.load(std::memory_order_relaxed) != 0) [[unlikely]] {
+    if (ISR_take_unusual(index, sample)) {
+      current_b = axis.current_b;
+      current_c = axis.current_c;
+    }
+  }
+  axis.current_b = current_b;
+  axis.current_c = current_c;
   const Count count = ISR_read_count(index, settings, driving);
   // Before the condition: a line interrupt in between must be found as what it is.
   const bool bridge_fell = axis.arm_failed || (driving && !hardware_.bridge(index).armed());
@@ -338,7 +387,7 @@ inline typename Drives<Hardware>::Count Drives<Hardware>::ISR_read_count(std::si
     ISR_configure_encoder(axis, settings);
   if (settings.role[axis] != EncoderRole::lines) [[unlikely]] {
     if (settings.role[axis] == EncoderRole::chip) return ISR_take_serial();
-    ISR_begin_serial();
+    ISR_select_serial();
     if (settings.role[axis] == EncoderRole::missing) return {};
   }
   const auto index_line = [this, axis] { return hardware_.ISR_index_line(axis); };
@@ -409,18 +458,23 @@ inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisO
 }
 
 template <typename Hardware>
-void Drives<Hardware>::ISR_pass(std::size_t index) {
+void Drives<Hardware>::ISR_begin_pass(std::size_t index) {
   const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
-  const float supply = supply_.volts(hardware_.ISR_sample(index).supply);
+  if (settings.role[index] == EncoderRole::lines_beside_chip) ISR_select_serial();
   hardware_.bridge(index).disarm();
   axes_[index].driving = axes_[index].arm_failed = false;
   axes_[index].count = {};  // for the other axes
-  if (settings.role[index] == EncoderRole::lines_beside_chip) ISR_begin_serial();
-  ISR_end_tick(index, supply);
+}
+
+template <typename Hardware>
+void Drives<Hardware>::ISR_end_pass(std::size_t index) {
+  ISR_end_tick(index, supply_.volts(hardware_.ISR_sample(index).supply));
 }
 
 template <typename Hardware>
 inline void Drives<Hardware>::ISR_end_tick(std::size_t index, float supply_voltage) {
+  if (serial_encoder().ISR_selected()) [[unlikely]]
+    ISR_begin_serial();
   ticked_[index].store(for_the_clock | for_the_main_loop, std::memory_order_relaxed);
   if (index == first_axis()) {
     const Settings& settings = double_buffer_.ISR_current();
@@ -455,7 +509,7 @@ bool Drives<Hardware>::ISR_ticks_have_stopped() {
   // Twice in a row: after an erase, in which the core stood still, this may come before the last axis' tick.
   ISR_silent_calls_ = stopped ? ISR_silent_calls_ + 1 : 0;
   if (ISR_silent_calls_ < 2) return false;
-  ISR_disarm();
+  static_cast<void>(ISR_disarm());
   hardware_.set_brake(false);
   main_loop_due_.store(true, std::memory_order_relaxed);
   return true;
@@ -517,7 +571,7 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values,
 
 template <typename Hardware>
 void Drives<Hardware>::restart_offset_calibration() {
-  calibrating_.store(false, std::memory_order_relaxed);
+  unusual_.fetch_and(static_cast<std::uint8_t>(~calibrating), std::memory_order_relaxed);
   std::atomic_signal_fence(std::memory_order_seq_cst);
   for (Axis& axis : axes_) {
     axis.sense_b = axis.sense_c = drivers::CurrentSense{{.gain = gain_}};
@@ -525,7 +579,7 @@ void Drives<Hardware>::restart_offset_calibration() {
     axis.offset_c.restart(drivers::offset_window(gain_));
   }
   std::atomic_signal_fence(std::memory_order_seq_cst);
-  calibrating_.store(true, std::memory_order_relaxed);
+  unusual_.fetch_or(calibrating, std::memory_order_relaxed);
 }
 
 template <typename Hardware>
@@ -538,7 +592,7 @@ OffsetProgress Drives<Hardware>::offset_progress() {
       refused = refused || offset->result() != drivers::OffsetResult::accepted;
     }
   }
-  calibrating_.store(false, std::memory_order_relaxed);
+  unusual_.fetch_and(static_cast<std::uint8_t>(~calibrating), std::memory_order_relaxed);
   if (refused) return OffsetProgress::refused;
   for (Axis& axis : axes_) {
     axis.sense_b.set_offset(axis.offset_b.offset());

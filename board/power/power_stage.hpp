@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstdint>
 
+#include "drivers/line_look.hpp"
 #include "firmware/drive/fault.hpp"
 #include "firmware/object_dictionary/dictionary.hpp"
 
@@ -53,6 +54,8 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 /// another accepted what was written, is not there, and the board goes on without its axis. One that has
 /// answered and is silent later has failed, and so has a board none of whose gate drivers answers.
 ///
+/// One look at a line proves nothing (line_look.hpp): what is active here must stay so.
+///
 /// An edge of nFAULT takes ready to `resetting` as soon as no axis is armed: the driver's latched fault goes
 /// away with the reset, and comes back if its cause is still there. So the host's fault reset is all that a
 /// user has to do.
@@ -69,8 +72,16 @@ class PowerStage {
 
   explicit PowerStage(Hardware& hardware) : hardware_(hardware) {}
 
-  void ISR_fault_line() { fault_edge_.store(true, std::memory_order_relaxed); }
-  void ISR_emergency_stop() { stop_edge_.store(true, std::memory_order_relaxed); }
+  enum class Line : std::uint8_t { fault, emergency_stop };
+  /// Something was seen at the line: is it more than interference? 3 us at most.
+  [[gnu::noinline]] bool ISR_is_meant(Line line) const {
+    return drivers::ISR_is_meant([&hardware = hardware_, of_fault = line == Line::fault] {
+      return of_fault ? hardware.fault_line_low() : hardware.emergency_stop_open();
+    });
+  }
+  void ISR_take(Line line) {
+    (line == Line::fault ? fault_edge_ : stop_edge_).store(true, std::memory_order_relaxed);
+  }
 
   /// Why no axis may be driven now; none: it may.
   firmware::Fault condition() const {
@@ -81,7 +92,7 @@ class PowerStage {
 
   /// Main loop, at least every few milliseconds.
   void poll(std::uint32_t now_us, bool any_armed) {
-    if (hardware_.emergency_stop_open()) {
+    if (hardware_.emergency_stop_open() && ISR_is_meant(Line::emergency_stop)) {
       stop_edge_.store(true, std::memory_order_relaxed);
     } else if (!any_armed) {
       stop_edge_.store(false, std::memory_order_relaxed);
@@ -92,7 +103,8 @@ class PowerStage {
       started_ = true;
       begin_reset(now_us, firmware::Fault::power_stage);
     }
-    const bool fault = fault_edge_.load(std::memory_order_relaxed) || hardware_.fault_line_low();
+    const bool fault = fault_edge_.load(std::memory_order_relaxed) ||
+                       (hardware_.fault_line_low() && ISR_is_meant(Line::fault));
     if (state_ == State::ready && fault) {
       // Once: a look at the faults takes those back whose cause is over.
       if (condition_.load(std::memory_order_relaxed) != firmware::Fault::gate_driver)

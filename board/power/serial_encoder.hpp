@@ -7,9 +7,11 @@
 
 namespace kmax::board {
 
-/// An AS5047P on a bus that it shares, read from the tick without waiting: the other axis' tick begins a
-/// frame, which takes 6 us, and the axis' own tick, 25 us later, takes it. The angle is that of the frame
-/// before (50 us), since the chip answers one frame late.
+/// An AS5047P on a bus that it shares, read from the tick without waiting: the other axis' tick selects the
+/// chip where it begins and begins a frame where it ends, which takes 6 us, and the axis' own tick, 25 us
+/// later, takes it. The shortest tick lasts longer than the select takes: 0.4 us through the filter of a
+/// board's pin and 0.35 us that the chip wants before the first clock (data sheet, from memory). The angle is
+/// that of the frame before (50 us), since the chip answers one frame late.
 ///
 /// `Bus`: claim(), release(), start(word) and finish() of drivers::stm32f4::SpiMaster. `Select`: write(level)
 /// of the chip's select line, low while it is selected.
@@ -22,13 +24,18 @@ class SerialEncoder {
  public:
   SerialEncoder(Bus& bus, Select select) : bus_(bus), select_(select) {}
 
-  void ISR_begin() {
+  void ISR_select() {
     if (under_way_) return;
-    if (!bus_.claim()) {
+    selected_ = bus_.claim();
+    if (selected_) {
+      select_.write(false);
+    } else {
       bus_was_taken_ = true;
-      return;
     }
-    select_.write(false);
+  }
+  bool ISR_selected() const { return selected_; }
+  void ISR_begin() {
+    selected_ = false;
     under_way_ = bus_.start(angle_.ISR_command());
     if (!under_way_) end();
   }
@@ -81,6 +88,7 @@ class SerialEncoder {
   Bus& bus_;
   Select select_;
   drivers::As5047pAngle angle_;
+  bool selected_ = false;  ///< and no frame begun
   bool under_way_ = false, bus_was_taken_ = false;
   std::atomic<bool> restart_{false}, forget_turns_{false};
 };

@@ -27,6 +27,8 @@ class SimulatedSerialEncoder {
 
   explicit SimulatedSerialEncoder(const simulation::SceneDrives& drives) : drives_(drives) {}
 
+  void ISR_select() {}
+  static constexpr bool ISR_selected() { return false; }
   void ISR_begin() {}
   Sample ISR_take();
   bool under_way() const { return false; }

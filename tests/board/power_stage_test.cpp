@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace kmax::board::power_stage_test {
 namespace {
 
@@ -13,6 +15,7 @@ struct Hardware {
   bool missing[2] = {};
   OffsetProgress offsets = OffsetProgress::accepted;
   bool offsets_hold = true;
+  mutable int looks_for_spike = 0;
   int gate_rises = 0, configured = 0, calibrations = 0, followed = 0;
   int looks[2] = {};
 
@@ -21,7 +24,7 @@ struct Hardware {
     gate = level;
   }
   bool fault_line_low() const { return fault_low; }
-  bool emergency_stop_open() const { return stop_open; }
+  bool emergency_stop_open() const { return stop_open || looks_for_spike-- > 0; }
   bool in_service(std::size_t axis) const { return !missing[axis]; }
   void set_missing(std::size_t axis) { missing[axis] = true; }
   void note_gate_driver_faults(std::size_t axis) {
@@ -186,7 +189,7 @@ TEST_F(PowerStageTest, OffsetsOutOfBoundsAreNamedAndMeasuredAgain) {
 TEST_F(PowerStageTest, AFaultEdgeActsAtOnceAndIsResetOnlyWhenNobodyIsArmed) {
   run(100'000);
   ASSERT_TRUE(stage.ready());
-  stage.ISR_fault_line();  // a pulse: the line is high again
+  stage.ISR_take(PowerStage<Hardware>::Line::fault);  // a pulse: the line is high again
   EXPECT_EQ(stage.condition(), Fault::gate_driver);
   run(50'000, true);
   EXPECT_TRUE(hardware.gate) << "the other axis may still be braking";
@@ -199,7 +202,7 @@ TEST_F(PowerStageTest, AFaultEdgeActsAtOnceAndIsResetOnlyWhenNobodyIsArmed) {
 TEST_F(PowerStageTest, AFaultThatStaysKeepsTheBridgesOff) {
   run(100'000);
   hardware.fault_low = true;
-  stage.ISR_fault_line();
+  stage.ISR_take(PowerStage<Hardware>::Line::fault);
   run(2'000'000);
   EXPECT_EQ(stage.condition(), Fault::gate_driver);
   hardware.fault_low = false;
@@ -217,7 +220,7 @@ TEST_F(PowerStageTest, AFaultLineThatIsLowWithoutAnEdgeIsSeenToo) {
 TEST_F(PowerStageTest, TheEmergencyStopLeavesTheBrakesSupplyOn) {
   run(100'000);
   hardware.stop_open = true;
-  stage.ISR_emergency_stop();
+  stage.ISR_take(PowerStage<Hardware>::Line::emergency_stop);
   EXPECT_EQ(stage.condition(), Fault::emergency_stop);
   run(100'000, false);
   EXPECT_TRUE(hardware.gate);
@@ -228,6 +231,18 @@ TEST_F(PowerStageTest, TheEmergencyStopLeavesTheBrakesSupplyOn) {
   EXPECT_EQ(stage.condition(), Fault::emergency_stop) << "an armed axis has not yet seen it";
   run(200, false);
   EXPECT_EQ(stage.condition(), Fault::none);
+}
+
+TEST_F(PowerStageTest, InterferenceAtTheLineIsNoStopAndWhatLastsOrKeepsComingIs) {
+  run(100'000);
+  for (const auto& [looks, stops] : {std::pair{1, false}, {20, false}, {39, false}, {64, true}}) {
+    hardware.looks_for_spike = looks;
+    stage.poll(now += 100, true);
+    EXPECT_EQ(stage.condition(), stops ? Fault::emergency_stop : Fault::none) << looks;
+  }
+  EXPECT_TRUE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 20 == 0; }))
+      << "never at rest for long enough";
+  EXPECT_FALSE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 40 == 0; }));
 }
 
 TEST_F(PowerStageTest, AStopPressedSincePowerUpIsSeenWithoutAnEdge) {

@@ -33,7 +33,8 @@ struct Select {
 struct Board {
   drivers::As5047pSample tick(int position) {
     bus.position = position;
-    encoder.ISR_begin();
+    encoder.ISR_select();
+    if (encoder.ISR_selected()) encoder.ISR_begin();
     return encoder.ISR_take();
   }
   drivers::As5047pSample ticks(int count, int position) {
