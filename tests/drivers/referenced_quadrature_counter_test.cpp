@@ -112,7 +112,25 @@ TEST(ReferencedQuadratureCounter, WatchesTheIndexWithoutReferringToIt) {
   EXPECT_EQ(encoder.move_to(1000).count, 1000u);
   EXPECT_FALSE(encoder.reading.referenced);
   encoder.unplugged = true;
+  EXPECT_TRUE(encoder.move_to(1000).valid && encoder.move_to(1000).valid) << "interference";
   EXPECT_FALSE(encoder.move_to(1000).valid);
+}
+
+// Of a handle that moves: one look would be a full crossing.
+TEST(ReferencedQuadratureCounter, InterferenceTeachesNoIndex) {
+  for (const int lasts : {1, 24, 25}) {
+    ReferencedQuadratureCounter<> counter;
+    counter.configure({true, true, 8192});
+    int looks = 0;
+    const auto read = [&](std::uint16_t count, int high_for) {
+      looks = 0;
+      return counter.ISR_read(
+          count, [&] { return ++looks <= high_for; }, false);
+    };
+    read(998, 0);
+    read(1000, lasts);
+    EXPECT_EQ(read(1002, 0).referenced, lasts == 25) << lasts << ": 1 look and 24 that prove it";
+  }
 }
 
 TEST(ReferencedQuadratureCounter, TheSameConfigurationChangesNothing) {
@@ -145,6 +163,8 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
   Encoder encoder(300, {true, false, 8192});
   encoder.move_to(1000);
   encoder.unplugged = true;
+  encoder.move_to(1000);
+  encoder.move_to(1000);
   ASSERT_FALSE(encoder.move_to(1000).valid);
   encoder.unplugged = false;
   encoder.counter.configure({true, true, 8192});

@@ -189,7 +189,7 @@ TEST(SimulatedPowerHardware, AnUnpluggedCableLooksLikeRestUnlessAnIndexIsWatched
   watched.set<"encoder.index">(1);
   EXPECT_TRUE(watched.turn_for(0.05).count_valid);
   watched.world.plant(0, Defect::encoder_unplugged);
-  EXPECT_FALSE(watched.turn_for(50e-6).count_valid);
+  EXPECT_FALSE(watched.turn_for(3 * 50e-6).count_valid);
 
   Plant serial(turning("gimbal_a"));
   serial.set<"encoder.kind">(1);

@@ -312,14 +312,12 @@ TEST(SimulatedPower, AMotorThatBrakesIsTakenByTheBrakeResistor) {
   EXPECT_GT(highest(25.0).second, 0.01);
 }
 
-/// A heavy handle that flies towards a wall which only damps: all of its energy goes into the supply, which
-/// takes nothing back.
-MotorBench flying_handle(bool for_24_v) {
+/// A heavy handle without friction that nobody holds.
+MotorBench heavy_handle(bool for_24_v) {
   simulation::Scene scene = identified("dc_coreless_a");
-  scene.axes[0].device.mass = 3.0;
+  scene.axes[0].device.mass = 0.5;
   scene.axes[0].device.friction = 0.0;
   scene.axes[0].device.damping = 0.0;
-  scene.axes[0].start.velocity = -1.5;
   scene.axes[0].person.reset();
   scene.axes[0].motion.reset();
   scene.supply->voltage = for_24_v ? 24.0 : 56.0;
@@ -327,23 +325,26 @@ MotorBench flying_handle(bool for_24_v) {
   return MotorBench(scene);
 }
 
+/// The motor speeds it up and brakes it: its energy goes into the supply, which takes nothing back.
 TEST(PartRatings, AMotorThatBrakesTripsAtTheBoardsCeilingBeforeAPartBreaks) {
   for (const bool for_24_v : {true, false}) {
-    MotorBench bench = flying_handle(for_24_v);
+    MotorBench bench = heavy_handle(for_24_v);
     const auto variant = *bench.drives().variant();
     const auto ceiling = static_cast<double>(board::odrive_v3::supply_ceiling(variant));
     EXPECT_EQ(bench.set<"supply.voltage_max">(ceiling + 0.1), firmware::Refusal::supply_above_ceiling);
     ASSERT_EQ(bench.set<"supply.voltage_max">(ceiling), firmware::Refusal::none);
-    bench.set<"wall.law">(1);
-    bench.set<"wall.stiffness">(0.0);
-    bench.set<"wall.damping">(5.0);
-    bench.set<"wall.position">(-0.001);
-    bench.set<"force.ramp_time">(0.0);
+    bench.set<"drive.mode">(2);
     bench.set<"velocity.limit">(10.0);
+    bench.set<"force.ramp_time">(0.0);
+    bench.set<"device.hand_force">(0.0);
     bench.run(0.1);
     ASSERT_TRUE(bench.arm());
+    bench.set<"profile.target_force">(1.5);
+    bench.run(0.6);
+    ASSERT_TRUE(bench.armed());
+    bench.set<"profile.target_force">(-1.5);
     double highest = 0.0;
-    for (int n = 0; n < 4000; ++n) {
+    for (int n = 0; n < 8000; ++n) {
       bench.tick();
       highest = std::max(highest, bench.drives().supply().voltage());
     }
@@ -357,7 +358,7 @@ TEST(PartRatings, AMotorThatBrakesTripsAtTheBoardsCeilingBeforeAPartBreaks) {
 TEST(PartRatings, ASupplyAboveThemEndsTheRunWithThePartsName) {
   for (const auto& [for_24_v, volts, part] :
        {std::tuple{true, 28.9, "capacitors of the 24 V board"}, {false, 60.1, "MOSFETs of the 56 V board"}}) {
-    MotorBench bench = flying_handle(for_24_v);
+    MotorBench bench = heavy_handle(for_24_v);
     bench.drives().supply().set_voltage(volts - 0.3);
     bench.tick();
     bench.drives().supply().set_voltage(volts);
