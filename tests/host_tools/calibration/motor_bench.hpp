@@ -44,6 +44,11 @@ struct BenchMotor {
     return brushed() ? dc().resistance + 2.0 * leg_resistance : pmsm().resistance + leg_resistance;
   }
   double inductance() const { return brushed() ? dc().inductance : pmsm().inductance_d; }
+  // Of the supply: what lets the amplifiers settle.
+  float modulation_limit() const {
+    return board::odrive_v3::description
+        .modulation_limit[static_cast<std::size_t>(std::lround(std::log2(gain / 10.0)))];
+  }
   double torque_constant() const { return brushed() ? dc().torque_constant : pmsm().torque_constant; }
 };
 

@@ -45,6 +45,7 @@ class TorqueLoop {
       config.resistance = static_cast<float>(motor.resistance());
       config.inductance = static_cast<float>(motor.inductance());
       config.bandwidth = 3000.0f;
+      config.modulation_limit = motor.modulation_limit();
       dc_coefficients_ = control::DcCurrentController<float>::prepare(config, static_cast<float>(tick));
     } else {
       control::FieldOrientedControllerConfig<float> config;
@@ -53,6 +54,7 @@ class TorqueLoop {
       config.inductance_q = static_cast<float>(motor.pmsm().inductance_q);
       config.pole_pairs = static_cast<std::int32_t>(motor.pmsm().pole_pairs);
       config.bandwidth = 3000.0f;
+      config.modulation_limit = motor.modulation_limit();
       three_coefficients_ =
           control::FieldOrientedController<float>::prepare(config, static_cast<float>(tick));
     }
