@@ -83,7 +83,7 @@ class CurrentSensor {
   // lower FET; 1 before.
   double left_after(double seconds) const;
 
-  // Of the board, degC.
+  // Of the amplifiers, degC; not the power stage's, whose temperature sensor is beside its transistors.
   void set_temperature(double celsius) { temperature_ = celsius; }
   void set_driven(bool driven) { driven_ = driven; }
 

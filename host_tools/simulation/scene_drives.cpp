@@ -75,7 +75,6 @@ void SceneDrives::advance(double duration) {
     const double step = std::min(left, longest_step);
     for (Axis& axis : axes_) {
       if (!axis.drive) continue;
-      axis.drive->current_sensor().set_temperature(axis.temperature.temperature());
       axis.drive->current_sensor().set_driven(driven(axis.command));
       axis.drive->advance(step, axis.command, supply_);
       if (!driven(axis.command)) axis.undriven += step;

@@ -228,7 +228,8 @@ TEST(ClosedLoopOfEachPhase, AnOpenPhaseOfTheSynchronousMotorIsNamed) {
 TEST_F(ClosedLoop, AForceStaysWhatItIsWhileTheBoardWarmsUp) {
   bench.board->run_for(0.7);
   for (double celsius = 25.0; celsius < 65.0; celsius += 0.4) {
-    for (std::size_t axis = 0; axis < 2; ++axis) bench.world.temperature(axis).set_temperature(celsius);
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      bench.world.drive(axis).current_sensor().set_temperature(celsius);
     bench.board->run_for(0.01);
   }
   bench.board->run_for(0.7);

@@ -161,10 +161,14 @@ Cause source(const char* name, double volts, Fault fault, double ticks, Refusal 
 }
 
 using Channel = simulation::CurrentSensor::Channel;
+/// `volts`: from what the pin shows without a current.
 Cause sensor(const char* name, Channel channel, double volts, Fault fault, double ticks, Refusal refusal) {
   return {name,
           [channel, volts](Bench& b, std::size_t a) {
-            b.world.drive(a).current_sensor().set_stuck(channel, volts);
+            auto& sensor = b.world.drive(a).current_sensor();
+            const auto& config = sensor.config();
+            sensor.set_stuck(channel,
+                             1.65 + volts + (channel == Channel::b ? config.offset_b : config.offset_c));
           },
           [channel](Bench& b, std::size_t a) {
             b.world.drive(a).current_sensor().set_stuck(channel, std::nullopt);
@@ -205,11 +209,11 @@ std::vector<Cause> causes() {
   return {
       silence,
       plug,
-      sensor("current sensor at its rail", Channel::b, 3.3, Fault::current_sense, tick,
+      sensor("current sensor at its rail", Channel::b, 2.0, Fault::current_sense, tick,
              Refusal::current_sense_invalid),
-      sensor("current sensor C at its other rail", Channel::c, 0.0, Fault::current_sense, tick,
+      sensor("current sensor C at its other rail", Channel::c, -2.0, Fault::current_sense, tick,
              Refusal::current_sense_invalid),
-      sensor("current sensor at rest", Channel::b, 1.65, Fault::phase_open, slow_tick, Refusal::none),
+      sensor("current sensor at rest", Channel::b, 0.0, Fault::phase_open, slow_tick, Refusal::none),
       moment(
           "timer's break",
           [](Bench& b, std::size_t a) { b.board->pwm(a).clock_failure_break(b.board->now()); }, Hits::axis,

@@ -418,7 +418,7 @@ struct SenseBench : MotorBench {
     constexpr double step = 0.01;
     const int steps = static_cast<int>(std::lround((to - from) / (rate * step)));
     for (int n = 1; n <= steps; ++n) {
-      drives().temperature(0).set_temperature(from + n * rate * step);
+      drive().current_sensor().set_temperature(from + n * rate * step);
       run(step);
     }
   }
@@ -510,7 +510,7 @@ TEST(CurrentAmplifiers, AnOffsetThatLeavesItsWindowTakesTheForceAway) {
   EXPECT_EQ(bench.application().fault(0), Fault::current_sense);
   bench.clear();
   EXPECT_FALSE(bench.arm()) << "it stays where it is";
-  bench.drives().temperature(0).set_temperature(25.0);
+  bench.drive().current_sensor().set_temperature(25.0);
   bench.run(0.5);
   bench.clear();
   bench.set_wall_force(0.0);
