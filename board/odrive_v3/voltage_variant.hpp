@@ -74,7 +74,7 @@ constexpr PartRatings part_ratings(VoltageVariant variant) {
 
 /// V, at which the drive trips whatever its parameters say: 7 % above the nominal supply, where the vendor's
 /// firmware does (25.7 and 59.9 V), but so far below the weakest part that what is returned until the bridges
-/// are off does not reach it: 40 A into 1 mF for the 50 us of a tick, 2 V.
+/// are off does not reach it: 20 A into 1 mF for two ticks, 100 us, 2 V.
 constexpr float supply_ceiling(VoltageVariant variant) {
   const PartRatings parts = part_ratings(variant);
   const float of_vendor = 1.07f * parts.supply, of_parts = parts.weakest() - 2.0f;

@@ -235,14 +235,14 @@ TEST_F(PowerStageTest, TheEmergencyStopLeavesTheBrakesSupplyOn) {
 
 TEST_F(PowerStageTest, InterferenceAtTheLineIsNoStopAndWhatLastsOrKeepsComingIs) {
   run(100'000);
-  for (const auto& [looks, stops] : {std::pair{1, false}, {20, false}, {39, false}, {64, true}}) {
+  for (const auto& [looks, stops] : {std::pair{1, false}, {10, false}, {16, false}, {27, true}}) {
     hardware.looks_for_spike = looks;
     stage.poll(now += 100, true);
     EXPECT_EQ(stage.condition(), stops ? Fault::emergency_stop : Fault::none) << looks;
   }
-  EXPECT_TRUE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 20 == 0; }))
+  EXPECT_TRUE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 10 == 0; }))
       << "never at rest for long enough";
-  EXPECT_FALSE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 40 == 0; }));
+  EXPECT_FALSE(drivers::ISR_is_meant([n = 0]() mutable { return ++n % 11 == 0; }));
 }
 
 TEST_F(PowerStageTest, AStopPressedSincePowerUpIsSeenWithoutAnEdge) {

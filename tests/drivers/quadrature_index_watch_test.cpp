@@ -60,7 +60,7 @@ TEST(QuadratureIndexWatch, InterferenceOfTwoLooksIsForgottenHoweverOftenItComes)
   for (std::uint32_t count = 0; count < 600; ++count)
     ASSERT_TRUE(watch.ISR_plausible(count, line_at(count, 500)));
   ASSERT_TRUE(watch.learned());
-  for (std::uint32_t count = 600; count < 8000; ++count)
+  for (std::uint32_t count = 600; count < 7999; ++count)
     ASSERT_TRUE(watch.ISR_plausible(count, count % 3 != 0)) << count;
   EXPECT_TRUE(doubts(watch, 8000));
 }

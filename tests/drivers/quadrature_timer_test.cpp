@@ -13,7 +13,7 @@ TEST(QuadratureTimer, CountsAllFourEdgesOnBothInputs) {
   QuadratureTimer<> encoder{timer};
   ASSERT_TRUE(encoder.configure({}));
   EXPECT_EQ(timer.smcr, 3U);
-  EXPECT_EQ(timer.ccmr[0], 0x4141U) << "CC1S = CC2S = 1, ICxF = 4";
+  EXPECT_EQ(timer.ccmr[0], 0xB1B1U) << "CC1S = CC2S = 1, ICxF = 11";
   EXPECT_EQ(timer.ccmr[1], 0U);
   EXPECT_EQ(timer.ccer, 0U);
   EXPECT_EQ(timer.arr, 0xFFFFU);

@@ -349,7 +349,7 @@ TEST(PartRatings, AMotorThatBrakesTripsAtTheBoardsCeilingBeforeAPartBreaks) {
       highest = std::max(highest, bench.drives().supply().voltage());
     }
     EXPECT_EQ(bench.application().fault(0), Fault::over_voltage);
-    EXPECT_GT(highest, ceiling);
+    EXPECT_GT(highest, ceiling - 0.05) << "a converter's step is 0.015 V";
     EXPECT_LT(highest, ceiling + 0.5)
         << "the weakest part bears " << board::odrive_v3::part_ratings(variant).weakest();
   }
