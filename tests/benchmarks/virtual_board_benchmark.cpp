@@ -31,7 +31,7 @@ void row(const char* name, std::size_t armed, double duration_s) {
 
 void memory_protection(double duration_s) {
   using namespace kmax;
-  tests::ImageBench bench({{"link.timeout", 0.0}});
+  tests::ImageBench bench(tests::ImageBench::Parameters{{"link.timeout", 0.0}});
   bench.start();
   for (const std::size_t axis : {0U, 1U}) bench.master->arm(axis);
   using namespace drivers::cortex_m;

@@ -160,7 +160,7 @@ TEST_F(PowerStageTest, TheDriversAreAskedOnceWhyTheLineFellWhoeverIsArmed) {
   EXPECT_EQ(hardware.looks[0] + hardware.looks[1], 0);
   for (const bool armed : {true, false}) {
     hardware.looks[0] = hardware.looks[1] = 0;
-    stage.ISR_fault_line();
+    stage.ISR_take(PowerStage<Hardware>::Line::fault);
     for (int i = 0; i < 5; ++i) stage.poll(now += 100, armed);
     run(100'000);
     EXPECT_TRUE(stage.ready());

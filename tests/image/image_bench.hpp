@@ -55,8 +55,8 @@ class ImageBench {
                       const std::string& scene_name = "motor_axes",
                       const virtual_board::VirtualBoardConfig& config = {})
       : ImageBench(with(simulated_board::open_scene(scene_name), parameters, push), config) {}
-  explicit ImageBench(simulation::Scene of, const virtual_board::VirtualBoardConfig& config = {})
-      : scene(std::move(of)), world(scene) {
+  explicit ImageBench(const simulation::Scene& of, const virtual_board::VirtualBoardConfig& config = {})
+      : scene(of), world(scene) {
     board = board_for_24_v(&world, config);
     virtual_board::store_parameters(*board, simulated_board::assignments_of(scene));
     master = std::make_unique<virtual_board::BoardLink>(*board);

@@ -27,7 +27,7 @@ TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
     ParameterValues values;
     values.set_real<"supply.voltage_max">(31.0f);
     values.set_real<"supply.ceiling">(ceiling);
-    EXPECT_EQ(AxesSettings(board_limit, values).of(1).supply_voltage_max, trips_above);
+    EXPECT_EQ(AxesSettings(values).of(1).supply_voltage_max, trips_above);
   }
 }
 
