@@ -180,14 +180,14 @@ void poll_power(std::uint32_t now_us) {
 std::uint32_t longest_tick = 0;
 
 /// Until the next interrupt. It is taken a few cycles after it has woken the core, by whose counter it is
-/// timed.
-void sleep() {
-  const cortex::CycleCounter counter{cortex::dwt(), cortex::core_debug()};
+/// timed. A function of its own: in between nothing is loaded from a stack that an interrupt might find full.
+[[gnu::noinline]] void sleep() {
+  const auto cycles = [] { return cortex::CycleCounter{cortex::dwt(), cortex::core_debug()}.now(); };
   cortex::mask_interrupts();
   cortex::wait_for_interrupt();
-  const std::uint32_t awake = counter.now();
+  const std::uint32_t awake = cycles();
   cortex::unmask_interrupts();
-  longest_tick = std::max(longest_tick, counter.since(awake));
+  longest_tick = std::max(longest_tick, cycles() - awake);
 }
 
 /// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on

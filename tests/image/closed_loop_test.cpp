@@ -94,6 +94,7 @@ TEST(ClosedLoopOfOneAxis, RendersWhileTheOtherAxisIsAbsentAndADriverThatDiesLate
 
     bench.world.drives().plant(there, simulation::Defect::gate_driver_missing);
     bench.board->hold_fault_line(true);
+    bench.board->run_for(20e-6);
     bench.board->hold_fault_line(false);
     bench.board->run_for(1.5);
     EXPECT_FALSE(bench.board->bridge_armed(there));
@@ -122,6 +123,7 @@ TEST_F(ClosedLoop, AGateDriverThatTripsSaysWhichTransistorItWas) {
 // nFAULT is pulled by nobody who admits it.
 TEST_F(ClosedLoop, InterferenceOnTheFaultLineIsNobodysFault) {
   bench.board->hold_fault_line(true);
+  bench.board->run_for(20e-6);
   bench.board->hold_fault_line(false);
   bench.board->run_for(0.005);
   for (std::size_t axis = 0; axis < 2; ++axis) {

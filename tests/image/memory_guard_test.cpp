@@ -81,8 +81,12 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
   double happen() {
     VirtualBoard& board = *bench.board;
     const Mishap& mishap = GetParam();
-    // Asleep in the main loop.
-    while (!board.processor().sleeping() || board.core().exceptions.active_count() != 0) board.run_for(1e-6);
+    // In the main loop: asleep, with interrupts that wait for the core to wake; or where one may come, if
+    // what is run next would not let it.
+    const bool asleep = mishap.program_counter == 0;
+    while (board.core().exceptions.active_count() != 0 ||
+           (asleep ? !board.processor().sleeping() : board.processor().masks().primask))
+      board.run_for(1e-6);
     board.processor().set_core_register(13, mishap.stack_pointer);
     board.processor().set_core_register(0, mishap.r0);
     std::uint32_t next = mishap.program_counter;

@@ -109,6 +109,7 @@ class Processor {
   /// Cycles in which the core was awake.
   std::uint64_t cycles() const { return cycles_ - cycles_ahead_; }
   BoardTime slept() const { return slept_; }
+  ExceptionMasks masks() const;
   bool sleeping() const { return sleeping_; }
 
   /// What ended the run as RunEnd::fault, in words.
@@ -124,7 +125,6 @@ class Processor {
   /// s0 to s31.
   float fp_register(unsigned number) const;
   void set_core_register(unsigned number, std::uint32_t value);
-  ExceptionMasks masks() const;
 
  private:
   enum class Event : std::uint8_t {

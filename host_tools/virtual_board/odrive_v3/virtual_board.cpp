@@ -41,9 +41,10 @@ VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const Virtu
   processor_.name_functions_by([this](std::uint32_t address) { return image_.function_at(address); });
   attach_peripherals(config);
   wire();
-  if (world_ == nullptr) return;
-  spikes_.configure(world_->spikes());
-  if (!world_->select_filtered()) serial_encoder_.set_select_timing({.filter = 0.0});
+  if (world_ != nullptr) {
+    spikes_.configure(world_->spikes());
+    if (!world_->select_filtered()) serial_encoder_.set_select_timing({.filter = 0.0});
+  }
   reset(ResetCause::power_on);
   set_board_resistors();
 }
