@@ -157,9 +157,18 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
   return power->hardware().start();
 }
 
-/// What the main loop does for the power stage.
+/// Cycles that the longest interrupt has taken which ended a sleep, with those behind it that did not let the
+/// core back: the longest tick, as it really is, without an instruction of its own for it.
+std::uint32_t longest_tick = 0;
+
+/// What the main loop does for the power stage. What has been read is for the next round: an answer on the
+/// bus does not wait for it.
 void poll_power(std::uint32_t now_us) {
   power->poll(*application, now_us);
+  firmware::BoardReadings readings = power->readings();
+  readings.longest_tick = longest_tick;
+  readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
+  application->set_readings(readings);
   bool healthy = power->condition() == firmware::Fault::none;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     healthy = healthy && application->fault(axis) == firmware::Fault::none;
@@ -174,10 +183,6 @@ void poll_power(std::uint32_t now_us) {
   cortex::enter_safe_state();
   cortex::reset_core();
 }
-
-/// Cycles that the longest interrupt has taken which ended a sleep, with those behind it that did not let the
-/// core back: the longest tick, as it really is, without an instruction of its own for it.
-std::uint32_t longest_tick = 0;
 
 /// Until the next interrupt. It is taken a few cycles after it has woken the core, by whose counter it is
 /// timed. A function of its own: in between nothing is loaded from a stack that an interrupt might find full.
@@ -232,16 +237,10 @@ void tick_without_power() {
     if (due || !power_runs) {
       const std::uint32_t now = system_tick.now_us();
       if (!power_runs) tick_without_power();
-      if (power_runs) {
-        firmware::BoardReadings readings = power->readings();
-        readings.longest_tick = longest_tick;
-        readings.ticks_have_stopped = ticks_have_stopped.load(std::memory_order_relaxed);
-        application->set_readings(readings);
-      }
       can_line->poll(application->can(), now);
       application->poll(now);
-      serial->poll(application->serial(), now);
       can_line->send(application->can());
+      serial->poll(application->serial(), now);
       if (application->can().restart_wanted()) restart();
       if (power_runs) poll_power(now);
     }

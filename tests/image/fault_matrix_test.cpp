@@ -149,6 +149,10 @@ Cause source(const char* name, double volts, Fault fault, double ticks, Refusal 
           [volts](Bench& b, std::size_t) {
             b.world.supply().set_source(volts);
             b.world.supply().set_voltage(volts);
+            // The chips feel it at once; the board's model looks at them every 25 us.
+            for (std::size_t axis = 0; volts < 5.9 && axis < 2; ++axis)
+              b.board->gate_driver(axis).set_condition(drivers::Drv8301Fault::supply_under_voltage, true,
+                                                       b.board->now());
           },
           [](Bench& b, std::size_t) {
             b.world.supply().set_source(24.0);

@@ -75,16 +75,20 @@ class RandomWorld final : public EmptyWorld {
   explicit RandomWorld(std::uint64_t seed) : random_(seed) {}
 
   double analogue(unsigned channel, BoardTime now) override {
-    if (!quiet && channel == 6) return (22.0 + uniform(0, 3.9)) / 11.0;
+    if (!quiet && channel == 6) return (22.0 + uniform(0, 3.4)) / 11.0;
     if (quiet || channel == 15 || channel == 4 || channel == 5) return EmptyWorld::analogue(channel, now);
     // The currents of B and C nearly add up to nothing, so that their sum does not end every run at once.
     constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
-    for (const auto& axis : wiring.axes) {
-      if (channel == axis.c) return 1.65 - deviation_b_ + uniform(-0.02, 0.02);
+    for (std::size_t axis = 0; axis < wiring.axes.size(); ++axis) {
+      const bool b = channel == wiring.axes[axis].b, c = channel == wiring.axes[axis].c;
+      // No current passes the shunts of the other axis, whose zero is looked at.
+      if ((b || c) && axis != low_sides_of_) return 1.65 + uniform(-0.02, 0.02);
+      if (c) return 1.65 - deviation_b_ + uniform(-0.02, 0.02);
     }
     deviation_b_ = uniform(-0.25, 0.25);
     return 1.65 + deviation_b_;
   }
+  void set_low_sides(std::size_t axis) override { low_sides_of_ = axis; }
   virtual_board::EncoderSignals encoder(std::size_t axis, BoardTime) override {
     if (!quiet) {
       const double kind = uniform(0, 1);
@@ -106,6 +110,7 @@ class RandomWorld final : public EmptyWorld {
   std::mt19937_64 random_;
   std::array<std::int64_t, 2> edges_{};
   double deviation_b_ = 0.0;
+  std::size_t low_sides_of_ = 0;
 };
 
 void expect_equal(const Companion& companion) {
