@@ -32,7 +32,7 @@ struct QuadratureIndexConfig {
 ///
 /// Once wrong it stays wrong until reset(): edges have been lost, and with them the position.
 ///
-/// Until the index is learned, a line that has just become high must be proved so (is_new(), line_look.hpp):
+/// Until the index is learned, a line that has just changed must be proved so (is_news(), line_look.hpp):
 /// interference would teach a place where no index is.
 ///
 /// Cost: about 10 Cortex-M4 instructions while the line is low, 30 (one division) while it is high.
@@ -64,8 +64,8 @@ class QuadratureIndexWatch {
 
   static constexpr unsigned looks_to_doubt = 3;
 
-  /// A high line would be news from which the index is learned.
-  constexpr bool is_new() const { return !learned_ && !high_; }
+  /// A line of this level would be news from which the index is learned.
+  constexpr bool is_news(bool high) const { return !learned_ && high != high_; }
   constexpr bool learned() const { return learned_; }
 
   /// Count at which the middle of the index is, once learned.

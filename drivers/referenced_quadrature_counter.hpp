@@ -53,14 +53,17 @@ class ReferencedQuadratureCounter {
   }
 
   /// Once per tick. `counter`: the timer's. `index_line`: a function that gives the line's level at the same
-  /// moment, asked only where there is one, and several times where it has just become high.
+  /// moment, asked only where there is one, and several times where it has just changed.
   template <std::predicate Line>
   constexpr Reading ISR_read(Counter counter, Line&& index_line, bool driving) {
     count_ = ISR_peek(counter);
     counter_ = counter;
     bool valid = true;
     if (config_.has_index) {
-      const bool high = index_line() && (!index_.is_new() || ISR_stays(index_line));
+      bool high = index_line();
+      if (index_.is_news(high)) [[unlikely]] {
+        if (!ISR_stays([&index_line, high] { return index_line() == high; })) high = !high;
+      }
       valid = index_.ISR_plausible(count_, high);
       if (index_.learned() && config_.from_index && !referenced_ && !driving) [[unlikely]]
         refer_to_index();

@@ -30,6 +30,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   { hardware.in_service(axis) } -> std::same_as<bool>;
   /// Writes and reads back one DRV8301.
   { hardware.configure_gate_driver(axis) } -> std::same_as<GateDriverAnswer>;
+  { hardware.is_missing(axis) } -> std::same_as<bool>;
   /// Notes for the host what the axis' gate driver says of its faults, which a reset by EN_GATE wipes out.
   {hardware.note_gate_driver_faults(axis)};
   /// The axis' gate driver is not there: in_service() is false for it from now on.
@@ -107,9 +108,9 @@ class PowerStage {
                        (hardware_.fault_line_low() && ISR_is_meant(Line::fault));
     if (state_ == State::ready && fault) {
       // Once: a look at the faults takes those back whose cause is over.
-      if (condition_.load(std::memory_order_relaxed) != firmware::Fault::gate_driver)
-        note_gate_driver_faults();
+      const bool is_new = condition_.load(std::memory_order_relaxed) != firmware::Fault::gate_driver;
       condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
+      if (is_new) note_gate_driver_faults();
       if (!any_armed) begin_reset(now_us, firmware::Fault::gate_driver);
       return;
     }
@@ -137,7 +138,8 @@ class PowerStage {
 
   void note_gate_driver_faults() {
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-      if (hardware_.in_service(axis)) hardware_.note_gate_driver_faults(axis);
+      // Also one that is left alone: it pulls the common line all the same.
+      if (!hardware_.is_missing(axis)) hardware_.note_gate_driver_faults(axis);
     }
   }
 
@@ -149,7 +151,7 @@ class PowerStage {
       if (!hardware_.in_service(axis)) continue;
       const GateDriverAnswer answer = hardware_.configure_gate_driver(axis);
       silent[axis] = answer == GateDriverAnswer::silent && !has_answered_[axis];
-      has_answered_[axis] = has_answered_[axis] || answer != GateDriverAnswer::silent;
+      has_answered_[axis] = has_answered_[axis] || answer == GateDriverAnswer::accepted;
       any = any || answer == GateDriverAnswer::accepted;
       all = all && (answer == GateDriverAnswer::accepted || silent[axis]);
     }

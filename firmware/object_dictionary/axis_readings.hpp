@@ -27,7 +27,8 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
         "drive.gate_driver_faults", group::drive_status, 7, unsigned16, "",
         "What the axis' gate driver said when the drivers' common fault line last fell, a bit each: too "
         "much current in the low side of phase C (1) and in its high side (2), in those of phase B (4 and "
-        "8) and of phase A (16 and 32), hot (64), too hot (128), motor supply too low (256), gate supply "
+        "8) and of phase A (16 and 32), over-temperature warning (64) and shut-down (128), motor supply too "
+        "low (256), gate supply "
         "too low (512) and too high (2048), no answer (4096). 0: nothing; it was another axis' driver, or "
         "interference on the line."),
 

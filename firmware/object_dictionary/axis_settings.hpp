@@ -271,9 +271,11 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         "long link.sign_of_life has not been written with this number over the link that armed the axis, and "
         "nothing else keeps it armed. Back to 0 when the axis is disarmed, or was not armed.")
         .volatile_value(),
-    choice("drive.declared_absent", group::drive_mode, 3, names::no_or_yes, 0,
-           "yes: the board has no such axis, or it is not to be used. It is left alone, whatever its gate "
-           "driver and its current sensors say, and cannot be armed.")
+    choice(
+        "drive.declared_absent", group::drive_mode, 3, names::no_or_yes, 0,
+        "yes: the board has no such axis, or it is not to be used. Its current sensors, its encoder and its "
+        "settings are left alone, and it cannot be armed. A gate driver that is there and reports a fault "
+        "holds up all axes nevertheless: the fault line is common.")
         .disarmed_only(),
 
     choice("excitation.kind", group::excitation, 1, names::excitation_kind, 0,

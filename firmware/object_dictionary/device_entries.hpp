@@ -176,8 +176,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "Control ticks that came late or were lost."),
     reading(
         "counters.longest_tick", group::counters, 11, Type::unsigned32, "",
-        "Cycles of info.core_clock that the longest tick of an axis has taken since the start, by the core's "
-        "own counter, entry and return included, and whatever interrupts came with it. 0: not measured."),
+        "Cycles of info.core_clock that the longest tick has taken which ended a sleep of the core, since "
+        "the "
+        "start, by its own counter, entry and return included, and whatever interrupts came with it. 0: not "
+        "measured."),
 
     reading("refusal.reason", group::refusal, 1, Type::unsigned16, "",
             "Why the last write was refused; 0: it was not."),

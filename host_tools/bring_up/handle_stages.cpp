@@ -160,7 +160,8 @@ CheckResult check_tick(device::Device& device) {
   const double room =
       share * device.read_number("info.core_clock") / firmware::tick_rate_hz / firmware::axis_count;
   check.values = {{"longest_tick", cycles, "cycles", 0.0, room}};
-  const std::string seen = fmt::format("{:.0f} cycles; the model says at most {:.0f}", cycles, modelled);
+  const std::string seen = fmt::format(
+      "{:.0f} cycles, of those that ended a sleep; the model says at most {:.0f}", cycles, modelled);
   if (cycles > room)
     return check.fail("control tick",
                       fmt::format("{}; {:.0f} are allowed: report it with this report's file, "

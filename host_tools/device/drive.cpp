@@ -100,8 +100,8 @@ std::string gate_driver_words(std::uint16_t faults) {
                                         "phase B, high side: too much current",
                                         "phase A, low side: too much current",
                                         "phase A, high side: too much current",
-                                        "hot",
-                                        "too hot",
+                                        "over-temperature warning",
+                                        "over-temperature shut-down",
                                         "the motor supply is too low for it",
                                         "its gate supply is too low",
                                         "",
@@ -113,7 +113,7 @@ std::string gate_driver_words(std::uint16_t faults) {
     words += fmt::format("{}{}", words.empty() ? "" : "; ", texts[bit]);
   }
   if (!words.empty()) return words;
-  return faults != 0 ? "a fault without a cause" : "nothing, so it was another axis' driver or interference";
+  return faults != 0 ? "a fault, and no cause" : "nothing, so it was another axis' driver or interference";
 }
 
 DriveStatus Drive::status() {

@@ -26,6 +26,7 @@ struct Hardware {
   bool fault_line_low() const { return fault_low; }
   bool emergency_stop_open() const { return stop_open || looks_for_spike-- > 0; }
   bool in_service(std::size_t axis) const { return !missing[axis]; }
+  bool is_missing(std::size_t axis) const { return missing[axis]; }
   void set_missing(std::size_t axis) { missing[axis] = true; }
   void note_gate_driver_faults(std::size_t axis) {
     EXPECT_TRUE(gate) << "a reset has wiped them out";
@@ -144,6 +145,16 @@ TEST_F(PowerStageTest, AChipThatHasAnsweredAndFallsSilentIsAFaultOfTheBoard) {
   run(5'000'000);
   EXPECT_FALSE(hardware.missing[1]);
   EXPECT_EQ(stage.condition(), Fault::power_stage);
+}
+
+// Whatever disturbed the line at first: it was no answer.
+TEST_F(PowerStageTest, ALineThatWasDisturbedAndIsSilentLaterHasNoChip) {
+  hardware.answers[1] = GateDriverAnswer::refused;
+  run(300'000);
+  hardware.answers[1] = GateDriverAnswer::silent;
+  run(1'000'000);
+  EXPECT_TRUE(hardware.missing[1]);
+  EXPECT_TRUE(stage.ready());
 }
 
 TEST_F(PowerStageTest, AChipThatAnswersAndKeepsNothingIsNotMissing) {

@@ -87,6 +87,15 @@ std::string status_line(std::size_t axis, const DriveStatus& status, const Guard
   return line;
 }
 
+std::string absence_line(Device& device, std::size_t axis, AxisPresence presence) {
+  std::string line = fmt::format("axis {}: {}", axis, device::presence_words(presence));
+  // The fault line is common: one that is left alone may hold up the others.
+  const auto faults =
+      static_cast<std::uint16_t>(device.read(device::Parameter::of<"drive.gate_driver_faults">(axis)));
+  if (faults != 0) line += fmt::format("; its gate driver has said: {}", device::gate_driver_words(faults));
+  return line;
+}
+
 int print_states(Context& context, Device& device, const std::vector<std::size_t>& axes) {
   Json list = Json::array();
   for (const std::size_t axis : axes) {
@@ -96,9 +105,8 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
     if (context.json) {
       list.push_back(status_json(axis, presence, status, drive.guard()));
     } else {
-      const std::string words = presence == AxisPresence::present
-                                    ? status_line(axis, status, drive.guard())
-                                    : fmt::format("axis {}: {}", axis, device::presence_words(presence));
+      const std::string words = presence == AxisPresence::present ? status_line(axis, status, drive.guard())
+                                                                  : absence_line(device, axis, presence);
       print(context.out, "{}\n", words);
     }
   }

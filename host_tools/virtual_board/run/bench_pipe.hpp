@@ -14,9 +14,11 @@ namespace kmax::virtual_board {
 ///   push AXIS NEWTON     a hand leans on the handle, along +x
 ///   swing AXIS NEWTON    a hand moves it to and fro, 0.2 s of board time each way
 ///   release AXIS         no hand is there
-///   unplug AXIS          the motor's three wires; plug AXIS: again
-///   plant AXIS DEFECT    a wiring fault or a broken part (host_tools/simulation/defect.hpp); mend AXIS
-///   DEFECT stop open            the emergency stop's contact; stop closed
+///   unplug AXIS          the motor's three wires
+///   plug AXIS            the same, back again
+///   plant AXIS DEFECT    a wiring fault or a broken part (host_tools/simulation/defect.hpp)
+///   mend AXIS DEFECT     it is right again
+///   stop open            the emergency stop's contact; or: stop closed
 ///
 /// A hand is damped by 8 N s/m. Lines that are not understood are answered on stderr, and nothing is done.
 class BenchPipe {

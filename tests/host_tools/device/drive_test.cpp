@@ -132,7 +132,7 @@ TEST_F(DriveTest, AFaultOfTheGateDriversIsToldWithWhatTheDriverSays) {
   EXPECT_CONTAINS(status.fault_words(), "this axis' driver says: phase B, low side: too much current");
   EXPECT_EQ(gate_driver_words(0x120),
             "phase A, high side: too much current; the motor supply is too low for it");
-  EXPECT_EQ(gate_driver_words(0x400), "a fault without a cause");
+  EXPECT_EQ(gate_driver_words(0x400), "a fault, and no cause");
   EXPECT_EQ(gate_driver_words(0x1000), "it does not answer");
 }
 
