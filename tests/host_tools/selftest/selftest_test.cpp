@@ -113,7 +113,7 @@ TEST(SelfTest, AWrongDirectionIsNamed) {
 TEST(SelfTest, ASupplyOutsideItsLimitsIsNamed) {
   for (const char* scene : host_tools_test::motor_scenes) {
     expect_part(scene, Defect::supply_low, "supply");
-    for (const double voltage : {0.0, 12.0, 35.0}) {
+    for (const double voltage : {0.0, 12.0, 27.0}) {
       TestedAxis tested(scene);
       tested.drives().supply().set_source(voltage);
       tested.drives().supply().set_voltage(voltage);

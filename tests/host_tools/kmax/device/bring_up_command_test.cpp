@@ -35,7 +35,7 @@ TEST_F(BringUpCommand, GoesOnWhereItHasPassedAndStopsWhereItFails) {
   EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button", "--supply", "24", "--stage", "logic"}), done)
       << said;
   EXPECT_CONTAINS(output, "logic: passed");
-  EXPECT_CONTAINS(output, "18 .. 28");
+  EXPECT_CONTAINS(output, "18 .. 25.5");
   EXPECT_CONTAINS(output, "next stage: gate_drivers");
   EXPECT_EQ(bring_up({"--report", file, "--yes", "--no-button"}), verdict_is_no) << said;
   EXPECT_CONTAINS(output, "gate_drivers: FAILED");
