@@ -60,10 +60,10 @@ class _Process:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         try:
-            self.process.communicate(timeout=PATIENCE)
+            self.said = self.process.communicate(timeout=PATIENCE)[0]
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self.process.communicate()
+            self.said = self.process.communicate()[0]
         self.folder.cleanup()
 
 

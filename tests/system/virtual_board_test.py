@@ -125,9 +125,12 @@ class Bench(unittest.TestCase):
                 until("profile.digital_inputs", lambda now: not int(now) & 1 << 16)
                 for line in ("push 1 1", "push 0 1e3", "push 0", "plant 0 luck", "stop", "dance"):
                     do(line)
+                # In their order: those before have been read, too.
+                do("push 0 0.5")
+                until("measured.velocity", lambda now: now > 0.01)
             self.assertFalse(pipe.exists())
-            self.assertEqual(board.errors.count("kmax-board: bench: "), 6, board.errors)
-            self.assertIn("'plant 0 luck': defect luck: allowed are phase_a_open", board.errors)
+            self.assertEqual(board.said.count("kmax-board: bench: "), 6, board.said)
+            self.assertIn("'plant 0 luck': defect luck: allowed are phase_a_open", board.said)
 
     def test_a_pipe_that_is_a_file_is_refused_and_left_alone(self):
         with tempfile.NamedTemporaryFile("w") as file:

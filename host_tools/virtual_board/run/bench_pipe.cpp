@@ -102,6 +102,8 @@ std::string BenchPipe::take(std::string_view line) {
     const auto [stop, error] = std::from_chars(words[2].data(), end, newton);
     if (error != std::errc{} || stop != end || !(std::abs(newton) <= strongest))
       return fmt::format("force {}: allowed are numbers from {} to {} N", words[2], -strongest, strongest);
+    // A scene's handle stands where it begins until its axis is driven.
+    world_.drive(axis).hold(false);
     hands_[axis] = {newton, what == "swing", board_.now()};
     move(axis);
   } else if (what == "release") {
