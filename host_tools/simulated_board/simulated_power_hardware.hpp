@@ -87,7 +87,7 @@ class SimulatedPowerHardware {
   bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
   board::GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
-  /// Of a planted fault it knows no phase; a supply that is too low is told.
+  /// Of a planted fault it knows no phase; a supply that is too low is named.
   std::uint16_t read_gate_driver_faults(std::size_t) const {
     using enum drivers::Drv8301Fault;
     return static_cast<std::uint16_t>(supply_suffices() ? fault : supply_under_voltage);

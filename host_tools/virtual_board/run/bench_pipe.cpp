@@ -21,7 +21,7 @@ using simulation::Defect;
 constexpr double damping = 8.0, strongest = 50.0;
 constexpr BoardTime one_way = units_per_second / 5;
 
-std::vector<std::string> words_of(std::string_view line) {
+std::vector<std::string> split_at_spaces(std::string_view line) {
   std::istringstream text{std::string(line)};
   std::vector<std::string> words;
   for (std::string word; text >> word;) words.push_back(word);
@@ -78,7 +78,7 @@ void BenchPipe::move(std::size_t axis) {
 }
 
 std::string BenchPipe::take(std::string_view line) {
-  const std::vector<std::string> words = words_of(line);
+  const std::vector<std::string> words = split_at_spaces(line);
   if (words.empty()) return "";
   const std::string& what = words[0];
   if (what == "stop") {
