@@ -15,7 +15,7 @@
 //   current = (code - offset) * reference / (4096 * gain * shunt)
 //
 // The offset may be 4 mV at the amplifier's input (DRV8301; a guess, its data sheet was not at hand; ODrive
-// accepts 3 mV) and drifts with the temperature, so it is measured (OffsetCalibration) and then followed.
+// accepts 3 mV) and drifts with the temperature, so it is measured (OffsetCalibration) and then tracked.
 //
 // Range and resolution with 0.5 mOhm and 3.3 V, amplifier used within +-1.35 V of its middle:
 //   gain 10: +-270 A, 161 mA per code    gain 40: +-67.5 A, 40.3 mA per code
@@ -53,7 +53,7 @@ class CurrentSense {
   constexpr void set_offset(float code) { offset_ = code; }
   /// Once a millisecond, with a code that no current made: with 0.26 s after the temperature, and at most 62
   /// codes a second, so that a few codes of something else do no harm.
-  constexpr void follow(std::uint32_t code) {
+  constexpr void track_offset(std::uint32_t code) {
     constexpr float share = 1.0F / 256.0F, most = 16.0F;
     const float off = static_cast<float>(code) - offset_;
     offset_ += share * (off > most ? most : off < -most ? -most : off);

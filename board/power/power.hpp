@@ -99,10 +99,7 @@ class Power {
       if (stage_.ready() && lines_.configured_gain != drives_.gain()) stage_.restart(now_us);
     }
     stage_.poll(now_us, armed);
-    if (now_us - forgave_at_us_ >= 1'000) {
-      forgave_at_us_ = now_us;
-      if (forgiven_.load(std::memory_order_relaxed) != 0) forgiven_.fetch_sub(1, std::memory_order_relaxed);
-    }
+    interference_.poll(now_us);
   }
 
  private:
@@ -123,7 +120,7 @@ class Power {
     }
     void restart_offset_calibration() { drives.restart_offset_calibration(); }
     OffsetProgress offset_progress() { return drives.offset_progress(); }
-    bool follow_offsets() { return drives.follow_offsets(); }
+    bool track_offsets() { return drives.track_offsets(); }
 
     Drives<Hardware>& drives;
     drivers::CurrentSenseGain configured_gain = drivers::CurrentSenseGain::x80;
@@ -135,10 +132,10 @@ class Power {
 
   [[gnu::noinline]] void ISR_line(typename PowerStage<Lines>::Line line) {
     const auto armed = drives_.ISR_disarm();
-    if (forgiven_.load(std::memory_order_relaxed) == most_forgiven || stage_.ISR_is_meant(line)) {
+    if (interference_.ISR_spent() || stage_.ISR_is_meant(line)) {
       stage_.ISR_take(line);
     } else {
-      forgiven_.fetch_add(1, std::memory_order_relaxed);
+      interference_.ISR_forgive();
       drives_.ISR_arm_again(armed);
     }
   }
@@ -147,11 +144,8 @@ class Power {
   Lines lines_{drives_};
   PowerStage<Lines> stage_{lines_};
   bool was_ready_ = false, taken_ = false;
-  std::uint32_t taken_changes_ = 0, forgave_at_us_ = 0;
-  /// Edges that were interference, less one for each millisecond since. A line that is disturbed in every
-  /// period would leave the current loop without samples, and nobody would know.
-  static constexpr std::uint8_t most_forgiven = 5;
-  std::atomic<std::uint8_t> forgiven_{0};
+  std::uint32_t taken_changes_ = 0;
+  InterferenceBudget interference_;
 };
 
 }  // namespace kmax::board

@@ -39,7 +39,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   {hardware.restart_offset_calibration()};
   { hardware.offset_progress() } -> std::same_as<OffsetProgress>;
   /// Once a millisecond from then on. False: an offset has left its window.
-  { hardware.follow_offsets() } -> std::same_as<bool>;
+  { hardware.track_offsets() } -> std::same_as<bool>;
 };
 
 /// From power-up to bridges that may be armed, and back again after a fault. Bridges are off all the while;
@@ -49,7 +49,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 ///   waking      20 ms until the gate drivers' serial interface answers
 ///   configuring the chips written and read back; one that fails sends all to `resetting` after 200 ms
 ///   measuring   offsets of the current sensors
-///   ready       the offsets are followed; one that leaves its window takes all to `resetting` after 200 ms
+///   ready       the offsets are tracked; one that leaves its window takes all to `resetting` after 200 ms
 ///
 /// A board need not have all axes. A gate driver that has never answered since the start, three times while
 /// another accepted what was written, is not there, and the board goes on without its axis. One that has
@@ -68,7 +68,7 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 template <PowerStageHardware Hardware>
 class PowerStage {
  public:
-  static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000, follow_us = 1'000;
+  static constexpr std::uint32_t reset_us = 1'000, wake_us = 20'000, retry_us = 200'000, track_us = 1'000;
   static constexpr std::uint8_t rounds_until_missing = 3;
 
   explicit PowerStage(Hardware& hardware) : hardware_(hardware) {}
@@ -203,9 +203,9 @@ class PowerStage {
         if (elapsed >= retry_us) begin_reset(now_us, condition_.load(std::memory_order_relaxed));
         return;
       case State::ready:
-        if (elapsed < follow_us) return;
+        if (elapsed < track_us) return;
         since_us_ = now_us;
-        if (!hardware_.follow_offsets()) refuse_offsets(now_us);
+        if (!hardware_.track_offsets()) refuse_offsets(now_us);
         return;
     }
   }

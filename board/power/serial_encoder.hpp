@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <optional>
 
 #include "drivers/as5047p_angle.hpp"
@@ -91,6 +92,24 @@ class SerialEncoder {
   bool selected_ = false;  ///< and no frame begun
   bool under_way_ = false, bus_was_taken_ = false;
   std::atomic<bool> restart_{false}, forget_turns_{false};
+};
+
+/// Stands for the AS5047P of a board that has none, no serial_encoder(): an axis whose encoder.kind asks for
+/// it has no valid count.
+struct NoSerialEncoder {
+  struct Sample {
+    std::uint32_t count = 0;
+    bool valid = false;
+    std::uint32_t reference_generation = 0;
+  };
+  static Sample ISR_take() { return {}; }
+  static void ISR_select() {}
+  static constexpr bool ISR_selected() { return false; }
+  static void ISR_begin() {}
+  static bool under_way() { return false; }
+  static void ISR_abandon() {}
+  static void restart() {}
+  static void restart_without_turns() {}
 };
 
 }  // namespace kmax::board

@@ -16,7 +16,7 @@ struct Hardware {
   OffsetProgress offsets = OffsetProgress::accepted;
   bool offsets_hold = true;
   mutable int looks_for_spike = 0;
-  int gate_rises = 0, configured = 0, calibrations = 0, followed = 0;
+  int gate_rises = 0, configured = 0, calibrations = 0, tracked = 0;
   int looks[2] = {};
 
   void set_gate_enable(bool level) {
@@ -41,8 +41,8 @@ struct Hardware {
   }
   void restart_offset_calibration() { ++calibrations; }
   OffsetProgress offset_progress() const { return offsets; }
-  bool follow_offsets() {
-    ++followed;
+  bool track_offsets() {
+    ++tracked;
     return offsets_hold;
   }
 };
@@ -73,11 +73,11 @@ TEST_F(PowerStageTest, WaitsForTheChipsBeforeItWritesToThem) {
   EXPECT_EQ(stage.condition(), Fault::none);
 }
 
-TEST_F(PowerStageTest, FollowsTheOffsetsEachMillisecondFromThenOnAlsoWhileArmed) {
+TEST_F(PowerStageTest, TracksTheOffsetsEachMillisecondFromThenOnAlsoWhileArmed) {
   run(21'000);
-  EXPECT_EQ(hardware.followed, 0);
+  EXPECT_EQ(hardware.tracked, 0);
   run(1'000'000, true);
-  EXPECT_NEAR(hardware.followed, 1000, 2);
+  EXPECT_NEAR(hardware.tracked, 1000, 2);
   hardware.offsets_hold = false;
   run(1'100, true);
   EXPECT_EQ(stage.condition(), Fault::current_sense);

@@ -114,12 +114,12 @@ TEST(CurrentSense, TheWindowOfTheOffsetIsThatOfTheAmplifiersInput) {
   }
 }
 
-TEST(CurrentSense, FollowsItsZeroSlowly) {
+TEST(CurrentSense, TracksItsOffsetSlowly) {
   CurrentSense sense;
   sense.set_offset(2100.0F);
-  sense.follow(2110);
+  sense.track_offset(2110);
   EXPECT_NEAR(sense.offset(), 2100.0F + 10.0F / 256.0F, 1e-3F);
-  for (int n = 0; n < 2000; ++n) sense.follow(2110);
+  for (int n = 0; n < 2000; ++n) sense.track_offset(2110);
   EXPECT_NEAR(sense.offset(), 2110.0F, 0.05F) << "as near as a float of that size goes";
 }
 
@@ -135,7 +135,7 @@ RC_GTEST_PROP(CurrentSense, FollowsNoFurtherThanItsCodesAndNoFasterThanItMay, ()
     low = std::min(low, static_cast<float>(code));
     high = std::max(high, static_cast<float>(code));
     const float before = sense.offset();
-    sense.follow(code);
+    sense.track_offset(code);
     RC_ASSERT(std::abs(sense.offset() - before) <= 0.0626F);
     RC_ASSERT(sense.offset() >= low && sense.offset() <= high);
   }
