@@ -24,7 +24,7 @@ class GateDrivers {
 
   /// Both control registers written and read back.
   GateDriverAnswer configure(std::size_t axis, drivers::CurrentSenseGain gain) {
-    if (!claim()) return GateDriverAnswer::refused;
+    if (!claim()) return GateDriverAnswer::bus_busy;
     Selected chip = select(axis);
     drivers::Drv8301<Selected> driver{chip};
     drivers::Drv8301Config config;
@@ -35,7 +35,7 @@ class GateDrivers {
     const bool silent = (result == stuck_high || result == stuck_low) && driver.probe() == result;
     bus_.release();
     if (result == ok) return GateDriverAnswer::accepted;
-    return silent ? GateDriverAnswer::silent : GateDriverAnswer::refused;
+    return silent ? GateDriverAnswer::silent : GateDriverAnswer::faulty;
   }
 
   /// In the bits of drive.gate_driver_faults, which are the chip's own (drivers::Drv8301Fault).

@@ -15,8 +15,9 @@ enum class OffsetProgress : std::uint8_t { running, accepted, refused };
 
 enum class GateDriverAnswer : std::uint8_t {
   accepted,
-  silent,   ///< a line that nobody drives
-  refused,  ///< it does not keep what is written, or the bus was not to be had
+  silent,    ///< a line that nobody drives
+  faulty,    ///< a reply that is none, or settings that are not kept
+  bus_busy,  ///< not asked
 };
 
 /// What the power stage's sequence needs of the board. All calls come from the main loop.
