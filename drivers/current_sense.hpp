@@ -51,12 +51,18 @@ class CurrentSense {
 
   /// The code at zero current, from OffsetCalibration.
   constexpr void set_offset(float code) { offset_ = code; }
-  /// Once a millisecond, with a code that no current made: with 0.26 s after the temperature, and at most 62
-  /// codes a second, so that a few codes of something else do no harm.
-  constexpr void track_offset(std::uint32_t code) {
-    constexpr float share = 1.0F / 256.0F, most = 16.0F;
+  /// Once a millisecond, with a code that no current made. `after`: calls since driving began or ended, which
+  /// moves an amplifier's zero at once: a mean of what has come since, and from the 252nd on a time constant
+  /// of 0.26 s, for what the temperature does. 16 codes at most are taken for real, so that a few codes of
+  /// something else do no harm.
+  constexpr void track_offset(std::uint32_t code, unsigned after) {
+    constexpr float most = 16.0F;
+    constexpr unsigned first = 4, last = 256;
     const float off = static_cast<float>(code) - offset_;
-    offset_ += share * (off > most ? most : off < -most ? -most : off);
+    offset_ += (off > most    ? most
+                : off < -most ? -most
+                              : off) /
+               static_cast<float>(after < last - first ? after + first : last);
   }
   constexpr float offset() const { return offset_; }
 

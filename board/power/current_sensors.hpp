@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "board/power/power_stage.hpp"
 #include "drivers/current_sense.hpp"
@@ -42,9 +43,14 @@ class CurrentSensors {
     sense_c_.set_offset(offset_c_.offset());
   }
   /// Once a millisecond, with codes that no current made. False: an offset has left its window.
-  bool track_offsets(std::uint32_t code_b, std::uint32_t code_c, drivers::CurrentSenseGain gain) {
-    sense_b_.track_offset(code_b);
-    sense_c_.track_offset(code_c);
+  /// `driven`: the bridge is on, which moves the offsets at once.
+  bool track_offsets(std::uint32_t code_b, std::uint32_t code_c, drivers::CurrentSenseGain gain,
+                     bool driven) {
+    if (driven != tracked_driven_) tracked_for_ = 0;
+    tracked_driven_ = driven;
+    sense_b_.track_offset(code_b, tracked_for_);
+    sense_c_.track_offset(code_c, tracked_for_);
+    if (tracked_for_ < std::numeric_limits<std::uint16_t>::max()) ++tracked_for_;
     const auto window = static_cast<float>(drivers::offset_window(gain));
     const auto within = [window](const drivers::CurrentSense& sense) {
       const float off = sense.offset() - drivers::CurrentSense::middle_code;
@@ -56,6 +62,8 @@ class CurrentSensors {
  private:
   drivers::CurrentSense sense_b_{}, sense_c_{};
   drivers::OffsetCalibration offset_b_{}, offset_c_{};
+  bool tracked_driven_ = false;
+  std::uint16_t tracked_for_ = 0;  ///< ms since driving began or ended
 };
 
 }  // namespace kmax::board

@@ -462,7 +462,9 @@ bool Drives<Hardware>::track_offsets() {
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!is_driven(axis)) continue;
     const auto codes = hardware_.zero_current(axis);
-    within = axes_[axis].sensors.track_offsets(codes.phase_b, codes.phase_c, gain_) && within;
+    within = axes_[axis].sensors.track_offsets(codes.phase_b, codes.phase_c, gain_,
+                                               hardware_.bridge(axis).armed()) &&
+             within;
   }
   return within;
 }

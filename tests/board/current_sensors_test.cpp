@@ -75,14 +75,27 @@ TEST_F(CurrentSensorsTest, AnOffsetIsTrackedUntilItLeavesItsWindow) {
   sensors.take_calibration();
   const auto window = drivers::offset_window(gain);
   for (int n = 0; n < 10'000; ++n)
-    ASSERT_TRUE(sensors.track_offsets(static_cast<std::uint16_t>(2048 + window), 2048, gain)) << n;
+    ASSERT_TRUE(sensors.track_offsets(static_cast<std::uint16_t>(2048 + window), 2048, gain, false)) << n;
   EXPECT_NEAR(read({static_cast<std::uint16_t>(2048 + window), 2048}).b, 0.0f, 0.02f);
   ASSERT_EQ(calibrate({}), OffsetProgress::accepted);
   sensors.take_calibration();
   int tracked = 0;
-  while (sensors.track_offsets(4095, 2048, gain)) ASSERT_LT(++tracked, 10'000);
+  while (sensors.track_offsets(4095, 2048, gain, false)) ASSERT_LT(++tracked, 10'000);
   EXPECT_NEAR(tracked, 16 * window, 16) << "a sixteenth of a code at a time, whatever the code";
 }
 
 }  // namespace
+TEST(CurrentSensors, OffsetsAreFoundAnewWheneverDrivingBeginsOrEnds) {
+  CurrentSensors sensors;
+  sensors.restart_calibration(gain);
+  const float code = drivers::CurrentSense{{.gain = gain}}.ISR_amperes(2049);
+  for (int ms = 0; ms < 2000; ++ms) sensors.track_offsets(2048, 2048, gain, false);
+  for (const bool driven : {true, false}) {
+    const std::uint32_t zero = driven ? 2060 : 2048;
+    for (int ms = 0; ms < 60; ++ms) sensors.track_offsets(zero, 2048, gain, driven);
+    EXPECT_NEAR(sensors.ISR_amperes_b(2048) / code, driven ? -12.0f + 12.0f / 21.0f : -12.0f / 21.0f, 0.1f)
+        << "3 / 63 of 12 codes are left";
+  }
+}
+
 }  // namespace kmax::board::current_sensors_test

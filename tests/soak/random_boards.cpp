@@ -54,6 +54,11 @@ class Draw {
     axis.device.mass *= between(0.8, 1.3);
     axis.device.damping *= between(0.5, 2.0);
     axis.device.friction *= between(0.5, 1.5);
+    // On lines that only the virtual board has: the image meets them.
+    simulation::SpikesConfig& spikes = scene.spikes.emplace();
+    spikes.width = between(50e-9, 1e-6);
+    spikes.rate = between(10.0, 300.0);
+    spikes.at_samples = random_() % 2 == 0;
     return scene;
   }
   double between(double low, double high) {
@@ -136,23 +141,22 @@ class NativeRun {
          "wall.damping=0", "wall.side=1", "force.ramp_time=0.05", "link.timeout=0"});
     axis().arm();
     const double half = contact_ / 2.0;
-    double time = 0.0, made = 0.0, asked = 0.0;
+    double time = 0.0, error = 0.0;
     unsigned ticks = 0;
     bool stood = false;
     board_.link->before_tick = [&] {
       time += 50e-6;
       drive().push(hand_force(time, 1.5), 8.0);
       const firmware::AxisReport report = board_.link->application().ISR_report(0);
-      made += drive().force();
-      asked += static_cast<double>(report.force);
+      // Cogging is no error of the force that is made.
+      error += drive().force() - cogging() - static_cast<double>(report.force);
       if (++ticks < 400) return;
       const double share = (law == "plain" ? 0.0 : 0.5) + 0.5 * std::min(1.0, time / half);
       drive().current_sensor().set_temperature(25.0 + share * (hottest_ - 25.0));
-      // Cogging is no error of the force that is made, and stands still where the handle does.
       const bool stands = report.haptic.inside && std::abs(drive().handle().velocity()) < 1e-4;
-      if (stands && stood) error_.add((made - asked) / ticks - cogging());
+      if (stands && stood) error_.add(error / ticks);
       stood = stands;
-      made = asked = 0.0;
+      error = 0.0;
       ticks = 0;
     };
     for (double done = 0.0; done < half; done += 3.0) {
@@ -250,11 +254,11 @@ struct Result {
   ForceError error;
 };
 
-int run(unsigned boards, unsigned seed, double contact, unsigned on_image) {
+int run(unsigned boards, unsigned first, unsigned seed, double contact, unsigned on_image) {
   std::vector<Result> results;
   unsigned failures = 0;
   ForceError all;
-  for (unsigned number = 0; number < boards; ++number) {
+  for (unsigned number = first; number < first + boards; ++number) {
     Draw draw(seed, number);
     const Scene scene = draw.board();
     // It warms up by a degree in a second at most.
@@ -262,8 +266,8 @@ int run(unsigned boards, unsigned seed, double contact, unsigned on_image) {
     try {
       NativeRun native(scene, contact, hottest);
       native.run();
-      if (native.error().mean() > 0.1 || native.error().worst > 0.3)
-        wrong(fmt::format("force error {:.3f} N mean, {:.3f} N worst; allowed are 0.1 and 0.3 N",
+      if (native.error().mean() > 0.1 || native.error().worst > 0.15)
+        wrong(fmt::format("force error {:.3f} N mean, {:.3f} N worst; allowed are 0.1 and 0.15 N",
                           native.error().mean(), native.error().worst));
       fmt::print("{:4} {:14} {:.4f} N mean, {:.4f} N worst\n", number, scene.name, native.error().mean(),
                  native.error().worst);
@@ -296,8 +300,8 @@ int run(unsigned boards, unsigned seed, double contact, unsigned on_image) {
 }
 
 constexpr const char* usage =
-    "usage: random_boards [--boards N] [--seed S] [--contact SECONDS] [--image N]\n"
-    "  --boards N  200 by default; --contact 600 s each, half of it at each of two walls\n"
+    "usage: random_boards [--boards N] [--first B] [--seed S] [--contact SECONDS] [--image N]\n"
+    "  --boards N  200 by default, from board B on; --contact 600 s each, half of it at each of two walls\n"
     "  --image N   the N worst of them, 20 s each, by the image on the virtual board; 0 by default\n"
     "Exit code 0: no false trip and none missed; 1: one, which the same seed does again; 2: wrong usage.\n";
 
@@ -313,12 +317,13 @@ bool parse(const char* text, Number& number) {
 
 int main(int count, char** arguments) {
   using namespace kmax::soak;
-  unsigned boards = 200, seed = 1, on_image = 0;
+  unsigned boards = 200, first = 0, seed = 1, on_image = 0;
   double contact = 600.0;
   for (int i = 1; i < count; i += 2) {
     const std::string name = arguments[i];
     const char* value = i + 1 < count ? arguments[i + 1] : "";
     const bool taken = name == "--boards"    ? parse(value, boards)
+                       : name == "--first"   ? parse(value, first)
                        : name == "--seed"    ? parse(value, seed)
                        : name == "--contact" ? parse(value, contact)
                        : name == "--image"   ? parse(value, on_image)
@@ -328,5 +333,5 @@ int main(int count, char** arguments) {
       return 2;
     }
   }
-  return run(boards, seed, contact, on_image);
+  return run(boards, first, seed, contact, on_image);
 }
