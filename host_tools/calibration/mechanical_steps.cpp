@@ -158,18 +158,30 @@ void find_motion(Calibration& run) {
   strong.prepare();
   const double rough = fit_of(known, {&strong}, {strong.half_period()}).friction.value;
   const double wanted = motion_force_ratio * std::max(rough, 0.0) / known.force_per_ampere();
-  Shaking gentle(bench, known, std::clamp(wanted, 0.15 * known.current, known.current),
-                 stroke_share * bench.travel());
-  gentle.prepare();
-  const int slow = gentle.half_period();
-  const int fast = std::max(20, static_cast<int>(slow * motion_second_period));
   std::vector<Estimate> mass, damping, friction;
-  for (int i = 0; i < run.settings.repetitions; ++i) {
-    bench.progress(fmt::format("motion: {} of {}", i + 1, run.settings.repetitions));
-    const MotionFit fit = fit_of(known, {&strong, &gentle, &gentle}, {strong.half_period(), slow, fast});
-    mass.push_back(fit.mass);
-    damping.push_back(fit.damping);
-    friction.push_back(fit.friction);
+  const auto shake_with = [&](double current) {
+    Shaking gentle(bench, known, current, stroke_share * bench.travel());
+    gentle.prepare();
+    const int slow = gentle.half_period();
+    const int fast = std::max(20, static_cast<int>(slow * motion_second_period));
+    for (int i = 0; i < run.settings.repetitions; ++i) {
+      bench.progress(fmt::format("motion: {} of {}", i + 1, run.settings.repetitions));
+      const MotionFit fit = fit_of(known, {&strong, &gentle, &gentle}, {strong.half_period(), slow, fast});
+      mass.push_back(fit.mass);
+      damping.push_back(fit.damping);
+      friction.push_back(fit.friction);
+    }
+  };
+  // Where the friction is small a detent of the cogging may hold the handle all the same.
+  for (double current = std::clamp(wanted, 0.15 * known.current, known.current);;
+       current = std::min(2.0 * current, known.current)) {
+    try {
+      shake_with(current);
+      break;
+    } catch (const StepFailed& failed) {
+      if (failed.diagnosis().cause != "motor_blocked" || current >= known.current) throw;
+    }
+    mass.clear(), damping.clear(), friction.clear();
   }
   report.values.push_back(repeated_value("device.mass", mass, "kg", known.mass));
   report.values.push_back(repeated_value("friction", friction, "N", std::nullopt));

@@ -88,8 +88,9 @@ constexpr double first_piece = 0.04;   // s
 constexpr double longest_piece = 0.3;  // s
 constexpr int most_pieces = 200;
 constexpr std::size_t pull_samples = 60;
-// A handle that has coasted out of the travel must come back by more than is left of it.
-constexpr double return_margin = 0.002;  // m
+// A handle that has coasted out of the travel must come back by more than is left of it; a light one, or one
+// that little damps, swings past the middle and is still within the travel there.
+constexpr double overshoot = 0.5;  // of the travel
 
 Waveforms pull(Bench& bench, const MotorKnowledge& known, double stroke, double duration, double reach) {
   ExcitationPlan spring;
@@ -116,7 +117,7 @@ void centre_handle(Bench& bench, const MotorKnowledge& known) {
   double away = bench.displacement();
   if (std::abs(away) < near_enough * bench.travel()) return;
   bench.disarm();
-  const double reach = std::abs(away) + return_margin;
+  const double reach = std::abs(away) + overshoot * bench.travel();
   double duration = first_piece;
   for (int piece = 0; piece < most_pieces; ++piece) {
     away = bench.displacement();

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host_tools/calibration/procedure.hpp"
@@ -39,7 +40,9 @@ struct CalibrationLength {
 class CalibratedDevice {
  public:
   explicit CalibratedDevice(const std::string& scene_name, std::uint64_t seed = 0)
-      : scene_(open(scene_name, seed)),
+      : CalibratedDevice(open(scene_name, seed)) {}
+  explicit CalibratedDevice(simulation::Scene scene)
+      : scene_(std::move(scene)),
         link_(new link::SimLink(scene_)),
         device_(std::unique_ptr<link::Link>(link_)) {
     set({"modbus.baud_rate=921600"});

@@ -54,6 +54,16 @@ TEST_P(Accuracy, LostTravelIsSeenAgainstTheCalibrationBefore) {
   EXPECT_EQ(device.parameters(), before);
 }
 
+// What pulls it back to the middle leaves it swinging past it.
+TEST(CalibrationAccuracy, AHandleOfLittleFrictionOnCoarseDetentsStaysWithinItsTravel) {
+  simulation::Scene scene = simulated_board::open_scene("gimbal_b");
+  scene.axes[0].device = {.mass = 0.094, .damping = 0.49, .friction = 0.05, .force_limit = 0.0};
+  std::get<simulation::SynchronousMotorConfig>(*scene.axes[0].motor).cogging_torque = 1.5e-3;
+  CalibratedDevice device(scene);
+  const auto report = device.calibrate();
+  EXPECT_TRUE(report.pass()) << cause_of(report);
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, Accuracy, testing::ValuesIn(motor_scenes));
 
 }  // namespace kmax::calibration_test::procedure_accuracy_test
