@@ -352,6 +352,8 @@ TEST(RtuPort, DiagnosticsCountWhatTheLineCarried) {
   client.exchange_next(adu(1, {8, 0, 10, 0, 0}));
   for (const std::uint8_t which : {std::uint8_t{12}, std::uint8_t{13}, std::uint8_t{15}})
     EXPECT_EQ(count(which), 0) << int{which};
+  for (int n = 0; n < 300; ++n) client.exchange_next(adu(1, {99}));
+  EXPECT_EQ(count(13), 300) << "more than a byte";
 }
 
 TEST(RtuPort, DiagnosticsEchoAnyData) {
