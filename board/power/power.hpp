@@ -55,7 +55,7 @@ class Power {
 
   /// The falling edge of the gate drivers' fault line, after it has been acknowledged. All bridges are off
   /// before anything is asked. Then the line is: an edge after which it is at rest for a microsecond was
-  /// interference, and the bridges go on, a few times in as many milliseconds: beyond, and where the line
+  /// interference, and the bridges go on, as often as InterferenceBudget has it: beyond, and where the line
   /// does not come to rest within 3 us, it is a fault for good. An edge meanwhile calls again.
   void ISR_fault_line() { ISR_line(PowerStage<Lines>::Line::fault); }
   /// The same of the emergency stop's contact, which opens, and bounces.

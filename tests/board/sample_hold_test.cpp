@@ -79,7 +79,7 @@ TEST(SampleHold, CalibrationAndInvalidSamplesAreToldApart) {
   EXPECT_TRUE(both.hold && both.calibrate);
 }
 
-TEST(InterferenceBudget, ForgivesItsMostAndOneMoreForEachMillisecondThatPasses) {
+TEST(InterferenceBudget, ForgivesItsMostAndItsLeakForEachMillisecondThatPasses) {
   InterferenceBudget budget;
   std::uint32_t now = 0xFFFF'FF00;  // the clock wraps
   budget.poll(now);
@@ -92,10 +92,12 @@ TEST(InterferenceBudget, ForgivesItsMostAndOneMoreForEachMillisecondThatPasses) 
   EXPECT_TRUE(budget.ISR_spent()) << "just before the bound";
   for (int n = 0; n < 3; ++n) {
     budget.poll(now += 1'000);
-    ASSERT_FALSE(budget.ISR_spent()) << n;
     budget.poll(now + 999);
-    budget.ISR_forgive();
-    EXPECT_TRUE(budget.ISR_spent()) << "what comes back just after the bound spends the one that has leaked";
+    for (unsigned leaked = 0; leaked < InterferenceBudget::leak; ++leaked) {
+      ASSERT_FALSE(budget.ISR_spent()) << n;
+      budget.ISR_forgive();
+    }
+    EXPECT_TRUE(budget.ISR_spent()) << "what comes back just after the bound spends what has leaked";
   }
 }
 
