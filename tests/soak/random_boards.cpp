@@ -225,18 +225,16 @@ class NativeRun {
 /// The image with the same parts, told of its motor: pressed for as long.
 ForceError run_image(Scene scene, double contact, double hottest) {
   scene.identified = true;
-  const std::pair<const char*, simulation::ParameterValue> told[] = {{"wall.law", std::string("adaptive")},
-                                                                     {"wall.position", -0.003},
-                                                                     {"wall.stiffness", 800.0},
-                                                                     {"link.timeout", 0.0}};
+  const std::pair<const char*, simulation::ParameterValue> told[] = {
+      {"wall.law", std::string("adaptive")},
+      {"wall.position", -0.003},
+      {"wall.stiffness", 800.0},
+      {"encoder.start", std::string("at_rest")},
+      {"link.timeout", 0.0}};
   for (const auto& [name, value] : told) scene.parameters.push_back({name, value, "random_boards"});
   ImageBench bench(scene);
   bench.start();
   simulation::MotorDrive& drive = bench.world.drive(0);
-  for (const double force : {1.0, -1.0, 1.0}) {  // past the index, and out of the wall
-    drive.push(force, 8.0);
-    bench.board->run_for(0.15);
-  }
   bench.master->arm(0);
   ForceError error;
   const double steps = contact / 0.02;
