@@ -70,7 +70,8 @@ static_assert(!over_current_code(59));
 
 }  // namespace drv8301
 
-/// Bits 0 to 10 are those of status register 1; GVDD_OV of status register 2 is put above them.
+/// Bits 0 to 10 are those of status register 1; GVDD_OV of status register 2 is put above them, and above
+/// that what the chip cannot say itself.
 enum class Drv8301Fault : std::uint16_t {
   over_current_c_low = 1U << 0,   // FETLC_OC
   over_current_c_high = 1U << 1,  // FETHC_OC
@@ -84,6 +85,7 @@ enum class Drv8301Fault : std::uint16_t {
   gate_supply_under_voltage = 1U << 9,  // GVDD_UV
   fault = 1U << 10,                     // FAULT: the gates are off and nFAULT is low
   gate_supply_over_voltage = 1U << 11,  // GVDD_OV; only a full reset by EN_GATE takes it back
+  no_answer = 1U << 12,
 };
 
 enum class Drv8301GateCurrent : std::uint8_t { a1_7, a0_7, a0_25 };

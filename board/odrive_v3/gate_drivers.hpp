@@ -38,9 +38,9 @@ class GateDrivers {
     return silent ? GateDriverAnswer::silent : GateDriverAnswer::faulty;
   }
 
-  /// In the bits of drive.gate_driver_faults, which are the chip's own (drivers::Drv8301Fault).
+  /// In the bits of drive.gate_driver_faults: drivers::Drv8301Fault.
   std::uint16_t read_faults(std::size_t axis) {
-    constexpr std::uint16_t no_answer = 4096;
+    constexpr auto no_answer = static_cast<std::uint16_t>(drivers::Drv8301Fault::no_answer);
     if (!claim()) return no_answer;
     Selected chip = select(axis);
     const std::optional<std::uint16_t> faults = drivers::Drv8301<Selected>{chip}.faults();

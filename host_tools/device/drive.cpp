@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <utility>
 
+#include "drivers/drv8301_registers.hpp"
 #include "firmware/drive/fault.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
@@ -93,24 +95,25 @@ std::string presence_words(firmware::AxisPresence presence) {
 }
 
 std::string gate_driver_words(std::uint16_t faults) {
-  // By bit; see drive.gate_driver_faults. What is empty says only that there is a fault.
-  constexpr std::string_view texts[] = {"phase C, low side: too much current",
-                                        "phase C, high side: too much current",
-                                        "phase B, low side: too much current",
-                                        "phase B, high side: too much current",
-                                        "phase A, low side: too much current",
-                                        "phase A, high side: too much current",
-                                        "over-temperature warning",
-                                        "over-temperature shut-down",
-                                        "the motor supply is too low for it",
-                                        "its gate supply is too low",
-                                        "",
-                                        "its gate supply is too high",
-                                        "it does not answer"};
+  // Drv8301Fault::fault says only that there is one.
+  using enum drivers::Drv8301Fault;
+  constexpr std::pair<drivers::Drv8301Fault, std::string_view> texts[] = {
+      {over_current_c_low, "phase C, low side: too much current"},
+      {over_current_c_high, "phase C, high side: too much current"},
+      {over_current_b_low, "phase B, low side: too much current"},
+      {over_current_b_high, "phase B, high side: too much current"},
+      {over_current_a_low, "phase A, low side: too much current"},
+      {over_current_a_high, "phase A, high side: too much current"},
+      {over_temperature_warning, "over-temperature warning"},
+      {over_temperature, "over-temperature shut-down"},
+      {supply_under_voltage, "the motor supply is too low for it"},
+      {gate_supply_under_voltage, "its gate supply is too low"},
+      {gate_supply_over_voltage, "its gate supply is too high"},
+      {no_answer, "it does not answer"}};
   std::string words;
-  for (std::size_t bit = 0; bit < std::size(texts); ++bit) {
-    if ((faults >> bit & 1U) == 0 || texts[bit].empty()) continue;
-    words += fmt::format("{}{}", words.empty() ? "" : "; ", texts[bit]);
+  for (const auto& [bit, text] : texts) {
+    if ((faults & static_cast<unsigned>(bit)) != 0)
+      words += fmt::format("{}{}", words.empty() ? "" : "; ", text);
   }
   if (!words.empty()) return words;
   return faults != 0 ? "a fault, and no cause" : "nothing, so it was another axis' driver or interference";

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <regex>
+
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/fake_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -134,6 +136,19 @@ TEST_F(DriveTest, AFaultOfTheGateDriversIsToldWithWhatTheDriverSays) {
             "phase A, high side: too much current; the motor supply is too low for it");
   EXPECT_EQ(gate_driver_words(0x400), "a fault, and no cause");
   EXPECT_EQ(gate_driver_words(0x1000), "it does not answer");
+}
+
+TEST_F(DriveTest, TheDictionaryNamesTheBitsOfTheGateDriverThatHaveWords) {
+  const std::string help(firmware::entry_at(firmware::entry_of<"drive.gate_driver_faults">()).help);
+  const std::regex number("[1-9][0-9]*");
+  unsigned named = 0;
+  for (std::sregex_iterator at(help.begin(), help.end(), number), end; at != end; ++at)
+    named |= static_cast<unsigned>(std::stoul(at->str()));
+  unsigned have_words = 0;
+  for (unsigned bit = 1; bit <= 0x8000; bit <<= 1) {
+    if (gate_driver_words(static_cast<std::uint16_t>(bit)) != "a fault, and no cause") have_words |= bit;
+  }
+  EXPECT_EQ(named, have_words);
 }
 
 TEST_F(DriveTest, AnUnknownErrorCodeIsShownAsANumber) {
