@@ -53,6 +53,11 @@ std::optional<AxisStateMachine> machine_in(DriveState state, std::uint16_t previ
   return m;
 }
 
+// By a word that leads there.
+AxisStateMachine machine_in(DriveState state) {
+  return *machine_in(state, state == operation_enabled ? 0x0F : state == switched_on ? 0x07 : 0x86);
+}
+
 // Words that set bits 3 and 7 of the previous word in each way, with the other bits in several ways.
 constexpr std::uint16_t previous_words[] = {0x00, 0x02, 0x06, 0x07, 0x08, 0x0A, 0x0E, 0x0F,   0x80,
                                             0x82, 0x86, 0x87, 0x88, 0x8A, 0x8E, 0x8F, 0xFF70, 0xFFFF};
@@ -200,7 +205,7 @@ TEST(AxisStateMachine, ResetEdgeDuringTheReactionIsNotKeptForLater) {
 
 TEST(AxisStateMachine, TripsFromEveryStateAndTheFirstFaultIsKept) {
   for (const DriveState state : all_states) {
-    auto m = *machine_in(state, state == operation_enabled ? 0x0F : state == switched_on ? 0x07 : 0x86);
+    auto m = machine_in(state);
     m.trip(Fault::none);
     EXPECT_EQ(m.state(), state);
     const Fault before = m.fault();
@@ -218,7 +223,7 @@ TEST(AxisStateMachine, TripsFromEveryStateAndTheFirstFaultIsKept) {
 
 TEST(AxisStateMachine, EndOfInitialisationAndOfReactionActOnlyInTheirState) {
   for (const DriveState state : all_states) {
-    auto m = *machine_in(state, state == operation_enabled ? 0x0F : state == switched_on ? 0x07 : 0x86);
+    auto m = machine_in(state);
     auto other = m;
     m.initialised();
     EXPECT_EQ(m.state(), state == not_ready_to_switch_on ? switch_on_disabled : state);
@@ -228,18 +233,14 @@ TEST(AxisStateMachine, EndOfInitialisationAndOfReactionActOnlyInTheirState) {
 }
 
 TEST(Controlword, BitsOfBothWordsAreTheStandards) {
-  EXPECT_EQ(controlword::switch_on, 0x0001);
-  EXPECT_EQ(controlword::enable_voltage, 0x0002);
-  EXPECT_EQ(controlword::quick_stop, 0x0004);
-  EXPECT_EQ(controlword::enable_operation, 0x0008);
-  EXPECT_EQ(controlword::fault_reset, 0x0080);
-  EXPECT_EQ(controlword::halt, 0x0100);
-  EXPECT_EQ(statusword::voltage_enabled, 0x0010);
-  EXPECT_EQ(statusword::warning, 0x0080);
-  EXPECT_EQ(statusword::remote, 0x0200);
-  EXPECT_EQ(statusword::target_reached, 0x0400);
-  EXPECT_EQ(statusword::internal_limit_active, 0x0800);
-  EXPECT_EQ(statusword::follows_command_value, 0x1000);
+  using Bits = std::array<unsigned, 6>;
+  EXPECT_EQ((Bits{controlword::switch_on, controlword::enable_voltage, controlword::quick_stop,
+                  controlword::enable_operation, controlword::fault_reset, controlword::halt}),
+            (Bits{0x0001, 0x0002, 0x0004, 0x0008, 0x0080, 0x0100}));
+  EXPECT_EQ(
+      (Bits{statusword::voltage_enabled, statusword::warning, statusword::remote, statusword::target_reached,
+            statusword::internal_limit_active, statusword::follows_command_value}),
+      (Bits{0x0010, 0x0080, 0x0200, 0x0400, 0x0800, 0x1000}));
 }
 
 TEST(Controlword, WhatAsksForOperationAndWhatHalts) {
