@@ -86,12 +86,13 @@ class NativeBoard {
     return out;
   }
 
-  /// Bytes from the host; each takes its character time from now on, one after the other.
-  void receive(std::span<const std::uint8_t> bytes) {
+  /// Bytes from the host; each takes its character time from now on, one after the other. `line_error`: of
+  /// another form than 8E1.
+  void receive(std::span<const std::uint8_t> bytes, bool line_error = false) {
     const std::uint64_t character = character_us();
     for (const std::uint8_t byte : bytes) {
       line_free_us_ = (line_free_us_ > now_us_ ? line_free_us_ : now_us_) + character;
-      incoming_.push_back({line_free_us_, byte});
+      incoming_.push_back({line_free_us_, byte, line_error});
     }
   }
 
@@ -114,6 +115,7 @@ class NativeBoard {
   struct TimedByte {
     std::uint64_t time_us;
     std::uint8_t byte;
+    bool line_error;
   };
 
   std::uint64_t character_us() const {
@@ -183,7 +185,7 @@ class NativeBoard {
 
     const auto now = static_cast<std::uint32_t>(now_us_);
     while (!incoming_.empty() && incoming_.front().time_us <= now_us_) {
-      application_->serial().ISR_byte(incoming_.front().byte, false,
+      application_->serial().ISR_byte(incoming_.front().byte, incoming_.front().line_error,
                                       static_cast<std::uint32_t>(incoming_.front().time_us));
       incoming_.pop_front();
     }

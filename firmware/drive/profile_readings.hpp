@@ -19,11 +19,14 @@ inline constexpr std::uint32_t supported_drive_modes = 1u << 9 | 1u << 16 | 1u <
 
 /// profile.digital_inputs, CiA 402: the emergency stop is pressed or its line is open.
 inline constexpr std::uint32_t emergency_stop_input = 1u << 16;
+/// The encoder's index has been passed since the start.
+inline constexpr std::uint32_t index_passed_input = 1u << 18;
 
 /// profile.digital_inputs. The board names one cause at a time, the emergency stop before all others.
 constexpr std::uint32_t digital_inputs_of(const AxisReport& report) {
   return (report.condition == Fault::emergency_stop ? emergency_stop_input : 0u) |
-         (report.condition == Fault::gate_driver ? 1u << 17 : 0u) | (report.referenced ? 1u << 18 : 0u);
+         (report.condition == Fault::gate_driver ? 1u << 17 : 0u) |
+         (report.referenced ? index_passed_input : 0u);
 }
 
 /// The nearest whole number, as the pattern of a value of 32 bits with its sign; what is beyond stays at the

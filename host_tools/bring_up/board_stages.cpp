@@ -50,6 +50,25 @@ bool stands(device::Device& device, const Settings& settings, const Party& party
   });
 }
 
+/// A line that is loose is pulled up: the index is never passed, and the count is not believed any more.
+CheckResult check_index(device::Device& device, const Settings& settings, const Party& party) {
+  CheckResult check{"encoder index"};
+  party.person.ask(
+      "Get ready to move the handle to and fro past the encoder's index: over a whole turn of the shaft, if "
+      "it goes that far");
+  if (wait_for(device, settings, party, "waiting for the index", [&] {
+        return (device.read(device::Parameter::of<"profile.digital_inputs">(settings.axis)) &
+                firmware::index_passed_input) != 0;
+      }))
+    return check.pass("it has been passed");
+  return check.fail(
+      "encoder index",
+      fmt::format("not seen within {:.0f} s although A and B count: check the wire of Z at J4, and its "
+                  "supply; see that "
+                  "the travel reaches it; for an encoder without this line set encoder.index=none",
+                  settings.patience));
+}
+
 CheckResult check_stop(device::Device& device, const Settings& settings, const Party& party) {
   CheckResult check{"emergency stop"};
   const auto open = [&] { return stop_is_open(device, settings.axis); };
@@ -92,16 +111,35 @@ CheckResult check_clock(device::Device& device) {
   return check.pass(seen);
 }
 
-/// The supply as the board measures it against the supply's own meter: two boards differ in their divider.
-CheckResult check_divider(double measured, double shown) {
+/// The supply as the board measures it against the supply's own meter: two boards differ in their divider. A
+/// reading at the end of the converter's range, which the ceiling tells with the variant, is no measurement.
+CheckResult check_divider(double measured, std::optional<double> meter, double ceiling) {
+  using namespace board::odrive_v3;
+  constexpr double reference = 3.3;  // V, of the converter
   CheckResult check{"supply divider"};
-  const double ratio = measured / shown;
+  for (const VoltageVariant variant : {VoltageVariant::v24, VoltageVariant::v56}) {
+    const double end = reference * static_cast<double>(supply_divider_ratio(variant));
+    const PartRatings parts = part_ratings(variant);
+    if (std::abs(ceiling - static_cast<double>(supply_ceiling(variant))) > 0.01 || measured < 0.995 * end)
+      continue;
+    check.values = {{"measured", measured, "V", 0.0, ceiling}};
+    return check.fail(
+        "supply (beyond the range)",
+        fmt::format(
+            "the board measures {:.1f} V, the end of its range ({:.1f} V): the supply has that or more. "
+            "Switch "
+            "it off at once: the capacitors of a {:.0f} V board are rated for {:.0f} V, and may be broken "
+            "already; look for swollen ones. Allowed are {:.0f} V at most. If the supply's own meter never "
+            "showed more than that, the divider on the board is open",
+            measured, end, parts.supply, parts.capacitors, parts.supply));
+  }
+  if (!meter) return check.not_judged("give what the supply's own meter shows with --supply VOLT");
+  const double shown = *meter, ratio = measured / shown;
   check.values = {{"measured_to_shown", ratio, "", 0.9, 1.1}};
   const std::string seen =
       fmt::format("the board measures {:.2f} V, the supply shows {:.2f} V", measured, shown);
-  using board::odrive_v3::VoltageVariant;
-  const double of_56_to_24 = board::odrive_v3::supply_divider_ratio(VoltageVariant::v56) /
-                             board::odrive_v3::supply_divider_ratio(VoltageVariant::v24);
+  const double of_56_to_24 =
+      supply_divider_ratio(VoltageVariant::v56) / supply_divider_ratio(VoltageVariant::v24);
   const auto near = [ratio](double other) { return std::abs(ratio / other - 1.0) < 0.1; };
   if (near(1.0)) return check.pass(seen);
   if (near(of_56_to_24))
@@ -181,7 +219,8 @@ CheckResult check_brake(const Settings& settings, double brake_voltage, double s
   if (!settings.brake)
     return check.not_judged("measure between the terminals of AUX, supply off, and give --brake OHM");
   const double ohm = *settings.brake;
-  check.values = {{"resistance", ohm, "ohm", 0.47, 100.0}, {"on_voltage", brake_voltage, "V"}};
+  check.values = {{"on_voltage", brake_voltage, "V"}};
+  if (ohm > 0.0) check.values.push_back({"resistance", ohm, "ohm", 0.47, 100.0});
   if (ohm <= 0.0 && brake_voltage > 0.0)
     return check.fail("brake resistor",
                       fmt::format("supply.brake_voltage is {:.1f} V and no resistor is there: connect "
@@ -224,8 +263,9 @@ StageResult try_logic(device::Device& device, const Settings& settings, const Pa
   result.checks = {check_link(evidence), check_clock(device)};
   const auto supply = selftest::mean_and_deviation(evidence.supply, 0, evidence.supply.size());
   // With a wrong divider every voltage is wrong: what is allowed is not looked at then.
-  if (settings.supply && supply.mean > 1.0)
-    result.checks.push_back(check_divider(supply.mean, *settings.supply));
+  if (supply.mean > 1.0)
+    result.checks.push_back(
+        check_divider(supply.mean, settings.supply, device.read_number("supply.ceiling")));
   if (result.passed()) result.checks.push_back(check_supply(evidence));
   result.checks.push_back(check_temperature(evidence));
   if (result.passed()) result.checks.push_back(check_stop(device, settings, party));
@@ -252,13 +292,19 @@ StageResult try_load(device::Device& device, const Settings& settings, const Par
 
 StageResult try_motor(device::Device& device, const Settings& settings, const Party& party) {
   StageResult result;
+  const auto index = device::Parameter::of<"encoder.index">(settings.axis);
+  const bool has_index =
+      device.read(index) != 0 && device.read(device::Parameter::of<"encoder.kind">(settings.axis)) == 0;
   {
     Probe probe(device, settings.axis, party.progress);
+    // A and B alone first.
+    if (has_index) probe.bench().set_temporary({"encoder.index=none"});
     const selftest::HandSettings hand{.patience = settings.patience};
     result.checks.push_back(check_hand_motion(
         probe, hand, [&](const std::string& text) { party.person.ask("Get ready to " + text); }));
     put_back(probe);
   }
+  if (has_index && result.passed()) result.checks.push_back(check_index(device, settings, party));
   if (!result.passed()) return result;
   party.person.ask("Let go of the handle");
   if (!stands(device, settings, party)) {

@@ -126,7 +126,7 @@ struct Evidence {
   ArmingTrial arming;
   std::optional<PulseResponse> rest;        ///< bridge off
   std::vector<PulseResponse> swings;        ///< along 0 and 90 degrees; a DC motor has one
-  std::optional<PulseResponse> under_load;  ///< a pulse with the supply recorded
+  std::optional<PulseResponse> under_load;  ///< a swing with the supply recorded
   std::optional<PhaseFinding> phases;
   std::optional<MotionEvidence> motion;
   firmware::Fault pulse_fault = firmware::Fault::none;  ///< the first that ended a pulse

@@ -36,9 +36,7 @@ class PulseSequence {
       if (!worth_going_on()) return;
       if (moved()) break;
     }
-    Pulse load = plan_pulse(plan_, test_current_share * limit, weak_budget, supply_);
-    load.voltage = voltage_for(test_current_share * limit);
-    evidence_.under_load = probe_.give(load, Probe::Observe::supply);
+    evidence_.under_load = probe_.give(evidence_.swings.front().pulse, Probe::Observe::supply);
     note_trip(*evidence_.under_load);
   }
 

@@ -45,7 +45,7 @@ class SelfTestEnded : public std::runtime_error {
 ///   4  if the circuit is healthy: a long even swing (80 ms) at the test current, a synchronous motor in two
 ///      directions, planned to move a free handle by 0.25 mm at most; once more with twice the current if
 ///      nothing has moved
-///   5  a pulse with the supply watched
+///   5  the swing once more with the supply watched
 ///
 /// The bounds go by the claimed mass and torque constant, or by the mobility that the pulses before have
 /// shown, whichever is larger (pulse_plan.hpp); and excitation.travel trips at 0.8 mm from the start.

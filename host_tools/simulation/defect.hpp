@@ -23,6 +23,7 @@ enum class Defect : std::uint8_t {
   current_b_inverted,  // the shunt's wires of leg B are exchanged
   current_c_inverted,
   gate_driver_missing,  // it does not answer, and the converter's pins of the currents float
+  index_loose,          // the encoder's line Z is off, and is pulled up
 };
 
 struct DefectName {
@@ -44,6 +45,7 @@ inline constexpr std::array defect_names{
     DefectName{Defect::current_b_inverted, "current_b_inverted"},
     DefectName{Defect::current_c_inverted, "current_c_inverted"},
     DefectName{Defect::gate_driver_missing, "gate_driver_missing"},
+    DefectName{Defect::index_loose, "index_loose"},
 };
 
 constexpr std::string_view name_of(Defect defect) {

@@ -34,7 +34,7 @@ EncoderLines QuadratureEncoder::lines() const {
   const std::int64_t state = edges_ & 3;
   std::int64_t in_turn = disc_count_ % counts_per_turn_;
   if (in_turn < 0) in_turn += counts_per_turn_;
-  return {state == 1 || state == 2, state == 2 || state == 3, in_turn == index_};
+  return {state == 1 || state == 2, state == 2 || state == 3, index_loose_ || in_turn == index_};
 }
 
 }  // namespace kmax::simulation

@@ -46,6 +46,8 @@ class QuadratureEncoder {
   // Pulls the plug, or puts it back.
   void set_plugged(bool plugged) { plugged_ = plugged; }
   bool plugged() const { return plugged_; }
+  // The wire of Z alone.
+  void set_index_loose(bool loose) { index_loose_ = loose; }
 
   std::int64_t lost_edges() const { return lost_; }  // by dropouts, number of
   const EncoderConfig& config() const { return config_; }
@@ -59,7 +61,7 @@ class QuadratureEncoder {
   std::int64_t disc_count_;
   std::int64_t edges_;
   std::int64_t lost_ = 0;
-  bool plugged_ = true;
+  bool plugged_ = true, index_loose_ = false;
 };
 
 // The encoder of an axis without a motor: true position in, counter value out. Ideal (EncoderModel) unless

@@ -145,6 +145,8 @@ void SceneDrives::set(std::size_t index, Defect defect, bool present) {
       return drive.current_sensor().invert(Channel::c, present);
     case Defect::gate_driver_missing:
       return drive.current_sensor().set_floating(present);
+    case Defect::index_loose:
+      return drive.encoder().set_index_loose(present);
   }
 }
 

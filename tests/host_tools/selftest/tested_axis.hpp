@@ -42,6 +42,8 @@ class WatchedLink final : public link::FrameLink {
   void lose_every(int nth) { lose_every_ = nth; }
   /// Loses every message from now on: the cable is pulled, or the program killed.
   void cut() { cut_ = true; }
+  /// The adapter sends its bytes without parity.
+  bool without_parity = false;
   /// Called before every tick.
   std::function<void()> before_tick;
   /// Called before every message: for how long the host is held up before it sends it.
@@ -63,7 +65,7 @@ class WatchedLink final : public link::FrameLink {
       wait(std::chrono::milliseconds(100));
       throw link::LinkError("lost");
     }
-    board_.board().receive(frame);
+    board_.board().receive(frame, without_parity);
     for (int tries = 0; tries < 20000; ++tries) {
       tick();
       const std::vector<std::uint8_t> reply = board_.board().transmitted();

@@ -198,7 +198,7 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
   const std::string defects =
       "\"phase_a_open\", \"phase_b_open\", \"phase_c_open\", \"phases_swapped\", \"encoder_unplugged\", "
       "\"encoder_stuck\", \"encoder_reversed\", \"encoder_slipping\", \"supply_low\", \"motor_blocked\", "
-      "\"current_b_inverted\", \"current_c_inverted\", \"gate_driver_missing\"";
+      "\"current_b_inverted\", \"current_c_inverted\", \"gate_driver_missing\", \"index_loose\"";
   const std::string motion = "[device]\n[operator]\n[motion]\nstart_position = -0.05\n";
   const std::string persons = "[device]\n[operator]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n";
   for (

@@ -4,6 +4,7 @@
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
+#include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
 namespace kmax::cli::bring_up_command_test {
@@ -17,6 +18,12 @@ class BringUpCommand : public SimulatedCommandLine {
     Context context(
         out, messages, [this](const std::string&, const link::Notice&) -> std::unique_ptr<link::Link> {
           if (silent) throw link::LinkError("nobody answers");
+          if (without_parity) {
+            auto adapter =
+                std::make_unique<selftest::WatchedLink>(simulated_board::open_scene("dc_coreless_a"), 0);
+            adapter->without_parity = true;
+            return adapter;
+          }
           auto sim = std::make_unique<link::SimLink>(simulated_board::open_scene("dc_coreless_a"));
           sim->wait(std::chrono::milliseconds(200));
           return sim;
@@ -26,7 +33,7 @@ class BringUpCommand : public SimulatedCommandLine {
     said = messages.str();
     return code;
   }
-  bool silent = false;
+  bool silent = false, without_parity = false;
   host_tools_test::TemporaryFolder folder;
   std::string file = (folder.path() / "report.json").string();
 };
@@ -65,6 +72,14 @@ TEST_F(BringUpCommand, WhatCannotBeDoneIsSaidAndChangesNothing) {
   silent = true;
   EXPECT_EQ(bring_up({"--yes"}), failed);
   EXPECT_CONTAINS(said, "8E1");
+}
+
+TEST_F(BringUpCommand, AnAdapterWithoutParityIsFoundBeforeAnythingElse) {
+  without_parity = true;
+  EXPECT_EQ(bring_up({"--report", file, "--yes"}), failed);
+  EXPECT_CONTAINS(said, "stage 'logic'");
+  EXPECT_CONTAINS(said, "8E1 (even parity)");
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 TEST_F(BringUpCommand, ListsItsStagesWithoutADevice) {
