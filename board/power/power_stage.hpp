@@ -53,8 +53,10 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
 ///   ready       the offsets are tracked; one that leaves its window takes all to `resetting` after 200 ms
 ///
 /// A board need not have all axes. A gate driver that has never answered since the start, three times while
-/// another accepted what was written, is not there, and the board goes on without its axis. One that has
-/// answered and is silent later has failed, and so has a board none of whose gate drivers answers.
+/// another accepted what was written and none pulled the fault line, is not there, and the board goes on
+/// without its axis. One that has answered and is silent later has failed, and so has a board none of whose
+/// gate drivers answers. A DRV8301 whose motor is turned fast does not start (a voltage at its SH pins); it
+/// is tried again until the motor stands.
 ///
 /// One look at a line proves nothing (line_look.hpp): what is active here must stay so.
 ///
@@ -158,7 +160,8 @@ class PowerStage {
     }
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
       if (!silent[axis]) continue;
-      if (any && ++silent_rounds_[axis] >= rounds_until_missing) {
+      // One that is there but does not start pulls its fault line.
+      if (any && !hardware_.fault_line_low() && ++silent_rounds_[axis] >= rounds_until_missing) {
         hardware_.set_missing(axis);
       } else {
         all = false;

@@ -74,7 +74,7 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
     {Fault::over_temperature, 0x4310, "over_temperature", "degC",
      "the power stage was hotter than temperature.limit", "let it cool down; lower current.limit"},
     {Fault::power_stage, 0x5400, "power_stage", "", "the power stage was not ready",
-     "check the supply; the gate driver needs it to answer"},
+     "check the supply; the gate driver needs it to answer, and a motor that is not turned fast"},
     {Fault::tick_missed, 0xFF03, "tick_missed", "", "a control tick was late or lost",
      "report it as a defect, with what was done before"},
     {Fault::current_sum, 0x2330, "current_sum", "A",

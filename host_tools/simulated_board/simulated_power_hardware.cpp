@@ -29,7 +29,9 @@ void SimulatedSerialEncoder::restart_without_turns() {
 }
 
 SimulatedPowerHardware::SimulatedPowerHardware(simulation::SceneDrives& drives)
-    : drives_(drives), supply_code_(converter_code(drives.supply().pin_voltage())) {}
+    : drives_(drives), supply_code_(converter_code(drives.supply().pin_voltage())) {
+  started_.fill(true);
+}
 
 const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::size_t axis) {
   simulation::MotorDrive& drive = drives_.drive(axis);
@@ -71,10 +73,17 @@ bool SimulatedPowerHardware::supply_suffices() const {
   return drives_.supply().voltage() >= board::odrive_v3::description.gate_driver_supply_minimum;
 }
 
+void SimulatedPowerHardware::set_gate_enable(bool high) {
+  for (std::size_t axis = 0; high && !gate_enabled_ && axis < started_.size(); ++axis)
+    started_[axis] = drives_.gate_driver_starts(axis);
+  gate_enabled_ = high;
+}
+
 board::GateDriverAnswer SimulatedPowerHardware::configure_gate_driver(std::size_t axis,
                                                                       drivers::CurrentSenseGain gain) {
   using enum board::GateDriverAnswer;
-  if (!supply_suffices() || drives_.planted(axis, simulation::Defect::gate_driver_missing)) return silent;
+  if (!supply_suffices() || !started_[axis] || drives_.planted(axis, simulation::Defect::gate_driver_missing))
+    return silent;
   if (drives_.has(axis))
     drives_.drive(axis).current_sensor().set_gain(static_cast<double>(drivers::gain_factor(gain)));
   return accepted;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <stdexcept>
 
 #include "board/power/power.hpp"
@@ -81,10 +82,10 @@ class SimulatedPowerHardware {
   std::uint16_t temperature_code(std::size_t axis) const;
   static constexpr std::uint32_t missed_ticks() { return 0; }
 
-  // board::MotorHardware. The level of EN_GATE has no model of its own: while it is low no axis is armed.
-  void set_gate_enable(bool) {}
-  /// A fault, or a supply below what the gate drivers need.
-  bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices(); }
+  // board::MotorHardware. Of EN_GATE only its rise has a model: while it is low no axis is armed.
+  void set_gate_enable(bool high);
+  /// A fault, a supply below what the gate drivers need, or one of them that has not started.
+  bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices() || !all_started(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
   board::GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
   /// Of a planted fault it knows no phase; a supply that is too low is named.
@@ -95,13 +96,15 @@ class SimulatedPowerHardware {
 
  private:
   bool supply_suffices() const;
+  bool all_started() const { return std::all_of(started_.begin(), started_.end(), std::identity{}); }
 
   simulation::SceneDrives& drives_;
   std::array<SimulatedBridge, firmware::axis_count> bridges_;
   std::array<Sample, firmware::axis_count> samples_;
   SimulatedSerialEncoder serial_encoder_{drives_};
   std::uint16_t supply_code_;
-  bool emergency_stop_pressed_ = false, gate_driver_fault_ = false;
+  bool emergency_stop_pressed_ = false, gate_driver_fault_ = false, gate_enabled_ = false;
+  std::array<bool, firmware::axis_count> started_;
 };
 
 /// What a 12-bit converter with a reference of 3.3 V makes of a voltage: the nearest code, and the ends

@@ -42,11 +42,15 @@ namespace kmax::simulation {
 struct InverterConfig {
   double on_resistance = 2e-3;  // ohm per leg
   double diode_drop = 0.8;      // V
+  // V at SH_x above which the gate driver does not start when EN_GATE rises (DRV8301 data sheet, 8.1.1, as
+  // recalled; the data sheet was not at hand); 0: it always starts.
+  double start_limit = 8.5;
 };
 
 inline constexpr std::array inverter_fields{
     ModelField<InverterConfig>{"on_resistance", &InverterConfig::on_resistance, 0.0, 10.0, "ohm"},
     ModelField<InverterConfig>{"diode_drop", &InverterConfig::diode_drop, 0.0, 5.0, "V"},
+    ModelField<InverterConfig>{"start_limit", &InverterConfig::start_limit, 0.0, 100.0, "V"},
 };
 
 struct LegCommand {

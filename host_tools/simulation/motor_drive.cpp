@@ -125,6 +125,13 @@ TerminalValues MotorDrive::leg_currents() const {
   return out_of_legs;
 }
 
+bool MotorDrive::gate_driver_starts() const {
+  const double limit = inverter_.config().start_limit;
+  const double highest = std::visit(
+      [&](const auto& motor) { return motor.largest_induced(handle_.velocity() / transmission_); }, motor_);
+  return limit == 0.0 || highest <= limit;
+}
+
 double MotorDrive::magnetic_energy() const {
   if (const auto* brushed = std::get_if<BrushedDcMotor>(&motor_)) return brushed->energy();
   return std::get<SynchronousMotor>(motor_).energy(shaft_angle());

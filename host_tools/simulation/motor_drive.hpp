@@ -99,10 +99,13 @@ class MotorDrive {
   TerminalValues currents() const;      // A, into the motor's terminals, now
   TerminalValues leg_currents() const;  // A, out of the inverter's legs, now
   double shaft_angle() const { return handle_.position() / transmission_; }  // rad
-  double shaft_speed() const { return handle_.velocity() / transmission_; }  // rad/s
   double mean_torque() const { return mean_torque_; }            // N m, with cogging, of the last advance
   double force() const { return mean_torque_ / transmission_; }  // N on the handle, of the last advance
   double magnetic_energy() const;                                // J in the inductances
+  // Whether the gate driver starts if EN_GATE rises now (InverterConfig::start_limit). Its highest SH_x is
+  // taken to be what the shaft induces between two legs, the lowest of which a diode holds at ground: a
+  // guess, since what leaks where decides.
+  bool gate_driver_starts() const;
   // Null: a brushed DC motor.
   const SynchronousMotor* synchronous_motor() const { return std::get_if<SynchronousMotor>(&motor_); }
 

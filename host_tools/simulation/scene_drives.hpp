@@ -61,6 +61,11 @@ class SceneDrives {
   // bears, whose variant the supply's divider tells (board/odrive_v3/voltage_variant.hpp).
   void advance(double duration);
 
+  // If EN_GATE rises now.
+  bool gate_driver_starts(std::size_t axis) const {
+    return !has(axis) || axes_[axis].drive->gate_driver_starts();
+  }
+
   EncoderKind encoder_kind(std::size_t axis) const { return axes_.at(axis).encoder_kind; }
   // The AS5047P of an axis: what its angle would be without wrapping at the turn.
   std::int64_t serial_angle(std::size_t axis) const;

@@ -58,6 +58,18 @@ class PowerStageTest : public testing::Test {
   std::uint32_t now = 0xFFFF'FF9C - 10'000;  // the clock wraps while it starts
 };
 
+TEST_F(PowerStageTest, ADriverThatPullsTheFaultLineWhileItIsSilentIsThere) {
+  hardware.answers[1] = GateDriverAnswer::silent;
+  hardware.fault_low = true;
+  run(3'000'000);
+  EXPECT_FALSE(hardware.missing[1]);
+  EXPECT_EQ(stage.condition(), Fault::power_stage);
+  hardware.answers[1] = GateDriverAnswer::accepted;
+  hardware.fault_low = false;
+  run(500'000);
+  EXPECT_TRUE(stage.ready());
+}
+
 TEST_F(PowerStageTest, IsNotReadyBeforeItHasRun) {
   EXPECT_EQ(stage.condition(), Fault::power_stage);
   EXPECT_FALSE(stage.ready());

@@ -41,8 +41,8 @@ void move(const Scene& scene, std::size_t axis) {
     drive.advance(sample, command, supply);
     drive.update_encoder();
   }
-  require_finite({drive.shaft_angle(), drive.shaft_speed(), drive.mean_torque(), drive.magnetic_energy(),
-                  drive.currents()[0], drive.currents()[1], drive.currents()[2]});
+  require_finite({drive.shaft_angle(), drive.handle().velocity(), drive.mean_torque(),
+                  drive.magnetic_energy(), drive.currents()[0], drive.currents()[1], drive.currents()[2]});
 }
 
 void read(std::string_view text) {

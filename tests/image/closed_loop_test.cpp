@@ -104,6 +104,26 @@ TEST(ClosedLoopOfOneAxis, RendersWhileTheOtherAxisIsAbsentAndADriverThatDiesLate
   }
 }
 
+// DRV8301: it does not start while a phase is above 8.5 V. The reset after a fault is such a start.
+TEST(ClosedLoopOfOneAxis, AGateDriverThatIsResetWhileItsMotorIsTurnedFastStartsWhenItStands) {
+  ImageBench bench({}, 0.0, "gimbal_b");
+  bench.start();
+  simulation::MotorDrive& drive = bench.world.drive(0);
+  drive.hold(false);
+  drive.push(20.0 * 1.6, 20.0);
+  bench.board->run_for(0.1);
+  bench.board->hold_fault_line(true);
+  bench.board->run_for(20e-6);
+  bench.board->hold_fault_line(false);
+  bench.board->run_for(0.5);
+  EXPECT_FALSE(bench.board->healthy());
+  EXPECT_EQ(bench.reading(firmware::entry_of<"drive.presence">(), 0), 0) << "it has answered";
+  drive.push(0.0, 0.0);
+  drive.hold(true);
+  bench.board->run_for(0.5);
+  EXPECT_TRUE(bench.board->healthy());
+}
+
 // Which transistor it was is asked of the drivers before the reset that lets them forget it.
 TEST_F(ClosedLoop, AGateDriverThatTripsSaysWhichTransistorItWas) {
   constexpr std::size_t faults = firmware::entry_of<"drive.gate_driver_faults">();

@@ -34,6 +34,8 @@ class BoardWorld {
   virtual void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) = 0;
   /// The axis' gate driver is on the board.
   virtual bool has_gate_driver(std::size_t /*axis*/) const { return true; }
+  /// It starts if EN_GATE rises now: its SH pins are low enough.
+  virtual bool gate_driver_starts(std::size_t /*axis*/, BoardTime /*now*/) { return true; }
   /// V at the motor supply's terminals, which also feeds the gate drivers.
   virtual double supply_voltage() const = 0;
   /// The brake resistor is switched.

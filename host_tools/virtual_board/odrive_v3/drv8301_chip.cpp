@@ -47,7 +47,7 @@ void Drv8301Chip::advance(BoardTime now) {
   update_output(awake_at_);
 }
 
-void Drv8301Chip::enable_gate(bool level, BoardTime now) {
+void Drv8301Chip::enable_gate(bool level, BoardTime now, bool starts) {
   advance(now);
   if (level == enabled_) return;
   enabled_ = level;
@@ -71,6 +71,7 @@ void Drv8301Chip::enable_gate(bool level, BoardTime now) {
     }
     latched_ |= conditions_ & shutting_down;
     flags_ |= conditions_;
+    if (!starts) awake_at_ = never;
   }
   update_output(now);
 }

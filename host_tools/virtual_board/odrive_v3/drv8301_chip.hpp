@@ -36,7 +36,9 @@ class Drv8301Chip {
   void select(bool level, BoardTime now);
   /// What the chip puts on the line during the frame; none: it does not drive it.
   std::optional<std::uint16_t> exchange(std::uint16_t mosi, BoardTime now);
-  void enable_gate(bool level, BoardTime now);
+  /// `starts`: false while a voltage at its SH pins keeps it from waking; it stays so until EN_GATE rises
+  /// again. That it pulls nFAULT and is silent meanwhile is a guess.
+  void enable_gate(bool level, BoardTime now, bool starts = true);
   /// The motor supply went away and came back: registers as after power-up, nFAULT low for the start-up time.
   void power_cycle(BoardTime now);
 

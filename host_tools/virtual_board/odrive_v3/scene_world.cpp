@@ -44,6 +44,11 @@ bool SceneWorld::has_gate_driver(std::size_t axis) const {
   return !drives_.planted(axis, simulation::Defect::gate_driver_missing);
 }
 
+bool SceneWorld::gate_driver_starts(std::size_t axis, BoardTime now) {
+  advance_to(now);
+  return drives_.gate_driver_starts(axis);
+}
+
 void SceneWorld::set_brake(bool on, BoardTime now) {
   advance_to(now);
   drives_.supply().set_brake(on ? 1.0 : 0.0);

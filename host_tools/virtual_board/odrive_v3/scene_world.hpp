@@ -22,6 +22,7 @@ class SceneWorld : public BoardWorld {
 
   void set_bridge(std::size_t axis, const std::array<PwmLegOutput, 3>& legs, BoardTime now) override;
   bool has_gate_driver(std::size_t axis) const override;
+  bool gate_driver_starts(std::size_t axis, BoardTime now) override;
   void set_amplifiers(std::size_t axis, double gain, bool shorted, BoardTime now) override;
   double supply_voltage() const override { return drives_.supply().voltage(); }
   void set_brake(bool on, BoardTime now) override;

@@ -253,7 +253,10 @@ void VirtualBoard::wire_pins() {
       const board::odrive_v3::PinLocation pin{port_id, static_cast<std::uint8_t>(number)};
       const bool high = output == PinOutput::high;
       if (pin == pins::gate_enable) {
-        for (Drv8301Chip& driver : gate_drivers_) driver.enable_gate(high, now);
+        for (std::size_t axis = 0; axis < pwm_.size(); ++axis) {
+          const bool starts = world_ == nullptr || world_->gate_driver_starts(axis, now);
+          gate_drivers_[axis].enable_gate(high, now, starts);
+        }
         for (std::size_t axis = 0; axis < pwm_.size(); ++axis) show_bridge(axis, now);
       }
       if (pin == pins::brake_high_side || pin == pins::gate_enable) show_brake(now);

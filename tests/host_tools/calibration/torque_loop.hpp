@@ -91,7 +91,9 @@ class TorqueLoop {
     in.angle = static_cast<control::TurnFraction>((turns - std::floor(turns)) * 4294967295.0);
     in.current_b = static_cast<float>(sample.current_b);
     in.current_c = static_cast<float>(sample.current_c);
-    in.electrical_speed = static_cast<float>(pmsm.pole_pairs * bench_.drive().shaft_speed());
+    const simulation::MotorDrive& drive = bench_.drive();
+    in.electrical_speed = static_cast<float>(pmsm.pole_pairs * drive.handle().velocity() /
+                                             drive.encoder().config().transmission);
     in.reference_q = static_cast<float>(reference);
     in.supply = static_cast<float>(sample.supply);
     const auto out = three_.update(three_coefficients_, in);

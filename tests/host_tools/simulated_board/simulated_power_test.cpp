@@ -148,6 +148,62 @@ TEST(SimulatedPower, AGateDriverThatFallsSilentLaterIsAFaultOfTheBoard) {
   }
 }
 
+/// A hand turns the motor of an axis with up to so many m/s at the handle, or holds it.
+void turn(MotorBench& bench, double speed, std::size_t axis = 0) {
+  bench.drive(axis).hold(speed == 0.0);
+  bench.drive(axis).push(20.0 * speed, speed == 0.0 ? 0.0 : 20.0);
+}
+
+// DRV8301: it does not start while a phase is above 8.5 V, which a motor that is turned makes.
+TEST(SimulatedPower, AGateDriverThatIsResetWhileItsMotorIsTurnedFastStartsWhenItStands) {
+  struct Turned {
+    double speed, limit;
+    bool starts;
+  };
+  for (const auto& [speed, limit, starts] : {Turned{1.0, 8.5, true}, {1.6, 8.5, false}, {1.6, 0.0, true}}) {
+    simulation::Scene scene = identified("gimbal_b");
+    scene.axes[0].inverter.start_limit = limit;
+    MotorBench bench(scene);
+    bench.set<"wall.law">(0);
+    bench.run(0.3);
+    ASSERT_TRUE(bench.arm());
+    bench.disarm();
+    turn(bench, speed);
+    bench.run(0.1);
+    bench.power().set_gate_driver_fault(true);
+    bench.run(0.01);
+    bench.power().set_gate_driver_fault(false);
+    bench.run(0.6);
+    bench.clear();
+    EXPECT_EQ(bench.arm(), starts) << speed;
+    EXPECT_EQ(bench.application().refusal(0), starts ? Refusal::none : Refusal::power_stage_not_ready);
+    bench.disarm();
+    turn(bench, 0.0);
+    bench.run(0.6);
+    EXPECT_TRUE(bench.arm()) << firmware::to_string(bench.application().refusal(0));
+  }
+}
+
+TEST(SimulatedPower, AnAxisThatIsTurnedWhileTheBoardStartsIsNotTakenForAbsent) {
+  simulation::Scene scene = open_scene("motor_axes");
+  for (simulation::SceneAxis& axis : scene.axes) {
+    axis.motion.reset();
+    axis.person.reset();
+    axis.inverter.start_limit = 1.0;
+  }
+  MotorBench bench(scene);
+  bench.set<"wall.law">(0, 1);
+  turn(bench, 2.0, 1);
+  bench.run(2.0);
+  EXPECT_FALSE(bench.arm(0)) << "the drivers share a line";
+  turn(bench, 0.0, 1);
+  bench.run(0.6);
+  bench.application().refresh_readings();
+  EXPECT_EQ(bench.application().values().whole<"drive.presence">(1), 0);
+  bench.set<"wall.law">(0, 0);
+  EXPECT_TRUE(bench.arm(0)) << firmware::to_string(bench.application().refusal(0));
+}
+
 TEST(SimulatedPower, AnAxisIsDeclaredAbsentAndTakenBackWhileNothingIsArmed) {
   MotorBench bench(open_scene("motor_axes"));
   bench.set<"wall.law">(0, 0);

@@ -77,7 +77,7 @@ TEST_F(MotorDriveTest, ForceOnTheHandleIsTorqueOverTransmission) {
   EXPECT_NEAR(drive.currents()[terminal_b], 1.1, 1e-3);
   EXPECT_NEAR(drive.force(), 3.3, 4e-3);
   EXPECT_EQ(drive.handle().applied_force(), drive.force());
-  EXPECT_EQ(drive.shaft_speed(), 0.0);
+  EXPECT_EQ(drive.handle().velocity(), 0.0);
 }
 
 TEST_F(MotorDriveTest, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
@@ -92,7 +92,8 @@ TEST_F(MotorDriveTest, RunsUpToTheSpeedThatBackEmfAndDampingAllow) {
                  share = brushed ? 1.0 : 2.0 / 3.0;
     const double load = 0.5 * 1e-4;
     const double speed = 2.0 * k / (resistance * load + share * k * k);
-    EXPECT_NEAR(drive.shaft_speed(), speed, (brushed ? 1e-3 : 1e-2) * speed) << brushed;
+    const double reached = drive.handle().velocity() / drive.encoder().config().transmission;
+    EXPECT_NEAR(reached, speed, (brushed ? 1e-3 : 1e-2) * speed) << brushed;
   }
 }
 

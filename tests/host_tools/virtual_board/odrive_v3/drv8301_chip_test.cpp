@@ -65,6 +65,21 @@ TEST(Drv8301Chip, IsSilentWhileStartingDisabledOrNotSelected) {
   EXPECT_TRUE(bench.frame(0x8800).has_value());
 }
 
+TEST(Drv8301Chip, DoesNotStartWhileItsPhasePinsAreHighAndTriesAtTheNextRise) {
+  Bench bench;
+  bench.chip.enable_gate(false, bench.now);
+  bench.run(100 * us);
+  bench.chip.enable_gate(true, bench.now, false);
+  bench.run(1'000'000 * us);
+  EXPECT_EQ(bench.frame(0x8800), std::nullopt);
+  EXPECT_FALSE(bench.fault_line);
+  EXPECT_FALSE(bench.chip.drives_gates(bench.now));
+  bench.pulse(100 * us);
+  bench.run(10'000 * us);
+  EXPECT_TRUE(bench.frame(0x8800).has_value());
+  EXPECT_TRUE(bench.fault_line);
+}
+
 TEST(Drv8301Chip, FullResetForgetsSettingsQuickResetOnlyFaults) {
   Bench bench;
   bench.frame(0x1000 | 0x550);
