@@ -65,6 +65,8 @@ class CurrentSense {
                static_cast<float>(after < last - first ? after + first : last);
   }
   constexpr float offset() const { return offset_; }
+  /// The same in A.
+  constexpr float offset_amperes() const { return (offset_ - middle_code) * amperes_per_code_; }
 
   /// A, positive into the motor. One conversion, one subtraction, one multiplication.
   constexpr float ISR_amperes(std::uint16_t code) const {

@@ -58,6 +58,9 @@ class CurrentSensors {
     };
     return within(sense_b_) && within(sense_c_);
   }
+  /// A, what is taken off.
+  float offset_b() const { return sense_b_.offset_amperes(); }
+  float offset_c() const { return sense_c_.offset_amperes(); }
 
  private:
   drivers::CurrentSense sense_b_{}, sense_c_{};

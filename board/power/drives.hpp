@@ -476,6 +476,8 @@ firmware::BoardReadings Drives<Hardware>::readings() const {
     const drivers::NtcReading reading = thermistor.read(hardware_.temperature_code(axis));
     readings.power_stage_temperature[axis] =
         reading.state == drivers::NtcState::ok ? reading.celsius : std::numeric_limits<float>::quiet_NaN();
+    readings.offset_b[axis] = axes_[axis].sensors.offset_b();
+    readings.offset_c[axis] = axes_[axis].sensors.offset_c();
   }
   readings.has_power_stage = true;
   readings.modulation_limit = hardware_.modulation_limit(gain_);

@@ -16,7 +16,9 @@ struct BoardReadings {
     std::array<float, axis_count> at_room_temperature{};
     at_room_temperature.fill(25.0f);
     return at_room_temperature;
-  }();                          ///< degC
+  }();  ///< degC
+  /// A, what the current sensors of legs B and C read at rest and what is taken off.
+  std::array<float, axis_count> offset_b{}, offset_c{};
   float supply_voltage = 0.0f;  ///< V; 0: not measured
   /// Of the supply, that the current controllers may use: what the board's bridge can give, and its current
   /// sensors can follow. A board that does not say it drives no current.

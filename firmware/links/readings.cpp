@@ -99,6 +99,8 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_real<"measured.current">(report.motor.current, axis);
   v.set_real<"measured.current_reference">(report.motor.current_reference, axis);
   v.set_real<"measured.temperature">(of_.axes.readings().power_stage_temperature[axis], axis);
+  v.set_real<"measured.offset_b">(of_.axes.readings().offset_b[axis], axis);
+  v.set_real<"measured.offset_c">(of_.axes.readings().offset_c[axis], axis);
   v.set_real<"measured.winding_temperature">(thermal.winding_temperature(), axis);
   v.set_real<"measured.current_limit">(v.real<"current.limit">(axis) * thermal.allowance(), axis);
   v.set_real<"measured.force_made">(report.motor.force_made, axis);

@@ -68,6 +68,10 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
             "1: a synchronous motor's electrical angle is known, or none is needed."),
     reading("measured.excitation_finished", group::measured, 21, unsigned8, "",
             "1: the present excitation has ended."),
+    reading("measured.offset_b", group::measured, 22, float32, "A",
+            "What the current sensor of leg B reads at rest, which is taken off. It drifts with the board's "
+            "temperature and is tracked."),
+    reading("measured.offset_c", group::measured, 23, float32, "A", "The same of leg C."),
 
     reading("trip.tick", group::trip, 1, unsigned32, "ticks", "Tick of the present fault."),
     reading("trip.position", group::trip, 2, float32, "m", "Position in that tick."),

@@ -52,6 +52,7 @@ bool do_stage(Stage stage, device::Device& device, Report& report, const Setting
                   text.name, text.title, text.connect, text.does));
   party.begins(text);
   StageResult result = run(stage, device, settings, party);
+  if (stage == Stage::stiffer) result.checks.push_back(check_offsets(device, settings.axis, report));
   result.stage = stage;
   result.time = time_now();
   const bool passed = result.passed();

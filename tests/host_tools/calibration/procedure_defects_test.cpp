@@ -137,6 +137,20 @@ TEST(PolePairs, WrongOnesAreNamedAndCorrectedOrRefused) {
   }
 }
 
+TEST(GainMismatch, IsMeasuredOfABrushedMotorAndRemarkedOnBeyondWhatIsAllowed) {
+  for (const double error : {0.0, 0.04, -0.07}) {
+    simulation::Scene scene = simulated_board::open_scene("dc_coreless_a");
+    scene.axes[0].current_sensor.gain_error_b = error;
+    CalibratedDevice device(scene);
+    calibration::CalibrationSettings electrical;
+    electrical.sets = {true};
+    const auto report = device.calibrate(electrical);
+    ASSERT_TRUE(report.pass()) << cause_of(report);
+    EXPECT_NEAR(value_of(report, "current_b.mismatch")->value, error, 0.01);
+    EXPECT_EQ(remarked(report, "current_mismatch"), error < -0.06);
+  }
+}
+
 TEST(Travel, TooLittleIsNamedWithWhatIsNeeded) {
   CalibratedDevice device("gimbal_b");
   CalibrationSettings settings;
