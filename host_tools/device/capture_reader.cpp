@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "firmware/capture/capture.hpp"
 #include "firmware/drive/haptic_configuration.hpp"
@@ -170,6 +171,7 @@ void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
       std::ceil(1e6 * static_cast<double>(all) * settings_.interval / firmware::tick_rate_hz)));
   auto deadline = device_.link().now() + patience;
   bool triggered = false;
+  std::uint32_t taken = 0;
   for (;;) {
     const Status now = status();
     if (now.state == CaptureState::complete) {
@@ -185,6 +187,9 @@ void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
       triggered = true;
       deadline = device_.link().now() + needed + grace;
     }
+    // A virtual board on a busy machine falls behind real time.
+    if (std::exchange(taken, now.taken) != now.taken && triggered)
+      deadline = std::max(deadline, device_.link().now() + grace);
     report_if_asked(report, {triggered ? Phase::running : Phase::waiting, now.taken, all});
     if (device_.link().now() >= deadline) {
       stop();
