@@ -201,4 +201,21 @@ TEST(SelfTest, ATripInTheMidstOfASwingIsReportedAndLeavesNothingBehind) {
   EXPECT_EQ(tested.settings(), before);
 }
 
+// A swing at part of the current takes 3 % of this supply, and the motor held at current.limit more than it
+// has.
+TEST(SelfTestSupply, IsJudgedByWhatItGivesAtTheCurrentLimit) {
+  for (const double resistance : {3.0, 5.0}) {
+    simulation::Scene scene = TestedAxis::opened("dc_coreless_a", true);
+    scene.supply->resistance = resistance;
+    const Report report = TestedAxis(scene, 0).run();
+    EXPECT_EQ(faulty_part(report), resistance > 4.0 ? "supply" : "") << text_of(report);
+    EXPECT_NE(text_of(report).find("with the motor held at current.limit"), std::string::npos);
+    for (const CheckResult& check : report.checks)
+      for (const MeasuredValue& value : check.values)
+        if (value.name == "source_resistance") {
+          EXPECT_NEAR(value.value / resistance, 1.0, 0.1);
+        }
+  }
+}
+
 }  // namespace kmax::selftest::selftest_test
