@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/cyclic_torque.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
 #include "firmware/modbus/rtu_timing.hpp"
 
 namespace kmax::firmware {

@@ -1,6 +1,6 @@
 #include "firmware/drive/axes_settings.hpp"
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware {
 

@@ -7,7 +7,7 @@
 #include "control/current_loop_delay.hpp"
 #include "control/resampler.hpp"
 #include "control/stability_case.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware {
 

@@ -1,6 +1,6 @@
 #include "firmware/drive/supervisor.hpp"
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/stability_guard.hpp"
 
 namespace kmax::firmware {

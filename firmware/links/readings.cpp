@@ -1,6 +1,6 @@
 #include "firmware/links/readings.hpp"
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/profile_readings.hpp"
 #include "firmware/drive/statusword.hpp"
 #include "firmware/object_dictionary/dictionary_checksum.hpp"

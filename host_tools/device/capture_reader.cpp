@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "firmware/capture/capture.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/suggestion.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 
 namespace kmax::device {

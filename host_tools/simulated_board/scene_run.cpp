@@ -3,7 +3,7 @@
 #include <array>
 #include <chrono>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::simulated_board {
 

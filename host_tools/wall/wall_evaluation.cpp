@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/base/files.hpp"
 
 namespace kmax::wall {

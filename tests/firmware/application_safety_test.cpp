@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "tests/board/bench.hpp"
 
 namespace kmax::board::application_safety_test {

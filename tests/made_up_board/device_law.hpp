@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "firmware/drive/axes_law.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware {
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::axis_background_test {
 namespace {

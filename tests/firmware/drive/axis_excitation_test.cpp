@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::axis_excitation_test {
 namespace {

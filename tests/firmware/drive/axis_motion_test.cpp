@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "firmware/drive/axis.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "tests/control/motor_winding.hpp"
 
 namespace kmax::firmware::axis_motion_test {

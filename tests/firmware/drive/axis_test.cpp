@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::axis_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::cyclic_torque_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::excitation_test {
 namespace {

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 namespace kmax::firmware::profile_readings_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "control/adaptive_coefficient.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/stability_case.hpp"
 #include "firmware/parameters/parameter_migration.hpp"
 #include "tests/firmware/drive/guarded_parameters.hpp"

@@ -7,7 +7,7 @@
 #include <map>
 #include <numbers>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"

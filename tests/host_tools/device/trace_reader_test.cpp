@@ -8,7 +8,7 @@
 #include <set>
 
 #include "firmware/capture/trace.hpp"
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::simulated_board {

@@ -1,11 +1,11 @@
-#include "firmware/drive/haptic_configuration.hpp"
+#include "firmware/drive/axis_configuration.hpp"
 
 #include <gtest/gtest.h>
 
-namespace kmax::firmware::haptic_configuration_test {
+namespace kmax::firmware::axis_configuration_test {
 namespace {
 
-TEST(HapticConfiguration, CountLengthIsTravelPerTurnOverCounts) {
+TEST(AxisConfiguration, CountLengthIsTravelPerTurnOverCounts) {
   ParameterValues values;
   values.set_real<"device.transmission">(0.05f, 1);
   values.set_whole<"encoder.counts_per_turn">(8192, 1);
@@ -14,7 +14,7 @@ TEST(HapticConfiguration, CountLengthIsTravelPerTurnOverCounts) {
   EXPECT_DOUBLE_EQ(count_length(values, 1), 2 * 3.14159265358979323846 * static_cast<double>(0.05f) / 1e9);
 }
 
-TEST(HapticConfiguration, EveryParameterArrivesAndOnlyFromItsAxis) {
+TEST(AxisConfiguration, EveryParameterArrivesAndOnlyFromItsAxis) {
   ParameterValues v;
   constexpr std::size_t axis = 1;
   float next = 1.0f;
@@ -89,7 +89,7 @@ TEST(HapticConfiguration, EveryParameterArrivesAndOnlyFromItsAxis) {
   EXPECT_EQ(untouched.divider, 1u);
 }
 
-TEST(HapticConfiguration, EveryAllowedRateGivesItsDivider) {
+TEST(AxisConfiguration, EveryAllowedRateGivesItsDivider) {
   for (std::uint32_t divider = 1; divider <= 200; ++divider) {
     ParameterValues v;
     v.set_real<"haptic.rate">(static_cast<float>(20000.0 / divider));
@@ -98,4 +98,4 @@ TEST(HapticConfiguration, EveryAllowedRateGivesItsDivider) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::haptic_configuration_test
+}  // namespace kmax::firmware::axis_configuration_test
