@@ -148,6 +148,7 @@ TEST(SceneWorld, EveryDefectShowsInWhatTheBoardReads) {
       const bool without_effect = brushed && defect == Defect::phase_a_open;
       // The codes say nothing about a chip that does not answer: SerialEncoderState::fitted does.
       if (defect == Defect::encoder_unplugged && std::string_view(name) == "gimbal_a") continue;
+      if (defect == Defect::index_loose) continue;  // nor about the line Z
       EXPECT_EQ(respond<OnWorld>(scene_of(name), defect) == good, without_effect) << name << ", " << named;
     }
   }
