@@ -181,6 +181,23 @@ void Drive::advance(std::uint16_t controlword, DriveState wanted) {
                                   axis_, to_string(seen.state()), to_string(wanted)));
 }
 
+std::string Drive::way_out() {
+  const Parameter asked[] = {Parameter::of<"measured.position">(axis_), Parameter::of<"wall.position">(axis_),
+                             Parameter::of<"wall.side">(axis_)};
+  const auto raw = device_.read(asked);
+  const double position = 1e3 * static_cast<double>(std::bit_cast<float>(raw[0]));
+  const double surface = 1e3 * static_cast<double>(std::bit_cast<float>(raw[1]));
+  const bool free_above = static_cast<std::int32_t>(raw[2]) > 0;
+  const double depth = free_above ? surface - position : position - surface;
+  if (!(depth >= 0.0)) return {};  // it has been moved meanwhile
+  return fmt::format(
+      ": it is at {:.2f} mm, the wall begins at {:.2f} mm, so by more than {:.2f} mm towards {} positions; "
+      "or put "
+      "the wall behind it: 'kmax set {}wall.position=here{}1mm'",
+      position, surface, depth, free_above ? "larger" : "smaller",
+      axis_ == 0 ? "" : fmt::format("axis{}.", axis_), free_above ? '-' : '+');
+}
+
 void Drive::enable() {
   const auto start = device_.link().now();
   // Not repeated when its answer is lost: an axis is never armed by a second try the user did not make.
@@ -199,7 +216,8 @@ void Drive::enable() {
       throw DeviceError(fmt::format("axis {} was not armed: refused: stability check: {}", axis_, words));
   }
   if (seen.refusal != Refusal::none)
-    throw DeviceError(fmt::format("axis {} was not armed: {}", axis_, firmware::to_string(seen.refusal)));
+    throw DeviceError(fmt::format("axis {} was not armed: {}{}", axis_, firmware::to_string(seen.refusal),
+                                  seen.refusal == Refusal::handle_inside_wall ? way_out() : std::string()));
   throw DeviceError(
       fmt::format("axis {} was not armed: it stays in '{}' and gives no reason; look at 'kmax state'", axis_,
                   to_string(seen.state())));

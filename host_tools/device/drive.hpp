@@ -86,6 +86,8 @@ class Drive {
   DriveStatus wait_until(Predicate done);
   void advance(std::uint16_t controlword, firmware::DriveState wanted);
   void enable();
+  /// Of a handle inside the wall.
+  std::string way_out();
 
   Device& device_;
   std::size_t axis_;

@@ -102,14 +102,9 @@ std::uint32_t parse_choice(const Parameter& parameter, std::string_view text) {
 }
 }  // namespace
 
-std::uint32_t parse_value(const Parameter& parameter, std::string_view given) {
+namespace {
+std::uint32_t raw_of(const Parameter& parameter, WrittenNumber number) {
   const Entry& entry = parameter.definition();
-  const std::string_view text = trimmed(given);
-  if (text.empty())
-    fail(parameter, fmt::format("the value is missing; allowed is {}", allowed_text(parameter)));
-  if (!entry.values.empty()) return parse_choice(parameter, text);
-
-  WrittenNumber number = parse_number(parameter, text);
   if (entry.type != Type::float32) {
     if (number.value != std::floor(number.value))
       fail(parameter, fmt::format("{} is not a whole number ({})", number.as_given, allowed_text(parameter)));
@@ -125,7 +120,35 @@ std::uint32_t parse_value(const Parameter& parameter, std::string_view given) {
   return raw;
 }
 
-std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts, std::size_t default_axis) {
+constexpr std::string_view here_word = "here";
+
+/// "here", "here+5mm", "here - 0.005"
+std::uint32_t parse_here(const Parameter& parameter, std::string_view text, const HandlePosition& here) {
+  if (parameter.entry() != firmware::entry_of<"wall.position">())
+    fail(parameter, fmt::format("'{}': only wall.position can be set from where the handle is", text));
+  if (!here) fail(parameter, fmt::format("'{}' needs a device that knows where its handle is", text));
+  std::string offset(trimmed(text.substr(here_word.size())));
+  if (!offset.empty() && !offset.starts_with('+') && !offset.starts_with('-'))
+    fail(parameter, fmt::format("'{}': write here, here+5mm or here-5mm", text));
+  if (offset.size() > 1)
+    offset = offset.substr(0, 1) + std::string(trimmed(std::string_view(offset).substr(1)));
+  const double away = offset.empty() ? 0.0 : parse_number(parameter, offset).value;
+  const double value = here(parameter.axis()) + away;
+  return raw_of(parameter, {value, fmt::format("{} = {}", text,
+                                               in_unit(number_text(value), parameter.definition().unit))});
+}
+}  // namespace
+
+std::uint32_t parse_value(const Parameter& parameter, std::string_view given) {
+  const std::string_view text = trimmed(given);
+  if (text.empty())
+    fail(parameter, fmt::format("the value is missing; allowed is {}", allowed_text(parameter)));
+  if (!parameter.definition().values.empty()) return parse_choice(parameter, text);
+  return raw_of(parameter, parse_number(parameter, text));
+}
+
+std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts, std::size_t default_axis,
+                                          const HandlePosition& here) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
     const auto equals = text.find('=');
@@ -153,7 +176,9 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
     for (const Assignment& other : assignments) {
       if (other.parameter == parameter) fail(parameter, "it is given twice");
     }
-    assignments.push_back({parameter, parse_value(parameter, std::string_view(text).substr(equals + 1))});
+    const std::string_view value = trimmed(std::string_view(text).substr(equals + 1));
+    assignments.push_back({parameter, value.starts_with(here_word) ? parse_here(parameter, value, here)
+                                                                   : parse_value(parameter, value)});
   }
   return assignments;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,10 +27,14 @@ struct Assignment {
 /// Errors: ValueError.
 std::uint32_t parse_value(const Parameter& parameter, std::string_view text);
 
+/// Where the handle of an axis is, m.
+using HandlePosition = std::function<double(std::size_t axis)>;
+
 /// "NAME=VALUE" each; a name without a prefix is on `default_axis`. A parameter that is read only, is named
-/// twice, or is a command rather than a value is refused. Errors: ValueError.
-std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
-                                          std::size_t default_axis = 0);
+/// twice, or is a command rather than a value is refused. wall.position also takes "here", "here+5mm" and
+/// "here-5mm", if `here` can be asked, which it is only then. Errors: ValueError, and what `here` throws.
+std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts, std::size_t default_axis = 0,
+                                          const HandlePosition& here = {});
 
 /// A value without its unit, such that parse_value() gives it back: choices by name.
 std::string value_text(const Parameter& parameter, std::uint32_t raw);

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <bit>
+#include <optional>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/print.hpp"
@@ -154,8 +156,15 @@ int run_set(Context& context, const SetOptions& options) {
   const std::vector<std::string>& texts = options.texts;
   if (texts.empty())
     throw UsageError("write NAME=VALUE, as in 'kmax set wall.stiffness=3580'; 'kmax list' shows all names");
-  const std::vector<Assignment> assignments = device::parse_assignments(texts, context.axis());
-  Device device = context.connect();
+  std::optional<Device> connected;
+  const std::vector<Assignment> assignments =
+      device::parse_assignments(texts, context.axis(), [&](std::size_t axis) {
+        connected.emplace(context.connect());
+        return static_cast<double>(
+            std::bit_cast<float>(connected->read(Parameter::of<"measured.position">(axis))));
+      });
+  if (!connected) connected.emplace(context.connect());
+  Device& device = *connected;
   std::vector<Parameter> parameters;
   for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
   const auto before = device.read(parameters);
@@ -199,7 +208,8 @@ void add_parameter_commands(CLI::App& app, Context& context) {
       app, context,
       {"set", "Sets values, all of them in the same instant or none, and reads them back.",
        "  kmax set wall.law=magnetic wall.stiffness=3.58N/mm wall.magnetic_length=1mm\n"
-       "  kmax set axis1.wall.side=-1\n\n"
+       "  kmax set axis1.wall.side=-1\n"
+       "  kmax set wall.position=here-5mm   5 mm below where the handle is now\n\n"
        "Numbers are SI; units such as N/mm, mm, mm/s, ms, kHz, g, mN are converted. Choices go by\n"
        "name or number."},
       Takes::device_and_axis, run_set);

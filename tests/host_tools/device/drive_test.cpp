@@ -64,6 +64,23 @@ TEST_F(DriveTest, ARefusalComesInWordsAndLeavesTheAxisDisabled) {
   EXPECT_EQ(state(), DriveState::operation_enabled);
 }
 
+TEST_F(DriveTest, AHandleInsideTheWallIsShownTheWayOut) {
+  fake->obstacle[1] = Refusal::handle_inside_wall;
+  const auto words = [&](float position, float wall, int side) {
+    fake->registers.values().set_real<"measured.position">(position, 1);
+    fake->registers.values().set_real<"wall.position">(wall, 1);
+    fake->registers.values().set_whole<"wall.side">(static_cast<std::uint32_t>(side), 1);
+    return thrown_message<DeviceError>([&] { drive.arm(); });
+  };
+  EXPECT_CONTAINS(
+      words(-0.0102f, 0.0031f, 1),
+      "it is at -10.20 mm, the wall begins at 3.10 mm, so by more than 13.30 mm towards larger positions");
+  EXPECT_CONTAINS(words(-0.0102f, 0.0031f, 1), "'kmax set axis1.wall.position=here-1mm'");
+  EXPECT_CONTAINS(words(0.02f, 0.01f, -1), "by more than 10.00 mm towards smaller positions");
+  EXPECT_CONTAINS(words(0.02f, 0.01f, -1), "here+1mm");
+  EXPECT_EQ(words(0.02f, 0.01f, 1).find("it is at"), std::string::npos) << "it has been moved meanwhile";
+}
+
 TEST_F(DriveTest, AnOldRefusalIsNotTakenForTheAnswerThatIsStillToCome) {
   fake->obstacle[1] = Refusal::handle_inside_wall;
   EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");

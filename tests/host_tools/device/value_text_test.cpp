@@ -130,6 +130,33 @@ TEST(ParseAssignments, TakesTheDefaultAxis) {
   EXPECT_EQ(all[2].parameter, Parameter::of<"link.timeout">());
 }
 
+TEST(ParseAssignments, AWallIsPutWhereTheHandleIs) {
+  int asked = 0;
+  const HandlePosition here = [&](std::size_t axis) {
+    ++asked;
+    return axis == 1 ? 0.25 : -0.5;
+  };
+  const auto metres = [&](const std::string& text) {
+    return std::bit_cast<float>(parse_assignments({text}, 0, here).front().raw);
+  };
+  EXPECT_EQ(metres("wall.position=here"), -0.5f);
+  EXPECT_EQ(metres("axis1.wall.position = here + 5 mm"), 0.255f);
+  EXPECT_EQ(metres("wall.position=here-0.005"), -0.505f);
+  EXPECT_EQ(asked, 3);
+  parse_assignments({"wall.position=0.1", "wall.stiffness=1"}, 0, here);
+  EXPECT_EQ(asked, 3) << "nobody needs it";
+  const auto refused = [&](const std::string& text, const HandlePosition& known) {
+    return thrown_message<ValueError>([&] { parse_assignments({text}, 0, known); });
+  };
+  EXPECT_CONTAINS(refused("wall.position=here", {}), "needs a device");
+  EXPECT_CONTAINS(refused("wall.position=here5mm", here), "write here, here+5mm or here-5mm");
+  EXPECT_CONTAINS(refused("wall.position=here+", here), "'+' is not a number");
+  EXPECT_CONTAINS(refused("wall.position=here+-5mm", here), "is not a number");
+  EXPECT_CONTAINS(refused("wall.position=here+5kg", here), "'kg' is not one of its units");
+  EXPECT_CONTAINS(refused("wall.stiffness=here", here), "only wall.position");
+  EXPECT_CONTAINS(refused("wall.position=here+5000", here), "here+5000 = 4999.5 m is above the largest");
+}
+
 TEST(ValueText, UnknownNumbersOfAChoiceAreShownAsNumbers) {
   EXPECT_EQ(value_text(law, 77), "77");
 }
