@@ -131,9 +131,10 @@ std::string text_of(const DeviceAddress& address) {
                      address.path, options.empty() ? "" : "?", fmt::join(options, "&"));
 }
 
-std::string default_device_address() {
+std::optional<std::string> device_address_of_environment() {
   const char* text = std::getenv("KMAX_DEVICE");
-  return text != nullptr && *text != '\0' ? text : "sim";
+  if (text == nullptr || *text == '\0') return std::nullopt;
+  return text;
 }
 
 }  // namespace kmax::link

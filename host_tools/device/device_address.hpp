@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -47,7 +48,7 @@ DeviceAddress parse_device_address(std::string_view text);
 /// The shortest text that parses to the same address.
 std::string text_of(const DeviceAddress& address);
 
-/// KMAX_DEVICE if it is set and not empty, else "sim".
-std::string default_device_address();
+/// KMAX_DEVICE, if it is set and not empty.
+std::optional<std::string> device_address_of_environment();
 
 }  // namespace kmax::link

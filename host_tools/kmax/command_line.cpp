@@ -131,7 +131,7 @@ int run(const std::vector<std::string>& arguments, Context& context) {
 }
 
 std::string Context::device_address() const {
-  return device_option.empty() ? link::default_device_address() : device_option;
+  return device_option.empty() ? link::device_address_of_environment().value_or("sim") : device_option;
 }
 
 std::vector<std::size_t> Context::axes() const {
@@ -149,6 +149,16 @@ device::Device Context::connect() {
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
         "names a lasting one");
   return device::Device(std::move(opened), notice);
+}
+
+device::Device Context::connect_to_change() {
+  if (device_option.empty() && !link::device_address_of_environment())
+    throw UsageError(
+        "this changes a device, and none is named: give --device serial:PATH or --device can:IFACE, or set "
+        "KMAX_DEVICE; 'kmax devices' shows what can be reached. 'kmax serve --serial /tmp/kmax' is a "
+        "simulated one "
+        "that lasts, --device sim one that is gone when the command ends");
+  return connect();
 }
 
 void Context::note(const std::string& text) {

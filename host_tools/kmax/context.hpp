@@ -40,6 +40,9 @@ class Context {
   /// Opens the device of --device, or of KMAX_DEVICE, or the simulated one, and checks that it is a Kmax
   /// device of this release.
   device::Device connect();
+  /// The same for a command that changes the device. UsageError where none is named: the simulated one lives
+  /// for that command only and keeps nothing of it.
+  device::Device connect_to_change();
 
   /// One line on the messages' stream.
   void note(const std::string& text);

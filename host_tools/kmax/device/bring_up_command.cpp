@@ -112,7 +112,7 @@ int list_stages(Context& context) {
 /// Before there is a device, nothing but its link can be wrong.
 device::Device connect_or_advise(Context& context) {
   try {
-    return context.connect();
+    return context.connect_to_change();
   } catch (const link::LinkError& error) {
     throw link::LinkError(
         fmt::format("stage 'logic': {}. PWR must be green (motor supply on); serial line: 3.3 V adapter, RXD "

@@ -106,7 +106,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   settings.save = !options.no_save;
   if (options.current > 0.0) settings.current = options.current;
   choose_sets(settings, options.sets);
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   const auto check_interruption = [&] {
     if (interruption.requested()) throw bench::Interrupted("interrupted");
   };

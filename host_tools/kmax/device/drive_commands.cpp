@@ -122,7 +122,7 @@ int run_state(Context& context) {
 /// Carries `act` out on every axis even if one fails; the first failure is then the command's.
 template <typename Act>
 int run_on_axes(Context& context, Act act) {
-  Device device = context.connect();
+  Device device = context.connect_to_change();
   std::exception_ptr first_error;
   for (const std::size_t axis : context.axes()) {
     try {
@@ -202,7 +202,7 @@ struct ArmOptions {
 int run_arm(Context& context, const ArmOptions& options) {
   const bool holding = options.holding;
   const Interruption interruption;
-  Device device = context.connect();
+  Device device = context.connect_to_change();
   Drive drive(device, context.axis());
   const double timeout = device.read_number("link.timeout");
   drive.arm();
@@ -234,7 +234,7 @@ int run_stop(Context& context) {
 }
 
 int run_clear(Context& context) {
-  Device device = context.connect();
+  Device device = context.connect_to_change();
   Drive drive(device, context.axis());
   if (!drive.clear()) context.note(fmt::format("axis {} has no fault", drive.axis()));
   return print_states(context, device, {drive.axis()});

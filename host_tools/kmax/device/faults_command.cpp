@@ -145,7 +145,7 @@ void print_entry(Context& context, const LogEntry& entry) {
 }
 
 int run_faults(Context& context, const FaultsOptions& options) {
-  device::Device device = context.connect();
+  device::Device device = options.clear ? context.connect_to_change() : context.connect();
   const auto entries = device::read_fault_log(device.link());
   if (options.clear) {
     device::erase_fault_log(device);

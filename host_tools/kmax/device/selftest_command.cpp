@@ -76,7 +76,7 @@ void print_table(Context& context, const selftest::Report& report) {
 
 int run_selftest_command(Context& context, const SelfTestOptions& options) {
   const Interruption interruption;
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   selftest::SelfTestSettings settings;
   settings.axis = context.axis();
   settings.link_exchanges = options.exchanges;

@@ -64,7 +64,7 @@ struct CodeSource {
 
 /// In a connection of its own: while somebody types, others must be able to talk to the device.
 device::LockStatus status_of(Context& context) {
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   return Lock(device).status();
 }
 
@@ -97,7 +97,7 @@ int run_lock(Context& context, const LockOptions& options) {
   if (options.remove && !has_code) return say(context, before, "no code is set; the device is open");
   const bool sets = !options.remove && (options.change || !has_code);
   const std::uint32_t code = sets ? options.code.new_code(context) : Lock::no_code;
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   Lock lock(device);
   if (sets || options.remove) {
     lock.set_code(code);
@@ -114,7 +114,7 @@ int run_unlock(Context& context, const CodeSource& options) {
   const device::LockStatus before = status_of(context);
   if (before.state != LockState::locked) return say(context, before, lock_words(before));
   const std::uint32_t code = options.present_code(context);
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   Lock lock(device);
   lock.open(code);
   if (before.attempts != 0)

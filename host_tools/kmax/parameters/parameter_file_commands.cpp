@@ -207,7 +207,7 @@ void set_all(Device& device, const LoadOptions& options, const std::vector<FileS
 
 int run_load(Context& context, const LoadOptions& options) {
   const auto settings = device::read_parameter_file(options.file);
-  Device device = context.connect();
+  Device device = context.connect_to_change();
   const std::string address = device.description();
   const auto present = values_of(device);
   const auto changes = differences_of(settings, present);

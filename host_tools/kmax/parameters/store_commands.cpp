@@ -16,7 +16,7 @@ using device::StoreStatus;
 
 namespace {
 int run_save(Context& context) {
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   Store store(device);
   const std::uint32_t errors_before = store.status().write_errors;
   const StoreStatus status = store.save();
@@ -48,7 +48,7 @@ int run_save(Context& context) {
 }
 
 int run_defaults(Context& context) {
-  device::Device device = context.connect();
+  device::Device device = context.connect_to_change();
   Store store(device);
   const auto changes = store.set_defaults();
   const std::size_t all = device::persistent_parameters().size();

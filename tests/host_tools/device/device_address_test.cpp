@@ -87,11 +87,11 @@ RC_GTEST_PROP(DeviceAddress, ItsTextGivesItBack, ()) {
 
 TEST(DefaultDeviceAddress, ComesFromTheEnvironment) {
   setenv("KMAX_DEVICE", "serial:/dev/x", 1);
-  EXPECT_EQ(default_device_address(), "serial:/dev/x");
+  EXPECT_EQ(device_address_of_environment(), "serial:/dev/x");
   setenv("KMAX_DEVICE", "", 1);
-  EXPECT_EQ(default_device_address(), "sim");
+  EXPECT_EQ(device_address_of_environment(), std::nullopt);
   unsetenv("KMAX_DEVICE");
-  EXPECT_EQ(default_device_address(), "sim");
+  EXPECT_EQ(device_address_of_environment(), std::nullopt);
 }
 
 }  // namespace kmax::link::device_address_test

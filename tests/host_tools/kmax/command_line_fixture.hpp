@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -18,6 +19,9 @@ namespace kmax::cli {
 /// The whole program in process, on whatever link open_device() gives.
 class CommandLineFixture : public testing::Test {
  protected:
+  /// Tests of one command on the simulated device mean it.
+  CommandLineFixture() { setenv("KMAX_DEVICE", "sim", 0); }
+
   virtual std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) = 0;
   /// What else a command reaches of this computer.
   virtual void prepare(Context&) {}

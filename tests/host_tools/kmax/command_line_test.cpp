@@ -160,6 +160,31 @@ TEST_F(CommandLine, TheDeviceIsTheOptionThenTheEnvironmentThenSim) {
   EXPECT_CONTAINS(said, "lives only for this command");
 }
 
+TEST_F(CommandLine, NothingIsChangedOnADeviceThatNobodyNamed) {
+  unsetenv("KMAX_DEVICE");
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"set", "wall.stiffness=1"},
+                                             {"set", "wall.position=here"},
+                                             {"save"},
+                                             {"defaults"},
+                                             {"arm"},
+                                             {"disarm"},
+                                             {"stop"},
+                                             {"clear"},
+                                             {"lock"},
+                                             {"unlock"},
+                                             {"faults", "--clear"},
+                                             {"calibrate"},
+                                             {"selftest"}}) {
+    opened.clear();
+    expect_error(arguments, wrong_usage, "none is named: give --device serial:PATH");
+    EXPECT_EQ(opened, "") << arguments.front();
+  }
+  EXPECT_EQ(kmax({"set", "wall.stiffness=1", "--device", "sim"}), done) << said;
+  EXPECT_EQ(opened, "sim");
+  EXPECT_EQ(kmax({"get", "wall.stiffness"}), done) << "looking harms nobody";
+}
+
 TEST_F(CommandLine, DescribeListsEveryValueOnceAsContracted) {
   EXPECT_EQ(kmax({"describe", "--format", "json"}), done);
   EXPECT_EQ(opened, "");
