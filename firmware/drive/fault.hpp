@@ -53,7 +53,7 @@ inline constexpr std::array fault_texts = std::to_array<FaultText>({
      "check the encoder's cable and supply, and encoder.kind; then switch the device off and on: its "
      "position is lost"},
     {Fault::link_silent, 0x8130, "link_silent", "s", "the host was silent for longer than link.timeout",
-     "check the cable and the host program; link.timeout = 0 turns this off"},
+     "check the cable and the host program"},
     {Fault::main_loop, 0x6100, "main_loop", "", "the firmware's main loop stood still for more than 0.1 s",
      "report it as a defect, with what was done before"},
     {Fault::emergency_stop, 0xFF02, "emergency_stop", "", "the emergency stop line was opened",

@@ -198,10 +198,10 @@ CheckResult check_offsets(device::Device& device, std::size_t axis, const Report
         "current sensors (offset)",
         fmt::format("{}; {}: the amplifier or its reference is bad: the board is broken", seen, wrong));
   if (!before || std::abs(warming) >= least_warming) return check.pass(seen);
-  return check.not_judged(
-      fmt::format("{}; {:+.1f} degC from stage gate_drivers, and {:.0f} show a drift: 'kmax bring-up "
-                  "--stage stiffer' once more when the board is warm",
-                  seen, warming, least_warming));
+  return check.not_judged(fmt::format(
+      "{}; the drift takes {:.0f} degC more than in stage gate_drivers, and it is {:+.1f}: 'kmax bring-up "
+      "--stage stiffer' once more when the board is warm",
+      seen, least_warming, warming));
 }
 
 Evidence test_free_handle(device::Device& device, const Settings& settings, const Party& party) {
@@ -315,7 +315,8 @@ StageResult try_gate_drivers(device::Device& device, const Settings& settings, c
                    check_offsets(device, settings.axis, Report(BoardFacts{})), check_no_motor(evidence)};
   if (!result.passed() || !settings.has_button) return result;
   party.person.ask(
-      "Put a hand on the emergency stop once more, without pressing it yet; now the bridge is on");
+      "Put a hand on the emergency stop, and do not press it yet. Next the axis is armed with 0 V; press it "
+      "then.");
   Probe probe(device, settings.axis, party.progress);
   result.checks.push_back(check_hand_stop(probe, {.patience = settings.patience}, party.progress));
   put_back(probe);

@@ -45,7 +45,7 @@ CheckResult check_hand_stop(Probe& probe, const HandSettings& settings, const Pr
   if (!probe.arm_with_zero_volts()) return result.not_judged("the axis cannot be armed");
   say("press the emergency stop");
   firmware::Fault fault = firmware::Fault::none;
-  const bool ended = wait_for(probe, settings, "waiting for the emergency stop", [&] {
+  const bool ended = wait_for(probe, settings, "press the emergency stop", [&] {
     const device::DriveStatus status = probe.bench().drive().status();
     fault = device::fault_of(status);
     return !status.armed();

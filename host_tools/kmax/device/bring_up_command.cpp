@@ -81,13 +81,15 @@ std::string range_text(const MeasuredValue& value) {
 void print_result(Context& context, const bring_up::Report& before, std::size_t axis,
                   const StageResult& result) {
   for (const CheckResult& check : result.checks) {
-    print(context.out, "  {:<22}{}\n", check.name, selftest::name_of(check.verdict));
+    print(context.out, "  {:<22} {}\n", check.name, selftest::name_of(check.verdict));
     if (check.verdict != selftest::Verdict::pass)
       print(context.out, "    {}\n", wrapped(check.message, 72, 4));
     for (const MeasuredValue& value : check.values) {
       const auto was = before.number(axis, result.stage, check.name, value.name);
-      print(context.out, "    {:<28}{:>12.5g} {:<8} {:<18}{}\n", value.name, value.value, value.unit,
-            range_text(value), was ? fmt::format("was {:.5g}", *was) : "");
+      std::string line = fmt::format("    {:<22}{:>11.5g} {:<7}{:<18}{}", value.name, value.value, value.unit,
+                                     range_text(value), was ? fmt::format(" was {:.5g}", *was) : "");
+      line.resize(line.find_last_not_of(' ') + 1);
+      print(context.out, "{}\n", line);
     }
   }
   context.out.flush();
@@ -179,7 +181,8 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
   } else {
     print(context.out, "{}: {}\n", file,
           next ? fmt::format("next stage: {}", bring_up::text_of(*next).name)
-               : "all stages have passed; 'kmax save' keeps the wall");
+               : "all stages have passed; 'kmax save' keeps wall.stiffness. Positions count from each start: "
+                 "then 'kmax set wall.position=here-5mm'");
   }
   return passed ? done : verdict_is_no;
 }
