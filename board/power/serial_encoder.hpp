@@ -14,12 +14,14 @@ namespace kmax::board {
 /// board's pin and 0.35 us that the chip wants before the first clock (data sheet, from memory). The angle is
 /// that of the frame before (50 us), since the chip answers one frame late.
 ///
-/// `Bus`: claim(), release(), start(word) and finish() of drivers::stm32f4::SpiMaster. `Select`: write(level)
-/// of the chip's select line, low while it is selected.
+/// `Bus`: claim(), release(), start(word), ready() and finish() of drivers::stm32f4::SpiMaster. `Select`:
+/// write(level) of the chip's select line, low while it is selected.
 ///
-/// A bus that the main loop has claimed for the gate drivers costs a frame, which counts as missed. When that
-/// was longer than missed frames are forgiven, the encoder itself has done nothing wrong: reading starts
-/// again with the first frame after, which is soon enough to know the turns still (As5047pAngle).
+/// A frame that does not come is never the encoder's doing, which answers with ones or zeros at worst: the
+/// main loop has claimed the bus for the gate drivers, or writes flash, which holds up the ticks, so that a
+/// frame is not over when it is taken. It counts as missed. When that was longer than missed frames are
+/// forgiven, reading starts again with the first frame after, which is soon enough to know the turns still
+/// (As5047pAngle).
 template <typename Bus, typename Select>
 class SerialEncoder {
  public:
@@ -28,17 +30,15 @@ class SerialEncoder {
   void ISR_select() {
     if (under_way_) return;
     selected_ = bus_.claim();
-    if (selected_) {
-      select_.write(false);
-    } else {
-      bus_was_taken_ = true;
-    }
+    if (selected_) select_.write(false);
   }
   bool ISR_selected() const { return selected_; }
   void ISR_begin() {
     selected_ = false;
     under_way_ = bus_.start(angle_.ISR_command());
-    if (!under_way_) end();
+    if (under_way_) return;
+    static_cast<void>(bus_.finish());  // what a frame that was given up has left; else no frame begins again
+    end();
   }
 
   /// Main loop: whatever was wrong is forgotten, and the next frame is the first. The turns are kept if they
@@ -63,11 +63,9 @@ class SerialEncoder {
       if (forget_turns_.exchange(false, std::memory_order_relaxed)) angle_.forget_turns();
       return ISR_start_again();
     }
-    if (!under_way_) return angle_.ISR_missed();
-    if (bus_was_taken_) {
-      bus_was_taken_ = false;
-      if (angle_.fault() == drivers::As5047pFault::missed) return ISR_start_again();
-    }
+    // A frame that is not over yet is taken by the next tick: given up, it would end with nobody to fetch it.
+    if (!under_way_ || !bus_.ready()) return angle_.ISR_missed();
+    if (angle_.fault() == drivers::As5047pFault::missed) return ISR_start_again();
     const std::optional<std::uint16_t> reply = bus_.finish();
     under_way_ = false;
     end();
@@ -90,7 +88,7 @@ class SerialEncoder {
   Select select_;
   drivers::As5047pAngle angle_;
   bool selected_ = false;  ///< and no frame begun
-  bool under_way_ = false, bus_was_taken_ = false;
+  bool under_way_ = false;
   std::atomic<bool> restart_{false}, forget_turns_{false};
 };
 

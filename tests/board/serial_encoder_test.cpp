@@ -14,14 +14,21 @@ struct Bus {
   void release() { taken = false; }
   bool start(std::uint16_t command) {
     EXPECT_TRUE(selected);
+    if (unfetched) return false;
+    unfetched = true;
     reply = pending;
     pending = drivers::as5047p::with_parity(command == 0xFFFF ? static_cast<std::uint16_t>(position & 0x3FFF)
                                                               : std::uint16_t{0});
     return true;
   }
-  std::optional<std::uint16_t> finish() { return reply; }
+  bool ready() const { return over && unfetched; }
+  std::optional<std::uint16_t> finish() {
+    if (!ready()) return std::nullopt;
+    unfetched = false;
+    return reply;
+  }
 
-  bool taken = false, selected = false;
+  bool taken = false, selected = false, over = true, unfetched = false;
   std::uint16_t reply = 0, pending = 0;
   int position = 0;
 };
@@ -68,6 +75,18 @@ TEST(SerialEncoder, ABusThatWasTakenForMillisecondsCostsNoTurnAndForLongerTheTur
     EXPECT_EQ(sample.reference_generation, row.generation);
     EXPECT_FALSE(board.bus.taken || board.bus.selected);
   }
+}
+
+// As while flash is written, which holds up the ticks: it was invalid until the next start of the board.
+TEST(SerialEncoder, FramesThatAreNotOverInTimeCostNoMoreThanABusThatWasTaken) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.bus.over = false;
+  EXPECT_FALSE(board.ticks(60, 20'100).valid);
+  board.bus.over = true;
+  EXPECT_TRUE(board.ticks(10, 20'100).valid);
+  EXPECT_EQ(board.tick(20'100).count, 20'100U);
+  EXPECT_FALSE(board.bus.taken || board.bus.selected);
 }
 
 TEST(SerialEncoder, ARestartOfAnEncoderThatIsReadKeepsTheTurns) {
