@@ -64,8 +64,14 @@ class SerialEncoder {
       return ISR_start_again();
     }
     // A frame that is not over yet is taken by the next tick: given up, it would end with nobody to fetch it.
-    if (!under_way_ || !bus_.ready()) return angle_.ISR_missed();
-    if (angle_.fault() == drivers::As5047pFault::missed) return ISR_start_again();
+    if (!under_way_ || !bus_.ready()) {
+      if (missed_ <= most_missed) ++missed_;
+      return angle_.ISR_missed();
+    }
+    // Not if another fault was among them.
+    const bool only_missed = missed_ > most_missed;
+    missed_ = 0;
+    if (only_missed && angle_.fault() == drivers::As5047pFault::missed) return ISR_start_again();
     const std::optional<std::uint16_t> reply = bus_.finish();
     under_way_ = false;
     end();
@@ -84,11 +90,14 @@ class SerialEncoder {
     bus_.release();
   }
 
+  static constexpr std::uint8_t most_missed = drivers::As5047pAngleConfig{}.maximum_held;
+
   Bus& bus_;
   Select select_;
   drivers::As5047pAngle angle_;
   bool selected_ = false;  ///< and no frame begun
   bool under_way_ = false;
+  std::uint8_t missed_ = 0;  ///< frames in a row
   std::atomic<bool> restart_{false}, forget_turns_{false};
 };
 

@@ -120,5 +120,15 @@ TEST(SerialEncoder, AFaultOfTheEncoderStaysAlsoWhenTheBusWasTakenThen) {
   EXPECT_TRUE(board.ticks(10, 25'000).valid);
 }
 
+TEST(SerialEncoder, AMissedFrameBehindOthersThatWereWrongForgivesNothing) {
+  Board board;
+  board.start_at_twenty_thousand();
+  board.ticks(5, 25'000);  // the reply comes one frame late: four jumps
+  board.bus.taken = true;
+  EXPECT_FALSE(board.tick(25'000).valid);
+  board.bus.taken = false;
+  EXPECT_FALSE(board.ticks(20, 25'000).valid);
+}
+
 }  // namespace
 }  // namespace kmax::board::serial_encoder_test

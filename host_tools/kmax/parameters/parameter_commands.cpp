@@ -159,7 +159,7 @@ int run_set(Context& context, const SetOptions& options) {
   std::optional<Device> connected;
   const std::vector<Assignment> assignments =
       device::parse_assignments(texts, context.axis(), [&](std::size_t axis) {
-        connected.emplace(context.connect_to_change());
+        if (!connected) connected.emplace(context.connect_to_change());
         return static_cast<double>(
             std::bit_cast<float>(connected->read(Parameter::of<"measured.position">(axis))));
       });
