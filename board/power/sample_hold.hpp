@@ -11,7 +11,7 @@ namespace kmax::board {
 
 /// Which current samples a tick does not take as they are: it holds the sample before in place of an invalid
 /// one, `longest` times in a row at most. The one beyond is taken whatever it is, so that an over-current
-/// trips in spite of interference; then holding begins anew.
+/// trips in spite of interference; then holding begins again.
 ///
 /// All in one byte that a tick loads once; so it has the flag of the offset calibration, too.
 ///
@@ -58,8 +58,8 @@ class SampleHold {
   std::array<std::uint8_t, firmware::axis_count> held_{};  ///< in a row
 };
 
-/// How much interference on the lines is forgiven: a leaky bucket of `most`, `leak` less a millisecond. Some
-/// hundred disturbances a second pass for ever; a line that is disturbed in every period would leave the
+/// How much interference on the lines is forgiven: a leaky bucket of `most`, `leak` less a millisecond. Up to
+/// 5,000 disturbances a second pass for ever; a line that is disturbed in every period would leave the
 /// current loop without samples, and nobody would know: that is over after 1.3 ms.
 class InterferenceBudget {
  public:

@@ -112,7 +112,7 @@ CheckResult check_clock(device::Device& device) {
 }
 
 /// The supply as the board measures it against the supply's own meter: two boards differ in their divider. A
-/// reading at the end of the converter's range, which the ceiling tells with the variant, is no measurement.
+/// reading at the end of the converter's range, which follows from the variant's ceiling, is no measurement.
 CheckResult check_divider(double measured, std::optional<double> meter, double ceiling) {
   using namespace board::odrive_v3;
   constexpr double reference = 3.3;  // V, of the converter

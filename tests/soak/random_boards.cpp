@@ -225,13 +225,13 @@ class NativeRun {
 /// The image with the same parts, told of its motor: pressed for as long.
 ForceError run_image(Scene scene, double contact, double hottest) {
   scene.identified = true;
-  const std::pair<const char*, simulation::ParameterValue> told[] = {
+  const std::pair<const char*, simulation::ParameterValue> settings[] = {
       {"wall.law", std::string("adaptive")},
       {"wall.position", -0.003},
       {"wall.stiffness", 800.0},
       {"encoder.start", std::string("at_rest")},
       {"link.timeout", 0.0}};
-  for (const auto& [name, value] : told) scene.parameters.push_back({name, value, "random_boards"});
+  for (const auto& [name, value] : settings) scene.parameters.push_back({name, value, "random_boards"});
   ImageBench bench(scene);
   bench.start();
   simulation::MotorDrive& drive = bench.world.drive(0);
