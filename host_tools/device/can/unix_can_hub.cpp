@@ -1,14 +1,17 @@
 #include "host_tools/device/can/unix_can_hub.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/link.hpp"
@@ -25,7 +28,7 @@ sockaddr_un socket_address(const std::string& path) {
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
     fail_hub(path, fmt::format("the path has {} characters; a socket's can have 1 to {}", path.size(),
-                           sizeof address.sun_path - 1));
+                               sizeof address.sun_path - 1));
   std::copy(path.begin(), path.end(), address.sun_path);
   return address;
 }
@@ -65,27 +68,40 @@ UnixCanHub::UnixCanHub(const std::string& path) : path_(path) {
   watch(events_.number(), listener_.number());
 }
 
+/// bind() shows a socket in the file system before listen() lets anybody connect to it (unix(7)): a client
+/// that had waited for the path was refused, and a second hub took the first for dead. So it is bound beside
+/// the path and linked there when it listens.
 void UnixCanHub::listen_at_path() {
   const sockaddr_un address = socket_address(path_);
-  listener_ = FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  const auto bind_it = [&] {
-    return bind(listener_.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  const auto fail = [this] {
+    fail_hub(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
   };
-  if (!bind_it()) {
-    if (errno == EADDRINUSE) {
+  const std::filesystem::path parent = std::filesystem::path(path_).parent_path();
+  const FileDescriptor folder(open(parent.empty() ? "." : parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  listener_ = FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!folder || !listener_) fail();
+  const std::string name = fmt::format(".kmax-{}-{}", getpid(), listener_.number());
+  // By the folder's descriptor, so that a path of the full length leaves room for the longer name.
+  const sockaddr_un beside = socket_address(fmt::format("/proc/self/fd/{}/{}", folder.number(), name));
+  if (bind(listener_.number(), reinterpret_cast<const sockaddr*>(&beside), sizeof beside) != 0) fail();
+  const auto link_it = [&] { return linkat(folder.number(), name.c_str(), AT_FDCWD, path_.c_str(), 0) == 0; };
+  try {
+    if (listen(listener_.number(), 64) != 0) fail();
+    if (!link_it()) {
+      if (errno != EEXIST) fail();
       if (inode_at(path_) == 0)
         fail_hub(path_, "there is something here that is not a socket; give another path for the CAN bus");
       if (is_served(address))
         fail_hub(path_, "another program serves a CAN bus here; end that one or give another path");
       unlink(path_.c_str());
-      errno = bind_it() ? 0 : errno;
+      if (!link_it()) fail();
     }
-    if (errno != 0)
-      fail_hub(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
+  } catch (...) {
+    unlinkat(folder.number(), name.c_str(), 0);
+    throw;
   }
+  unlinkat(folder.number(), name.c_str(), 0);
   inode_ = inode_at(path_);
-  if (listen(listener_.number(), 64) != 0)
-    fail_hub(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
 }
 
 UnixCanHub::~UnixCanHub() {

@@ -1,5 +1,6 @@
 #include "host_tools/device/can/unix_can.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -289,6 +290,28 @@ TEST(UnixCanHubAlone, WhatACrashedProgramLeftIsReplaced) {
     EXPECT_NO_THROW(UnixCan client(path));
   }
   EXPECT_FALSE(std::filesystem::exists(path)) << "it is removed at the end";
+}
+
+// A program that waits for the path may connect as soon as it sees it.
+TEST(UnixCanHubAlone, APathThatIsThereIsServed) {
+  const TemporaryFolder folder;
+  std::string refusal;
+  for (int i = 0; i < 300 && refusal.empty(); ++i) {
+    const std::string path = (folder / fmt::format("bus{}", i)).string();
+    std::thread waiting([&] {
+      while (!std::filesystem::exists(path)) {
+      }
+      try {
+        UnixCan port(path);
+      } catch (const LinkError& error) {
+        refusal = error.what();
+      }
+    });
+    const UnixCanHub hub(path);
+    waiting.join();
+  }
+  EXPECT_EQ(refusal, "");
+  EXPECT_EQ(folder.entries(), 0u);
 }
 
 TEST(UnixCanHubAlone, AnotherThingAtThePathIsLeftAlone) {

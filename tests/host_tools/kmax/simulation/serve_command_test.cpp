@@ -60,17 +60,20 @@ TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
 
 // The device's PDOs and emergencies do not wait for a client that hangs.
 TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
+  std::string problem;
   std::thread user([&] {
     const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!std::filesystem::exists(folder / "bus") && std::chrono::steady_clock::now() < patience)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    {
+    try {
       link::CanPortOptions options;
       options.send_patience = std::chrono::seconds(60);
       link::UnixCan sleeping(in("bus")), sender(in("bus"), options);
       drivers::CanFrame frame;
       frame.identifier = 0x700;
       for (int i = 0; i < 50'000; ++i) sender.send(frame);
+    } catch (const std::exception& error) {
+      problem = error.what();
     }
     kill(getpid(), SIGTERM);
   });
@@ -78,6 +81,7 @@ TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
   EXPECT_EQ(kmax({"serve", "--can", in("bus")}), done) << said;
   user.join();
   std::signal(SIGTERM, previous);
+  EXPECT_EQ(problem, "");
   EXPECT_CONTAINS(said, "CAN frames were lost");
 }
 
