@@ -1,5 +1,5 @@
 # Cross compilation for the Cortex-M4F with GNU Arm Embedded and newlib-nano (Debian: gcc-arm-none-eabi,
-# libnewlib-arm-none-eabi, libstdc++-arm-none-eabi-newlib).
+# libnewlib-arm-none-eabi, libstdc++-arm-none-eabi-dev).
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR cortex-m4)
 set(KMAX_CHIP stm32f405)
@@ -21,8 +21,10 @@ set(CMAKE_C_FLAGS_INIT "${kmax_common_flags}")
 set(CMAKE_ASM_FLAGS_INIT "${kmax_cpu_flags}")
 set(CMAKE_CXX_FLAGS_INIT
   "${kmax_common_flags} -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-use-cxa-atexit")
+# The firmware takes templates from the C++ library and links nothing of it, whose archives are a download of 313 MB.
+set(CMAKE_CXX_STANDARD_LIBRARIES "-Wl,--start-group -lgcc -lc -lnosys -Wl,--end-group")
 set(CMAKE_EXE_LINKER_FLAGS_INIT
-  "--specs=nosys.specs -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments")
+  "-nodefaultlibs -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments")
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
