@@ -15,6 +15,7 @@ from pathlib import Path
 from kmax_under_test import PATIENCE, VirtualBoard, kmax, kmax_json
 
 FOLDER = Path(__file__).resolve().parent / "node_canopen"
+CLIENT = FOLDER.parents[2] / "build" / "node_canopen" / "node_modules"
 
 
 def frame(identifier, data):
@@ -125,6 +126,7 @@ class BusBridge(unittest.TestCase):
         self.assertIn("/nowhere/bus", done.stderr)
 
 
+@unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_client)")
 class NodeTest(unittest.TestCase):
     def run_script(self, script, argument):
         """Runs a script of the folder to its end, and returns what it prints."""
