@@ -1,21 +1,22 @@
 #include "host_tools/base/progress.hpp"
 
-#include <unistd.h>
+#include <algorithm>
 
-#include <iostream>
+#include "host_tools/base/terminal_text.hpp"
 
 namespace kmax::cli {
 
 Progress::Progress(std::ostream& messages)
-    : messages_(messages), terminal_(&messages == &std::cerr && isatty(STDERR_FILENO) == 1) {}
+    : messages_(messages), terminal_(terminal_behind(messages).has_value()) {}
 
 Progress::~Progress() {
   make_room();
 }
 
 void Progress::make_room() {
-  if (width_ > 0) messages_ << '\r' << std::string(width_, ' ') << '\r' << std::flush;
+  if (width_ > 0) messages_ << "\r\x1b[K" << std::flush;  // ECMA-48 EL
   width_ = 0;
+  if (on_terminal_ == this) on_terminal_ = nullptr;
 }
 
 void Progress::show(const std::string& text) {
@@ -26,9 +27,11 @@ void Progress::show(const std::string& text) {
     messages_ << "kmax: " << text << std::endl;
     return;
   }
-  const std::string blank(width_ > text.size() ? width_ - text.size() : 0, ' ');
-  messages_ << '\r' << text << blank << std::flush;
-  width_ = text.size();
+  // Asked each time, since the terminal may have been resized. The last column stays free: some wrap there.
+  const TerminalSize size = terminal_behind(messages_).value_or(TerminalSize{});
+  width_ = std::min(text.size(), size.columns - 1);
+  messages_ << '\r' << text.substr(0, width_) << "\x1b[K" << std::flush;
+  on_terminal_ = this;
 }
 
 }  // namespace kmax::cli

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "firmware/object_dictionary/axis_groups.hpp"
+#include "host_tools/base/terminal_text.hpp"
 
 namespace kmax::check {
 
@@ -89,18 +90,10 @@ static_assert(in_order());
 
 std::string wrapped(std::string_view text, std::string_view indent) {
   constexpr std::size_t width = 110;
-  std::string out, line(indent);
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(' '), text.size());
-    if (line.size() > indent.size() && line.size() + 1 + end > width) {
-      out += line + '\n';
-      line = indent;
-    }
-    if (line.size() > indent.size()) line += ' ';
-    line += text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return out + line + '\n';
+  std::string out;
+  for (const std::string& line : cli::lines_of(text, width - indent.size()))
+    out += fmt::format("{}{}\n", indent, line);
+  return out;
 }
 
 std::string_view CriterionText::name() const {

@@ -35,28 +35,28 @@ constexpr milliseconds transition_poll_interval{10};
 constexpr milliseconds judgement{50};
 
 struct StateText {
-  std::string_view name, text;
+  std::string_view name, text, words;
 };
 StateText text_of(DriveState state) {
   switch (state) {
     case DriveState::not_ready_to_switch_on:
-      return {"not_ready_to_switch_on", "Not ready to switch on"};
+      return {"not_ready_to_switch_on", "Not ready to switch on", "starting"};
     case DriveState::switch_on_disabled:
-      return {"switch_on_disabled", "Switch on disabled"};
+      return {"switch_on_disabled", "Switch on disabled", "disarmed"};
     case DriveState::ready_to_switch_on:
-      return {"ready_to_switch_on", "Ready to switch on"};
+      return {"ready_to_switch_on", "Ready to switch on", "disarmed, being armed"};
     case DriveState::switched_on:
-      return {"switched_on", "Switched on"};
+      return {"switched_on", "Switched on", "disarmed, being armed"};
     case DriveState::operation_enabled:
-      return {"operation_enabled", "Operation enabled"};
+      return {"operation_enabled", "Operation enabled", "armed, force is on"};
     case DriveState::quick_stop_active:
-      return {"quick_stop_active", "Quick stop active"};
+      return {"quick_stop_active", "Quick stop active", "stopped"};
     case DriveState::fault_reaction_active:
-      return {"fault_reaction_active", "Fault reaction active"};
+      return {"fault_reaction_active", "Fault reaction active", "fault, its force is being removed"};
     case DriveState::fault:
-      return {"fault", "Fault"};
+      return {"fault", "Fault", "fault"};
   }
-  return {"unknown", "Unknown"};
+  return {"unknown", "Unknown", "in an unknown state"};
 }
 }  // namespace
 
@@ -66,6 +66,10 @@ std::string_view name_of(DriveState state) {
 
 std::string_view to_string(DriveState state) {
   return text_of(state).text;
+}
+
+std::string_view plain_words(DriveState state) {
+  return text_of(state).words;
 }
 
 std::string DriveStatus::fault_words() const {

@@ -16,6 +16,8 @@ namespace kmax::device {
 /// "operation_enabled" for programs, "Operation enabled" for people: the standard's own names.
 std::string_view name_of(firmware::DriveState state);
 std::string_view to_string(firmware::DriveState state);
+/// For people who do not know the standard: "armed, force is on".
+std::string_view plain_words(firmware::DriveState state);
 
 /// What an axis says about itself; read in one request, so it belongs together.
 struct DriveStatus {

@@ -5,10 +5,15 @@
 #include <set>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/base/progress.hpp"
 #include "host_tools/base/suggestion.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/completion.hpp"
 #include "host_tools/kmax/context.hpp"
+#include "host_tools/kmax/help_text.hpp"
+#include "host_tools/kmax/settings_file.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
@@ -99,15 +104,23 @@ int act(Context& context) {
   }
 }
 
-std::optional<int> parse(CLI::App& app, const std::vector<std::string>& arguments, Context& context) {
+void declare(CLI::App& app, Context& context) {
   app.name("kmax");
-  app.description("Sets parameters of a Kmax haptic device, reads its state and lets it make force.");
-  app.set_version_flag("--version", "kmax " KMAX_VERSION);
+  app.description(
+      "Sets parameters of a Kmax haptic device, reads its state, renders virtual walls and measures them.");
+  app.formatter(std::make_shared<HelpFormatter>(context.columns()));
+  app.set_help_flag("-h,--help", "This text");
+  app.set_version_flag("--version", "kmax " KMAX_VERSION, "The version of this program");
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
   add_device_option(app, context);
   app.require_subcommand(1);
-  app.footer(std::string("'kmax COMMAND --help' shows examples.\n\n") + exit_code_text);
-  for (const AddCommand add : all_commands()) add(app, context);
+  app.footer(std::string("'kmax COMMAND --help' explains a command and shows examples.\n\n") +
+             exit_code_text);
+  add_all_commands(app, context);
+}
+
+std::optional<int> parse(CLI::App& app, const std::vector<std::string>& arguments, Context& context) {
+  declare(app, context);
 
   // Known before parsing can fail, so that an error is a document too.
   const bool wants_json = std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
@@ -126,12 +139,21 @@ std::optional<int> parse(CLI::App& app, const std::vector<std::string>& argument
 
 int run(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app;
+  if (!arguments.empty() && arguments.front() == "complete") {  // asked by the scripts of 'kmax completion'
+    declare(app, context);
+    const auto first = arguments.begin() + (arguments.size() > 1 && arguments[1] == "--" ? 2 : 1);
+    for (const std::string& candidate : completions(app, {first, arguments.end()}))
+      context.out << candidate << '\n';
+    return done;
+  }
   const std::optional<int> ended = parse(app, arguments, context);
   return ended ? *ended : act(context);
 }
 
-std::string Context::device_address() const {
-  return device_option.empty() ? link::device_address_of_environment().value_or("sim") : device_option;
+std::optional<std::string> Context::named_device() const {
+  if (!device_option.empty()) return device_option;
+  if (const auto address = link::device_address_of_environment()) return address;
+  return device_of_settings_file();
 }
 
 std::vector<std::size_t> Context::axes() const {
@@ -147,22 +169,32 @@ device::Device Context::connect() {
   if (simulated())
     note(
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
-        "names a lasting one");
+        "names a "
+        "lasting one");
   return device::Device(std::move(opened), notice);
 }
 
 device::Device Context::connect_to_change() {
-  if (device_option.empty() && !link::device_address_of_environment())
+  if (!named_device())
     throw UsageError(
-        "this changes a device, and none is named: give --device serial:PATH or --device can:IFACE, or set "
-        "KMAX_DEVICE; 'kmax devices' shows what can be reached. 'kmax serve --serial /tmp/kmax' is a "
-        "simulated one "
-        "that lasts, --device sim one that is gone when the command ends");
+        fmt::format("this changes a device, and none is named: give --device serial:PATH or --device "
+                    "can:IFACE, set KMAX_DEVICE, or "
+                    "write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be reached. 'kmax "
+                    "serve --serial /tmp/kmax' "
+                    "is a simulated one that lasts, --device sim one that is gone when the command ends",
+                    settings_file().string()));
   return connect();
 }
 
 void Context::note(const std::string& text) {
-  messages_ << "kmax: " << text << std::endl;
+  Progress::make_room_on_terminal();
+  const auto terminal = terminal_behind(messages_);
+  messages_ << (terminal ? wrapped("kmax: " + text, terminal->columns - 1, 2) : "kmax: " + text) << std::endl;
+}
+
+std::size_t Context::columns() const {
+  // Longer lines are hard to read.
+  return std::min<std::size_t>(terminal_behind(out).value_or(TerminalSize{}).columns, 120);
 }
 
 }  // namespace kmax::cli

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
+#include <vector>
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
@@ -34,20 +34,32 @@ void add_flash_command(CLI::App& app, Context& context);
 void add_serve_command(CLI::App& app, Context& context);
 void add_describe_command(CLI::App& app, Context& context);
 
-std::span<const AddCommand> all_commands() {
-  static constexpr std::array commands = {&add_parameter_commands, &add_parameter_file_commands,
-                                          &add_store_commands,     &add_lock_commands,
-                                          &add_info_command,       &add_devices_command,
-                                          &add_drive_commands,     &add_faults_command,
-                                          &add_watch_command,      &add_record_command,
-                                          &add_capture_command,    &add_calibrate_command,
-                                          &add_selftest_command,   &add_bring_up_command,
-                                          &add_wall_command,
-                                          &add_check_command,      &add_simulate_command,
-                                          &add_experiment_command, &add_plot_command,
-                                          &add_lines_commands,     &add_flash_command,
-                                          &add_serve_command,      &add_describe_command};
-  return commands;
+void add_completion_commands(CLI::App& app, Context& context);  // completion, manual
+
+void add_all_commands(CLI::App& app, Context& context) {
+  struct Group {
+    const char* title;
+    std::vector<void (*)(CLI::App&, Context&)> add;
+  };
+  const Group groups[] = {
+      {"Device", {add_devices_command, add_info_command, add_drive_commands, add_faults_command}},
+      {"Parameters",
+       {add_parameter_commands, add_parameter_file_commands, add_store_commands, add_lock_commands}},
+      {"Looking and recording",
+       {add_watch_command, add_record_command, add_capture_command, add_plot_command}},
+      {"Commissioning", {add_bring_up_command, add_calibrate_command, add_selftest_command}},
+      {"Walls and experiments",
+       {add_wall_command, add_check_command, add_simulate_command, add_experiment_command,
+        add_serve_command}},
+      {"Board", {add_lines_commands, add_flash_command}},
+      {"Documents", {add_describe_command, add_completion_commands}},
+  };
+  for (const Group& group : groups) {
+    const std::size_t before = app.get_subcommands({}).size();
+    for (const auto add : group.add) add(app, context);
+    const auto commands = app.get_subcommands({});
+    for (std::size_t i = before; i < commands.size(); ++i) commands[i]->group(group.title);
+  }
 }
 
 CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* help) {
@@ -67,14 +79,16 @@ CLI::Validator within(double least, double most) {
 
 void add_device_option(CLI::App& command, Context& context) {
   command
-      .add_option(
-          "--device", context.device_option,
-          "sim (default), serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; also from KMAX_DEVICE")
+      .add_option("--device", context.device_option,
+                  "sim, serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; else KMAX_DEVICE, the "
+                  "settings file, or sim")
       ->type_name("ADDRESS");
 }
 
 CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes) {
   CLI::App* command = app.add_subcommand(text.name, text.summary);
+  command->group("Commands");
+  command->set_help_flag("-h,--help", "This text");
   command->add_flag("--json", context.json, "One JSON document on standard output, in SI units");
   if (takes == Takes::device || takes == Takes::device_and_axis) add_device_option(*command, context);
   if (takes == Takes::axis || takes == Takes::device_and_axis)

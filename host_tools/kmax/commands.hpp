@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -31,9 +30,8 @@ namespace kmax::cli {
 // link::AddressError become exit code 2, every other exception 1; the message is shown, with --json as
 // {"error": "..."}.
 
-/// All of them, in the order the help shows.
-using AddCommand = void (*)(CLI::App&, Context&);
-std::span<const AddCommand> all_commands();
+/// All of them, in groups and in the order the help shows.
+void add_all_commands(CLI::App& app, Context& context);
 
 struct CommandText {
   const char* name;
@@ -95,8 +93,11 @@ CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, 
 /// turns what is thrown into a message and an exit code.
 int run(const std::vector<std::string>& arguments, Context& context);
 
-/// Its halves. parse() leaves in the context what is to be done, and touches nothing else; an exit code: it
-/// was done (--help), or is wrong usage. `app`: a new one, whose options act() still reads.
+/// Commands and options, without anything parsed. `app`: a new one.
+void declare(CLI::App& app, Context& context);
+
+/// The halves of run(). parse() leaves in the context what is to be done, and touches nothing else; an exit
+/// code: it was done (--help), or is wrong usage. `app`: a new one, whose options act() still reads.
 std::optional<int> parse(CLI::App& app, const std::vector<std::string>& arguments, Context& context);
 int act(Context& context);
 

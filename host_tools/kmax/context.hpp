@@ -37,7 +37,7 @@ class Context {
   Context(std::ostream& out_stream, std::ostream& messages, Opener opener)
       : out(out_stream), messages_(messages), opener_(std::move(opener)) {}
 
-  /// Opens the device of --device, or of KMAX_DEVICE, or the simulated one, and checks that it is a Kmax
+  /// Opens the named device, or the simulated one, and checks that it is a Kmax
   /// device of this release.
   device::Device connect();
   /// The same for a command that changes the device. UsageError where none is named: the simulated one lives
@@ -46,6 +46,9 @@ class Context {
 
   /// One line on the messages' stream.
   void note(const std::string& text);
+
+  /// How wide what is written to `out` may be: the terminal, at most 120; 80 for a file or a pipe.
+  std::size_t columns() const;
 
   /// For what a line at a time cannot show (Progress).
   std::ostream& messages() { return messages_; }
@@ -59,8 +62,11 @@ class Context {
   std::size_t axis() const { return axis_option.value_or(0); }
   /// --axis, or every axis: looking at and stopping one axis too many harms nobody.
   std::vector<std::size_t> axes() const;
+  /// The address that the user named: --device, else KMAX_DEVICE, else the settings file's. UsageError: that
+  /// is wrong.
+  std::optional<std::string> named_device() const;
   /// The address in use.
-  std::string device_address() const;
+  std::string device_address() const { return named_device().value_or("sim"); }
   bool simulated() const { return device_address() == "sim"; }
 
   std::ostream& out;

@@ -32,26 +32,46 @@ std::optional<std::string> next_line(const std::function<void()>& check) {
   }
 }
 
-/// While it exists, the terminal does not show what is typed.
-class EchoOff {
+}  // namespace
+
+/// While it exists, the terminal on standard input works without these flags of termios(3), local modes.
+class TerminalMode {
  public:
-  EchoOff() {
-    if (!input_is_terminal() || tcgetattr(STDIN_FILENO, &before_) != 0) return;
-    termios quiet = before_;
-    quiet.c_lflag &= ~static_cast<tcflag_t>(ECHO);
-    changed_ = tcsetattr(STDIN_FILENO, TCSADRAIN, &quiet) == 0;
+  explicit TerminalMode(tcflag_t without) {
+    if (!input_is_terminal()) return;
+    // In the background a change would stop the program (SIGTTOU). -1: not the terminal that controls it.
+    if (const pid_t foreground = tcgetpgrp(STDIN_FILENO); foreground != -1 && foreground != getpgrp()) return;
+    if (tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    termios changed = before_;
+    changed.c_lflag &= ~without;
+    changed_ = tcsetattr(STDIN_FILENO, TCSADRAIN, &changed) == 0;
   }
-  ~EchoOff() {
+  ~TerminalMode() {
     if (changed_) tcsetattr(STDIN_FILENO, TCSADRAIN, &before_);
   }
-  EchoOff(const EchoOff&) = delete;
-  EchoOff& operator=(const EchoOff&) = delete;
+  TerminalMode(const TerminalMode&) = delete;
+  TerminalMode& operator=(const TerminalMode&) = delete;
+
+  bool changed() const { return changed_; }
 
  private:
   termios before_{};
   bool changed_ = false;
 };
-}  // namespace
+
+PressedKeys::PressedKeys() : mode_(std::make_unique<TerminalMode>(ICANON | ECHO)) {}
+PressedKeys::~PressedKeys() = default;
+
+bool PressedKeys::pressed(char key) {
+  if (!mode_->changed()) return false;
+  bool found = false;
+  for (pollfd input{STDIN_FILENO, POLLIN, 0}; poll(&input, 1, 0) > 0;) {
+    char byte = 0;
+    if (read(STDIN_FILENO, &byte, 1) != 1) break;
+    found = found || byte == key;
+  }
+  return found;
+}
 
 void TerminalPrompter::ask(const std::string& what_to_do) {
   context_.note(fmt::format("{}, then press Enter", what_to_do));
@@ -68,7 +88,7 @@ std::string hidden_line(Context& context, const std::string& prompt) {
   if (typed) context.messages() << "kmax: " << prompt << ": " << std::flush;
   std::optional<std::string> line;
   {
-    const EchoOff echo_off;
+    const TerminalMode echo_off(ECHO);
     line = next_line([&interruption] {
       if (interruption.requested()) throw std::runtime_error("interrupted; nothing was changed");
     });

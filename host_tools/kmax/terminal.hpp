@@ -2,12 +2,15 @@
 // Whoever sits at the terminal: asked on the messages' stream, answers on standard input.
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "host_tools/bench/prompter.hpp"
 #include "host_tools/kmax/context.hpp"
 
 namespace kmax::cli {
+
+class TerminalMode;
 
 /// Asks, and waits for the Enter key.
 class TerminalPrompter final : public bench::Prompter {
@@ -34,6 +37,22 @@ std::string hidden_line(Context& context, const std::string& prompt);
 
 /// Whether somebody types.
 bool input_is_terminal();
+
+/// While it exists, keys are read as they are pressed, without being shown. Does nothing where nobody types.
+/// One at a time.
+class PressedKeys {
+ public:
+  PressedKeys();
+  ~PressedKeys();
+  PressedKeys(const PressedKeys&) = delete;
+  PressedKeys& operator=(const PressedKeys&) = delete;
+
+  /// Whether this key has been pressed since the last call; others are forgotten. Does not wait.
+  bool pressed(char key);
+
+ private:
+  std::unique_ptr<TerminalMode> mode_;
+};
 
 /// What an experiment's prompter advises.
 inline constexpr auto experiment_prompt_advice =

@@ -75,7 +75,7 @@ Words command_line_words() {
   Words words = parameter_words("=");
   CLI::App app;
   cli::Context context(std::cout, std::cerr, {});
-  for (const cli::AddCommand add : cli::all_commands()) add(app, context);
+  cli::add_all_commands(app, context);
   add_options(app, words);
   return words;
 }

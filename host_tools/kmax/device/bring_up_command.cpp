@@ -9,6 +9,7 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/terminal.hpp"
@@ -51,22 +52,14 @@ struct BringUpOptions {
 /// Asks whoever is at the terminal, in lines that fit there; or nobody, as if all were agreed to.
 class StagePrompter final : public bench::Prompter {
  public:
-  StagePrompter(TerminalPrompter* terminal, Progress& progress) : terminal_(terminal), progress_(progress) {}
+  explicit StagePrompter(TerminalPrompter* terminal) : terminal_(terminal) {}
   void ask(const std::string& what_to_do) override {
     if (terminal_ == nullptr) return;
-    progress_.make_room();
-    std::string text;
-    for (std::size_t begin = 0; begin <= what_to_do.size();) {
-      const std::size_t end = std::min(what_to_do.find('\n', begin), what_to_do.size());
-      text += (begin == 0 ? "" : "\n") + wrapped(what_to_do.substr(begin, end - begin), 72, 2);
-      begin = end + 1;
-    }
-    terminal_->ask(text);
+    terminal_->ask(wrapped(what_to_do, 72, 2));
   }
 
  private:
   TerminalPrompter* terminal_;
-  Progress& progress_;
 };
 
 std::string range_text(const MeasuredValue& value) {
@@ -147,7 +140,7 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
   };
   TerminalPrompter terminal(context, check, "somebody must be at the board; --yes asks nothing");
   Progress progress(context.messages());
-  StagePrompter prompter(options.yes ? nullptr : &terminal, progress);
+  StagePrompter prompter(options.yes ? nullptr : &terminal);
   const auto keep = [&file](const bring_up::Report& now) { base::write_file(file, now.text()); };
   const bring_up::Party party{prompter,
                               [&](const std::string& text) {

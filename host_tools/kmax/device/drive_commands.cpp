@@ -74,9 +74,9 @@ Json status_json(std::size_t axis, AxisPresence presence, const DriveStatus& sta
 }
 
 std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
-  std::string line = fmt::format("axis {}: {}", axis, device::to_string(status.state()));
-  if (status.armed()) line += " (armed: force is on)";
-  if (status.state() == DriveState::quick_stop_active) line += " (stopped; 'kmax disarm' leaves this state)";
+  std::string line = fmt::format("axis {}: {} ({})", axis, device::plain_words(status.state()),
+                                 device::to_string(status.state()));
+  if (status.state() == DriveState::quick_stop_active) line += "; 'kmax disarm' leaves this state";
   if (status.faulty()) line += fmt::format(": {}; then 'kmax clear --axis {}'", status.fault_words(), axis);
   const std::string check = device::guard_words(guard);
   if (!status.armed() && status.refusal == Refusal::guard_refused && !check.empty())
@@ -242,14 +242,16 @@ int run_clear(Context& context) {
 }  // namespace
 
 void add_drive_commands(CLI::App& app, Context& context) {
-  add_command(app, context,
-              {"state", "Shows each axis' CiA 402 state and its fault in words.",
-               "  kmax state\n  kmax state --axis 1 --json"},
-              Takes::device_and_axis, run_state);
+  add_command(
+      app, context,
+      {"state",
+       "Shows whether each axis is armed, and its fault in words; in brackets the state's name in CiA 402.",
+       "  kmax state\n  kmax state --axis 1 --json"},
+      Takes::device_and_axis, run_state);
 
   add_command<ArmOptions>(
       app, context,
-      {"arm", "Lets an axis make force.",
+      {"arm", "Arms an axis: from then on it makes force.",
        "  kmax arm --hold           until Ctrl-C\n  kmax arm --axis 1\n\n"
        "The device removes the force, with a fault, when the host has been silent for link.timeout.\n"
        "Refused while the handle is inside the wall, while a fault is present, and, with guard.mode=refuse,\n"
@@ -257,12 +259,12 @@ void add_drive_commands(CLI::App& app, Context& context) {
       Takes::device_and_axis, run_arm);
 
   add_command(app, context,
-              {"disarm", "Takes the force away in order, on every axis unless --axis names one.",
+              {"disarm", "Disarms: takes the force away in order, on every axis unless --axis names one.",
                "  kmax disarm\n  kmax disarm --axis 1"},
               Takes::device_and_axis, run_disarm);
 
   add_command(app, context,
-              {"stop", "Quick stop: the force is gone at once, on every axis unless --axis names one.",
+              {"stop", "Stops: the force is gone at once, on every axis unless --axis names one.",
                "  kmax stop                 then 'kmax disarm' before arming again"},
               Takes::device_and_axis, run_stop);
 

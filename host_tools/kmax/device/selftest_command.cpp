@@ -7,6 +7,7 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/bench/prompter.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/selftest/selftest.hpp"
@@ -60,8 +61,8 @@ void print_json(Context& context, const selftest::Report& report) {
 }
 
 void print_table(Context& context, const selftest::Report& report) {
-  constexpr std::size_t name_width = 23, verdict_width = 11, width = 108;
-  constexpr std::size_t indent = name_width + verdict_width;
+  constexpr std::size_t name_width = 23, verdict_width = 11, indent = name_width + verdict_width;
+  const std::size_t width = context.columns();
   if (report.fault_at_start)
     print(context.out, "{:<{}}{}\n", "fault before the test", indent,
           wrapped(fmt::format("{} ({})", report.fault_at_start->words,
@@ -90,7 +91,7 @@ int run_selftest_command(Context& context, const SelfTestOptions& options) {
     Progress progress(context.messages());
     report = selftest::run_selftest(device, settings, [&](const std::string& text) {
       if (interruption.requested()) throw bench::Interrupted("interrupted");
-      progress.show(text);
+      if (!text.empty()) progress.show(text);
     });
   }
   if (context.json) {

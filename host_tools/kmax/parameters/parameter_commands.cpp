@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/suggestion.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/parameter_table.hpp"
@@ -22,23 +24,32 @@ using device::Parameter;
 
 namespace {
 struct ListOptions {
-  std::string prefix;
+  std::string text;
   bool all_axes = false, changed_only = false, whole_texts = false;
 
   void declare(CLI::App& command) {
-    command.add_option("prefix", prefix, "Only names that begin with this")->option_text("PREFIX");
+    command
+        .add_option("text", text,
+                    "Only names that begin with this; if none does, those that contain it; else those whose "
+                    "help does")
+        ->option_text("TEXT");
     command.add_flag("--all", all_axes, "Every axis");
     command.add_flag("--changed", changed_only, "Only values that are not the default");
     command.add_flag("--long", whole_texts, "Whole help texts and choices, on lines of their own");
   }
 };
 
+bool contains_whatever_case(std::string_view text, std::string_view part) {
+  const auto same = [](unsigned char a, unsigned char b) { return std::tolower(a) == std::tolower(b); };
+  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
+}
+
 std::vector<Parameter> listed(const Context& context, const ListOptions& options) {
   // axis0.wall is how axis 0's names may be written, not how they are shown.
-  const bool names_axis_0 = options.prefix.starts_with("axis0.");
-  const std::string prefix = names_axis_0 ? options.prefix.substr(6) : options.prefix;
-  const bool names_axis = names_axis_0 || prefix.starts_with("axis");
-  std::vector<Parameter> chosen;
+  const bool names_axis_0 = options.text.starts_with("axis0.");
+  const std::string text = names_axis_0 ? options.text.substr(6) : options.text;
+  const bool names_axis = names_axis_0 || text.starts_with("axis");
+  std::vector<Parameter> beginning, containing, explained;
   std::vector<std::string> groups;
   for (const Parameter& parameter : device::all_parameters()) {
     const std::string name = parameter.name();
@@ -46,15 +57,19 @@ std::vector<Parameter> listed(const Context& context, const ListOptions& options
     if (parameter.belongs_to_axis() && !names_axis && !options.all_axes && parameter.axis() != context.axis())
       continue;
     if (names_axis_0 && !(parameter.belongs_to_axis() && parameter.axis() == 0)) continue;
-    // With --axis 1 the prefix `wall` means axis1.wall.
+    // With --axis 1 the text `wall` means axis1.wall.
     const std::string_view compared = names_axis ? std::string_view(name) : parameter.definition().name;
-    if (compared.starts_with(prefix)) chosen.push_back(parameter);
+    if (compared.starts_with(text)) beginning.push_back(parameter);
+    if (contains_whatever_case(compared, text)) containing.push_back(parameter);
+    if (contains_whatever_case(parameter.definition().help, text)) explained.push_back(parameter);
   }
-  if (!chosen.empty()) return chosen;
+  for (auto* found : {&beginning, &containing, &explained}) {
+    if (!found->empty()) return *found;
+  }
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-  throw UsageError(fmt::format("no parameter begins with '{}'{}", options.prefix,
-                               device::did_you_mean(options.prefix, groups)));
+  throw UsageError(fmt::format("no parameter's name or help contains '{}'{}", options.text,
+                               device::did_you_mean(options.text, groups)));
 }
 
 int run_list(Context& context, const ListOptions& options) {
@@ -71,7 +86,7 @@ int run_list(Context& context, const ListOptions& options) {
     if (rows.empty()) {
       context.note("every value is its default");
     } else {
-      print_parameter_table(context.out, rows, options.whole_texts);
+      print_parameter_table(context.out, rows, terminal_behind(context.out), options.whole_texts);
     }
     return done;
   }

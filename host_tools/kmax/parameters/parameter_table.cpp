@@ -3,19 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/print.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::cli {
 
 namespace {
-constexpr std::size_t table_width = 120;
 constexpr std::size_t range_width_max = 24;
+constexpr std::size_t help_width_min = 24;
 constexpr std::size_t help_indent = 4;
+/// Narrower terminals have no room for a column of defaults beside one of help.
+constexpr std::size_t width_for_defaults = 120;
 
 struct Cells {
   std::string name, value, unit, range, default_value, help;
@@ -51,43 +55,49 @@ std::string cut(const std::string& text, std::size_t length) {
   return length < 4 ? std::string() : text.substr(0, length - 3) + "...";
 }
 
-void print_wrapped(std::ostream& out, std::string_view text) {
-  while (!text.empty()) {
-    std::size_t end = text.size();
-    if (end > table_width - help_indent) {
-      end = text.rfind(' ', table_width - help_indent);
-      if (end == std::string_view::npos) end = table_width - help_indent;
-    }
-    print(out, "{:{}}{}\n", "", help_indent, text.substr(0, end));
-    text.remove_prefix(std::min(text.size(), end + 1));
-  }
+void print_indented(std::ostream& out, std::string_view text, std::size_t width) {
+  print(out, "{:{}}{}\n", "", help_indent, wrapped(text, width - help_indent, help_indent));
 }
 }  // namespace
 
-void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows, bool whole_texts) {
-  std::vector<Cells> table{{"name", "value", "unit", "range", "default", "help"}};
+void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows,
+                           std::optional<TerminalSize> terminal, bool whole_texts) {
+  constexpr std::size_t unlimited = std::numeric_limits<std::size_t>::max();
+  const std::size_t width = terminal      ? std::max<std::size_t>(terminal->columns, 60)
+                            : whole_texts ? 100
+                                          : unlimited;
+  const bool shows_defaults = width >= width_for_defaults;
+  std::vector<Cells> table{{"name", "value", "unit", "range", shows_defaults ? "default" : "", "help"}};
   for (const ParameterRow& row : rows) table.push_back(cells_of(row));
 
-  const auto widest = [&table](std::string Cells::*cell, std::size_t limit) {
+  const auto widest = [&table](std::string Cells::*cell) {
     std::size_t most = 0;
     for (const Cells& cells : table) most = std::max(most, (cells.*cell).size());
-    return std::min(most, limit);
+    return most;
   };
-  const std::size_t name = widest(&Cells::name, table_width), value = widest(&Cells::value, table_width);
-  const std::size_t unit = widest(&Cells::unit, table_width), range = widest(&Cells::range, range_width_max);
-  const std::size_t default_value = widest(&Cells::default_value, table_width);
-  const std::size_t used = name + value + unit + range + default_value + 10;
-  const std::size_t help = used < table_width && !whole_texts ? table_width - used : 0;
+  const std::size_t name = widest(&Cells::name), value = widest(&Cells::value), unit = widest(&Cells::unit);
+  const std::size_t before_range = name + value + unit + 6;
+  const std::size_t room = width == unlimited ? unlimited : width - std::min(width, before_range);
+  // A few letters of help say nothing: then ranges have the room.
+  const bool shows_help = !whole_texts && room >= range_width_max + help_width_min;
+  const std::size_t range = std::min({widest(&Cells::range), shows_help ? range_width_max : unlimited, room});
+  if (!shows_help) table.front().help.clear();
 
   for (const Cells& cells : table) {
-    std::string line = fmt::format("{:<{}}  {:>{}}  {:<{}}  {:<{}}  {:>{}}  {}", cells.name, name,
-                                   cells.value, value, cells.unit, unit, cut(cells.range, range), range,
-                                   cells.default_value, default_value, cut(cells.help, help));
+    std::string line =
+        fmt::format("{:<{}}  {:>{}}  {:<{}}  {:<{}}", cells.name, name, cells.value, value, cells.unit, unit,
+                    width == unlimited ? cells.range : cut(cells.range, range), range);
+    if (shows_defaults) line += fmt::format("  {:>{}}", cells.default_value, widest(&Cells::default_value));
+    if (shows_help)
+      line +=
+          "  " + cut(cells.help, width == unlimited ? unlimited : width - std::min(width, line.size() + 2));
     line.erase(line.find_last_not_of(' ') + 1);
-    print(out, "{}\n", line);
+    print(out, "{}\n", cut(line, width));
     if (!whole_texts || &cells == &table.front()) continue;
-    if (cells.range.size() > range) print_wrapped(out, cells.range);
-    print_wrapped(out, cells.help);
+    if (cells.range.size() > range) print_indented(out, cells.range, width);
+    if (!shows_defaults && !cells.default_value.empty())
+      print_indented(out, "default " + cells.default_value, width);
+    print_indented(out, cells.help, width);
   }
 }
 

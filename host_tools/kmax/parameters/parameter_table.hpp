@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <ostream>
 #include <span>
 
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/parameter.hpp"
 
 namespace kmax::cli {
@@ -12,8 +14,11 @@ struct ParameterRow {
   std::uint32_t raw;
 };
 
-/// An aligned table of at most 120 columns: name, value, unit, range, default, help. A value that is not
-/// the default is marked with '*'. `whole_texts`: long ranges and help are wrapped instead of cut.
-void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows, bool whole_texts);
+/// An aligned table: name, value, unit, range, default, help, a line for each row. A value that is not the
+/// default is marked with '*'. On a terminal lines are cut to its width, 60 at least; below 120 columns
+/// defaults are left out, and help where it has no room. Elsewhere (`terminal` is empty) they are whole, so
+/// that they can be searched. `whole_texts`: what would be cut follows on lines of its own.
+void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows,
+                           std::optional<TerminalSize> terminal, bool whole_texts);
 
 }  // namespace kmax::cli

@@ -4,35 +4,33 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
+#include <cmath>
 
 #include "firmware/parameters/refusal.hpp"
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/base/terminal_text.hpp"
 
 namespace kmax::cli {
 
 namespace {
-constexpr std::size_t label_width = 10, column_width = 28;
+constexpr const char* red = "\x1b[31m";
+constexpr const char* green = "\x1b[32m";
+constexpr const char* yellow = "\x1b[33m";
 
 std::string joined(const std::vector<std::string>& words) {
   return words.empty() ? "none" : fmt::format("{}", fmt::join(words, ", "));
 }
 
-/// Pieces of at most `width`, broken at spaces.
-std::vector<std::string> wrapped(std::string text, std::size_t width) {
-  std::vector<std::string> lines;
-  while (text.size() > width) {
-    std::size_t end = text.rfind(' ', width);
-    if (end == std::string::npos || end == 0) end = width;
-    lines.push_back(text.substr(0, end));
-    text.erase(0, text.find_first_not_of(' ', end));
-  }
-  lines.push_back(std::move(text));
-  return lines;
+const char* colour_of(const WatchedAxis& axis) {
+  if (axis.status.faulty()) return red;
+  return axis.status.armed() ? green : nullptr;
 }
 
-std::string in_column(const std::string& text) {
-  return fmt::format("{:<{}}", text, column_width);
+/// Cut to `width` before the colour, whose letters take no place.
+std::string coloured(std::string line, std::size_t width, const char* colour) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  if (line.size() > width) line.resize(width);
+  return colour == nullptr ? line : colour + line + "\x1b[0m";
 }
 }  // namespace
 
@@ -55,42 +53,48 @@ std::string trouble_of(const WatchedAxis& axis) {
   return {};
 }
 
-std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::size_t width) {
-  using Cell = std::function<std::string(const WatchedAxis&)>;
-  const std::vector<std::pair<const char*, Cell>> rows = {
-      {"", [](const auto& a) { return fmt::format("axis {}", a.axis); }},
-      {"state", [](const auto& a) { return std::string(device::to_string(a.status.state())); }},
-      {"position", [](const auto& a) { return fmt::format("{:+12.6f} m", a.measured.position); }},
-      {"velocity", [](const auto& a) { return fmt::format("{:+12.6f} m/s", a.measured.velocity); }},
-      {"force", [](const auto& a) { return fmt::format("{:+12.4f} N", a.measured.force); }},
-      {"current", [](const auto& a) { return fmt::format("{:+12.4f} A", a.measured.current); }},
-  };
+std::string bar(float value, float end, std::size_t half) {
+  const bool beyond = !(std::abs(value) <= end);
+  const float part = beyond ? 1.0F : end > 0 ? std::abs(value) / end : 0.0F;
+  const auto filled = static_cast<std::size_t>(std::lround(part * static_cast<float>(half)));
+  std::string lower(half, ' '), upper(half, ' ');
+  if (value < 0) {
+    std::fill_n(lower.rbegin(), filled, '#');
+    if (beyond && half > 0) lower.front() = '!';
+  } else {
+    std::fill_n(upper.begin(), filled, '#');
+    if (beyond && half > 0) upper.back() = '!';
+  }
+  return fmt::format("[{}|{}]", lower, upper);
+}
+
+std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::size_t width, bool colour) {
+  constexpr std::size_t half = 14;
   std::vector<std::string> lines;
-  for (const auto& [label, cell] : rows) {
-    std::string line = fmt::format("{:<{}}", label, label_width);
-    for (const WatchedAxis& axis : axes) line += in_column(cell(axis));
-    lines.push_back(line);
-  }
-  // As many lines as the axis with the most flags has, one flag in each.
-  std::size_t most = 1;
-  for (const WatchedAxis& axis : axes) most = std::max(most, flag_words(axis.measured.flags).size());
-  for (std::size_t i = 0; i < most; ++i) {
-    std::string line = fmt::format("{:<{}}", i == 0 ? "flags" : "", label_width);
-    for (const WatchedAxis& axis : axes) {
-      const auto words = flag_words(axis.measured.flags);
-      line += in_column(i < words.size() ? words[i] : i == 0 ? "none" : "");
-    }
-    lines.push_back(line);
-  }
-  for (std::string& line : lines) {
-    line.erase(line.find_last_not_of(' ') + 1);
-    if (line.size() > width) line.resize(width);
-  }
+  const auto add = [&](const std::string& line, const char* its_colour = nullptr) {
+    lines.push_back(coloured(line, width, colour ? its_colour : nullptr));
+  };
+  const auto with_bar = [](std::string line, float value, float end, std::string_view unit) {
+    if (end > 0) line += fmt::format("  {} {:.3g} {}", bar(value, end, half), end, unit);
+    return line;
+  };
   for (const WatchedAxis& axis : axes) {
-    const std::string trouble = trouble_of(axis);
-    if (trouble.empty()) continue;
-    for (std::string& line : wrapped(fmt::format("axis {}: {}", axis.axis, trouble), width))
-      lines.push_back(std::move(line));
+    const auto& measured = axis.measured;
+    const firmware::DriveState state = axis.status.state();
+    add(fmt::format("axis {}: {} ({})", axis.axis, device::plain_words(state), device::to_string(state)),
+        colour_of(axis));
+    add(fmt::format("  position {:+12.3f} mm", measured.position * 1e3F));
+    add(fmt::format("  velocity {:+12.1f} mm/s", measured.velocity * 1e3F));
+    add(with_bar(fmt::format("  force    {:+12.3f} N ", measured.force), measured.force, axis.force_limit,
+                 "N"));
+    add(with_bar(fmt::format("  current  {:+12.3f} A ", measured.current), measured.current,
+                 axis.current_limit, "A"));
+    const std::string flags = joined(flag_words(measured.flags));
+    add("  flags    " + flags, flags.find("wall ") != std::string::npos ? yellow : nullptr);
+    if (const std::string trouble = trouble_of(axis); !trouble.empty()) {
+      for (const std::string& line : lines_of(trouble, width > 4 ? width - 2 : width))
+        add("  " + line, yellow);
+    }
   }
   return lines;
 }
@@ -98,10 +102,10 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
 std::string watch_line(double seconds, const std::vector<WatchedAxis>& axes) {
   std::string line = fmt::format("{:.1f} s", seconds);
   for (const WatchedAxis& axis : axes) {
-    line +=
-        fmt::format(" | axis {}: {}, {:+.6f} m, {:+.6f} m/s, {:+.4f} N, {:+.4f} A, flags: {}", axis.axis,
-                    device::to_string(axis.status.state()), axis.measured.position, axis.measured.velocity,
-                    axis.measured.force, axis.measured.current, joined(flag_words(axis.measured.flags)));
+    line += fmt::format(" | axis {}: {}, {:+.3f} mm, {:+.1f} mm/s, {:+.4f} N, {:+.4f} A, flags: {}",
+                        axis.axis, device::plain_words(axis.status.state()), axis.measured.position * 1e3F,
+                        axis.measured.velocity * 1e3F, axis.measured.force, axis.measured.current,
+                        joined(flag_words(axis.measured.flags)));
     const std::string trouble = trouble_of(axis);
     if (!trouble.empty()) line += ", " + trouble;
   }

@@ -17,6 +17,7 @@ struct WatchedAxis {
   std::size_t axis = 0;
   device::DriveStatus status{};
   record::Measurement measured{};
+  float force_limit = 0, current_limit = 0;  ///< N, A: the ends of the bars; 0: no bar
 };
 
 /// The bits of measured.flags: "inside the wall", "armed", ...
@@ -25,8 +26,13 @@ std::vector<std::string> flag_words(std::uint16_t flags);
 /// Fault, or refusal of the last attempt to arm, with what to do next; empty if there is none.
 std::string trouble_of(const WatchedAxis& axis);
 
-/// A table of the axes side by side, faults in words below it; no line is longer than `width`.
-std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::size_t width);
+/// The axes below each other, two axes in 15 lines unless there is much to say; no line takes more than
+/// `width` columns, 20 at least. `colour`: with ANSI control sequences (ECMA-48 SGR), which take none.
+std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::size_t width, bool colour);
+
+/// "[   ###|      ]": how far `value` is from 0 on the way to `end` or -`end`, `half` characters to either
+/// side. A value beyond an end, or that is not a number, ends in '!'.
+std::string bar(float value, float end, std::size_t half);
 
 /// All of it in one line, for a log.
 std::string watch_line(double seconds, const std::vector<WatchedAxis>& axes);

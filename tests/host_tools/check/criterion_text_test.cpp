@@ -61,7 +61,7 @@ TEST(CriterionText, TheRelationHoldsOnTheBound) {
 TEST(CriterionText, LinesAreShortAndWhole) {
   const std::string words = "one two three " + std::string(120, 'x') + " four";
   const std::string text = wrapped(words, "  ");
-  EXPECT_EQ(text, "  one two three\n  " + std::string(120, 'x') + "\n  four\n");
+  EXPECT_EQ(text, "  one two three\n  " + std::string(108, 'x') + "\n  " + std::string(12, 'x') + " four\n");
   EXPECT_EQ(wrapped("", ">"), ">\n");
   for (const CriterionText& criterion : all_criteria()) {
     const std::string all = explanation(criterion.criterion);

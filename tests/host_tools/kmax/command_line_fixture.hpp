@@ -19,8 +19,11 @@ namespace kmax::cli {
 /// The whole program in process, on whatever link open_device() gives.
 class CommandLineFixture : public testing::Test {
  protected:
-  /// Tests of one command on the simulated device mean it.
-  CommandLineFixture() { setenv("KMAX_DEVICE", "sim", 0); }
+  /// Tests of one command on the simulated device mean it, and no settings of whoever runs them.
+  CommandLineFixture() {
+    setenv("KMAX_DEVICE", "sim", 0);
+    setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1);
+  }
 
   virtual std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) = 0;
   /// What else a command reaches of this computer.

@@ -131,7 +131,7 @@ TEST_F(CommandLine, MistypedCommandsGetASuggestion) {
   EXPECT_EQ(kmax({"--device", "sim", "disram"}), wrong_usage);
   EXPECT_CONTAINS(said, "did you mean disarm?");
   EXPECT_EQ(kmax({"bananas"}), wrong_usage);
-  EXPECT_CONTAINS(said, "commands are list, get");
+  EXPECT_CONTAINS(said, "commands are devices, info");
   EXPECT_EQ(kmax({}), wrong_usage);
   EXPECT_CONTAINS(said, "a command is missing");
 }
@@ -242,8 +242,13 @@ TEST_F(CommandLine, ListFiltersAndMarks) {
   fake->registers.values().set_real<"wall.stiffness">(5.0f);
   EXPECT_EQ(kmax({"list", "wall."}), done);
   EXPECT_CONTAINS(output, "*5");
-  EXPECT_EQ(output.find("guard"), std::string::npos);
-  EXPECT_EQ(output.find("axis1"), std::string::npos);
+  EXPECT_EQ(output.find("\nguard"), std::string::npos);
+  EXPECT_EQ(output.find("\naxis1"), std::string::npos);
+  EXPECT_EQ(kmax({"list", "STIFFNESS_c", "--json"}), done)
+      << "what no name begins with is looked for within names";
+  EXPECT_EQ(keys(), std::vector<std::string>{"wall.stiffness_ceiling"});
+  EXPECT_EQ(kmax({"list", "soft start", "--json"}), done) << "and then in the help";
+  EXPECT_TRUE(document().contains("force.ramp_time")) << output;
   EXPECT_EQ(kmax({"list", "--changed", "--json"}), done);
   EXPECT_EQ(document().size(), 1u);
   EXPECT_EQ(document()["wall.stiffness"]["default"], 1000);
@@ -330,6 +335,20 @@ TEST_F(CommandLine, WatchLendsTheLinkAtAnyPace) {
   };
   EXPECT_EQ(kmax({"watch", "--rate", "50", "--for", "1.5", "--json"}), done);
   EXPECT_GE(longest, 25'000u);
+}
+
+TEST_F(CommandLine, WatchWritesAReadingALineForPrograms) {
+  EXPECT_EQ(kmax({"watch", "--rate", "20", "--for", "0.2", "--json"}), done);
+  std::istringstream lines(output);
+  double before = -1;
+  int readings = 0;
+  for (std::string line; std::getline(lines, line); ++readings) {
+    const Json reading = Json::parse(line);
+    EXPECT_GT(reading["time_s"], before);
+    before = reading["time_s"];
+    EXPECT_EQ(reading["axes"].size(), firmware::axis_count);
+  }
+  EXPECT_GE(readings, 4);
 }
 
 TEST_F(CommandLine, StopAndDisarmActOnEveryAxis) {

@@ -46,7 +46,7 @@ class Commands : public testing::Test {
     auto app = std::make_unique<CLI::App>("", "kmax");
     app->add_flag("--json", context.json);
     app->add_option("--device", context.device_option);
-    for (const AddCommand add : all_commands()) add(*app, context);
+    add_all_commands(*app, context);
     return app;
   }
 

@@ -115,7 +115,7 @@ TEST_F(GuardOnCommandLine, AWarningArmsAndIsSaidOnceBesideTheResult) {
   EXPECT_EQ(axis_0()["warning"], true);
   EXPECT_EQ(axis_0()["stability_check"]["pass"], false);
   EXPECT_EQ(kmax({"state"}), done);
-  EXPECT_CONTAINS(output, "(armed: force is on); stability check: wall.stiffness 5500 N/m exceeds ");
+  EXPECT_CONTAINS(output, "armed, force is on (Operation enabled); stability check: wall.stiffness 5500 N/m exceeds ");
 }
 
 TEST_F(GuardOnCommandLine, OffSaysNothing) {

@@ -10,10 +10,10 @@ struct Experiment : SimulatedCommandLine {
   /// Of all experiments, as the help lists them: two spaces, the name, what it does.
   std::vector<std::string> names() {
     EXPECT_EQ(kmax({"experiment", "--help"}), done);
-    std::istringstream help(output.substr(output.find("Subcommands:")));
+    std::istringstream help(output.substr(output.find("Commands:")));
     std::vector<std::string> all;
     for (std::string line; std::getline(help, line);)
-      if (line.size() > 2 && line.starts_with("  ") && line[2] != ' ')
+      if (line.size() > 2 && line.starts_with("  ") && line[2] != ' ' && line[2] != '-')
         all.push_back(line.substr(2, line.find(' ', 2) - 2));
     return all;
   }

@@ -9,9 +9,10 @@ namespace kmax::cli::parameter_table_test {
 
 using device::Parameter;
 
-std::vector<std::string> lines_of(std::span<const ParameterRow> rows, bool whole_texts) {
+std::vector<std::string> table_of(std::span<const ParameterRow> rows, std::optional<TerminalSize> terminal,
+                                  bool whole_texts) {
   std::ostringstream out;
-  print_parameter_table(out, rows, whole_texts);
+  print_parameter_table(out, rows, terminal, whole_texts);
   std::istringstream in(out.str());
   std::vector<std::string> lines;
   for (std::string line; std::getline(in, line);) lines.push_back(line);
@@ -26,16 +27,37 @@ std::vector<ParameterRow> everything() {
 }
 
 TEST(ParameterTable, FitsIntoTheTerminal) {
-  for (const bool whole_texts : {false, true}) {
-    for (const std::string& line : lines_of(everything(), whole_texts)) {
-      EXPECT_LE(line.size(), 120u) << line;
-      EXPECT_FALSE(line.ends_with(' ')) << line;
+  for (const std::size_t columns : {60u, 80u, 119u, 120u, 200u}) {
+    for (const bool whole_texts : {false, true}) {
+      for (const std::string& line : table_of(everything(), TerminalSize{.columns = columns}, whole_texts)) {
+        EXPECT_LE(line.size(), columns) << line;
+        EXPECT_FALSE(line.ends_with(' ')) << line;
+      }
     }
   }
 }
 
 TEST(ParameterTable, OneLineForEachAndAHeading) {
-  EXPECT_EQ(lines_of(everything(), false).size(), firmware::slot_count + 1);
+  for (const auto terminal : {std::optional<TerminalSize>{}, std::optional<TerminalSize>{TerminalSize{}}})
+    EXPECT_EQ(table_of(everything(), terminal, false).size(), firmware::slot_count + 1);
+}
+
+// A table that is searched by grep must not lose what it is searched for.
+TEST(ParameterTable, ElsewhereThanOnATerminalNothingIsCut) {
+  const auto rows = everything();
+  const auto lines = table_of(rows, std::nullopt, false);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_TRUE(lines[i + 1].ends_with(rows[i].parameter.definition().help)) << lines[i + 1];
+    if (!rows[i].parameter.writable()) continue;
+    for (const auto& value : rows[i].parameter.definition().values)
+      EXPECT_NE(lines[i + 1].find(value.name), std::string::npos) << lines[i + 1];
+  }
+}
+
+TEST(ParameterTable, EveryValueIsWholeAtEightyColumns) {
+  const ParameterRow rows[] = {
+      {Parameter::of<"wall.adaptive_velocity_max">(1), std::bit_cast<std::uint32_t>(-1.234567e-5f)}};
+  EXPECT_NE(table_of(rows, TerminalSize{}, false)[1].find("*-1.234567e-5  m/s"), std::string::npos);
 }
 
 TEST(ParameterTable, MarksWhatIsNotTheDefault) {
@@ -43,7 +65,7 @@ TEST(ParameterTable, MarksWhatIsNotTheDefault) {
                                {Parameter::of<"wall.damping">(), 0},
                                {Parameter::of<"wall.position">(), std::bit_cast<std::uint32_t>(-0.0f)},
                                {Parameter::of<"measured.force">(), std::bit_cast<std::uint32_t>(1.0f)}};
-  const auto lines = lines_of(rows, false);
+  const auto lines = table_of(rows, std::nullopt, false);
   EXPECT_NE(lines[1].find("*5"), std::string::npos);
   for (const std::size_t unmarked : {2u, 3u, 4u})
     EXPECT_EQ(lines[unmarked].find('*'), std::string::npos) << lines[unmarked];
@@ -52,7 +74,7 @@ TEST(ParameterTable, MarksWhatIsNotTheDefault) {
 TEST(ParameterTable, WholeTextsLoseNoWord) {
   const ParameterRow rows[] = {{Parameter::of<"velocity.estimator">(), 0}};
   std::string all;
-  for (const std::string& line : lines_of(rows, true))
+  for (const std::string& line : table_of(rows, TerminalSize{}, true))
     all += line.substr(std::min<std::size_t>(line.find_first_not_of(' '), line.size())) + " ";
   EXPECT_NE(all.find(rows[0].parameter.definition().help), std::string::npos) << all;
   EXPECT_NE(all.find("difference|low_pass|foaw|foaw_end_fit|tracking"), std::string::npos) << all;
