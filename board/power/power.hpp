@@ -79,6 +79,7 @@ class Power {
     firmware::BoardReadings readings = drives_.readings();
     readings.gate_driver_missing = lines_.missing;
     readings.gate_driver_faults = lines_.faults;
+    readings.interference_forgiven = interference_.forgiven();
     return readings;
   }
 
