@@ -1,6 +1,7 @@
 #pragma once
 
 #include "board/power/drives.hpp"
+#include "drivers/drv8301_registers.hpp"
 
 namespace kmax::board {
 
@@ -78,6 +79,7 @@ class Power {
     firmware::BoardReadings readings = drives_.readings();
     readings.gate_driver_missing = lines_.missing;
     readings.gate_driver_faults = lines_.faults;
+    readings.interference_forgiven = interference_.forgiven();
     return readings;
   }
 
@@ -115,8 +117,9 @@ class Power {
       configured_gain = drives.gain();
       return drives.hardware().configure_gate_driver(axis, configured_gain);
     }
-    void note_gate_driver_faults(std::size_t axis) {
+    bool note_gate_driver_faults(std::size_t axis) {
       faults[axis] = drives.hardware().read_gate_driver_faults(axis);
+      return (faults[axis] & static_cast<unsigned>(drivers::Drv8301Fault::fault)) != 0;
     }
     void restart_offset_calibration() { drives.restart_offset_calibration(); }
     OffsetProgress offset_progress() { return drives.offset_progress(); }

@@ -33,7 +33,8 @@ concept PowerStageHardware = requires(Hardware hardware, std::size_t axis, bool 
   { hardware.configure_gate_driver(axis) } -> std::same_as<GateDriverAnswer>;
   { hardware.is_missing(axis) } -> std::same_as<bool>;
   /// Notes for the host what the axis' gate driver says of its faults, which a reset by EN_GATE wipes out.
-  {hardware.note_gate_driver_faults(axis)};
+  /// True: it says that the fault line is low for one of its own.
+  { hardware.note_gate_driver_faults(axis) } -> std::same_as<bool>;
   /// The axis' gate driver is not there: in_service() is false for it from now on.
   {hardware.set_missing(axis)};
   /// Begins to average the current sensors' codes with the bridges off.
@@ -139,11 +140,14 @@ class PowerStage {
     since_us_ = now_us;
   }
 
-  void note_gate_driver_faults() {
+  /// True: one of them says that it has a fault.
+  bool note_gate_driver_faults() {
+    bool any = false;
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
       // Also one that is left alone: it pulls the common line all the same.
-      if (!hardware_.is_missing(axis)) hardware_.note_gate_driver_faults(axis);
+      if (!hardware_.is_missing(axis)) any = hardware_.note_gate_driver_faults(axis) || any;
     }
+    return any;
   }
 
   /// All axes in service; those that are found missing are no longer.
@@ -181,17 +185,7 @@ class PowerStage {
         if (elapsed < wake_us) return;
         // The drivers pull nFAULT while they start; an edge from then says nothing.
         fault_edge_.store(false, std::memory_order_relaxed);
-        if (!configure_gate_drivers()) {
-          condition_.store(firmware::Fault::power_stage, std::memory_order_relaxed);
-          return enter(State::waiting, now_us);
-        }
-        if (hardware_.fault_line_low()) {
-          note_gate_driver_faults();
-          condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
-          return enter(State::waiting, now_us);
-        }
-        hardware_.restart_offset_calibration();
-        return enter(State::measuring, now_us);
+        return leave_waking(now_us);
       case State::measuring:
         switch (hardware_.offset_progress()) {
           case OffsetProgress::running:
@@ -212,6 +206,18 @@ class PowerStage {
         if (!hardware_.track_offsets()) refuse_offsets(now_us);
         return;
     }
+  }
+  /// A driver that answers and pulls the fault line is named, whatever keeps the other one silent.
+  void leave_waking(std::uint32_t now_us) {
+    const bool configured = configure_gate_drivers(), low = hardware_.fault_line_low();
+    if (configured && !low) {
+      hardware_.restart_offset_calibration();
+      return enter(State::measuring, now_us);
+    }
+    const bool named = low && note_gate_driver_faults();
+    condition_.store(configured || named ? firmware::Fault::gate_driver : firmware::Fault::power_stage,
+                     std::memory_order_relaxed);
+    enter(State::waiting, now_us);
   }
   void refuse_offsets(std::uint32_t now_us) {
     condition_.store(firmware::Fault::current_sense, std::memory_order_relaxed);

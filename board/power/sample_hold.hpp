@@ -61,23 +61,33 @@ class SampleHold {
 /// How much interference on the lines is forgiven: a leaky bucket of `most`, `leak` less a millisecond. Up to
 /// 5,000 disturbances a second pass for ever; a line that is disturbed in every period would leave the
 /// current loop without samples, and nobody would know: that is over after 1.3 ms.
+///
+/// Contexts: ISR_ functions the line interrupts, which do not interrupt each other; all others the main loop.
 class InterferenceBudget {
  public:
   static constexpr std::uint8_t most = 20, leak = 5;
 
-  bool ISR_spent() const { return forgiven_.load(std::memory_order_relaxed) >= most; }
+  bool ISR_spent() const { return level_.load(std::memory_order_relaxed) >= most; }
   /// Only while it is not spent.
-  void ISR_forgive() { forgiven_.fetch_add(1, std::memory_order_relaxed); }
-  /// Main loop, at least every millisecond.
-  void poll(std::uint32_t now_us) {
-    if (now_us - leaked_at_us_ < 1'000) return;
-    leaked_at_us_ = now_us;
-    const std::uint8_t forgiven = forgiven_.load(std::memory_order_relaxed);
-    forgiven_.fetch_sub(forgiven < leak ? forgiven : leak, std::memory_order_relaxed);
+  void ISR_forgive() {
+    level_.fetch_add(1, std::memory_order_relaxed);
+    forgiven_.store(forgiven_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
+  /// At any time: all that has leaked since the last call leaks then, for each whole millisecond since the
+  /// bucket was last seen empty.
+  void poll(std::uint32_t now_us) {
+    const std::uint8_t level = level_.load(std::memory_order_relaxed);
+    const std::uint32_t passed_ms = (now_us - leaked_at_us_) / 1'000;
+    leaked_at_us_ = level == 0 ? now_us : leaked_at_us_ + 1'000 * passed_ms;
+    const std::uint32_t leaked = leak * passed_ms;
+    level_.fetch_sub(leaked < level ? static_cast<std::uint8_t>(leaked) : level, std::memory_order_relaxed);
+  }
+  /// Since the start; wraps at 2^32.
+  std::uint32_t forgiven() const { return forgiven_.load(std::memory_order_relaxed); }
 
  private:
-  std::atomic<std::uint8_t> forgiven_{0};
+  std::atomic<std::uint8_t> level_{0};
+  std::atomic<std::uint32_t> forgiven_{0};
   std::uint32_t leaked_at_us_ = 0;
 };
 

@@ -25,6 +25,7 @@ struct BoardReadings {
   float modulation_limit = 0.0f;
   std::uint32_t missed_ticks = 0;
   std::uint32_t longest_tick = 0;                      ///< cycles; 0: not measured
+  std::uint32_t interference_forgiven = 0;             ///< disturbances of the lines that were not meant
   std::array<bool, axis_count> gate_driver_missing{};  ///< has not answered since the start
   /// What the axis' gate driver said when its fault line last fell, in the bits of drive.gate_driver_faults.
   std::array<std::uint16_t, axis_count> gate_driver_faults{};

@@ -165,6 +165,7 @@ void Readings::refresh_device() {
 
   v.set_whole<"counters.missed_ticks">(of_.axes.readings().missed_ticks);
   v.set_whole<"counters.longest_tick">(of_.axes.readings().longest_tick);
+  v.set_whole<"counters.interference_forgiven">(of_.axes.readings().interference_forgiven);
   v.set_real<"supply.voltage">(of_.axes.readings().supply_voltage);
 
   publish_crash();

@@ -180,6 +180,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
         "the "
         "start, by its own counter, entry and return included, and whatever interrupts came with it. 0: not "
         "measured."),
+    reading("counters.interference_forgiven", group::counters, 12, Type::unsigned32, "",
+            "Disturbances of the emergency stop's line and of the gate drivers' fault line that were over "
+            "within microseconds, and after which force went on. Up to 5 a millisecond go on for ever; a "
+            "number that rises asks for shielded cables."),
 
     reading("refusal.reason", group::refusal, 1, Type::unsigned16, "",
             "Why the last write was refused; 0: it was not."),

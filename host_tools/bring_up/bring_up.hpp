@@ -50,8 +50,10 @@ bool bring_up(device::Device& device, Report& report, const Settings& settings, 
 /// pulses, and finds its place.
 selftest::Evidence test_free_handle(device::Device& device, const Settings& settings, const Party& party);
 
-/// The current amplifiers' offsets with the board's temperature beside them; and how they drift, if `cold`
-/// has them from another temperature.
+/// The current amplifiers' offsets with the board's temperature beside them, as a cold board has them.
+selftest::CheckResult check_cold_offsets(device::Device& device, std::size_t axis);
+/// The same of a warm one; and how they drift, if `cold` has them from another temperature. Else that is not
+/// judged.
 selftest::CheckResult check_offsets(device::Device& device, std::size_t axis, const Report& cold);
 
 // The stages, each of which looks at one thing more.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/selftest/checks.hpp"
 
@@ -42,9 +43,10 @@ namespace {
 /// How the supply follows what the swing takes: with the bus capacitor C,  (E - V)/R - C dV/dt = i,  whose
 /// integral is fitted for 1/R and C. A short swing charges the capacitor only, and a long one shows R.
 struct Sag {
-  double lowest = 0.0;      ///< V
-  double resistance = 0.0;  ///< ohm
-  bool seen = false;        ///< beyond the steps of the converter; else the resistance is its bound
+  double lowest = 0.0;                    ///< V
+  bool seen = false;                      ///< beyond the steps of the converter
+  double least_seen = 0.0;                ///< ohm, that would just have been
+  std::optional<double> resistance = {};  ///< ohm, of one that was seen; none: it follows no resistance
 };
 
 Sag sag_of(const PulseResponse& swing, const AxisFacts& facts) {
@@ -65,8 +67,8 @@ Sag sag_of(const PulseResponse& swing, const AxisFacts& facts) {
   sag.seen = lost > step * duration;
   const double determinant = ll * ff - lf * lf;
   const double conductance = (lt * ff - ft * lf) / determinant;
-  sag.resistance =
-      sag.seen && conductance > 0.0 ? 1.0 / conductance : step * duration / std::max(taken, 1e-9);
+  sag.least_seen = step * duration / std::max(taken, 1e-9);
+  if (sag.seen && conductance > 0.0) sag.resistance = 1.0 / conductance;
   return sag;
 }
 
@@ -122,17 +124,25 @@ CheckResult check_supply(const Evidence& evidence) {
     return result.pass(at_rest + "; not loaded, since no pulse could be given");
   const Sag sag = sag_of(*evidence.under_load, facts);
   result.values.push_back({"lowest_under_load", sag.lowest, "V", 0.9 * rest.mean});
-  result.values.push_back({"source_resistance", sag.resistance, "ohm"});
-  const std::string under_load = fmt::format(
-      "{:.2f} V at rest falls to {:.2f} V in a swing at part of the current; source resistance {} {:.2g} ohm",
-      rest.mean, sag.lowest, sag.seen ? "about" : "below", sag.resistance);
+  std::string under_load = fmt::format("{:.2f} V at rest falls to {:.2f} V in a swing at part of the current",
+                                       rest.mean, sag.lowest);
+  if (sag.resistance || !sag.seen) {
+    const double resistance = sag.resistance.value_or(sag.least_seen);
+    result.values.push_back({"source_resistance", resistance, "ohm"});
+    under_load += fmt::format("; source resistance {} {:.2g} ohm", sag.seen ? "about" : "below", resistance);
+  }
   const std::string advice =
       "check the supply's current limit, the cable and its plugs, or lower current.limit";
   if (sag.lowest < 0.9 * rest.mean)
     return result.fail("supply", fmt::format("{}; allowed is a tenth; {}", under_load, advice));
-  if (!sag.seen || !evidence.phases || !(evidence.phases->admittance > 0.0)) return result.pass(under_load);
+  if (!sag.seen) return result.pass(under_load);
+  if (!sag.resistance)
+    return result.not_judged(under_load +
+                             ", and not as it does behind a resistance: what it has left at current.limit is "
+                             "not known; look whether it is switched on and gives current at all");
+  if (!evidence.phases || !(evidence.phases->admittance > 0.0)) return result.pass(under_load);
   const double winding = evidence.phases->judged_resistance / evidence.phases->admittance;
-  const double at_limit = supply_at_limit(rest.mean, sag.resistance, winding, facts);
+  const double at_limit = supply_at_limit(rest.mean, *sag.resistance, winding, facts);
   result.values.push_back({"at_current_limit", at_limit, "V", facts.supply_min});
   const std::string computed =
       fmt::format("{}; with the motor held at current.limit it would fall to {:.1f} V; {}", under_load,

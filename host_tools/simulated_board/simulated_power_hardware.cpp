@@ -79,11 +79,21 @@ void SimulatedPowerHardware::set_gate_enable(bool high) {
   gate_enabled_ = high;
 }
 
+bool SimulatedPowerHardware::answers(std::size_t axis) const {
+  return supply_suffices() && started_[axis] &&
+         !drives_.planted(axis, simulation::Defect::gate_driver_missing);
+}
+
+std::uint16_t SimulatedPowerHardware::read_gate_driver_faults(std::size_t axis) const {
+  using enum drivers::Drv8301Fault;
+  if (!answers(axis)) return static_cast<std::uint16_t>(no_answer);
+  return gate_driver_fault_ ? static_cast<std::uint16_t>(fault) : std::uint16_t{0};
+}
+
 board::GateDriverAnswer SimulatedPowerHardware::configure_gate_driver(std::size_t axis,
                                                                       drivers::CurrentSenseGain gain) {
   using enum board::GateDriverAnswer;
-  if (!supply_suffices() || !started_[axis] || drives_.planted(axis, simulation::Defect::gate_driver_missing))
-    return silent;
+  if (!answers(axis)) return silent;
   if (drives_.has(axis))
     drives_.drive(axis).current_sensor().set_gain(static_cast<double>(drivers::gain_factor(gain)));
   return accepted;

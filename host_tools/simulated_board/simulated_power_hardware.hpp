@@ -88,13 +88,11 @@ class SimulatedPowerHardware {
   bool fault_line_low() const { return gate_driver_fault_ || !supply_suffices() || !all_started(); }
   bool emergency_stop_open() const { return emergency_stop_pressed_; }
   board::GateDriverAnswer configure_gate_driver(std::size_t axis, drivers::CurrentSenseGain gain);
-  /// Of a planted fault it knows no phase; a supply that is too low is named.
-  std::uint16_t read_gate_driver_faults(std::size_t) const {
-    using enum drivers::Drv8301Fault;
-    return static_cast<std::uint16_t>(supply_suffices() ? fault : supply_under_voltage);
-  }
+  /// Of a planted fault it knows no phase.
+  std::uint16_t read_gate_driver_faults(std::size_t axis) const;
 
  private:
+  bool answers(std::size_t axis) const;
   bool supply_suffices() const;
   bool all_started() const { return std::all_of(started_.begin(), started_.end(), std::identity{}); }
 

@@ -98,4 +98,17 @@ TEST(CurrentSensors, OffsetsAreFoundAnewWheneverDrivingBeginsOrEnds) {
   }
 }
 
+TEST(CurrentSensors, AStepThatIsNoZerosIsNotTakenInHoweverOftenDrivingBegins) {
+  CurrentSensors sensors;
+  sensors.restart_calibration(gain);
+  for (int n = 0; n < 10; ++n) {
+    for (const bool driven : {true, false}) {
+      const std::uint32_t code = driven ? 2108 : 2048;
+      for (int ms = 0; ms < 250; ++ms) sensors.track_offsets(2048, code, gain, driven);
+      const float taken = sensors.offset_c() / drivers::CurrentSense{{.gain = gain}}.ISR_amperes(2049);
+      ASSERT_LE(taken, 16.5f) << n << ", with what was left of the time before";
+    }
+  }
+}
+
 }  // namespace kmax::board::current_sensors_test

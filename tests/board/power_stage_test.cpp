@@ -12,7 +12,7 @@ using firmware::Fault;
 struct Hardware {
   bool gate = false, fault_low = false, stop_open = false;
   GateDriverAnswer answers[2] = {GateDriverAnswer::accepted, GateDriverAnswer::accepted};
-  bool missing[2] = {};
+  bool missing[2] = {}, names_cause[2] = {};
   OffsetProgress offsets = OffsetProgress::accepted;
   bool offsets_hold = true;
   mutable int looks_for_spike = 0;
@@ -28,10 +28,11 @@ struct Hardware {
   bool in_service(std::size_t axis) const { return !missing[axis]; }
   bool is_missing(std::size_t axis) const { return missing[axis]; }
   void set_missing(std::size_t axis) { missing[axis] = true; }
-  void note_gate_driver_faults(std::size_t axis) {
+  bool note_gate_driver_faults(std::size_t axis) {
     EXPECT_TRUE(gate) << "a reset has wiped them out";
     EXPECT_FALSE(missing[axis]);
     ++looks[axis];
+    return names_cause[axis];
   }
   GateDriverAnswer configure_gate_driver(std::size_t axis) {
     EXPECT_TRUE(gate) << "the chips do not answer while EN_GATE is low";
@@ -68,6 +69,26 @@ TEST_F(PowerStageTest, ADriverThatPullsTheFaultLineWhileItIsSilentIsThere) {
   hardware.fault_low = false;
   run(500'000);
   EXPECT_TRUE(stage.ready());
+}
+
+TEST_F(PowerStageTest, ADriverThatPullsTheFaultLineIsNamedBesideOneThatDoesNotAnswer) {
+  for (const GateDriverAnswer other : {GateDriverAnswer::silent, GateDriverAnswer::faulty}) {
+    for (const std::size_t axis : {0U, 1U}) {
+      Hardware board;
+      PowerStage<Hardware> faulty{board};
+      board.answers[1 - axis] = other;
+      board.fault_low = board.names_cause[axis] = true;
+      std::uint32_t at = 0;
+      for (; at < 1'000'000; at += 100) faulty.poll(at, false);
+      EXPECT_EQ(faulty.condition(), Fault::gate_driver);
+      EXPECT_EQ(board.looks[axis], board.gate_rises) << "once before each reset";
+      EXPECT_FALSE(board.missing[0] || board.missing[1]);
+      board.fault_low = board.names_cause[axis] = false;
+      for (; at < 2'000'000; at += 100) faulty.poll(at, false);
+      EXPECT_EQ(board.missing[1 - axis], other == GateDriverAnswer::silent);
+      EXPECT_EQ(faulty.condition(), other == GateDriverAnswer::silent ? Fault::none : Fault::power_stage);
+    }
+  }
 }
 
 TEST_F(PowerStageTest, IsNotReadyBeforeItHasRun) {

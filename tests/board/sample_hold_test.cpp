@@ -88,6 +88,7 @@ TEST(InterferenceBudget, ForgivesItsMostAndItsLeakForEachMillisecondThatPasses) 
     budget.ISR_forgive();
   }
   EXPECT_TRUE(budget.ISR_spent());
+  EXPECT_EQ(budget.forgiven(), InterferenceBudget::most);
   budget.poll(now + 999);
   EXPECT_TRUE(budget.ISR_spent()) << "just before the bound";
   for (int n = 0; n < 3; ++n) {
@@ -98,6 +99,22 @@ TEST(InterferenceBudget, ForgivesItsMostAndItsLeakForEachMillisecondThatPasses) 
       budget.ISR_forgive();
     }
     EXPECT_TRUE(budget.ISR_spent()) << "what comes back just after the bound spends what has leaked";
+  }
+}
+
+// Whenever it is polled: the same number in the long run.
+TEST(InterferenceBudget, LeaksForTheWholeTimeHoweverSeldomItIsPolled) {
+  for (const unsigned interval : {200U, 999U, 1'001U, 1'900U, 3'100U}) {
+    SCOPED_TRACE(interval);
+    InterferenceBudget budget;
+    unsigned forgiven = 0;
+    constexpr std::uint32_t duration = 10'000'000;
+    for (std::uint32_t passed = 0; passed < duration; passed += interval) {
+      budget.poll(0xFFFF'0000 + passed);
+      for (; !budget.ISR_spent(); ++forgiven) budget.ISR_forgive();
+    }
+    EXPECT_NEAR(forgiven, InterferenceBudget::leak * duration / 1'000, InterferenceBudget::most);
+    EXPECT_EQ(budget.forgiven(), forgiven) << "what has leaked too";
   }
 }
 

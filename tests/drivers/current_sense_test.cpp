@@ -82,6 +82,33 @@ TEST(CurrentSense, TracksAStepInMillisecondsAndTheTemperatureInQuarters) {
   EXPECT_NEAR(sense.offset(), 2058.0F - 10.0F * std::exp(-1.0F), 0.02F);
 }
 
+TEST(CurrentSense, WhatDrivingMovesIsNoMoreThanSixteenCodesWhateverIsShown) {
+  for (const float sign : {1.0F, -1.0F}) {
+    CurrentSense sense;
+    sense.set_offset(2100.0F);
+    const auto code = static_cast<std::uint32_t>(2100.0F + sign * 60.0F);
+    for (unsigned after = 0; after < 252; ++after) {
+      sense.track_offset(code, after);
+      ASSERT_LE(std::abs(sense.offset() - 2100.0F), 16.0F) << after;
+    }
+    EXPECT_EQ(sense.offset(), 2100.0F + sign * 16.0F);
+    // From then on as fast as the temperature may do it, and not held where driving began.
+    for (unsigned after = 252; after < 268; ++after) sense.track_offset(code, after);
+    EXPECT_NEAR(sense.offset(), 2100.0F + sign * 17.0F, 0.01F);
+    // Where driving ends, the bound is about what is taken off then.
+    for (unsigned after = 0; after < 252; ++after) sense.track_offset(2100, after);
+    EXPECT_NEAR(sense.offset(), 2100.0F + sign * 1.0F, 0.01F);
+  }
+}
+
+TEST(CurrentSense, ACalibrationJustBehindDrivingMovesTheBound) {
+  CurrentSense sense;
+  sense.track_offset(2048, 0);
+  sense.set_offset(2148.0F);
+  sense.track_offset(2148, 1);
+  EXPECT_EQ(sense.offset(), 2148.0F);
+}
+
 TEST(OffsetCalibration, TakesExactlyItsSamples) {
   OffsetCalibration calibration{{.log2_samples = 3}};
   for (int i = 0; i < 7; ++i) EXPECT_EQ(calibration.ISR_add(2050), OffsetResult::running) << i;

@@ -104,6 +104,24 @@ TEST(ClosedLoopOfOneAxis, RendersWhileTheOtherAxisIsAbsentAndADriverThatDiesLate
   }
 }
 
+TEST(ClosedLoopOfOneAxis, ADriverThatPullsTheFaultLineIsNamedBesideOneThatIsNotFitted) {
+  for (const std::size_t there : {0U, 1U}) {
+    ImageBench bench(stiff_walls(), 2.0);
+    bench.world.drives().plant(1 - there, simulation::Defect::gate_driver_missing);
+    auto& driver = bench.board->gate_driver(there);
+    driver.set_condition(drivers::Drv8301Fault::over_temperature, true, bench.board->now());
+    bench.board->run_for(1.0);
+    EXPECT_ANY_THROW(bench.master->arm(there));
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.refusal">(), there),
+              static_cast<unsigned>(firmware::Refusal::gate_driver_fault));
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.gate_driver_faults">(), there) & 128U, 128U);
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.gate_driver_faults">(), 1 - there), 4096U);
+    driver.set_condition(drivers::Drv8301Fault::over_temperature, false, bench.board->now());
+    bench.start();
+    EXPECT_EQ(bench.reading(firmware::entry_of<"drive.presence">(), 1 - there), 1) << "no_answer";
+  }
+}
+
 // DRV8301: it does not start while a phase is above 8.5 V. The reset after a fault is such a start.
 TEST(ClosedLoopOfOneAxis, AGateDriverThatIsResetWhileItsMotorIsTurnedFastStartsWhenItStands) {
   ImageBench bench({}, 0.0, "gimbal_b");

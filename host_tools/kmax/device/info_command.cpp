@@ -70,12 +70,15 @@ Json reading_json(const Parameter& parameter, std::uint32_t raw) {
 int run_info(Context& context) {
   device::Device device = context.connect();
   const auto texts = device.identify();
-  // The link's own counters.
-  const std::string_view counters = device.description().starts_with("can:") ? "can" : "counters";
+  // The link's own counters, and those of the board, which stand behind the serial line's.
+  const std::string_view link_counters = device.description().starts_with("can:") ? "can" : "counters";
+  const std::size_t first_of_board = firmware::entry_of<"counters.missed_ticks">();
   std::vector<Parameter> parameters;
   for (const Parameter& parameter : device::all_parameters()) {
     const std::string_view group = parameter.definition().group.name;
-    if (group == "info" || (group == counters && !parameter.writable())) parameters.push_back(parameter);
+    const bool counts =
+        group == link_counters || (group == "counters" && parameter.entry() >= first_of_board);
+    if (group == "info" || (counts && !parameter.writable())) parameters.push_back(parameter);
   }
   const auto raw = device.read(parameters);
   const std::string crash = crash_text(device);

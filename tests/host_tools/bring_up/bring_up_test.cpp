@@ -268,6 +268,28 @@ TEST(BringUp, AmplifiersThatDriftAreFoundOnceTheBoardIsWarm) {
   }
 }
 
+TEST(BringUp, AmplifiersAreNotSaidToDriftLittleWhereEitherTemperatureIsNotKnown) {
+  StartedBoard board("dc_coreless_a");
+  device::Device& device = *board.board.device;
+  auto& temperature = board.board.drives().temperature(0);
+  Report report{BoardFacts{}};
+  const auto check = [&] {
+    board.board.link->wait(std::chrono::seconds(4));
+    return check_offsets(device, 0, report);
+  };
+  report.add(0, {Stage::gate_drivers, "", {check_cold_offsets(device, 0)}});
+  temperature.set_temperature(60.0);
+  EXPECT_EQ(check().verdict, selftest::Verdict::pass);
+  temperature.set_wiring(TemperatureSensor::Wiring::open);
+  EXPECT_EQ(check().verdict, selftest::Verdict::not_judged) << "the sensor is broken";
+  temperature.set_wiring(TemperatureSensor::Wiring::intact);
+  // By an earlier kmax, which measured none.
+  report.add(0, {Stage::gate_drivers, "", {}});
+  const selftest::CheckResult found = check();
+  EXPECT_EQ(found.verdict, selftest::Verdict::not_judged);
+  EXPECT_NE(found.message.find("gate_drivers"), std::string::npos) << found.message;
+}
+
 TEST(BringUp, ThreeResistorsInAStarAreALoad) {
   simulation::Scene scene = selftest::TestedAxis::opened("gimbal_b", false);
   auto& motor = std::get<simulation::SynchronousMotorConfig>(*scene.axes[0].motor);

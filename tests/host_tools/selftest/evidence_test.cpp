@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace kmax::selftest::evidence_test {
@@ -40,6 +41,44 @@ TEST(Evidence, TheSupplysLimitsBelongToTheAllowed) {
   evidence.supply = {24.0};
   evidence.pulse_fault = Fault::under_voltage;
   EXPECT_EQ(check_supply(evidence).part, "supply");
+}
+
+/// 24 V that feed 2 A for 2 ms, and what is left of them there: `supply` of the share of the time.
+template <typename Supply>
+Evidence loaded(Supply supply) {
+  Evidence evidence = armed_at_24_volts();
+  evidence.phases = PhaseFinding{.circuit = Circuit::healthy, .admittance = 1.0, .judged_resistance = 1.0};
+  PulseResponse& swing = evidence.under_load.emplace();
+  swing.before = 20;
+  swing.pulse.duration = 40;
+  for (unsigned k = 0; k < 70; ++k) {
+    const double share = k < 20 ? 0.0 : std::min(1.0, (k - 20) / 40.0);
+    const double current = k < 20 ? 0.0 : 2.0;
+    swing.voltage.push_back(6.0 * current);
+    swing.current_b.push_back(current);
+    swing.current_c.push_back(-current);
+    swing.position.push_back(0.0);
+    swing.supply.push_back(supply(share));
+  }
+  return evidence;
+}
+
+TEST(Evidence, ASupplyIsJudgedAtTheCurrentLimitOnlyByAResistanceThatWasFound) {
+  // 0.3 ohm, and a capacitor for half a millisecond.
+  const CheckResult strong =
+      check_supply(loaded([](double share) { return 24.0 - 0.3 * (1.0 - std::exp(-4.0 * share)); }));
+  EXPECT_EQ(strong.verdict, Verdict::pass) << strong.message;
+  EXPECT_NE(strong.message.find("with the motor held at current.limit"), std::string::npos);
+  // One that gives nothing any more, but what its capacitor has, falls faster and faster: of no resistance.
+  const CheckResult dead =
+      check_supply(loaded([](double share) { return 24.0 - 1.5 * std::pow(share, 1.3); }));
+  EXPECT_EQ(dead.verdict, Verdict::not_judged) << dead.message;
+  EXPECT_NE(dead.message.find("falls to 22.50 V"), std::string::npos) << dead.message;
+  EXPECT_EQ(dead.message.find("source resistance about"), std::string::npos) << dead.message;
+  for (const MeasuredValue& value : dead.values) EXPECT_NE(value.name, "source_resistance");
+  // More than a tenth is too much, whatever its resistance is.
+  EXPECT_EQ(check_supply(loaded([](double share) { return 24.0 - 3.0 * std::pow(share, 1.3); })).verdict,
+            Verdict::fail);
 }
 
 TEST(Evidence, AGateDriverThatDoesNotAnswerIsNotBlamedForAMissingSupply) {

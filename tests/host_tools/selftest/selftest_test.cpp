@@ -24,6 +24,15 @@ Report run_and_check(TestedAxis& tested, const std::string& what) {
   return report;
 }
 
+/// What some check has measured under this name.
+double value_of(const Report& report, const std::string& name) {
+  for (const CheckResult& check : report.checks)
+    for (const MeasuredValue& value : check.values)
+      if (value.name == name) return value.value;
+  ADD_FAILURE() << "no check has measured " << name;
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 void expect_part(const std::string& scene, Defect defect, const std::string& part) {
   const std::string what = scene + ", " + std::string(simulation::name_of(defect));
   TestedAxis tested(scene);
@@ -210,11 +219,7 @@ TEST(SelfTestSupply, IsJudgedByWhatItGivesAtTheCurrentLimit) {
     const Report report = TestedAxis(scene, 0).run();
     EXPECT_EQ(faulty_part(report), resistance > 4.0 ? "supply" : "") << text_of(report);
     EXPECT_NE(text_of(report).find("with the motor held at current.limit"), std::string::npos);
-    for (const CheckResult& check : report.checks)
-      for (const MeasuredValue& value : check.values)
-        if (value.name == "source_resistance") {
-          EXPECT_NEAR(value.value / resistance, 1.0, 0.1);
-        }
+    EXPECT_NEAR(value_of(report, "source_resistance") / resistance, 1.0, 0.1);
   }
 }
 

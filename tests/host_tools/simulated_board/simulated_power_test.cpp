@@ -571,6 +571,24 @@ TEST(CurrentAmplifiers, TheZeroThatDrivingMovesIsFoundInMilliseconds) {
   }
 }
 
+// 0.6 mV, 60 codes, are no zero that driving moves, even where the sum's watch takes 17 ms for its verdict.
+TEST(CurrentAmplifiers, ASensorThatFailsWhenDrivingBeginsIsNotTakenForAZeroThatMoves) {
+  simulation::Scene scene = identified("dc_coreless_a");
+  for (const double driven : {0.6e-3, -0.6e-3}) {
+    scene.axes[0].current_sensor.driven_c = driven;
+    MotorBench bench(scene);
+    bench.set<"current.limit">(5.0);
+    bench.set<"current.bandwidth">(300.0);
+    bench.set<"wall.law">(0);
+    bench.run(0.2);
+    ASSERT_EQ(bench.drive().current_sensor().gain(), 80.0);
+    ASSERT_TRUE(bench.arm());
+    bench.run(0.1);
+    EXPECT_FALSE(bench.armed());
+    EXPECT_EQ(bench.application().fault(0), Fault::current_sum);
+  }
+}
+
 TEST(CurrentAmplifiers, AnOffsetThatLeavesItsWindowTakesTheForceAway) {
   SenseBench bench({.offset_b = 0.3, .drift_b = 20e-6});
   bench.heat(25.0, 35.0, 5.0);

@@ -125,6 +125,7 @@ TEST_F(StoreCommands, InfoShowsResetCauseStoreAndNoCrash) {
   const Json info = document();
   EXPECT_EQ(info["info"]["reset_cause"], "native");
   EXPECT_EQ(info["crash"], nullptr);
+  EXPECT_EQ(info["counters"]["interference_forgiven"], 0);
   EXPECT_EQ(info["store"]["state"], "idle");
   EXPECT_EQ(info["store"]["saved_parameters"], 0);
   EXPECT_EQ(info["store"]["first_dropped"], Json::array());
