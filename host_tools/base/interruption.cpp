@@ -30,6 +30,10 @@ Interruption::~Interruption() {
 }
 
 bool Interruption::requested() const {
+  return last_was_requested();
+}
+
+bool Interruption::last_was_requested() {
   return seen != 0;
 }
 

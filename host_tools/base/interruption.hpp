@@ -12,6 +12,9 @@ class Interruption {
   Interruption& operator=(const Interruption&) = delete;
 
   bool requested() const;
+
+  /// Of the one that exists, or that existed last.
+  static bool last_was_requested();
 };
 
 }  // namespace kmax::cli

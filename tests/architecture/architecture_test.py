@@ -48,6 +48,7 @@ FOLDERS = {
         ["experiment"],
         ["bring_up"],
         ["virtual_board", "kmax"],
+        ["libkmax"],
     ],
 }
 # Standard headers whose contents need a heap, an operating system or libm.

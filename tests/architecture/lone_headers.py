@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DEAR = ["firmware/parameters/parameter_values.hpp", "firmware/canopen/communication_rules.hpp", "host_tools/device/device.hpp",
         "firmware/application.hpp", "host_tools/simulation/scene.hpp"]
 FLOORS = ["control", "drivers", "firmware", "board", "host_tools"]
-CLANG = ["clang++", "-std=c++20", f"-I{ROOT}", "-isystem", "/usr/include/eigen3", "-DKMAX_AXIS_COUNT=2",
+CLANG = ["clang++", "-std=c++20", f"-I{ROOT}", f"-I{ROOT}/host_tools/libkmax", "-isystem", "/usr/include/eigen3", "-DKMAX_AXIS_COUNT=2",
          '-DKMAX_VERSION=""', "-fconstexpr-steps=100000000", "-Wno-pragma-once-outside-header", "-x", "c++-header"]
 
 

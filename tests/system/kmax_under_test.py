@@ -35,12 +35,13 @@ def kmax_json(*arguments, **options):
 
 
 class _Process:
-    """A process that offers a serial line under a name of its own."""
+    """A process that offers a serial line, LINK in its command, and perhaps a bus, BUS, under names of its own."""
 
     def __init__(self, command):
         self.folder = tempfile.TemporaryDirectory()
         self.link = Path(self.folder.name) / "line"
-        self.process = subprocess.Popen([part.replace("LINK", str(self.link)) for part in command],
+        self.process = subprocess.Popen([part.replace("LINK", str(self.link)).replace("BUS", str(self.link.parent / "bus"))
+                                         for part in command],
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         end = time.monotonic() + PATIENCE
         while not self.link.exists():

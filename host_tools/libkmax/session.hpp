@@ -1,0 +1,56 @@
+#pragma once
+
+#include <sys/types.h>
+#include <kmax/device.hpp>
+
+#include <array>
+#include <mutex>
+
+#include "host_tools/device/device.hpp"
+#include "host_tools/device/device_address.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/libkmax/keeper.hpp"
+#include "host_tools/libkmax/shared_link.hpp"
+
+namespace kmax::library {
+
+/// What an open device consists of.
+class Session {
+ public:
+  Session(const link::DeviceAddress& address, DeviceOptions options);
+  /// Disarms what it armed.
+  ~Session();
+
+  void require_axis(std::size_t axis) const;
+  bool is_of_this_process() const;
+  bool is_can() const { return address.kind == link::DeviceAddress::Kind::can; }
+  double link_timeout() { return device.read_number("link.timeout"); }
+
+  void arm(std::size_t axis, bool keep_alive);
+  std::string disarm(std::size_t axis);
+  /// RefusedError, or LinkError, if an axis that was armed here has lost its force.
+  void require_armed_ones();
+
+  const link::DeviceAddress address;
+  const DeviceOptions options;
+  const pid_t process;
+
+ private:
+  SharedLink* opened_;  // owned by `device`
+
+ public:
+  device::Device device;
+  SharedLink& link() { return *opened_; }
+  /// Of what takes several requests that must not mix: settings, a capture, a recording.
+  std::mutex sequence;
+
+ private:
+  struct Axis {
+    bool armed = false;
+    std::unique_ptr<Keeper> keeper;
+  };
+  std::mutex axes_mutex_;
+  std::array<Axis, firmware::axis_count> axes_;
+};
+
+}  // namespace kmax::library

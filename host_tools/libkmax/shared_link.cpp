@@ -1,0 +1,141 @@
+#include "host_tools/libkmax/shared_link.hpp"
+
+#include <algorithm>
+
+namespace kmax::library {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+namespace {
+/// Long enough for a program that tries to get in every 2 ms (link::ExclusiveUse), short enough to hear of
+/// Ctrl-C.
+constexpr milliseconds slice{20}, lent{10}, idle{30};
+}  // namespace
+
+int& Uninterrupted::depth() {
+  thread_local int depth = 0;
+  return depth;
+}
+
+/// From construction to destruction the link is this thread's.
+class SharedLink::Turn {
+ public:
+  explicit Turn(const SharedLink& link) : link_(link) { link_.enter(); }
+  ~Turn() { link_.leave(); }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  const SharedLink& link_;
+};
+
+SharedLink::SharedLink(std::unique_ptr<link::Link> inner, bool virtual_time, std::function<void()> poll)
+    : inner_(std::move(inner)), virtual_time_(virtual_time), poll_(std::move(poll)), yield_(*inner_) {}
+
+void SharedLink::enter() const {
+  std::unique_lock lock(mutex_);
+  // Who writes may be asked about the time meanwhile (link::Link::write).
+  if (depth_ > 0 && owner_ == std::this_thread::get_id()) {
+    ++depth_;
+    return;
+  }
+  const std::uint64_t mine = next_++;
+  moved_.wait(lock, [&] { return served_ == mine; });
+  owner_ = std::this_thread::get_id();
+  depth_ = 1;
+}
+
+void SharedLink::leave() const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (--depth_ > 0) return;
+    ++served_;
+  }
+  moved_.notify_all();
+}
+
+void SharedLink::lend_if_due() {
+  if (lending_ && !virtual_time_) yield_.yield_if_due();
+  last_used_ = Clock::now().time_since_epoch().count();
+}
+
+std::vector<std::uint32_t> SharedLink::read(std::span<const std::size_t> slots) {
+  const Turn turn(*this);
+  lend_if_due();
+  return inner_->read(slots);
+}
+
+void SharedLink::write(std::span<const link::SlotValue> values, link::Repeat repeat,
+                       const std::function<void()>& before_request) {
+  const Turn turn(*this);
+  inner_->write(values, repeat, before_request);
+  last_used_ = Clock::now().time_since_epoch().count();
+}
+
+std::vector<std::uint32_t> SharedLink::read_trace(std::size_t first, std::size_t count) {
+  const Turn turn(*this);
+  lend_if_due();
+  return inner_->read_trace(first, count);
+}
+
+std::vector<std::uint32_t> SharedLink::read_capture(std::size_t count, const Progress& progress) {
+  const Turn turn(*this);
+  return inner_->read_capture(count, [&](std::size_t done) {
+    poll();
+    if (progress) progress(done);
+  });
+}
+
+std::vector<std::uint32_t> SharedLink::read_log_entry(std::size_t place) {
+  const Turn turn(*this);
+  return inner_->read_log_entry(place);
+}
+
+std::map<std::string, std::string> SharedLink::identify() {
+  const Turn turn(*this);
+  return inner_->identify();
+}
+
+void SharedLink::follow_serial_settings(std::optional<std::uint8_t> unit,
+                                        std::optional<std::uint32_t> baud_rate) {
+  const Turn turn(*this);
+  inner_->follow_serial_settings(unit, baud_rate);
+}
+
+microseconds SharedLink::now() const {
+  if (!virtual_time_) return inner_->now();
+  const Turn turn(*this);
+  return inner_->now();
+}
+
+void SharedLink::wait(microseconds duration) {
+  if (virtual_time_) {
+    for (microseconds left = duration; left > microseconds(0); left -= slice) {
+      poll();
+      const Turn turn(*this);
+      inner_->wait(std::min<microseconds>(left, slice));
+    }
+    return;
+  }
+  const auto end = Clock::now() + duration;
+  do {
+    poll();
+    const auto left = std::chrono::duration_cast<microseconds>(end - Clock::now());
+    const Turn turn(*this);
+    inner_->wait(std::clamp<microseconds>(left, microseconds(0), slice));
+  } while (Clock::now() < end);
+}
+
+void SharedLink::poll() const {
+  if (poll_ && !Uninterrupted::here()) poll_();
+}
+
+void SharedLink::lend_if_idle() {
+  const Clock::time_point used{Clock::duration(last_used_.load())};
+  if (virtual_time_ || Clock::now() - used < idle) return;
+  const Turn turn(*this);
+  inner_->wait(lent);
+}
+
+}  // namespace kmax::library

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "host_tools/device/link.hpp"
+
+namespace kmax::library {
+
+/// While one exists, waiting in this thread does not ask whether it should end: what takes the force away is
+/// not to be interrupted, and a thread of the library's own must not need what its user's threads hold.
+class Uninterrupted {
+ public:
+  Uninterrupted() { ++depth(); }
+  ~Uninterrupted() { --depth(); }
+  Uninterrupted(const Uninterrupted&) = delete;
+  Uninterrupted& operator=(const Uninterrupted&) = delete;
+  static bool here() { return depth() > 0; }
+
+ private:
+  static int& depth();
+};
+
+/// One link for many threads: each request is whole, and who waits longest is next.
+///
+/// A link is lent to other programs in wait(), and if `lending` between requests too (link::PeriodicYield):
+/// one that stops the device must not be kept out.
+class SharedLink final : public link::Link {
+ public:
+  /// `poll` is called at least every 20 ms while a thread waits, unless it is Uninterrupted; what it throws
+  /// ends the waiting. `virtual_time`: time passes in the link's own calls only.
+  SharedLink(std::unique_ptr<link::Link> inner, bool virtual_time, std::function<void()> poll);
+
+  std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
+  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+             const std::function<void()>& before_request) override;
+  std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
+  std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
+  std::vector<std::uint32_t> read_log_entry(std::size_t place) override;
+  std::map<std::string, std::string> identify() override;
+  void follow_serial_settings(std::optional<std::uint8_t> unit,
+                              std::optional<std::uint32_t> baud_rate) override;
+  std::chrono::microseconds now() const override;
+  void wait(std::chrono::microseconds duration) override;
+  std::string description() const override { return inner_->description(); }
+
+  void poll() const;
+  void set_lending(bool lending) { lending_ = lending; }
+  /// For a thread beside those that use the link: lends it for 10 ms if nobody has used it for 30 ms.
+  void lend_if_idle();
+  bool virtual_time() const { return virtual_time_; }
+  link::Link& inner() { return *inner_; }
+
+ private:
+  class Turn;
+  using Clock = std::chrono::steady_clock;
+
+  void enter() const;
+  void leave() const;
+  /// With a turn.
+  void lend_if_due();
+
+  std::unique_ptr<link::Link> inner_;
+  bool virtual_time_;
+  std::function<void()> poll_;
+  link::PeriodicYield yield_;
+  std::atomic<bool> lending_ = false;
+  std::atomic<Clock::rep> last_used_{0};
+
+  // The queue.
+  mutable std::mutex mutex_;
+  mutable std::condition_variable moved_;
+  mutable std::uint64_t next_ = 0, served_ = 0;
+  mutable std::thread::id owner_;
+  mutable int depth_ = 0;  ///< of the owner's turns within each other
+};
+
+/// A link that belongs to somebody else, for an owner that wants one of its own.
+class BorrowedLink final : public link::Link {
+ public:
+  /// `lender` must outlive this.
+  explicit BorrowedLink(link::Link& lender) : lender_(lender) {}
+
+  std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override { return lender_.read(slots); }
+  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+             const std::function<void()>& before_request) override {
+    lender_.write(values, repeat, before_request);
+  }
+  std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override {
+    return lender_.read_trace(first, count);
+  }
+  std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override {
+    return lender_.read_capture(count, progress);
+  }
+  std::vector<std::uint32_t> read_log_entry(std::size_t place) override {
+    return lender_.read_log_entry(place);
+  }
+  std::map<std::string, std::string> identify() override { return lender_.identify(); }
+  void follow_serial_settings(std::optional<std::uint8_t> unit,
+                              std::optional<std::uint32_t> baud_rate) override {
+    lender_.follow_serial_settings(unit, baud_rate);
+  }
+  std::chrono::microseconds now() const override { return lender_.now(); }
+  void wait(std::chrono::microseconds duration) override { lender_.wait(duration); }
+  std::string description() const override { return lender_.description(); }
+
+ private:
+  link::Link& lender_;
+};
+
+}  // namespace kmax::library
