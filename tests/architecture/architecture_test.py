@@ -44,7 +44,7 @@ FOLDERS = {
         ["plot", "report", "lines", "simulation"],
         ["flash", "wall", "device"],
         ["description", "record", "check", "bench", "simulated_board"],
-        ["device/sim", "serve", "calibration", "selftest"],
+        ["device/sim", "serve", "calibration", "selftest", "json"],
         ["experiment"],
         ["bring_up"],
         ["virtual_board", "kmax"],

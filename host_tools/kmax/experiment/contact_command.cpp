@@ -33,7 +33,7 @@ struct ContactOptions {
   }
 };
 
-Json condition_json(const experiment::ContactResult& result) {
+Json contact_json(const experiment::ContactResult& result) {
   return {{"name", result.condition.name},
           {"figure", result.condition.figure},
           {"assignments", result.condition.assignments},
@@ -89,7 +89,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   const int verdict = all_agree ? done : verdict_is_no;
   if (context.json) {
     Json list = Json::array();
-    for (const experiment::ContactResult& result : results) list.push_back(condition_json(result));
+    for (const experiment::ContactResult& result : results) list.push_back(contact_json(result));
     context.print({{"stiffness_n_per_m", settings.stiffness},
                    {"haptic_rate_hz", settings.haptic_rate},
                    {"hold_time_s", settings.hold_time},

@@ -36,17 +36,6 @@ std::string in_column(const std::string& text) {
 }
 }  // namespace
 
-std::vector<std::string> flag_words(std::uint16_t flags) {
-  static constexpr std::array words = {"inside the wall", "force limited", "slew limited",
-                                       "soft start",      "armed",         "motor saturated",
-                                       "wall unstable",   "wall softened"};
-  std::vector<std::string> found;
-  for (std::size_t bit = 0; bit < words.size(); ++bit) {
-    if ((flags >> bit & 1) != 0) found.emplace_back(words[bit]);
-  }
-  return found;
-}
-
 std::string trouble_of(const WatchedAxis& axis) {
   const device::DriveStatus& status = axis.status;
   if (status.faulty()) return fmt::format("{}; then 'kmax clear --axis {}'", status.fault_words(), axis.axis);
@@ -73,11 +62,11 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
   }
   // As many lines as the axis with the most flags has, one flag in each.
   std::size_t most = 1;
-  for (const WatchedAxis& axis : axes) most = std::max(most, flag_words(axis.measured.flags).size());
+  for (const WatchedAxis& axis : axes) most = std::max(most, record::flag_words(axis.measured.flags).size());
   for (std::size_t i = 0; i < most; ++i) {
     std::string line = fmt::format("{:<{}}", i == 0 ? "flags" : "", label_width);
     for (const WatchedAxis& axis : axes) {
-      const auto words = flag_words(axis.measured.flags);
+      const auto words = record::flag_words(axis.measured.flags);
       line += in_column(i < words.size() ? words[i] : i == 0 ? "none" : "");
     }
     lines.push_back(line);
@@ -98,10 +87,10 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
 std::string watch_line(double seconds, const std::vector<WatchedAxis>& axes) {
   std::string line = fmt::format("{:.1f} s", seconds);
   for (const WatchedAxis& axis : axes) {
-    line +=
-        fmt::format(" | axis {}: {}, {:+.6f} m, {:+.6f} m/s, {:+.4f} N, {:+.4f} A, flags: {}", axis.axis,
-                    device::to_string(axis.status.state()), axis.measured.position, axis.measured.velocity,
-                    axis.measured.force, axis.measured.current, joined(flag_words(axis.measured.flags)));
+    line += fmt::format(" | axis {}: {}, {:+.6f} m, {:+.6f} m/s, {:+.4f} N, {:+.4f} A, flags: {}", axis.axis,
+                        device::to_string(axis.status.state()), axis.measured.position,
+                        axis.measured.velocity, axis.measured.force, axis.measured.current,
+                        joined(record::flag_words(axis.measured.flags)));
     const std::string trouble = trouble_of(axis);
     if (!trouble.empty()) line += ", " + trouble;
   }
@@ -118,7 +107,7 @@ Json watch_json(const WatchedAxis& axis) {
           {"velocity_m_per_s", device::shortest_double(axis.measured.velocity)},
           {"force_n", device::shortest_double(axis.measured.force)},
           {"current_a", device::shortest_double(axis.measured.current)},
-          {"flags", flag_words(axis.measured.flags)},
+          {"flags", record::flag_words(axis.measured.flags)},
           {"trouble", trouble.empty() ? Json(nullptr) : Json(trouble)}};
 }
 

@@ -19,9 +19,6 @@ struct WatchedAxis {
   record::Measurement measured{};
 };
 
-/// The bits of measured.flags: "inside the wall", "armed", ...
-std::vector<std::string> flag_words(std::uint16_t flags);
-
 /// Fault, or refusal of the last attempt to arm, with what to do next; empty if there is none.
 std::string trouble_of(const WatchedAxis& axis);
 
