@@ -18,6 +18,7 @@ void add_info_command(CLI::App& app, Context& context);
 void add_devices_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
 void add_faults_command(CLI::App& app, Context& context);
+void add_view_command(CLI::App& app, Context& context);
 void add_watch_command(CLI::App& app, Context& context);
 void add_record_command(CLI::App& app, Context& context);
 void add_capture_command(CLI::App& app, Context& context);
@@ -35,18 +36,13 @@ void add_serve_command(CLI::App& app, Context& context);
 void add_describe_command(CLI::App& app, Context& context);
 
 std::span<const AddCommand> all_commands() {
-  static constexpr std::array commands = {&add_parameter_commands, &add_parameter_file_commands,
-                                          &add_store_commands,     &add_lock_commands,
-                                          &add_info_command,       &add_devices_command,
-                                          &add_drive_commands,     &add_faults_command,
-                                          &add_watch_command,      &add_record_command,
-                                          &add_capture_command,    &add_calibrate_command,
-                                          &add_selftest_command,   &add_bring_up_command,
-                                          &add_wall_command,
-                                          &add_check_command,      &add_simulate_command,
-                                          &add_experiment_command, &add_plot_command,
-                                          &add_lines_commands,     &add_flash_command,
-                                          &add_serve_command,      &add_describe_command};
+  static constexpr std::array commands = {
+      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_lock_commands,
+      &add_info_command,       &add_devices_command,         &add_drive_commands,     &add_faults_command,
+      &add_view_command,       &add_watch_command,           &add_record_command,     &add_capture_command,
+      &add_calibrate_command,  &add_selftest_command,        &add_bring_up_command,   &add_wall_command,
+      &add_check_command,      &add_simulate_command,        &add_experiment_command, &add_plot_command,
+      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command};
   return commands;
 }
 

@@ -45,7 +45,7 @@ FOLDERS = {
         ["flash", "wall", "device"],
         ["description", "record", "check", "bench", "simulated_board"],
         ["device/sim", "serve", "calibration", "selftest", "json"],
-        ["experiment"],
+        ["experiment", "view"],
         ["bring_up"],
         ["virtual_board", "kmax"],
     ],
