@@ -83,6 +83,23 @@ std::string title_of(const StabilityMap& map, const firmware::ParameterValues& v
 }
 }  // namespace
 
+MapOutlines outlines_of(const StabilityMap& map) {
+  const auto unstable = [](const Results& results) {
+    return -nearness(results[static_cast<std::size_t>(control::Criterion::sampled_eigenvalues)]);
+  };
+  MapOutlines outlines{
+      positive_area(field_of(map, nearness_of_all)), positive_area(field_of(map, unstable)), {}};
+  to_values(outlines.all_met, map);
+  to_values(outlines.unstable, map);
+  for (const CriterionText& text : all_criteria()) {
+    const auto number = static_cast<std::size_t>(text.criterion);
+    auto strokes = zero_lines(field_of(map, [number](const Results& r) { return nearness(r[number]); }));
+    to_values(strokes, map);
+    outlines.bounds.emplace_back(text.criterion, std::move(strokes));
+  }
+  return outlines;
+}
+
 bool write_map_picture(const StabilityMap& map, const firmware::ParameterValues& values,
                        const std::string& hand, const std::filesystem::path& path) {
   plot::MapFigure figure;
@@ -94,19 +111,13 @@ bool write_map_picture(const StabilityMap& map, const firmware::ParameterValues&
   figure.log_x = map.x.logarithmic;
   figure.log_y = map.y.logarithmic;
 
-  const auto unstable = [](const Results& results) {
-    return -nearness(results[static_cast<std::size_t>(control::Criterion::sampled_eigenvalues)]);
-  };
-  figure.regions = {{"all criteria met", "#cfe5f5", positive_area(field_of(map, nearness_of_all))},
-                    {"linear loop unstable", "#d4d4d4", positive_area(field_of(map, unstable))}};
-  for (plot::MapRegion& region : figure.regions) to_values(region.polygons, map);
-  for (const CriterionText& text : all_criteria()) {
-    const auto number = static_cast<std::size_t>(text.criterion);
-    plot::MapLine line{fmt::format("{} ({})", text.name(), name_of(text.worth)),
-                       zero_lines(field_of(map, [number](const Results& r) { return nearness(r[number]); })),
-                       number};
-    to_values(line.strokes, map);
-    figure.lines.push_back(std::move(line));
+  MapOutlines outlines = outlines_of(map);
+  figure.regions = {{"all criteria met", "#cfe5f5", std::move(outlines.all_met)},
+                    {"linear loop unstable", "#d4d4d4", std::move(outlines.unstable)}};
+  for (auto& [criterion, strokes] : outlines.bounds) {
+    const CriterionText& text = text_of(criterion);
+    figure.lines.push_back({fmt::format("{} ({})", text.name(), name_of(text.worth)), std::move(strokes),
+                            static_cast<std::size_t>(criterion)});
   }
   const double x = present(map.x, values), y = present(map.y, values);
   if (map.x.from <= x && x <= map.x.to && map.y.from <= y && y <= map.y.to)

@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "control/stability_criteria.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/device/parameter.hpp"
+#include "host_tools/plot/map_figure.hpp"
 
 namespace kmax::check {
 
@@ -46,6 +48,15 @@ StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t 
 /// One row per point: the two parameters, whether all criteria pass, and each criterion; 1 passes, 0 fails,
 /// empty where it does not apply. Throws std::runtime_error if the file cannot be written.
 void write_map_csv(const StabilityMap& map, const std::filesystem::path& path);
+
+/// Where the bounds run and what lies between them, in the parameters' values.
+struct MapOutlines {
+  std::vector<plot::Outline> all_met;   ///< polygons: every criterion that applies passes
+  std::vector<plot::Outline> unstable;  ///< polygons: the linear loop is unstable
+  std::vector<std::pair<control::Criterion, std::vector<plot::Outline>>>
+      bounds;  ///< strokes; of all criteria
+};
+MapOutlines outlines_of(const StabilityMap& map);
 
 /// Draws where each criterion's bound runs, the regions between, and the present set as a point. False if
 /// that lies outside of the map. Throws plot::FigureError.

@@ -165,6 +165,17 @@ CaptureReader::Status CaptureReader::status() {
   return {static_cast<CaptureState>(raw[0]), raw[1], raw[2], raw[3], raw[4]};
 }
 
+std::optional<CaptureProgress> CaptureReader::look() {
+  const Status now = status();
+  if (now.state == CaptureState::complete || now.state == CaptureState::idle) running_ = false;
+  if (now.state == CaptureState::complete) return std::nullopt;
+  if (now.state == CaptureState::idle)
+    throw DeviceError(fmt::format("{}: the capture was stopped by another program, or the device restarted",
+                                  device_.description()));
+  return CaptureProgress{now.state == CaptureState::running ? Phase::running : Phase::waiting, now.taken,
+                         samples_of(settings_)};
+}
+
 void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
   const std::uint32_t all = samples_of(settings_);
   const auto needed = microseconds(static_cast<std::int64_t>(
@@ -173,29 +184,22 @@ void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
   bool triggered = false;
   std::uint32_t taken = 0;
   for (;;) {
-    const Status now = status();
-    if (now.state == CaptureState::complete) {
-      running_ = false;
-      return;
-    }
-    if (now.state == CaptureState::idle) {
-      running_ = false;
-      throw DeviceError(fmt::format("{}: the capture was stopped by another program, or the device restarted",
-                                    device_.description()));
-    }
-    if (now.state == CaptureState::running && !triggered) {
+    auto progress = look();
+    if (!progress) return;
+    if (progress->phase == Phase::running && !triggered) {
       triggered = true;
       deadline = device_.link().now() + needed + grace;
     }
     // A virtual board on a busy machine falls behind real time.
-    if (std::exchange(taken, now.taken) != now.taken && triggered)
+    if (std::exchange(taken, progress->done) != progress->done && triggered)
       deadline = std::max(deadline, device_.link().now() + grace);
-    report_if_asked(report, {triggered ? Phase::running : Phase::waiting, now.taken, all});
+    if (triggered) progress->phase = Phase::running;
+    report_if_asked(report, *progress);
     if (device_.link().now() >= deadline) {
       stop();
       if (!triggered) fail_without_trigger(patience);
       throw DeviceError(fmt::format("{}: the capture stands still at {} of {} samples: the axis has no ticks",
-                                    device_.description(), now.taken, all));
+                                    device_.description(), progress->done, all));
     }
     device_.link().wait(std::min<microseconds>(capture_poll_interval, deadline - device_.link().now()));
   }

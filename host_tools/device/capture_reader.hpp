@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -90,6 +91,9 @@ class CaptureReader {
   /// Until the capture is complete. `patience`: for the trigger; from then on it lasts as long as it must.
   /// DeviceError, and the capture is stopped, if the trigger has not come by then.
   void wait(std::chrono::microseconds patience, const ReportProgress& report = {});
+
+  /// How far it is now; nothing if it is complete. DeviceError as wait().
+  std::optional<CaptureProgress> look();
 
   /// Ends the capture: what has been taken since the trigger can be read.
   void stop();

@@ -163,9 +163,13 @@ std::vector<std::size_t> Context::axes() const {
   return all;
 }
 
+std::unique_ptr<link::Link> Context::open_link() {
+  return opener_(device_address(), [this](const std::string& text) { note(text); });
+}
+
 device::Device Context::connect() {
   const link::Notice notice = [this](const std::string& text) { note(text); };
-  auto opened = opener_(device_address(), notice);
+  auto opened = open_link();
   if (simulated())
     note(
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "

@@ -18,6 +18,7 @@ void add_info_command(CLI::App& app, Context& context);
 void add_devices_command(CLI::App& app, Context& context);
 void add_drive_commands(CLI::App& app, Context& context);  // state, arm, disarm, stop, clear
 void add_faults_command(CLI::App& app, Context& context);
+void add_view_command(CLI::App& app, Context& context);
 void add_watch_command(CLI::App& app, Context& context);
 void add_record_command(CLI::App& app, Context& context);
 void add_capture_command(CLI::App& app, Context& context);
@@ -46,7 +47,7 @@ void add_all_commands(CLI::App& app, Context& context) {
       {"Parameters",
        {add_parameter_commands, add_parameter_file_commands, add_store_commands, add_lock_commands}},
       {"Looking and recording",
-       {add_watch_command, add_record_command, add_capture_command, add_plot_command}},
+       {add_view_command, add_watch_command, add_record_command, add_capture_command, add_plot_command}},
       {"Commissioning", {add_bring_up_command, add_calibrate_command, add_selftest_command}},
       {"Walls and experiments",
        {add_wall_command, add_check_command, add_simulate_command, add_experiment_command,

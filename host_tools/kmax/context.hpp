@@ -7,17 +7,15 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "host_tools/base/exit_code.hpp"
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/link.hpp"
+#include "host_tools/json/json.hpp"
 
 namespace kmax::cli {
 
-/// Keys stay in the order they are added.
-using Json = nlohmann::ordered_json;
+using json::Json;
 
 struct BoardServices;
 
@@ -43,6 +41,8 @@ class Context {
   /// The same for a command that changes the device. UsageError where none is named: the simulated one lives
   /// for that command only and keeps nothing of it.
   device::Device connect_to_change();
+  /// The link alone.
+  std::unique_ptr<link::Link> open_link();
 
   /// One line on the messages' stream.
   void note(const std::string& text);

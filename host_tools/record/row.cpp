@@ -45,6 +45,21 @@ std::string RowCsv::line(const Row& row, std::uint64_t first_tick) const {
   return text + '\n';
 }
 
+std::span<const std::string_view> flag_texts() {
+  static constexpr std::array<std::string_view, 8> texts = {
+      "inside the wall", "force limited",   "slew limited",  "soft start",
+      "armed",           "motor saturated", "wall unstable", "wall softened"};
+  return texts;
+}
+
+std::vector<std::string> flag_words(std::uint16_t flags) {
+  std::vector<std::string> found;
+  for (std::size_t bit = 0; bit < flag_texts().size(); ++bit) {
+    if ((flags >> bit & 1) != 0) found.emplace_back(flag_texts()[bit]);
+  }
+  return found;
+}
+
 using device::Parameter;
 
 namespace {

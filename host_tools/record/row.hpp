@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "firmware/object_dictionary/dictionary.hpp"
@@ -43,6 +44,11 @@ class RowCsv {
   std::vector<std::size_t> axes_;
   bool axes_apart_;
 };
+
+/// What the bits of measured.flags mean, from bit 0 up: "inside the wall", "force limited", ...
+std::span<const std::string_view> flag_texts();
+/// Those of the bits that are set.
+std::vector<std::string> flag_words(std::uint16_t flags);
 
 /// What an axis measures, all of it at one tick.
 struct Measurement {

@@ -9,25 +9,22 @@
 
 namespace kmax::wall {
 
-namespace {
-plot::Series curve(const firmware::ParameterValues& values, std::size_t axis, const WallEvaluator& evaluator,
-                   double approach_speed, std::string label) {
+ForceCurve force_curve(const firmware::ParameterValues& values, std::size_t axis, double approach_speed) {
+  const WallEvaluator evaluator(values, axis);
   const double surface = static_cast<double>(values.real<"wall.position">(axis));
   const double side = values.whole<"wall.side">(axis);
   const double field = static_cast<double>(values.real<"wall.magnetic_length">(axis));
-  // From inside, where about 3 N of spring have built up, to where 4 % of the field is left.
   const double stiffness = static_cast<double>(values.real<"wall.stiffness">(axis));
   const double inside = stiffness > 0 ? std::min(3.0 / stiffness, 4 * field) : field;
-  plot::Series series{std::move(label), {}, {}, false};
+  ForceCurve curve;
   constexpr int points = 600;
   for (int i = 0; i <= points; ++i) {
     const double distance = -inside + (4 * field + inside) * i / points;
-    series.x.push_back(distance * 1e3);
-    series.y.push_back(side * evaluator.at(surface + side * distance, -side * approach_speed).force);
+    curve.distance.push_back(distance);
+    curve.force.push_back(side * evaluator.at(surface + side * distance, -side * approach_speed).force);
   }
-  return series;
+  return curve;
 }
-}  // namespace
 
 void write_force_curves(const firmware::ParameterValues& values, std::size_t axis,
                         const std::filesystem::path& picture) {
@@ -44,7 +41,10 @@ void write_force_curves(const firmware::ParameterValues& values, std::size_t axi
     of_law.set_whole<"wall.law">(law, axis);
     const WallEvaluator evaluator(of_law, axis);
     const auto add = [&](double approach_speed, std::string label) {
-      figure.panels[0].series.push_back(curve(values, axis, evaluator, approach_speed, std::move(label)));
+      ForceCurve curve = force_curve(of_law, axis, approach_speed);
+      for (double& distance : curve.distance) distance *= 1e3;
+      figure.panels[0].series.push_back(
+          {std::move(label), std::move(curve.distance), std::move(curve.force), false});
     };
     const double surface = static_cast<double>(values.real<"wall.position">(axis));
     const double coefficient = std::abs(evaluator.at(surface, 0).magnetic_force);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <stdexcept>
+#include <vector>
 
 #include "control/wall_law.hpp"
 #include "firmware/parameters/parameter_values.hpp"
@@ -32,6 +33,14 @@ class WallEvaluator {
   double position_;
   double side_;
 };
+
+/// The law that is set, at one speed towards the wall, from where about 3 N of spring have built up to where
+/// 4 % of the field is left.
+struct ForceCurve {
+  std::vector<double> distance;  ///< m outside the surface; negative is inside
+  std::vector<double> force;     ///< N outwards
+};
+ForceCurve force_curve(const firmware::ParameterValues& values, std::size_t axis, double approach_speed);
 
 /// Draws force against distance for every law with the other parameters given, those that follow the velocity
 /// at rest and at 0.5 m/s towards the wall. Throws plot::FigureError.

@@ -1,5 +1,5 @@
 """The npm package `canopen`, a CANopen master that was not written here, against the image on the virtual board; what
-joins them; and its reader of data sheets. scripts/install_node_client installs it."""
+joins them; and its reader of data sheets. scripts/install_node_packages installs it."""
 
 import json
 import os
@@ -126,7 +126,7 @@ class BusBridge(unittest.TestCase):
         self.assertIn("/nowhere/bus", done.stderr)
 
 
-@unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_client)")
+@unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_packages)")
 class NodeTest(unittest.TestCase):
     def run_script(self, script, argument):
         """Runs a script of the folder to its end, and returns what it prints."""

@@ -13,6 +13,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/guard_words.hpp"
+#include "host_tools/json/drive_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 
 namespace kmax::cli {
@@ -28,51 +29,6 @@ using firmware::Refusal;
 using std::chrono::milliseconds;
 
 namespace {
-Json fault_json(const DriveStatus& status) {
-  if (!status.faulty()) return nullptr;
-  const firmware::FaultText* text = firmware::fault_by_error_code(status.error_code);
-  const bool has_number = text != nullptr && !text->unit.empty();
-  return {
-      {"name", text != nullptr ? std::string(text->name) : "unknown"},
-      {"error_code", status.error_code},
-      {"value", has_number ? Json(device::shortest_double(status.fault_value)) : Json(nullptr)},
-      {"bound", has_number ? Json(device::shortest_double(status.fault_bound)) : Json(nullptr)},
-      {"unit", has_number ? std::string(text->unit) : ""},
-      {"gate_driver", status.gate_driver_faults ? Json(device::gate_driver_words(*status.gate_driver_faults))
-                                                : Json(nullptr)},
-      {"message", status.fault_words()}};
-}
-
-Json guard_json(const GuardFinding& guard) {
-  if (guard.verdict == GuardFinding::Verdict::not_judged) return nullptr;
-  Json failed = Json::array();
-  for (const firmware::NamedValue& criterion : firmware::names::guard_criterion) {
-    if ((guard.failed >> criterion.value & 1U) != 0) failed.push_back(std::string(criterion.name));
-  }
-  return {{"pass", guard.verdict == GuardFinding::Verdict::pass},
-          {"failed", failed},
-          {"criterion", std::string(device::name_of(guard.criterion))},
-          {"value", device::shortest_double(guard.value)},
-          {"bound", device::shortest_double(guard.bound)},
-          {"unit", std::string(device::unit_of(guard.criterion))},
-          {"message", device::guard_words(guard)}};
-}
-
-Json status_json(std::size_t axis, AxisPresence presence, const DriveStatus& status,
-                 const GuardFinding& guard) {
-  const bool refused = status.refusal != Refusal::none;
-  return {{"axis", axis},
-          {"state", std::string(device::name_of(status.state()))},
-          {"armed", status.armed()},
-          {"present", presence == AxisPresence::present},
-          {"presence", device::presence_words(presence)},
-          {"statusword", status.statusword},
-          {"warning", status.warning()},
-          {"stability_check", guard_json(guard)},
-          {"fault", fault_json(status)},
-          {"refusal", refused ? Json(std::string(firmware::to_string(status.refusal))) : Json(nullptr)}};
-}
-
 std::string status_line(std::size_t axis, const DriveStatus& status, const GuardFinding& guard) {
   std::string line = fmt::format("axis {}: {} ({})", axis, device::plain_words(status.state()),
                                  device::to_string(status.state()));
@@ -103,7 +59,7 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
     const AxisPresence presence = drive.presence();
     const DriveStatus status = drive.status();
     if (context.json) {
-      list.push_back(status_json(axis, presence, status, drive.guard()));
+      list.push_back(json::status_json(axis, presence, status, drive.guard()));
     } else {
       const std::string words = presence == AxisPresence::present ? status_line(axis, status, drive.guard())
                                                                   : absence_line(device, axis, presence);
@@ -216,8 +172,8 @@ int run_arm(Context& context, const ArmOptions& options) {
     // Ctrl-C while it was being armed was meant to end that.
     if (!holding && interruption.requested()) throw std::runtime_error("interrupted");
     if (context.json)
-      context.print(
-          {{"axes", Json::array({status_json(drive.axis(), AxisPresence::present, status, drive.guard())})}});
+      context.print({{"axes", Json::array({json::status_json(drive.axis(), AxisPresence::present, status,
+                                                             drive.guard())})}});
   } catch (const std::exception&) {
     disarm_after_failure(context, drive, timeout);
     throw;

@@ -9,9 +9,9 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/lock.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/store_text.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 
@@ -64,7 +64,7 @@ std::string reading_text(const Parameter& parameter, std::uint32_t raw) {
 
 Json reading_json(const Parameter& parameter, std::uint32_t raw) {
   if (parameter == Parameter::of<"info.firmware_version">()) return version_text(raw);
-  return value_json(parameter, raw);
+  return json::value_json(parameter, raw);
 }
 
 int run_info(Context& context) {

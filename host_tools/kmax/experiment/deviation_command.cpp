@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "host_tools/experiment/deviation/deviation_experiment.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -77,12 +77,12 @@ Json verdict_json(const experiment::DeviationVerdict& verdict) {
   Json trends = Json::array();
   for (const experiment::BackgroundTrend& trend : verdict.trends)
     trends.push_back({{"interference_force_n", trend.interference},
-                      {"without_m", optional_json(trend.without)},
-                      {"with_m", optional_json(trend.with)},
-                      {"rank_with_background_force", optional_json(trend.rank)},
-                      {"falls", optional_json(trend.falls())}});
-  return {{"claim_met", optional_json(verdict.claim_met())},
-          {"rank_correlation", optional_json(verdict.rank)},
+                      {"without_m", json::optional_json(trend.without)},
+                      {"with_m", json::optional_json(trend.with)},
+                      {"rank_with_background_force", json::optional_json(trend.rank)},
+                      {"falls", json::optional_json(trend.falls())}});
+  return {{"claim_met", json::optional_json(verdict.claim_met())},
+          {"rank_correlation", json::optional_json(verdict.rank)},
           {"trends", trends}};
 }
 

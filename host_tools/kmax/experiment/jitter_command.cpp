@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "host_tools/experiment/jitter/jitter_experiment.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -73,11 +73,11 @@ Json pairs_json(const std::vector<experiment::JitterResult>& results) {
 }
 
 Json verdict_json(const experiment::JitterVerdict& verdict) {
-  return {{"jitter_falls", optional_json(verdict.amplitude_falls())},
-          {"adjustment_time_falls", optional_json(verdict.time_falls())},
-          {"claim_met", optional_json(verdict.claim_met())},
-          {"jitter_rank_correlation", optional_json(verdict.amplitude_rank)},
-          {"adjustment_time_rank_correlation", optional_json(verdict.time_rank)}};
+  return {{"jitter_falls", json::optional_json(verdict.amplitude_falls())},
+          {"adjustment_time_falls", json::optional_json(verdict.time_falls())},
+          {"claim_met", json::optional_json(verdict.claim_met())},
+          {"jitter_rank_correlation", json::optional_json(verdict.amplitude_rank)},
+          {"adjustment_time_rank_correlation", json::optional_json(verdict.time_rank)}};
 }
 
 StudyReport report_of(const experiment::JitterStudy& study) {

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "host_tools/experiment/resolution/resolution_experiment.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -90,11 +90,11 @@ experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& o
 }
 
 Json verdict_json(const experiment::ResolutionVerdict& verdict) {
-  return {{"coarse_vibrates_at_every_speed", optional_json(verdict.coarse_vibrates)},
-          {"fine_is_still_below_onset", optional_json(verdict.fine_is_still)},
-          {"fine_vibrates_above_onset", optional_json(verdict.fine_vibrates_fast)},
-          {"onset_from_resolution", optional_json(verdict.onset_from_resolution)},
-          {"claim_met", optional_json(verdict.claim_met())}};
+  return {{"coarse_vibrates_at_every_speed", json::optional_json(verdict.coarse_vibrates)},
+          {"fine_is_still_below_onset", json::optional_json(verdict.fine_is_still)},
+          {"fine_vibrates_above_onset", json::optional_json(verdict.fine_vibrates_fast)},
+          {"onset_from_resolution", json::optional_json(verdict.onset_from_resolution)},
+          {"claim_met", json::optional_json(verdict.claim_met())}};
 }
 
 Json run_json(const experiment::ResolutionRun& run, bool simulated) {

@@ -12,8 +12,8 @@
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/description/described_objects.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 
@@ -38,7 +38,8 @@ struct DescribeOptions {
 
 void describe_json(Context& context) {
   Json objects = Json::array();
-  for (const Parameter& parameter : device::all_parameters()) objects.push_back(description_json(parameter));
+  for (const Parameter& parameter : device::all_parameters())
+    objects.push_back(json::description_json(parameter));
   context.print({{"objects", objects}});
 }
 
@@ -53,7 +54,7 @@ void describe_modbus(Context& context) {
     by_address.emplace(std::pair(parameter.table(), parameter.address()), parameter);
   print(context.out, "table,address,words,type,access,name,unit,allowed,default\n");
   for (const auto& [place, parameter] : by_address) {
-    const Json description = description_json(parameter);
+    const Json description = json::description_json(parameter);
     print(context.out, "{},0x{:04X},{},{},{},{},{},\"{}\",{}\n", table_name(parameter), parameter.address(),
           parameter.words(), description["type"].get<std::string>(), description["access"].get<std::string>(),
           parameter.name(), parameter.definition().unit, parameter.writable() ? allowed_text(parameter) : "",
@@ -155,7 +156,7 @@ registers have the high word first. What is set over CANopen only can be read ov
     help += change_text(entry);
     if (parameter.writable() && !entry.persistent) help += " Not saved.";
     const bool settable = entry.access != firmware::Access::read_only;
-    const Json type = description_json(parameter)["type"];
+    const Json type = json::description_json(parameter)["type"];
     print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name, entry.unit,
           settable ? escaped(allowed_text(parameter)) : "read only", default_text(parameter),
           type.get<std::string>(), parameter.index(), entry.object_subindex(), parameter.address(), help);

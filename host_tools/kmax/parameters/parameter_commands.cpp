@@ -12,9 +12,9 @@
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/parameter_table.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 
@@ -92,8 +92,8 @@ int run_list(Context& context, const ListOptions& options) {
   }
   Json document = Json::object();
   for (const ParameterRow& row : rows) {
-    Json one = value_and_unit_json(row.parameter, row.raw);
-    const Json description = description_json(row.parameter);
+    Json one = json::value_and_unit_json(row.parameter, row.raw);
+    const Json description = json::description_json(row.parameter);
     for (const char* key : {"min", "max", "default", "values", "access", "help"}) one[key] = description[key];
     document[row.parameter.name()] = one;
   }
@@ -125,7 +125,7 @@ int run_get(Context& context, const GetOptions& options) {
   Json document = Json::object();
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (context.json) {
-      document[shown_name(names[i], parameters[i])] = value_and_unit_json(parameters[i], raw[i]);
+      document[shown_name(names[i], parameters[i])] = json::value_and_unit_json(parameters[i], raw[i]);
     } else {
       print(context.out, "{} = {}\n", shown_name(names[i], parameters[i]),
             value_with_unit(parameters[i], raw[i]));
@@ -191,7 +191,7 @@ int run_set(Context& context, const SetOptions& options) {
   for (std::size_t i = 0; i < assignments.size(); ++i) {
     const auto& [parameter, raw] = assignments[i];
     if (context.json) {
-      document[parameter.name()] = value_and_unit_json(parameter, raw);
+      document[parameter.name()] = json::value_and_unit_json(parameter, raw);
     } else {
       print(context.out, "{} = {} (was {})\n", parameter.name(), value_with_unit(parameter, raw),
             value_text(parameter, before[i]));

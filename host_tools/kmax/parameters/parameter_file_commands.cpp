@@ -9,9 +9,9 @@
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/parameter_file.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/store_text.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 
@@ -115,7 +115,7 @@ int run_dump(Context& context, const DumpOptions& options) {
   if (context.json) {
     Json all = Json::object();
     for (const Assignment& one : values)
-      all[one.parameter.name()] = value_and_unit_json(one.parameter, one.raw);
+      all[one.parameter.name()] = json::value_and_unit_json(one.parameter, one.raw);
     context.print({{"file", to_file ? Json(file) : Json(nullptr)},
                    {"device", origin.device},
                    {"firmware", origin.firmware},
@@ -221,8 +221,8 @@ int run_load(Context& context, const LoadOptions& options) {
     Json changed = Json::object();
     for (const auto& [setting, before] : changes) {
       const auto& [parameter, raw] = setting.assignment;
-      changed[parameter.name()] = {{"before", value_json(parameter, before)},
-                                   {"value", value_json(parameter, raw)},
+      changed[parameter.name()] = {{"before", json::value_json(parameter, before)},
+                                   {"value", json::value_json(parameter, raw)},
                                    {"unit", std::string(parameter.definition().unit)}};
     }
     context.print({{"file", options.file},
@@ -260,8 +260,8 @@ int run_diff(Context& context, const DiffOptions& options) {
     Json differing = Json::object();
     for (const auto& [setting, on_device] : differences) {
       const auto& [parameter, raw] = setting.assignment;
-      differing[parameter.name()] = {{"file", value_json(parameter, raw)},
-                                     {"device", value_json(parameter, on_device)},
+      differing[parameter.name()] = {{"file", json::value_json(parameter, raw)},
+                                     {"device", json::value_json(parameter, on_device)},
                                      {"unit", std::string(parameter.definition().unit)}};
     }
     context.print({{"file", file},

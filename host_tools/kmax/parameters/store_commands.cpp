@@ -5,9 +5,9 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/device/value_text.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/store_text.hpp"
-#include "host_tools/kmax/value_json.hpp"
 
 namespace kmax::cli {
 
@@ -56,8 +56,8 @@ int run_defaults(Context& context) {
   if (context.json) {
     Json changed = Json::object();
     for (const auto& [parameter, before] : changes)
-      changed[parameter.name()] = {{"before", value_json(parameter, before)},
-                                   {"value", value_json(parameter, parameter.default_raw())},
+      changed[parameter.name()] = {{"before", json::value_json(parameter, before)},
+                                   {"value", json::value_json(parameter, parameter.default_raw())},
                                    {"unit", std::string(parameter.definition().unit)}};
     context.print(
         {{"parameters", all}, {"changed", changed}, {"unsaved_parameters", status.unsaved_parameters}});

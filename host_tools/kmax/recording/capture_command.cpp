@@ -15,6 +15,7 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/device/drive.hpp"
+#include "host_tools/json/capture_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 
 namespace kmax::cli {
@@ -83,15 +84,6 @@ CaptureTrigger trigger_of(const std::string& name) {
   throw UsageError(fmt::format("--trigger: there is no '{}'", name));
 }
 
-/// "force_n", "velocity_m_per_s", "count": a name that says its unit.
-std::string heading_of(const CaptureColumn& column) {
-  static const std::map<std::string, std::string> endings = {
-      {"m", "_m"}, {"m/s", "_m_per_s"}, {"N", "_n"}, {"A", "_a"}, {"V", "_v"}, {"rad", "_rad"}};
-  if (column.name.starts_with("duty")) return column.name + "_ratio";
-  const auto ending = endings.find(column.unit);
-  return ending == endings.end() ? column.name : column.name + ending->second;
-}
-
 /// A float32 with no more digits than it has.
 std::string value_text(double value) {
   const auto narrow = static_cast<float>(value);
@@ -100,43 +92,13 @@ std::string value_text(double value) {
 
 void write_csv(std::ostream& out, const Captured& captured) {
   std::string line = "time_s,tick";
-  for (const CaptureColumn& column : captured.columns) line += "," + heading_of(column);
+  for (const CaptureColumn& column : captured.columns) line += "," + json::heading_of(column);
   out << line << '\n';
   for (std::size_t s = 0; s < captured.samples(); ++s) {
     line = fmt::format("{},{}", captured.time(s), captured.tick(s));
     for (const CaptureColumn& column : captured.columns) line += "," + value_text(column.values[s]);
     out << line << '\n';
   }
-}
-
-Json column_json(const CaptureColumn& column, bool with_values) {
-  double low = 0, high = 0, sum = 0;
-  if (!column.values.empty()) {
-    const auto [least, most] = std::minmax_element(column.values.begin(), column.values.end());
-    low = *least;
-    high = *most;
-    for (const double value : column.values) sum += value;
-    sum /= static_cast<double>(column.values.size());
-  }
-  Json json = {{"name", column.name}, {"unit", column.unit}, {"heading", heading_of(column)},
-               {"minimum", low},      {"maximum", high},     {"mean", sum}};
-  if (with_values) json["values"] = column.values;
-  return json;
-}
-
-Json capture_json(const Captured& captured, const CaptureOptions& options) {
-  Json columns = Json::array();
-  for (const CaptureColumn& column : captured.columns)
-    columns.push_back(column_json(column, options.file.empty()));
-  return {{"axis", options.settings.axis},
-          {"trigger", trigger_name(options.settings.trigger)},
-          {"samples", captured.samples()},
-          {"trigger_sample", captured.trigger_sample},
-          {"first_tick", captured.first_tick},
-          {"interval_ticks", captured.interval},
-          {"tick_rate_hz", captured.tick_rate},
-          {"channels", columns},
-          {"file", options.file.empty() ? Json(nullptr) : Json(options.file)}};
 }
 
 std::string progress_text(const CaptureProgress& progress, CaptureTrigger trigger) {
@@ -236,7 +198,9 @@ int run_capture(Context& context, const CaptureOptions& given) {
     base::write_file(options.file, table.str());
   }
   if (context.json) {
-    context.print(capture_json(captured, options));
+    Json document = json::capture_json(captured, options.settings, options.file.empty());
+    document["file"] = options.file.empty() ? Json(nullptr) : Json(options.file);
+    context.print(document);
     return done;
   }
   const std::string summary =

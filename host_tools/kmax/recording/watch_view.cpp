@@ -34,17 +34,6 @@ std::string coloured(std::string line, std::size_t width, const char* colour) {
 }
 }  // namespace
 
-std::vector<std::string> flag_words(std::uint16_t flags) {
-  static constexpr std::array words = {"inside the wall", "force limited", "slew limited",
-                                       "soft start",      "armed",         "motor saturated",
-                                       "wall unstable",   "wall softened"};
-  std::vector<std::string> found;
-  for (std::size_t bit = 0; bit < words.size(); ++bit) {
-    if ((flags >> bit & 1) != 0) found.emplace_back(words[bit]);
-  }
-  return found;
-}
-
 std::string trouble_of(const WatchedAxis& axis) {
   const device::DriveStatus& status = axis.status;
   if (status.faulty()) return fmt::format("{}; then 'kmax clear --axis {}'", status.fault_words(), axis.axis);
@@ -89,7 +78,7 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
                  "N"));
     add(with_bar(fmt::format("  current  {:+12.3f} A ", measured.current), measured.current,
                  axis.current_limit, "A"));
-    const std::string flags = joined(flag_words(measured.flags));
+    const std::string flags = joined(record::flag_words(measured.flags));
     add("  flags    " + flags, flags.find("wall ") != std::string::npos ? yellow : nullptr);
     if (const std::string trouble = trouble_of(axis); !trouble.empty()) {
       for (const std::string& line : lines_of(trouble, width > 4 ? width - 2 : width))
@@ -105,7 +94,7 @@ std::string watch_line(double seconds, const std::vector<WatchedAxis>& axes) {
     line += fmt::format(" | axis {}: {}, {:+.3f} mm, {:+.1f} mm/s, {:+.4f} N, {:+.4f} A, flags: {}",
                         axis.axis, device::plain_words(axis.status.state()), axis.measured.position * 1e3F,
                         axis.measured.velocity * 1e3F, axis.measured.force, axis.measured.current,
-                        joined(flag_words(axis.measured.flags)));
+                        joined(record::flag_words(axis.measured.flags)));
     const std::string trouble = trouble_of(axis);
     if (!trouble.empty()) line += ", " + trouble;
   }
@@ -122,7 +111,7 @@ Json watch_json(const WatchedAxis& axis) {
           {"velocity_m_per_s", device::shortest_double(axis.measured.velocity)},
           {"force_n", device::shortest_double(axis.measured.force)},
           {"current_a", device::shortest_double(axis.measured.current)},
-          {"flags", flag_words(axis.measured.flags)},
+          {"flags", record::flag_words(axis.measured.flags)},
           {"trouble", trouble.empty() ? Json(nullptr) : Json(trouble)}};
 }
 

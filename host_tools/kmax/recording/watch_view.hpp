@@ -20,9 +20,6 @@ struct WatchedAxis {
   float force_limit = 0, current_limit = 0;  ///< N, A: the ends of the bars; 0: no bar
 };
 
-/// The bits of measured.flags: "inside the wall", "armed", ...
-std::vector<std::string> flag_words(std::uint16_t flags);
-
 /// Fault, or refusal of the last attempt to arm, with what to do next; empty if there is none.
 std::string trouble_of(const WatchedAxis& axis);
 

@@ -1,4 +1,4 @@
-// The installed npm package `canopen`, which scripts/install_node_client puts into build/node_canopen.
+// The installed npm package `canopen`, which scripts/install_node_packages puts into build/node_canopen.
 
 import { createRequire } from 'node:module';
 

@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "host_tools/device/parameter.hpp"
-#include "host_tools/kmax/context.hpp"
+#include "host_tools/json/json.hpp"
 
-namespace kmax::cli {
+namespace kmax::json {
 
 /// Choices as their names; numbers as the shortest text that gives the same value, whole ones without a
 /// fraction.
@@ -27,4 +27,4 @@ Json value_and_unit_json(const device::Parameter& parameter, std::uint32_t raw);
 /// One object of `kmax describe --format json`.
 Json description_json(const device::Parameter& parameter);
 
-}  // namespace kmax::cli
+}  // namespace kmax::json

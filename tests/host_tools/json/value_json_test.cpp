@@ -1,4 +1,4 @@
-#include "host_tools/kmax/value_json.hpp"
+#include "host_tools/json/value_json.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-namespace kmax::cli::value_json_test {
+namespace kmax::json::value_json_test {
 
 using device::Parameter;
 
@@ -31,4 +31,4 @@ TEST(ValueJson, WhatIsNoNumberIsNull) {
   EXPECT_EQ(text_of(std::nanf("")), "null");
 }
 
-}  // namespace kmax::cli::value_json_test
+}  // namespace kmax::json::value_json_test

@@ -1,4 +1,4 @@
-#include "host_tools/kmax/value_json.hpp"
+#include "host_tools/json/value_json.hpp"
 
 #include <bit>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/value_text.hpp"
 
-namespace kmax::cli {
+namespace kmax::json {
 
 using firmware::Entry;
 using firmware::Type;
@@ -115,4 +115,4 @@ Json description_json(const device::Parameter& parameter) {
   };
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::json

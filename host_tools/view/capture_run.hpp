@@ -1,0 +1,32 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "host_tools/device/capture_reader.hpp"
+#include "host_tools/view/message.hpp"
+
+namespace kmax::view {
+
+/// One capture of the device, looked after now and then until its samples are there.
+class CaptureRun {
+ public:
+  /// `device` must outlive it.
+  CaptureRun(device::Device& device, Publish publish) : device_(device), publish_(std::move(publish)) {}
+
+  /// Takes the place of the one before. Errors as device::CaptureReader::arm().
+  void begin(const device::CaptureSettings& settings);
+
+  /// Looks, if it is time; reads the samples once they are complete. What goes wrong is published, but for
+  /// link::LinkError and ForceRemoved.
+  void look();
+
+ private:
+  device::Device& device_;
+  Publish publish_;
+  device::CaptureSettings settings_;
+  std::optional<device::CaptureReader> reader_;
+  std::chrono::steady_clock::time_point next_look_{};
+};
+
+}  // namespace kmax::view

@@ -1,0 +1,160 @@
+#include "host_tools/view/command.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "host_tools/base/numbers.hpp"
+#include "host_tools/base/suggestion.hpp"
+
+namespace kmax::view {
+
+using json::Json;
+using Kind = Command::Kind;
+
+namespace {
+constexpr std::array<std::pair<std::string_view, Kind>, 10> kinds = {{{"alive", Kind::alive},
+                                                                      {"stop", Kind::stop},
+                                                                      {"arm", Kind::arm},
+                                                                      {"disarm", Kind::disarm},
+                                                                      {"clear", Kind::clear},
+                                                                      {"set", Kind::set},
+                                                                      {"revert", Kind::revert},
+                                                                      {"save", Kind::save},
+                                                                      {"map", Kind::map},
+                                                                      {"capture", Kind::capture}}};
+constexpr std::size_t longest_id = 64, longest_value = 100, most_values = 64;
+
+/// A message whose id is known, for what is wrong with the rest of it.
+class Received {
+ public:
+  explicit Received(const Json& message) : message_(message) {
+    if (!message.is_object()) fail("a message is a JSON object with a \"type\"");
+    const auto found = message.find("id");
+    if (found == message.end()) return;
+    const bool short_text = found->is_string() && found->get_ref<const std::string&>().size() <= longest_id;
+    if (!short_text && !found->is_number_integer())
+      fail(fmt::format("\"id\" is a whole number or a text of at most {} bytes", longest_id));
+    id_ = *found;
+  }
+
+  [[noreturn]] void fail(const std::string& what) const { throw BadMessage(what, id_); }
+  const Json& id() const { return id_; }
+
+  /// Null if there is none.
+  const Json& at(const char* key) const {
+    static const Json none;
+    const auto found = message_.find(key);
+    return found == message_.end() ? none : *found;
+  }
+
+  std::string text(const char* key) const {
+    const Json& value = at(key);
+    if (!value.is_string()) fail(fmt::format("\"{}\" is missing, or no text", key));
+    return value.get<std::string>();
+  }
+
+  std::uint32_t whole(const char* key, std::uint32_t otherwise, std::uint32_t most) const {
+    const Json& value = at(key);
+    if (value.is_null()) return otherwise;
+    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > most)
+      fail(fmt::format("\"{}\": {} is not a whole number from 0 to {}", key, value.dump(), most));
+    return value.get<std::uint32_t>();
+  }
+
+ private:
+  const Json& message_;
+  Json id_;
+};
+
+/// "wall.stiffness=3580"
+std::string assignment(const Received& message, const std::string& name, const Json& value) {
+  if (value.is_number()) {
+    const double number = value.get<double>();
+    if (!std::isfinite(number)) message.fail(fmt::format("{}: the value is not finite", name));
+    return fmt::format("{}={}", name, device::number_text(number));
+  }
+  if (value.is_string() && value.get_ref<const std::string&>().size() <= longest_value)
+    return fmt::format("{}={}", name, value.get_ref<const std::string&>());
+  message.fail(
+      fmt::format("{}: a value is a number in SI units, or a text of at most {} bytes as 'kmax set' takes it",
+                  name, longest_value));
+}
+
+std::vector<std::string> assignments(const Received& message) {
+  const Json& values = message.at("values");
+  if (!values.is_object() || values.empty() || values.size() > most_values)
+    message.fail(fmt::format(
+        "\"values\" is an object of 1 to {} parameters, as in {{\"wall.stiffness\": 3580}}", most_values));
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : values.items()) {
+    if (name.size() > longest_value || name.find('=') != std::string::npos)
+      message.fail(fmt::format("'{}' is no name of a parameter", name.substr(0, longest_value)));
+    texts.push_back(assignment(message, name, value));
+  }
+  return texts;
+}
+
+device::CaptureSettings capture_settings(const Received& message, std::size_t axis) {
+  device::CaptureSettings settings{.axis = axis, .channels = {"position", "force"}};
+  if (const Json& channels = message.at("channels"); !channels.is_null()) {
+    if (!channels.is_array() || channels.empty() || channels.size() > 4)
+      message.fail("\"channels\" is a list of one to four names, as in [\"position\", \"force\"]");
+    settings.channels.clear();
+    for (const Json& one : channels) {
+      if (!one.is_string()) message.fail(fmt::format("\"channels\": {} is no text", one.dump()));
+      settings.channels.push_back(one.get<std::string>());
+    }
+  }
+  settings.samples = message.whole("samples", 2000, 12288);
+  settings.pre_trigger = message.whole("pre_trigger", 0, 12288);
+  settings.interval = message.whole("interval", 1, 65535);
+  if (settings.interval == 0) message.fail("\"interval\" is at least one tick");
+  const std::string wanted = message.at("trigger").is_null() ? "now" : message.text("trigger");
+  std::vector<std::string> names;
+  for (const auto& trigger : firmware::names::capture_trigger) {
+    names.emplace_back(trigger.name);
+    if (trigger.name == wanted) settings.trigger = static_cast<firmware::CaptureTrigger>(trigger.value);
+  }
+  if (std::find(names.begin(), names.end(), wanted) == names.end())
+    message.fail(
+        fmt::format("\"trigger\": there is no '{}'; triggers are {}", wanted, fmt::join(names, ", ")));
+  if (const Json& level = message.at("level"); !level.is_null()) {
+    if (!level.is_number() || !(level.get<double>() >= 0))
+      message.fail(fmt::format("\"level\": {} is no number from 0 up", level.dump()));
+    settings.level = level.get<double>();
+  }
+  return settings;
+}
+}  // namespace
+
+Command parse_command(std::string_view text) {
+  const Json parsed = Json::parse(text, nullptr, false);
+  if (parsed.is_discarded()) throw BadMessage("this is no JSON", nullptr);
+  const Received message(parsed);
+  const std::string type = message.text("type");
+  std::vector<std::string> names;
+  Command command{.id = message.id()};
+  bool known = false;
+  for (const auto& [name, kind] : kinds) {
+    names.emplace_back(name);
+    if (name != type) continue;
+    command.kind = kind;
+    known = true;
+  }
+  if (!known) {
+    const std::string meant = device::did_you_mean(type.substr(0, longest_value), names);
+    message.fail(
+        fmt::format("there is no message '{}'{}", type.substr(0, longest_value),
+                    meant.empty() ? fmt::format("; messages are {}", fmt::join(names, ", ")) : meant));
+  }
+  command.axis = message.whole("axis", 0, static_cast<std::uint32_t>(firmware::axis_count) - 1);
+  if (command.kind == Kind::set) command.assignments = assignments(message);
+  if (command.kind == Kind::map) command.map_side = message.text("up");
+  if (command.kind == Kind::capture) command.capture = capture_settings(message, command.axis);
+  return command;
+}
+
+}  // namespace kmax::view

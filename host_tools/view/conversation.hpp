@@ -1,0 +1,84 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/record/polled_source.hpp"
+#include "host_tools/record/telemetry_request.hpp"
+#include "host_tools/view/analysis.hpp"
+#include "host_tools/view/capture_run.hpp"
+#include "host_tools/view/command_queue.hpp"
+#include "host_tools/view/force_removal.hpp"
+#include "host_tools/view/messages.hpp"
+#include "host_tools/view/parameter_mirror.hpp"
+#include "host_tools/view/reach.hpp"
+#include "host_tools/view/row_batch.hpp"
+#include "host_tools/view/row_stream.hpp"
+
+namespace kmax::view {
+
+/// One connection to the device: carries commands out, and publishes state, parameters and rows. Belongs to
+/// the thread that makes it.
+///
+/// Errors of all calls: link::LinkError, device::DeviceError; then it has to be made anew.
+class Conversation {
+ public:
+  /// All must outlive it.
+  Conversation(const Reach& reach, CommandQueue& commands, Analysis& analysis, ParameterMirror& mirror,
+               Publish publish);
+  ~Conversation();
+  Conversation(const Conversation&) = delete;
+  Conversation& operator=(const Conversation&) = delete;
+
+  std::map<std::string, std::string> identify() { return device_.identify(); }
+
+  /// What there is to do now, and a moment's wait.
+  void step();
+  /// Disarms what clients have armed.
+  void end();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::unique_ptr<link::Link> urgent_link();
+  void start_rows();
+  void look_after_rows();
+  void settle();
+  void carry_out(const Command& command);
+  /// What to say about it.
+  std::string do_as_told(const Command& command);
+  void refuse_long_reading(const device::CaptureSettings& settings) const;
+  std::string arm(const Command& command);
+  std::string set(const std::vector<device::Assignment>& assignments);
+  void publish_parameters();
+  void read_state();
+  void wait_a_moment();
+
+  const Reach& reach_;
+  CommandQueue& commands_;
+  Analysis& analysis_;
+  ParameterMirror& mirror_;
+  Publish publish_;
+
+  std::unique_ptr<link::Link> link_;
+  ForceRemoval removal_;
+  device::Device device_;
+  CaptureRun capture_;
+  std::optional<record::TelemetryRequest> telemetry_;
+  std::optional<record::PolledSource> polled_;
+  std::optional<RowBatch> batch_;
+  std::unique_ptr<RowStream> stream_;
+  link::PeriodicYield yield_;
+
+  LinkState state_{.connected = true};
+  std::vector<AxisState> axes_;
+  std::optional<device::StoreStatus> store_;
+  std::string last_stop_trouble_;
+  Clock::time_point next_state_{}, next_slow_{}, began_ = Clock::now();
+  std::chrono::microseconds link_began_;
+};
+
+}  // namespace kmax::view

@@ -1,0 +1,65 @@
+#include "host_tools/view/device_session.hpp"
+
+#include <fmt/format.h>
+
+#include <thread>
+
+namespace kmax::view {
+
+namespace {
+constexpr std::chrono::milliseconds attempt_interval{500}, piece{50};
+}  // namespace
+
+DeviceSession::DeviceSession(Reach reach, DeviceFacts facts, CommandQueue& commands, Analysis& analysis,
+                             Publish publish)
+    : reach_(std::move(reach)),
+      facts_(std::move(facts)),
+      commands_(commands),
+      analysis_(analysis),
+      publish_(std::move(publish)) {
+  facts_.address = reach_.address;
+  facts_.counted_rows = reach_.open_bus != nullptr;
+  connect();
+}
+
+void DeviceSession::connect() {
+  conversation_ = std::make_unique<Conversation>(reach_, commands_, analysis_, mirror_, publish_);
+  facts_.identification = conversation_->identify();
+  publish_(device_message(facts_));
+}
+
+void DeviceSession::run(const std::function<bool()>& ended) {
+  while (!ended()) {
+    std::string trouble;
+    try {
+      if (!conversation_) connect();
+      while (!ended()) conversation_->step();
+      break;
+    } catch (const std::exception& error) {
+      trouble = error.what();
+    }
+    publish_(state_message({.trouble = trouble}, {}, std::nullopt));
+    conversation_.reset();
+    for (auto waited = piece; waited <= attempt_interval && !ended(); waited += piece) {
+      answer_without_a_device(trouble);
+      std::this_thread::sleep_for(piece);
+    }
+  }
+  if (conversation_) conversation_->end();
+  conversation_.reset();
+}
+
+void DeviceSession::answer_without_a_device(const std::string& why) {
+  while (const auto command = commands_.take()) {
+    const bool stop = command->kind == Command::Kind::stop;
+    publish_(
+        reply(command->id, false,
+              fmt::format("the device does not answer: {}{}", why,
+                          stop ? "; it is told to stop as soon as it does, and link.timeout takes the force "
+                                 "meanwhile, unless it is 0"
+                               : ""),
+              command->client));
+  }
+}
+
+}  // namespace kmax::view

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "firmware/parameters/parameter_values.hpp"
+#include "host_tools/check/judgement.hpp"
+#include "host_tools/check/stability_map.hpp"
+#include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/drive.hpp"
+#include "host_tools/device/store.hpp"
+#include "host_tools/record/recording.hpp"
+#include "host_tools/view/message.hpp"
+
+namespace kmax::view {
+
+// Every message there is, as docs/view.md explains it. Numbers are in SI units.
+
+Message welcome(ClientId client);
+Message reply(const json::Json& id, bool ok, const std::string& text, ClientId to = 0);
+
+/// What the page shows and sets of each axis.
+const std::vector<device::Parameter>& shown_parameters();
+
+struct DeviceFacts {
+  std::string address{}, version{};
+  std::map<std::string, std::string> identification{};
+  bool counted_rows = false;  ///< rows are due at fixed times, so that a lost one is known
+  std::string hand{};
+};
+Message device_message(const DeviceFacts& facts);
+
+struct AxisState {
+  std::size_t axis = 0;
+  firmware::AxisPresence presence{};
+  device::DriveStatus status{};
+  firmware::GuardFinding guard{};
+  std::optional<ClientId> armed_by{};
+};
+struct LinkState {
+  bool connected = false;
+  std::string trouble{};       ///< why not
+  double round_trip = 0;       ///< s, of the last request
+  std::string rows_trouble{};  ///< why no rows come
+};
+Message state_message(const LinkState& link, std::span<const AxisState> axes,
+                      const std::optional<device::StoreStatus>& store);
+
+/// How a stop, or what is as urgent, ended.
+struct StopReport {
+  std::string why{};
+  double seconds = 0;     ///< from when it was asked for until the device had answered
+  std::string trouble{};  ///< empty: no axis makes force
+};
+Message stopped_message(const StopReport& report);
+
+/// `revert`: what a revert would set them to.
+Message parameters_message(const firmware::ParameterValues& values, const firmware::ParameterValues& revert);
+
+/// `first_row` counts from 0 since the connection to the device was made.
+Message rows_message(std::uint64_t first_row, std::span<const record::Row> rows,
+                     const std::optional<record::Losses>& losses);
+
+Message curve_message(const firmware::ParameterValues& values, std::size_t axis);
+Message judgement_message(const check::Judgement& judgement, const std::string& hand, std::size_t axis);
+Message map_message(const check::StabilityMap& map, std::size_t axis);
+
+Message capture_progress(std::string_view phase, std::uint32_t done, std::uint32_t all);
+Message capture_failed(const std::string& why);
+Message capture_message(const device::Captured& captured, const device::CaptureSettings& settings);
+
+}  // namespace kmax::view

@@ -1,0 +1,339 @@
+#include "host_tools/view/conversation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/device/sim/sim_link.hpp"
+#include "host_tools/view/device_session.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+
+namespace kmax::view::conversation_test {
+
+using device::Parameter;
+using json::Json;
+using Kind = Command::Kind;
+
+constexpr std::uint32_t quick_stop = 2;  // CiA 402
+
+/// A simulated device that outlives its links, and what is asked of it request by request.
+struct Watched {
+  link::SimLink device{simulated_board::factory_scene()};
+  std::vector<std::string> requests;  ///< "read", "write" or "word A V": controlword V of axis A
+  std::function<void()> before_request;
+  bool lost = false;
+
+  void request(std::string what) {
+    if (lost) throw link::LinkError("nobody answers");
+    requests.push_back(std::move(what));
+    if (before_request) before_request();
+  }
+};
+
+class WatchedLink final : public link::Link {
+ public:
+  explicit WatchedLink(Watched& watched) : watched_(watched) {}
+
+  std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override {
+    watched_.request("read");
+    return watched_.device.read(slots);
+  }
+  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+             const std::function<void()>& before_request) override {
+    std::string what = "write";
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      if (values[0].slot == Parameter::of<"drive.controlword">(axis).slot())
+        what = "word " + std::to_string(axis) + " " + std::to_string(values[0].raw);
+    }
+    watched_.device.write(values, repeat, [&] {
+      if (before_request) before_request();
+      watched_.request(what);
+    });
+  }
+  std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override {
+    watched_.request("read");
+    return watched_.device.read_trace(first, count);
+  }
+  std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override {
+    return watched_.device.read_capture(count, [&](std::size_t done) {
+      watched_.request("read");
+      progress(done);
+    });
+  }
+  std::vector<std::uint32_t> read_log_entry(std::size_t place) override {
+    watched_.request("read");
+    return watched_.device.read_log_entry(place);
+  }
+  std::chrono::microseconds now() const override { return watched_.device.now(); }
+  void wait(std::chrono::microseconds duration) override { watched_.device.wait(duration); }
+  std::string description() const override { return "watched"; }
+
+ private:
+  Watched& watched_;
+};
+
+class ConversationTest : public testing::Test {
+ protected:
+  void push(Command command) {
+    command.client = 1;
+    commands.push(std::move(command));
+  }
+  /// Steps until a message of this type is there that `wanted` accepts.
+  template <typename Steps>
+  Json until(Steps& steps, const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
+    for (int i = 0; i < 2000; ++i) {
+      for (; looked_at < published.size(); ++looked_at) {
+        const Json message = Json::parse(published[looked_at].text);
+        if (message["type"] != type || (wanted && !wanted(message))) continue;
+        ++looked_at;
+        return message;
+      }
+      steps.step();
+    }
+    ADD_FAILURE() << "no message " << type;
+    return {};
+  }
+  Json reply_to(Conversation& talk, Command command) {
+    command.id = ++last_id;
+    push(std::move(command));
+    return until(talk, "reply", [this](const Json& reply) { return reply["id"] == last_id; });
+  }
+  Json state(Conversation& talk) {
+    looked_at = published.size();
+    return until(talk, "state");
+  }
+  /// Nobody presses against a wall that is far away, so that it can be armed again and again.
+  void move_the_wall_away(Conversation& talk) {
+    EXPECT_EQ(reply_to(talk, {.kind = Kind::set,
+                              .assignments = {"wall.position=-1m", "axis1.wall.position=-1m"}})["ok"],
+              true);
+  }
+  bool armed(std::size_t axis) {
+    return device::DriveStatus{
+        .statusword = static_cast<std::uint16_t>(
+            watched.device.read(std::vector{Parameter::of<"drive.statusword">(axis).slot()}).front())}
+        .armed();
+  }
+
+  Watched watched;
+  Reach reach{.address = "watched", .open_link = [this] {
+                if (watched.lost) throw link::LinkError("nobody answers");
+                return std::make_unique<WatchedLink>(watched);
+              }};
+  CommandQueue commands;
+  std::vector<Message> published;
+  Publish publish = [this](Message message) { published.push_back(std::move(message)); };
+  Analysis analysis{check::choose_hand("none"), [](const Message&) {}};
+  ParameterMirror mirror;
+  std::size_t looked_at = 0;
+  int last_id = 0;
+};
+
+TEST_F(ConversationTest, ArmsAndDisarms) {
+  commands.joined(1);
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  const Json reply = reply_to(talk, {.kind = Kind::arm});
+  EXPECT_EQ(reply["ok"], true) << reply;
+  EXPECT_TRUE(armed(0));
+  const Json armed_state = state(talk)["axes"][0];
+  EXPECT_EQ(armed_state["words"], "Armed: force is on");
+  EXPECT_EQ(armed_state["armed_by"], 1);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::disarm})["ok"], true);
+  EXPECT_FALSE(armed(0));
+  EXPECT_TRUE(state(talk)["axes"][0]["armed_by"].is_null());
+}
+
+TEST_F(ConversationTest, SetsRevertsAndSaysWhatIsRefused) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::set,
+                            .assignments = {"wall.stiffness=2N/mm", "wall.damping=1"}})["message"],
+            "wall.stiffness = 2000 N/m, wall.damping = 1 N s/m");
+  looked_at = 0;
+  const Json values = until(talk, "parameters", [](const Json& m) {
+    return m["values"]["wall.stiffness"]["value"] == 2000;
+  })["values"];
+  EXPECT_EQ(values["wall.stiffness"]["revert"], 1000);
+  const Json refused = reply_to(talk, {.kind = Kind::set, .assignments = {"wall.stiffnes=1"}});
+  EXPECT_EQ(refused["ok"], false);
+  EXPECT_CONTAINS(refused["message"].get<std::string>(), "did you mean wall.stiffness");
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::revert})["ok"], true);
+  EXPECT_EQ(mirror.values().real<"wall.stiffness">(), 1000);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::revert})["message"], "nothing had been changed");
+}
+
+TEST_F(ConversationTest, SaveIsWhatARevertGoesBackToFromThenOn) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  reply_to(talk, {.kind = Kind::set, .assignments = {"wall.damping=3"}});
+  EXPECT_GT(state(talk)["unsaved"], 0);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::save})["ok"], true);
+  EXPECT_EQ(state(talk)["unsaved"], 0);
+  reply_to(talk, {.kind = Kind::set, .assignments = {"wall.damping=4"}});
+  reply_to(talk, {.kind = Kind::revert});
+  EXPECT_EQ(mirror.values().real<"wall.damping">(), 3);
+}
+
+TEST_F(ConversationTest, WhatAnotherProgramSetsIsSeen) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  const link::SlotValue value{Parameter::of<"wall.damping">(1).slot(), std::bit_cast<std::uint32_t>(2.5F)};
+  watched.device.write({&value, 1}, link::Repeat::never);
+  until(talk, "parameters", [](const Json& m) { return m["values"]["axis1.wall.damping"]["value"] == 2.5; });
+}
+
+// Whatever is going on: one request may be on its way when the stop comes, and the next one is the stop.
+TEST_F(ConversationTest, AStopIsTheNextRequest) {
+  commands.joined(1);
+  const std::vector<Command> doings = {
+      {.kind = Kind::set,
+       .assignments = {"wall.stiffness=900", "wall.damping=1", "wall.magnetic_coefficient=1"}},
+      {.kind = Kind::arm, .axis = 1},
+      {.kind = Kind::save},
+      {.kind = Kind::disarm},
+      {.kind = Kind::capture, .capture = {.channels = {"position", "force"}, .samples = 500}},
+      {.kind = Kind::revert}};
+  int stops = 0;
+  for (const Command& doing : doings) {
+    for (std::size_t nth = 1; nth < 60; nth += nth < 12 ? 1 : 7) {
+      Conversation talk(reach, commands, analysis, mirror, publish);
+      move_the_wall_away(talk);
+      const Json reply = reply_to(talk, {.kind = Kind::arm});
+      ASSERT_EQ(reply["ok"], true) << reply;
+      push(doing);
+      std::size_t count = 0, stopped_at = 0;
+      watched.requests.clear();
+      watched.before_request = [&] {
+        if (++count != nth) return;
+        stopped_at = watched.requests.size();
+        commands.push({.kind = Kind::stop});
+      };
+      looked_at = published.size();
+      const Json stopped = until(talk, "stopped");
+      watched.before_request = {};
+      ASSERT_GT(watched.requests.size(), stopped_at);
+      ASSERT_EQ(watched.requests[stopped_at], "word 0 " + std::to_string(quick_stop))
+          << json::Json(static_cast<int>(doing.kind)) << ", request " << nth;
+      ASSERT_TRUE(stopped["trouble"].is_null()) << stopped;
+      for (int i = 0; i < 20; ++i) talk.step();
+      ASSERT_FALSE(armed(0) || armed(1)) << json::Json(static_cast<int>(doing.kind)) << ", request " << nth;
+      ++stops;
+    }
+  }
+  EXPECT_GT(stops, 100);
+}
+
+TEST_F(ConversationTest, WhoArmedAndGoesLeavesTheAxisDisarmed) {
+  commands.joined(1);
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  reply_to(talk, {.kind = Kind::arm});
+  commands.left(1);
+  EXPECT_CONTAINS(until(talk, "stopped")["why"].get<std::string>(), "closed or reloaded");
+  EXPECT_FALSE(armed(0));
+  EXPECT_EQ(state(talk)["axes"][0]["state"], "switch_on_disabled");
+}
+
+TEST_F(ConversationTest, WhatAnotherProgramArmedIsNotThePages) {
+  device::Device other(std::make_unique<WatchedLink>(watched));
+  device::Drive(other, 0).arm();
+  commands.joined(1);
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  EXPECT_CONTAINS(reply_to(talk, {.kind = Kind::arm})["message"].get<std::string>(), "armed already");
+  commands.left(1);
+  for (int i = 0; i < 20; ++i) talk.step();
+  EXPECT_TRUE(armed(0));
+}
+
+TEST_F(ConversationTest, AfterAStopItCanBeArmedAgain) {
+  commands.joined(1);
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  move_the_wall_away(talk);
+  reply_to(talk, {.kind = Kind::arm});
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::stop})["message"], "the force is off");
+  EXPECT_EQ(state(talk)["axes"][0]["words"], "Stopped: the force is off");
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::arm})["ok"], true);
+  EXPECT_TRUE(armed(0));
+}
+
+TEST_F(ConversationTest, ARefusalToArmSaysWhy) {
+  commands.joined(1);
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  reply_to(talk, {.kind = Kind::set, .assignments = {"wall.position=here+5mm"}});
+  const Json reply = reply_to(talk, {.kind = Kind::arm});
+  EXPECT_EQ(reply["ok"], false);
+  EXPECT_CONTAINS(reply["message"].get<std::string>(), "inside");
+  EXPECT_FALSE(commands.owner(0));
+}
+
+TEST_F(ConversationTest, RowsAreCountedWithoutAGap) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  std::uint64_t next = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Json rows = until(talk, "rows");
+    EXPECT_EQ(rows["first_row"], next);
+    next += rows["tick"].size();
+    EXPECT_EQ(rows["axes"][1]["force"].size(), rows["tick"].size());
+    EXPECT_TRUE(rows["lost"].is_null());
+  }
+}
+
+TEST_F(ConversationTest, ACaptureIsReadInTheEnd) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  Command command{.kind = Kind::capture, .capture = {.channels = {"position", "velocity"}, .samples = 100}};
+  EXPECT_EQ(reply_to(talk, command)["ok"], true);
+  const Json taken = until(talk, "capture", [](const Json& m) { return m["phase"] == "complete"; });
+  EXPECT_EQ(taken["samples"], 100);
+  EXPECT_EQ(taken["channels"][1]["values"].size(), 100U);
+  command.capture.channels = {"positio"};
+  EXPECT_CONTAINS(reply_to(talk, command)["message"].get<std::string>(), "there is no channel");
+}
+
+TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAnewAndAStopMeanwhileIsKept) {
+  commands.joined(1);
+  DeviceSession session(reach, {}, commands, analysis, publish);
+  push({.kind = Kind::arm, .id = 1});
+  // Everything in order, by what has been published so far.
+  enum class Stage { armed, lost, answered, back } stage = Stage::armed;
+  std::string trouble, refusal, why;
+  session.run([&] {
+    if (published.size() > 10'000) return true;
+    for (; looked_at < published.size(); ++looked_at) {
+      const Json message = Json::parse(published[looked_at].text);
+      if (stage == Stage::armed && message["type"] == "reply") {
+        EXPECT_EQ(message["ok"], true);
+        watched.lost = true;
+        stage = Stage::lost;
+      } else if (stage == Stage::lost && message["type"] == "state" &&
+                 message["link"]["connected"] == false) {
+        trouble = message["link"]["trouble"].get<std::string>();
+        push({.kind = Kind::stop, .id = 2});
+        stage = Stage::answered;
+      } else if (stage == Stage::answered && message["type"] == "reply") {
+        refusal = message["message"].get<std::string>();
+        EXPECT_TRUE(armed(0));
+        watched.lost = false;
+        stage = Stage::back;
+      } else if (stage == Stage::back && message["type"] == "stopped") {
+        why = message["why"].get<std::string>();
+        return true;
+      }
+    }
+    return false;
+  });
+  EXPECT_CONTAINS(trouble, "nobody answers");
+  EXPECT_CONTAINS(refusal, "told to stop as soon as");
+  EXPECT_CONTAINS(why, "STOP");
+  EXPECT_FALSE(armed(0));
+}
+
+TEST_F(ConversationTest, TheEndDisarmsWhatAPageArmed) {
+  commands.joined(1);
+  DeviceSession session(reach, {}, commands, analysis, publish);
+  push({.kind = Kind::arm, .id = 1});
+  session.run([&] { return armed(0); });
+  EXPECT_FALSE(armed(0));
+}
+
+TEST_F(ConversationTest, ADeviceThatIsNotThereAtFirstIsAnError) {
+  watched.lost = true;
+  EXPECT_CONTAINS(host_tools_test::thrown_message<link::LinkError>(
+                      [&] { DeviceSession(reach, {}, commands, analysis, publish); }),
+                  "nobody answers");
+}
+
+}  // namespace kmax::view::conversation_test
