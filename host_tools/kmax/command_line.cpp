@@ -14,6 +14,7 @@
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/help_text.hpp"
 #include "host_tools/kmax/settings_file.hpp"
+#include "host_tools/kmax/supplied_files.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
@@ -110,7 +111,7 @@ void declare(CLI::App& app, Context& context) {
       "Sets parameters of a Kmax haptic device, reads its state, renders virtual walls and measures them.");
   app.formatter(std::make_shared<HelpFormatter>(context.columns()));
   app.set_help_flag("-h,--help", "This text");
-  app.set_version_flag("--version", "kmax " KMAX_VERSION, "The version of this program");
+  app.set_version_flag("--version", version_text, "The version of this program, and the image that comes with it");
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
   add_device_option(app, context);
   app.require_subcommand(1);

@@ -19,6 +19,7 @@
 #include "host_tools/flash/method_choice.hpp"
 #include "host_tools/kmax/board/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/supplied_files.hpp"
 
 namespace kmax::cli {
 
@@ -77,11 +78,7 @@ std::filesystem::path chosen_image(const FlashOptions& options, const BoardProfi
   if (board.image.empty())
     throw UsageError(fmt::format("name the image: none is supplied for {}", board.title));
   const std::filesystem::path built = board.image;
-  std::error_code ignored;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  for (const auto& candidate : {"build" / built, program.parent_path().parent_path() / built}) {
-    if (std::filesystem::exists(candidate, ignored)) return candidate;
-  }
+  if (const auto supplied = supplied_file(built); !supplied.empty()) return supplied;
   throw UsageError(fmt::format("build/{} is not there: run scripts/build {} or name the image",
                                built.string(), built.parent_path().string()));
 }

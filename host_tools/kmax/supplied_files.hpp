@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace kmax::cli {
+
+/// Where a file that comes with this program is: below the build tree, `built`, or installed in share/kmax
+/// under its last name. Empty if it is in neither.
+std::filesystem::path supplied_file(const std::filesystem::path& built);
+
+/// "kmax 0.1.0, commit 1a2b3c4", and on a second line the image that is supplied, with its CRC-32. A program
+/// from a work tree names no commit.
+std::string version_text();
+
+}  // namespace kmax::cli
