@@ -290,10 +290,11 @@ class Node {
   }
 
   // Those that start do so at the next call of poll_pdos() but one: to start them takes so long that the next
-  // may be late.
+  // may be late. Where this node makes SYNC they wait to be in step with it: a SYNC between them would come
+  // sooner or later by a frame, as it meets one on the bus or not.
   void configure_tpdos(const ParameterValues& values) {
     const std::uint8_t id = nmt_.configured() ? node_id() : std::uint8_t{0};
-    tpdos_.configure(values, id, lss_.active_bit_rate(), pdo_us_ + 2 * pdo_interval_us_);
+    tpdos_.configure(values, id, lss_.active_bit_rate(), sync_.in_step(pdo_us_ + 2 * pdo_interval_us_));
   }
 
   /// After the start, or NMT stop.

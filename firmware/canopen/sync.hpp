@@ -81,6 +81,13 @@ class Sync {
     return true;
   }
 
+  /// The first moment from `us` on, less than a millisecond later, that is whole milliseconds from the own
+  /// SYNCs: PDOs whose event times are such, and begin there, are in step with them. `us` itself if none is
+  /// made.
+  std::uint32_t in_step(std::uint32_t us) const {
+    return period_us_ == 0 ? us : us + (due_us_ + 2 * least_us - us) % least_us;
+  }
+
   std::uint32_t identifier() const { return identifier_; }
 
  private:

@@ -89,6 +89,16 @@ struct Regularity {
   }
 };
 
+/// A host that lives: it asks for something at another moment of the PDOs' period each time.
+void run_with_host(tests::CanBench& bench, double duration_s) {
+  constexpr double between_requests_s = 0.250'037;
+  for (double done = 0.0; done < duration_s; done += between_requests_s) {
+    bench.board->run_for(between_requests_s);
+    bench.port.send(tests::upload_request({0x1000, 0}));
+    bench.port.forget();
+  }
+}
+
 /// SYNC made by the device, beside its PDOs.
 void own_syncs(tests::CanBench& bench, double duration_s) {
   std::uint64_t received = 0;
@@ -104,11 +114,7 @@ void own_syncs(tests::CanBench& bench, double duration_s) {
   bench.write(0x1006, 0, 1000, 4);
   bench.write(0x1005, 0, 0x4000'0080, 4);
   bench.nmt(0x01);
-  for (double done = 0.0; done < duration_s; done += 0.25) {
-    bench.board->run_for(0.25);
-    bench.port.send(tests::upload_request({0x1000, 0}));
-    bench.port.forget();
-  }
+  run_with_host(bench, duration_s);
   bench.nmt(0x80);
   bench.board->run_for(0.01);
   row(fmt::format("own SYNC at 1 kHz beside 4 PDOs for {:.0f} s", duration_s),
@@ -135,12 +141,7 @@ void pdos(tests::CanBench& bench, const std::string& what, double duration_s) {
   bench.ask_for_telemetry();
   bench.nmt(0x01);
   const auto busy = bench.board->can_bus().busy_time();
-  // A host that lives: an armed axis would lose its force otherwise.
-  for (double done = 0.0; done < duration_s; done += 0.25) {
-    bench.board->run_for(0.25);
-    bench.port.send(tests::upload_request({0x1000, 0}));
-    bench.port.forget();
-  }
+  run_with_host(bench, duration_s);
   const double load = seconds(bench.board->can_bus().busy_time() - busy) / duration_s;
   bench.nmt(0x80);
   bench.board->run_for(0.01);

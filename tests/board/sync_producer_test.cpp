@@ -94,6 +94,32 @@ TEST_F(OwnSync, SetsOffSynchronousPdosOfBothKinds) {
   EXPECT_EQ(frames(0x181, 100).size(), 0U);
 }
 
+// Else it would wait for whichever of them is on the bus.
+TEST_F(OwnSync, GoesInARoundWithPdosOfTheSamePeriodAndBeforeThem) {
+  EXPECT_EQ(write(0x1800, 5, 1, 2), 0U);
+  make(1'000);
+  for (int start = 0; start < 11; ++start) {
+    nmt(0x80);
+    run_ms(0.2 * start);
+    nmt(1);
+    run_ms(10);
+    int together = 0;
+    for (int round = 0; round < 100; ++round) {
+      heard.clear();
+      run_ms(0.2);
+      const auto at = [this](std::uint32_t identifier) {
+        return std::find_if(heard.begin(), heard.end(),
+                            [&](const drivers::CanFrame& frame) { return frame.identifier == identifier; });
+      };
+      if (at(0x80) == heard.end() && at(0x181) == heard.end()) continue;
+      ASSERT_LT(at(0x80), at(0x181)) << start << ", in round " << round;
+      ASSERT_NE(at(0x181), heard.end()) << start << ", in round " << round;
+      ++together;
+    }
+    EXPECT_EQ(together, 20) << start;
+  }
+}
+
 TEST_F(OwnSync, ChangesOnlyWhileNoAxisIsArmed) {
   make(5'000);
   ASSERT_TRUE(bench.arm());
