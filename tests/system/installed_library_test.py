@@ -60,6 +60,11 @@ class Installed(unittest.TestCase):
         run(CXX, "-std=c++20", "-Wall", "-Wextra", "-Werror", source, "-o", program, *flags)
         return program
 
+    def source(self, text):
+        path = Path(tempfile.mkstemp(suffix=".cpp", dir=self.folder)[1])
+        path.write_text(text)
+        return path
+
     def test_nothing_of_the_inside_is_installed(self):
         headers = sorted(path.name for path in self.prefix.glob("include/**/*.hpp"))
         self.assertIn("version.hpp", headers)
@@ -78,6 +83,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(self.run_here(sys.executable, "-c", "import kmax; print(kmax.__version__)").strip(), version)
         major, minor, _ = version.split(".")
         self.assertTrue((self.libraries / f"libkmax.so.{major}.{minor}").exists())
+        self.assertIn(f"with version {version}", self.run_here(self.compile(self.source(blocks("cpp")[0]), self.folder / "versioned")))
 
     def test_examples_by_cmake(self):
         build = self.folder / "examples"
@@ -119,14 +125,12 @@ class Installed(unittest.TestCase):
         self.assertEqual(names | {"version"}, set(there.split()))
 
     def test_every_block_of_the_document(self):
-        for number, text in enumerate(blocks("python")):
+        for text in blocks("python"):
             with self.subTest(text):
                 self.run_here(sys.executable, "-c", text)
         for number, text in enumerate(blocks("cpp")):
             with self.subTest(text):
-                source = self.folder / f"block_{number}.cpp"
-                source.write_text(text)
-                self.run_here(self.compile(source, source.with_suffix("")))
+                self.run_here(self.compile(self.source(text), self.folder / f"block_{number}"))
         known = {"python", "cpp", "sh", "cmake"}
         self.assertLessEqual(set(re.findall(r"^```(\w+)$", DOCUMENT.read_text(), re.M)), known)
 
