@@ -12,17 +12,9 @@ import unittest
 import kmax
 import numpy as np
 
-from kmax_under_test import PATIENCE, Serve, kmax as command_line
+from kmax_under_test import PATIENCE, Serve, kmax as command_line, wait_for
 
 TICKS_PER_SECOND = 20000
-
-
-def wait_for(path):
-    end = time.monotonic() + PATIENCE
-    while not path.exists():
-        if time.monotonic() > end:
-            raise AssertionError(f"{path} did not appear")
-        time.sleep(0.02)
 
 
 class Served(Serve):
