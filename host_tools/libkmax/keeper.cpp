@@ -38,9 +38,9 @@ void Keeper::run(const std::stop_token& stop) {
     try {
       if (watch_) watch_();
       link_.lend_if_idle();
-      if (std::chrono::steady_clock::now() >= next) {
+      if (std::chrono::steady_clock::now() >= next && (!alive_ || alive_())) {
         next = std::chrono::steady_clock::now() + interval_;
-        if (!alive_ || alive_()) look();
+        look();
       }
     } catch (const std::exception& error) {
       const std::lock_guard lock(mutex_);

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from kmax_under_test import KMAX, PATIENCE, Serve
+from kmax_under_test import KMAX, PATIENCE, Serve, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("KMAX_BUILD", ROOT / "build/native"))
@@ -43,22 +43,30 @@ class Installed(unittest.TestCase):
             run(CMAKE, "--install", BUILD, "--component", component, "--prefix", cls.prefix)
         cls.libraries = next(cls.prefix.glob("**/libkmax.so")).parent
         cls.python = next(cls.prefix.glob("**/dist-packages"))
-        cls.served = cls.enterClassContext(Serve("--can", "BUS"))
-        cls.bus = f"can:{cls.served.link.parent / 'bus'}"
-        # What a user has: the prefix, and a device.
-        cls.environment = {**os.environ, "PYTHONPATH": str(cls.python), "KMAX_DEVICE": cls.bus,
+        # What a user has.
+        cls.environment = {**os.environ, "PYTHONPATH": str(cls.python),
                            "PATH": f"{Path(KMAX).resolve().parent}:{os.environ['PATH']}",
                            "PKG_CONFIG_PATH": str(cls.libraries / "pkgconfig"), "CMAKE_PREFIX_PATH": str(cls.prefix),
                            "LD_LIBRARY_PATH": str(cls.libraries)}
 
-    def run_here(self, *command, **more):
+    def run_here(self, *command):
+        """In a folder of its own, with a fresh device, whose address stands for ADDRESS too."""
         folder = tempfile.mkdtemp(dir=self.folder)
-        return run(*command, cwd=folder, env={**self.environment, **more})
+        with Serve("--can", "BUS") as served:
+            bus = served.link.parent / "bus"
+            wait_for(bus)
+            return run(*(str(part).replace("ADDRESS", f"can:{bus}") for part in command), cwd=folder,
+                       env={**self.environment, "KMAX_DEVICE": f"can:{bus}"})
 
     def compile(self, source, program):
         flags = run("pkg-config", "--cflags", "--libs", "kmax", env=self.environment).split()
         run(CXX, "-std=c++20", "-Wall", "-Wextra", "-Werror", source, "-o", program, *flags)
         return program
+
+    def source(self, text):
+        path = Path(tempfile.mkstemp(suffix=".cpp", dir=self.folder)[1])
+        path.write_text(text)
+        return path
 
     def test_nothing_of_the_inside_is_installed(self):
         headers = sorted(path.name for path in self.prefix.glob("include/**/*.hpp"))
@@ -78,19 +86,20 @@ class Installed(unittest.TestCase):
         self.assertEqual(self.run_here(sys.executable, "-c", "import kmax; print(kmax.__version__)").strip(), version)
         major, minor, _ = version.split(".")
         self.assertTrue((self.libraries / f"libkmax.so.{major}.{minor}").exists())
+        self.assertIn(f"with version {version}", self.run_here(self.compile(self.source(blocks("cpp")[0]), self.folder / "versioned")))
 
     def test_examples_by_cmake(self):
         build = self.folder / "examples"
         run(CMAKE, "-S", EXAMPLES, "-B", build, f"-DCMAKE_CXX_COMPILER={CXX}", env=self.environment)
         run(CMAKE, "--build", build)
-        self.assertRegex(self.run_here(build / "spring", self.bus), r"\d+ cycles at 1000 Hz")
+        self.assertRegex(self.run_here(build / "spring", "ADDRESS"), r"\d+ cycles at 1000 Hz")
         self.assertRegex(self.run_here(build / "wall"), r"\d+ samples")
 
     def test_examples_by_pkg_config(self):
         for source in sorted(EXAMPLES.glob("*.cpp")):
             with self.subTest(source.name):
                 program = self.compile(source, self.folder / source.stem)
-                self.assertNotEqual(self.run_here(program, self.bus), "")
+                self.assertNotEqual(self.run_here(program, "ADDRESS"), "")
 
     def test_the_wrong_version_is_not_found(self):
         (self.folder / "newer").mkdir()
@@ -100,7 +109,7 @@ class Installed(unittest.TestCase):
             run(CMAKE, "-S", self.folder / "newer", "-B", self.folder / "newer/build", env=self.environment)
 
     def test_python_examples(self):
-        arguments = {"force_loop_timing": [self.bus, "--seconds", "1"]}
+        arguments = {"force_loop_timing": ["ADDRESS", "--seconds", "1"]}
         for source in sorted(PYTHON_EXAMPLES.glob("*.py")):
             with self.subTest(source.name):
                 self.assertNotEqual(self.run_here(sys.executable, source, *arguments.get(source.stem, [])), "")
@@ -119,14 +128,12 @@ class Installed(unittest.TestCase):
         self.assertEqual(names | {"version"}, set(there.split()))
 
     def test_every_block_of_the_document(self):
-        for number, text in enumerate(blocks("python")):
+        for text in blocks("python"):
             with self.subTest(text):
                 self.run_here(sys.executable, "-c", text)
         for number, text in enumerate(blocks("cpp")):
             with self.subTest(text):
-                source = self.folder / f"block_{number}.cpp"
-                source.write_text(text)
-                self.run_here(self.compile(source, source.with_suffix("")))
+                self.run_here(self.compile(self.source(text), self.folder / f"block_{number}"))
         known = {"python", "cpp", "sh", "cmake"}
         self.assertLessEqual(set(re.findall(r"^```(\w+)$", DOCUMENT.read_text(), re.M)), known)
 
@@ -134,7 +141,7 @@ class Installed(unittest.TestCase):
         """Those that install, with this prefix, and that measure, for a second."""
         for text in blocks("sh"):
             text = text.replace("/usr/local", str(self.prefix)).replace("build/native", str(BUILD))
-            text = text.replace("--seconds 60", "--seconds 1").replace("kmax serve", f"timeout 30 {KMAX} serve")
+            text = text.replace("--seconds 60", "--seconds 1").replace("kmax serve", f"timeout 60 {KMAX} serve")
             with self.subTest(text):
                 run("bash", "-euc", f"{text}\nkill $(jobs -p) 2>/dev/null || true", cwd=ROOT,
                     env={**self.environment, "TMPDIR": str(self.folder)})

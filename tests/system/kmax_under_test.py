@@ -34,6 +34,14 @@ def kmax_json(*arguments, **options):
     return json.loads(kmax(*arguments, "--json", **options).stdout)
 
 
+def wait_for(path):
+    end = time.monotonic() + PATIENCE
+    while not path.exists():
+        if time.monotonic() > end:
+            raise AssertionError(f"{path} did not appear")
+        time.sleep(0.02)
+
+
 class _Process:
     """A process that offers a serial line, LINK in its command, and perhaps a bus, BUS, under names of its own."""
 

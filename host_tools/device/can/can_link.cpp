@@ -187,7 +187,7 @@ void CanLink::claim(const SlotValue& next) {
 }
 
 void CanLink::keep_alive() {
-  constexpr auto interval = std::chrono::milliseconds(100);
+  constexpr auto interval = std::chrono::milliseconds(50);
   const bool commands = std::find(commands_.begin(), commands_.end(), true) != commands_.end();
   if (!commands || Clock::now() - last_sign_of_life_ < interval) return;
   constexpr Parameter sign_of_life = Parameter::of<"link.sign_of_life">();

@@ -28,8 +28,8 @@ class SdoRefused : public RefusedError {
 /// a transaction.
 ///
 /// An axis that this program enables is its own (drive.commander): from that controlword on, until one that
-/// does not enable it, whatever is asked through this link also writes this program's link.sign_of_life ten
-/// times a second, and no other program's traffic keeps the axis armed.
+/// does not enable it, whatever is asked through this link also writes this program's link.sign_of_life
+/// twenty times a second, and no other program's traffic keeps the axis armed.
 ///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
 class CanLink final : public Link {

@@ -268,10 +268,4 @@ TEST(LibraryScene, SaysWhatIsWrong) {
   EXPECT_FALSE(scene_names().empty());
 }
 
-TEST(Library, HasOneVersion) {
-  EXPECT_EQ(std::string(version()), std::to_string(KMAX_VERSION_MAJOR) + "." +
-                                        std::to_string(KMAX_VERSION_MINOR) + "." +
-                                        std::to_string(KMAX_VERSION_PATCH));
-}
-
 }  // namespace kmax::library::device_test
