@@ -189,7 +189,9 @@ Message stopped_message(const StopReport& report) {
   return {.text = text_of({{"type", "stopped"},
                            {"why", report.why},
                            {"seconds", report.seconds},
-                           {"trouble", or_null(report.trouble)}})};
+                           {"trouble", or_null(report.trouble)},
+                           {"time", std::chrono::duration<double>(report.time.time_since_epoch()).count()}}),
+          .key = "stopped"};
 }
 
 Message parameters_message(const firmware::ParameterValues& values, const firmware::ParameterValues& revert) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -55,6 +56,7 @@ struct StopReport {
   std::string why{};
   double seconds = 0;     ///< from when it was asked for until the device had answered
   std::string trouble{};  ///< empty: no axis makes force
+  std::chrono::system_clock::time_point time = std::chrono::system_clock::now();
 };
 Message stopped_message(const StopReport& report);
 

@@ -2,6 +2,7 @@
 
 import { Controls } from "/controls.js";
 import { Criteria } from "/criteria.js";
+import { exportTable } from "/export.js";
 import { LoopView } from "/loop_view.js";
 import { MapView } from "/map_view.js";
 import { Rows } from "/rows.js";
@@ -12,6 +13,7 @@ import { followTheme } from "/theme.js";
 import { digits } from "/units.js";
 
 const MAPS = { "guard.damping": "damping of the device", "wall.damping": "damping of the wall", "wall.magnetic_coefficient": "magnetic coefficient" };
+const NEWS_S = 20;  // a page that is reloaded says what that did
 const at = (id) => document.getElementById(id);
 
 let axis = 0, device = null, state = null, values = null, client = null, connected = false;
@@ -46,7 +48,11 @@ const heard = {
     showState();
     showControls();
   },
-  stopped(message) { banner(`Stopped: ${message.why}. The device had answered after ${digits(1e3 * message.seconds, 2)} ms.${message.trouble ? ` ${message.trouble}` : ""}`, Boolean(message.trouble)); },
+  stopped(message) {
+    if (Date.now() / 1e3 - message.time > NEWS_S) return;
+    const trouble = message.trouble ? ` ${message.trouble}` : "";
+    banner(`Stopped: ${message.why}. The device had answered after ${digits(1e3 * message.seconds, 2)} ms.${trouble}`, Boolean(message.trouble));
+  },
   curve(message) { curves.set(message.axis, message); },
   judgement(message) {
     judgements.set(message.axis, message);
@@ -167,6 +173,10 @@ at("copy").onclick = async () => {
   } catch {
     say(command);
   }
+};
+at("export").onclick = () => {
+  if (!device || !values || !rows[axis].length) return say("there is nothing to export yet", false);
+  exportTable({ device, axis, values, rows: rows[axis], taken: scope.kind === "capture" ? scope.captured ?? null : null });
 };
 at("banner").onclick = () => banner("", false);
 addEventListener("resize", () => { changed = true; });

@@ -30,6 +30,9 @@ export class Controls {
     this.asking = false;
     this.touched = new Map();
     this.fields = new Map();
+    // What is being typed is not a value yet, and is left alone.
+    box.addEventListener("input", ({ target }) => { if (target.type === "number") target.dataset.typing = "yes"; });
+    for (const name of ["change", "focusout"]) box.addEventListener(name, ({ target }) => delete target.dataset.typing, { capture: true });
   }
 
   /** The full name of a parameter of the chosen axis. */
@@ -131,7 +134,7 @@ export class Controls {
       const locked = armed && this.device.parameters[full].change_while_armed === "none";
       for (const input of field.locks) input.disabled = locked;
       field.row?.classList.toggle("changed", values[full].value !== values[full].revert);
-      if (this.wanted.has(name) || now - (this.touched.get(name) ?? -Infinity) < QUIET_MS) continue;
+      if (field.locks.some((input) => input.dataset.typing) || this.wanted.has(name) || now - (this.touched.get(name) ?? -Infinity) < QUIET_MS) continue;
       field.show(values[full].value);
     }
   }

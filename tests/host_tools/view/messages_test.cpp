@@ -98,10 +98,8 @@ std::map<std::string, Json> all_that_is_heard() {
   commands.push({.kind = Kind::arm, .id = 1, .client = 1});
   bool stopped = false;
   session.run([&] {
-    if (has("capture complete") && has("capture progress") && has("rows") && !std::exchange(stopped, true)) {
-      // A second capture fails by the stop while it is read.
+    if (has("capture complete") && has("capture progress") && has("rows") && !std::exchange(stopped, true))
       commands.push({.kind = Kind::stop, .client = 1});
-    }
     return has("stopped") && has("map") && has("judgement") && has("curve");
   });
   publish(capture_failed("why"));

@@ -13,12 +13,20 @@ export async function launch() {
   });
 }
 
-/** The page at `url`, once it has heard of its device. What goes wrong in it is said on standard error. */
+/**
+ * The page at `url`, once it has heard of its device; `page.heard` has the newest message of each type that came to it. What
+ * goes wrong in it is said on standard error.
+ */
 export async function open(browser, url, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, ...options });
   const page = await context.newPage();
   page.on("pageerror", (error) => console.error(`page: ${error.message}`));
   page.on("console", (message) => message.type() === "error" && console.error(`page: ${message.text()}`));
+  page.heard = {};
+  page.on("websocket", (socket) => socket.on("framereceived", ({ payload }) => {
+    const message = JSON.parse(payload);
+    page.heard[message.type] = message;
+  }));
   await page.goto(url);
   await page.waitForSelector("body[data-ready=yes]");
   return page;

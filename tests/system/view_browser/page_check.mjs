@@ -1,0 +1,205 @@
+#!/usr/bin/env node
+// The live page in a browser, against a device on a bus. Each step prints a line.
+// usage: page_check.mjs all|short COMMAND...        COMMAND starts the device; BUS in it is the bus's socket
+import assert from "node:assert/strict";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createServer } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { arm, launch, open } from "./browser.mjs";
+import { PATIENCE, device, kmax, until, view } from "./kmax_processes.mjs";
+
+const [extent, ...command] = process.argv.slice(2);
+const folder = mkdtempSync(join(tmpdir(), "kmax-view-"));
+const bus = join(folder, "bus");
+const browser = await launch();
+let running = await device(command, bus);
+let served = await view(bus);
+let page = await open(browser, served.address.url);
+page.setDefaultTimeout(PATIENCE);
+
+const stateIs = (name, on = page) => on.waitForSelector(`#state[data-state=${name}]`);
+// As the stream says it. Another program is asked only while nothing is armed: it has the link to itself for as long as it
+// takes, and on a slow machine that may be longer than link.timeout.
+const armed = () => page.heard.state.axes[0].armed;
+const field = (name) => page.locator(`#field-${name.replaceAll(".", "-")}`);
+const value = (name) => page.heard.parameters.values[name].value;
+const set = async (name, text) => {
+  await field(name).fill(text);
+  await field(name).press("Tab");
+};
+/** The person lets go when the force is off: until the handle is out of the wall, it cannot be armed. */
+const outside = () => page.waitForFunction(() => Number.parseFloat(document.getElementById("loop-values").textContent.replace("−", "-")) > 1);
+
+const steps = {
+  async "a fresh page says what there is"() {
+    await stateIs("disarmed");
+    assert.equal(await page.locator("#state-words").textContent(), "Disarmed");
+    assert.match(await page.locator("#device").textContent(), /Kmax/);
+    await page.waitForFunction(() => document.querySelector("#criteria .verdict"));
+  },
+  async "sliders set the device, and the drawn law follows"() {
+    await page.click("summary");
+    await set("wall.stiffness_ceiling", "5");
+    await set("wall.stiffness", "2");
+    await until("stiffness is set", () => value("wall.stiffness") === 2000);
+    const times = [];
+    for (const k of [2.5, 3, 3.5, 3]) {
+      const began = performance.now();
+      await page.evaluate((shown) => {
+        const slider = document.querySelector(".slider input[type=range]");
+        slider.value = shown;
+        slider.dispatchEvent(new Event("input"));
+      }, k);
+      await until("stiffness and the law follow the slider", () => value("wall.stiffness") === 1e3 * k && page.heard.curve);
+      times.push(Math.round(performance.now() - began));
+    }
+    console.log(`   after ${times.join(", ")} ms`);
+    assert.equal(kmax(bus, "get", "wall.stiffness", "--json")["wall.stiffness"].value, 3000);
+    await page.waitForFunction(() => document.querySelector(".slider.changed"));
+  },
+  async "what another program sets is shown"() {
+    assert.ok(kmax(bus, "set", "wall.damping=0.5", "--json"));
+    await page.waitForFunction(() => document.getElementById("field-wall-damping").value === "0.5");
+  },
+  async "a press that does not last arms nothing, and one that loses the focus stops"() {
+    const box = await page.locator("#arm").boundingBox();
+    await page.mouse.move(box.x + 10, box.y + 10);
+    await page.mouse.down();
+    await page.mouse.up();
+    await page.mouse.down();
+    await page.evaluate(() => window.dispatchEvent(new Event("blur")));
+    await page.waitForFunction(() => document.getElementById("banner").textContent.includes("STOP was asked for"));
+    await page.mouse.up();
+    assert.equal(armed(), false);
+  },
+  async "held, it arms; the person presses, the loop shows it"() {
+    await outside();
+    await arm(page);
+    assert.equal(await page.locator("#arm-words").textContent(), "Disarm");
+    await page.waitForFunction(() => Number.parseFloat(document.getElementById("loop-values").textContent.split("mm")[1].replace("−", "-")) > 0.2);
+    assert.ok(await page.locator("#law").isDisabled());
+  },
+  async "stiffness is dragged while armed, up to its ceiling"() {
+    await page.evaluate(() => {
+      const slider = document.querySelector(".slider input[type=range]");
+      for (const k of [3.2, 3.5, 4]) {
+        slider.value = k;
+        slider.dispatchEvent(new Event("input"));
+      }
+    });
+    await until("stiffness follows the slider", () => value("wall.stiffness") === 4000);
+    await set("wall.stiffness", "6");
+    await page.waitForFunction(() => document.getElementById("said").textContent.includes("wall.stiffness_ceiling"));
+    assert.equal(value("wall.stiffness"), 4000);
+    await page.waitForFunction(() => document.getElementById("field-wall-stiffness").value === "4");
+  },
+  async "the space bar stops, with the focus anywhere"() {
+    await field("wall.damping").focus();
+    await page.keyboard.press("Space");
+    await stateIs("stopped");
+    assert.equal(armed(), false);
+    assert.match(await page.locator("#banner").textContent(), /answered after/);
+  },
+  async "revert"() {
+    await page.click("#revert");
+    await until("stiffness is back", () => value("wall.stiffness") === 1000);
+    await page.waitForFunction(() => !document.querySelector(".slider.changed"));
+  },
+  async "a capture is drawn, and exported with where it is from"() {
+    await page.click("[data-scope=capture]");
+    await page.click("#capture");
+    await page.waitForFunction(() => document.getElementById("scope-words").textContent.includes("500 samples"));
+    const [file] = await Promise.all([page.waitForEvent("download"), page.click("#export")]);
+    const lines = readFileSync(await file.path(), "utf8").trim().split("\n");
+    const comments = lines.filter((line) => line.startsWith("#"));
+    assert.ok(comments.some((line) => line.includes("wall.stiffness = 1000 N/m")) && comments.some((line) => line.includes("kmax view")), comments);
+    assert.deepEqual([lines[comments.length], lines.length - comments.length], ["time_s,position_m,velocity_m_per_s,force_n,current_a", 501]);
+    await page.click("[data-scope=rolling]");
+  },
+  async "two pages: the other one sees and stops"() {
+    const other = await open(browser, served.address.url);
+    await outside();
+    await arm(page);
+    await stateIs("armed", other);
+    await other.waitForFunction(() => document.getElementById("state-detail").textContent.includes("another page"));
+    await other.click("#stop");
+    await stateIs("stopped");
+    await other.close();
+    await outside();
+    assert.equal(armed(), false);
+  },
+  async "a reload while armed takes the force"() {
+    await arm(page);
+    await page.reload();
+    // The page itself stops as it is hidden; if it cannot any more, kmax view does.
+    await page.waitForFunction(() => /Stopped: (STOP|the page that had armed)/.test(document.getElementById("banner").textContent));
+    assert.equal(armed(), false);
+  },
+  async "another page of the same browser can do nothing, not even with the token"() {
+    const server = createServer((_, response) => response.end("<!doctype html><title>other</title>"));
+    await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+    const context = await browser.newContext();
+    const other = await context.newPage();
+    await other.goto(`http://127.0.0.1:${server.address().port}/`);
+    const heard = await other.evaluate(async ({ stream, token, url }) => {
+      const socket = new WebSocket(stream, ["kmax.v1", `token.${token}`]);
+      const opened = await new Promise((resolve) => { socket.onopen = () => resolve(true); socket.onerror = () => resolve(false); });
+      const read = await fetch(url).then(() => true, () => false);
+      const frame = document.createElement("iframe");
+      frame.src = url;
+      document.body.append(frame);
+      await new Promise((resolve) => { frame.onload = resolve; });
+      let framed = true;
+      try { framed = Boolean(frame.contentDocument?.getElementById("stop")); } catch { framed = false; }
+      return { opened, read, framed };
+    }, served.address);
+    assert.deepEqual(heard, { opened: false, read: false, framed: false });
+    await context.close();
+    server.close();
+  },
+  async "without uPlot the values stand there as text"() {
+    const context = await browser.newContext();
+    const plain = await context.newPage();
+    await plain.route("**/uplot.*", (route) => route.abort());
+    await plain.goto(served.address.url);
+    await plain.waitForFunction(() => document.getElementById("plots").textContent.includes("velocity"));
+    await context.close();
+  },
+  async "a link that is lost is said, and made anew"() {
+    await running.end("SIGKILL");
+    await stateIs("lost");
+    assert.equal(await page.locator("#state-words").textContent(), "Link lost");
+    rmSync(bus, { force: true });
+    running = await device(command, bus);
+    await stateIs("disarmed");
+    await page.waitForFunction(() => document.getElementById("scope-words").textContent.includes("rows a second"));
+  },
+  async "kmax view that ends disarms, and the page finds the next one"() {
+    await outside();
+    await arm(page);
+    await served.end("SIGINT");
+    await page.waitForFunction(() => document.getElementById("state-words").textContent.includes("cannot be reached"));
+    assert.equal(kmax(bus, "state", "--axis", "0", "--json").axes[0].armed, false);
+  },
+};
+
+let failed = 0;
+const chosen = Object.entries(steps).slice(0, extent === "all" ? undefined : 7);
+for (const [name, step] of chosen) {
+  try {
+    await step();
+    console.log(`ok ${name}`);
+  } catch (error) {
+    ++failed;
+    console.log(`FAILED ${name}: ${error.stack}\nview: ${served.said}\ndevice: ${running.said}`);
+    await page.screenshot({ path: join(tmpdir(), "kmax_view_failed.png") });
+    break;  // the next step begins where this one should have ended
+  }
+}
+await browser.close();
+await served.end();
+await running.end();
+rmSync(folder, { recursive: true });
+console.log(`${chosen.length} steps, ${failed} FAILED`);
+process.exit(failed ? 1 : 0);
