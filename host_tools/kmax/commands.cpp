@@ -27,6 +27,7 @@ void add_bring_up_command(CLI::App& app, Context& context);
 void add_wall_command(CLI::App& app, Context& context);
 void add_check_command(CLI::App& app, Context& context);
 void add_simulate_command(CLI::App& app, Context& context);
+void add_sweep_command(CLI::App& app, Context& context);
 void add_experiment_command(CLI::App& app, Context& context);
 void add_plot_command(CLI::App& app, Context& context);
 void add_lines_commands(CLI::App& app, Context& context);  // lines, reset, bootloader
@@ -35,18 +36,13 @@ void add_serve_command(CLI::App& app, Context& context);
 void add_describe_command(CLI::App& app, Context& context);
 
 std::span<const AddCommand> all_commands() {
-  static constexpr std::array commands = {&add_parameter_commands, &add_parameter_file_commands,
-                                          &add_store_commands,     &add_lock_commands,
-                                          &add_info_command,       &add_devices_command,
-                                          &add_drive_commands,     &add_faults_command,
-                                          &add_watch_command,      &add_record_command,
-                                          &add_capture_command,    &add_calibrate_command,
-                                          &add_selftest_command,   &add_bring_up_command,
-                                          &add_wall_command,
-                                          &add_check_command,      &add_simulate_command,
-                                          &add_experiment_command, &add_plot_command,
-                                          &add_lines_commands,     &add_flash_command,
-                                          &add_serve_command,      &add_describe_command};
+  static constexpr std::array commands = {
+      &add_parameter_commands, &add_parameter_file_commands, &add_store_commands,     &add_lock_commands,
+      &add_info_command,       &add_devices_command,         &add_drive_commands,     &add_faults_command,
+      &add_watch_command,      &add_record_command,          &add_capture_command,    &add_calibrate_command,
+      &add_selftest_command,   &add_bring_up_command,        &add_wall_command,       &add_check_command,
+      &add_simulate_command,   &add_sweep_command,           &add_experiment_command, &add_plot_command,
+      &add_lines_commands,     &add_flash_command,           &add_serve_command,      &add_describe_command};
   return commands;
 }
 
