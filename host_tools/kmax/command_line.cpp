@@ -9,6 +9,7 @@
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/context.hpp"
+#include "host_tools/kmax/usage_suggestion.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
@@ -55,6 +56,8 @@ std::string command_meant(const CLI::App& app, const std::string& word) {
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
                           const std::vector<std::string>& arguments) {
+  if (const std::string misplaced = misplaced_option_text(app, arguments); !misplaced.empty())
+    return misplaced;
   const auto names = command_names(app);
   const std::string word = word_for_command(arguments);
   if (word.empty())
@@ -66,7 +69,8 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
                        meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
   }
   const std::string command = command_meant(app, word);
-  return fmt::format("{}: {}; 'kmax {} --help' explains it", command, error.what(), command);
+  return fmt::format("{}: {}{}; 'kmax {} --help' explains it", command, error.what(),
+                     usage_suggestion(app, error, arguments), command);
 }
 
 }  // namespace
