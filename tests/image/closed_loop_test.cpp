@@ -1,4 +1,4 @@
-// The image on the virtual board, in the loop with motors, handles and persons.
+// The image on the virtual board, in the loop with motors, handles and people.
 #include <gtest/gtest.h>
 
 #include <array>

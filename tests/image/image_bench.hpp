@@ -50,7 +50,7 @@ class ImageBench {
  public:
   using Parameters = std::vector<std::pair<std::string, simulation::ParameterValue>>;
 
-  /// `push`: N, how hard the persons press; 0: as the scene says.
+  /// `push`: N, how hard the people press; 0: as the scene says.
   explicit ImageBench(const Parameters& parameters = {}, double push = 0.0,
                       const std::string& scene_name = "motor_axes",
                       const virtual_board::VirtualBoardConfig& config = {})

@@ -7,13 +7,13 @@
 
 namespace kmax::virtual_board {
 
-/// The motors, handles, persons and the supply of a scene, on the board's connectors.
+/// The motors, handles, people and the supply of a scene, on the board's connectors.
 ///
 /// Everything is integrated from one look of the board to the next: sampling instants and changes of the PWM,
 /// some 25 us apart. An axis that the scene does not have, or has without a motor, is an open connector: no
 /// current, and an encoder that stands still at 0.
 ///
-/// When persons begin and handles are let go, and which defects can be planted: scene_drives.hpp.
+/// When people begin and handles are let go, and which defects can be planted: scene_drives.hpp.
 class SceneWorld : public BoardWorld {
  public:
   /// Throws what the parts of the scene throw; std::invalid_argument for more axes than the board has, or a
