@@ -10,7 +10,10 @@
 
 namespace kmax::cli {
 
-CLI::Validator quantity(const char* unit, double least, double most) {
+using CLI::Option;
+using CLI::Validator;
+
+Validator quantity(const char* unit, double least, double most) {
   const std::string allowed =
       device::in_unit(fmt::format("{} .. {}", device::number_text(least), device::number_text(most)), unit);
   const auto convert = [unit = std::string(unit), least, most, allowed](std::string& text) -> std::string {
@@ -24,19 +27,19 @@ CLI::Validator quantity(const char* unit, double least, double most) {
       return error.what();
     }
   };
-  return CLI::Validator(convert, "");
+  return Validator(convert, "");
 }
 
-CLI::Option* add_quantity(CLI::App& command, const char* name, double& value, const char* unit,
-                          const char* help, double least, double most) {
+Option* add_quantity(CLI::App& command, const char* name, double& value, const char* unit, const char* help,
+                     double least, double most) {
   return command.add_option(name, value, help)
       ->transform(quantity(unit, least, most))
       ->type_name("NUMBER")
       ->capture_default_str();
 }
 
-CLI::Option* add_quantity(CLI::App& command, const char* name, std::optional<double>& value, const char* unit,
-                          const char* help, double least, double most) {
+Option* add_quantity(CLI::App& command, const char* name, std::optional<double>& value, const char* unit,
+                     const char* help, double least, double most) {
   return command.add_option(name, value, help)->transform(quantity(unit, least, most))->type_name("NUMBER");
 }
 

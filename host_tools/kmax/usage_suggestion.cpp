@@ -9,6 +9,8 @@
 
 namespace kmax::cli {
 
+using CLI::App;
+
 namespace {
 /// "--axis" of "--axis=0".
 std::string option_name(const std::string& argument) {
@@ -19,24 +21,24 @@ bool is_long_option(const std::string& argument) {
   return argument.starts_with("--") && argument.size() > 2;
 }
 
-const CLI::App* command_named(const CLI::App& app, const std::string& name) {
-  for (const CLI::App* command : app.get_subcommands({})) {
+const App* command_named(const App& app, const std::string& name) {
+  for (const App* command : app.get_subcommands({})) {
     if (command->get_name() == name) return command;
   }
   return nullptr;
 }
 
 /// Groups of options are nameless apps of their own.
-void collect_options(const CLI::App& app, std::vector<std::string>& names) {
+void collect_options(const App& app, std::vector<std::string>& names) {
   for (const CLI::Option* option : app.get_options()) {
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
   }
-  for (const CLI::App* group : app.get_subcommands({})) {
+  for (const App* group : app.get_subcommands({})) {
     if (group->get_name().empty()) collect_options(*group, names);
   }
 }
 
-std::vector<std::string> options_of(const CLI::App& app) {
+std::vector<std::string> options_of(const App& app) {
   std::vector<std::string> names;
   collect_options(app, names);
   return names;
@@ -47,10 +49,10 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 /// The command that the arguments name, as deep as they go; `app` if none.
-const CLI::App* command_in(const CLI::App& app, const std::vector<std::string>& arguments) {
-  const CLI::App* command = &app;
+const App* command_in(const App& app, const std::vector<std::string>& arguments) {
+  const App* command = &app;
   for (const std::string& argument : arguments) {
-    if (const CLI::App* next = command_named(*command, argument)) command = next;
+    if (const App* next = command_named(*command, argument)) command = next;
   }
   return command;
 }
@@ -74,9 +76,9 @@ std::string choice_suggestion(std::string_view message) {
 }
 }  // namespace
 
-std::string misplaced_option_text(const CLI::App& app, const std::vector<std::string>& arguments) {
+std::string misplaced_option_text(const App& app, const std::vector<std::string>& arguments) {
   const std::vector<std::string> known = options_of(app);
-  const CLI::App* command = command_in(app, arguments);
+  const App* command = command_in(app, arguments);
   if (command == &app) return {};
   for (const std::string& argument : arguments) {
     if (command_named(app, argument) != nullptr) return {};
@@ -84,7 +86,7 @@ std::string misplaced_option_text(const CLI::App& app, const std::vector<std::st
     if (!is_long_option(argument) || contains(known, name)) continue;
     if (!contains(options_of(*command), name)) return {};
     std::string path = command->get_name();
-    for (const CLI::App* above = command->get_parent(); above != nullptr && above != &app;
+    for (const App* above = command->get_parent(); above != nullptr && above != &app;
          above = above->get_parent())
       path = above->get_name() + ' ' + path;
     return fmt::format("{0} stands behind its command: 'kmax {1} {0} ...'", name, path);
@@ -92,7 +94,7 @@ std::string misplaced_option_text(const CLI::App& app, const std::vector<std::st
   return {};
 }
 
-std::string usage_suggestion(const CLI::App& app, const CLI::ParseError& error,
+std::string usage_suggestion(const App& app, const CLI::ParseError& error,
                              const std::vector<std::string>& arguments) {
   if (const std::string choice = choice_suggestion(error.what()); !choice.empty()) return choice;
   const std::vector<std::string> known = options_of(*command_in(app, arguments));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <vector>
+
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::cli {
@@ -12,13 +14,10 @@ std::string supplied_scene_names() {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-CLI::Option* add_scene_argument(CLI::App& command, std::string& scene) {
-  return command.add_option("scene", scene, "TOML file, or a supplied scene: " + supplied_scene_names())
-      ->option_text("SCENE");
-}
-
-CLI::Option* add_setting_option(CLI::App& command, std::vector<std::string>& settings, const char* help) {
-  return command.add_option("--set", settings, help)->type_name("NAME=VALUE")->take_all();
+void add_scene_argument(CLI::App& command, std::string& scene, bool required) {
+  command.add_option("scene", scene, "TOML file, or a supplied scene: " + supplied_scene_names())
+      ->option_text("SCENE")
+      ->required(required);
 }
 
 std::string unarmed_text(std::string_view given, firmware::Refusal refusal) {

@@ -5,7 +5,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "firmware/parameters/refusal.hpp"
 
@@ -15,10 +14,7 @@ namespace kmax::cli {
 std::string supplied_scene_names();
 
 /// The argument SCENE.
-CLI::Option* add_scene_argument(CLI::App& command, std::string& scene);
-
-/// --set NAME=VALUE.
-CLI::Option* add_setting_option(CLI::App& command, std::vector<std::string>& settings, const char* help);
+void add_scene_argument(CLI::App& command, std::string& scene, bool required);
 
 /// Why an axis of the scene, given on the command line as `given`, could not be armed, and what to do.
 std::string unarmed_text(std::string_view given, firmware::Refusal refusal);

@@ -28,9 +28,12 @@ struct SimulateOptions {
   bool keys = false;
 
   void declare(CLI::App& command) {
-    add_scene_argument(command, scene);
-    add_setting_option(command, settings,
-                       "In place of what the scene says: one of its keys or a parameter; may be repeated");
+    add_scene_argument(command, scene, false);  // --keys needs none
+    command
+        .add_option("--set", settings,
+                    "In place of what the scene says: one of its keys or a parameter; may be repeated")
+        ->type_name("NAME=VALUE")
+        ->take_all();
     command.add_flag("--keys", keys, "Prints every key that a scene may have, as docs/scenes.md");
     command.add_option("--csv", csv, "Table of every haptic sample to write")->type_name("FILE");
     command.add_option("--picture", picture, "Picture to draw, .svg or .png")->type_name("FILE");

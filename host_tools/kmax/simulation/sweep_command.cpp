@@ -26,13 +26,14 @@ struct SweepOptions {
   std::size_t repeats = 1, jobs = 0;
 
   void declare(CLI::App& command) {
-    add_scene_argument(command, scene)->required();
-    add_setting_option(
-        command, settings,
-        "Values of a key of the scene or a parameter: FROM..TO:STEP or A,B,C; may be repeated: "
-        "every combination is simulated")
+    add_scene_argument(command, scene, true);
+    command
+        .add_option("--set", settings,
+                    "Values of a key of the scene or a parameter: FROM..TO:STEP or A,B,C; may be repeated: "
+                    "every combination is simulated")
         ->required()
-        ->type_name("NAME=VALUES");
+        ->type_name("NAME=VALUES")
+        ->take_all();
     add_number(command, "--repeat", repeats, "Runs of each combination, with seeds of their own", 1, 100000);
     command.add_option("--jobs", jobs, "Runs at a time; all processors without it. Changes no result")
         ->check(CLI::Range(1, 4096))
