@@ -1,9 +1,13 @@
 #include "host_tools/base/numbers.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <string_view>
+
+#include "host_tools/base/errors.hpp"
 
 namespace kmax::device {
 
@@ -79,6 +83,8 @@ constexpr Conversion conversions[] = {
     {"H", "mH", over(1e3)},          {"H", "uH", over(1e6)},          {"A", "mA", over(1e3)},
     {"V", "mV", over(1e3)},          {"degC", "C", times(1)},         {"degC", "°C", times(1)},
     {"bit/s", "kbit/s", times(1e3)}, {"bit/s", "Mbit/s", times(1e6)}, {"rad/s", "krad/s", times(1e3)},
+    {"F", "mF", over(1e3)},          {"F", "uF", over(1e6)},          {"N m", "mN m", over(1e3)},
+    {"V", "uV", over(1e6)},          {"s", "ns", over(1e9)},          {"kg", "mg", over(1e6)},
 };
 
 std::string without_spacing(std::string_view text) {
@@ -110,6 +116,43 @@ std::vector<std::string> suffixes_of(std::string_view unit) {
     if (conversion.unit == unit) suffixes.emplace_back(conversion.suffix);
   }
   return suffixes;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+std::string in_unit(std::string text, std::string_view unit) {
+  return unit.empty() ? text : fmt::format("{} {}", text, unit);
+}
+
+WrittenNumber written_number(std::string_view given, std::string_view unit, std::string_view kind,
+                             std::string_view allowed) {
+  const std::string_view text = trimmed(given);
+  std::string_view rest = text;
+  if (rest.starts_with('+')) rest.remove_prefix(1);
+  // Keeps out what from_chars() would take as well: inf, nan.
+  const std::string_view digits =
+      rest.starts_with('-') && rest.size() != text.size() ? "" : rest.substr(rest.starts_with('-'));
+  const bool starts_like_a_number = digits.find_first_of("0123456789") == (digits.starts_with('.') ? 1u : 0u);
+  if (!starts_like_a_number) throw ValueError(fmt::format("'{}' is not {}", text, kind));
+
+  double number = 0;
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+  if (error != std::errc{})
+    throw ValueError(fmt::format("{} is not a number this program can hold; allowed is {}", text, allowed));
+  const std::string_view suffix = trimmed(rest.substr(static_cast<std::size_t>(end - rest.data())));
+  const auto scale = scale_from(suffix, unit);
+  if (!scale) {
+    if (unit.empty())
+      throw ValueError(fmt::format("'{}': it has no unit, so nothing may follow the number", text));
+    throw ValueError(fmt::format("'{}': '{}' is not one of its units {}; without a unit the number is in {}",
+                                 text, suffix, fmt::join(suffixes_of(unit), ", "), unit));
+  }
+  const std::string_view bare = trimmed(text.substr(0, text.size() - suffix.size()));
+  return {scale->to_si(number), in_unit(std::string(bare), suffix.empty() ? unit : suffix)};
 }
 
 }  // namespace kmax::device

@@ -34,4 +34,21 @@ std::optional<UnitScale> scale_from(std::string_view suffix, std::string_view un
 /// Suffixes that are understood for `unit`, the unit itself first; empty for a number without a unit.
 std::vector<std::string> suffixes_of(std::string_view unit);
 
+/// Without spaces and tabs at both ends.
+std::string_view trimmed(std::string_view text);
+
+/// "3580 N/m", or the number alone where there is no unit.
+std::string in_unit(std::string text, std::string_view unit);
+
+struct WrittenNumber {
+  double value;          ///< in the unit that was asked for
+  std::string as_given;  ///< number and unit, for messages
+};
+
+/// A number as a person writes it, in `unit` or with one that converts to it: "0.5N/mm", "1 mm", "800".
+/// ValueError for anything else, NaN and infinities among it: a clause to stand behind the name of what the
+/// number is for. `kind` and `allowed` say in it what belongs there: "a number", "0 .. 1e6 N/m".
+WrittenNumber written_number(std::string_view text, std::string_view unit, std::string_view kind,
+                             std::string_view allowed);
+
 }  // namespace kmax::device

@@ -56,7 +56,7 @@ struct StepReport {
   bool pass = false;
   bool skipped = false;  // not run, because a step that it needs has failed
   std::vector<IdentifiedValue> values;
-  std::vector<Diagnosis> remarks;  // found and cured, or worth a look: the step passes all the same
+  std::vector<Diagnosis> remarks;  // found and corrected, or worth a look: the step passes all the same
   std::optional<Diagnosis> failure;
 };
 

@@ -151,9 +151,9 @@ void find_motion(Calibration& run);
 void map_compensation(Calibration& run);
 
 // What follows from a motor that does or does not turn the way the encoder counts. Turned against it, either
-// the encoder is reversed or two of the motor's wires are swapped. The first is cured by encoder.direction,
-// and if nobody has shown where positive is, so is the second. If a hand has shown it, it is the wires:
-// throws StepFailed.
+// the encoder is reversed or two of the motor's wires are swapped. The first is corrected by
+// encoder.direction, and if nobody has shown where positive is, so is the second. If a hand has shown it, it
+// is the wires: throws StepFailed.
 //
 // Sets encoder.direction as a result, adds it to the report and keeps it in the knowledge.
 void settle_direction(Calibration& run, bool agrees, const std::string& evidence);

@@ -111,7 +111,7 @@ std::string conclusion(const Judgement& judgement) {
   const bool guaranteed = judgement.pass_of(Worth::guarantee);
   const bool held = c.hand.hand_mass > 0;
   std::string text = judgement.pass ? "pass: every criterion that applies is met. "
-                                    : "no pass: a pass takes every criterion that applies. ";
+                                    : "no pass: at least one criterion that applies is not met. ";
   if (has_no_wall(c) && !(c.magnetic_coefficient > 0)) return "\n" + text + "There is no wall.\n";
   if (!exact.applies)
     text += has_no_wall(c) ? "The exact loop leaves out the field, and there is nothing else. "

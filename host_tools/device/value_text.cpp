@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
@@ -19,10 +18,6 @@ using firmware::NamedValue;
 using firmware::Type;
 
 namespace {
-std::string in_unit(std::string text, std::string_view unit) {
-  return unit.empty() ? text : fmt::format("{} {}", text, unit);
-}
-
 std::string bound_text(const Entry& entry, double bound) {
   return entry.type == Type::float32 ? number_text(bound) : fmt::format("{:.0f}", bound);
 }
@@ -37,44 +32,15 @@ std::vector<std::string> choice_names(const Entry& entry) {
   throw ValueError(fmt::format("{}: {}", parameter.name(), what));
 }
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-struct WrittenNumber {
-  double value;          ///< in the parameter's unit
-  std::string as_given;  ///< number and unit, for messages
-};
-
 WrittenNumber parse_number(const Parameter& parameter, std::string_view text) {
   const Entry& entry = parameter.definition();
-  const std::string kind =
-      entry.values.empty() ? "a number" : fmt::format("one of {}", allowed_text(parameter));
-  std::string_view rest = text;
-  if (rest.starts_with('+')) rest.remove_prefix(1);
-  // Keeps out what from_chars() would take as well: inf, nan.
-  const std::string_view digits =
-      rest.starts_with('-') && rest.size() != text.size() ? "" : rest.substr(rest.starts_with('-'));
-  const bool starts_like_a_number = digits.find_first_of("0123456789") == (digits.starts_with('.') ? 1u : 0u);
-  if (!starts_like_a_number) fail(parameter, fmt::format("'{}' is not {}", text, kind));
-
-  double number = 0;
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
-  if (error != std::errc{})
-    fail(parameter, fmt::format("{} is not a number this program can hold; allowed is {}", text,
-                                allowed_text(parameter)));
-  const std::string_view suffix = trimmed(rest.substr(static_cast<std::size_t>(end - rest.data())));
-  const auto scale = scale_from(suffix, entry.unit);
-  if (!scale) {
-    if (entry.unit.empty())
-      fail(parameter, fmt::format("'{}': it has no unit, so nothing may follow the number", text));
-    fail(parameter, fmt::format("'{}': '{}' is not one of its units {}; without a unit the number is in {}",
-                                text, suffix, fmt::join(suffixes_of(entry.unit), ", "), entry.unit));
+  const std::string allowed = allowed_text(parameter);
+  try {
+    return written_number(text, entry.unit,
+                          entry.values.empty() ? "a number" : fmt::format("one of {}", allowed), allowed);
+  } catch (const ValueError& error) {
+    fail(parameter, error.what());
   }
-  const std::string_view given = trimmed(text.substr(0, text.size() - suffix.size()));
-  return {scale->to_si(number), in_unit(std::string(given), suffix.empty() ? entry.unit : suffix)};
 }
 
 [[noreturn]] void fail_out_of_range(const Parameter& parameter, const WrittenNumber& number) {

@@ -32,7 +32,7 @@ struct TouchLimits {
   std::size_t axis = 0;                           ///< of the wall
   double force_limit = paper::touch_force_limit;  ///< N; force.limit is lowered to it
   double abort_amplitude = 0.01;                  ///< m; TouchWatch::abort_amplitude
-  double patience = 20.0;                         ///< s for the person to come to the wall
+  double patience = 20.0;                         ///< s to wait for the touch
   double wall_abort_amplitude = 1e-3;             ///< m, against a wall that forces act along: TouchWatch
 };
 

@@ -15,6 +15,7 @@
 #include "host_tools/kmax/help_text.hpp"
 #include "host_tools/kmax/settings_file.hpp"
 #include "host_tools/kmax/supplied_files.hpp"
+#include "host_tools/kmax/usage_suggestion.hpp"
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
@@ -61,6 +62,8 @@ std::string command_meant(const CLI::App& app, const std::string& word) {
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
                           const std::vector<std::string>& arguments) {
+  if (const std::string misplaced = misplaced_option_text(app, arguments); !misplaced.empty())
+    return misplaced;
   const auto names = command_names(app);
   const std::string word = word_for_command(arguments);
   if (word.empty())
@@ -72,7 +75,8 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
                        meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
   }
   const std::string command = command_meant(app, word);
-  return fmt::format("{}: {}; 'kmax {} --help' explains it", command, error.what(), command);
+  return fmt::format("{}: {}{}; 'kmax {} --help' explains it", command, error.what(),
+                     usage_suggestion(app, error, arguments), command);
 }
 
 }  // namespace
@@ -111,7 +115,8 @@ void declare(CLI::App& app, Context& context) {
       "Sets parameters of a Kmax haptic device, reads its state, renders virtual walls and measures them.");
   app.formatter(std::make_shared<HelpFormatter>(context.columns()));
   app.set_help_flag("-h,--help", "This text");
-  app.set_version_flag("--version", version_text, "The version of this program, and the image that comes with it");
+  app.set_version_flag("--version", version_text,
+                       "The version of this program, and the image that comes with it");
   app.add_flag("--json", context.json, "One JSON document on standard output, in SI units");
   add_device_option(app, context);
   app.require_subcommand(1);

@@ -73,6 +73,8 @@ class Context {
 
   // Set by the command line.
   bool json = false;
+  /// Columns of the terminal that `out` is, 0 for anything else: then lines are as long as they are.
+  std::size_t width = 0;
   std::string device_option;
   std::optional<std::size_t> axis_option;
   /// How a CAN bus is reached, besides the link to one device on it.

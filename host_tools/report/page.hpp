@@ -83,7 +83,13 @@ std::size_t display_width(std::string_view text);
 /// The table in columns two spaces apart, numbers with a straight right edge, the
 /// headings over a line, the caption before them. No space at the end of a line. A control character in a
 /// cell (a line's end, an escape sequence) becomes a space. A table without columns is its caption alone.
-std::string terminal_text(const Table& table);
+/// `width` columns, if it is not 0, are not exceeded as long as words fit: headings and texts go on in
+/// further lines, numbers never.
+std::string terminal_text(const Table& table, std::size_t width = 0);
+
+/// `text` in lines of at most `width` columns, broken between words; a longer word has a line of its own. 0:
+/// as it is. Without a line's end at the end.
+std::string wrapped(std::string_view text, std::size_t width);
 
 /// The file's name alone as a relative reference (RFC 3986): every byte but letters, digits, '-', '.', '_'
 /// and '~' in per cent. It thus means the same in Markdown, in HTML and on a disk.

@@ -83,30 +83,92 @@ std::size_t display_width(std::string_view text) {
   return width;
 }
 
-std::string terminal_text(const Table& table) {
+namespace {
+std::vector<std::string> lines_of(std::string_view text, std::size_t width) {
+  std::vector<std::string> lines(1);
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t begin = text.find_first_not_of(' ', at);
+    if (begin == std::string_view::npos) break;
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    const std::string word(text.substr(begin, end - begin));
+    if (!lines.back().empty() && display_width(lines.back()) + 1 + display_width(word) > width)
+      lines.emplace_back();
+    lines.back() += lines.back().empty() ? word : ' ' + word;
+    at = end;
+  }
+  return lines;
+}
+
+std::size_t widest_word(std::string_view text) {
+  std::size_t widest = 0;
+  for (const std::string& word : lines_of(text, 0)) widest = std::max(widest, display_width(word));
+  return widest;
+}
+
+std::size_t sum_of(const std::vector<std::size_t>& widths) {
+  std::size_t sum = widths.empty() ? 0 : 2 * (widths.size() - 1);
+  for (const std::size_t width : widths) sum += width;
+  return sum;
+}
+}  // namespace
+
+std::string wrapped(std::string_view text, std::size_t width) {
+  if (width == 0) return std::string(text);
+  std::string result;
+  for (const std::string& line : lines_of(text, width)) result += (result.empty() ? "" : "\n") + line;
+  return result;
+}
+
+std::string terminal_text(const Table& table, std::size_t width) {
   const std::vector<bool> right = number_columns(table);
   std::string text;
-  if (!table.caption.empty()) add_line(text, printable(table.caption));
+  if (!table.caption.empty()) add_line(text, wrapped(printable(table.caption), width));
   if (table.columns.empty()) return text;
 
-  std::vector<std::vector<std::string>> lines{table.columns};
-  lines.insert(lines.end(), table.rows.begin(), table.rows.end());
-  std::vector<std::size_t> widths(table.columns.size(), 0);
-  for (auto& line : lines) {
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      line[i] = printable(line[i]);
-      widths[i] = std::max(widths[i], display_width(line[i]));
+  std::vector<std::vector<std::string>> rows{table.columns};
+  rows.insert(rows.end(), table.rows.begin(), table.rows.end());
+  std::vector<std::size_t> widths(table.columns.size(), 0), least(table.columns.size(), 0);
+  for (std::size_t number = 0; number < rows.size(); ++number) {
+    for (std::size_t i = 0; i < widths.size(); ++i) {
+      std::string& cell = rows[number][i];
+      cell = printable(cell);
+      const std::size_t whole = display_width(cell);
+      widths[i] = std::max(widths[i], whole);
+      least[i] = std::max(least[i], number > 0 && right[i] ? whole : widest_word(cell));
     }
   }
-  for (std::size_t number = 0; number < lines.size(); ++number) {
-    std::string written, rule;
-    for (std::size_t i = 0; i < widths.size(); ++i) {
-      const std::string gap(i == 0 ? 0 : 2, ' ');
-      const std::string padding(widths[i] - display_width(lines[number][i]), ' ');
-      written += gap + (right[i] ? padding + lines[number][i] : lines[number][i] + padding);
-      rule += gap + std::string(widths[i], '-');
+  // The widest gives way first, as most words are there; the first column, what a row is about, last.
+  while (width > 0 && sum_of(widths) > width) {
+    std::size_t widest = 0;
+    for (std::size_t i = 1; i < widths.size(); ++i) {
+      if (widths[i] > least[i] && (widest == 0 || widths[i] > widths[widest])) widest = i;
     }
-    add_line(text, written);
+    if (widths[widest] <= least[widest]) break;
+    --widths[widest];
+  }
+  for (std::size_t number = 0; number < rows.size(); ++number) {
+    std::vector<std::vector<std::string>> cells;
+    std::size_t height = 1;
+    for (std::size_t i = 0; i < widths.size(); ++i) {
+      const bool fits = display_width(rows[number][i]) <= widths[i];
+      cells.push_back(fits ? std::vector{rows[number][i]} : lines_of(rows[number][i], widths[i]));
+      height = std::max(height, cells.back().size());
+    }
+    std::string rule;
+    for (std::size_t line = 0; line < height; ++line) {
+      std::string written;
+      for (std::size_t i = 0; i < widths.size(); ++i) {
+        // Headings stand on their rule.
+        const std::size_t above = number == 0 ? height - cells[i].size() : 0;
+        const bool there = line >= above && line - above < cells[i].size();
+        const std::string part = there ? cells[i][line - above] : "";
+        const std::string gap(i == 0 ? 0 : 2, ' ');
+        const std::string padding(widths[i] - display_width(part), ' ');
+        written += gap + (right[i] ? padding + part : part + padding);
+        if (line == 0) rule += gap + std::string(widths[i], '-');
+      }
+      add_line(text, written);
+    }
     if (number == 0) add_line(text, rule);
   }
   return text;

@@ -6,11 +6,14 @@
 
 namespace kmax::simulated_board {
 
-simulation::Scene open_scene(const std::string& name_or_path) {
-  if (std::filesystem::exists(name_or_path)) return simulation::load_scene(name_or_path, check_parameter);
+simulation::Scene open_scene(const std::string& name_or_path,
+                             std::span<const simulation::SceneSetting> settings) {
+  if (std::filesystem::exists(name_or_path))
+    return simulation::load_scene(name_or_path, check_parameter, settings);
   std::string names;
   for (const SuppliedScene& scene : supplied_scenes()) {
-    if (scene.name == name_or_path) return simulation::parse_scene(scene.text, scene.name, check_parameter);
+    if (scene.name == name_or_path)
+      return simulation::parse_scene(scene.text, scene.name, check_parameter, settings);
     names += fmt::format("{}{}", names.empty() ? "" : ", ", scene.name);
   }
   throw simulation::SceneError(fmt::format(

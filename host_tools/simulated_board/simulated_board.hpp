@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string_view>
 
 #include "board/native/native_board.hpp"
@@ -44,8 +45,9 @@ struct SuppliedScene {
 std::vector<SuppliedScene> supplied_scenes();
 
 /// A scene by file name, or by the name of a supplied one when there is no such file. Checks parameters.
-/// Throws simulation::SceneError.
-simulation::Scene open_scene(const std::string& name_or_path);
+/// `settings`: in place of what it says. Throws simulation::SceneError.
+simulation::Scene open_scene(const std::string& name_or_path,
+                             std::span<const simulation::SceneSetting> settings = {});
 
 /// The device that `sim` and `serve` have when no scene is named: the supplied "touch" hardware and person,
 /// all parameters as from the factory but those that describe the hardware.

@@ -44,10 +44,12 @@ struct BrushedDcMotorConfig {
 };
 
 inline constexpr std::array brushed_dc_motor_fields{
-    ModelField<BrushedDcMotorConfig>{"resistance", &BrushedDcMotorConfig::resistance, 1e-4, 1000.0, "ohm"},
-    ModelField<BrushedDcMotorConfig>{"inductance", &BrushedDcMotorConfig::inductance, 1e-7, 1.0, "H"},
+    ModelField<BrushedDcMotorConfig>{"resistance", &BrushedDcMotorConfig::resistance, 1e-4, 1000.0, "ohm",
+                                     "resistance between the terminals"},
+    ModelField<BrushedDcMotorConfig>{"inductance", &BrushedDcMotorConfig::inductance, 1e-7, 1.0, "H",
+                                     "inductance between the terminals"},
     ModelField<BrushedDcMotorConfig>{"torque_constant", &BrushedDcMotorConfig::torque_constant, 1e-5, 100.0,
-                                     "N m/A"},
+                                     "N m/A", "torque constant"},
 };
 
 class BrushedDcMotor {

@@ -27,9 +27,12 @@ struct StructureModel {
 };
 
 inline constexpr std::array structure_fields{
-    ModelField<StructureModel>{"stiffness", &StructureModel::stiffness, 1.0, 1e8, "N/m"},
-    ModelField<StructureModel>{"damping", &StructureModel::damping, 0.0, 1000.0, "N s/m"},
-    ModelField<StructureModel>{"handle_mass", &StructureModel::handle_mass, 1e-4, 100.0, "kg"},
+    ModelField<StructureModel>{"stiffness", &StructureModel::stiffness, 1.0, 1e8, "N/m",
+                               "stiffness of the compliance between motor side and handle"},
+    ModelField<StructureModel>{"damping", &StructureModel::damping, 0.0, 1000.0, "N s/m",
+                               "damping beside it"},
+    ModelField<StructureModel>{"handle_mass", &StructureModel::handle_mass, 1e-4, 100.0, "kg",
+                               "mass of the handle, behind the compliance"},
 };
 
 // Throws std::invalid_argument.
@@ -53,11 +56,16 @@ struct DeviceModel {
 };
 
 inline constexpr std::array device_fields{
-    ModelField<DeviceModel>{"mass", &DeviceModel::mass, 1e-4, 100.0, "kg"},
-    ModelField<DeviceModel>{"damping", &DeviceModel::damping, 0.0, 1000.0, "N s/m"},
-    ModelField<DeviceModel>{"friction", &DeviceModel::friction, 0.0, 1000.0, "N"},
-    ModelField<DeviceModel>{"force_limit", &DeviceModel::force_limit, 0.0, 1e5, "N (0 = no limit)"},
-    ModelField<DeviceModel>{"delay", &DeviceModel::delay, 0.0, 1.0, "s"},
+    ModelField<DeviceModel>{"mass", &DeviceModel::mass, 1e-4, 100.0, "kg",
+                            "mass at the handle; with a [structure], of the motor side alone"},
+    ModelField<DeviceModel>{"damping", &DeviceModel::damping, 0.0, 1000.0, "N s/m", "viscous damping"},
+    ModelField<DeviceModel>{"friction", &DeviceModel::friction, 0.0, 1000.0, "N",
+                            "Coulomb friction, the same standing and moving"},
+    ModelField<DeviceModel>{"force_limit", &DeviceModel::force_limit, 0.0, 1e5, "N",
+                            "largest force of the device; what is commanded beyond it is clipped",
+                            "0: no limit"},
+    ModelField<DeviceModel>{"delay", &DeviceModel::delay, 0.0, 1.0, "s",
+                            "from a command to its force at the handle"},
 };
 
 // Throws std::invalid_argument.

@@ -72,11 +72,16 @@ struct EncoderConfig {
 };
 
 inline constexpr std::array encoder_fields{
-    ModelField<EncoderConfig>{"counts_per_turn", &EncoderConfig::counts_per_turn, 1.0, 1e9, ""},
-    ModelField<EncoderConfig>{"transmission", &EncoderConfig::transmission, 1e-6, 10.0, "m/rad"},
-    ModelField<EncoderConfig>{"index_position", &EncoderConfig::index_position, 0.0, 1e9, "counts"},
-    ModelField<EncoderConfig>{"dropout_probability", &EncoderConfig::dropout_probability, 0.0, 1.0, ""},
-    ModelField<EncoderConfig>{"edge_noise", &EncoderConfig::edge_noise, 0.0, 100.0, "counts"},
+    ModelField<EncoderConfig>{"counts_per_turn", &EncoderConfig::counts_per_turn, 1.0, 1e9, "",
+                              "counts of a turn; quadrature: four times the lines", "whole with a motor"},
+    ModelField<EncoderConfig>{"transmission", &EncoderConfig::transmission, 1e-6, 10.0, "m/rad",
+                              "travel of the handle per motor radian"},
+    ModelField<EncoderConfig>{"index_position", &EncoderConfig::index_position, 0.0, 1e9, "counts",
+                              "count within the turn at which the index is high; needs a motor", "whole"},
+    ModelField<EncoderConfig>{"dropout_probability", &EncoderConfig::dropout_probability, 0.0, 1.0, "",
+                              "probability with which an edge is lost"},
+    ModelField<EncoderConfig>{"edge_noise", &EncoderConfig::edge_noise, 0.0, 100.0, "counts",
+                              "standard deviation of where an edge is seen"},
 };
 
 // Whether the lines are worth simulating: without defects a count is all that they say.

@@ -23,8 +23,11 @@ struct IntegratorConfig {
 };
 
 inline constexpr std::array integrator_fields{
-    ModelField<IntegratorConfig>{"substeps", &IntegratorConfig::substeps, 1.0, 1e6, "per 2 ms"},
-    ModelField<IntegratorConfig>{"tolerance", &IntegratorConfig::tolerance, 1e-14, 1e-2, ""},
+    ModelField<IntegratorConfig>{
+        "substeps", &IntegratorConfig::substeps, 1.0, 1e6, "per 2 ms",
+        "equal steps per 2 ms, at least one per interval; semi_implicit_euler and rk4"},
+    ModelField<IntegratorConfig>{"tolerance", &IntegratorConfig::tolerance, 1e-14, 1e-2, "",
+                                 "relative tolerance of the local error; adaptive"},
 };
 
 // Throws std::invalid_argument.

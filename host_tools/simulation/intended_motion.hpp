@@ -48,13 +48,18 @@ struct IntendedMotionConfig {
 
 inline constexpr std::array motion_fields{
     ModelField<IntendedMotionConfig>{"start_position", &IntendedMotionConfig::start_position, -10.0, 10.0,
-                                     "m"},
+                                     "m", "where the hand begins, in free space"},
     ModelField<IntendedMotionConfig>{"approach_speed", &IntendedMotionConfig::approach_speed, 1e-4, 100.0,
-                                     "m/s"},
-    ModelField<IntendedMotionConfig>{"push_force", &IntendedMotionConfig::push_force, 0.0, 1000.0, "N"},
-    ModelField<IntendedMotionConfig>{"hold_time", &IntendedMotionConfig::hold_time, 0.0, 1e5, "s"},
-    ModelField<IntendedMotionConfig>{"wall_position", &IntendedMotionConfig::wall_position, -10.0, 10.0, "m"},
-    ModelField<IntendedMotionConfig>{"wall_side", &IntendedMotionConfig::wall_side, -1.0, 1.0, "(-1 or +1)"},
+                                     "m/s", "speed towards the wall and back"},
+    ModelField<IntendedMotionConfig>{"push_force", &IntendedMotionConfig::push_force, 0.0, 1000.0, "N",
+                                     "static push at the surface, without the background force"},
+    ModelField<IntendedMotionConfig>{"hold_time", &IntendedMotionConfig::hold_time, 0.0, 1e5, "s",
+                                     "how long the wall is pressed"},
+    ModelField<IntendedMotionConfig>{"wall_position", &IntendedMotionConfig::wall_position, -10.0, 10.0, "m",
+                                     "wall that is aimed at; without it the parameter wall.position"},
+    ModelField<IntendedMotionConfig>{
+        "wall_side", &IntendedMotionConfig::wall_side, -1.0, 1.0, "",
+        "side of that wall where free space is; without it the parameter wall.side", "-1 or +1"},
 };
 
 // Throws std::invalid_argument, also for a start inside the wall.

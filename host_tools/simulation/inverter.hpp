@@ -48,9 +48,13 @@ struct InverterConfig {
 };
 
 inline constexpr std::array inverter_fields{
-    ModelField<InverterConfig>{"on_resistance", &InverterConfig::on_resistance, 0.0, 10.0, "ohm"},
-    ModelField<InverterConfig>{"diode_drop", &InverterConfig::diode_drop, 0.0, 5.0, "V"},
-    ModelField<InverterConfig>{"start_limit", &InverterConfig::start_limit, 0.0, 100.0, "V"},
+    ModelField<InverterConfig>{"on_resistance", &InverterConfig::on_resistance, 0.0, 10.0, "ohm",
+                               "resistance of a leg"},
+    ModelField<InverterConfig>{"diode_drop", &InverterConfig::diode_drop, 0.0, 5.0, "V",
+                               "voltage of a conducting diode"},
+    ModelField<InverterConfig>{"start_limit", &InverterConfig::start_limit, 0.0, 100.0, "V",
+                               "voltage at a motor terminal above which the gate driver does not start",
+                               "0: it always starts"},
 };
 
 struct LegCommand {

@@ -1,6 +1,7 @@
 #pragma once
-// One table per model: every number of a model is listed once, with its range and unit, and both the
-// validation of a struct and the reading of a scene file go through that list.
+// One table per model: every number of a model is listed once, with its range, unit and meaning. The
+// validation of a struct, the reading of a scene file and the list of its keys (scene_keys.hpp) go through
+// it.
 
 #include <fmt/format.h>
 
@@ -20,6 +21,8 @@ struct ModelField {
   double minimum;
   double maximum;
   std::string_view unit;
+  std::string_view meaning = "";
+  std::string_view note = "";  // on the range: "whole", "0: no limit"
 };
 
 template <typename Model>
@@ -29,8 +32,9 @@ bool is_allowed(const ModelField<Model>& field, double value) {
 
 template <typename Model>
 std::string allowed_range(const ModelField<Model>& field) {
-  return fmt::format("a number from {} to {}{}{}", field.minimum, field.maximum,
-                     field.unit.empty() ? "" : " ", field.unit);
+  return fmt::format("a number from {} to {}{}{}{}", field.minimum, field.maximum,
+                     field.unit.empty() ? "" : " ", field.unit,
+                     field.note.empty() ? "" : fmt::format(" ({})", field.note));
 }
 
 // Throws std::invalid_argument that names the first field outside its range, its value and the range.

@@ -44,14 +44,22 @@ struct OperatorModel {
 };
 
 inline constexpr std::array operator_fields{
-    ModelField<OperatorModel>{"grip_stiffness", &OperatorModel::grip_stiffness, 1.0, 1e7, "N/m"},
-    ModelField<OperatorModel>{"grip_damping", &OperatorModel::grip_damping, 0.0, 1000.0, "N s/m"},
-    ModelField<OperatorModel>{"hand_mass", &OperatorModel::hand_mass, 1e-3, 100.0, "kg"},
-    ModelField<OperatorModel>{"arm_stiffness", &OperatorModel::arm_stiffness, 1.0, 1e7, "N/m"},
-    ModelField<OperatorModel>{"arm_damping", &OperatorModel::arm_damping, 0.0, 1000.0, "N s/m"},
-    ModelField<OperatorModel>{"activation_gain", &OperatorModel::activation_gain, 0.0, 100.0, "1/N"},
-    ModelField<OperatorModel>{"activation_time", &OperatorModel::activation_time, 1e-3, 100.0, "s"},
-    ModelField<OperatorModel>{"push_lag", &OperatorModel::push_lag, 1e-3, 100.0, "s"},
+    ModelField<OperatorModel>{"grip_stiffness", &OperatorModel::grip_stiffness, 1.0, 1e7, "N/m",
+                              "k1, stiffness of the grip"},
+    ModelField<OperatorModel>{"grip_damping", &OperatorModel::grip_damping, 0.0, 1000.0, "N s/m",
+                              "b1, damping of the grip"},
+    ModelField<OperatorModel>{"hand_mass", &OperatorModel::hand_mass, 1e-3, 100.0, "kg",
+                              "M, mass of the hand"},
+    ModelField<OperatorModel>{"arm_stiffness", &OperatorModel::arm_stiffness, 1.0, 1e7, "N/m",
+                              "k2, stiffness of the arm"},
+    ModelField<OperatorModel>{"arm_damping", &OperatorModel::arm_damping, 0.0, 1000.0, "N s/m",
+                              "b2, damping of the arm"},
+    ModelField<OperatorModel>{"activation_gain", &OperatorModel::activation_gain, 0.0, 100.0, "1/N",
+                              "gamma: how much grip and arm stiffen per newton of background force"},
+    ModelField<OperatorModel>{"activation_time", &OperatorModel::activation_time, 1e-3, 100.0, "s",
+                              "time constant of that stiffening"},
+    ModelField<OperatorModel>{"push_lag", &OperatorModel::push_lag, 1e-3, 100.0, "s",
+                              "how fast the push follows the background force"},
 };
 
 // Throws std::invalid_argument.

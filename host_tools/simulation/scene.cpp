@@ -9,23 +9,26 @@
 #include <stdexcept>
 
 #include "firmware/object_dictionary/entry.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/base/files.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/base/toml_text.hpp"
+#include "host_tools/simulation/scene_keys.hpp"
+#include "host_tools/simulation/scene_settings.hpp"
 #include "host_tools/simulation/scene_table.hpp"
 
 namespace kmax::simulation {
 namespace {
 
-constexpr std::array measurement_fields{
-    ModelField<Measurement>{"window", &Measurement::window, 1e-3, 1e5, "s"},
-    ModelField<Measurement>{"threshold", &Measurement::threshold, 1e-9, 1.0, "m"},
-};
-constexpr std::array scene_fields{ModelField<Scene>{"duration", &Scene::duration, 1e-3, 1e5, "s"}};
-
-constexpr std::array start_fields{
-    ModelField<HandleStart>{"start_position", &HandleStart::position, -10.0, 10.0, "m"},
-    ModelField<HandleStart>{"start_velocity", &HandleStart::velocity, -100.0, 100.0, "m/s"},
-};
+// The numbers of [name], whose keys are those that scene_keys() lists. `motor`: the kind of a [motor].
+template <typename Model, std::size_t count>
+void read_numbers(const SceneTables& tables, const toml::table& table, const std::string& axis,
+                  std::string_view name, const std::array<ModelField<Model>, count>& fields, Model& model,
+                  std::string_view motor = "") {
+  const std::string prefix = fmt::format("{}{}.", axis, name);
+  tables.require_known(table, prefix, key_names(name, motor));
+  tables.read_fields(table, prefix, fields, model);
+}
 
 const toml::table& device_of(const SceneTables& tables, const toml::table& table, const std::string& prefix) {
   const toml::table* device = tables.part(table, prefix, "device");
@@ -47,10 +50,9 @@ void refuse_unused(const SceneTables& tables, const toml::table& table, std::str
 // `table`: the one that holds the tables of the axis; `prefix`: "" or "axis1.".
 void read_device_tables(const SceneTables& tables, const toml::table& table, const std::string& prefix,
                         SceneAxis& axis) {
-  tables.read_model(device_of(tables, table, prefix), prefix + "device.", device_fields, axis.device,
-                    {"start_position", "start_velocity"});
+  read_numbers(tables, device_of(tables, table, prefix), prefix, "device", device_fields, axis.device);
   if (const toml::table* structure = tables.part(table, prefix, "structure")) {
-    tables.read_model(*structure, prefix + "structure.", structure_fields, axis.device.structure.emplace());
+    read_numbers(tables, *structure, prefix, "structure", structure_fields, axis.device.structure.emplace());
   }
 }
 
@@ -76,7 +78,7 @@ void read_integrator_table(const SceneTables& tables, const toml::table& root, S
   const toml::table* table = tables.part(root, "", "integrator");
   if (table == nullptr) return;
   IntegratorConfig& integrator = scene.integrator;
-  tables.read_model(*table, "integrator.", integrator_fields, integrator, {"kind"});
+  read_numbers(tables, *table, "", "integrator", integrator_fields, integrator);
   if (const auto kind = tables.read_choice(*table, "integrator.", "kind", integrator_names))
     integrator.kind = static_cast<IntegratorKind>(*kind);
   const std::string_view name = integrator_names[static_cast<std::size_t>(integrator.kind)];
@@ -86,9 +88,6 @@ void read_integrator_table(const SceneTables& tables, const toml::table& root, S
   if (integrator.kind != IntegratorKind::adaptive)
     refuse_unused(tables, *table, "tolerance", name, "\"adaptive\"");
 }
-
-constexpr std::array<std::string_view, 3> motor_kinds{"ideal", "dc", "pmsm"};
-constexpr std::array<std::string_view, 2> encoder_kinds{"quadrature", "as5047p"};
 
 // What only the whole model can tell, with the axis in front and the table's place.
 template <typename Model>
@@ -100,13 +99,6 @@ void require_valid(const SceneTables& tables, const toml::table& table, const st
     tables.fail(table.source(), axis + error.what());
   }
 }
-
-struct BothInductances {
-  double inductance = 0.0;
-};
-constexpr std::array both_inductances_fields{
-    ModelField<BothInductances>{"inductance", &BothInductances::inductance, 1e-7, 1.0, "H"},
-};
 
 SynchronousMotorConfig read_synchronous(const SceneTables& tables, const toml::table& table,
                                         const std::string& axis) {
@@ -125,7 +117,7 @@ SynchronousMotorConfig read_synchronous(const SceneTables& tables, const toml::t
     tables.read_fields(table, prefix, both_inductances_fields, same);
     config.inductance_d = config.inductance_q = same.inductance;
   }
-  tables.read_model(table, prefix, synchronous_motor_fields, config, {"kind", "inductance", "defects"});
+  read_numbers(tables, table, axis, "motor", synchronous_motor_fields, config, "pmsm");
   require_valid(tables, table, axis, config);
   return config;
 }
@@ -180,8 +172,7 @@ void read_encoder_table(const SceneTables& tables, const toml::table& table, con
                         SceneAxis& axis) {
   const toml::table* encoder = tables.part(table, prefix, "encoder");
   if (encoder == nullptr) return;
-  tables.read_model(*encoder, prefix + "encoder.", encoder_fields, axis.encoder,
-                    {"kind", "reversed", "select_filtered"});
+  read_numbers(tables, *encoder, prefix, "encoder", encoder_fields, axis.encoder);
   tables.read_truth(*encoder, prefix + "encoder.", "reversed", axis.encoder.reversed);
   tables.read_truth(*encoder, prefix + "encoder.", "select_filtered", axis.encoder.select_filtered);
   const auto kind = tables.read_choice(*encoder, prefix + "encoder.", "kind", encoder_kinds);
@@ -218,7 +209,7 @@ void read_motor_tables(const SceneTables& tables, const toml::table& table, cons
       axis.motor = read_synchronous(tables, *motor, prefix);
     } else {
       BrushedDcMotorConfig config;
-      tables.read_model(*motor, prefix + "motor.", brushed_dc_motor_fields, config, {"kind", "defects"});
+      read_numbers(tables, *motor, prefix, "motor", brushed_dc_motor_fields, config, "dc");
       axis.motor = config;
     }
   }
@@ -231,16 +222,17 @@ void read_motor_tables(const SceneTables& tables, const toml::table& table, cons
                             prefix, inverter != nullptr ? "inverter" : "current_sensor"));
   }
   read_defects(tables, *motor, prefix, axis);
-  if (inverter != nullptr) tables.read_model(*inverter, prefix + "inverter.", inverter_fields, axis.inverter);
+  if (inverter != nullptr)
+    read_numbers(tables, *inverter, prefix, "inverter", inverter_fields, axis.inverter);
   if (sensor != nullptr)
-    tables.read_model(*sensor, prefix + "current_sensor.", current_sensor_fields, axis.current_sensor);
+    read_numbers(tables, *sensor, prefix, "current_sensor", current_sensor_fields, axis.current_sensor);
 }
 
 void read_supply_table(const SceneTables& tables, const toml::table& root, Scene& scene) {
   const toml::table* supply = tables.part(root, "", "supply");
   if (supply == nullptr) return;
   SupplyConfig& config = scene.supply.emplace();
-  tables.read_model(*supply, "supply.", supply_fields, config, {"absorbs", "part_ratings"});
+  read_numbers(tables, *supply, "", "supply", supply_fields, config);
   tables.read_truth(*supply, "supply.", "absorbs", config.absorbs);
   tables.read_truth(*supply, "supply.", "part_ratings", config.part_ratings);
 }
@@ -254,8 +246,7 @@ void read_spikes_table(const SceneTables& tables, const toml::table& root, Scene
                                                   {"emergency_stop", &spikes.emergency_stop},
                                                   {"fault_line", &spikes.fault_line},
                                                   {"encoder", &spikes.encoder}};
-  tables.read_model(*table, "spikes.", spikes_fields, spikes,
-                    {"at_samples", "index", "emergency_stop", "fault_line", "encoder"});
+  read_numbers(tables, *table, "", "spikes", spikes_fields, spikes);
   for (const auto& [name, value] : truths) tables.read_truth(*table, "spikes.", name, *value);
 }
 
@@ -269,10 +260,12 @@ class SceneReader : private SceneTables {
       if (axis > 1 && !root.contains(further_axes.back())) break;
       further_axes.push_back(fmt::format("axis{}", axis));
     }
-    std::vector<std::string_view> known{
-        "name",     "description", "duration",       "seed",       "identified",  "device",
-        "operator", "motion",      "encoder",        "parameters", "measurement", "structure",
-        "motor",    "inverter",    "current_sensor", "supply",     "integrator",  "spikes"};
+    std::vector<std::string_view> known = key_names("");
+    std::vector<std::string_view> of_further_axes;
+    for (const SceneTable& table : scene_tables) {
+      if (!table.name.empty()) known.push_back(table.name);
+      if (table.of_axis) of_further_axes.push_back(table.name);
+    }
     known.insert(known.end(), further_axes.begin(), further_axes.end());
     require_known(root, "", known);
     Scene scene;
@@ -283,17 +276,14 @@ class SceneReader : private SceneTables {
     read_seed(root, scene);
     read_truth(root, "", "identified", scene.identified);
     if (const toml::table* table = part(root, "", "measurement")) {
-      require_known(*table, "measurement.", {"window", "threshold"});
-      read_fields(*table, "measurement.", measurement_fields, scene.measurement);
+      read_numbers(*this, *table, "", "measurement", measurement_fields, scene.measurement);
     }
     if (const toml::table* table = part(root, "", "parameters")) read_parameters(*table, "", scene);
     scene.axes.push_back(read_axis(root, "", scene));
     for (const std::string& name : further_axes) {
       const toml::table* table = part(root, "", name);
       if (table == nullptr) continue;
-      require_known(
-          *table, name + ".",
-          {"device", "structure", "operator", "motion", "encoder", "motor", "inverter", "current_sensor"});
+      require_known(*table, name + ".", of_further_axes);
       scene.axes.push_back(read_axis(*table, name + ".", scene));
     }
     read_supply_table(*this, root, scene);
@@ -339,8 +329,10 @@ class SceneReader : private SceneTables {
   void read_operator(const toml::table& table, const std::string& prefix, const Scene& scene,
                      SceneAxis& axis) const {
     const bool first = scene.axes.empty();
-    const std::initializer_list<std::string_view> none, others{"same_person"};
-    read_model(table, prefix + "operator.", operator_fields, axis.person.emplace(), first ? none : others);
+    std::vector<std::string_view> known = key_names("operator");
+    if (first) std::erase(known, "same_person");
+    require_known(table, prefix + "operator.", known);
+    read_fields(table, prefix + "operator.", operator_fields, axis.person.emplace());
     if (first) return;
     read_truth(table, prefix + "operator.", "same_person", axis.same_person);
     if (axis.same_person && !scene.axes.front().person) {
@@ -360,7 +352,7 @@ class SceneReader : private SceneTables {
     IntendedMotionConfig& motion = axis.motion.emplace();
     read_wall(table, prefix, scene, "wall.position", "wall_position", motion.wall_position);
     read_wall(table, prefix, scene, "wall.side", "wall_side", motion.wall_side);
-    read_model(table, prefix + "motion.", motion_fields, motion);
+    read_numbers(*this, table, prefix, "motion", motion_fields, motion);
     check_wall(table, prefix, scene, "wall.position", "wall_position", motion.wall_position);
     check_wall(table, prefix, scene, "wall.side", "wall_side", motion.wall_side);
     try {
@@ -397,23 +389,30 @@ class SceneReader : private SceneTables {
     return nullptr;
   }
 
-  static std::optional<double> number_in(const SceneParameter* parameter) {
+  static std::optional<double> number_in(const SceneParameter* parameter, std::string_view unit) {
     if (parameter == nullptr) return std::nullopt;
     if (const auto* whole = std::get_if<std::int64_t>(&parameter->value)) return static_cast<double>(*whole);
     if (const auto* number = std::get_if<double>(&parameter->value)) return *number;
-    return std::nullopt;
+    const auto* text = std::get_if<std::string>(&parameter->value);
+    if (text == nullptr) return std::nullopt;
+    try {
+      return device::written_number(*text, unit, "a number", "a number").value;
+    } catch (const device::ValueError&) {
+      return std::nullopt;  // the caller's check has its own words for it
+    }
   }
 
   static void read_wall(const toml::table& table, const std::string& prefix, const Scene& scene,
                         std::string_view parameter, std::string_view key, double& value) {
     if (table.contains(key)) return;
-    value = number_in(find_parameter(scene, prefix, parameter)).value_or(value);
+    const std::string_view unit = find_scene_key("motion", key)->unit;
+    value = number_in(find_parameter(scene, prefix, parameter), unit).value_or(value);
   }
 
   void check_wall(const toml::table& table, const std::string& prefix, const Scene& scene,
                   std::string_view name, std::string_view key, double value) const {
     const SceneParameter* parameter = find_parameter(scene, prefix, name);
-    const std::optional<double> wall = number_in(parameter);
+    const std::optional<double> wall = number_in(parameter, find_scene_key("motion", key)->unit);
     const toml::node* node = table.get(key);
     if (!wall || *wall == value || node == nullptr) return;
     fail(node->source(),
@@ -462,72 +461,17 @@ class SceneReader : private SceneTables {
 
 }  // namespace
 
-CoupledHandle SceneAxis::make_handle(const IntegratorConfig& integrator) const {
-  const auto make = [this] {
-    if (!person) return CoupledHandle(device, start);
-    if (motion) return CoupledHandle(device, *person, *motion, start);
-    IntendedMotionConfig stay;
-    stay.start_position = start.position;
-    stay.wall_position = start.position;
-    return CoupledHandle(device, *person, stay, start);
-  };
-  CoupledHandle handle = make();
-  if (integrator.kind != IntegratorKind::exact) handle.set_integrator(integrator);
-  return handle;
+Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check,
+                  std::span<const SceneSetting> settings) {
+  toml::table root = base::parsed_toml<SceneError>(text, source);
+  put_settings(root, settings, source);
+  return SceneReader(source, check).read(root);
 }
 
-MotorDrive SceneAxis::make_drive(std::uint64_t seed, const IntegratorConfig& integrator) const {
-  if (!motor) throw std::logic_error("make_drive: this axis of the scene has no [motor]");
-  SceneAxis unlimited = *this;
-  unlimited.device.force_limit = 0.0;
-  return MotorDrive({*motor, inverter, current_sensor, encoder, seed}, unlimited.make_handle(integrator));
-}
-
-std::uint64_t Scene::seed_of(std::size_t axis) const {
-  NoiseGenerator seeds(seed);
-  std::uint64_t own = seeds.bits();
-  for (std::size_t n = 0; n < axis; ++n) own = seeds.bits();
-  return own;
-}
-
-Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check) {
-  return SceneReader(source, check).read(base::parsed_toml<SceneError>(text, source));
-}
-
-Scene load_scene(const std::string& path, const ParameterCheck& check) {
-  return parse_scene(base::text_of<SceneError>(path, "give the path of a scene file (TOML)"), path, check);
-}
-
-std::string to_string(const IntegratorConfig& integrator) {
-  const std::string_view name = integrator_names[static_cast<std::size_t>(integrator.kind)];
-  switch (integrator.kind) {
-    case IntegratorKind::exact:
-      break;
-    case IntegratorKind::semi_implicit_euler:
-    case IntegratorKind::rk4:
-      return fmt::format("{}, {} substeps per 2 ms", name, integrator.substeps);
-    case IntegratorKind::adaptive:
-      return fmt::format("{}, tolerance {}", name, integrator.tolerance);
-  }
-  return std::string(name);
-}
-
-std::vector<std::string> integrated_parts(const SceneAxis& axis) {
-  std::vector<std::string> parts;
-  if (axis.motor) {
-    const bool brushed = std::holds_alternative<BrushedDcMotorConfig>(*axis.motor);
-    parts.emplace_back(brushed ? "DC motor" : "synchronous motor");
-    parts.emplace_back("inverter");
-    parts.emplace_back("supply");
-  }
-  parts.emplace_back("device");
-  if (axis.device.delay > 0.0) parts.push_back(fmt::format("delay of {} ms", axis.device.delay * 1e3));
-  if (axis.device.structure) parts.emplace_back("structure");
-  if (axis.person) parts.emplace_back("hand and arm");
-  if (axis.person && axis.person->activation_gain > 0.0) parts.emplace_back("activation");
-  if (axis.encoder.edge_noise > 0.0) parts.emplace_back("encoder noise");
-  if (axis.encoder.dropout_probability > 0.0) parts.emplace_back("encoder dropouts");
-  return parts;
+Scene load_scene(const std::string& path, const ParameterCheck& check,
+                 std::span<const SceneSetting> settings) {
+  return parse_scene(base::text_of<SceneError>(path, "give the path of a scene file (TOML)"), path, check,
+                     settings);
 }
 
 }  // namespace kmax::simulation

@@ -2,46 +2,11 @@
 // A scene: what a simulated run consists of, in a TOML file. It names its parts; a part that is not named is
 // not there and is not integrated (a scene without [operator] is a handle that nobody holds).
 //
-//   name = "touch"                  optional; the file name without ending
-//   description = "..."             optional
-//   duration = 5.0                  s, from the start of the motion
-//   seed = 1                        for parts with noise
-//   identified = true               whether a board starts with the values of the scene's motors, as after a
-//                                   calibration; false: with the factory's
+// docs/scenes.md lists every table and key, from scene_keys.hpp. A further axis has its tables as
+// [axis1.device] and so on, as many as the firmware has axes.
 //
-//   [device]                        required: device_model.hpp; also start_position (m), start_velocity (m/s)
-//   [structure]                     device_model.hpp: the handle behind a compliant structure
-//   [operator]                      operator_model.hpp; in [axis1.operator] also same_person = true: the hand
-//                                   is that of axis 0's person, so that grip and arm answer to the background
-//                                   forces of both axes, which stand at right angles. Without [motion] the
-//                                   person stays at the start
-//   [motion]                        intended_motion.hpp; needs [operator]
-//   [encoder]                       encoder_config.hpp; also kind = "quadrature" (default) or "as5047p", and
-//                                   reversed = true: it counts downwards; select_filtered = false: an
-//                                   AS5047P's select passes no filter (jumper J20). Without a motor: a count,
-//                                   without index, chip or mounting, but with noise and dropouts if asked for
-//   [motor]                         kind = "ideal" (as without the table: a force source with the device's
-//                                   force limit), "dc" (brushed_dc_motor.hpp) or "pmsm"
-//                                   (synchronous_motor.hpp; also inductance for inductance_d and
-//                                   inductance_q). Also defects = ["phase_b_open", ...] (defect.hpp) of a
-//                                   real motor, which are there from the beginning
-//   [inverter] [current_sensor]     inverter.hpp, current_sensor.hpp; need a motor that is not ideal
-//   [integrator]                    integrator_config.hpp, one for all axes: kind = "exact" (default),
-//                                   "semi_implicit_euler", "rk4" or "adaptive", with substeps or tolerance
-//                                   where the kind has them. Of the mechanical parts: circuits are always
-//                                   solved exactly
-//   [supply]                        supply.hpp, one for all axes; its divider_ratio says which variant of the
-//                                   board it is, 11 that for 24 V and 19 that for 56 V. part_ratings = false:
-//                                   its parts bear everything
-//   [spikes]                        spikes.hpp: interference on the lines of a virtual board. Also
-//   at_samples, index,
-//                                   emergency_stop, fault_line, encoder = true or false
-//   [parameters]                    firmware parameters, `wall.stiffness = 5500` or `"wall.stiffness" = 5500`
-//   [measurement]                   window (s, the end of the hold phase that is judged), threshold (m)
-//   [axis1.device] [axis1.structure] [axis1.operator] [axis1.motion] [axis1.encoder] [axis1.motor]
-//   [axis1.inverter] [axis1.current_sensor]   a second axis, and so on, as many as the firmware has
-//
-// SI units. Numbers that are not given keep the defaults of the model structs. The wall that a motion aims at
+// Numbers are in SI units, or texts with a unit that converts ("60 g"). Those that are not given keep the
+// defaults of the model structs. The wall that a motion aims at
 // is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
 // axis); a motion that names another one is refused.
 //
@@ -54,6 +19,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -135,10 +101,19 @@ struct Scene {
 using ParameterCheck =
     std::function<std::optional<std::string>(const std::string& name, const ParameterValue& value)>;
 
-Scene load_scene(const std::string& path, const ParameterCheck& check = {});
+// A value in place of what the file says, or added to it: what `--set NAME=VALUE` is.
+struct SceneSetting {
+  std::string name;   // "device.mass", "axis1.motion.hold_time", "seed", "parameters.wall.stiffness"
+  std::string value;  // as a person writes it: "60 g", "true"
+};
+
+// A setting of a part that the scene does not name is refused: it would be a scene of another kind.
+Scene load_scene(const std::string& path, const ParameterCheck& check = {},
+                 std::span<const SceneSetting> settings = {});
 
 // `source` stands for the file name in messages.
-Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check = {});
+Scene parse_scene(std::string_view text, std::string_view source, const ParameterCheck& check = {},
+                  std::span<const SceneSetting> settings = {});
 
 // "exact", or a reference integrator with what it goes by: "rk4, 40 substeps per 2 ms".
 std::string to_string(const IntegratorConfig& integrator);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "host_tools/base/errors.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/simulation/scene.hpp"
 
@@ -26,6 +28,7 @@ void SceneTables::fail(const toml::source_region& where, const std::string& what
 }
 
 std::string SceneTables::place(const toml::source_region& where) const {
+  if (where.begin.line == 0) return "--set";  // not from the file
   return fmt::format("{}:{}:{}", source_, where.begin.line, where.begin.column);
 }
 
@@ -72,6 +75,19 @@ std::optional<std::size_t> SceneTables::read_choice(const toml::table& table, st
                                      one_of(words), device::did_you_mean(given, names)));
   }
   return static_cast<std::size_t>(word - words.begin());
+}
+
+std::optional<double> SceneTables::number_of(const toml::node& node, std::string_view name,
+                                             std::string_view unit, std::string_view allowed) const {
+  // value_exact would refuse `mass = 1`, value<double> would accept `true`: a number is an integer or a
+  // float.
+  if (node.is_number()) return node.value<double>();
+  if (!node.is_string()) return std::nullopt;
+  try {
+    return device::written_number(node.as_string()->get(), unit, "a number", "a smaller one").value;
+  } catch (const device::ValueError& error) {
+    fail(node.source(), fmt::format("{} = {}; allowed is {}", name, error.what(), allowed));
+  }
 }
 
 void SceneTables::read_text(const toml::table& table, std::string_view name, std::string& value) const {

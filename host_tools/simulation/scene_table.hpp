@@ -56,6 +56,11 @@ class SceneTables {
   void read_truth(const toml::table& table, std::string_view prefix, std::string_view name,
                   bool& value) const;
 
+  // A number, or a text with one in `unit` or in a unit that converts to it; nothing if it is neither.
+  // Refuses a text that is no such number. `name` and `allowed`: for messages.
+  std::optional<double> number_of(const toml::node& node, std::string_view name, std::string_view unit,
+                                  std::string_view allowed) const;
+
   // Numbers that are there replace those of the model.
   template <typename Model, std::size_t count>
   void read_fields(const toml::table& table, std::string_view prefix,
@@ -63,9 +68,8 @@ class SceneTables {
     for (const ModelField<Model>& field : fields) {
       const toml::node* node = table.get(field.name);
       if (node == nullptr) continue;
-      // value_exact would refuse `mass = 1`, value<double> would accept `true`: a number is an integer or a
-      // float.
-      const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
+      const std::optional<double> value =
+          number_of(*node, fmt::format("{}{}", prefix, field.name), field.unit, allowed_range(field));
       if (!value || !is_allowed(field, *value)) {
         fail(node->source(), fmt::format("{}{} = {}: allowed is {}", prefix, field.name, text_of(*node),
                                          allowed_range(field)));

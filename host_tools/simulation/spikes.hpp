@@ -22,8 +22,8 @@ struct SpikesConfig {
 };
 
 inline constexpr std::array spikes_fields{
-    ModelField<SpikesConfig>{"width", &SpikesConfig::width, 10e-9, 1e-3, "s"},
-    ModelField<SpikesConfig>{"rate", &SpikesConfig::rate, 0.0, 20e3, "1/s"},
+    ModelField<SpikesConfig>{"width", &SpikesConfig::width, 10e-9, 1e-3, "s", "length of a pulse"},
+    ModelField<SpikesConfig>{"rate", &SpikesConfig::rate, 0.0, 20e3, "1/s", "pulses per second on each line"},
 };
 
 }  // namespace kmax::simulation

@@ -34,11 +34,16 @@ struct SupplyConfig {
 };
 
 inline constexpr std::array supply_fields{
-    ModelField<SupplyConfig>{"voltage", &SupplyConfig::voltage, 0.0, 1000.0, "V"},
-    ModelField<SupplyConfig>{"resistance", &SupplyConfig::resistance, 1e-4, 1000.0, "ohm"},
-    ModelField<SupplyConfig>{"capacitance", &SupplyConfig::capacitance, 1e-6, 10.0, "F"},
-    ModelField<SupplyConfig>{"brake_resistance", &SupplyConfig::brake_resistance, 0.01, 1000.0, "ohm"},
-    ModelField<SupplyConfig>{"divider_ratio", &SupplyConfig::divider_ratio, 1.0, 1000.0, ""},
+    ModelField<SupplyConfig>{"voltage", &SupplyConfig::voltage, 0.0, 1000.0, "V", "E, voltage of the source"},
+    ModelField<SupplyConfig>{"resistance", &SupplyConfig::resistance, 1e-4, 1000.0, "ohm",
+                             "R, of source and cable"},
+    ModelField<SupplyConfig>{"capacitance", &SupplyConfig::capacitance, 1e-6, 10.0, "F",
+                             "C, of the bus capacitor"},
+    ModelField<SupplyConfig>{"brake_resistance", &SupplyConfig::brake_resistance, 0.01, 1000.0, "ohm",
+                             "brake resistor"},
+    ModelField<SupplyConfig>{
+        "divider_ratio", &SupplyConfig::divider_ratio, 1.0, 1000.0, "",
+        "bus voltage per voltage at the converter pin; 11: the 24 V board, 19: the 56 V board"},
 };
 
 class Supply {

@@ -48,20 +48,22 @@ struct SynchronousMotorConfig {
 };
 
 inline constexpr std::array synchronous_motor_fields{
-    ModelField<SynchronousMotorConfig>{"resistance", &SynchronousMotorConfig::resistance, 1e-4, 1000.0,
-                                       "ohm"},
-    ModelField<SynchronousMotorConfig>{"inductance_d", &SynchronousMotorConfig::inductance_d, 1e-7, 1.0, "H"},
-    ModelField<SynchronousMotorConfig>{"inductance_q", &SynchronousMotorConfig::inductance_q, 1e-7, 1.0, "H"},
+    ModelField<SynchronousMotorConfig>{"resistance", &SynchronousMotorConfig::resistance, 1e-4, 1000.0, "ohm",
+                                       "resistance of a phase"},
+    ModelField<SynchronousMotorConfig>{"inductance_d", &SynchronousMotorConfig::inductance_d, 1e-7, 1.0, "H",
+                                       "inductance along the magnets"},
+    ModelField<SynchronousMotorConfig>{"inductance_q", &SynchronousMotorConfig::inductance_q, 1e-7, 1.0, "H",
+                                       "inductance across the magnets"},
     ModelField<SynchronousMotorConfig>{"torque_constant", &SynchronousMotorConfig::torque_constant, 1e-5,
-                                       100.0, "N m/A"},
-    ModelField<SynchronousMotorConfig>{"pole_pairs", &SynchronousMotorConfig::pole_pairs, 1.0, 64.0,
-                                       "(whole)"},
+                                       100.0, "N m/A", "torque constant, per ampere of q current"},
+    ModelField<SynchronousMotorConfig>{"pole_pairs", &SynchronousMotorConfig::pole_pairs, 1.0, 64.0, "",
+                                       "pole pairs", "whole"},
     ModelField<SynchronousMotorConfig>{"electrical_offset", &SynchronousMotorConfig::electrical_offset, -7.0,
-                                       7.0, "rad"},
+                                       7.0, "rad", "electrical angle at the handle position 0"},
     ModelField<SynchronousMotorConfig>{"cogging_torque", &SynchronousMotorConfig::cogging_torque, 0.0, 100.0,
-                                       "N m"},
+                                       "N m", "amplitude of the cogging"},
     ModelField<SynchronousMotorConfig>{"cogging_periods", &SynchronousMotorConfig::cogging_periods, 1.0,
-                                       10000.0, "(whole)"},
+                                       10000.0, "", "periods of the cogging in a turn", "whole"},
 };
 
 // Throws std::invalid_argument: a value outside its range, a number of pole pairs or cogging periods that is

@@ -86,8 +86,7 @@ double read_number(std::string_view field, std::string_view column, const std::s
 
 }  // namespace
 
-std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem::path& input,
-                           const std::filesystem::path& output) {
+EvaluatedTable evaluated_table(const WallEvaluator& evaluator, const std::filesystem::path& input) {
   const std::string text = base::text_of<TableError>(
       input, "give the path of a table with the columns position_m,velocity_m_per_s");
   const std::string file = input.string();
@@ -124,18 +123,23 @@ std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem
     ++rows;
   }
   if (columns.count == 0) throw TableError(fmt::format("{}: the file is empty", file));
+  return {fmt::to_string(out), rows};
+}
 
+std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem::path& input,
+                           const std::filesystem::path& output) {
+  const EvaluatedTable table = evaluated_table(evaluator, input);
   std::error_code error;
   // The finished table takes the place of what has its name: that must not be /dev/stdout, or a folder.
   if (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error))
     throw TableError(
         fmt::format("{}: is not a regular file; give the name of a file to write", output.string()));
   try {
-    base::write_file(output, std::string_view(out.data(), out.size()));
+    base::write_file(output, table.text);
   } catch (const std::runtime_error& failure) {
     throw TableError(failure.what());
   }
-  return rows;
+  return table.rows;
 }
 
 }  // namespace kmax::wall

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "control/wall_law.hpp"
@@ -58,5 +59,12 @@ class TableError : public std::runtime_error {
 /// The output appears whole or not at all. Returns the number of rows. About 0.3 us a row. Throws TableError.
 std::size_t evaluate_table(const WallEvaluator& evaluator, const std::filesystem::path& input,
                            const std::filesystem::path& output);
+
+/// The same as a text.
+struct EvaluatedTable {
+  std::string text;
+  std::size_t rows = 0;
+};
+EvaluatedTable evaluated_table(const WallEvaluator& evaluator, const std::filesystem::path& input);
 
 }  // namespace kmax::wall

@@ -61,7 +61,7 @@ The compensations know what the motor really is. Friction, cogging and gravity t
 friction, so that they can never drive a handle that nobody holds (control/force_compensation.hpp); the last rows show
 what that bound costs. Gravity and cogging come first, friction gets what they leave over.
 
-![Felt force over the way](pictures/torque_ripple.svg)
+![Felt force over displacement](pictures/torque_ripple.svg)
 
 )",
               1e9 * torque_ripple::Rig::dead_time, torque_ripple::asked_force, 1e3 * torque_ripple::speed,
@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
     print_conclusions();
     if (!picture.empty()) {
       plot::write_figure({"Force felt while the handle is moved at 5 mm/s, 0.5 N asked for",
-                          "way (mm)",
+                          "displacement (mm)",
                           {panel("gimbal_b", "gimbal motor b", 0.8), panel("drone", "drone motor", 0.8)}},
                          picture);
     }

@@ -41,7 +41,7 @@ class Contract(unittest.TestCase):
         self.assertIs(point["inside"], True)
 
     def test_contact_experiment_on_the_simulated_device(self):
-        done = kmax("experiment", "contact", "--json", check=False, timeout=10 * PATIENCE)
+        done = kmax("experiment", "contact", "--expect-paper", "--json", check=False, timeout=10 * PATIENCE)
         result = json.loads(done.stdout)
         all_agree = all(c["agrees"] for c in result["conditions"])
         self.assertEqual(done.returncode, 0 if all_agree else 3)

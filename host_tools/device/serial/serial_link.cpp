@@ -125,10 +125,11 @@ void SerialLink::fail_unanswered(std::span<const std::uint8_t> request, const Un
         "{}: no answer from unit {} at {} baud within {} ms ({}, {}); check that the device is powered, the "
         "wiring, and that unit and baud rate are the device's",
         address_.path, address_.unit, address_.baud_rate, patience_.count(), asked, tried));
-  throw LinkError(fmt::format(
-      "{}: what came back from unit {} at {} baud is not an answer ({}, {}); check the baud rate, the wiring "
-      "and its shielding, and that no other device has the same unit",
-      address_.path, address_.unit, address_.baud_rate, asked, tried));
+  throw LinkError(
+      fmt::format("{}: what came back from unit {} at {} baud is no Modbus response ({}, {}); check the baud "
+                  "rate, the wiring "
+                  "and its shielding, and that no other device has the same unit",
+                  address_.path, address_.unit, address_.baud_rate, asked, tried));
 }
 
 }  // namespace kmax::link

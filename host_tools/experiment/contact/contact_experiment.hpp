@@ -69,8 +69,8 @@ ContactResult run_contact(Rig& rig, const ContactCondition& condition, const Con
 
 // What is said of the results.
 
-/// The results beside the paper's words, as a table for the terminal.
-std::string contact_table(const std::vector<ContactResult>& results);
+/// The results beside the paper's words.
+report::Table contact_table(const std::vector<ContactResult>& results);
 
 /// A picture (position, force and F_MC over time) and a CSV file with the same base name for one condition.
 /// Returns the names written. Throws plot::FigureError or std::runtime_error.

@@ -23,16 +23,18 @@ std::string_view to_string(simulation::ContactVerdict verdict) {
   return "";
 }
 
-std::string contact_table(const std::vector<ContactResult>& results) {
-  std::string table =
-      fmt::format("{:<22}{:>14}  {:<11}{:<13}{:>8}  {:<9}{:<33}{}\n", "condition", "peak to peak", "verdict",
-                  "unstable in", "limited", "figure", "paper 1 says", "agrees");
+report::Table contact_table(const std::vector<ContactResult>& results) {
+  report::Table table{
+      "",
+      {"condition", "peak to peak", "verdict", "unstable in", "limited", "figure", "paper 1 says", "agrees"},
+      {}};
   for (const ContactResult& result : results) {
-    table += fmt::format("{:<22}{:>11.3f} mm  {:<11}{:<13}{:>6.1f} %  {:<9}{:<33}{}\n", result.condition.name,
-                         result.measure.peak_to_peak * 1e3, to_string(result.measure.verdict),
-                         fmt::format("{} of {}", result.unstable_trials, result.trials),
-                         result.limited_share * 100, "Fig. " + result.condition.figure,
-                         result.condition.paper_words, result.agrees_with_paper() ? "yes" : "no");
+    table.rows.push_back({result.condition.name, fmt::format("{:.3f} mm", result.measure.peak_to_peak * 1e3),
+                          std::string(to_string(result.measure.verdict)),
+                          fmt::format("{} of {}", result.unstable_trials, result.trials),
+                          fmt::format("{:.1f} %", result.limited_share * 100),
+                          "Fig. " + result.condition.figure, result.condition.paper_words,
+                          result.agrees_with_paper() ? "yes" : "no"});
   }
   return table;
 }
@@ -90,13 +92,12 @@ std::vector<std::filesystem::path> write_contact(const ContactResult& result,
 
 std::vector<std::string> contact_words(const ContactSettings& settings, std::size_t trials,
                                        const std::string& velocity_estimator) {
-  return {
-      fmt::format("Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.",
-                  settings.stiffness / 1000, settings.haptic_rate, settings.hold_time),
-      fmt::format(
-          "Unstable: more than {:g} mm peak to peak in every quarter of it; the worst of {} trials counts.",
-          settings.threshold * 1000, trials),
-      fmt::format("Velocity estimator: {}.", velocity_estimator)};
+  return {fmt::format("Contact with a wall of {:g} N/mm at {:g} Hz, held for {:g} s, the last second judged.",
+                      settings.stiffness / 1000, settings.haptic_rate, settings.hold_time),
+          fmt::format("Unstable: more than {:g} mm peak to peak in every quarter of it{}.",
+                      settings.threshold * 1000,
+                      trials == 1 ? "" : fmt::format("; the worst of {} trials counts", trials)),
+          fmt::format("Velocity estimator: {}.", velocity_estimator)};
 }
 
 std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactResult>& results,

@@ -23,7 +23,7 @@ using simulation::SceneError;
 constexpr std::array fitted_fields{
     simulation::ModelField<Fitted>{"plain", &Fitted::plain_target, 1.0, 1e7, "N/m"},
     simulation::ModelField<Fitted>{"magnetic", &Fitted::magnetic_target, 1.0, 1e7, "N/m"},
-    simulation::ModelField<Fitted>{"force_limit", &Fitted::force_limit, 0.0, 1e5, "N (0 = no limit)"},
+    simulation::ModelField<Fitted>{"force_limit", &Fitted::force_limit, 0.0, 1e5, "N", "", "0: no limit"},
 };
 
 class SubjectSetReader : private simulation::SceneTables {

@@ -9,6 +9,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/kmax/board/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 
@@ -83,7 +84,7 @@ struct LinesOptions {
   void declare_duration(CLI::App& command) {
     command.add_option("--for", duration, "Ends after so many seconds instead of at Ctrl-C")
         ->type_name("S")
-        ->check(within(0.001, 1e6));
+        ->transform(quantity("s", 0.001, 1e6));
   }
 };
 

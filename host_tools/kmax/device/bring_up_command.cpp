@@ -12,6 +12,7 @@
 #include "host_tools/base/terminal_text.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/kmax/terminal.hpp"
 
 namespace kmax::cli {
@@ -37,12 +38,14 @@ struct BringUpOptions {
         ->check(CLI::IsMember(names));
     command.add_option("--report", report, "Report file (default: bring_up_SERIAL.json)")->type_name("FILE");
     supply_given = command.add_option("--supply", supply, "What the supply's own meter shows, V")
-                       ->check(within(5.0, 60.0));
+                       ->transform(quantity("V", 5.0, 60.0));
     brake_given =
         command.add_option("--brake", brake, "Measured between the terminals of AUX, ohm; 0: nothing there")
-            ->check(within(0.0, 1000.0));
-    add_number(command, "--stiffness", settings.stiffness, "The last wall's at most, N/m", 100.0, 100000.0);
-    add_number(command, "--patience", settings.patience, "How long a hand is waited for, s", 1.0, 600.0);
+            ->transform(quantity("ohm", 0.0, 1000.0));
+    add_quantity(command, "--stiffness", settings.stiffness, "N/m", "The last wall's at most, N/m", 100.0,
+                 100000.0);
+    add_quantity(command, "--patience", settings.patience, "s", "How long a hand is waited for, s", 1.0,
+                 600.0);
     command.add_flag("--no-button", no_button, "The emergency stop is a wire, and nobody can press it");
     command.add_flag("--yes", yes, "Everything is connected as it must be: ask nothing");
     command.add_flag("--list", list, "Show the stages and do nothing");

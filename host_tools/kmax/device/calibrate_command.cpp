@@ -8,6 +8,7 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/calibration/procedure.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/kmax/terminal.hpp"
 
 namespace kmax::cli {
@@ -31,12 +32,12 @@ struct CalibrateOptions {
         ->delimiter(',')
         ->check(CLI::IsMember({"electrical", "encoder", "mechanical", "compensation", "all"}))
         ->capture_default_str();
-    add_number(command, "--travel", settings.travel, "How far the handle may move to either side, m", 0.001,
-               1.0);
+    add_quantity(command, "--travel", settings.travel, "m", "How far the handle may move to either side, m",
+                 0.001, 1.0);
     command
         .add_option("--current", current,
                     "Motor current to measure with, A; half of current.limit without it")
-        ->check(within(0.01, 120.0));
+        ->transform(quantity("A", 0.01, 120.0));
     command.add_flag("--keep-pole-pairs", settings.keep_pole_pairs,
                      "Fail if motor.pole_pairs is not what is measured, rather than correct it");
     command.add_flag("--hand", hand, "Ask for a move of the handle by hand, which shows where positive is");

@@ -10,6 +10,7 @@
 #include "host_tools/base/terminal_text.hpp"
 #include "host_tools/bench/prompter.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/selftest/selftest.hpp"
 
 namespace kmax::cli {
@@ -22,7 +23,7 @@ struct SelfTestOptions {
 
   void declare(CLI::App& command) {
     command.add_flag("--hand", hand, "Also asks you to move the handle and to press the emergency stop");
-    add_number(command, "--patience", patience, "How long --hand waits for each, s", 1.0, 600.0);
+    add_quantity(command, "--patience", patience, "s", "How long --hand waits for each, s", 1.0, 600.0);
     add_number(command, "--exchanges", exchanges, "Messages exchanged to test the link", 1, 10000);
   }
 };

@@ -5,6 +5,7 @@
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -17,22 +18,23 @@ struct DeviationOptions : StudyOptions {
   experiment::DeviationSettings settings;
 
   void declare(CLI::App& command, Context& context) {
-    add_number(command, "--stiffness", settings.protocol.stiffness,
-               "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
-    add_number(command, "--rate", settings.protocol.haptic_rate, "Rate of the haptic loop, Hz", 100.0,
-               20000.0);
-    add_number(command, "--pulse", settings.protocol.pulse_on, "Length of a pulse, s; the paper gives none",
-               0.1, 10.0);
-    add_number(command, "--pause", settings.protocol.pulse_off, "Time between pulses, s", 0.1, 10.0);
+    add_quantity(command, "--stiffness", settings.protocol.stiffness, "N/m",
+                 "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
+    add_quantity(command, "--rate", settings.protocol.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
+                 20000.0);
+    add_quantity(command, "--pulse", settings.protocol.pulse_on, "s",
+                 "Length of a pulse, s; the paper gives none", 0.1, 10.0);
+    add_quantity(command, "--pause", settings.protocol.pulse_off, "s", "Time between pulses, s", 0.1, 10.0);
     add_number(command, "--pulses", settings.protocol.pulses, "Pulses without F_B, and as many with it", 1,
                100);
-    add_number(command, "--rest", settings.protocol.rest,
-               "Time for the arm to adjust, after the touch and with F_B, s", 0.1, 60.0);
+    add_quantity(command, "--rest", settings.protocol.rest, "s",
+                 "Time for the arm to adjust, after the touch and with F_B, s", 0.1, 60.0);
     add_file_options(command, files);
 
     declare_for_people(command);
     add_people_options(*simulated, people);
-    add_number(*simulated, "--push", hands.push, "Push against the wall, N; above every F_B", 0.01, 100.0);
+    add_quantity(*simulated, "--push", hands.push, "N", "Push against the wall, N; above every F_B", 0.01,
+                 100.0);
     add_clip_option(*simulated, people.clip);
     declare_for_device(command, context);
   }
@@ -138,7 +140,7 @@ paper finds that the deviation falls when F_B increases. A device needs two axes
 other one lies along the surface. You are told before each touch what to do; both axes' force limits are
 lowered, each touch is disarmed at its end and when the handle swings too far, and all parameters are put
 back, on Ctrl-C too.
-Exit code 3: the deviation did not fall, or too little was touched to tell.)"},
+With --expect-paper the exit code is 3 if the deviation did not fall, or too little was touched to tell.)"},
       Takes::device, run_deviation);
 }
 

@@ -8,6 +8,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 
@@ -60,7 +61,8 @@ void add_people_options(CLI::App& command, PeopleOptions& options) {
 }
 
 void add_clip_option(CLI::App& command, double& clip) {
-  add_number(command, "--clip", clip, "Largest force of the simulated device, N; 0: no limit", 0.0, 1000.0);
+  add_quantity(command, "--clip", clip, "N", "Largest force of the simulated device, N; 0: no limit", 0.0,
+               1000.0);
 }
 
 std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
@@ -72,18 +74,26 @@ std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
   return people;
 }
 
+void add_expect_paper_option(CLI::App& command, bool& expect) {
+  command.add_flag("--expect-paper", expect, "Exit code 3 where the result differs from the paper's");
+}
+
+int paper_exit_code(bool expect, bool as_paper) {
+  return expect && !as_paper ? verdict_is_no : done;
+}
+
 void add_safety_options(CLI::App& command, experiment::TouchLimits& limits) {
-  add_number(command, "--force-limit", limits.force_limit,
-             "Largest force on a device, N: lowers force.limit, never raises it", 0.01, 1000.0);
-  add_number(
-      command, "--abort-amplitude", limits.abort_amplitude,
+  add_quantity(command, "--force-limit", limits.force_limit, "N",
+               "Largest force on a device, N: lowers force.limit, never raises it", 0.01, 1000.0);
+  add_quantity(
+      command, "--abort-amplitude", limits.abort_amplitude, "m",
       "Oscillation within 0.25 s, m, at which a device is disarmed at once; the touch is unstable then", 1e-5,
       1.0);
 }
 
 void add_touch_options(CLI::App& command, bool& no_prompt, double& patience) {
   command.add_flag("--no-prompt", no_prompt, "Ask nobody: a simulated person needs no asking");
-  add_number(command, "--patience", patience, "Time to come to the wall, s", 1.0, 600.0);
+  add_quantity(command, "--patience", patience, "s", "How long to wait for the touch, s", 1.0, 600.0);
 }
 
 }  // namespace kmax::cli

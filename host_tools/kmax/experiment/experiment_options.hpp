@@ -55,6 +55,11 @@ void add_clip_option(CLI::App& command, double& clip);
 std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
                                                  simulation::DeviceModel& device);
 
+/// --expect-paper: a result that differs from the paper's gives exit code 3.
+void add_expect_paper_option(CLI::App& command, bool& expect);
+/// done, or verdict_is_no where the paper's result is expected and is not there.
+int paper_exit_code(bool expect, bool as_paper);
+
 /// --force-limit and --abort-amplitude, which every experiment on a device takes.
 void add_safety_options(CLI::App& command, experiment::TouchLimits& limits);
 /// --no-prompt and --patience (s), for somebody who is told before each touch what to do.

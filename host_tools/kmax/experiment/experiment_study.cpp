@@ -27,6 +27,7 @@ void add_experiment_command(CLI::App& app, Context& context) {
 }
 
 void StudyOptions::declare_for_people(CLI::App& command) {
+  add_expect_paper_option(command, expect_paper);
   simulated = command.add_option_group("Simulated", "Without --device");
 }
 
@@ -70,16 +71,19 @@ std::string force_pairs_words(std::size_t done, std::size_t all) {
   return fmt::format("{} of {} pairs of forces", done, all);
 }
 
-int print_study(Context& context, StudyReport study, const std::vector<std::filesystem::path>& files) {
+int print_study(Context& context, StudyReport study, const std::vector<std::filesystem::path>& files,
+                bool expect_paper) {
   if (context.json) {
     study.document["files"] = names_json(files);
     context.print(study.document);
   } else {
-    for (const std::string& words : study.paragraphs) print(context.out, "{}\n\n", words);
-    for (const report::Table& table : study.tables) print(context.out, "{}\n", report::terminal_text(table));
+    for (const std::string& words : study.paragraphs)
+      print(context.out, "{}\n\n", report::wrapped(words, context.width));
+    for (const report::Table& table : study.tables)
+      print(context.out, "{}\n", report::terminal_text(table, context.width));
     print_names(context.out, files);
   }
-  return study.claim_met ? done : verdict_is_no;
+  return paper_exit_code(expect_paper, study.claim_met);
 }
 
 }  // namespace kmax::cli

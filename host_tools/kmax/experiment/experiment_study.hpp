@@ -27,7 +27,7 @@ namespace kmax::cli {
 /// Options of every such command. Each derives its own, with the experiment's settings.
 struct StudyOptions {
   ExperimentFiles files;
-  bool no_prompt = false, resume = false;
+  bool no_prompt = false, resume = false, expect_paper = false;
   experiment::SimulatedHands hands;
   PeopleOptions people;
   experiment::TouchLimits limits;
@@ -81,7 +81,8 @@ struct StudyCommand {
 };
 
 /// With --json the document, else the rest; then the files. Returns the exit code.
-int print_study(Context& context, StudyReport study, const std::vector<std::filesystem::path>& files);
+int print_study(Context& context, StudyReport study, const std::vector<std::filesystem::path>& files,
+                bool expect_paper);
 
 /// The whole command: the study, its files if there is a folder for them, what is said of it. Returns the
 /// exit code.
@@ -98,7 +99,7 @@ int run_study(Context& context, const Options& options, const StudyCommand<Study
       (context.simulated() ? command.simulate : command.measure)(context, options, interruption);
   std::vector<std::filesystem::path> files;
   if (!options.files.folder.empty()) files = command.write(study, options.files.folder, options.files.ending);
-  return print_study(context, command.report(study), files);
+  return print_study(context, command.report(study), files, options.expect_paper);
 }
 
 /// What a run that keeps no journal says on Ctrl-C.

@@ -5,6 +5,7 @@
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -17,19 +18,21 @@ struct JitterOptions : StudyOptions {
   experiment::JitterSettings settings;
 
   void declare(CLI::App& command, Context& context) {
-    add_number(command, "--stiffness", settings.wall.stiffness,
-               "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
-    add_number(command, "--rate", settings.wall.haptic_rate, "Rate of the haptic loop, Hz", 100.0, 20000.0);
-    add_number(command, "--window", settings.wall.window, "Time after the touch that is judged, s", 0.5,
-               60.0);
+    add_quantity(command, "--stiffness", settings.wall.stiffness, "N/m",
+                 "Stiffness of the wall, N/m; the paper gives none", 1.0, 1e6);
+    add_quantity(command, "--rate", settings.wall.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
+                 20000.0);
+    add_quantity(command, "--window", settings.wall.window, "s", "Time after the touch that is judged, s",
+                 0.5, 60.0);
     add_number(command, "--touches", settings.touches, "Touches per person and pair of forces", 1, 1000);
     add_file_options(command, files);
 
     declare_for_people(command);
     add_people_options(*simulated, people);
-    add_number(*simulated, "--push", hands.push, "Push without the forces that the person answers to, N",
-               0.01, 100.0);
-    add_number(*simulated, "--speed", hands.approach_speed, "Speed of the approach, m/s", 0.001, 5.0);
+    add_quantity(*simulated, "--push", hands.push, "N",
+                 "Push without the forces that the person answers to, N", 0.01, 100.0);
+    add_quantity(*simulated, "--speed", hands.approach_speed, "m/s", "Speed of the approach, m/s", 0.001,
+                 5.0);
     add_number(*simulated, "--reaction", hands.reaction, "Share of F_I that the person answers to, 0 to 1",
                0.0, 1.0);
     add_clip_option(*simulated, people.clip);
@@ -109,8 +112,8 @@ void add_jitter_experiment(CLI::App& experiment, Context& context) {
   add_command<JitterOptions>(
       experiment, context,
       {"jitter",
-       "Throws a hand out of the wall and measures how far, and how long it takes to return (paper 1, Table "
-       "I).",
+       "Pushes the hand out of the wall by a force pulse; measures how far it goes and how soon it returns "
+       "(paper 1, Table I).",
        R"(  kmax experiment jitter                                        simulated people, takes seconds
   kmax experiment jitter --subjects unclipped --out results     with pictures and a page
   kmax experiment jitter --activation-gain 0                    a hand that cannot stiffen
@@ -120,7 +123,8 @@ Inside the wall an interference force F_I is added, everywhere a background forc
 4 N). The paper finds that jitter and adjustment time fall when F_B increases. On a device you are told
 before each touch what to do; the force limit is lowered, each touch is disarmed at its end and when the
 handle swings too far, and all parameters are put back, on Ctrl-C too.
-Exit code 3: jitter or adjustment time did not fall, or too little was touched to tell.)"},
+With --expect-paper the exit code is 3 if jitter or adjustment time did not fall, or too little was
+touched to tell.)"},
       Takes::device, run_jitter);
 }
 

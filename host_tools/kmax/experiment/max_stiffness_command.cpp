@@ -7,6 +7,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
 #include "host_tools/kmax/experiment/max_stiffness_options.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 
@@ -61,6 +62,7 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
       ->type_name("DIR");
   add_resume_option(command, resume);
   add_format_option(command, files.ending);
+  add_expect_paper_option(command, expect_paper);
 
   simulated = command.add_option_group("Simulated people", "Without --device");
   simulated
@@ -82,20 +84,21 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
 
   on_device = command.add_option_group("Device", "With --device");
   add_axis_option(*on_device, context, "Axis that the wall is on");
-  add_number(*on_device, "--start", device.start, "First stiffness, N/m", 1.0, 1e6);
-  add_number(*on_device, "--start-adaptive", device.start_adaptive, "First stiffness of adaptive walls, N/m",
-             1.0, 1e6);
-  add_number(*on_device, "--step", device.step, "Step, N/m", 1.0, 1e6);
-  add_number(*on_device, "--last", device.last, "The search ends there, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--start", device.start, "N/m", "First stiffness, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--start-adaptive", device.start_adaptive, "N/m",
+               "First stiffness of adaptive walls, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--step", device.step, "N/m", "Step, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--last", device.last, "N/m", "The search ends there, N/m", 1.0, 1e6);
   add_number(*on_device, "--trials", device.trials, "Touches at each stiffness; one unstable touch decides",
              1, 1000);
-  on_device->add_option("--rate", device.touch.haptic_rate, "Rate of the haptic loop, Hz")
-      ->capture_default_str();
-  add_number(*on_device, "--hold", device.touch.hold_time,
-             "Time from the first touch to the end of judging, s", 1.0, 60.0);
-  add_number(*on_device, "--threshold", device.touch.threshold,
-             "Peak to peak above which a wall is unstable, m", 1e-9, 1.0);
-  add_number(*on_device, "--patience", limits.patience, "Time from arming to the first touch, s", 1.0, 600.0);
+  add_quantity(*on_device, "--rate", device.touch.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
+               20000.0);
+  add_quantity(*on_device, "--hold", device.touch.hold_time, "s",
+               "Time from the first touch to the end of judging, s", 1.0, 60.0);
+  add_quantity(*on_device, "--threshold", device.touch.threshold, "m",
+               "Peak to peak above which a wall is unstable, m", 1e-9, 1.0);
+  add_quantity(*on_device, "--patience", limits.patience, "s", "Time from arming to the first touch, s", 1.0,
+               600.0);
   on_device->add_flag("--no-prompt", no_prompt,
                       "Ask nobody: for a device with a simulated person ('kmax serve')");
   add_safety_options(*on_device, limits);
@@ -130,8 +133,8 @@ Simulated people touch each stiffness at several speeds with several pushes. On 
 before each touch take the handle out of the wall and press Enter, then press against the wall until the time is
 over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on Ctrl-C; its
 parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from there.
-Exit code 3: simulated, a calibrated number is missed or F_MC does not raise the stiffness; on a device,
-2 N or an adaptive wall does not allow more than the plain wall.)"},
+With --expect-paper the exit code is 3 if, simulated, a calibrated number is missed or F_MC does not raise the
+stiffness; on a device, if 2 N or an adaptive wall does not allow more than the plain wall.)"},
       Takes::device, run_max_stiffness);
 }
 

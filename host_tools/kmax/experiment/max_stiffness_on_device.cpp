@@ -30,7 +30,8 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
     return;
   }
   for (const std::string& line : words) print(context.out, "{}\n", line);
-  print(context.out, "\n{}", report::terminal_text(experiment::device_stiffness_table(results)));
+  print(context.out, "\n{}",
+        report::terminal_text(experiment::device_stiffness_table(results), context.width));
   print_names(context.out, files);
 }
 }  // namespace
@@ -68,7 +69,7 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
                                                options.files.folder, options.files.ending);
   print_results(context, results, experiment::device_stiffness_words(settings, limits, device.description()),
                 files);
-  return experiment::order_is_the_papers(results) ? done : verdict_is_no;
+  return paper_exit_code(options.expect_paper, experiment::order_is_the_papers(results));
 }
 
 }  // namespace kmax::cli

@@ -142,9 +142,11 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
   return {{"conditions", conditions}};
 }
 
-void print_section(std::ostream& out, const report::Section& section) {
-  for (const std::string& paragraph : section.paragraphs) print(out, "{}\n", paragraph);
-  for (const report::Table& table : section.tables) print(out, "\n{}", report::terminal_text(table));
+void print_section(const Context& context, const report::Section& section) {
+  for (const std::string& paragraph : section.paragraphs)
+    print(context.out, "{}\n", report::wrapped(paragraph, context.width));
+  for (const report::Table& table : section.tables)
+    print(context.out, "\n{}", report::terminal_text(table, context.width));
 }
 }  // namespace
 
@@ -186,10 +188,11 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
     context.print(document(studies));
     for (const auto& file : files) context.note(file.string());
   } else {
-    for (const report::Section& section : page.sections) print_section(context.out, section);
+    for (const report::Section& section : page.sections) print_section(context, section);
     print_names(context.out, files);
   }
-  return std::all_of(studies.begin(), studies.end(), experiment::as_calibrated) ? done : verdict_is_no;
+  return paper_exit_code(options.expect_paper,
+                         std::all_of(studies.begin(), studies.end(), experiment::as_calibrated));
 }
 
 }  // namespace kmax::cli

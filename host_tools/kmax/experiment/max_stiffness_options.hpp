@@ -16,7 +16,7 @@ namespace kmax::cli {
 struct MaxStiffnessOptions {
   std::vector<std::string> conditions;  ///< keys of conditions_for(); empty: all
   ExperimentFiles files;
-  bool resume = false;
+  bool resume = false, expect_paper = false;
 
   // On simulated people.
   std::string subjects;  ///< file or name of a set

@@ -5,6 +5,7 @@
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 namespace {
@@ -18,18 +19,19 @@ struct ResolutionOptions : StudyOptions {
   std::string rounding = "nearest";
 
   void declare(CLI::App& command, Context& context) {
-    add_number(command, "--stiffness", wall.stiffness, "Stiffness of the wall, N/m", 1.0, 1e6);
-    add_number(command, "--rate", wall.haptic_rate, "Rate of the haptic loop, Hz; the paper gives none",
-               100.0, 20000.0);
-    add_number(command, "--hold", wall.hold, "Time from the touch to the end of judging, s", 1.0, 60.0);
-    add_number(command, "--threshold", wall.threshold, "Peak to peak above which a wall vibrates, m", 1e-9,
-               1.0);
+    add_quantity(command, "--stiffness", wall.stiffness, "N/m", "Stiffness of the wall, N/m", 1.0, 1e6);
+    add_quantity(command, "--rate", wall.haptic_rate, "Hz",
+                 "Rate of the haptic loop, Hz; the paper gives none", 100.0, 20000.0);
+    add_quantity(command, "--hold", wall.hold, "s", "Time from the touch to the end of judging, s", 1.0,
+                 60.0);
+    add_quantity(command, "--threshold", wall.threshold, "m", "Peak to peak above which a wall vibrates, m",
+                 1e-9, 1.0);
     command.add_option("--rounding", rounding, "How positions are re-sampled")
         ->check(CLI::IsMember({"nearest", "floor", "hysteresis"}))
         ->capture_default_str();
     command.add_option("--speeds", speeds, "Speeds of the touch, m/s; else some from 0.02 to 0.5")
         ->delimiter(',')
-        ->check(within(0.001, 5.0));
+        ->transform(quantity("m/s", 0.001, 5.0));
     command.add_option("--touches", touches, "Touches per speed (and push); else 4, on a device 1")
         ->check(CLI::Range(1, 1000));
     add_file_options(command, files);
@@ -37,15 +39,15 @@ struct ResolutionOptions : StudyOptions {
     declare_for_people(command);
     add_subjects_option(*simulated, people.subjects);
     add_number(*simulated, "--grip", weak.grip, "Factor of the grip's stiffness and damping", 0.01, 10.0);
-    add_number(*simulated, "--delay", weak.delay, "From a command to its force, s", 0.0, 0.1);
-    add_number(*simulated, "--friction", hands.device.friction, "Coulomb friction of the handle, N", 0.0,
-               10.0);
+    add_quantity(*simulated, "--delay", weak.delay, "s", "From a command to its force, s", 0.0, 0.1);
+    add_quantity(*simulated, "--friction", hands.device.friction, "N", "Coulomb friction of the handle, N",
+                 0.0, 10.0);
     simulated->add_option("--pushes", pushes, "Static pushes, N; a wall vibrates when it does with any")
         ->delimiter(',')
-        ->check(within(0.01, 100.0))
+        ->transform(quantity("N", 0.01, 100.0))
         ->capture_default_str();
-    add_number(*simulated, "--clip", hands.device.force_limit, "Largest force of the device, N; 0: no limit",
-               0.0, 1000.0);
+    add_quantity(*simulated, "--clip", hands.device.force_limit, "N",
+                 "Largest force of the device, N; 0: no limit", 0.0, 1000.0);
     declare_for_device(command, context);
   }
 };
@@ -156,7 +158,7 @@ The paper finds that a wall of 1.2 N/mm vibrates at steps of 0.4 mm, and at 0.1 
 faster than 0.1 m/s. On a device you are told before each touch what to do; the force limit is lowered, each
 touch is disarmed at its end and when the handle swings too far, and all parameters are put back, on Ctrl-C
 too.
-Exit code 3: one of the two did not come out, or was not tested.)"},
+With --expect-paper the exit code is 3 if one of the two did not come out, or was not tested.)"},
       Takes::device, run_resolution);
 }
 

@@ -17,6 +17,7 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/json/capture_json.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 
 namespace kmax::cli {
 
@@ -60,9 +61,7 @@ struct CaptureOptions {
         ->capture_default_str();
     command.add_option("--interval", settings.interval, "Ticks of 50 us from one sample to the next")
         ->capture_default_str();
-    command.add_option("--timeout", timeout, "How long to wait for the trigger, s")
-        ->check(within(0.0, 1e6))
-        ->capture_default_str();
+    add_quantity(command, "--timeout", timeout, "s", "How long to wait for the trigger, s", 0.0, 1e6);
     command.add_option("--out", file, "CSV file to write")->type_name("FILE");
     command.add_flag("--arm", arm, "Let the axis make force from the capture's start to its end");
   }

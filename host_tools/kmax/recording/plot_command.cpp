@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <filesystem>
+#include <functional>
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -22,7 +24,9 @@ struct PlotOptions {
         ->required()
         ->option_text("FILE");
     command.add_option("--x", x, "Column along the x axis (default: the first)")->type_name("COLUMN");
-    command.add_option("--y", y, "Column to draw; may be repeated (default: all others)")
+    command
+        .add_option("--y", y,
+                    "Column to draw; may be repeated (default: all others that change, but tick counters)")
         ->type_name("COLUMN");
     command.add_flag("--together", together, "All in one panel instead of one below the other");
     command
@@ -31,14 +35,35 @@ struct PlotOptions {
   }
 };
 
-plot::Figure figure_of(const plot::CsvTable& table, const PlotOptions& options) {
-  const std::string x = options.x.empty() ? table.names.front() : options.x;
-  std::vector<std::string> columns = options.y;
-  if (columns.empty()) {
-    for (const std::string& name : table.names) {
-      if (name != x) columns.push_back(name);
-    }
+bool changes(const std::vector<double>& values) {
+  return std::adjacent_find(values.begin(), values.end(), std::not_equal_to<>()) != values.end();
+}
+
+/// A panel of a straight line says nothing: what stays as it is and what counts the device's ticks is drawn
+/// only if it is asked for, or if there is nothing else.
+std::vector<std::string> columns_worth_drawing(Context& context, const plot::CsvTable& table,
+                                               const std::string& x) {
+  std::vector<std::string> all, worth, left_out;
+  for (const std::string& name : table.names) {
+    if (name == x) continue;
+    all.push_back(name);
+    const bool counter = name == "tick" || name.ends_with("_tick");
+    (counter || !changes(table.column(name)) ? left_out : worth).push_back(name);
   }
+  if (worth.empty()) {
+    if (!all.empty()) context.note(fmt::format("none of these columns changes: {}", fmt::join(all, ", ")));
+    return all;
+  }
+  if (!left_out.empty())
+    context.note(fmt::format("left out, as they do not change or count ticks: {}; --y draws them",
+                             fmt::join(left_out, ", ")));
+  return worth;
+}
+
+plot::Figure figure_of(Context& context, const plot::CsvTable& table, const PlotOptions& options) {
+  const std::string x = options.x.empty() ? table.names.front() : options.x;
+  const std::vector<std::string> columns =
+      options.y.empty() ? columns_worth_drawing(context, table, x) : options.y;
   plot::Figure figure;
   figure.title = std::filesystem::path(options.table).filename().string();
   figure.x_label = plot::label_of(x);
@@ -57,7 +82,7 @@ plot::Figure figure_of(const plot::CsvTable& table, const PlotOptions& options) 
 int run_plot(Context& context, const PlotOptions& options) {
   std::string picture = options.picture;
   if (picture.empty()) picture = std::filesystem::path(options.table).replace_extension(".svg").string();
-  plot::write_figure(figure_of(plot::read_csv(options.table), options), picture);
+  plot::write_figure(figure_of(context, plot::read_csv(options.table), options), picture);
   if (context.json) {
     context.print({{"picture", picture}});
   } else {
@@ -71,7 +96,7 @@ void add_plot_command(CLI::App& app, Context& context) {
   add_command<PlotOptions>(
       app, context,
       {"plot", "Draws the columns of a CSV file.",
-       "  kmax plot run.csv                                  every column over the first\n"
+       "  kmax plot run.csv                                  every column that changes, over the first\n"
        "  kmax plot run.csv --y force_n --out force.png\n"
        "  kmax plot run.csv --x position_m --y force_n"},
       Takes::nothing, run_plot);

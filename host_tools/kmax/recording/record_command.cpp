@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
 #include "host_tools/record/recording.hpp"
@@ -34,8 +34,8 @@ struct RecordOptions {
     command.add_option("file", file, "CSV file to write; -: standard output")
         ->option_text("FILE|-")
         ->required();
-    command.add_option("--for", seconds, "How long, s of the device's time; without it until Ctrl-C")
-        ->type_name("S");
+    add_quantity(command, "--for", seconds, "s",
+                 "How long, s of the device's time; without it until Ctrl-C", 0.0, 1e9);
   }
 };
 
@@ -170,7 +170,7 @@ Json finished_json(Context& context, const Finished& finished, const RecordOptio
 }
 
 void check(const Context& context, const RecordOptions& options) {
-  if (options.seconds && !(std::isfinite(*options.seconds) && *options.seconds > 0))
+  if (options.seconds && !(*options.seconds > 0))
     throw UsageError(fmt::format("--for: {} is not a number of seconds above 0", *options.seconds));
   if (context.json && options.to_standard_output())
     throw UsageError("--json and a recording to standard output exclude each other; name a file");

@@ -98,6 +98,30 @@ int judge_set(Context& context, const CheckOptions& options) {
   return judgement.pass ? done : verdict_is_no;
 }
 
+/// "met nowhere: ...", and what to do about it; empty if every criterion that applies is met somewhere.
+std::string met_nowhere(const check::StabilityMap& map) {
+  std::vector<std::string> names;
+  for (const CriterionText& text : check::all_criteria()) {
+    const auto result_at = [&](const check::Results& results) -> const auto& {
+      return results[static_cast<std::size_t>(text.criterion)];
+    };
+    const bool applies =
+        std::any_of(map.results.begin(), map.results.end(),
+                    [&](const check::Results& results) { return result_at(results).applies; });
+    const bool met = std::any_of(map.results.begin(), map.results.end(), [&](const check::Results& results) {
+      return result_at(results).applies && result_at(results).pass;
+    });
+    if (applies && !met) names.emplace_back(text.name());
+  }
+  if (names.empty()) return {};
+  return fmt::format(
+      "Met nowhere on this map: {0}. 'kmax check --explain {1}' says what it needs; 'kmax check' says what "
+      "to "
+      "change. A handle whose friction and damping are not entered (guard.friction, guard.damping) meets "
+      "few.",
+      fmt::join(names, ", "), names.front());
+}
+
 int draw_map(Context& context, const CheckOptions& options) {
   if (options.sides.size() != 2)
     throw UsageError(
@@ -137,6 +161,8 @@ int draw_map(Context& context, const CheckOptions& options) {
   }
   print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
         map.results.size());
+  if (const std::string nowhere = met_nowhere(map); passing["all"] == 0 && !nowhere.empty())
+    print(context.out, "{}\n", nowhere);
   for (const std::string& file : {options.picture, options.csv}) {
     if (!file.empty()) print(context.out, "{}\n", file);
   }
@@ -201,9 +227,10 @@ void add_check_command(CLI::App& app, Context& context) {
        R"(  kmax check                                 the device's parameters
   kmax check --set guard.damping=0.5 --set wall.stiffness=2N/mm --hand subject_1
   kmax check --explain colgate               formula, assumptions, source; without a name, of all
-  kmax check --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log --picture map.svg
+  kmax check --set guard.friction=0.1 --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log \
+             --picture map.svg             green where every criterion passes, as a line where each begins to
 
-Sets nothing. 'pass' takes every criterion that applies; most walls in use are without a guarantee and
+Sets nothing. 'pass' means that every criterion that applies is met; most walls in use are without a guarantee and
 still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.
 See docs/stability_check.md. Exit code of a map: 0.)"},
       Takes::device_and_axis, run_check);

@@ -10,9 +10,11 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/simulation/scene_options.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/simulated_board/scene_run.hpp"
-#include "host_tools/simulation/scene.hpp"
+#include "host_tools/simulated_board/setting_names.hpp"
+#include "host_tools/simulation/scene_keys.hpp"
 
 namespace kmax::cli {
 
@@ -22,13 +24,17 @@ using simulated_board::RunSample;
 namespace {
 struct SimulateOptions {
   std::string scene, csv, picture;
+  std::vector<std::string> settings;
+  bool keys = false;
 
   void declare(CLI::App& command) {
-    std::string names;
-    for (const auto& one : simulated_board::supplied_scenes()) names += fmt::format(" {}", one.name);
-    command.add_option("scene", scene, "TOML file, or a supplied scene:" + names)
-        ->required()
-        ->option_text("SCENE");
+    add_scene_argument(command, scene, false);  // --keys needs none
+    command
+        .add_option("--set", settings,
+                    "In place of what the scene says: one of its keys or a parameter; may be repeated")
+        ->type_name("NAME=VALUE")
+        ->take_all();
+    command.add_flag("--keys", keys, "Prints every key that a scene may have, as docs/scenes.md");
     command.add_option("--csv", csv, "Table of every haptic sample to write")->type_name("FILE");
     command.add_option("--picture", picture, "Picture to draw, .svg or .png")->type_name("FILE");
   }
@@ -160,13 +166,37 @@ Json result_json(const simulation::Scene& scene, const RunResult& result) {
           {"simulated_per_real_s", result.simulated_s / result.real_s}};
 }
 
+int print_keys(Context& context, const SimulateOptions& options) {
+  if (!options.scene.empty() || !options.settings.empty() || !options.csv.empty() || !options.picture.empty())
+    throw UsageError("--keys simulates nothing; give it alone");
+  if (!context.json) {
+    context.out << simulation::scene_keys_markdown();
+    return done;
+  }
+  Json keys = Json::array();
+  for (const simulation::SceneKey& key : simulation::scene_keys())
+    keys.push_back({{"table", std::string(key.table)},
+                    {"key", std::string(key.name)},
+                    {"motor", key.motor.empty() ? Json(nullptr) : Json(std::string(key.motor))},
+                    {"unit", std::string(key.unit)},
+                    {"default", key.initial.empty() ? Json(nullptr) : Json(key.initial)},
+                    {"allowed", key.allowed},
+                    {"meaning", std::string(key.meaning)}});
+  context.print({{"keys", keys}});
+  return done;
+}
+
 int run_simulate(Context& context, const SimulateOptions& options) {
-  const simulation::Scene scene = simulated_board::open_scene(options.scene);
+  if (options.keys) return print_keys(context, options);
+  if (options.scene.empty())
+    throw UsageError(fmt::format("a SCENE is missing: a TOML file, or one of {}", supplied_scene_names()));
+  const simulation::Scene scene =
+      simulated_board::open_scene(options.scene, simulated_board::parse_settings(options.settings));
   const RunResult result = simulated_board::run_scene(scene);
   const std::string axis = scene.axes.size() > 1 ? fmt::format("axis {}", result.axis) : "the axis";
   if (result.samples[0].empty())
-    throw std::runtime_error(
-        fmt::format("{}: {} could not be armed: {}", scene.name, axis, firmware::to_string(result.refusal)));
+    throw std::runtime_error(fmt::format("{}: {} could not be armed: {}", scene.name, axis,
+                                         unarmed_text(options.scene, result.refusal)));
   if (!options.csv.empty()) write_csv(scene, result, options.csv);
   if (!options.picture.empty()) write_picture(scene, result, options.picture);
   if (context.json) {
@@ -206,10 +236,13 @@ void add_simulate_command(CLI::App& app, Context& context) {
       app, context,
       {"simulate", "Runs one scene through the firmware on a simulated device.",
        "  kmax simulate touch\n"
-       "  kmax simulate my_scene.toml --csv run.csv --picture run.svg\n\n"
-       "A scene names its parts: device, structure, operator, motion, encoder, motor, parameters,\n"
-       "measurement, integrator. Its axes are armed at time 0 and the person begins to move; everything\n"
-       "goes through the firmware."},
+       "  kmax simulate touch --set wall.stiffness=3N/mm --set operator.grip_stiffness=800 --set "
+       "device.mass=60g\n"
+       "  kmax simulate my_scene.toml --csv run.csv --picture run.svg\n"
+       "  kmax simulate --keys           what a scene may say: key, unit, default, allowed, meaning\n\n"
+       "The axes of the scene are armed at time 0 and the person begins to move; everything goes through\n"
+       "the firmware. A name of --set that is both a scene's key and a parameter is the key;\n"
+       "parameters.NAME is the parameter. 'kmax sweep' simulates a grid of such settings."},
       Takes::nothing, run_simulate);
 }
 

@@ -10,6 +10,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/wall/wall_evaluation.hpp"
 
 namespace kmax::cli {
@@ -22,11 +23,12 @@ struct WallOptions {
   std::vector<std::string> assignments;
 
   void declare(CLI::App& command) {
-    command.add_option("--position", position, "Position of the handle, m");
-    command.add_option("--velocity", velocity, "Its velocity, m/s (default 0)");
+    add_quantity(command, "--position", position, "m", "Position of the handle, m", -1000.0, 1000.0);
+    add_quantity(command, "--velocity", velocity, "m/s", "Its velocity, m/s", -1000.0, 1000.0);
     command.add_option("--csv", input, "Table with the columns position_m and velocity_m_per_s")
         ->type_name("IN");
-    command.add_option("--out", output, "Table to write, with the column force_n")->type_name("OUT");
+    command.add_option("--out", output, "Table to write, with the column force_n; -: standard output")
+        ->type_name("OUT");
     command.add_option("--picture", picture, "Draws the force-position curve of each law, .svg or .png")
         ->type_name("FILE");
     command.add_option("--set", assignments, "Parameter of the wall; may be repeated")
@@ -63,9 +65,6 @@ int run_wall(Context& context, const WallOptions& options) {
     throw UsageError("give exactly one of: --position X; --csv IN with --out OUT; --picture FILE");
   if (table && (options.input.empty() || options.output.empty()))
     throw UsageError("--csv IN and --out OUT go together");
-  for (const double number : {options.position.value_or(0.0), options.velocity}) {
-    if (!control::is_finite(number)) throw UsageError("--position and --velocity must be finite numbers");
-  }
   const firmware::ParameterValues values = values_of(options, context.axis());
   if (!options.picture.empty()) {
     wall::write_force_curves(values, context.axis(), options.picture);
@@ -89,6 +88,11 @@ int run_wall(Context& context, const WallOptions& options) {
   std::error_code ignored;
   if (std::filesystem::equivalent(options.input, options.output, ignored))
     throw UsageError(fmt::format("--out {} is the table that is read; give another name", options.output));
+  if (options.output == "-") {
+    if (context.json) throw UsageError("--json and --out - exclude each other: both write standard output");
+    context.out << wall::evaluated_table(evaluator, options.input).text;
+    return done;
+  }
   const std::size_t rows = wall::evaluate_table(evaluator, options.input, options.output);
   if (context.json) {
     context.print({{"rows", rows}, {"out", options.output}});
@@ -100,17 +104,16 @@ int run_wall(Context& context, const WallOptions& options) {
 }  // namespace
 
 void add_wall_command(CLI::App& app, Context& context) {
-  add_command<WallOptions>(
-      app, context,
-      {"wall", "Evaluates the wall law as the firmware computes it, without a device.",
-       R"(  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.0001
+  add_command<WallOptions>(app, context,
+                           {"wall", "Evaluates the wall law as the firmware computes it, without a device.",
+                            R"(  kmax wall --set wall.law=magnetic --set wall.stiffness=8410 --position -0.1mm
   kmax wall --csv in.csv --out out.csv --set wall.law=adaptive
                         in: position_m,velocity_m_per_s; out: the same and force_n
   kmax wall --picture laws.svg      force against distance, each law with these parameters
 
-Positions in m and velocities in m/s along +x. Parameters not set have their defaults. Every point stands
+Positions and velocities along +x, in m and m/s or with a unit. Parameters not set have their defaults. Every point stands
 alone, as the first sample of a contact; force limit, sampling and encoder are left out.)"},
-      Takes::axis, run_wall);
+                           Takes::axis, run_wall);
 }
 
 }  // namespace kmax::cli

@@ -8,7 +8,11 @@
 #include <cstdlib>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "firmware/object_dictionary/dictionary.hpp"
+#include "host_tools/base/errors.hpp"
+#include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::device::number_text_test::numbers_test {
 
@@ -98,6 +102,33 @@ TEST(Unit, SuffixesStartWithTheUnitItself) {
   EXPECT_EQ(suffixes_of("N/m").front(), "N/m");
   EXPECT_GE(suffixes_of("m").size(), 4u);
   EXPECT_TRUE(suffixes_of("").empty());
+}
+
+TEST(WrittenNumber, HasTheUnitOrOneThatConverts) {
+  const auto value = [](std::string_view text, std::string_view unit) {
+    return written_number(text, unit, "a number", "0 .. 1").value;
+  };
+  EXPECT_EQ(value("0.5 N/mm", "N/m"), 500.0);
+  EXPECT_EQ(value(" 60g ", "kg"), 0.06);
+  EXPECT_EQ(value("-1e-3", "m"), -0.001);
+  EXPECT_EQ(value("+.5", ""), 0.5);
+  EXPECT_EQ(value("470uF", "F"), 470e-6);
+  EXPECT_EQ(value("2 mN m", "N m"), 2e-3);
+  EXPECT_EQ(written_number("0.5N/mm", "N/m", "", "").as_given, "0.5 N/mm");
+  EXPECT_EQ(written_number("800", "N/m", "", "").as_given, "800 N/m");
+}
+
+TEST(WrittenNumber, AnythingElseIsRefused) {
+  const auto refusal = [](std::string_view text, std::string_view unit) {
+    return host_tools_test::thrown_message<ValueError>(
+        [&] { written_number(text, unit, "a number", "0 .. 1 kg"); });
+  };
+  for (const char* text : {"", "heavy", "nan", "inf", "-inf", "+-1", "--1", "e5"})
+    EXPECT_EQ(refusal(text, "kg"), fmt::format("'{}' is not a number", text));
+  EXPECT_EQ(refusal("1e400", "kg"), "1e400 is not a number this program can hold; allowed is 0 .. 1 kg");
+  EXPECT_EQ(refusal("5 N", "kg"),
+            "'5 N': 'N' is not one of its units kg, g, mg; without a unit the number is in kg");
+  EXPECT_EQ(refusal("5 N", ""), "'5 N': it has no unit, so nothing may follow the number");
 }
 
 }  // namespace kmax::device::number_text_test::numbers_test

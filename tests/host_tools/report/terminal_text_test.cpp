@@ -116,4 +116,30 @@ TEST(NumberColumns, EmptyCellsAndMarksDoNotCountAndDoNotMakeOne) {
 
 }  // namespace
 
+TEST(TerminalText, FitsIntoAWidthBetweenWords) {
+  const Table table{"What it is about",
+                    {"hand", "peak to peak (mm)", "what the paper says"},
+                    {{"subject 1", "1.595", "a large sustained oscillation"}, {"2", "0", "stable"}}};
+  EXPECT_EQ(terminal_text(table, 40),
+            "What it is about\n"
+            "            peak to peak  what the paper\n"
+            "hand                (mm)  says\n"
+            "---------  -------------  --------------\n"
+            "subject 1          1.595  a large\n"
+            "                          sustained\n"
+            "                          oscillation\n"
+            "2                      0  stable\n");
+  EXPECT_EQ(terminal_text(table, 1000), terminal_text(table));
+  // No word is cut, whatever is asked.
+  EXPECT_NE(terminal_text(table, 1).find("oscillation"), std::string::npos);
+  EXPECT_NE(terminal_text(table, 1).find("1.595"), std::string::npos);
+}
+
+TEST(Wrapped, BreaksBetweenWords) {
+  EXPECT_EQ(wrapped("one two three", 7), "one two\nthree");
+  EXPECT_EQ(wrapped("one two three", 0), "one two three");
+  EXPECT_EQ(wrapped("extraordinary a", 4), "extraordinary\na");
+  EXPECT_EQ(wrapped("", 4), "");
+}
+
 }  // namespace kmax::report::terminal_text_test

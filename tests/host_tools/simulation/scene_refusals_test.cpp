@@ -109,11 +109,11 @@ TEST(SceneRefusals, NoNumberIsNotOneOrBeyondItsRange) {
   const std::vector<Key> keys = every_number();
   EXPECT_GT(keys.size(), 90u);
   for (const Key& key : keys) {
-    for (const char* value : {"nan", "-nan", "inf", "-inf", "\"1\"", "\"\"", "true", "[1.0]", "{a = 1.0}",
-                              "1979-05-27", "07:32:00", "-1e308", "1.5e308"})
+    for (const char* value : {"nan", "-nan", "inf", "-inf", "\"one\"", "\"1 parsec\"", "\"\"", "true",
+                              "[1.0]", "{a = 1.0}", "1979-05-27", "07:32:00", "-1e308", "1.5e308"})
       expect_refused(key, value);
     if (key.whole) {
-      for (const char* value : {"-1", "1.0", "-9223372036854775808"}) expect_refused(key, value);
+      for (const char* value : {"-1", "1.0", "\"1\"", "-9223372036854775808"}) expect_refused(key, value);
       continue;
     }
     expect_refused(key, fmt::format("{:.17e}", std::nextafter(key.minimum, -infinity)));
@@ -201,99 +201,99 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
       "\"current_b_inverted\", \"current_c_inverted\", \"gate_driver_missing\", \"index_loose\"";
   const std::string motion = "[device]\n[operator]\n[motion]\nstart_position = -0.05\n";
   const std::string persons = "[device]\n[operator]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n";
-  for (
-      const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
-          {"[device]\nmass = -1\n", "2:8: device.mass = -1: allowed is a number from 0.0001 to 100 kg"},
-          {"[device]\nmass = \"heavy\"\n",
-           "2:8: device.mass = 'heavy': allowed is a number from 0.0001 to 100 kg"},
-          {"[device]\n\n  mas = 1.0\n",
-           "3:3: device.mas = 1.0: unknown key; allowed here: start_position, start_velocity, mass, damping, "
-           "friction, force_limit, delay; did you mean mass?"},
-          {"[device]\n[operator]\ngrip = 1\n",
-           "3:1: operator.grip = 1: unknown key; allowed here: grip_stiffness, grip_damping, hand_mass, "
-           "arm_stiffness, arm_damping, activation_gain, activation_time, push_lag"},
-          {"[device]\n[axis1.device]\n[axis1.encodr]\n",
-           "3:8: axis1.encodr = {table}: unknown key; allowed here: device, structure, operator, motion, "
-           "encoder, motor, inverter, current_sensor; did you mean encoder?"},
-          {"seed = -1\n[device]\n", "1:8: seed = -1: allowed is a whole number from 0 to 2^63 - 1"},
-          {"device = 3\n", "1:10: device = 3: allowed is a table, [device]"},
-          {"[device]\n[parameters]\na.b = [1, 2]\n",
-           "3:7: parameters.a.b = [array]: allowed is a number, a text or true/false"},
-          {"[axis1.device]\n", "1:1: [device] is missing: every axis needs a device"},
-          {motion + "wall_side = -1\nwall_position = 0.0\n[parameters]\nwall.position = -0.01\n",
-           "6:17: motion.wall_position = 0: the parameter wall.position is -0.01 (bad.toml:8:17); allowed is "
-           "the same value, or none here"},
-          {"[device]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n",
-           "4:15: axis1.operator.same_person = true: nobody holds axis 0; allowed is that with an "
-           "[operator]"},
-          {persons + "[motor]\nkind = \"dc\"\n",
-           "5:15: axis1.operator.same_person = true: allowed is that where neither axis has a motor of kind "
-           "\"dc\" or \"pmsm\""},
-          {"[device]\n[integrator]\nkind = \"rk5\"\n",
-           "3:8: integrator.kind = 'rk5': allowed is \"exact\", \"semi_implicit_euler\", \"rk4\" or "
-           "\"adaptive\"; did you mean rk4?"},
-          {"[device]\n[motor]\nresistance = 1\n",
-           "2:1: motor.kind is missing; allowed is \"ideal\", \"dc\" or \"pmsm\""},
-          {"[device]\n[motor]\nkind = \"stepper\"\n",
-           "3:8: motor.kind = 'stepper': allowed is \"ideal\", \"dc\" or \"pmsm\""},
-          {"[device]\n[motor]\nkind = \"dc\"\npole_pairs = 7\n",
-           "4:1: motor.pole_pairs = 7: unknown key; allowed here: kind, defects, resistance, inductance, "
-           "torque_constant"},
-          {"[device]\n[axis1.device]\n[axis1.motor]\nkind = \"pmsm\"\npole_pairs = 6.5\n",
-           "3:1: axis1.motor.pole_pairs = 6.5: allowed is a whole number"},
-          {"[device]\n[motor]\nkind = \"pmsm\"\ninductance = 1e-3\ninductance_q = 1e-3\n",
-           "4:14: motor.inductance = 0.001: motor.inductance_q is given too; allowed is inductance, or "
-           "inductance_d and inductance_q"},
-          {"[device]\n[motor]\nkind = \"dc\"\ndefects = [\"smoke\"]\n",
-           "4:12: motor.defects = 'smoke': allowed is a list of " + defects},
-          {"[device]\n[motor]\nkind = \"dc\"\ndefects = 3\n",
-           "4:11: motor.defects = 3: allowed is a list of " + defects},
-          {"[device]\n[inverter]\n",
-           "2:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no current; add the "
-           "motor, or remove the table"},
-          {"[device]\n[axis1.device]\n[axis1.current_sensor]\n",
-           "3:1: [axis1.current_sensor] without a [axis1.motor] of kind \"dc\" or \"pmsm\": there is no "
-           "current; add the motor, or remove the table"},
-          {"[device]\n[encoder]\nkind = \"hall\"\n",
-           "3:8: encoder.kind = 'hall': allowed is \"quadrature\" or \"as5047p\""},
-          {"[device]\n[encoder]\nindex_position = 4000\n[motor]\nkind = \"dc\"\n",
-           "2:1: encoder.index_position = 4000: allowed is a whole number below counts_per_turn = 4000"},
-          // Parts that contradict each other.
-          {"[device]\ndelay = 1e-3\n[motor]\nkind = \"dc\"\n",
-           "2:9: device.delay = 0.001: with this [motor] the circuit makes the delay; "
-           "allowed is 0 there, or a delay with [motor] kind = \"ideal\""},
-          {"[device]\n[axis1.device]\ndelay = 1e-3\n[axis1.motor]\nkind = \"pmsm\"\n",
-           "3:9: axis1.device.delay = 0.001: with this [axis1.motor] the circuit makes the "
-           "delay; allowed is 0 there, or a delay with [axis1.motor] kind = \"ideal\""},
-          {"[device]\n[integrator]\nsubsteps = 10\n",
-           "3:12: integrator.substeps = 10: integrator.kind is \"exact\", which has none; "
-           "allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
-          {"[device]\n[integrator]\nkind = \"adaptive\"\nsubsteps = 10\n",
-           "4:12: integrator.substeps = 10: integrator.kind is \"adaptive\", which has "
-           "none; allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
-          {"[device]\n[integrator]\nkind = \"rk4\"\ntolerance = 1e-9\n",
-           "4:13: integrator.tolerance = 1e-09: integrator.kind is \"rk4\", which has "
-           "none; allowed is that with kind = \"adaptive\""},
-          {"[device]\n[motor]\nkind = \"ideal\"\nresistance = 1\n",
-           "4:1: motor.resistance = 1: unknown key; allowed here: kind"},
-          {"[device]\n[motor]\nkind = \"ideal\"\ndefects = [\"phase_b_open\"]\n",
-           "4:11: motor.defects = [array]: an ideal motor has nothing that could break; "
-           "allowed is motor.kind = \"dc\" or \"pmsm\", or no defects"},
-          {"[device]\n[motor]\nkind = \"ideal\"\n[inverter]\n",
-           "4:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no "
-           "current; add the motor, or remove the table"},
-          {"[device]\n[encoder]\nreversed = true\n",
-           "3:12: encoder.reversed = true: how it is mounted belongs to a motor's encoder; "
-           "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
-          {"[device]\n[encoder]\nkind = \"as5047p\"\n",
-           "3:8: encoder.kind = 'as5047p': this chip belongs to a motor's encoder; allowed "
-           "is that with [motor] kind = \"dc\" or \"pmsm\""},
-          {"[device]\n[encoder]\nindex_position = 3\n[motor]\nkind = \"ideal\"\n",
-           "3:18: encoder.index_position = 3: an index belongs to a motor's encoder; "
-           "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
-          {"[device]\n[encoder]\ncounts_per_turn = 16.5\nedge_noise = 0.1\n",
-           "2:1: encoder.counts_per_turn = 16.5: allowed is a whole number"},
-      }) {
+  for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
+           {"[device]\nmass = -1\n", "2:8: device.mass = -1: allowed is a number from 0.0001 to 100 kg"},
+           {"[device]\nmass = \"heavy\"\n",
+            "2:8: device.mass = 'heavy' is not a number; allowed is a number from 0.0001 to 100 kg"},
+           {"[device]\n\n  mas = 1.0\n",
+            "3:3: device.mas = 1.0: unknown key; allowed here: mass, damping, friction, force_limit, "
+            "delay, start_position, start_velocity; did you mean mass?"},
+           {"[device]\n[operator]\ngrip = 1\n",
+            "3:1: operator.grip = 1: unknown key; allowed here: grip_stiffness, grip_damping, hand_mass, "
+            "arm_stiffness, arm_damping, activation_gain, activation_time, push_lag"},
+           {"[device]\n[axis1.device]\n[axis1.encodr]\n",
+            "3:8: axis1.encodr = {table}: unknown key; allowed here: device, structure, operator, motion, "
+            "encoder, motor, inverter, current_sensor; did you mean encoder?"},
+           {"seed = -1\n[device]\n", "1:8: seed = -1: allowed is a whole number from 0 to 2^63 - 1"},
+           {"device = 3\n", "1:10: device = 3: allowed is a table, [device]"},
+           {"[device]\n[parameters]\na.b = [1, 2]\n",
+            "3:7: parameters.a.b = [array]: allowed is a number, a text or true/false"},
+           {"[axis1.device]\n", "1:1: [device] is missing: every axis needs a device"},
+           {motion + "wall_side = -1\nwall_position = 0.0\n[parameters]\nwall.position = -0.01\n",
+            "6:17: motion.wall_position = 0: the parameter wall.position is -0.01 (bad.toml:8:17); allowed "
+            "is "
+            "the same value, or none here"},
+           {"[device]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n",
+            "4:15: axis1.operator.same_person = true: nobody holds axis 0; allowed is that with an "
+            "[operator]"},
+           {persons + "[motor]\nkind = \"dc\"\n",
+            "5:15: axis1.operator.same_person = true: allowed is that where neither axis has a motor of kind "
+            "\"dc\" or \"pmsm\""},
+           {"[device]\n[integrator]\nkind = \"rk5\"\n",
+            "3:8: integrator.kind = 'rk5': allowed is \"exact\", \"semi_implicit_euler\", \"rk4\" or "
+            "\"adaptive\"; did you mean rk4?"},
+           {"[device]\n[motor]\nresistance = 1\n",
+            "2:1: motor.kind is missing; allowed is \"ideal\", \"dc\" or \"pmsm\""},
+           {"[device]\n[motor]\nkind = \"stepper\"\n",
+            "3:8: motor.kind = 'stepper': allowed is \"ideal\", \"dc\" or \"pmsm\""},
+           {"[device]\n[motor]\nkind = \"dc\"\npole_pairs = 7\n",
+            "4:1: motor.pole_pairs = 7: unknown key; allowed here: kind, resistance, inductance, "
+            "torque_constant, defects"},
+           {"[device]\n[axis1.device]\n[axis1.motor]\nkind = \"pmsm\"\npole_pairs = 6.5\n",
+            "3:1: axis1.motor.pole_pairs = 6.5: allowed is a whole number"},
+           {"[device]\n[motor]\nkind = \"pmsm\"\ninductance = 1e-3\ninductance_q = 1e-3\n",
+            "4:14: motor.inductance = 0.001: motor.inductance_q is given too; allowed is inductance, or "
+            "inductance_d and inductance_q"},
+           {"[device]\n[motor]\nkind = \"dc\"\ndefects = [\"smoke\"]\n",
+            "4:12: motor.defects = 'smoke': allowed is a list of " + defects},
+           {"[device]\n[motor]\nkind = \"dc\"\ndefects = 3\n",
+            "4:11: motor.defects = 3: allowed is a list of " + defects},
+           {"[device]\n[inverter]\n",
+            "2:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no current; add the "
+            "motor, or remove the table"},
+           {"[device]\n[axis1.device]\n[axis1.current_sensor]\n",
+            "3:1: [axis1.current_sensor] without a [axis1.motor] of kind \"dc\" or \"pmsm\": there is no "
+            "current; add the motor, or remove the table"},
+           {"[device]\n[encoder]\nkind = \"hall\"\n",
+            "3:8: encoder.kind = 'hall': allowed is \"quadrature\" or \"as5047p\""},
+           {"[device]\n[encoder]\nindex_position = 4000\n[motor]\nkind = \"dc\"\n",
+            "2:1: encoder.index_position = 4000: allowed is a whole number below counts_per_turn = 4000"},
+           // Parts that contradict each other.
+           {"[device]\ndelay = 1e-3\n[motor]\nkind = \"dc\"\n",
+            "2:9: device.delay = 0.001: with this [motor] the circuit makes the delay; "
+            "allowed is 0 there, or a delay with [motor] kind = \"ideal\""},
+           {"[device]\n[axis1.device]\ndelay = 1e-3\n[axis1.motor]\nkind = \"pmsm\"\n",
+            "3:9: axis1.device.delay = 0.001: with this [axis1.motor] the circuit makes the "
+            "delay; allowed is 0 there, or a delay with [axis1.motor] kind = \"ideal\""},
+           {"[device]\n[integrator]\nsubsteps = 10\n",
+            "3:12: integrator.substeps = 10: integrator.kind is \"exact\", which has none; "
+            "allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
+           {"[device]\n[integrator]\nkind = \"adaptive\"\nsubsteps = 10\n",
+            "4:12: integrator.substeps = 10: integrator.kind is \"adaptive\", which has "
+            "none; allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
+           {"[device]\n[integrator]\nkind = \"rk4\"\ntolerance = 1e-9\n",
+            "4:13: integrator.tolerance = 1e-09: integrator.kind is \"rk4\", which has "
+            "none; allowed is that with kind = \"adaptive\""},
+           {"[device]\n[motor]\nkind = \"ideal\"\nresistance = 1\n",
+            "4:1: motor.resistance = 1: unknown key; allowed here: kind"},
+           {"[device]\n[motor]\nkind = \"ideal\"\ndefects = [\"phase_b_open\"]\n",
+            "4:11: motor.defects = [array]: an ideal motor has nothing that could break; "
+            "allowed is motor.kind = \"dc\" or \"pmsm\", or no defects"},
+           {"[device]\n[motor]\nkind = \"ideal\"\n[inverter]\n",
+            "4:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no "
+            "current; add the motor, or remove the table"},
+           {"[device]\n[encoder]\nreversed = true\n",
+            "3:12: encoder.reversed = true: how it is mounted belongs to a motor's encoder; "
+            "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
+           {"[device]\n[encoder]\nkind = \"as5047p\"\n",
+            "3:8: encoder.kind = 'as5047p': this chip belongs to a motor's encoder; allowed "
+            "is that with [motor] kind = \"dc\" or \"pmsm\""},
+           {"[device]\n[encoder]\nindex_position = 3\n[motor]\nkind = \"ideal\"\n",
+            "3:18: encoder.index_position = 3: an index belongs to a motor's encoder; "
+            "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
+           {"[device]\n[encoder]\ncounts_per_turn = 16.5\nedge_noise = 0.1\n",
+            "2:1: encoder.counts_per_turn = 16.5: allowed is a whole number"},
+       }) {
     EXPECT_EQ(refusal(text), "bad.toml:" + message);
   }
 }

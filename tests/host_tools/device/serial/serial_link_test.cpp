@@ -164,7 +164,7 @@ TEST(SerialLink, ADeviceThatOnlyChattersIsNamed) {
     return Answer{answer};
   });
   SerialLink link(address_of(device), {}, quick);
-  EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.read_input(0x20, 2); }), "is not an answer");
+  EXPECT_CONTAINS(thrown_message<LinkError>([&] { link.read_input(0x20, 2); }), "is no Modbus response");
 }
 
 // The answer to the first attempt arrives together with the second's: the one that is left over must not

@@ -195,14 +195,14 @@ ContactResult result_of(const std::string& name) {
 }
 
 TEST(ContactReport, TableHasALineForEachConditionUnderItsHeadings) {
-  const std::string table = contact_table({result_of("first"), result_of("second")});
-  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);
+  const std::string table = report::terminal_text(contact_table({result_of("first"), result_of("second")}));
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 4);
   for (const char* text : {"first", "second", "0.123 mm", "0 of 3", "Fig. 9", "yes"})
     EXPECT_CONTAINS(table, text);
   const auto column = table.find("verdict");
   EXPECT_EQ(table.substr(table.find("first") + column, 6), "stable") << table;
-  const std::string empty = contact_table({});
-  EXPECT_EQ(std::count(empty.begin(), empty.end(), '\n'), 1);
+  const std::string empty = report::terminal_text(contact_table({}));
+  EXPECT_EQ(std::count(empty.begin(), empty.end(), '\n'), 2);
 }
 
 TEST(ContactReport, PictureAndTableShareASafeName) {

@@ -30,7 +30,9 @@ TEST_F(DeviationCommand, TheDocumentHasEveryPairAndTheVerdict) {
 }
 
 TEST_F(DeviationCommand, AHandThatCannotStiffenIsAnswerNo) {
-  EXPECT_EQ(simulated({"--pulses", "1", "--rest", "0.2", "--activation-gain", "0", "--json"}), verdict_is_no)
+  EXPECT_EQ(
+      simulated({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--activation-gain", "0", "--json"}),
+      verdict_is_no)
       << said;
   const Json trends = document()["verdict"]["trends"];
   ASSERT_EQ(trends.size(), 3u);
@@ -51,7 +53,7 @@ TEST_F(DeviationCommand, PicturesHaveTheKindAskedFor) {
 
 TEST_F(DeviationCommand, ADeviceIsMeasured) {
   // Nothing hangs on this board's second axis, so that nothing gives way along the surface.
-  EXPECT_EQ(on_device({"--pulses", "1", "--rest", "0.2", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(on_device({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--json"}), verdict_is_no) << said;
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["pairs"].size(), 16u);
@@ -72,7 +74,9 @@ TEST_F(DeviationCommand, ADeviceIsMeasured) {
 
 // At 20 N/mm no hand holds the plain wall still.
 TEST_F(DeviationCommand, ATouchThatWasEndedIsExplained) {
-  EXPECT_EQ(on_device({"--pulses", "1", "--rest", "0.2", "--stiffness", "20000"}), verdict_is_no) << said;
+  EXPECT_EQ(on_device({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--stiffness", "20000"}),
+            verdict_is_no)
+      << said;
   EXPECT_CONTAINS(said, "F_B = 0 N, F_I = 1 N: not counted, the handle swung too far");
   EXPECT_CONTAINS(said, "left the wall before the 2.4 s of the touch were over");
 }

@@ -27,7 +27,7 @@ TEST_F(Experiment, WithoutANameOrWithAnUnknownOneIsWrongUsage) {
 // The help that a message points to is the one that has the option.
 TEST_F(Experiment, AWrongValuePointsToTheHelpOfTheExperimentThatItWasGivenTo) {
   expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
-               "experiment jitter: --stiffness: Value 0 not in range");
+               "experiment jitter: --stiffness: 0 N/m not in range 1 .. 1e6 N/m");
   expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
                "'kmax experiment jitter --help' explains it");
   expect_error({"--device", "sim", "experiment", "resolution", "--nothing"}, wrong_usage,

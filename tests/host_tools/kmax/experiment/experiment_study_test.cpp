@@ -13,9 +13,9 @@ using host_tools_test::thrown_message;
 
 class ExperimentStudy : public testing::Test {
  protected:
-  int print(bool claim_met = true) {
+  int print(bool claim_met = true, bool expect_paper = false) {
     StudyReport study{claim_met, {{"origin", "predicted"}}, {"One.", "Two."}, {{"A table", {"a"}, {{"1"}}}}};
-    return print_study(context, study, {"out/a.csv", "out/b.svg"});
+    return print_study(context, study, {"out/a.csv", "out/b.svg"}, expect_paper);
   }
 
   std::ostringstream out, messages;
@@ -36,10 +36,23 @@ TEST_F(ExperimentStudy, TheDocumentEndsWithTheFiles) {
             (Json{{"origin", "predicted"}, {"files", Json{"out/a.csv", "out/b.svg"}}}));
 }
 
-TEST_F(ExperimentStudy, AClaimThatIsNotMetIsTheAnswerNo) {
-  EXPECT_EQ(print(false), verdict_is_no);
+TEST_F(ExperimentStudy, AClaimThatIsNotMetIsTheAnswerNoWhereThePaperIsExpected) {
+  EXPECT_EQ(print(false), done);
+  EXPECT_EQ(print(true, true), done);
+  EXPECT_EQ(print(false, true), verdict_is_no);
   context.json = true;
-  EXPECT_EQ(print(false), verdict_is_no);
+  EXPECT_EQ(print(false, true), verdict_is_no);
+}
+
+TEST_F(ExperimentStudy, FitsIntoATerminal) {
+  StudyReport study{true,
+                    {},
+                    {"Words that go on and on and on, and would be cut by a terminal."},
+                    {{"", {"a long heading", "another one"}, {{"some words", "1"}}}}};
+  context.width = 20;
+  print_study(context, study, {}, false);
+  std::istringstream lines(out.str());
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 20u) << line;
 }
 
 TEST_F(ExperimentStudy, ProgressIsShownInItsWords) {

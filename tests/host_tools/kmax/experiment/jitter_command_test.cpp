@@ -27,14 +27,16 @@ TEST_F(JitterCommand, TheDocumentHasEveryPairAndTheVerdict) {
 }
 
 TEST_F(JitterCommand, AHandThatCannotStiffenIsAnswerNo) {
-  EXPECT_EQ(simulated({"--touches", "1", "--activation-gain", "0", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--activation-gain", "0", "--json"}),
+            verdict_is_no)
+      << said;
   EXPECT_EQ(document()["verdict"]["claim_met"], false);
   EXPECT_EQ(document()["verdict"]["jitter_falls"], false);
   EXPECT_EQ(document()["files"], Json::array());
 }
 
 TEST_F(JitterCommand, ADeviceIsMeasured) {
-  const int code = on_device({"--touches", "1", "--window", "0.6", "--json"});
+  const int code = on_device({"--expect-paper", "--touches", "1", "--window", "0.6", "--json"});
   ASSERT_TRUE(code == done || code == verdict_is_no) << said;
   const Json all = document();
   EXPECT_EQ(all["verdict"]["claim_met"] == true, code == done);
@@ -47,7 +49,8 @@ TEST_F(JitterCommand, ADeviceIsMeasured) {
 
 // In half a second nobody settles, and a time that nobody has neither falls nor does not.
 TEST_F(JitterCommand, WhatWasNotShownIsNullAndNotNo) {
-  EXPECT_EQ(simulated({"--touches", "1", "--window", "0.5", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--window", "0.5", "--json"}), verdict_is_no)
+      << said;
   const Json verdict = document()["verdict"];
   EXPECT_EQ(verdict["jitter_falls"], true);
   EXPECT_TRUE(verdict["adjustment_time_falls"].is_null()) << verdict;
@@ -58,7 +61,8 @@ TEST_F(JitterCommand, WhatWasNotShownIsNullAndNotNo) {
 TEST_F(JitterCommand, APersonWhoNeverComesToTheWallIsAFailure) {
   board.axes[0].motion.reset();
   board.axes[0].start.position = 0.02;
-  EXPECT_EQ(on_device({"--touches", "1", "--window", "0.6", "--patience", "3", "--json"}), failed);
+  EXPECT_EQ(on_device({"--expect-paper", "--touches", "1", "--window", "0.6", "--patience", "3", "--json"}),
+            failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "nobody touched the wall within 3 s");
 }
 

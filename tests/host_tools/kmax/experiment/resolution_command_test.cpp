@@ -28,7 +28,8 @@ TEST_F(ResolutionCommand, TheDocumentHasEveryHandAndTheVerdict) {
 }
 
 TEST_F(ResolutionCommand, AFirmHandWithoutDelayIsAnswerNo) {
-  EXPECT_EQ(simulated({"--touches", "1", "--speeds", "0.05,0.3", "--grip", "1", "--delay", "0", "--json"}),
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--speeds", "0.05,0.3", "--grip", "1", "--delay",
+                       "0", "--json"}),
             verdict_is_no)
       << said;
   EXPECT_EQ(document()["verdict"]["coarse_vibrates_at_every_speed"], false);
@@ -37,7 +38,8 @@ TEST_F(ResolutionCommand, AFirmHandWithoutDelayIsAnswerNo) {
 }
 
 TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
-  EXPECT_EQ(simulated({"--touches", "1", "--speeds", "0.05", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--speeds", "0.05", "--json"}), verdict_is_no)
+      << said;
   const Json verdict = document()["verdict"];
   EXPECT_EQ(verdict["coarse_vibrates_at_every_speed"], true);
   EXPECT_EQ(verdict["fine_is_still_below_onset"], true);
@@ -49,7 +51,7 @@ TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
 
 TEST_F(ResolutionCommand, ADeviceIsMeasured) {
   // The board's person comes at one speed, whatever is asked for: never on both sides of the onset.
-  EXPECT_EQ(on_device({"--speeds", "0.1", "--hold", "1", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(on_device({"--expect-paper", "--speeds", "0.1", "--hold", "1", "--json"}), verdict_is_no) << said;
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["runs"].size(), 1u);

@@ -23,6 +23,24 @@ TEST_F(Plot, ChosenColumns) {
   expect_error({"plot", table, "--x", "none"}, wrong_usage, "no column 'none'");
 }
 
+TEST_F(Plot, WhatDoesNotChangeIsDrawnOnlyIfAskedFor) {
+  const std::string table =
+      folder.write("run.csv", "time_s,tick,force_n,gap_mm\n0,20,1,2\n1,40,2,2\n").string();
+  EXPECT_EQ(kmax({"plot", table}), done);
+  EXPECT_CONTAINS(said, "left out, as they do not change or count ticks: tick, gap_mm; --y draws them");
+  const std::string picture = folder.read("run.svg");
+  EXPECT_CONTAINS(picture, "force (N)");
+  EXPECT_EQ(picture.find("gap (mm)"), std::string::npos);
+  EXPECT_EQ(picture.find(">tick<"), std::string::npos);
+  EXPECT_EQ(kmax({"plot", table, "--y", "gap_mm"}), done);
+  EXPECT_EQ(said, "");
+  EXPECT_CONTAINS(folder.read("run.svg"), "gap (mm)");
+  // Flat lines are better than nothing.
+  EXPECT_EQ(kmax({"plot", folder.write("flat.csv", "time_s,force_n\n0,1\n1,1\n").string()}), done);
+  EXPECT_CONTAINS(said, "none of these columns changes: force_n");
+  EXPECT_CONTAINS(folder.read("flat.svg"), "force (N)");
+}
+
 TEST_F(Plot, BadInput) {
   expect_error({"plot"}, wrong_usage, "table is required");
   expect_error({"plot", in("none.csv")}, wrong_usage, "cannot be read");

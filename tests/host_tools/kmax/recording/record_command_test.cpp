@@ -69,7 +69,7 @@ class RecordCommand : public CommandLineFixture {
 };
 
 TEST_F(RecordCommand, OverCanItStartsTheNodeRecordsAndPutsItBack) {
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "0.5", "--device", "can:fake0", "--json"}), done) << said;
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "500ms", "--device", "can:fake0", "--json"}), done) << said;
   EXPECT_EQ(opened, "fake0");
   ASSERT_EQ(bus.sent.size(), 2u);
   EXPECT_EQ(bus.sent[0], (drivers::CanFrame{.length = 2, .data = {1, 1}}));

@@ -71,7 +71,7 @@ TEST_F(Simulate, LostEdgesAreTold) {
 }
 
 TEST_F(Simulate, BadScenes) {
-  expect_error({"simulate"}, wrong_usage, "scene is required");
+  expect_error({"simulate"}, wrong_usage, "a SCENE is missing: a TOML file, or one of compliant_structure, ");
   expect_error({"simulate", "tuoch"}, wrong_usage, "supplied are compliant_structure, dc_coreless_a, ");
   expect_error({"simulate", scene("wall.stifness = 1\n")}, wrong_usage, "scene.toml:5:");
   expect_error({"simulate", scene("wall.stiffness = -1\n")}, wrong_usage, "scene.toml:5:");
@@ -100,6 +100,97 @@ TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
   EXPECT_CONTAINS(said, "the run ended in a fault of the axis");
   EXPECT_EQ(document()["fault"], "over_speed");
   EXPECT_EQ(document()["state"], "fault");
+}
+
+TEST_F(Simulate, ASettingStandsInPlaceOfWhatTheSceneSays) {
+  const auto table = [&](std::vector<std::string> settings) {
+    std::vector<std::string> arguments{"simulate", scene("haptic.rate = 500\n"), "--csv", in("r.csv")};
+    settings.push_back("device.friction=0.01");
+    for (const std::string& one : settings) arguments.insert(arguments.end(), {"--set", one});
+    EXPECT_EQ(kmax(arguments), done) << said;
+    return folder.read("r.csv");
+  };
+  const std::string plain = table({"device.start_velocity=-30cm/s"});
+  EXPECT_TRUE(plain == table({"device.start_velocity = -0.3"}));
+  EXPECT_TRUE(plain != table({"device.start_velocity=-30cm/s", "device.damping=1"}));
+  EXPECT_TRUE(plain != table({"device.start_velocity=-30cm/s", "wall.stiffness=3N/mm"}));
+  EXPECT_TRUE(plain == table({"axis0.device.start_velocity=-0.3", "axis0.wall.stiffness=1N/mm"}));
+  EXPECT_EQ(kmax({"simulate", scene(""), "--set", "duration=100ms", "--json"}), done);
+  EXPECT_EQ(document()["samples"], 2000);
+}
+
+TEST_F(Simulate, ASceneMaySayItsNumbersWithUnits) {
+  const auto table = [&](const std::string& text) {
+    const std::string path = folder.write("u.toml", "duration = 0.05\n" + text).string();
+    EXPECT_EQ(kmax({"simulate", path, "--csv", in("r.csv")}), done) << said;
+    return folder.read("r.csv");
+  };
+  EXPECT_TRUE(table("[device]\nmass = 0.06\nstart_position = 0.005\nstart_velocity = -0.2\n") ==
+              table("[device]\nmass = \"60 g\"\nstart_position = \"5mm\"\nstart_velocity = \"-20 cm/s\"\n"));
+}
+
+TEST_F(Simulate, ThePersonAimsAtAWallThatIsSetWithAUnit) {
+  EXPECT_EQ(kmax({"simulate", "touch", "--set", "wall.position=5mm", "--set", "wall.law=none", "--set",
+                  "motion.hold_time=1.5s", "--json"}),
+            done);
+  const Json with_unit = document()["contact"];
+  EXPECT_EQ(kmax({"simulate", "touch", "--set", "wall.position=0.005", "--set", "wall.law=none", "--set",
+                  "motion.hold_time=1.5", "--json"}),
+            done);
+  EXPECT_EQ(document()["contact"], with_unit);
+  EXPECT_NE(with_unit["verdict"], "no_contact");
+}
+
+TEST_F(Simulate, SettingsThatCannotBeMeant) {
+  const auto set = [&](const std::string& one) {
+    return std::vector<std::string>{"simulate", scene(""), "--set", one};
+  };
+  expect_error(set("operator.grip_stifness=800"), wrong_usage,
+               "'operator.grip_stifness' is neither a key of a scene nor a parameter; did you mean "
+               "operator.grip_stiffness");
+  expect_error(set("wall.stifness=800"), wrong_usage, "did you mean wall.stiffness");
+  expect_error(set("sed=2"), wrong_usage, "did you mean seed");
+  expect_error(set("operator.grip_stiffness=800"), wrong_usage,
+               "--set operator.grip_stiffness=800: " + in("scene.toml") + " has no [operator]");
+  expect_error(set("axis1.device.mass=1"), wrong_usage, "has no [axis1.device]");
+  expect_error(set("device.mass=60kgg"), wrong_usage, "'kgg' is not one of its units kg, g");
+  expect_error(set("device.mass=-1"), wrong_usage, "allowed is a number from 0.0001 to 100 kg");
+  expect_error(set("wall.stiffness=1kg"), wrong_usage, "'kg' is not one of its units N/m");
+  expect_error(set("wall.law=magnetik"), wrong_usage, "did you mean magnetic");
+  expect_error(set("identified=perhaps"), wrong_usage, "allowed is true or false");
+  expect_error(set("seed=-1"), wrong_usage, "a whole number from 0");
+  expect_error(set("integrator.kind=rk5"), wrong_usage, "did you mean rk4");
+  expect_error(set("device.mass"), wrong_usage, "write NAME=VALUE");
+  expect_error({"simulate", scene(""), "--set", "seed=1", "--set", "seed=2"}, wrong_usage, "given twice");
+}
+
+TEST_F(Simulate, ANameOfBothIsTheScenesUnlessSaidOtherwise) {
+  // A wrong mass in the firmware does not make the handle heavier.
+  const auto run = [&](const std::string& one) {
+    EXPECT_EQ(kmax({"simulate", scene(""), "--set", "device.start_velocity=-0.1", "--set", one, "--csv",
+                    in("r.csv")}),
+              done)
+        << said;
+    return folder.read("r.csv");
+  };
+  EXPECT_TRUE(run("parameters.device.mass=1kg") == run("parameters.device.mass=2kg"));
+  EXPECT_TRUE(run("device.mass=1kg") != run("device.mass=2kg"));
+}
+
+TEST_F(Simulate, AMotorThatIsNotCalibratedSaysWhatToDo) {
+  expect_error({"simulate", "gimbal_a"}, failed, "'kmax simulate gimbal_a --set identified=true'");
+  EXPECT_CONTAINS(said, "'kmax serve --scene gimbal_a --serial /tmp/kmax'");
+  EXPECT_EQ(kmax({"simulate", "gimbal_a", "--set", "identified=true", "--set", "duration=0.1"}), done)
+      << said;
+}
+
+TEST_F(Simulate, TheKeysAreAPageOrADocument) {
+  EXPECT_EQ(kmax({"simulate", "--keys"}), done);
+  EXPECT_CONTAINS(output, "\n## [operator], per axis\n");
+  EXPECT_CONTAINS(output, "\n| `grip_stiffness` | N/m | 540 | 1 .. 1e7 | k1, stiffness of the grip |\n");
+  EXPECT_EQ(kmax({"simulate", "--keys", "--json"}), done);
+  EXPECT_EQ(document()["keys"][0]["key"], "name");
+  expect_error({"simulate", "touch", "--keys"}, wrong_usage, "give it alone");
 }
 
 }  // namespace kmax::cli::simulate_command_test

@@ -33,6 +33,30 @@ TEST_F(Wall, ATable) {
   EXPECT_EQ(folder.read("out.csv"), "position_m,velocity_m_per_s,force_n\n-0.001,0,1\n");
 }
 
+TEST_F(Wall, ATableOnStandardOutput) {
+  folder.write("in.csv", "position_m\n-0.001\n");
+  EXPECT_EQ(kmax({"wall", "--csv", in("in.csv"), "--out", "-"}), done) << said;
+  EXPECT_EQ(output, "position_m,velocity_m_per_s,force_n\n-0.001,0,1\n");
+  EXPECT_FALSE(std::filesystem::exists("-"));
+  EXPECT_EQ(kmax({"wall", "--csv", in("in.csv"), "--out", "-", "--json"}), wrong_usage);
+  EXPECT_CONTAINS(said, "exclude each other");
+}
+
+TEST_F(Wall, PositionAndVelocityMayHaveAUnit) {
+  const auto force = [&](const char* position, const char* velocity) {
+    EXPECT_EQ(kmax({"wall", "--set", "wall.stiffness=8410", "--set", "wall.damping=1", "--position", position,
+                    "--velocity", velocity, "--json"}),
+              done)
+        << said;
+    return document()["force_n"].get<double>();
+  };
+  EXPECT_EQ(force("-0.1mm", "-5cm/s"), force("-0.0001", "-0.05"));
+  expect_error({"wall", "--position", "-0.1kg"}, wrong_usage, "'kg' is not one of its units m, mm");
+  expect_error({"wall", "--position", "2km"}, wrong_usage, "'km' is not one of its units m");
+  expect_error({"wall", "--position", "2000"}, wrong_usage,
+               "2000 m not in range -1000 .. 1000 m");
+}
+
 TEST_F(Wall, APicture) {
   EXPECT_EQ(kmax({"wall", "--picture", in("laws.svg"), "--json"}), done);
   EXPECT_EQ(document(), (Json{{"picture", in("laws.svg")}}));
@@ -52,7 +76,7 @@ TEST_F(Wall, ExactlyOneThingIsAskedFor) {
 }
 
 TEST_F(Wall, BadNumbersAndParametersAreWrongUsage) {
-  for (const char* bad : {"nan", "inf", "-inf", "1e400", "1mm", ""})
+  for (const char* bad : {"nan", "inf", "-inf", "1e400", "1kg", ""})
     EXPECT_EQ(kmax({"wall", "--position", bad}), wrong_usage) << bad;
   EXPECT_EQ(kmax({"wall", "--position", "0", "--velocity", "nan"}), wrong_usage);
   const auto set = [](const char* one) {
