@@ -19,7 +19,8 @@ using device::Parameter;
 using std::chrono::milliseconds;
 
 namespace {
-constexpr milliseconds state_interval{100}, slow_interval{1000};
+// What is asked of the device by requests leaves fewer of them for rows, unless those come by themselves.
+constexpr milliseconds state_interval{100}, state_interval_of_polled{200}, slow_interval{1000};
 
 std::vector<std::size_t> all_axes() {
   std::vector<std::size_t> axes;
@@ -90,7 +91,7 @@ void Conversation::step() {
   try {
     while (const auto command = commands_.take()) carry_out(*command);
     if (Clock::now() >= next_state_) {
-      next_state_ = Clock::now() + state_interval;
+      next_state_ = Clock::now() + (polled_ ? state_interval_of_polled : state_interval);
       read_state();
       if (mirror_.read_some(device_)) publish_parameters();
     }

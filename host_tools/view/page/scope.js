@@ -6,7 +6,7 @@ import { spectrum } from "/spectrum.js";
 import { colour } from "/theme.js";
 import { digits, shownUnit, steady, toShown, withUnit } from "/units.js";
 
-const WINDOW_S = 2;
+const WINDOW_S = 1;
 const SPECTRUM_ROWS = 2048;
 const SAMPLES = 500;  // of four channels: read over CAN in less than half of link.timeout
 const LEVELLED = ["force", "velocity"];

@@ -28,8 +28,9 @@ function started(command, ...parts) {
 /** A device on a bus at a Unix socket: `device` is its command, in which BUS stands for the socket. */
 export async function device(command, bus) {
   const running = started(...command.map((part) => part.replace("BUS", bus)));
+  running.child.on("exit", (code) => code && console.error(running.said));
   // Over the bus like anybody else: the image takes its time to start.
-  await until(`${command.join(" ")} answers: ${running.said}`, () => existsSync(bus) && (kmax(bus, "get", "info.tick", "--json")?.["info.tick"].value ?? 0) > 6000);
+  await until(`${command.join(" ")} answers`, () => existsSync(bus) && (kmax(bus, "get", "info.tick", "--json")?.["info.tick"].value ?? 0) > 6000);
   return running;
 }
 

@@ -1,54 +1,64 @@
 #!/usr/bin/env node
-// Pictures of the live page while a simulated person presses against the wall.
-// usage: pictures.mjs URL FOLDER [moving]      moving: also the frames of a moving picture, FOLDER/frames/*.png
-import { mkdirSync } from "node:fs";
+// Pictures of the live page while a simulated person presses against a wall, in every size, light and dark; and
+// the frames of a moving one, of which `img2webp -loop 0 -d 120 -lossy -q 70 FOLDER/frames/*.png -o FOLDER/view.webp` (Debian
+// package webp) makes one file.
+// usage: pictures.mjs FOLDER      with KMAX in the environment, or build/native/kmax
+import { mkdirSync, rmSync } from "node:fs";
+import { join } from "node:path";
 import { arm, launch, open } from "./browser.mjs";
+import { device, view } from "./kmax_processes.mjs";
 
-const [url, folder, moving] = process.argv.slice(2);
-mkdirSync(folder, { recursive: true });
+const SIZES = { desk: [1280, 720], tablet: [1024, 768], portrait: [768, 1024], telephone: [412, 915] };
+const FRAMES = 70;
+
+const scene = new URL("long_touch.toml", import.meta.url).pathname;
+const folder = process.argv[2];
+mkdirSync(join(folder, "frames"), { recursive: true });
+const bus = join(folder, "bus");
+const running = await device([process.env.KMAX ?? "build/native/kmax", "serve", "--can", "BUS", "--scene", scene], bus);
+const served = await view(bus);
 const browser = await launch();
-const SIZES = { desk: { width: 1280, height: 720 }, tablet: { width: 1024, height: 768 }, portrait: { width: 768, height: 1024 }, telephone: { width: 412, height: 915 } };
+const page = await open(browser, served.address.url);
 
-const set = (page, name, value) => page.locator(`#field-${name.replaceAll(".", "-")}`).fill(value).then(() => page.keyboard.press("Tab"));
+const picture = (name, options = {}) => page.screenshot({ path: join(folder, `${name}.png`), ...options });
+const drag = (place, shown) => page.evaluate(([i, value]) => {
+  const slider = document.querySelectorAll(".slider input[type=range]")[i];
+  slider.value = value;
+  slider.dispatchEvent(new Event("input"));
+}, [place, shown]);
 
-const page = await open(browser, url);
-await page.selectOption("#law", "magnetic");
-await set(page, "wall.stiffness", "2");
-await page.locator("summary").click();
-await set(page, "wall.stiffness_ceiling", "10");
-await page.locator("summary").click();
-await page.screenshot({ path: `${folder}/disarmed.png` });
+await picture("disarmed");
 await arm(page);
-await page.waitForTimeout(2500);
+await page.waitForTimeout(1500);
+for (let frame = 0; frame < FRAMES; ++frame) {
+  // The wall oscillates, and holds still once the field is strong enough.
+  if (frame > FRAMES / 3) await drag(2, Math.min(2, (frame / FRAMES - 1 / 3) * 4));
+  await page.screenshot({ path: join(folder, "frames", `${String(frame).padStart(3, "0")}.png`) });
+}
+await drag(2, 0.5);
 for (const scheme of ["light", "dark"]) {
   await page.emulateMedia({ colorScheme: scheme });
-  for (const [name, size] of Object.entries(SIZES)) {
-    await page.setViewportSize(size);
-    await page.waitForTimeout(500);
-    await page.screenshot({ path: `${folder}/${name}_${scheme}.png`, fullPage: true });
+  for (const [name, [width, height]] of Object.entries(SIZES)) {
+    await page.setViewportSize({ width, height });
+    await page.waitForTimeout(400);
+    await picture(`${name}_${scheme}`, { fullPage: true });
   }
-  await page.setViewportSize(SIZES.desk);
+  await page.setViewportSize({ width: 1280, height: 720 });
   await page.click("[data-scope=capture]");
   await page.click("#capture");
   await page.waitForFunction(() => document.getElementById("scope-words").textContent.includes("samples"));
-  await page.waitForTimeout(300);
-  await page.screenshot({ path: `${folder}/capture_${scheme}.png` });
+  await picture(`capture_${scheme}`);
   await page.click("[data-scope=spectrum]");
   await page.waitForTimeout(600);
-  await page.screenshot({ path: `${folder}/spectrum_${scheme}.png` });
+  await picture(`spectrum_${scheme}`);
   await page.click("[data-scope=rolling]");
-}
-if (moving) {
-  mkdirSync(`${folder}/frames`, { recursive: true });
-  await page.emulateMedia({ colorScheme: "light" });
-  await page.click("#revert");
-  await set(page, "wall.stiffness_ceiling", "10");
-  for (let i = 0; i < 60; ++i) {
-    if (i % 2 === 0) await set(page, "wall.stiffness", String((1 + i / 12).toFixed(2)));
-    await page.screenshot({ path: `${folder}/frames/${String(i).padStart(3, "0")}.png` });
-  }
 }
 await page.keyboard.press("Space");
 await page.waitForSelector("#state[data-state=stopped]");
-await page.screenshot({ path: `${folder}/stopped.png` });
+await picture("stopped");
+await running.end("SIGKILL");
+await page.waitForSelector("#state[data-state=lost]");
+await picture("lost");
 await browser.close();
+await served.end();
+rmSync(bus, { force: true });
