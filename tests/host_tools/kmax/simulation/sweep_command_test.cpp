@@ -71,7 +71,8 @@ TEST_F(Sweep, RangesAndListsInTheirUnits) {
     EXPECT_EQ(kmax({"sweep", scene(""), "--set", set, "--set", "measurement.window=0.5s", "--json"}), done)
         << said;
     std::vector<std::string> found;
-    for (const Json& run : document()["runs"]) found.push_back(run["settings"].front().get<std::string>());
+    const Json all = document();
+    for (const Json& run : all["runs"]) found.push_back(run["settings"].front().get<std::string>());
     return found;
   };
   EXPECT_EQ(values("device.mass=40g..60g:10g"), (std::vector<std::string>{"0.04", "0.05", "0.06"}));
