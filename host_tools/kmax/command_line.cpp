@@ -202,9 +202,4 @@ void Context::note(const std::string& text) {
   messages_ << (terminal ? wrapped("kmax: " + text, terminal->columns - 1, 2) : "kmax: " + text) << std::endl;
 }
 
-std::size_t Context::columns() const {
-  // Longer lines are hard to read.
-  return std::min<std::size_t>(terminal_behind(out).value_or(TerminalSize{}).columns, 120);
-}
-
 }  // namespace kmax::cli

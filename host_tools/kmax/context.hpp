@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -47,8 +48,8 @@ class Context {
   /// One line on the messages' stream.
   void note(const std::string& text);
 
-  /// How wide what is written to `out` may be: the terminal, at most 120; 80 for a file or a pipe.
-  std::size_t columns() const;
+  /// How wide a text is best written to `out`: as the terminal, at most 120; 80 for a file or a pipe.
+  std::size_t columns() const { return width == 0 ? 80 : std::min<std::size_t>(width, 120); }
 
   /// For what a line at a time cannot show (Progress).
   std::ostream& messages() { return messages_; }
