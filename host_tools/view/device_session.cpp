@@ -7,7 +7,7 @@
 namespace kmax::view {
 
 namespace {
-constexpr std::chrono::milliseconds attempt_interval{500}, piece{50};
+constexpr std::chrono::milliseconds attempt_interval{500}, answer_interval{50};
 }  // namespace
 
 DeviceSession::DeviceSession(Reach reach, DeviceFacts facts, CommandQueue& commands, Analysis& analysis,
@@ -40,9 +40,9 @@ void DeviceSession::run(const std::function<bool()>& ended) {
     }
     publish_(state_message({.trouble = trouble}, {}, std::nullopt));
     conversation_.reset();
-    for (auto waited = piece; waited <= attempt_interval && !ended(); waited += piece) {
+    for (auto waited = answer_interval; waited <= attempt_interval && !ended(); waited += answer_interval) {
       answer_without_a_device(trouble);
-      std::this_thread::sleep_for(piece);
+      std::this_thread::sleep_for(answer_interval);
     }
   }
   if (conversation_) conversation_->end();

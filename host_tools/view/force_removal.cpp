@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "firmware/drive/axis_state_machine.hpp"
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/drive.hpp"
 
 namespace kmax::view {

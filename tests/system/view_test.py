@@ -13,11 +13,12 @@ from kmax_under_test import BOARD, ELF, KMAX, PATIENCE
 FOLDER = Path(__file__).resolve().parent / "view_browser"
 DRIVER = FOLDER.parents[2] / "build" / "view_browser" / "package-lock.json"
 BROWSER = os.environ.get("CHROMIUM") or shutil.which("chromium")
+LEFT_OUT = ("node is missing (Debian package nodejs)" if not shutil.which("node") else
+            "there is no chromium (Debian package chromium)" if not BROWSER else
+            f"{DRIVER} is not installed (scripts/install_node_packages)" if not DRIVER.exists() else None)
 
 
-@unittest.skipUnless(DRIVER.exists(), f"left out: {DRIVER} is not installed (scripts/install_node_packages)")
-@unittest.skipUnless(BROWSER, "left out: there is no chromium (Debian package chromium)")
-@unittest.skipUnless(shutil.which("node"), "left out: node is missing (Debian package nodejs)")
+@unittest.skipIf(LEFT_OUT, LEFT_OUT)
 class Page(unittest.TestCase):
     def check(self, extent, *device):
         done = subprocess.run(["node", str(FOLDER / "page_check.mjs"), extent, *device], capture_output=True, text=True,
@@ -33,4 +34,6 @@ class Page(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    if LEFT_OUT:  # CTest reports a test that begins so as skipped
+        sys.exit(print(f"left out: {LEFT_OUT}"))
     sys.exit(unittest.main())

@@ -134,7 +134,7 @@ const steps = {
     await page.reload();
     // The page itself stops as it is hidden; if it cannot any more, kmax view does.
     await page.waitForFunction(() => /Stopped: (STOP|the page that had armed)/.test(document.getElementById("banner").textContent));
-    assert.equal(armed(), false);
+    await until("the axis is not armed", () => !armed());
   },
   async "another page of the same browser can do nothing, not even with the token"() {
     const server = createServer((_, response) => response.end("<!doctype html><title>other</title>"));
