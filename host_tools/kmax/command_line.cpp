@@ -9,11 +9,11 @@
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/device_address.hpp"
+#include "host_tools/device/settings_file.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/completion.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/kmax/help_text.hpp"
-#include "host_tools/kmax/settings_file.hpp"
 #include "host_tools/kmax/supplied_files.hpp"
 #include "host_tools/kmax/usage_suggestion.hpp"
 #include "host_tools/plot/csv_table.hpp"
@@ -157,9 +157,7 @@ int run(const std::vector<std::string>& arguments, Context& context) {
 }
 
 std::optional<std::string> Context::named_device() const {
-  if (!device_option.empty()) return device_option;
-  if (const auto address = link::device_address_of_environment()) return address;
-  return device_of_settings_file();
+  return device_option.empty() ? link::default_device_address() : device_option;
 }
 
 std::vector<std::size_t> Context::axes() const {
@@ -179,20 +177,18 @@ device::Device Context::connect() {
   if (simulated())
     note(
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
-        "names a "
-        "lasting one");
+        "names a lasting one");
   return device::Device(std::move(opened), notice);
 }
 
 device::Device Context::connect_to_change() {
   if (!named_device())
-    throw UsageError(
-        fmt::format("this changes a device, and none is named: give --device serial:PATH or --device "
-                    "can:IFACE, set KMAX_DEVICE, or "
-                    "write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be reached. 'kmax "
-                    "serve --serial /tmp/kmax' "
-                    "is a simulated one that lasts, --device sim one that is gone when the command ends",
-                    settings_file().string()));
+    throw UsageError(fmt::format(
+        "this changes a device, and none is named: give --device serial:PATH or --device can:IFACE, "
+        "set KMAX_DEVICE, or write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be "
+        "reached. 'kmax serve --serial /tmp/kmax' is a simulated one that lasts, --device sim one that is "
+        "gone when the command ends",
+        link::settings_file().string()));
   return connect();
 }
 

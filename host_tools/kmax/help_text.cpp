@@ -93,16 +93,27 @@ void add_options(std::string& text, const CLI::App& app, bool positional, const 
   }
 }
 
-/// Examples and remarks keep their lines where these fit, and their indent where not.
+/// Remarks are wrapped as paragraphs. What is indented, an example, keeps its line; where that is too long it
+/// keeps its indent, and its comment moves up to it.
 std::string footer_text(const std::string& footer, std::size_t width) {
-  std::string text;
+  std::string text, paragraph;
+  const auto end_paragraph = [&] {
+    if (!paragraph.empty()) text += wrapped(paragraph, width, 0) + "\n";
+    paragraph.clear();
+  };
   for (const std::string& line : lines_of(footer, std::string::npos)) {
     const std::size_t indent = std::min(line.find_first_not_of(' '), line.size());
-    text += line.size() <= width
-                ? line
-                : line.substr(0, indent) + wrapped(line.substr(indent), width - indent - 2, indent + 2);
+    if (indent == 0 && !line.empty()) {
+      paragraph += (paragraph.empty() ? "" : " ") + line;
+      continue;
+    }
+    end_paragraph();
+    const std::string words = std::regex_replace(line.substr(indent), std::regex(" {2,}"), "  ");
+    text +=
+        line.size() <= width ? line : line.substr(0, indent) + wrapped(words, width - indent - 2, indent + 2);
     text += '\n';
   }
+  end_paragraph();
   return text;
 }
 

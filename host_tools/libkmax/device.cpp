@@ -23,7 +23,7 @@ using library::translated;
 namespace {
 link::DeviceAddress address_of(const std::string& text) {
   if (!text.empty()) return link::parse_device_address(text);
-  const auto named = link::device_address_of_environment();
+  const auto named = link::default_device_address();
   if (!named)
     throw device::ValueError(
         "no device is named: give its address, serial:PATH, can:IFACE or sim, or set KMAX_DEVICE; 'kmax "

@@ -28,8 +28,11 @@ CLANG = ["clang++", "-std=c++20", f"-I{ROOT}", f"-I{ROOT}/host_tools/libkmax", "
 
 
 def is_library(include):
-    """Of the standard library, whose headers have neither a folder nor a suffix, or in another library's folder."""
-    return not include.quoted and ("/" in include.target or "." not in include.target)
+    """Of the standard library, whose headers have neither a folder nor a suffix, or in another library's folder. In kmax/
+    are the headers of libkmax."""
+    if include.quoted or include.target.startswith("kmax/"):
+        return False
+    return "/" in include.target or "." not in include.target
 
 
 def precompiled(listed, text, *first):

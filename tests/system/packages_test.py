@@ -19,7 +19,7 @@ class Packages(unittest.TestCase):
 
     def run_in(self, root, *command, **more):
         environment = {**os.environ, "KMAX_DEVICE": "sim", "PATH": f"{root}/usr/bin:{os.environ['PATH']}",
-                       "LD_LIBRARY_PATH": ":".join(map(str, root.glob("usr/lib/*-linux-gnu"))),
+                       "LD_LIBRARY_PATH": str(root / "usr/lib"),
                        "PYTHONPATH": str(root / "usr/lib/python3/dist-packages")}
         return subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=300, cwd=root,
                               **more).stdout

@@ -15,6 +15,7 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/link.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/quantity_option.hpp"
 #include "host_tools/kmax/recording/watch_view.hpp"
 #include "host_tools/kmax/terminal.hpp"
 
@@ -29,10 +30,8 @@ struct WatchOptions {
   double rate = 10;
 
   void declare(CLI::App& command) {
-    command.add_option("--for", seconds, "How long; without it until q or Ctrl-C")->type_name("S");
-    command.add_option("--rate", rate, "Readings a second, 0.1 .. 50")
-        ->type_name("HZ")
-        ->capture_default_str();
+    add_quantity(command, "--for", seconds, "s", "How long, s; without it until q or Ctrl-C", 0.0, 1e9);
+    add_quantity(command, "--rate", rate, "Hz", "Readings a second, Hz", 0.1, 50.0);
   }
 };
 
@@ -93,10 +92,6 @@ class Display {
 };
 
 int run_watch(Context& context, const WatchOptions& options) {
-  if (options.seconds && !(std::isfinite(*options.seconds) && *options.seconds >= 0))
-    throw UsageError(fmt::format("--for: {} is not a number of seconds", *options.seconds));
-  if (!(options.rate >= 0.1 && options.rate <= 50))
-    throw UsageError(fmt::format("--rate: {} is not within 0.1 .. 50 Hz", options.rate));
   const Interruption interruption;
   device::Device device = context.connect();
   link::Link& link = device.link();

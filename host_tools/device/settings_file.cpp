@@ -1,4 +1,4 @@
-#include "host_tools/kmax/settings_file.hpp"
+#include "host_tools/device/settings_file.hpp"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/base/toml_text.hpp"
-#include "host_tools/kmax/context.hpp"
+#include "host_tools/device/device_address.hpp"
 
-namespace kmax::cli {
+namespace kmax::link {
 
 namespace {
 /// The specification ignores a path that is not absolute.
@@ -28,17 +28,18 @@ std::filesystem::path settings_file() {
   return {};
 }
 
-std::optional<std::string> device_of_settings_file() {
+std::optional<std::string> default_device_address() {
+  if (const auto address = device_address_of_environment()) return address;
   const std::filesystem::path file = settings_file();
   std::error_code unreadable;
   if (file.empty() || !std::filesystem::exists(file, unreadable)) return std::nullopt;
   const std::string text =
-      base::text_of<UsageError>(file, "it holds your defaults for kmax; mend it or remove it");
-  const toml::table table = base::parsed_toml<UsageError>(text, file.string());
+      base::text_of<AddressError>(file, "it holds your defaults for kmax; mend it or remove it");
+  const toml::table table = base::parsed_toml<AddressError>(text, file.string());
   static const std::array<std::string, 1> keys = {"device"};
   for (const auto& [key, value] : table) {
     if (key.str() != keys[0])
-      throw UsageError(
+      throw AddressError(
           fmt::format("{}: there is no setting '{}'{}; what may stand here is device = \"serial:PATH\" or "
                       "\"can:IFACE\"",
                       file.string(), key.str(), device::did_you_mean(key.str(), keys)));
@@ -46,9 +47,9 @@ std::optional<std::string> device_of_settings_file() {
   if (!table.contains(keys[0])) return std::nullopt;
   const auto address = table[keys[0]].value<std::string>();
   if (!address || address->empty())
-    throw UsageError(fmt::format(
+    throw AddressError(fmt::format(
         "{}: device is not an address; write it as in device = \"serial:/dev/ttyUSB0\"", file.string()));
   return address;
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::link
