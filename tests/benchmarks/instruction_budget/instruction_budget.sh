@@ -13,10 +13,10 @@ here=$source_dir/tests/benchmarks/instruction_budget
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 # As the images are compiled, see CMakeLists.txt and board/stm32f405/toolchain.cmake.
-flags="-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -O2 -std=c++20 -fno-exceptions -fno-rtti
+flags="-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -O2 -std=c++20 -fno-exceptions -fno-rtti -fno-threadsafe-statics
        -ffp-contract=off -fno-math-errno -ffunction-sections -DNDEBUG -I$source_dir"
 # shellcheck disable=SC2086  # the flags are words
-"$gxx" $flags -nostartfiles -specs=nano.specs -T "$here/image.ld" \
-  "$here/start.cpp" "$here/image.cpp" "$here/steps.cpp" -o "$work/image.elf"
+"$gxx" $flags -nostartfiles -nodefaultlibs -specs=nano.specs -T "$here/image.ld" \
+  "$here/start.cpp" "$here/image.cpp" "$here/steps.cpp" -lm -lc -lgcc -o "$work/image.elf"
 "$qemu" -M netduinoplus2 -icount shift=0,sleep=off -nographic -monitor none -serial none \
   -semihosting-config enable=on,target=native -kernel "$work/image.elf" 2>&1

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/view/device_session.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -79,7 +80,9 @@ class ConversationTest : public testing::Test {
   /// Steps until a message of this type is there that `wanted` accepts.
   template <typename Steps>
   Json until(Steps& steps, const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
-    for (int i = 0; i < 2000; ++i) {
+    // How many steps it takes hangs on how fast they are, since some things are asked for once a second.
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < patience) {
       for (; looked_at < published.size(); ++looked_at) {
         const Json message = Json::parse(published[looked_at].text);
         if (message["type"] != type || (wanted && !wanted(message))) continue;

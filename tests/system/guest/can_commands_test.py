@@ -18,7 +18,7 @@ READINGS = 10
 REPORT_TICKS = 4  # how often the ticks report to the main loop, which has PDOs sent
 
 # What differs between two readings of one device, or between two links, and so is not compared.
-MOVES = {"device", "uptime", "tick", "duration_s", "readings", "current_a", "counters",
+MOVES = {"device", "uptime", "tick", "duration_s", "time_s", "readings", "current_a", "counters",
          # Modbus only: its device identification has more objects than CANopen's.
          "product_code", "vendor_name",
          # Each link's own state and counters.
