@@ -68,8 +68,7 @@ class Watchdog {
         axis_(axis),
         limit_(static_cast<std::int64_t>(limit * 1e9)),
         keeper_(
-            session.link(), session.device, axis, timeout, [this] { return loop_lives(); },
-            [this] { watch(); }) {}
+            session.device, axis, timeout, [this] { return loop_lives(); }, [this] { watch(); }) {}
 
   /// The function's time begins and ends.
   void begin() { busy_since_ = now(); }
@@ -88,9 +87,11 @@ class Watchdog {
 
   void watch() {
     const std::int64_t since = busy_since_;
-    if (since == 0 || tripped_ || now() - since < limit_) return;
+    if (!tripped_ && (since == 0 || now() - since < limit_)) return;
     tripped_ = true;
-    Drive(session_.device, axis_).disarm();
+    if (disarmed_) return;
+    Drive(session_.device, axis_).disarm();  // called again if the link fails it
+    disarmed_ = true;
   }
 
   Session& session_;
@@ -99,7 +100,8 @@ class Watchdog {
   std::atomic<std::int64_t> busy_since_ = 0;
   std::atomic<std::uint64_t> cycles_ = 1;
   std::atomic<bool> tripped_ = false;
-  Keeper keeper_;  // last: its thread uses the others
+  bool disarmed_ = false;  ///< since it tripped; of the keeper's thread
+  Keeper keeper_;          // last: its thread uses the others
 };
 
 /// Made when the axis is armed, and disarms it.
@@ -110,6 +112,7 @@ class ArmedForLoop {
     session_.link().set_lending(false);  // the loop lends its own idle time
   }
   ~ArmedForLoop() {
+    session_.link().set_lending(true);
     try {
       session_.disarm(axis_);
     } catch (const std::exception& error) {

@@ -4,7 +4,10 @@
 #include <kmax/device.hpp>
 
 #include <array>
+#include <atomic>
+#include <condition_variable>
 #include <mutex>
+#include <thread>
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/device_address.hpp"
@@ -49,8 +52,18 @@ class Session {
     bool armed = false;
     std::unique_ptr<Keeper> keeper;
   };
+  /// With axes_mutex_.
+  void note_kept_alive();
+  /// The thread that lends an idle link to other programs.
+  void lend(const std::stop_token& stop);
+
   std::mutex axes_mutex_;
   std::array<Axis, firmware::axis_count> axes_;
+  std::atomic<bool> kept_alive_ = false;  ///< an axis has a keeper
+
+  std::mutex lender_mutex_;
+  std::condition_variable_any lender_ended_;
+  std::jthread lender_;  // last: it uses the others
 };
 
 }  // namespace kmax::library

@@ -56,8 +56,9 @@ struct ForceLoopOptions {
 /// A haptic device with its controller.
 ///
 /// Calls are safe from any number of threads; they take turns. A device belongs to the process that opened
-/// it: a fork's child gets an Error. Other programs can use the link of an armed device in between, to stop
-/// it; otherwise it is this one's alone. Errors of all calls: LinkError, RefusedError, ValueError, and Error
+/// it: a fork's child gets an Error. Other programs can use the link in between, to stop it for
+/// instance: whenever this one has nothing to say, and for a moment every 500 ms while it talks without a
+/// pause. Errors of all calls: LinkError, RefusedError, ValueError, and Error
 /// for a closed device.
 class KMAX_API Device {
  public:
