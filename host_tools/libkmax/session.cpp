@@ -52,10 +52,6 @@ Session::~Session() {
   }
 }
 
-bool Session::is_of_this_process() const {
-  return getpid() == process;
-}
-
 void Session::require_axis(std::size_t axis) const {
   if (axis >= firmware::axis_count)
     throw device::ValueError(

@@ -13,6 +13,7 @@
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/libkmax/keeper.hpp"
+#include "host_tools/libkmax/sequence.hpp"
 #include "host_tools/libkmax/shared_link.hpp"
 
 namespace kmax::library {
@@ -25,7 +26,6 @@ class Session {
   ~Session();
 
   void require_axis(std::size_t axis) const;
-  bool is_of_this_process() const;
   bool is_can() const { return address.kind == link::DeviceAddress::Kind::can; }
   double link_timeout() { return device.read_number("link.timeout"); }
 
@@ -44,8 +44,8 @@ class Session {
  public:
   device::Device device;
   SharedLink& link() { return *opened_; }
-  /// Of what takes several requests that must not mix: settings, a capture, a recording.
-  std::mutex sequence;
+  Sequence run;       ///< of force loops, recordings and captures
+  Sequence settings;  ///< of what writes several values, beside a run or for it
 
  private:
   struct Axis {

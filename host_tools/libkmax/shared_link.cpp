@@ -1,5 +1,7 @@
 #include "host_tools/libkmax/shared_link.hpp"
 
+#include <kmax/errors.hpp>
+
 #include <algorithm>
 
 namespace kmax::library {
@@ -136,7 +138,9 @@ void SharedLink::wait(microseconds duration) {
 }
 
 void SharedLink::poll() const {
-  if (poll_ && !Uninterrupted::here()) poll_();
+  if (Uninterrupted::here()) return;
+  if (ended_) throw Error("the device was closed by another thread");
+  if (poll_) poll_();
 }
 
 void SharedLink::lend_if_idle(const std::function<void()>& sign_of_life) {

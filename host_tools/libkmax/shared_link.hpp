@@ -52,6 +52,8 @@ class SharedLink final : public link::Link {
   std::string description() const override { return inner_->description(); }
 
   void poll() const;
+  /// From now on poll() throws Error: the device is being closed.
+  void end() { ended_ = true; }
   void set_lending(bool lending) { lending_ = lending; }
   /// For a thread beside those that use the link: lends it for 10 ms if nobody has used it for 30 ms.
   /// `sign_of_life` is called before, with the link this thread's: whoever gets it may keep it for
@@ -74,7 +76,7 @@ class SharedLink final : public link::Link {
   bool virtual_time_;
   std::function<void()> poll_;
   Clock::time_point lent_ = Clock::now();  ///< the end of the last loan; with a turn
-  std::atomic<bool> lending_ = true;
+  std::atomic<bool> lending_ = true, ended_ = false;
   std::atomic<Clock::rep> last_used_{0};
 
   // The queue.
@@ -86,7 +88,7 @@ class SharedLink final : public link::Link {
 };
 
 /// A link that belongs to somebody else, for an owner that wants one of its own.
-class BorrowedLink final : public link::Link {
+class BorrowedLink : public link::Link {
  public:
   /// `lender` must outlive this.
   explicit BorrowedLink(link::Link& lender) : lender_(lender) {}

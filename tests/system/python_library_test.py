@@ -374,6 +374,38 @@ class Loops(AgainstAServedDevice):
         with self.assertRaisesRegex(ValueError, "1 to 1000 Hz"):
             device.force_loop(lambda sample: 0.0, rate=2000)
 
+    def test_what_its_function_may_do(self):
+        for address in self.served.bus, self.served.device:
+            with self.subTest(address), kmax.Device(address) as device:
+                def pull(sample):
+                    device["wall.stiffness"] = 432
+                    return None
+
+                device.force_loop(pull, watchdog=PATIENCE / 10)
+                self.assertEqual(device["wall.stiffness"], 432)
+                with self.assertRaisesRegex(kmax.RefusedError, "from within another call"):
+                    device.record(PATIENCE, more=lambda block: device.record(1))
+                with self.assertRaisesRegex(kmax.Error, "cannot be closed from within"):
+                    device.force_loop(lambda sample: device.close())
+                self.assertDisarmed(device)
+
+    def test_closing_in_another_thread(self):
+        for address in self.served.bus, self.served.device:
+            with self.subTest(address), kmax.Device(address) as device:
+                closer = threading.Thread(target=device.close)
+
+                def pull(sample):
+                    if closer.ident is None:
+                        closer.start()
+                    return 0.1
+
+                with self.assertRaisesRegex(kmax.Error, "closed by another thread"):
+                    device.force_loop(pull)
+                closer.join()
+                self.assertFalse(device.is_open)
+                with kmax.Device(address) as again:
+                    self.assertDisarmed(again)
+
     def test_what_is_in_its_way(self):
         device = self.open()
         device["link.timeout"] = 0
