@@ -11,8 +11,8 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/libkmax/command_run.hpp"
 #include "host_tools/libkmax/force_loop.hpp"
+#include "host_tools/libkmax/open_device.hpp"
 #include "host_tools/libkmax/recording.hpp"
-#include "host_tools/libkmax/session.hpp"
 #include "host_tools/libkmax/translated.hpp"
 
 namespace kmax {
@@ -68,46 +68,41 @@ Status status_of(const device::DriveStatus& status) {
 }  // namespace
 
 Device::Device(const std::string& address, DeviceOptions options)
-    : session_(
-          translated([&] { return std::make_unique<Session>(address_of(address), std::move(options)); })) {}
+    : open_(translated(
+          [&] { return std::make_unique<library::OpenDevice>(address_of(address), std::move(options)); })) {}
 
 Device::Device(Device&&) noexcept = default;
 
 Device& Device::operator=(Device&& other) noexcept {
-  std::swap(session_, other.session_);
+  std::swap(open_, other.open_);
   return *this;
 }
 
 Device::~Device() {
-  close();
+  try {
+    close();
+  } catch (const std::exception&) {
+    // In the middle of a call of its own, which needs it.
+    static_cast<void>(open_.release());
+  }
 }
 
 void Device::close() {
-  // What a fork's child has of it are the parent's link and threads that do not run there.
-  if (session_ && !session_->is_of_this_process()) static_cast<void>(session_.release());
-  session_.reset();
+  if (open_) open_->close();
 }
 
 bool Device::is_open() const {
-  return session_ != nullptr && session_->is_of_this_process();
-}
-
-Session& Device::session() const {
-  if (!session_) throw Error("the device is closed; open it again");
-  if (!session_->is_of_this_process())
-    throw Error(
-        fmt::format("the device was opened by process {}, of which this one is a fork; open it again here, "
-                    "when the other one has closed it",
-                    session_->process));
-  return *session_;
+  return open_ != nullptr && open_->is_open();
 }
 
 std::string Device::address() const {
-  return link::text_of(session().address);
+  const library::OpenDevice::Call call(open_.get());
+  return link::text_of(call.session().address);
 }
 
 std::vector<Value> Device::get(const std::vector<std::string>& names) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] {
     std::vector<device::Parameter> parameters;
     for (const std::string& name : names) parameters.push_back(device::resolve(name));
@@ -119,20 +114,22 @@ std::vector<Value> Device::get(const std::vector<std::string>& names) {
 }
 
 void Device::set(const std::vector<std::pair<std::string, std::string>>& values) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   translated([&] {
     const auto here = [&](std::size_t axis) {
       return static_cast<double>(
           std::bit_cast<float>(session.device.read(device::Parameter::of<"measured.position">(axis))));
     };
     const auto assignments = device::parse_assignments(assignment_texts(values), 0, here);
-    const std::lock_guard lock(session.sequence);
+    const library::Sequence::Hold hold(session.settings, session.link());
     session.device.apply(assignments);
   });
 }
 
 Status Device::status(std::size_t axis) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] {
     session.require_axis(axis);
     return status_of(device::Drive(session.device, axis).status());
@@ -140,17 +137,20 @@ Status Device::status(std::size_t axis) {
 }
 
 void Device::arm(std::size_t axis, bool keep_alive) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   translated([&] { session.arm(axis, keep_alive); });
 }
 
 std::string Device::disarm(std::size_t axis) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] { return session.disarm(axis); });
 }
 
 void Device::stop(std::size_t axis) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   translated([&] {
     session.require_axis(axis);
     const library::Uninterrupted uninterrupted;
@@ -159,7 +159,8 @@ void Device::stop(std::size_t axis) {
 }
 
 bool Device::clear(std::size_t axis) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] {
     session.require_axis(axis);
     return device::Drive(session.device, axis).clear();
@@ -167,7 +168,8 @@ bool Device::clear(std::size_t axis) {
 }
 
 void Device::wait(double seconds) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   translated([&] {
     if (!(seconds >= 0) || !std::isfinite(seconds))
       throw device::ValueError(fmt::format("{} s cannot be waited; it is a number from 0 on", seconds));
@@ -177,22 +179,26 @@ void Device::wait(double seconds) {
 
 Recording Device::record(double seconds, std::size_t axis,
                          const std::function<bool(const std::vector<Sample>&)>& more) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] { return library::record(session, seconds, axis, more); });
 }
 
 Capture Device::capture(const CaptureRequest& request, const std::function<void()>& armed) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] { return library::capture(session, request, armed); });
 }
 
 ForceRecord Device::force_loop(const ForceLoopOptions& options, const ForceFunction& function) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] { return library::run_force_loop(session, options, function); });
 }
 
 CommandResult Device::command(const std::vector<std::string>& arguments) {
-  Session& session = this->session();
+  const library::OpenDevice::Call call(open_.get());
+  Session& session = call.session();
   return translated([&] {
     return library::run_command_on(arguments, link::text_of(session.address), [&session] {
       return std::make_unique<library::BorrowedLink>(session.link());

@@ -44,7 +44,7 @@ constexpr std::uint32_t mapped_target(std::size_t axis) {
 /// was killed has left is taken for its own.
 class LoopPdos {
  public:
-  explicit LoopPdos(Session& session) : device_(session.device), node_(session.address.node) {
+  explicit LoopPdos(Session& session) : session_(session) {
     require_no_other_sync();
     const bool left = device_.read(rpdo_count) == 1 && is_target(device_.read(rpdo_object));
     if (!left && (device_.read(rpdo_count) != 0 || device_.read(rpdo_cob_id) != rpdo_cob_id.default_raw()))
@@ -57,6 +57,7 @@ class LoopPdos {
   /// After the plan has been read, which must find TPDOs that are sent by themselves.
   void set_up(std::size_t axis) {
     in_use_ = true;
+    const Sequence::Hold hold(session_.settings, session_.link());
     device_.write(rpdo_object, mapped_target(axis), true);
     device_.write(rpdo_count, 1, true);
     device_.write(rpdo_cob_id, rpdo_identifier + node_, true);
@@ -95,6 +96,7 @@ class LoopPdos {
   }
 
   void put_back() {
+    const Sequence::Hold hold(session_.settings, session_.link());
     for (const Parameter& type : transmission_types)
       if (device_.read(type) == at_each_sync) device_.write(type, type.default_raw(), true);
     device_.write(rpdo_cob_id, cob_id::invalid | (rpdo_identifier + node_), true);
@@ -102,8 +104,9 @@ class LoopPdos {
     device_.write(rpdo_object, 0, true);
   }
 
-  device::Device& device_;
-  std::uint8_t node_;
+  Session& session_;
+  device::Device& device_ = session_.device;
+  std::uint8_t node_ = session_.address.node;
   bool in_use_ = false;
 };
 
@@ -212,6 +215,7 @@ class PolledChannel final : public ForceChannel {
 
   void send(float force) override {
     const auto start = session_.link().now();
+    const Sequence::Hold hold(session_.settings, session_.link());  // of a transaction it would be a part
     session_.device.write(Parameter::of<"profile.target_force">(axis_), std::bit_cast<std::uint32_t>(force),
                           true);
     round_trip_ += since(start);

@@ -34,8 +34,8 @@ void sleep_until(SharedLink& link, microseconds time) {
 /// drive.mode torque, from construction to destruction.
 class TorqueMode {
  public:
-  TorqueMode(device::Device& device, std::size_t axis)
-      : device_(device), mode_(Parameter::of<"drive.mode">(axis)), before_(device.read(mode_)) {
+  TorqueMode(Session& session, std::size_t axis)
+      : session_(session), mode_(Parameter::of<"drive.mode">(axis)), before_(session.device.read(mode_)) {
     set(device::parse_value(mode_, "torque"));
   }
   ~TorqueMode() {
@@ -52,10 +52,11 @@ class TorqueMode {
  private:
   void set(std::uint32_t mode) {
     const device::Assignment one{mode_, mode};
-    if (device_.read(mode_) != mode) device_.apply({&one, 1});
+    const Sequence::Hold hold(session_.settings, session_.link());
+    if (session_.device.read(mode_) != mode) session_.device.apply({&one, 1});
   }
 
-  device::Device& device_;
+  Session& session_;
   Parameter mode_;
   std::uint32_t before_;
 };
@@ -68,8 +69,7 @@ class Watchdog {
         axis_(axis),
         limit_(static_cast<std::int64_t>(limit * 1e9)),
         keeper_(
-            session.link(), session.device, axis, timeout, [this] { return loop_lives(); },
-            [this] { watch(); }) {}
+            session.device, axis, timeout, [this] { return loop_lives(); }, [this] { watch(); }) {}
 
   /// The function's time begins and ends.
   void begin() { busy_since_ = now(); }
@@ -88,9 +88,11 @@ class Watchdog {
 
   void watch() {
     const std::int64_t since = busy_since_;
-    if (since == 0 || tripped_ || now() - since < limit_) return;
+    if (!tripped_ && (since == 0 || now() - since < limit_)) return;
     tripped_ = true;
-    Drive(session_.device, axis_).disarm();
+    if (disarmed_) return;
+    Drive(session_.device, axis_).disarm();  // called again if the link fails it
+    disarmed_ = true;
   }
 
   Session& session_;
@@ -99,7 +101,8 @@ class Watchdog {
   std::atomic<std::int64_t> busy_since_ = 0;
   std::atomic<std::uint64_t> cycles_ = 1;
   std::atomic<bool> tripped_ = false;
-  Keeper keeper_;  // last: its thread uses the others
+  bool disarmed_ = false;  ///< since it tripped; of the keeper's thread
+  Keeper keeper_;          // last: its thread uses the others
 };
 
 /// Made when the axis is armed, and disarms it.
@@ -110,6 +113,7 @@ class ArmedForLoop {
     session_.link().set_lending(false);  // the loop lends its own idle time
   }
   ~ArmedForLoop() {
+    session_.link().set_lending(true);
     try {
       session_.disarm(axis_);
     } catch (const std::exception& error) {
@@ -258,7 +262,7 @@ ForceRecord run_force_loop(Session& session, const ForceLoopOptions& options,
         "a watchdog of {} s is not possible; allowed is more than 0 and up to 10 s", options.watchdog));
   if (options.seconds && !(*options.seconds > 0))
     throw device::ValueError(fmt::format("{} is not a number of seconds above 0", *options.seconds));
-  const std::lock_guard lock(session.sequence);
+  const Sequence::Hold hold(session.run, session.link());
   const double timeout = session.link_timeout();
   if (timeout == 0)
     throw DeviceError(
@@ -266,7 +270,7 @@ ForceRecord run_force_loop(Session& session, const ForceLoopOptions& options,
         "instance");
   if (Drive(session.device, options.axis).status().armed())
     throw DeviceError(fmt::format("axis {} is armed already; a force loop arms it itself", options.axis));
-  const TorqueMode mode(session.device, options.axis);
+  const TorqueMode mode(session, options.axis);
   const auto channel = open_force_channel(session, options.axis);
   const double rate = checked_rate(options, *channel);
   const ArmedForLoop armed(session, options.axis);

@@ -14,10 +14,8 @@ std::string force_is_off(std::size_t axis, const device::DriveStatus& status) {
                      status.faulty() ? status.fault_words() : std::string(device::to_string(status.state())));
 }
 
-Keeper::Keeper(SharedLink& link, device::Device& device, std::size_t axis, double timeout, Alive alive,
-               Watch watch)
-    : link_(link),
-      device_(device),
+Keeper::Keeper(device::Device& device, std::size_t axis, double timeout, Alive alive, Watch watch)
+    : device_(device),
       axis_(axis),
       interval_(std::clamp(timeout > 0 ? microseconds(static_cast<std::int64_t>(timeout * 250e3))
                                        : microseconds(milliseconds(200)),
@@ -37,7 +35,6 @@ void Keeper::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       if (watch_) watch_();
-      link_.lend_if_idle();
       if (std::chrono::steady_clock::now() >= next && (!alive_ || alive_())) {
         next = std::chrono::steady_clock::now() + interval_;
         look();

@@ -15,7 +15,7 @@ namespace kmax::library {
 /// "the force of axis 0 is off: ...", and why, of an axis that is not armed.
 std::string force_is_off(std::size_t axis, const device::DriveStatus& status);
 
-/// A thread that says for an armed axis that this process lives, and lends the link to others meanwhile.
+/// A thread that says for an armed axis that this process lives.
 class Keeper {
  public:
   /// Asked before each sign of life: false leaves it out.
@@ -24,8 +24,7 @@ class Keeper {
   using Watch = std::function<void()>;
 
   /// `timeout`: link.timeout, s; 0: none.
-  Keeper(SharedLink& link, device::Device& device, std::size_t axis, double timeout, Alive alive = {},
-         Watch watch = {});
+  Keeper(device::Device& device, std::size_t axis, double timeout, Alive alive = {}, Watch watch = {});
 
   /// What took the force away, or keeps it from being kept alive; empty if nothing does.
   std::string trouble() const;
@@ -34,7 +33,6 @@ class Keeper {
   void run(const std::stop_token& stop);
   void look();
 
-  SharedLink& link_;
   device::Device& device_;
   std::size_t axis_;
   std::chrono::microseconds interval_;

@@ -63,11 +63,20 @@ void take_rows(SharedLink& link, record::RowSource& source, double seconds, std:
   source.stop();
 }
 
+/// The session's link, while nobody else sets anything.
+class SettingLink final : public BorrowedLink {
+ public:
+  explicit SettingLink(Session& session)
+      : BorrowedLink(session.link()), hold_(session.settings, session.link()) {}
+
+ private:
+  Sequence::Hold hold_;
+};
+
 Recording record_pdos(Session& session, double seconds, std::size_t axis,
                       const std::function<bool(const std::vector<Sample>&)>& more) {
   record::TelemetryRequest telemetry(
-      [&session] { return device::Device(std::make_unique<BorrowedLink>(session.link())); },
-      session.options.notice);
+      [&session] { return device::Device(std::make_unique<SettingLink>(session)); }, session.options.notice);
   telemetry.ask();
   const record::PdoPlan plan = record::read_pdo_plan(session.device, session.address.node);
   const auto port = link::open_can_port(session.address.path, record::port_options(plan));
@@ -101,7 +110,7 @@ Recording record(Session& session, double seconds, std::size_t axis,
                  const std::function<bool(const std::vector<Sample>&)>& more) {
   session.require_axis(axis);
   if (!(seconds > 0)) throw device::ValueError(fmt::format("{} is not a number of seconds above 0", seconds));
-  const std::lock_guard lock(session.sequence);
+  const Sequence::Hold hold(session.run, session.link());
   if (session.is_can()) return record_pdos(session, seconds, axis, more);
   record::PolledSource source(session.device, {axis});
   Recording recording{.source = fmt::format("{}, as fast as it answers", link::text_of(session.address))};
@@ -113,15 +122,18 @@ Capture capture(Session& session, const CaptureRequest& request, const std::func
   session.require_axis(request.axis);
   if (!(request.patience >= 0))
     throw device::ValueError(fmt::format("{} s is no time to wait for a trigger", request.patience));
-  const std::lock_guard lock(session.sequence);
+  const Sequence::Hold hold(session.run, session.link());
   device::CaptureReader reader(session.device);
-  reader.arm({.axis = request.axis,
-              .channels = request.channels,
-              .interval = request.interval,
-              .samples = request.samples,
-              .pre_trigger = request.pre_trigger,
-              .trigger = trigger_of(request.trigger),
-              .level = request.level});
+  {
+    const Sequence::Hold hold_settings(session.settings, session.link());
+    reader.arm({.axis = request.axis,
+                .channels = request.channels,
+                .interval = request.interval,
+                .samples = request.samples,
+                .pre_trigger = request.pre_trigger,
+                .trigger = trigger_of(request.trigger),
+                .level = request.level});
+  }
   if (armed) armed();
   reader.wait(duration_of(request.patience));
   const device::Captured captured = reader.read();

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
+
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/device/sim/open_link.hpp"
@@ -33,7 +36,9 @@ Session::Session(const link::DeviceAddress& where, DeviceOptions wanted)
             opened_ = shared.get();
             return shared;
           }(),
-          options.notice) {}
+          options.notice) {
+  if (!link().virtual_time()) lender_ = std::jthread([this](const std::stop_token& stop) { lend(stop); });
+}
 
 Session::~Session() {
   for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
@@ -47,10 +52,6 @@ Session::~Session() {
   }
 }
 
-bool Session::is_of_this_process() const {
-  return getpid() == process;
-}
-
 void Session::require_axis(std::size_t axis) const {
   if (axis >= firmware::axis_count)
     throw device::ValueError(
@@ -60,16 +61,16 @@ void Session::require_axis(std::size_t axis) const {
 void Session::arm(std::size_t axis, bool keep_alive) {
   require_axis(axis);
   const double timeout = link_timeout();
-  device::Drive drive(device, axis);
+  // Without the lock: while it waits, the program's own signal handlers run, which may disarm.
+  device::Drive(device, axis).arm();
   const std::lock_guard lock(axes_mutex_);
   axes_[axis].keeper.reset();
-  drive.arm();
   axes_[axis].armed = true;
-  link().set_lending(true);
   if (timeout == 0)
     options.notice("link.timeout is 0: the force stays on until it is disarmed, even if this program dies");
   if (keep_alive && !link().virtual_time())
-    axes_[axis].keeper = std::make_unique<Keeper>(link(), device, axis, timeout);
+    axes_[axis].keeper = std::make_unique<Keeper>(device, axis, timeout);
+  note_kept_alive();
 }
 
 std::string Session::disarm(std::size_t axis) {
@@ -80,16 +81,47 @@ std::string Session::disarm(std::size_t axis) {
   Axis& own = axes_[axis];
   std::string trouble = own.keeper ? own.keeper->trouble() : std::string();
   own.keeper.reset();
-  const bool was_armed = std::exchange(own.armed, false);
-  bool any = false;
-  for (const Axis& one : axes_) any = any || one.armed;
-  link().set_lending(any);
-  if (was_armed && trouble.empty()) {
-    const device::DriveStatus status = drive.status();
-    if (!status.armed()) trouble = force_is_off(axis, status);
+  note_kept_alive();
+  if (own.armed && trouble.empty()) {
+    try {
+      const device::DriveStatus status = drive.status();
+      if (!status.armed()) trouble = force_is_off(axis, status);
+    } catch (const std::exception&) {
+      // A lost answer must not keep the force on: it is taken away, whatever it was before.
+    }
   }
   drive.disarm();
+  own.armed = false;  // not if that failed: the destructor tries again
   return trouble;
+}
+
+void Session::note_kept_alive() {
+  kept_alive_ = std::ranges::any_of(axes_, [](const Axis& one) { return one.keeper != nullptr; });
+}
+
+void Session::lend(const std::stop_token& stop) {
+  using std::chrono::milliseconds;
+  const Uninterrupted uninterrupted;
+  // A look at any axis is a sign of life for all of them.
+  const auto sign_of_life = [this] {
+    if (!kept_alive_) return;
+    try {
+      device.read(device::Parameter::of<"drive.statusword">(0));
+    } catch (const std::exception&) {
+      // The keeper will find that out, too, and tells of it.
+    }
+  };
+  while (!stop.stop_requested()) {
+    milliseconds pause{5};
+    try {
+      link().lend_if_idle(sign_of_life);
+    } catch (const std::exception&) {
+      // Somebody has not given it back, and each attempt makes this program's own requests wait for it.
+      pause = milliseconds(10000);
+    }
+    std::unique_lock lock(lender_mutex_);
+    lender_ended_.wait_for(lock, stop, pause, [] { return false; });
+  }
 }
 
 void Session::require_armed_ones() {

@@ -4,12 +4,16 @@
 #include <kmax/device.hpp>
 
 #include <array>
+#include <atomic>
+#include <condition_variable>
 #include <mutex>
+#include <thread>
 
 #include "host_tools/device/device.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/libkmax/keeper.hpp"
+#include "host_tools/libkmax/sequence.hpp"
 #include "host_tools/libkmax/shared_link.hpp"
 
 namespace kmax::library {
@@ -22,7 +26,6 @@ class Session {
   ~Session();
 
   void require_axis(std::size_t axis) const;
-  bool is_of_this_process() const;
   bool is_can() const { return address.kind == link::DeviceAddress::Kind::can; }
   double link_timeout() { return device.read_number("link.timeout"); }
 
@@ -41,16 +44,26 @@ class Session {
  public:
   device::Device device;
   SharedLink& link() { return *opened_; }
-  /// Of what takes several requests that must not mix: settings, a capture, a recording.
-  std::mutex sequence;
+  Sequence run;       ///< of force loops, recordings and captures
+  Sequence settings;  ///< of what writes several values, beside a run or for it
 
  private:
   struct Axis {
     bool armed = false;
     std::unique_ptr<Keeper> keeper;
   };
+  /// With axes_mutex_.
+  void note_kept_alive();
+  /// The thread that lends an idle link to other programs.
+  void lend(const std::stop_token& stop);
+
   std::mutex axes_mutex_;
   std::array<Axis, firmware::axis_count> axes_;
+  std::atomic<bool> kept_alive_ = false;  ///< an axis has a keeper
+
+  std::mutex lender_mutex_;
+  std::condition_variable_any lender_ended_;
+  std::jthread lender_;  // last: it uses the others
 };
 
 }  // namespace kmax::library

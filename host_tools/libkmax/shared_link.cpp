@@ -1,5 +1,7 @@
 #include "host_tools/libkmax/shared_link.hpp"
 
+#include <kmax/errors.hpp>
+
 #include <algorithm>
 
 namespace kmax::library {
@@ -31,7 +33,7 @@ class SharedLink::Turn {
 };
 
 SharedLink::SharedLink(std::unique_ptr<link::Link> inner, bool virtual_time, std::function<void()> poll)
-    : inner_(std::move(inner)), virtual_time_(virtual_time), poll_(std::move(poll)), yield_(*inner_) {}
+    : inner_(std::move(inner)), virtual_time_(virtual_time), poll_(std::move(poll)) {}
 
 void SharedLink::enter() const {
   std::unique_lock lock(mutex_);
@@ -56,8 +58,16 @@ void SharedLink::leave() const {
 }
 
 void SharedLink::lend_if_due() {
-  if (lending_ && !virtual_time_) yield_.yield_if_due();
+  using link::PeriodicYield;
+  if (lending_ && !virtual_time_ && !Uninterrupted::here() && Clock::now() - lent_ >= PeriodicYield::own_time)
+    lend(PeriodicYield::others_time);
   last_used_ = Clock::now().time_since_epoch().count();
+}
+
+/// Another loan must not follow at once, and cost an armed axis twice what one does.
+void SharedLink::lend(microseconds duration) {
+  inner_->wait(duration);
+  lent_ = Clock::now();
 }
 
 std::vector<std::uint32_t> SharedLink::read(std::span<const std::size_t> slots) {
@@ -123,19 +133,24 @@ void SharedLink::wait(microseconds duration) {
     poll();
     const auto left = std::chrono::duration_cast<microseconds>(end - Clock::now());
     const Turn turn(*this);
-    inner_->wait(std::clamp<microseconds>(left, microseconds(0), slice));
+    lend(std::clamp<microseconds>(left, microseconds(0), slice));
   } while (Clock::now() < end);
 }
 
 void SharedLink::poll() const {
-  if (poll_ && !Uninterrupted::here()) poll_();
+  if (Uninterrupted::here()) return;
+  if (ended_) throw Error("the device was closed by another thread");
+  if (poll_) poll_();
 }
 
-void SharedLink::lend_if_idle() {
-  const Clock::time_point used{Clock::duration(last_used_.load())};
-  if (virtual_time_ || Clock::now() - used < idle) return;
+void SharedLink::lend_if_idle(const std::function<void()>& sign_of_life) {
+  const auto in_use = [this] { return Clock::now() - Clock::time_point(Clock::duration(last_used_)) < idle; };
+  if (virtual_time_ || in_use()) return;
   const Turn turn(*this);
-  inner_->wait(lent);
+  if (in_use()) return;  // by the one who had it before this turn
+  lent_ = Clock::now();  // the sign of life is not to lend it first
+  sign_of_life();
+  lend(lent);
 }
 
 }  // namespace kmax::library

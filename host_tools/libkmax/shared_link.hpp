@@ -12,7 +12,8 @@
 
 namespace kmax::library {
 
-/// While one exists, waiting in this thread does not ask whether it should end: what takes the force away is
+/// While one exists, waiting in this thread does not ask whether it should end, and reading does not lend the
+/// link first: what takes the force away is
 /// not to be interrupted, and a thread of the library's own must not need what its user's threads hold.
 class Uninterrupted {
  public:
@@ -28,8 +29,9 @@ class Uninterrupted {
 
 /// One link for many threads: each request is whole, and who waits longest is next.
 ///
-/// A link is lent to other programs in wait(), and if `lending` between requests too (link::PeriodicYield):
-/// one that stops the device must not be kept out.
+/// A link is lent to other programs in wait(), in lend_if_idle(), and, unless that is switched off, between
+/// the requests of one that reads without a pause (as link::PeriodicYield does): one that stops the device
+/// must not be kept out, whoever has armed it.
 class SharedLink final : public link::Link {
  public:
   /// `poll` is called at least every 20 ms while a thread waits, unless it is Uninterrupted; what it throws
@@ -50,9 +52,13 @@ class SharedLink final : public link::Link {
   std::string description() const override { return inner_->description(); }
 
   void poll() const;
+  /// From now on poll() throws Error: the device is being closed.
+  void end() { ended_ = true; }
   void set_lending(bool lending) { lending_ = lending; }
   /// For a thread beside those that use the link: lends it for 10 ms if nobody has used it for 30 ms.
-  void lend_if_idle();
+  /// `sign_of_life` is called before, with the link this thread's: whoever gets it may keep it for
+  /// link::PeriodicYield::own_time.
+  void lend_if_idle(const std::function<void()>& sign_of_life);
   bool virtual_time() const { return virtual_time_; }
   link::Link& inner() { return *inner_; }
 
@@ -62,14 +68,15 @@ class SharedLink final : public link::Link {
 
   void enter() const;
   void leave() const;
-  /// With a turn.
+  /// Both with a turn.
   void lend_if_due();
+  void lend(std::chrono::microseconds duration);
 
   std::unique_ptr<link::Link> inner_;
   bool virtual_time_;
   std::function<void()> poll_;
-  link::PeriodicYield yield_;
-  std::atomic<bool> lending_ = false;
+  Clock::time_point lent_ = Clock::now();  ///< the end of the last loan; with a turn
+  std::atomic<bool> lending_ = true, ended_ = false;
   std::atomic<Clock::rep> last_used_{0};
 
   // The queue.
@@ -81,7 +88,7 @@ class SharedLink final : public link::Link {
 };
 
 /// A link that belongs to somebody else, for an owner that wants one of its own.
-class BorrowedLink final : public link::Link {
+class BorrowedLink : public link::Link {
  public:
   /// `lender` must outlive this.
   explicit BorrowedLink(link::Link& lender) : lender_(lender) {}

@@ -16,7 +16,7 @@
 namespace kmax {
 
 namespace library {
-class Session;
+class OpenDevice;
 }
 
 /// A parameter's value.
@@ -55,9 +55,12 @@ struct ForceLoopOptions {
 
 /// A haptic device with its controller.
 ///
-/// Calls are safe from any number of threads; they take turns. A device belongs to the process that opened
-/// it: a fork's child gets an Error. Other programs can use the link of an armed device in between, to stop
-/// it; otherwise it is this one's alone. Errors of all calls: LinkError, RefusedError, ValueError, and Error
+/// Calls are safe from any number of threads; they take turns. One force loop, recording or capture goes on
+/// at a time, and a second one waits for it, or is a RefusedError in the first one's function; settings and
+/// readings go on beside it. A device belongs to the process that opened
+/// it: a fork's child gets an Error. Other programs can use the link in between, to stop it for
+/// instance: whenever this one has nothing to say, and for a moment every 500 ms while it talks without a
+/// pause. Errors of all calls: LinkError, RefusedError, ValueError, and Error
 /// for a closed device.
 class KMAX_API Device {
  public:
@@ -69,7 +72,8 @@ class KMAX_API Device {
   Device(Device&&) noexcept;
   Device& operator=(Device&&) noexcept;
 
-  /// Disarms what it armed and gives the link back. Again does nothing.
+  /// Disarms what it armed and gives the link back. Again does nothing. Calls that other threads are in end
+  /// with an Error, and are waited for; it is an Error in the function of one of the device's own calls.
   void close();
   bool is_open() const;
   std::string address() const;
@@ -114,8 +118,7 @@ class KMAX_API Device {
   CommandResult command(const std::vector<std::string>& arguments);
 
  private:
-  library::Session& session() const;
-  std::unique_ptr<library::Session> session_;
+  std::unique_ptr<library::OpenDevice> open_;
 };
 
 /// An axis makes force while this exists.

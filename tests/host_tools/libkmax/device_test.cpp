@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <thread>
@@ -229,6 +230,94 @@ TEST(LibraryDevice, IsAskedWhetherToGoOnWhileItWaits) {
   asked = 19;
   EXPECT_EQ(device.disarm(), "") << "what takes the force away is not interrupted";
   EXPECT_FALSE(device.status().armed);
+}
+
+TEST(LibraryDevice, IsSetInTheFunctionOfALoopOrARecording) {
+  Device device("sim");
+  int cycles = 0;
+  device.force_loop({}, [&](const Sample&) -> std::optional<double> {
+    device.set("wall.stiffness", "432");
+    if (++cycles == 2) return std::nullopt;
+    return 0.0;
+  });
+  EXPECT_EQ(device.get("wall.stiffness").number, 432);
+  device.record(1, 0, [&](const std::vector<Sample>&) {
+    device.set("wall.stiffness", "321");
+    return false;
+  });
+  EXPECT_EQ(device.get("wall.stiffness").number, 321);
+}
+
+TEST(LibraryDevice, RefusesARunInTheFunctionOfAnother) {
+  Device device("sim");
+  const auto zero = [](const Sample&) { return std::optional(0.0); };
+  const auto loop_with = [&](const std::function<void()>& act) {
+    return [&device, act] {
+      device.force_loop({}, [act](const Sample&) {
+        act();
+        return std::optional(0.0);
+      });
+    };
+  };
+  for (const std::function<void()>& act : {std::function<void()>([&] { device.record(0.1); }),
+                                           std::function<void()>([&] { device.capture({}); }),
+                                           std::function<void()>([&] { device.force_loop({}, zero); })})
+    EXPECT_CONTAINS(thrown_message<RefusedError>(loop_with(act)), "from within another call");
+  EXPECT_FALSE(device.status().armed);
+}
+
+TEST(LibraryDevice, IsSetByAnotherThreadWhileALoopGoesOn) {
+  Device device("sim");
+  std::optional<std::jthread> setter;
+  std::atomic<bool> set = false;
+  device.force_loop({}, [&](const Sample&) -> std::optional<double> {
+    if (!setter)
+      setter.emplace([&] {
+        device.set("wall.stiffness", "432");
+        set = true;
+      });
+    if (set) return std::nullopt;
+    return 0.0;
+  });
+  EXPECT_EQ(device.get("wall.stiffness").number, 432);
+}
+
+TEST(LibraryDevice, IsNotClosedInTheFunctionOfALoop) {
+  Device device("sim");
+  EXPECT_CONTAINS(thrown_message<Error>([&] {
+                    device.force_loop({}, [&](const Sample&) {
+                      device.close();
+                      return std::optional(0.0);
+                    });
+                  }),
+                  "cannot be closed from within one of its own calls");
+  EXPECT_FALSE(device.status().armed);
+  device.close();
+}
+
+TEST(LibraryDevice, EndsTheCallsOfOtherThreadsWhenClosed) {
+  for (const bool loop : {true, false}) {
+    Device device("sim");
+    std::atomic<bool> runs = false;
+    std::string message;
+    std::jthread other([&] {
+      message = thrown_message<Error>([&] {
+        if (loop) {
+          device.force_loop({}, [&](const Sample&) {
+            runs = true;
+            return std::optional(0.0);
+          });
+        } else {
+          device.record(1e9, 0, [&](const std::vector<Sample>&) { return runs = true; });
+        }
+      });
+    });
+    while (!runs) std::this_thread::yield();
+    device.close();
+    other.join();
+    EXPECT_CONTAINS(message, "closed");
+    EXPECT_FALSE(device.is_open());
+  }
 }
 
 TEST(LibraryDevice, RunsCommandsOnItself) {
