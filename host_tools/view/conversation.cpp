@@ -118,7 +118,7 @@ void Conversation::settle() {
 
 void Conversation::carry_out(const Command& command) {
   try {
-    const std::string said = do_as_told(command);
+    const std::string said = do_it(command);
     publish_(reply(command.id, true, said, command.client));
   } catch (const ForceRemoved& removed) {
     publish_(reply(command.id, false, removed.what(), command.client));
@@ -132,7 +132,7 @@ void Conversation::carry_out(const Command& command) {
   next_state_ = {};
 }
 
-std::string Conversation::do_as_told(const Command& command) {
+std::string Conversation::do_it(const Command& command) {
   Drive drive(device_, command.axis);
   switch (command.kind) {
     case Command::Kind::alive:
@@ -260,8 +260,11 @@ void Conversation::wait_a_moment() {
 }
 
 void Conversation::end() {
-  for (const std::size_t axis : all_axes()) {
-    if (commands_.owner(axis)) Drive(device_, axis).disarm();
+  try {
+    ForceRemoval::disarm_of_clients(device_, commands_);
+  } catch (const ForceRemoved&) {
+    // Stopped meanwhile; that interrupts once only.
+    ForceRemoval::disarm_of_clients(device_, commands_);
   }
 }
 

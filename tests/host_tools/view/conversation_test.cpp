@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/view/device_session.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -283,7 +284,7 @@ TEST_F(ConversationTest, ACaptureIsReadInTheEnd) {
   EXPECT_CONTAINS(reply_to(talk, command)["message"].get<std::string>(), "there is no channel");
 }
 
-TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAnewAndAStopMeanwhileIsKept) {
+TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAgainAndAStopMeanwhileIsKept) {
   commands.joined(1);
   DeviceSession session(reach, {}, commands, analysis, publish);
   push({.kind = Kind::arm, .id = 1});
@@ -316,7 +317,7 @@ TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAnewAndAStopMeanwhileIsKept) {
     return false;
   });
   EXPECT_CONTAINS(trouble, "nobody answers");
-  EXPECT_CONTAINS(refusal, "told to stop as soon as");
+  EXPECT_CONTAINS(refusal, "it will be stopped as soon as");
   EXPECT_CONTAINS(why, "STOP");
   EXPECT_FALSE(armed(0));
 }
@@ -327,6 +328,78 @@ TEST_F(ConversationTest, TheEndDisarmsWhatAPageArmed) {
   push({.kind = Kind::arm, .id = 1});
   session.run([&] { return armed(0); });
   EXPECT_FALSE(armed(0));
+}
+
+TEST_F(ConversationTest, TheEndWhileTheLinkIsLostTriesOnceMoreAndSaysWhatBecomesOfTheForce) {
+  for (const bool back_in_time : {true, false}) {
+    for (const std::string timeout : {"0.5", "0"}) {
+      commands.joined(1);
+      DeviceSession session(reach, {}, commands, analysis, publish);
+      push({.kind = Kind::set, .assignments = {"wall.position=-1m", "link.timeout=" + timeout}});
+      push({.kind = Kind::arm});
+      looked_at = published.size();
+      const auto ended = [&] {
+        watched.lost = watched.lost || armed(0);
+        for (; looked_at < published.size(); ++looked_at) {
+          const Json message = Json::parse(published[looked_at].text);
+          if (message["type"] != "state" || message["link"]["connected"] == true) continue;
+          watched.lost = !back_in_time;
+          return true;
+        }
+        return published.size() > 10'000;
+      };
+      const std::string message =
+          back_in_time ? (session.run(ended), "")
+                       : host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); });
+      EXPECT_EQ(armed(0), !back_in_time);
+      if (!back_in_time) {
+        EXPECT_CONTAINS(message, "nobody answers");
+        EXPECT_CONTAINS(message,
+                        timeout == "0" ? "MAY STILL BE ON, cut its power" : "removes its force after");
+      }
+      watched.lost = false;
+      device::Device other(std::make_unique<WatchedLink>(watched));
+      ForceRemoval::disarm_of_clients(other, commands);
+    }
+  }
+}
+
+TEST_F(ConversationTest, TheEndDisarmsEveryAxisEvenIfOneFails) {
+  commands.joined(1);
+  DeviceSession session(reach, {}, commands, analysis, publish);
+  push({.kind = Kind::set, .assignments = {"wall.position=-1m", "axis1.wall.position=-1m"}});
+  push({.kind = Kind::arm});
+  push({.kind = Kind::arm, .axis = 1});
+  const auto ended = [&] {
+    if (!armed(1)) return published.size() > 10'000;
+    watched.before_request = [&] {
+      if (watched.requests.back().starts_with("word 0 ")) throw link::LinkError("axis 0 is not reached");
+    };
+    return true;
+  };
+  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); }),
+                  "axis 0 is not reached");
+  EXPECT_TRUE(armed(0));
+  EXPECT_FALSE(armed(1));
+}
+
+TEST_F(ConversationTest, AStopDuringTheEndDoesNotKeepItFromDisarming) {
+  for (std::size_t nth = 1; nth < 8; ++nth) {
+    commands.joined(1);
+    Conversation talk(reach, commands, analysis, mirror, publish);
+    move_the_wall_away(talk);
+    ASSERT_EQ(reply_to(talk, {.kind = Kind::arm})["ok"], true);
+    std::size_t count = 0;
+    watched.before_request = [&] {
+      if (++count == nth) commands.push({.kind = Kind::stop});
+    };
+    talk.end();
+    watched.before_request = {};
+    EXPECT_FALSE(armed(0)) << nth;
+    EXPECT_FALSE(commands.owner(0)) << nth;
+    if (const auto urgency = commands.urgent()) commands.settled(*urgency);
+    while (commands.take()) continue;
+  }
 }
 
 TEST_F(ConversationTest, ADeviceThatIsNotThereAtFirstIsAnError) {
