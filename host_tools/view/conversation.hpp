@@ -52,7 +52,8 @@ class Conversation {
   void carry_out(const Command& command);
   /// What to say about it.
   std::string do_it(const Command& command);
-  void refuse_long_reading(const device::CaptureSettings& settings) const;
+  std::string too_long_while_armed(const device::CaptureSettings& settings) const;
+  bool any_armed();
   std::string arm(const Command& command);
   std::string set(const std::vector<device::Assignment>& assignments);
   void publish_parameters();

@@ -21,6 +21,7 @@ struct Watched {
   std::vector<std::string> requests;  ///< "read", "write" or "word A V": controlword V of axis A
   std::function<void()> before_request;
   bool lost = false;
+  int loans = 0;  ///< how often others could use the link
 
   void request(std::string what) {
     if (lost) throw link::LinkError("nobody answers");
@@ -39,6 +40,8 @@ class WatchedLink final : public link::Link {
   }
   void write(std::span<const link::SlotValue> values, link::Repeat repeat,
              const std::function<void()>& before_request) override {
+    // Only over CAN can they be written.
+    if (Parameter::at(values[0].slot).name().find("event_time") != std::string::npos) return;
     std::string what = "write";
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
       if (values[0].slot == Parameter::of<"drive.controlword">(axis).slot())
@@ -64,7 +67,10 @@ class WatchedLink final : public link::Link {
     return watched_.device.read_log_entry(place);
   }
   std::chrono::microseconds now() const override { return watched_.device.now(); }
-  void wait(std::chrono::microseconds duration) override { watched_.device.wait(duration); }
+  void wait(std::chrono::microseconds duration) override {
+    ++watched_.loans;
+    watched_.device.wait(duration);
+  }
   std::string description() const override { return "watched"; }
 
  private:
@@ -80,9 +86,11 @@ class ConversationTest : public testing::Test {
   /// Steps until a message of this type is there that `wanted` accepts.
   template <typename Steps>
   Json until(Steps& steps, const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
-    for (int i = 0; i < 2000; ++i) {
+    // What is looked at now and then needs some rounds of readings, however fast the steps are.
+    for (int i = 0, rounds = 0; i < 2000 || rounds < 40; ++i) {
       for (; looked_at < published.size(); ++looked_at) {
         const Json message = Json::parse(published[looked_at].text);
+        if (message["type"] == "state") ++rounds;
         if (message["type"] != type || (wanted && !wanted(message))) continue;
         ++looked_at;
         return message;
@@ -282,6 +290,43 @@ TEST_F(ConversationTest, ACaptureIsReadInTheEnd) {
   EXPECT_EQ(taken["channels"][1]["values"].size(), 100U);
   command.capture.channels = {"positio"};
   EXPECT_CONTAINS(reply_to(talk, command)["message"].get<std::string>(), "there is no channel");
+}
+
+// A node sends a capture in one transfer, and hears no sign of life meanwhile.
+TEST_F(ConversationTest, OverCanALongCaptureAndAnArmedAxisExcludeEachOther) {
+  commands.joined(1);
+  reach.open_bus = [](const auto&) -> std::unique_ptr<link::CanPort> {
+    throw device::DeviceError("this bus carries no rows");
+  };
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  move_the_wall_away(talk);
+  Command capture{
+      .kind = Kind::capture,
+      .capture = {.channels = {"force"}, .samples = 9000, .trigger = firmware::CaptureTrigger::contact}};
+  ASSERT_EQ(reply_to(talk, capture)["ok"], true);
+  EXPECT_CONTAINS(reply_to(talk, {.kind = Kind::arm})["message"].get<std::string>(),
+                  "begin a shorter one in its place");
+  EXPECT_FALSE(armed(0));
+  capture.capture.samples = 100;
+  ASSERT_EQ(reply_to(talk, capture)["ok"], true);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::arm})["ok"], true);
+  reply_to(talk, {.kind = Kind::disarm});
+  // Also if it was another program that armed it.
+  device::Device other(std::make_unique<WatchedLink>(watched));
+  device::Drive(other, 0).arm();
+  capture.capture.samples = 9000;
+  EXPECT_CONTAINS(reply_to(talk, capture)["message"].get<std::string>(), "an axis is armed");
+}
+
+TEST_F(ConversationTest, OthersMayUseTheLinkAfterEachRoundOfReadings) {
+  Conversation talk(reach, commands, analysis, mirror, [this](Message message) {
+    if (Json::parse(message.text)["type"] == "state") watched.loans = 0;
+    publish(std::move(message));
+  });
+  for (int round = 0; round < 5; ++round) {
+    state(talk);
+    EXPECT_GE(watched.loans, 1);
+  }
 }
 
 TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAgainAndAStopMeanwhileIsKept) {
