@@ -59,9 +59,8 @@ std::string Access::refusal_of_stream(const Credentials& asked) const {
     if (one.starts_with(offered) && is_token(one.substr(offered.size()))) return {};
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
   }
-  return "the token is missing or wrong; open the address that 'kmax view' printed, whole, or send "
-         "'Authorization: "
-         "Bearer TOKEN'";
+  return "the token is missing or wrong; open the address that 'kmax view' printed, whole, or "
+         "send 'Authorization: Bearer TOKEN'";
 }
 
 }  // namespace kmax::view

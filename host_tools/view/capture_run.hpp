@@ -21,6 +21,9 @@ class CaptureRun {
   /// link::LinkError and ForceRemoved.
   void look();
 
+  /// The one that is under way; null if none is.
+  const device::CaptureSettings* settings() const { return reader_ ? &settings_ : nullptr; }
+
  private:
   device::Device& device_;
   Publish publish_;

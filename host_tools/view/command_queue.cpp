@@ -88,4 +88,9 @@ std::optional<ClientId> CommandQueue::owner(std::size_t axis) const {
   return owners_.at(axis);
 }
 
+bool CommandQueue::any_owner() const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(owners_.begin(), owners_.end(), [](const auto& owner) { return owner.has_value(); });
+}
+
 }  // namespace kmax::view

@@ -66,6 +66,7 @@ class CommandQueue {
   /// From before `axis` is armed until it is known to be disarmed. Urgent at once if that client is gone.
   void armed_by(std::size_t axis, std::optional<ClientId> client);
   std::optional<ClientId> owner(std::size_t axis) const;
+  bool any_owner() const;
 
  private:
   void raise(Urgency::Why why);  // with the mutex held

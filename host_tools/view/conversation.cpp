@@ -21,6 +21,8 @@ using std::chrono::milliseconds;
 namespace {
 // What is asked of the device by requests leaves fewer of them for rows, unless those come by themselves.
 constexpr milliseconds state_interval{100}, state_interval_of_polled{200}, slow_interval{1000};
+// Longer than from one attempt of a program that waits to the next (ExclusiveUse).
+constexpr milliseconds others_turn{5};
 
 std::vector<std::size_t> all_axes() {
   std::vector<std::size_t> axes;
@@ -94,6 +96,8 @@ void Conversation::step() {
       next_state_ = Clock::now() + (polled_ ? state_interval_of_polled : state_interval);
       read_state();
       if (mirror_.read_some(device_)) publish_parameters();
+      // Whoever keeps an axis armed by another program must not be kept out for long.
+      if (!commands_.any_owner()) device_.link().wait(others_turn);
     }
     capture_.look();
     if (polled_) {
@@ -118,7 +122,7 @@ void Conversation::settle() {
 
 void Conversation::carry_out(const Command& command) {
   try {
-    const std::string said = do_as_told(command);
+    const std::string said = do_it(command);
     publish_(reply(command.id, true, said, command.client));
   } catch (const ForceRemoved& removed) {
     publish_(reply(command.id, false, removed.what(), command.client));
@@ -132,7 +136,7 @@ void Conversation::carry_out(const Command& command) {
   next_state_ = {};
 }
 
-std::string Conversation::do_as_told(const Command& command) {
+std::string Conversation::do_it(const Command& command) {
   Drive drive(device_, command.axis);
   switch (command.kind) {
     case Command::Kind::alive:
@@ -167,35 +171,50 @@ std::string Conversation::do_as_told(const Command& command) {
       analysis_.want_map(command.axis, command.map_side);
       return {};
     case Command::Kind::capture:
-      refuse_long_reading(command.capture);
+      if (const std::string why = too_long_while_armed(command.capture); !why.empty() && any_armed())
+        throw device::ValueError(
+            fmt::format("an axis is armed, and the capture is too long for that: {}; or disarm first", why));
       capture_.begin(command.capture);
       return "the device looks for the trigger";
   }
   return {};
 }
 
-/// A node sends the whole capture in one transfer, during which it hears nothing else of this program.
-void Conversation::refuse_long_reading(const device::CaptureSettings& settings) const {
-  const bool armed =
-      std::any_of(axes_.begin(), axes_.end(), [](const AxisState& axis) { return axis.armed_by; });
+/// Why this capture must not be read while an axis is armed; empty if it may be. A node sends the whole of it
+/// in one transfer, during which it hears nothing else of this program.
+std::string Conversation::too_long_while_armed(const device::CaptureSettings& settings) const {
   const auto timeout = static_cast<double>(mirror_.values().real<"link.timeout">());
-  if (!reach_.open_bus || !armed || timeout == 0) return;
+  if (!reach_.open_bus || timeout == 0) return {};
   constexpr double values_per_second = 5000;  // at 1 Mbit/s beside telemetry of two axes
   const auto most = static_cast<std::size_t>(timeout / 2 * values_per_second);
   const std::size_t values =
       settings.samples == 0 ? firmware::capture_words : settings.samples * settings.channels.size();
-  if (values > most)
-    throw device::ValueError(
-        fmt::format("to read {} values would take longer than half of link.timeout, and the axis is armed: "
-                    "at most {} now, or disarm "
-                    "first",
-                    values, most));
+  if (values <= most) return {};
+  return fmt::format(
+      "to read its {} values would take longer than half of link.timeout: at most {} while an "
+      "axis is armed",
+      values, most);
+}
+
+/// By whomever.
+bool Conversation::any_armed() {
+  const auto axes = all_axes();
+  return std::any_of(axes.begin(), axes.end(),
+                     [this](std::size_t axis) { return Drive(device_, axis).status().armed(); });
 }
 
 std::string Conversation::arm(const Command& command) {
   Drive drive(device_, command.axis);
   const device::DriveStatus before = drive.status();
   if (before.armed()) return fmt::format("axis {} was armed already; who armed it keeps it", command.axis);
+  if (const auto* capture = capture_.settings()) {
+    if (const std::string why = too_long_while_armed(*capture); !why.empty())
+      throw device::ValueError(
+          fmt::format("axis {} was not armed: a capture is under way, and too long for that: {}; wait for "
+                      "its end, or begin "
+                      "a shorter one in its place",
+                      command.axis, why));
+  }
   commands_.armed_by(command.axis, command.client);
   try {
     if (before.state() == firmware::DriveState::quick_stop_active) drive.disarm();
@@ -260,8 +279,11 @@ void Conversation::wait_a_moment() {
 }
 
 void Conversation::end() {
-  for (const std::size_t axis : all_axes()) {
-    if (commands_.owner(axis)) Drive(device_, axis).disarm();
+  try {
+    ForceRemoval::disarm_of_clients(device_, commands_);
+  } catch (const ForceRemoved&) {
+    // Stopped meanwhile; that interrupts once only.
+    ForceRemoval::disarm_of_clients(device_, commands_);
   }
 }
 

@@ -23,7 +23,8 @@ namespace kmax::view {
 /// One connection to the device: carries commands out, and publishes state, parameters and rows. Belongs to
 /// the thread that makes it.
 ///
-/// Errors of all calls: link::LinkError, device::DeviceError; then it has to be made anew.
+/// Errors of all calls: link::LinkError, device::DeviceError, and of the constructor ForceRemoved too; then
+/// it has to be made again.
 class Conversation {
  public:
   /// All must outlive it.
@@ -37,7 +38,8 @@ class Conversation {
 
   /// What there is to do now, and a moment's wait.
   void step();
-  /// Disarms what clients have armed.
+  /// Disarms what clients have armed (ForceRemoval::disarm_of_clients), also after a stop that comes
+  /// meanwhile.
   void end();
 
  private:
@@ -49,8 +51,9 @@ class Conversation {
   void settle();
   void carry_out(const Command& command);
   /// What to say about it.
-  std::string do_as_told(const Command& command);
-  void refuse_long_reading(const device::CaptureSettings& settings) const;
+  std::string do_it(const Command& command);
+  std::string too_long_while_armed(const device::CaptureSettings& settings) const;
+  bool any_armed();
   std::string arm(const Command& command);
   std::string set(const std::vector<device::Assignment>& assignments);
   void publish_parameters();

@@ -4,6 +4,9 @@
 
 #include <thread>
 
+#include "host_tools/base/errors.hpp"
+#include "host_tools/device/disarm_failure.hpp"
+
 namespace kmax::view {
 
 namespace {
@@ -45,8 +48,26 @@ void DeviceSession::run(const std::function<bool()>& ended) {
       std::this_thread::sleep_for(answer_interval);
     }
   }
-  if (conversation_) conversation_->end();
-  conversation_.reset();
+  disarm();
+}
+
+void DeviceSession::disarm() {
+  if (conversation_) {
+    try {
+      conversation_->end();
+    } catch (const std::exception&) {
+      // What it leaves armed is tried once more.
+    }
+    conversation_.reset();
+  }
+  if (!commands_.any_owner()) return;
+  try {
+    device::Device device(reach_.open_link());
+    ForceRemoval::disarm_of_clients(device, commands_);
+  } catch (const std::exception& error) {
+    const double timeout = mirror_.values().real<"link.timeout">();
+    throw device::DeviceError(fmt::format("{}; {}", error.what(), device::words_for_disarm_failure(timeout)));
+  }
 }
 
 void DeviceSession::answer_without_a_device(const std::string& why) {
@@ -55,7 +76,7 @@ void DeviceSession::answer_without_a_device(const std::string& why) {
     publish_(
         reply(command->id, false,
               fmt::format("the device does not answer: {}{}", why,
-                          stop ? "; it is told to stop as soon as it does, and link.timeout takes the force "
+                          stop ? "; it will be stopped as soon as it does, and link.timeout takes the force "
                                  "meanwhile, unless it is 0"
                                : ""),
               command->client));

@@ -15,12 +15,14 @@ class DeviceSession {
   /// All must outlive it. Connects. Errors: link::LinkError, device::DeviceError.
   DeviceSession(Reach reach, DeviceFacts facts, CommandQueue& commands, Analysis& analysis, Publish publish);
 
-  /// Until `ended`, which is asked at least every 100 ms; then disarms what clients have armed. Throws only
-  /// if that is not possible: link::LinkError, device::DeviceError.
+  /// Until `ended`, which is asked at least every 100 ms; then disarms what clients have armed, by a new link
+  /// if the one that is there fails or is lost. Throws only if that is not possible: device::DeviceError,
+  /// which says what becomes of the force.
   void run(const std::function<bool()>& ended);
 
  private:
   void connect();
+  void disarm();
   void answer_without_a_device(const std::string& why);
 
   Reach reach_;

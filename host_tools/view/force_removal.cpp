@@ -63,6 +63,20 @@ void ForceRemoval::interrupt_if_urgent() {
   if (removed_) throw ForceRemoved("ended, because " + words_of(removed_->why));
 }
 
+void ForceRemoval::disarm_of_clients(device::Device& device, CommandQueue& commands) {
+  std::exception_ptr first_failure;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (!commands.owner(axis)) continue;
+    try {
+      device::Drive(device, axis).disarm();
+      commands.armed_by(axis, std::nullopt);
+    } catch (const std::exception&) {
+      if (!first_failure) first_failure = std::current_exception();
+    }
+  }
+  if (first_failure) std::rethrow_exception(first_failure);
+}
+
 std::optional<ForceRemoval::Settled> ForceRemoval::settle(device::Device& device) {
   if (!removed_) return std::nullopt;
   Settled settled{.report = {.why = words_of(removed_->why),

@@ -101,8 +101,8 @@ void CanLink::write(std::span<const SlotValue> values, Repeat repeat,
         i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, values.size());
     if (before_request) before_request();
     try {
-      claim(values[i]);
-      keep_alive();
+      claim(values[i], before_request);
+      if (!gives_up(values[i])) keep_alive(before_request);
       sdo_.download(parameter.object(), bytes_of(values[i].raw, parameter.bytes()),
                     repeat == Repeat::if_lost);
     } catch (const SdoAborted& aborted) {
@@ -175,24 +175,35 @@ std::vector<std::uint32_t> CanLink::read_capture(std::size_t count, const Progre
   return words;
 }
 
+/// Whether it takes an axis' force, before which nothing else is to be sent.
+bool CanLink::gives_up(const SlotValue& next) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    if (next.slot == Parameter::of<"drive.controlword">(axis).slot())
+      return (next.raw & firmware::controlword::enable_operation) == 0;
+  }
+  return false;
+}
+
 /// A controlword that is about to be written: whether its axis is this program's from now on.
-void CanLink::claim(const SlotValue& next) {
+void CanLink::claim(const SlotValue& next, const std::function<void()>& before_next) {
   for (std::size_t axis = 0; axis < commands_.size(); ++axis) {
     if (next.slot != Parameter::of<"drive.controlword">(axis).slot()) continue;
     commands_[axis] = (next.raw & firmware::controlword::enable_operation) != 0;
     if (!commands_[axis]) continue;
     const Parameter commander = Parameter::of<"drive.commander">(axis);
     sdo_.download(commander.object(), bytes_of(number_, commander.bytes()), true);
+    if (before_next) before_next();
   }
 }
 
-void CanLink::keep_alive() {
+void CanLink::keep_alive(const std::function<void()>& before_next) {
   constexpr auto interval = std::chrono::milliseconds(50);
   const bool commands = std::find(commands_.begin(), commands_.end(), true) != commands_.end();
   if (!commands || Clock::now() - last_sign_of_life_ < interval) return;
   constexpr Parameter sign_of_life = Parameter::of<"link.sign_of_life">();
   sdo_.download(sign_of_life.object(), bytes_of(number_, sign_of_life.bytes()), true);
   last_sign_of_life_ = Clock::now();
+  if (before_next) before_next();
 }
 
 std::map<std::string, std::string> CanLink::identify() {

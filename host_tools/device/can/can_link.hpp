@@ -29,7 +29,8 @@ class SdoRefused : public RefusedError {
 ///
 /// An axis that this program enables is its own (drive.commander): from that controlword on, until one that
 /// does not enable it, whatever is asked through this link also writes this program's link.sign_of_life
-/// twenty times a second, and no other program's traffic keeps the axis armed.
+/// twenty times a second, and no other program's traffic keeps the axis armed. Nothing is written before a
+/// controlword that takes the force.
 ///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
 class CanLink final : public Link {
@@ -56,8 +57,10 @@ class CanLink final : public Link {
                                         const SdoClient::ReportProgress& progress = {});
   /// One that has exactly so many bytes.
   std::vector<std::uint32_t> read_object(SdoClient::Object object, std::size_t bytes);
-  void claim(const SlotValue& next);
-  void keep_alive();
+  static bool gives_up(const SlotValue& next);
+  /// What these ask is asked before something else, for which `before_next` is then called.
+  void claim(const SlotValue& next, const std::function<void()>& before_next);
+  void keep_alive(const std::function<void()>& before_next = {});
 
   using Clock = std::chrono::steady_clock;
   DeviceAddress address_;

@@ -11,6 +11,7 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/print.hpp"
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/guard_words.hpp"
 #include "host_tools/json/drive_json.hpp"
@@ -98,12 +99,7 @@ void disarm_after_failure(Context& context, Drive& drive, double link_timeout) {
     drive.disarm();
     context.note("disarmed");
   } catch (const std::exception&) {
-    context.note(
-        link_timeout > 0
-            ? fmt::format("the axis could not be disarmed; link.timeout removes its force after {} s",
-                          device::number_text(static_cast<float>(link_timeout)))
-            : std::string("the axis could not be disarmed and link.timeout is 0: its force MAY STILL BE ON, "
-                          "cut its power"));
+    context.note(device::words_for_disarm_failure(link_timeout));
   }
 }
 

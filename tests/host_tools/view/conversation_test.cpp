@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include "host_tools/base/errors.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/view/device_session.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -21,6 +21,7 @@ struct Watched {
   std::vector<std::string> requests;  ///< "read", "write" or "word A V": controlword V of axis A
   std::function<void()> before_request;
   bool lost = false;
+  int loans = 0;  ///< how often others could use the link
 
   void request(std::string what) {
     if (lost) throw link::LinkError("nobody answers");
@@ -39,6 +40,8 @@ class WatchedLink final : public link::Link {
   }
   void write(std::span<const link::SlotValue> values, link::Repeat repeat,
              const std::function<void()>& before_request) override {
+    // Only over CAN can they be written.
+    if (Parameter::at(values[0].slot).name().find("event_time") != std::string::npos) return;
     std::string what = "write";
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
       if (values[0].slot == Parameter::of<"drive.controlword">(axis).slot())
@@ -64,7 +67,10 @@ class WatchedLink final : public link::Link {
     return watched_.device.read_log_entry(place);
   }
   std::chrono::microseconds now() const override { return watched_.device.now(); }
-  void wait(std::chrono::microseconds duration) override { watched_.device.wait(duration); }
+  void wait(std::chrono::microseconds duration) override {
+    ++watched_.loans;
+    watched_.device.wait(duration);
+  }
   std::string description() const override { return "watched"; }
 
  private:
@@ -80,11 +86,11 @@ class ConversationTest : public testing::Test {
   /// Steps until a message of this type is there that `wanted` accepts.
   template <typename Steps>
   Json until(Steps& steps, const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
-    // How many steps it takes hangs on how fast they are, since some things are asked for once a second.
-    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (std::chrono::steady_clock::now() < patience) {
+    // What is looked at now and then needs some rounds of readings, however fast the steps are.
+    for (int i = 0, rounds = 0; i < 2000 || rounds < 40; ++i) {
       for (; looked_at < published.size(); ++looked_at) {
         const Json message = Json::parse(published[looked_at].text);
+        if (message["type"] == "state") ++rounds;
         if (message["type"] != type || (wanted && !wanted(message))) continue;
         ++looked_at;
         return message;
@@ -286,7 +292,44 @@ TEST_F(ConversationTest, ACaptureIsReadInTheEnd) {
   EXPECT_CONTAINS(reply_to(talk, command)["message"].get<std::string>(), "there is no channel");
 }
 
-TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAnewAndAStopMeanwhileIsKept) {
+// A node sends a capture in one transfer, and hears no sign of life meanwhile.
+TEST_F(ConversationTest, OverCanALongCaptureAndAnArmedAxisExcludeEachOther) {
+  commands.joined(1);
+  reach.open_bus = [](const auto&) -> std::unique_ptr<link::CanPort> {
+    throw device::DeviceError("this bus carries no rows");
+  };
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  move_the_wall_away(talk);
+  Command capture{
+      .kind = Kind::capture,
+      .capture = {.channels = {"force"}, .samples = 9000, .trigger = firmware::CaptureTrigger::contact}};
+  ASSERT_EQ(reply_to(talk, capture)["ok"], true);
+  EXPECT_CONTAINS(reply_to(talk, {.kind = Kind::arm})["message"].get<std::string>(),
+                  "begin a shorter one in its place");
+  EXPECT_FALSE(armed(0));
+  capture.capture.samples = 100;
+  ASSERT_EQ(reply_to(talk, capture)["ok"], true);
+  EXPECT_EQ(reply_to(talk, {.kind = Kind::arm})["ok"], true);
+  reply_to(talk, {.kind = Kind::disarm});
+  // Also if it was another program that armed it.
+  device::Device other(std::make_unique<WatchedLink>(watched));
+  device::Drive(other, 0).arm();
+  capture.capture.samples = 9000;
+  EXPECT_CONTAINS(reply_to(talk, capture)["message"].get<std::string>(), "an axis is armed");
+}
+
+TEST_F(ConversationTest, OthersMayUseTheLinkAfterEachRoundOfReadings) {
+  Conversation talk(reach, commands, analysis, mirror, [this](Message message) {
+    if (Json::parse(message.text)["type"] == "state") watched.loans = 0;
+    publish(std::move(message));
+  });
+  for (int round = 0; round < 5; ++round) {
+    state(talk);
+    EXPECT_GE(watched.loans, 1);
+  }
+}
+
+TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAgainAndAStopMeanwhileIsKept) {
   commands.joined(1);
   DeviceSession session(reach, {}, commands, analysis, publish);
   push({.kind = Kind::arm, .id = 1});
@@ -319,7 +362,7 @@ TEST_F(ConversationTest, ALostLinkIsSaidAndMadeAnewAndAStopMeanwhileIsKept) {
     return false;
   });
   EXPECT_CONTAINS(trouble, "nobody answers");
-  EXPECT_CONTAINS(refusal, "told to stop as soon as");
+  EXPECT_CONTAINS(refusal, "it will be stopped as soon as");
   EXPECT_CONTAINS(why, "STOP");
   EXPECT_FALSE(armed(0));
 }
@@ -330,6 +373,78 @@ TEST_F(ConversationTest, TheEndDisarmsWhatAPageArmed) {
   push({.kind = Kind::arm, .id = 1});
   session.run([&] { return armed(0); });
   EXPECT_FALSE(armed(0));
+}
+
+TEST_F(ConversationTest, TheEndWhileTheLinkIsLostTriesOnceMoreAndSaysWhatBecomesOfTheForce) {
+  for (const bool back_in_time : {true, false}) {
+    for (const std::string timeout : {"0.5", "0"}) {
+      commands.joined(1);
+      DeviceSession session(reach, {}, commands, analysis, publish);
+      push({.kind = Kind::set, .assignments = {"wall.position=-1m", "link.timeout=" + timeout}});
+      push({.kind = Kind::arm});
+      looked_at = published.size();
+      const auto ended = [&] {
+        watched.lost = watched.lost || armed(0);
+        for (; looked_at < published.size(); ++looked_at) {
+          const Json message = Json::parse(published[looked_at].text);
+          if (message["type"] != "state" || message["link"]["connected"] == true) continue;
+          watched.lost = !back_in_time;
+          return true;
+        }
+        return published.size() > 10'000;
+      };
+      const std::string message =
+          back_in_time ? (session.run(ended), "")
+                       : host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); });
+      EXPECT_EQ(armed(0), !back_in_time);
+      if (!back_in_time) {
+        EXPECT_CONTAINS(message, "nobody answers");
+        EXPECT_CONTAINS(message,
+                        timeout == "0" ? "MAY STILL BE ON, cut its power" : "removes its force after");
+      }
+      watched.lost = false;
+      device::Device other(std::make_unique<WatchedLink>(watched));
+      ForceRemoval::disarm_of_clients(other, commands);
+    }
+  }
+}
+
+TEST_F(ConversationTest, TheEndDisarmsEveryAxisEvenIfOneFails) {
+  commands.joined(1);
+  DeviceSession session(reach, {}, commands, analysis, publish);
+  push({.kind = Kind::set, .assignments = {"wall.position=-1m", "axis1.wall.position=-1m"}});
+  push({.kind = Kind::arm});
+  push({.kind = Kind::arm, .axis = 1});
+  const auto ended = [&] {
+    if (!armed(1)) return published.size() > 10'000;
+    watched.before_request = [&] {
+      if (watched.requests.back().starts_with("word 0 ")) throw link::LinkError("axis 0 is not reached");
+    };
+    return true;
+  };
+  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); }),
+                  "axis 0 is not reached");
+  EXPECT_TRUE(armed(0));
+  EXPECT_FALSE(armed(1));
+}
+
+TEST_F(ConversationTest, AStopDuringTheEndDoesNotKeepItFromDisarming) {
+  for (std::size_t nth = 1; nth < 8; ++nth) {
+    commands.joined(1);
+    Conversation talk(reach, commands, analysis, mirror, publish);
+    move_the_wall_away(talk);
+    ASSERT_EQ(reply_to(talk, {.kind = Kind::arm})["ok"], true);
+    std::size_t count = 0;
+    watched.before_request = [&] {
+      if (++count == nth) commands.push({.kind = Kind::stop});
+    };
+    talk.end();
+    watched.before_request = {};
+    EXPECT_FALSE(armed(0)) << nth;
+    EXPECT_FALSE(commands.owner(0)) << nth;
+    if (const auto urgency = commands.urgent()) commands.settled(*urgency);
+    while (commands.take()) continue;
+  }
 }
 
 TEST_F(ConversationTest, ADeviceThatIsNotThereAtFirstIsAnError) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "firmware/capture/trace.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/base/errors.hpp"
@@ -185,6 +187,31 @@ TEST(CanLink, WhatItsCallerThrowsBetweenRequestsEndsTheWriting) {
                device::StoodStill);
   EXPECT_EQ(read(bench.link(), stiffness), 0x40000000u);
   EXPECT_NE(read(bench.link(), damping), 0x40000000u);
+}
+
+// A stop that comes while an axis is being armed waits for one request: what claims the axis is one of its
+// own.
+TEST(CanLink, ItsCallerIsAskedBeforeEachRequestOfArming) {
+  std::atomic<int> answers = 0;
+  Bench bench([&](int, const CanFrame& answer) { return ++answers, Frames{answer}; });
+  const SlotValue enabling{Parameter::of<"drive.controlword">(0).slot(), 15},
+      stopping{Parameter::of<"drive.controlword">(1).slot(), 2};
+  CanLink& link = bench.link();
+  answers = 0;
+  EXPECT_THROW(link.write({&enabling, 1}, Repeat::never,
+                          [&] {
+                            if (answers == 1) throw device::StoodStill("held up");
+                          }),
+               device::StoodStill);
+  EXPECT_EQ(answers, 1) << "commander";
+  answers = 0;
+  link.write({&stopping, 1}, Repeat::if_lost);
+  EXPECT_EQ(answers, 1) << "a sign of life of the other axis was due, and waits";
+  answers = 0;
+  std::vector<int> asked_after;
+  link.write({&enabling, 1}, Repeat::never, [&] { asked_after.push_back(answers); });
+  ASSERT_EQ(answers, 3) << "commander, sign of life, controlword";
+  EXPECT_EQ(asked_after, (std::vector{0, 1, 2}));
 }
 
 TEST(CanLink, AnotherDevicesObjectIsNotTakenForAValue) {
