@@ -15,7 +15,9 @@ class Packages(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         cls.made = Path(cls.folder.name) / "packages"
-        subprocess.run([str(HOUSE / "scripts" / "package"), str(cls.made)], check=True, capture_output=True, text=True)
+        done = subprocess.run([str(HOUSE / "scripts" / "package"), str(cls.made)], capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise AssertionError(done.stdout + done.stderr)
 
     def run_in(self, root, *command, **more):
         environment = {**os.environ, "KMAX_DEVICE": "sim", "PATH": f"{root}/usr/bin:{os.environ['PATH']}",
