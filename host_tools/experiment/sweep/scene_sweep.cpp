@@ -66,7 +66,12 @@ std::vector<std::string> list_of(const SweptSetting& setting, std::string_view t
     const std::size_t comma = std::min(text.find(',', at), text.size());
     const std::string_view one = device::trimmed(text.substr(at, comma - at));
     if (one.empty()) fail(setting.shown, fmt::format("'{}': a value is missing", text));
-    values.push_back(numbers ? device::number_text(number_of(setting, one)) : std::string(one));
+    std::string value = numbers ? device::number_text(number_of(setting, one)) : std::string(one);
+    if (std::find(values.begin(), values.end(), value) != values.end())
+      fail(setting.shown, fmt::format("'{}': {} is given twice; leave one out (--repeat runs a combination "
+                                      "more than once)",
+                                      text, value));
+    values.push_back(std::move(value));
     at = comma + 1;
   }
   return values;
@@ -100,6 +105,7 @@ SweepRow run_one(const SceneSweep& sweep, std::size_t run) {
   try {
     const simulated_board::RunResult result = simulated_board::run_scene(scene);
     row.outcome = outcome_of(result);
+    row.refused = result.samples[0].empty();
     row.contact = result.contact;
     for (const auto& sample : result.samples[0])
       row.largest_force = std::max(row.largest_force, std::abs(sample.applied_force));
@@ -179,13 +185,18 @@ void run_sweep(const SceneSweep& sweep, std::size_t jobs, std::vector<std::optio
 
 std::string sweep_csv(const SceneSweep& sweep, const std::vector<std::optional<SweepRow>>& rows) {
   std::string table;
-  for (const SweptSetting& setting : sweep.settings) table += cell(setting.shown) + ',';
+  const auto has_column = [](const SweptSetting& setting) { return setting.name != "seed"; };
+  for (const SweptSetting& setting : sweep.settings) {
+    if (has_column(setting)) table += cell(setting.shown) + ',';
+  }
   table +=
       "repeat,seed,verdict,peak_to_peak_m,deepest_m,largest_force_n,alarms,first_alarm_s,limited_share,"
       "clipped_share,outcome\n";
   for (const std::optional<SweepRow>& row : rows) {
     if (!row) break;
-    for (const std::string& value : row->values) table += cell(value) + ',';
+    for (std::size_t i = 0; i < row->values.size(); ++i) {
+      if (has_column(sweep.settings[i])) table += cell(row->values[i]) + ',';
+    }
     table += fmt::format("{},{},", row->repeat, row->seed);
     table += row->contact ? fmt::format("{},{},{}", to_string(row->contact->verdict),
                                         row->contact->peak_to_peak, row->contact->deepest)

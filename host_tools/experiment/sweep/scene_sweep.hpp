@@ -19,7 +19,7 @@ struct SweptSetting {
   std::string name;                 ///< as simulation::SceneSetting has it
   std::string shown;                ///< as it was given, without "parameters."
   std::string unit;                 ///< of the values; empty for none
-  std::vector<std::string> values;  ///< numbers in that unit
+  std::vector<std::string> values;  ///< numbers in that unit; none is there twice
 };
 
 /// "NAME=VALUE", "NAME=A,B,C" or "NAME=FROM..TO:STEP", which ends at the last step that does not pass TO.
@@ -46,6 +46,7 @@ bool check_sweep(const SceneSweep& sweep);
 
 struct SweepRow {
   std::vector<std::string> values;  ///< of the settings
+  bool refused = false;             ///< it could not be armed; `outcome` says why
   std::size_t repeat = 0;
   std::uint64_t seed = 0;  ///< repeat 0 has the scene's own: --set seed=... makes any row again
   std::optional<simulation::ContactMeasure> contact;
@@ -62,7 +63,8 @@ struct SweepRow {
 void run_sweep(const SceneSweep& sweep, std::size_t jobs, std::vector<std::optional<SweepRow>>& rows,
                const ProgressReport& report = {});
 
-/// One line per row, with a heading: settings by name, all in SI units. Up to the first row that is missing.
+/// One line per row, with a heading: settings by name, all in SI units; a seed that is one of them is not
+/// there again, since each row has the one it was run with. Up to the first row that is missing.
 std::string sweep_csv(const SceneSweep& sweep, const std::vector<std::optional<SweepRow>>& rows);
 
 }  // namespace kmax::experiment

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <map>
+#include <set>
 
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/interruption.hpp"
@@ -52,9 +53,16 @@ std::string verdict_of(const SweepRow& row) {
   return row.contact ? std::string(experiment::to_string(row.contact->verdict)) : "not judged";
 }
 
+/// A number as a number, a word as text.
+Json value_json(const std::string& value) {
+  Json number = Json::parse(value, nullptr, false);
+  return number.is_number() ? number : Json(value);
+}
+
 Json row_json(const SceneSweep& sweep, const SweepRow& row) {
   Json settings = Json::object();
-  for (std::size_t i = 0; i < row.values.size(); ++i) settings[sweep.settings[i].shown] = row.values[i];
+  for (std::size_t i = 0; i < row.values.size(); ++i)
+    settings[sweep.settings[i].shown] = value_json(row.values[i]);
   return {{"settings", settings},
           {"repeat", row.repeat},
           {"seed", row.seed},
@@ -102,6 +110,21 @@ void write_result(Context& context, const SweepOptions& options, const SceneSwee
   }
 }
 
+/// Whether any run was armed. Says how many were not, and why.
+bool note_refused(Context& context, const Rows& rows) {
+  std::size_t refused = 0;
+  std::set<std::string> why;
+  for (const auto& row : rows) {
+    if (!row || !row->refused) continue;
+    ++refused;
+    why.insert(row->outcome);
+  }
+  if (refused > 0)
+    context.note(
+        fmt::format("{} of {} runs were not armed: {}", refused, rows.size(), fmt::join(why, "; or ")));
+  return refused < rows.size();
+}
+
 int run_sweep_command(Context& context, const SweepOptions& options) {
   SceneSweep sweep{options.scene, {}, options.repeats};
   for (const std::string& text : options.settings) {
@@ -133,7 +156,7 @@ int run_sweep_command(Context& context, const SweepOptions& options) {
     return failed;
   }
   write_result(context, options, sweep, rows);
-  return done;
+  return note_refused(context, rows) ? done : failed;
 }
 }  // namespace
 
@@ -148,7 +171,7 @@ void add_sweep_command(CLI::App& app, Context& context) {
 Names are those of 'kmax simulate --set'. A range has three numbers, all with a unit or none. The table has
 every setting in SI units, the seed, and of axis 0 the verdict on the held contact, its peak to peak and
 deepest point, the largest force, the device's own alarms, and how the run ended. Repeat 0 has the scene's
-own seed; 'kmax simulate SCENE --set seed=...' runs any row again. Ctrl-C keeps the runs that are done.)"},
+own seed; 'kmax simulate SCENE --set seed=...' runs any row again. Ctrl-C keeps the runs that are done. Ends with code 1 if no run could be armed.)"},
       Takes::nothing, run_sweep_command);
 }
 

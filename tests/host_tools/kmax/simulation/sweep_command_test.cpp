@@ -51,7 +51,7 @@ TEST_F(Sweep, TheTableDoesNotDependOnTheJobs) {
 TEST_F(Sweep, ARowIsWhatSimulateGives) {
   EXPECT_EQ(kmax({"sweep", scene(), "--set", "wall.stiffness=4000", "--repeat", "2", "--json"}), done);
   const Json row = document()["runs"][1];
-  EXPECT_EQ(row["settings"], (Json{{"wall.stiffness", "4000"}}));
+  EXPECT_EQ(row["settings"], (Json{{"wall.stiffness", 4000}}));
   EXPECT_EQ(kmax({"simulate", scene(), "--set", "wall.stiffness=4000", "--set",
                   fmt::format("seed={}", row["seed"].get<std::uint64_t>()), "--json"}),
             done)
@@ -70,17 +70,17 @@ TEST_F(Sweep, RangesAndListsInTheirUnits) {
   const auto values = [&](const std::string& set) {
     EXPECT_EQ(kmax({"sweep", scene(""), "--set", set, "--set", "measurement.window=0.5s", "--json"}), done)
         << said;
-    std::vector<std::string> found;
+    Json found = Json::array();
     const Json all = document();
-    for (const Json& run : all["runs"]) found.push_back(run["settings"].front().get<std::string>());
+    for (const Json& run : all["runs"]) found.push_back(run["settings"].front());
     return found;
   };
-  EXPECT_EQ(values("device.mass=40g..60g:10g"), (std::vector<std::string>{"0.04", "0.05", "0.06"}));
-  EXPECT_EQ(values("operator.grip_damping=1..1.3:0.1"), (std::vector<std::string>{"1", "1.1", "1.2", "1.3"}));
-  EXPECT_EQ(values("wall.stiffness=1000..2000:600"), (std::vector<std::string>{"1000", "1600"}));
-  EXPECT_EQ(values("wall.stiffness=1N/mm,500"), (std::vector<std::string>{"1000", "500"}));
-  EXPECT_EQ(values("wall.law=plain,magnetic"), (std::vector<std::string>{"plain", "magnetic"}));
-  EXPECT_EQ(values("motion.push_force=2"), (std::vector<std::string>{"2"}));
+  EXPECT_EQ(values("device.mass=40g..60g:10g"), (Json{0.04, 0.05, 0.06}));
+  EXPECT_EQ(values("operator.grip_damping=1..1.3:0.1"), (Json{1, 1.1, 1.2, 1.3}));
+  EXPECT_EQ(values("wall.stiffness=1000..2000:600"), (Json{1000, 1600}));
+  EXPECT_EQ(values("wall.stiffness=1N/mm,500"), (Json{1000, 500}));
+  EXPECT_EQ(values("wall.law=plain,magnetic"), (Json::array({"plain", "magnetic"})));
+  EXPECT_EQ(values("motion.push_force=2"), (Json::array({2})));
 }
 
 TEST_F(Sweep, ARunThatCannotBeArmedIsARowThatSaysSo) {
@@ -89,6 +89,21 @@ TEST_F(Sweep, ARunThatCannotBeArmedIsARowThatSaysSo) {
   EXPECT_EQ(lines(output), 3u) << output;
   EXPECT_CONTAINS(output, "-0.03,0.2,0,");
   EXPECT_CONTAINS(output, "inside the wall");
+  EXPECT_CONTAINS(said, "1 of 2 runs were not armed: ");
+  EXPECT_EQ(kmax({"sweep", "free_handle", "--set", "wall.position=0.4,0.5", "--set", "duration=0.2"}),
+            failed);
+  EXPECT_EQ(lines(output), 3u) << output;
+  EXPECT_CONTAINS(said, "2 of 2 runs were not armed: ");
+  EXPECT_CONTAINS(said, "inside the wall");
+}
+
+TEST_F(Sweep, ASeedThatIsSweptHasOneColumn) {
+  EXPECT_EQ(kmax({"sweep", scene(), "--set", "seed=1,2"}), done) << said;
+  EXPECT_TRUE(output.starts_with("repeat,seed,verdict,")) << output;
+  EXPECT_CONTAINS(output, "\n0,1,");
+  EXPECT_CONTAINS(output, "\n0,2,");
+  EXPECT_EQ(kmax({"sweep", scene(), "--set", "seed=2", "--json"}), done);
+  EXPECT_EQ(document()["runs"][0]["settings"]["seed"], document()["runs"][0]["seed"]);
 }
 
 TEST_F(Sweep, RepeatsWithoutNoiseAreEqualAndItIsSaid) {
@@ -134,6 +149,8 @@ TEST_F(Sweep, WhatCannotBeMeantIsRefusedBeforeAnythingRuns) {
   expect_error(set("wall.stiffness=1N/mm..2:1"), wrong_usage, "give all three numbers their unit, or none");
   expect_error(set("wall.stiffness=1kg,2kg"), wrong_usage, "'kg' is not one of its units N/m");
   expect_error(set("wall.stiffness=1,,2"), wrong_usage, "a value is missing");
+  expect_error(set("wall.stiffness=1000,2,1N/mm"), wrong_usage, "1000 is given twice");
+  expect_error(set("wall.law=plain,plain"), wrong_usage, "plain is given twice");
   expect_error(set("wall.stiffness=1000,-1"), wrong_usage, "wall.stiffness");
   expect_error(set("wall.law=plain..magnetic:1"), wrong_usage, "it is not a number; give a list");
   expect_error({"sweep", scene(), "--set", "seed=1", "--set", "seed=2"}, wrong_usage, "given twice");
