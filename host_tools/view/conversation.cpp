@@ -280,10 +280,10 @@ void Conversation::wait_a_moment() {
 
 void Conversation::end() {
   try {
-    ForceRemoval::disarm_of_clients(device_, commands_);
+    disarm_of_clients(device_, commands_);
   } catch (const ForceRemoved&) {
     // Stopped meanwhile; that interrupts once only.
-    ForceRemoval::disarm_of_clients(device_, commands_);
+    disarm_of_clients(device_, commands_);
   }
 }
 

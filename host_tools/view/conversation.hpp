@@ -38,7 +38,7 @@ class Conversation {
 
   /// What there is to do now, and a moment's wait.
   void step();
-  /// Disarms what clients have armed (ForceRemoval::disarm_of_clients), also after a stop that comes
+  /// Disarms what clients have armed (disarm_of_clients), also after a stop that comes
   /// meanwhile.
   void end();
 

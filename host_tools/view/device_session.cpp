@@ -63,7 +63,7 @@ void DeviceSession::disarm() {
   if (!commands_.any_owner()) return;
   try {
     device::Device device(reach_.open_link());
-    ForceRemoval::disarm_of_clients(device, commands_);
+    disarm_of_clients(device, commands_);
   } catch (const std::exception& error) {
     const double timeout = mirror_.values().real<"link.timeout">();
     throw device::DeviceError(fmt::format("{}; {}", error.what(), device::words_for_disarm_failure(timeout)));

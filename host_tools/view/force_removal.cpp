@@ -63,7 +63,7 @@ void ForceRemoval::interrupt_if_urgent() {
   if (removed_) throw ForceRemoved("ended, because " + words_of(removed_->why));
 }
 
-void ForceRemoval::disarm_of_clients(device::Device& device, CommandQueue& commands) {
+void disarm_of_clients(device::Device& device, CommandQueue& commands) {
   std::exception_ptr first_failure;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!commands.owner(axis)) continue;

@@ -37,10 +37,6 @@ class ForceRemoval {
   /// disarmed.
   std::optional<Settled> settle(device::Device& device);
 
-  /// Disarms what clients have armed, each axis even if another one fails; the first failure is then thrown:
-  /// link::LinkError, device::DeviceError. An axis that failed stays its client's.
-  static void disarm_of_clients(device::Device& device, CommandQueue& commands);
-
  private:
   std::vector<std::size_t> axes_in_order() const;
 
@@ -50,5 +46,9 @@ class ForceRemoval {
   std::optional<Urgency> removed_;
   std::chrono::steady_clock::time_point answered_{};
 };
+
+/// Disarms what clients have armed, each axis even if another one fails; the first failure is then thrown:
+/// link::LinkError, device::DeviceError. An axis that failed stays its client's.
+void disarm_of_clients(device::Device& device, CommandQueue& commands);
 
 }  // namespace kmax::view

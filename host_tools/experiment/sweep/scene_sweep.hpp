@@ -20,7 +20,6 @@ struct SweptSetting {
   std::string shown;                ///< as it was given, without "parameters."
   std::string unit;                 ///< of the values; empty for none
   std::vector<std::string> values;  ///< numbers in that unit; none is there twice
-  bool number = false;              ///< else words
 };
 
 /// "NAME=VALUE", "NAME=A,B,C" or "NAME=FROM..TO:STEP", which ends at the last step that does not pass TO.

@@ -53,16 +53,16 @@ std::string verdict_of(const SweepRow& row) {
   return row.contact ? std::string(experiment::to_string(row.contact->verdict)) : "not judged";
 }
 
-/// A number as one.
-Json value_json(const experiment::SweptSetting& setting, const std::string& value) {
-  const Json number = setting.number ? Json::parse(value, nullptr, false) : Json();
+/// A number as a number, a word as text.
+Json value_json(const std::string& value) {
+  Json number = Json::parse(value, nullptr, false);
   return number.is_number() ? number : Json(value);
 }
 
 Json row_json(const SceneSweep& sweep, const SweepRow& row) {
   Json settings = Json::object();
   for (std::size_t i = 0; i < row.values.size(); ++i)
-    settings[sweep.settings[i].shown] = value_json(sweep.settings[i], row.values[i]);
+    settings[sweep.settings[i].shown] = value_json(row.values[i]);
   return {{"settings", settings},
           {"repeat", row.repeat},
           {"seed", row.seed},

@@ -404,7 +404,7 @@ TEST_F(ConversationTest, TheEndWhileTheLinkIsLostTriesOnceMoreAndSaysWhatBecomes
       }
       watched.lost = false;
       device::Device other(std::make_unique<WatchedLink>(watched));
-      ForceRemoval::disarm_of_clients(other, commands);
+      disarm_of_clients(other, commands);
     }
   }
 }

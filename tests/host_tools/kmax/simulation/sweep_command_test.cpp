@@ -102,6 +102,8 @@ TEST_F(Sweep, ASeedThatIsSweptHasOneColumn) {
   EXPECT_TRUE(output.starts_with("repeat,seed,verdict,")) << output;
   EXPECT_CONTAINS(output, "\n0,1,");
   EXPECT_CONTAINS(output, "\n0,2,");
+  EXPECT_EQ(kmax({"sweep", scene(), "--set", "seed=2", "--json"}), done);
+  EXPECT_EQ(document()["runs"][0]["settings"]["seed"], document()["runs"][0]["seed"]);
 }
 
 TEST_F(Sweep, RepeatsWithoutNoiseAreEqualAndItIsSaid) {
