@@ -46,7 +46,7 @@ class LoopPdos {
  public:
   explicit LoopPdos(Session& session) : session_(session) {
     require_no_other_sync();
-    const bool left = device_.read(rpdo_count) == 1 && is_target(device_.read(rpdo_object));
+    const bool left = are_left(device_);
     if (!left && (device_.read(rpdo_count) != 0 || device_.read(rpdo_cob_id) != rpdo_cob_id.default_raw()))
       throw device::DeviceError(
           "RPDO 3 is set up for something else, and a force loop needs it: put 0 into 0x1602:0, or reset the "
@@ -62,6 +62,10 @@ class LoopPdos {
     device_.write(rpdo_count, 1, true);
     device_.write(rpdo_cob_id, rpdo_identifier + node_, true);
     for (const Parameter& type : transmission_types) device_.write(type, at_each_sync, true);
+  }
+
+  static bool are_left(device::Device& device) {
+    return device.read(rpdo_count) == 1 && is_target(device.read(rpdo_object));
   }
 
   ~LoopPdos() {
@@ -244,6 +248,13 @@ class PolledChannel final : public ForceChannel {
 std::unique_ptr<ForceChannel> open_force_channel(Session& session, std::size_t axis) {
   if (session.is_can()) return std::make_unique<PdoChannel>(session, axis);
   return std::make_unique<PolledChannel>(session, axis);
+}
+
+void put_back_left_pdos(Session& session) {
+  if (!LoopPdos::are_left(session.device)) return;
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+    if (device::Drive(session.device, axis).status().armed()) return;
+  const LoopPdos put_back(session);
 }
 
 }  // namespace kmax::library

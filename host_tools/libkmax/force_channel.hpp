@@ -37,4 +37,8 @@ class ForceChannel {
 /// somebody's own that are in the way.
 std::unique_ptr<ForceChannel> open_force_channel(Session& session, std::size_t axis);
 
+/// Puts the PDOs back that a force loop of a killed program has left over CAN, unless an axis is armed: then
+/// another program's loop may be going on.
+void put_back_left_pdos(Session& session);
+
 }  // namespace kmax::library

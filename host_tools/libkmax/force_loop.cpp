@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -167,6 +168,7 @@ class Loop {
         cycle += behind;
       }
     }
+    std::ranges::rotate(record_.steps, record_.steps.begin() + static_cast<std::ptrdiff_t>(oldest_));
     return std::move(record_);
   }
 
@@ -205,15 +207,25 @@ class Loop {
       throw device::ValueError(
           fmt::format("the loop's function gave {} N; a force is from {} to {} N", *force, -most, most));
     channel_.send(static_cast<float>(*force));
-    record_.steps.push_back({.time = sample.time,
-                             .position = sample.position,
-                             .velocity = sample.velocity,
-                             .measured_force = sample.force,
-                             .force = *force,
-                             .lateness = std::max(lateness, 0.0),
-                             .round_trip = channel_.round_trip(),
-                             .flags = sample.flags});
+    keep({.time = sample.time,
+          .position = sample.position,
+          .velocity = sample.velocity,
+          .measured_force = sample.force,
+          .force = *force,
+          .lateness = std::max(lateness, 0.0),
+          .round_trip = channel_.round_trip(),
+          .flags = sample.flags});
     return true;
+  }
+
+  /// A loop without an end must not take all of the memory.
+  void keep(const ForceStep& step) {
+    if (record_.steps.size() < options_.keep) {
+      record_.steps.push_back(step);
+    } else if (options_.keep > 0) {
+      record_.steps[oldest_] = step;
+      oldest_ = (oldest_ + 1) % options_.keep;
+    }
   }
 
   [[noreturn]] void fail_disarmed() {
@@ -242,6 +254,7 @@ class Loop {
   microseconds period_{}, unanswered_{};
   std::optional<std::uint64_t> first_tick_;
   ForceRecord record_;
+  std::size_t oldest_ = 0;  ///< of record_.steps
 };
 
 double checked_rate(const ForceLoopOptions& options, const ForceChannel& channel) {

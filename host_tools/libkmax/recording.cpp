@@ -8,6 +8,7 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/suggestion.hpp"
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/libkmax/force_channel.hpp"
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
 #include "host_tools/record/telemetry_request.hpp"
@@ -75,6 +76,7 @@ class SettingLink final : public BorrowedLink {
 
 Recording record_pdos(Session& session, double seconds, std::size_t axis,
                       const std::function<bool(const std::vector<Sample>&)>& more) {
+  put_back_left_pdos(session);
   record::TelemetryRequest telemetry(
       [&session] { return device::Device(std::make_unique<SettingLink>(session)); }, session.options.notice);
   telemetry.ask();

@@ -19,8 +19,9 @@ namespace cob_id = firmware::canopen::cob_id;
 namespace {
 [[noreturn]] void fail(const std::string& name, const std::string& what) {
   throw DeviceError(fmt::format(
-      "{} {}: a recording over CAN needs the factory's PDOs 1 to 4; 'kmax defaults' and a restart bring them "
-      "back, or record over the serial port",
+      "{} {}: a recording over CAN needs the factory's PDOs 1 to 4; if a program that was killed has changed "
+      "them, a reset of the node's communication (NMT 130) or turning the power off and on brings back those "
+      "that were saved; or record over the serial port",
       name, what));
 }
 

@@ -301,6 +301,7 @@ class TakesTheForceAway(AgainstAServedDevice):
         while device.status().armed:
             device.wait(0.05)
         device.clear()
+        self.assertGreater(len(device.record(0.2).time), 0)
         record = device.force_loop(lambda sample: 0.0, seconds=0.2)
         self.assertGreater(len(record.time), 0)
         self.assertEqual(device["rpdo3.mapped_count"], 0)
@@ -370,7 +371,9 @@ class Loops(AgainstAServedDevice):
         record = device.force_loop(lambda sample: 0.0, seconds=0.5)
         self.assertEqual(record.rate, 1000)
         self.assertEqual(len(record.time) + record.missed, 500)
-        self.assertEqual(device.force_loop(lambda sample: 0.0, seconds=0.5, rate=200).rate, 200)
+        record = device.force_loop(lambda sample: 0.0, seconds=0.5, rate=200, keep=10)
+        self.assertEqual(record.rate, 200)
+        self.assertEqual(len(record.time), 10)
         with self.assertRaisesRegex(ValueError, "1 to 1000 Hz"):
             device.force_loop(lambda sample: 0.0, rate=2000)
 

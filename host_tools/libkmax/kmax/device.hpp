@@ -51,6 +51,8 @@ struct ForceLoopOptions {
   /// s that the function may take. After that the axis is disarmed by a thread of its own, which needs
   /// neither the function's thread nor a lock that it holds.
   double watchdog = 0.1;
+  /// As many of the last cycles are in the record, 64 bytes each: of 17 minutes at 1000 Hz.
+  std::size_t keep = 1'000'000;
 };
 
 /// A haptic device with its controller.

@@ -64,9 +64,9 @@ struct ForceStep {
 };
 
 struct ForceRecord {
-  std::vector<ForceStep> steps{};
-  double rate = 0;           ///< Hz
-  std::uint64_t missed = 0;  ///< cycles left out, because the one before took too long or got no answer
+  std::vector<ForceStep> steps{};  ///< the last ForceLoopOptions::keep
+  double rate = 0;                 ///< Hz
+  std::uint64_t missed = 0;        ///< cycles left out, because the one before took too long or got no answer
 };
 
 }  // namespace kmax

@@ -112,21 +112,21 @@ py::tuple record(PythonDevice& device, double seconds, std::size_t axis, const p
 }
 
 py::tuple force_loop(PythonDevice& device, const py::object& function, std::optional<double> seconds,
-                     std::optional<double> rate, double watchdog, std::size_t axis) {
+                     std::optional<double> rate, double watchdog, std::size_t axis, std::size_t keep) {
   kmax::ForceRecord record;
   {
     const py::gil_scoped_release released;
-    record = device->force_loop({.axis = axis, .rate = rate, .seconds = seconds, .watchdog = watchdog},
-                                [&function](const kmax::Sample& sample) -> std::optional<double> {
-                                  const py::gil_scoped_acquire lock;
-                                  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-                                  const py::object force = function(sample);
-                                  if (force.is_none()) return std::nullopt;
-                                  const double newtons = PyFloat_AsDouble(force.ptr());
-                                  if (newtons == -1.0 && PyErr_Occurred() != nullptr)
-                                    throw py::error_already_set();
-                                  return newtons;
-                                });
+    record = device->force_loop(
+        {.axis = axis, .rate = rate, .seconds = seconds, .watchdog = watchdog, .keep = keep},
+        [&function](const kmax::Sample& sample) -> std::optional<double> {
+          const py::gil_scoped_acquire lock;
+          if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+          const py::object force = function(sample);
+          if (force.is_none()) return std::nullopt;
+          const double newtons = PyFloat_AsDouble(force.ptr());
+          if (newtons == -1.0 && PyErr_Occurred() != nullptr) throw py::error_already_set();
+          return newtons;
+        });
   }
   return py::make_tuple(array_of(std::move(record.steps)), record.rate, record.missed);
 }

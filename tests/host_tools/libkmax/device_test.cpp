@@ -175,6 +175,23 @@ TEST(LibraryDevice, MakesTheForceThatALoopAsksFor) {
   EXPECT_EQ(device.get("profile.target_force").number, 0);
 }
 
+TEST(LibraryDevice, KeepsTheLastCyclesOfALoop) {
+  Device device("sim");
+  const auto kept = [&](std::size_t keep) {
+    std::vector<double> forces;
+    int cycle = 0;
+    const ForceRecord record = device.force_loop({.keep = keep}, [&](const Sample&) -> std::optional<double> {
+      if (cycle == 8) return std::nullopt;
+      return 0.01 * cycle++;
+    });
+    for (const ForceStep& step : record.steps) forces.push_back(step.force);
+    return forces;
+  };
+  EXPECT_EQ(kept(3), (std::vector<double>{0.05, 0.06, 0.07}));
+  EXPECT_EQ(kept(8).size(), 8U);
+  EXPECT_TRUE(kept(0).empty());
+}
+
 TEST(LibraryDevice, EndsALoopInOrder) {
   Device device("sim");
   int left = 5;

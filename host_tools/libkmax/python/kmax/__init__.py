@@ -121,7 +121,7 @@ class Capture:
 
 @dataclass(frozen=True)
 class ForceRecord:
-    """What a force loop did; `steps` is a structured array of all columns, one row for each cycle."""
+    """What a force loop did; `steps` is a structured array of all columns, one row for each of its last cycles."""
 
     steps: NDArray[Any]
     rate: float  #: Hz
@@ -313,15 +313,17 @@ class Device:
                                              float(patience), when_ready))
 
     def force_loop(self, function: Callable[[Sample], Number | None], seconds: Number | None = None, *,
-                   rate: Number | None = None, watchdog: Number = 0.1, axis: int = 0) -> ForceRecord:
+                   rate: Number | None = None, watchdog: Number = 0.1, axis: int = 0,
+                   keep: int = 1_000_000) -> ForceRecord:
         """Calls the function with a Sample in each cycle, and makes the force that it returns, N at the handle along +x. None
         ends the loop. It arms before and disarms after, however it ends.
 
         rate: Hz; without it 1000 over CAN of 1 Mbit/s, over a serial line what that can carry. watchdog: s that the function
-        may take; after that the axis is disarmed at once and WatchdogError raised when it returns.
+        may take; after that the axis is disarmed at once and WatchdogError raised when it returns. keep: as many of the last
+        cycles are in the record, 64 bytes each.
         """
         return ForceRecord(*self._device.force_loop(function, None if seconds is None else float(seconds),
-                                                    None if rate is None else float(rate), float(watchdog), axis))
+                                                    None if rate is None else float(rate), float(watchdog), axis, keep))
 
     def check(self, parameters: Mapping[str, Setting] | None = None, *, hand: str = "none", axis: int = 0) -> Check:
         """Stability criteria for the device's parameters with these in place of its own. Sets nothing. hand: none,
