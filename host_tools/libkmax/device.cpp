@@ -8,6 +8,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/device/settings_file.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/libkmax/command_run.hpp"
 #include "host_tools/libkmax/force_loop.hpp"
