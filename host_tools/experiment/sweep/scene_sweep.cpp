@@ -131,7 +131,7 @@ std::string cell(std::string_view text) {
 SweptSetting parse_swept_setting(const std::string& text) {
   const simulation::SceneSetting given = simulated_board::split_setting(text);
   const simulated_board::NamedSetting named = simulated_board::resolve_setting(given.name);
-  SweptSetting setting{named.name, given.name, std::string(named.unit), {}, named.number};
+  SweptSetting setting{named.name, given.name, std::string(named.unit), {}};
   const std::size_t dots = given.value.find("..");
   if (dots != std::string::npos && !named.number)
     fail(setting.shown, fmt::format("'{}': it is not a number; give a list, A,B,C", given.value));
