@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
 #include <sstream>
@@ -50,6 +51,12 @@ class CommandLineFixture : public testing::Test {
     Json parsed = Json::parse(output, nullptr, false);
     EXPECT_FALSE(parsed.is_discarded()) << output;
     return parsed;
+  }
+  /// What was printed, wherever its lines are broken.
+  std::string words() const {
+    std::string all = output;
+    std::replace(all.begin(), all.end(), '\n', ' ');
+    return all;
   }
   std::vector<std::string> keys() {
     std::vector<std::string> found;
