@@ -34,7 +34,7 @@ std::optional<std::string> default_device_address() {
   std::error_code unreadable;
   if (file.empty() || !std::filesystem::exists(file, unreadable)) return std::nullopt;
   const std::string text =
-      base::text_of<AddressError>(file, "it holds your defaults for kmax; mend it or remove it");
+      base::text_of<AddressError>(file, "it holds your defaults for kmax; correct it or remove it");
   const toml::table table = base::parsed_toml<AddressError>(text, file.string());
   static const std::array<std::string, 1> keys = {"device"};
   for (const auto& [key, value] : table) {

@@ -4,15 +4,11 @@
 
 #include <random>
 
+#include "host_tools/base/numbers.hpp"
+
 namespace kmax::view {
 
 namespace {
-std::string_view trimmed(std::string_view text) {
-  while (text.starts_with(' ')) text.remove_prefix(1);
-  while (text.ends_with(' ')) text.remove_suffix(1);
-  return text;
-}
-
 std::string shown(std::string_view text) {
   return std::string(text.substr(0, 100));
 }
@@ -50,12 +46,12 @@ std::string Access::refusal_of_stream(const Credentials& asked) const {
   if (asked.origin && *asked.origin != "http://" + by_number_ && *asked.origin != "http://" + by_name_)
     return fmt::format("a page of the origin '{}' may not use this stream", shown(*asked.origin));
   constexpr std::string_view bearer = "Bearer ";
-  if (asked.authorization.starts_with(bearer) && is_token(trimmed(asked.authorization.substr(bearer.size()))))
+  if (asked.authorization.starts_with(bearer) && is_token(device::trimmed(asked.authorization.substr(bearer.size()))))
     return {};
   constexpr std::string_view offered = "token.";
   for (std::string_view rest = asked.protocols; !rest.empty();) {
     const std::size_t comma = rest.find(',');
-    const std::string_view one = trimmed(rest.substr(0, comma));
+    const std::string_view one = device::trimmed(rest.substr(0, comma));
     if (one.starts_with(offered) && is_token(one.substr(offered.size()))) return {};
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
   }

@@ -13,7 +13,7 @@ using device::Parameter;
 namespace {
 constexpr std::uint16_t quick_stop_now = firmware::controlword::enable_voltage;
 
-std::string words_of(Urgency::Why why) {
+std::string to_string(Urgency::Why why) {
   switch (why) {
     case Urgency::Why::asked:
       return "STOP was asked for";
@@ -60,7 +60,7 @@ void ForceRemoval::remove_if_urgent() {
 void ForceRemoval::interrupt_if_urgent() {
   if (removed_) return;  // it has interrupted before; settle() may ask in peace
   remove_if_urgent();
-  if (removed_) throw ForceRemoved("ended, because " + words_of(removed_->why));
+  if (removed_) throw ForceRemoved("ended, because " + to_string(removed_->why));
 }
 
 void disarm_of_clients(device::Device& device, CommandQueue& commands) {
@@ -79,7 +79,7 @@ void disarm_of_clients(device::Device& device, CommandQueue& commands) {
 
 std::optional<ForceRemoval::Settled> ForceRemoval::settle(device::Device& device) {
   if (!removed_) return std::nullopt;
-  Settled settled{.report = {.why = words_of(removed_->why),
+  Settled settled{.report = {.why = to_string(removed_->why),
                              .seconds = std::chrono::duration<double>(answered_ - removed_->since).count()},
                   .revoked = {}};
   for (const std::size_t axis : axes_in_order()) {

@@ -30,7 +30,7 @@ std::string text_of(const Json& document) {
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string words_of(const AxisState& axis) {
+std::string to_string(const AxisState& axis) {
   if (axis.presence != firmware::AxisPresence::present) return device::presence_words(axis.presence);
   switch (axis.status.state()) {
     case DriveState::operation_enabled:
@@ -169,7 +169,7 @@ Message state_message(const LinkState& link, std::span<const AxisState> axes,
   Json list = Json::array();
   for (const AxisState& axis : axes) {
     Json one = json::status_json(axis.axis, axis.presence, axis.status, axis.guard);
-    one["words"] = words_of(axis);
+    one["words"] = to_string(axis);
     one["trouble"] = or_null(trouble_of(axis));
     one["armed_by"] = axis.armed_by ? Json(*axis.armed_by) : Json(nullptr);
     list.push_back(one);
