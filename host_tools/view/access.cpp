@@ -46,7 +46,8 @@ std::string Access::refusal_of_stream(const Credentials& asked) const {
   if (asked.origin && *asked.origin != "http://" + by_number_ && *asked.origin != "http://" + by_name_)
     return fmt::format("a page of the origin '{}' may not use this stream", shown(*asked.origin));
   constexpr std::string_view bearer = "Bearer ";
-  if (asked.authorization.starts_with(bearer) && is_token(device::trimmed(asked.authorization.substr(bearer.size()))))
+  if (asked.authorization.starts_with(bearer) &&
+      is_token(device::trimmed(asked.authorization.substr(bearer.size()))))
     return {};
   constexpr std::string_view offered = "token.";
   for (std::string_view rest = asked.protocols; !rest.empty();) {
