@@ -119,7 +119,6 @@ class CanLine {
   /// bus. Other identifiers alone do not interrupt what is under way.
   void configure(const firmware::CanSettings& wanted) {
     using namespace drivers::cortex_m;
-    using namespace drivers::cortex_m;
     using namespace drivers::stm32f4;
     const bool same_rate = configured_ && wanted.bit_rate == settings_.bit_rate;
     settings_ = wanted;

@@ -58,12 +58,6 @@ Abort abort_for(Refusal refusal, const SlotDescriptor& entry, std::uint32_t raw)
   }
 }
 
-consteval std::uint16_t index_of(SpecialObject what) {
-  return std::find_if(special_objects.begin(), special_objects.end(),
-                      [what](const SpecialObjectRow& row) { return row.what == what; })
-      ->index;
-}
-
 std::uint32_t little_endian(std::span<const std::uint8_t> in) {
   std::uint32_t raw = 0;
   for (std::size_t i = 0; i < in.size(); ++i) raw |= std::uint32_t{in[i]} << (8 * i);
@@ -167,9 +161,19 @@ std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std:
       return canopen::cob_id::sdo_request + of_.node.node_id();
     case SpecialObject::sdo_response:
       return canopen::cob_id::sdo_response + of_.node.node_id();
-    default:
-      return 1;  // 0x1010, 0x1011: on command
+    case SpecialObject::store_parameters:
+    case SpecialObject::restore_defaults:
+      return 1;  // on command
+    case SpecialObject::device_name:
+    case SpecialObject::hardware_version:
+    case SpecialObject::software_version:
+    case SpecialObject::trace_records:
+    case SpecialObject::capture_samples:
+    case SpecialObject::scratch:
+    case SpecialObject::fault_log:
+      break;  // no numbers: read_special() has them
   }
+  return 0;
 }
 
 std::span<const char> CanopenObjects::text_of(SpecialObject what) const {
@@ -247,8 +251,10 @@ Abort CanopenObjects::write_begin(ObjectAddress address, canopen::WriteBounds& b
 /// Of what is longer than a read of it and changes: the scratch pad, and a capture after which another one
 /// has been taken. Every transfer asks, so that nothing is searched for.
 std::uint32_t CanopenObjects::version(ObjectAddress address) const {
-  if (address.index == index_of(SpecialObject::scratch)) return scratch_version_;
-  if (address.index != index_of(SpecialObject::capture_samples)) return 0;
+  constexpr std::uint16_t scratch = index_of(SpecialObject::scratch);
+  constexpr std::uint16_t capture = index_of(SpecialObject::capture_samples);
+  if (address.index == scratch) return scratch_version_;
+  if (address.index != capture) return 0;
   return of_.axes.tick().capture().readings().first_tick;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string_view>
@@ -14,21 +15,21 @@ namespace kmax::firmware {
 /// than four bytes. With the entries and each record's sub-index 0 they are all that SDO reaches and the EDS
 /// lists.
 enum class SpecialObject : std::uint8_t {
-  device_type,          ///< 0x1000: CiA 402, several devices in one (CiA 301: 0xFFFF, see 0x67FF)
-  error_register,       ///< 0x1001
-  error_history_count,  ///< 0x1003:0; writing 0 erases
-  error_history,        ///< 0x1003:1 to 8, newest first; those beyond the count are not there
-  device_name,          ///< 0x1008
-  hardware_version,     ///< 0x1009
-  software_version,     ///< 0x100A
-  store_parameters,     ///< 0x1010:1, writes 'save' to
-  restore_defaults,     ///< 0x1011:1, writes 'load' to; takes effect at the next reset
-  trace_records,        ///< 0x5820:1 to 64, eight records of the trace window each, little-endian
-  capture_samples,      ///< 0x5821:1, all values of a complete capture, 32 bits each
-  scratch,              ///< 0x5822:1, keeps what is written, for trying transfers
-  fault_log,            ///< 0x5828:1 to 16, an entry each with its CRC, little-endian
-  sdo_request,          ///< 0x1200:1, of the server that is always there
-  sdo_response,         ///< 0x1200:2
+  device_type,
+  error_register,
+  error_history_count,
+  error_history,
+  device_name,
+  hardware_version,
+  software_version,
+  store_parameters,
+  restore_defaults,
+  trace_records,
+  capture_samples,
+  scratch,
+  fault_log,
+  sdo_request,
+  sdo_response,
 };
 
 enum class ObjectType : std::uint8_t { unsigned8, unsigned32, visible_string, domain };
@@ -95,5 +96,12 @@ inline constexpr std::array special_objects = std::to_array<SpecialObjectRow>({
     {SpecialObject::sdo_response, "COB-ID server to client", 0x1200, 2, 2, ObjectType::unsigned32,
      ObjectAccessKind::read_only, canopen::cob_id::sdo_response, "Identifier of the answers.", true},
 });
+
+/// Where an object is found. A search through the table: for constants, and for hosts.
+constexpr std::uint16_t index_of(SpecialObject what) {
+  return std::find_if(special_objects.begin(), special_objects.end(),
+                      [what](const SpecialObjectRow& row) { return row.what == what; })
+      ->index;
+}
 
 }  // namespace kmax::firmware

@@ -19,7 +19,6 @@
 #include "host_tools/plot/csv_table.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 #include "host_tools/simulation/scene.hpp"
-#include "host_tools/wall/wall_evaluation.hpp"
 
 namespace kmax::cli {
 
@@ -97,8 +96,6 @@ int act(Context& context) {
   } catch (const link::AddressError& error) {
     return report_error(context, error.what(), wrong_usage);
   } catch (const simulation::SceneError& error) {
-    return report_error(context, error.what(), wrong_usage);
-  } catch (const wall::TableError& error) {
     return report_error(context, error.what(), wrong_usage);
   } catch (const plot::CsvError& error) {
     return report_error(context, error.what(), wrong_usage);

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
-#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/board_time.hpp"
 
 namespace kmax::virtual_board {
@@ -53,7 +53,11 @@ class Peripheral {
 /// and makes it pending again when the handler returns and it is still there.
 class InterruptLines {
  public:
-  virtual void set_level(drivers::stm32f4::Interrupt interrupt, bool level) = 0;
+  /// `Interrupt`: the chip's enumeration of its interrupts by their numbers.
+  template <typename Interrupt>
+  requires std::is_enum_v<Interrupt>
+  void set_level(Interrupt interrupt, bool level) { set_line(static_cast<unsigned>(interrupt), level); }
+  virtual void set_line(unsigned interrupt, bool level) = 0;
 
  protected:
   ~InterruptLines() = default;

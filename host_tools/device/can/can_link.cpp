@@ -17,12 +17,6 @@ using firmware::SpecialObject;
 using firmware::canopen::Abort;
 
 namespace {
-constexpr std::uint16_t index_of(SpecialObject what) {
-  return std::find_if(firmware::special_objects.begin(), firmware::special_objects.end(),
-                      [what](const auto& row) { return row.what == what; })
-      ->index;
-}
-
 constexpr std::size_t words_per_record = firmware::trace_words_per_record / 2;
 constexpr std::size_t records_per_object = firmware::trace_records_per_object;
 

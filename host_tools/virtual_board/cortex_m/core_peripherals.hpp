@@ -143,8 +143,10 @@ class MemoryProtection final : public RegisterBlock<MemoryProtection> {
 /// What the Cortex-M4 keeps at 0xE000E000: all blocks of the system control space, on the bus. PM0214, core
 /// peripherals. `system_tick` is the only one with events of its own.
 struct CorePeripherals {
-  CorePeripherals(Bus& bus, const BoardClocks& clocks)
-      : nvic(exceptions),
+  /// `interrupts`: how many the chip has.
+  CorePeripherals(Bus& bus, const BoardClocks& clocks, std::size_t interrupts)
+      : exceptions(interrupts),
+        nvic(exceptions),
         software_trigger(exceptions),
         system_control(exceptions),
         system_tick(clocks, exceptions) {

@@ -23,7 +23,7 @@ void ExceptionTable::reset() {
   priority_ = {};
   group_ = 0;
   active_count_ = 0;
-  for (unsigned exception = 0; exception < exception_count; ++exception) {
+  for (unsigned exception = 0; exception < end(); ++exception) {
     if (enabled_from_reset(exception)) set(enabled_, exception, true);
   }
   pending_ = line_;
@@ -112,7 +112,7 @@ void ExceptionTable::find_candidate() {
   candidate_ = 0;
   candidate_level_ = base_level;
   int candidate_order = 0;
-  for (unsigned word = 0; word < words; ++word) {
+  for (unsigned word = 0; word < words_; ++word) {
     for (std::uint32_t left = pending_[word] & enabled_[word]; left != 0; left &= left - 1) {
       const unsigned exception = 32 * word + static_cast<unsigned>(std::countr_zero(left));
       // Group first, then sub-priority, then the lower number: going upwards, only a strictly smaller one
@@ -129,7 +129,7 @@ void ExceptionTable::find_candidate() {
 
 void ExceptionTable::find_active_level() {
   active_level_ = base_level;
-  for (unsigned word = 0; word < words; ++word) {
+  for (unsigned word = 0; word < words_; ++word) {
     for (std::uint32_t left = active_[word]; left != 0; left &= left - 1) {
       const unsigned exception = 32 * word + static_cast<unsigned>(std::countr_zero(left));
       if (level(exception) < active_level_) active_level_ = level(exception);

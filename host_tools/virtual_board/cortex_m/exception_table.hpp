@@ -1,16 +1,15 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-
-#include "drivers/stm32f4/interrupts.hpp"
 
 // The state of all exceptions and the decision which of them runs: PM0214, exception model (states,
 // priorities, pre-emption) and NVIC (level-sensitive and pulse interrupts). NVIC, SCB and SysTick are faces
 // of this table; the processor asks it what to enter.
 //
 // Cost: `preempting()` is one comparison; a change of state that may alter the decision goes once through the
-// pending ones (six words of bits).
+// pending ones, 32 exceptions a word.
 
 namespace kmax::virtual_board {
 
@@ -30,7 +29,8 @@ inline constexpr unsigned system_tick = 15;
 inline constexpr unsigned first_interrupt = 16;
 }  // namespace exception_number
 
-inline constexpr unsigned exception_count = 16 + drivers::stm32f4::interrupt_count;
+/// The architecture's most; how many a chip has is said where its board is made.
+inline constexpr std::size_t most_interrupts = 240;
 
 /// What the special registers of the core keep back.
 struct ExceptionMasks {
@@ -43,6 +43,11 @@ class ExceptionTable {
  public:
   /// Less urgent than every settable priority: nothing is active.
   static constexpr int base_level = 256;
+
+  /// A core with interrupts 0 to `interrupts` - 1, 1 to 240.
+  explicit ExceptionTable(std::size_t interrupts)
+      : interrupts_(static_cast<unsigned>(interrupts)),
+        words_((exception_number::first_interrupt + interrupts_ + 31) / 32) {}
 
   /// As after a reset: nothing pending, active or enabled, priorities 0. Levels of interrupt lines stay, they
   /// belong to the peripherals.
@@ -61,6 +66,10 @@ class ExceptionTable {
 
   void activate(unsigned exception);    ///< pending -> active
   void deactivate(unsigned exception);  ///< active -> inactive, or pending again when its line is still high
+
+  unsigned interrupts() const { return interrupts_; }
+  /// One more than the number of the last exception.
+  unsigned end() const { return exception_number::first_interrupt + interrupts_; }
 
   bool pending(unsigned exception) const { return get(pending_, exception); }
   bool active(unsigned exception) const { return get(active_, exception); }
@@ -91,8 +100,8 @@ class ExceptionTable {
   }
 
  private:
-  static constexpr unsigned words = (exception_count + 31) / 32;
-  using Bits = std::array<std::uint32_t, words>;
+  static constexpr std::size_t capacity = exception_number::first_interrupt + most_interrupts;
+  using Bits = std::array<std::uint32_t, capacity / 32>;
 
   static bool get(const Bits& bits, unsigned exception) {
     return (bits[exception / 32] >> (exception % 32) & 1U) != 0;
@@ -103,11 +112,13 @@ class ExceptionTable {
   void find_candidate();
   void find_active_level();
 
+  unsigned interrupts_;
+  unsigned words_;  ///< of the bits that exist
   Bits pending_{};
   Bits active_{};
   Bits enabled_{};
   Bits line_{};
-  std::array<std::uint8_t, exception_count> priority_{};
+  std::array<std::uint8_t, capacity> priority_{};
   unsigned group_ = 0;
   unsigned active_count_ = 0;
   unsigned candidate_ = 0;

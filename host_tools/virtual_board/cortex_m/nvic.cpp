@@ -4,13 +4,10 @@
 #include <bit>
 #include <cstddef>
 
-#include "drivers/stm32f4/interrupts.hpp"
-
 namespace kmax::virtual_board {
 namespace {
 
 using Registers = drivers::cortex_m::NvicRegisters;
-using drivers::stm32f4::interrupt_count;
 
 constexpr const char* nvic_name = "NVIC";
 
@@ -44,8 +41,11 @@ const BitArray& array_at(const Access& access) {
   refuse(access, nvic_name, "no register here");
 }
 
-[[noreturn]] void refuse_interrupt(const Access& access, const char* block, unsigned interrupt) {
-  refuse(access, block, "interrupt " + std::to_string(interrupt) + " does not exist, 81 is the last one");
+[[noreturn]] void refuse_interrupt(const Access& access, const char* block, unsigned interrupt,
+                                   unsigned interrupts) {
+  refuse(access, block,
+         "interrupt " + std::to_string(interrupt) + " does not exist, " + std::to_string(interrupts - 1) +
+             " is the last one");
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ std::uint32_t Nvic::read(const Access& access) {
   if (is_priority(access.offset)) {
     const auto first = static_cast<unsigned>(access.offset - offsetof(Registers, ipr));
     std::uint32_t value = 0;
-    for (unsigned byte = 0; byte < access.bytes && first + byte < interrupt_count; ++byte) {
+    for (unsigned byte = 0; byte < access.bytes && first + byte < exceptions_.interrupts(); ++byte) {
       value |= std::uint32_t{exceptions_.priority(exception_number::first_interrupt + first + byte)}
                << (8 * byte);
     }
@@ -63,7 +63,7 @@ std::uint32_t Nvic::read(const Access& access) {
   const BitArray& array = array_at(access);
   const auto first = static_cast<unsigned>(access.offset - array.begin) * 8;
   std::uint32_t word = 0;
-  for (unsigned bit = 0; bit < 32 && first + bit < interrupt_count; ++bit) {
+  for (unsigned bit = 0; bit < 32 && first + bit < exceptions_.interrupts(); ++bit) {
     if ((exceptions_.*array.shows)(exception_number::first_interrupt + first + bit)) word |= 1U << bit;
   }
   return word;
@@ -72,7 +72,7 @@ std::uint32_t Nvic::read(const Access& access) {
 void Nvic::write(const Access& access, std::uint32_t value) {
   if (is_priority(access.offset)) {
     const auto first = static_cast<unsigned>(access.offset - offsetof(Registers, ipr));
-    for (unsigned byte = 0; byte < access.bytes && first + byte < interrupt_count; ++byte) {
+    for (unsigned byte = 0; byte < access.bytes && first + byte < exceptions_.interrupts(); ++byte) {
       exceptions_.set_priority(exception_number::first_interrupt + first + byte,
                                static_cast<std::uint8_t>(value >> (8 * byte)));
     }
@@ -82,16 +82,17 @@ void Nvic::write(const Access& access, std::uint32_t value) {
   if (array.sets == nullptr) refuse(access, nvic_name, "IABR is read-only");
   const auto first = static_cast<unsigned>(access.offset - array.begin) * 8;
   const unsigned end = first + static_cast<unsigned>(std::bit_width(value));
-  if (array.existing_only && value != 0 && end > interrupt_count)
-    refuse_interrupt(access, nvic_name, end - 1);
+  if (array.existing_only && value != 0 && end > exceptions_.interrupts())
+    refuse_interrupt(access, nvic_name, end - 1, exceptions_.interrupts());
   for (; value != 0; value &= value - 1) {
     const unsigned interrupt = first + static_cast<unsigned>(std::countr_zero(value));
-    if (interrupt < interrupt_count) array.sets(exceptions_, exception_number::first_interrupt + interrupt);
+    if (interrupt < exceptions_.interrupts())
+      array.sets(exceptions_, exception_number::first_interrupt + interrupt);
   }
 }
 
-void Nvic::set_level(drivers::stm32f4::Interrupt interrupt, bool level) {
-  exceptions_.set_line(exception_number::first_interrupt + static_cast<unsigned>(interrupt), level);
+void Nvic::set_line(unsigned interrupt, bool level) {
+  exceptions_.set_line(exception_number::first_interrupt + interrupt, level);
 }
 
 std::uint32_t SoftwareTrigger::read(const Access& access) {
@@ -101,7 +102,8 @@ std::uint32_t SoftwareTrigger::read(const Access& access) {
 void SoftwareTrigger::write(const Access& access, std::uint32_t value) {
   require_word(access, "STIR");
   const std::uint32_t interrupt = drivers::cortex_m::nvic_stir::InterruptNumber::of(value);
-  if (interrupt >= interrupt_count) refuse_interrupt(access, "STIR", interrupt);
+  if (interrupt >= exceptions_.interrupts())
+    refuse_interrupt(access, "STIR", interrupt, exceptions_.interrupts());
   exceptions_.pend(exception_number::first_interrupt + interrupt);
 }
 

@@ -1,15 +1,14 @@
 #pragma once
 
 #include "drivers/cortex_m/registers.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_table.hpp"
 #include "host_tools/virtual_board/peripheral.hpp"
 
-// Nested vectored interrupt controller, PM0214: the register face of the exception table for interrupts 0 to
-// 81, and the place where peripherals raise their lines.
+// Nested vectored interrupt controller, PM0214: the register face of the exception table for the chip's
+// interrupts, and the place where peripherals raise their lines.
 //
-// Enabling or pending an interrupt beyond 81 is refused. Priorities are bytes and may be accessed as bytes,
-// half words and words; all other registers only as words.
+// Enabling or pending an interrupt that the chip has not is refused. Priorities are bytes and may be accessed
+// as bytes, half words and words; all other registers only as words.
 
 namespace kmax::virtual_board {
 
@@ -24,7 +23,7 @@ class Nvic final : public Peripheral, public InterruptLines {
   /// The exception table is reset by the processor.
   void reset(BoardTime /*now*/) override {}
 
-  void set_level(drivers::stm32f4::Interrupt interrupt, bool level) override;
+  void set_line(unsigned interrupt, bool level) override;
 
  private:
   ExceptionTable& exceptions_;

@@ -24,7 +24,7 @@ using chip::ResetCause;
 VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config)
     : image_(image),
       world_(world),
-      core_(bus_, clocks_),
+      core_(bus_, clocks_, drivers::stm32f4::interrupt_count),
       processor_(bus_, core_, clocks_, config.processor),
       events_(processor_),
       brake_(config.bootstrap),

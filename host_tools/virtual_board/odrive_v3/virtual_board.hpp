@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/base/elf_image.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "host_tools/virtual_board/cortex_m/processor.hpp"

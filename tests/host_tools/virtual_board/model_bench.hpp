@@ -20,16 +20,16 @@ namespace kmax::virtual_board::testing {
 /// Remembers levels and how often each line has risen.
 class RecordedInterrupts final : public InterruptLines {
  public:
-  void set_level(drivers::stm32f4::Interrupt interrupt, bool level) override {
+  void set_line(unsigned interrupt, bool level) override {
     if (level && !levels_[interrupt]) ++rises_[interrupt];
     levels_[interrupt] = level;
   }
-  bool level(drivers::stm32f4::Interrupt interrupt) { return levels_[interrupt]; }
-  unsigned rises(drivers::stm32f4::Interrupt interrupt) { return rises_[interrupt]; }
+  bool level(drivers::stm32f4::Interrupt interrupt) { return levels_[static_cast<unsigned>(interrupt)]; }
+  unsigned rises(drivers::stm32f4::Interrupt interrupt) { return rises_[static_cast<unsigned>(interrupt)]; }
 
  private:
-  std::map<drivers::stm32f4::Interrupt, bool> levels_;
-  std::map<drivers::stm32f4::Interrupt, unsigned> rises_;
+  std::map<unsigned, bool> levels_;
+  std::map<unsigned, unsigned> rises_;
 };
 
 /// Models in their time, as the board has them: what is due happens as time passes, in order.

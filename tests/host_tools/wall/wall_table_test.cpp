@@ -25,8 +25,8 @@ class WallTable : public testing::Test {
   std::string refused(const std::string& text) {
     folder.write("in.csv", text);
     folder.write("out.csv", "as it was");
-    const auto what =
-        thrown_message<TableError>([&] { evaluate_table(evaluator, folder / "in.csv", folder / "out.csv"); });
+    const auto what = thrown_message<plot::CsvError>(
+        [&] { evaluate_table(evaluator, folder / "in.csv", folder / "out.csv"); });
     EXPECT_EQ(folder.read("out.csv"), "as it was");
     EXPECT_EQ(folder.entries(), 2u) << "something was left behind";
     return what;
@@ -89,18 +89,18 @@ TEST_F(WallTable, HeaderMustNameThePositionOnce) {
 }
 
 TEST_F(WallTable, MissingFilesAndFoldersAreErrorsOfThisKind) {
+  EXPECT_CONTAINS(thrown_message<plot::CsvError>(
+                      [&] { evaluate_table(evaluator, folder / "none.csv", folder / "out.csv"); }),
+                  "none.csv: cannot be read");
   EXPECT_CONTAINS(
-      thrown_message<TableError>([&] { evaluate_table(evaluator, folder / "none.csv", folder / "out.csv"); }),
-      "none.csv: cannot be read");
-  EXPECT_CONTAINS(
-      thrown_message<TableError>([&] { evaluate_table(evaluator, folder.path(), folder / "out.csv"); }),
+      thrown_message<plot::CsvError>([&] { evaluate_table(evaluator, folder.path(), folder / "out.csv"); }),
       "cannot be read");
   folder.write("in.csv", "position_m\n0\n");
-  EXPECT_CONTAINS(thrown_message<TableError>(
+  EXPECT_CONTAINS(thrown_message<plot::CsvError>(
                       [&] { evaluate_table(evaluator, folder / "in.csv", folder / "no/out.csv"); }),
                   "out.csv: cannot be written");
   EXPECT_CONTAINS(
-      thrown_message<TableError>([&] { evaluate_table(evaluator, folder / "in.csv", folder.path()); }),
+      thrown_message<plot::CsvError>([&] { evaluate_table(evaluator, folder / "in.csv", folder.path()); }),
       "not a regular file");
   EXPECT_EQ(folder.entries(), 1u);
 }
@@ -112,7 +112,7 @@ TEST_F(WallTable, ASpecialFileIsNotReplaced) {
   std::filesystem::create_symlink(folder / "pipe", folder / "link");
   for (const char* name : {"pipe", "link"})
     EXPECT_CONTAINS(
-        thrown_message<TableError>([&] { evaluate_table(evaluator, folder / "in.csv", folder / name); }),
+        thrown_message<plot::CsvError>([&] { evaluate_table(evaluator, folder / "in.csv", folder / name); }),
         "not a regular file");
   EXPECT_TRUE(std::filesystem::is_fifo(folder / "pipe"));
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));

@@ -234,12 +234,6 @@ TEST(CanLink, Identifies) {
             (std::map<std::string, std::string>{{"product_name", "Kmax"}, {"model_name", "fake board"}}));
 }
 
-constexpr std::uint16_t index_of(firmware::SpecialObject what) {
-  for (const auto& row : firmware::special_objects) {
-    if (row.what == what) return row.index;
-  }
-  return 0;
-}
 constexpr std::uint16_t trace_index = index_of(firmware::SpecialObject::trace_records);
 constexpr std::uint16_t capture_index = index_of(firmware::SpecialObject::capture_samples);
 

@@ -210,7 +210,7 @@ struct Core : testing::ModelBench {
     peripherals.reset(0);
   }
   Bus bus;
-  CorePeripherals peripherals{bus, clocks};
+  CorePeripherals peripherals{bus, clocks, 82};
   NvicOnModel nvic = block_on_model<NvicOnModel>(*this, peripherals.nvic);
   ScbOnModel scb = block_on_model<ScbOnModel>(*this, peripherals.system_control);
   SystemTickOnModel system_tick = block_on_model<SystemTickOnModel>(*this, peripherals.system_tick);

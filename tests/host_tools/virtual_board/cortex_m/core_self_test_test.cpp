@@ -92,7 +92,7 @@ std::string image_path() {
 
 struct SelfTestBoard {
   explicit SelfTestBoard(const ElfImage& image, ProcessorConfig config)
-      : core(bus, clocks), processor(bus, core, clocks, config), loop(processor) {
+      : core(bus, clocks, 82), processor(bus, core, clocks, config), loop(processor) {
     clocks.core = 2;
     timer.processor = &processor;
     bus.attach(rcc_base_address, 0x400, "RCC", clock_control);

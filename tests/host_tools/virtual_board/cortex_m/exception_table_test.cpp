@@ -8,21 +8,22 @@ namespace kmax::virtual_board::exception_table_test {
 
 constexpr unsigned a = 20;
 constexpr unsigned b = 40;
+constexpr unsigned interrupts = 82;
 constexpr unsigned c = 97;  // interrupt 81, the last one
 
 ExceptionTable with_enabled() {
-  ExceptionTable table;
+  ExceptionTable table{interrupts};
   table.reset();
   for (const unsigned exception : {a, b, c}) table.set_enabled(exception, true);
   return table;
 }
 
 TEST(ExceptionTable, HasNothingToDoAfterReset) {
-  ExceptionTable table;
+  ExceptionTable table{interrupts};
   table.reset();
   EXPECT_EQ(table.candidate(), 0U);
   EXPECT_FALSE(table.preempting());
-  for (unsigned exception = exception_number::first_interrupt; exception < exception_count; ++exception) {
+  for (unsigned exception = exception_number::first_interrupt; exception < table.end(); ++exception) {
     table.pend(exception);
     EXPECT_EQ(table.candidate(), 0U) << "not enabled";
   }

@@ -18,7 +18,7 @@ struct Controller : testing::ModelBench {
   Controller() : ModelBench({&nvic}) { exceptions.reset(); }
   static unsigned exception(unsigned interrupt) { return 16 + interrupt; }
 
-  ExceptionTable exceptions;
+  ExceptionTable exceptions{82};
   Nvic nvic{exceptions};
   SoftwareTrigger trigger{exceptions};
 };

@@ -48,7 +48,7 @@ TEST(Processor, StartsWithStackAndProgramCounterOfTheVectorTable_ResetException)
 TEST(Processor, RefusesToStartWithoutAProgram) {
   Bus bus;
   BoardClocks clocks;
-  CorePeripherals core(bus, clocks);
+  CorePeripherals core(bus, clocks, 82);
   Processor processor(bus, core, clocks);
   EXPECT_THROW(processor.reset(0), std::runtime_error);
 }

@@ -60,7 +60,7 @@ struct ProgramOnCore {
   static constexpr BoardTime cycle = 2;  // 168 MHz
 
   explicit ProgramOnCore(const Program& program, ProcessorConfig config = {})
-      : core(bus, clocks), processor(bus, core, clocks, config), loop(processor) {
+      : core(bus, clocks, 82), processor(bus, core, clocks, config), loop(processor) {
     clocks.core = cycle;
     bus.attach(block_base, 0x400, "BLOCK", block, [this] { return clocked; });
     loop.add(core.system_tick);

@@ -18,7 +18,7 @@ struct Block : testing::ModelBench {
     exceptions.reset();
     control.reset(0);
   }
-  ExceptionTable exceptions;
+  ExceptionTable exceptions{82};
   SystemControl control{exceptions};
 };
 

@@ -36,7 +36,7 @@ struct Timer : testing::ModelBench {
     return pending;
   }
 
-  ExceptionTable exceptions;
+  ExceptionTable exceptions{82};
   SystemTick timer{clocks, exceptions};
 };
 
