@@ -23,7 +23,7 @@ void ExceptionTable::reset() {
   priority_ = {};
   group_ = 0;
   active_count_ = 0;
-  for (unsigned exception = 0; exception < end(); ++exception) {
+  for (unsigned exception = 0; exception < exception_number::first_interrupt + interrupts_; ++exception) {
     if (enabled_from_reset(exception)) set(enabled_, exception, true);
   }
   pending_ = line_;

@@ -68,8 +68,6 @@ class ExceptionTable {
   void deactivate(unsigned exception);  ///< active -> inactive, or pending again when its line is still high
 
   unsigned interrupts() const { return interrupts_; }
-  /// One more than the number of the last exception.
-  unsigned end() const { return exception_number::first_interrupt + interrupts_; }
 
   bool pending(unsigned exception) const { return get(pending_, exception); }
   bool active(unsigned exception) const { return get(active_, exception); }
