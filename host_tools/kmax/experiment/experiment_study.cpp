@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "host_tools/base/print.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -78,7 +79,7 @@ int print_study(Context& context, StudyReport study, const std::vector<std::file
     context.print(study.document);
   } else {
     for (const std::string& words : study.paragraphs)
-      print(context.out, "{}\n\n", report::wrapped(words, context.width));
+      print(context.out, "{}\n\n", wrapped(words, context.width));
     for (const report::Table& table : study.tables)
       print(context.out, "{}\n", report::terminal_text(table, context.width));
     print_names(context.out, files);

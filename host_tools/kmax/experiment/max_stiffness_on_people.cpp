@@ -6,6 +6,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
@@ -144,7 +145,7 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
 
 void print_section(const Context& context, const report::Section& section) {
   for (const std::string& paragraph : section.paragraphs)
-    print(context.out, "{}\n", report::wrapped(paragraph, context.width));
+    print(context.out, "{}\n", wrapped(paragraph, context.width));
   for (const report::Table& table : section.tables)
     print(context.out, "\n{}", report::terminal_text(table, context.width));
 }
