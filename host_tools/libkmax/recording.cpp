@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/suggestion.hpp"
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/libkmax/force_channel.hpp"
 #include "host_tools/record/can_source.hpp"
@@ -88,16 +87,6 @@ Recording record_pdos(Session& session, double seconds, std::size_t axis,
   take_rows(session.link(), source, seconds, axis, more, recording);
   return recording;
 }
-
-firmware::CaptureTrigger trigger_of(const std::string& name) {
-  std::vector<std::string> names;
-  for (const auto& trigger : firmware::names::capture_trigger) {
-    if (trigger.name == name) return static_cast<firmware::CaptureTrigger>(trigger.value);
-    names.emplace_back(trigger.name);
-  }
-  throw device::ValueError(
-      fmt::format("there is no trigger '{}'; triggers are {}", name, fmt::join(names, ", ")));
-}
 }  // namespace
 
 void wait(Session& session, double seconds) {
@@ -133,7 +122,7 @@ Capture capture(Session& session, const CaptureRequest& request, const std::func
                 .interval = request.interval,
                 .samples = request.samples,
                 .pre_trigger = request.pre_trigger,
-                .trigger = trigger_of(request.trigger),
+                .trigger = device::capture_trigger_of(request.trigger),
                 .level = request.level});
   }
   if (armed) armed();
