@@ -7,6 +7,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/forwarding_link.hpp"
 #include "host_tools/libkmax/force_channel.hpp"
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
@@ -64,10 +65,10 @@ void take_rows(SharedLink& link, record::RowSource& source, double seconds, std:
 }
 
 /// The session's link, while nobody else sets anything.
-class SettingLink final : public BorrowedLink {
+class SettingLink final : public link::ForwardingLink {
  public:
   explicit SettingLink(Session& session)
-      : BorrowedLink(session.link()), hold_(session.settings, session.link()) {}
+      : ForwardingLink(session.link()), hold_(session.settings, session.link()) {}
 
  private:
   Sequence::Hold hold_;
