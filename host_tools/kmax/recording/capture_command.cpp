@@ -14,6 +14,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/json/capture_json.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -112,19 +113,13 @@ class Armed {
       if (status.faulty()) context_.note(fmt::format("axis {}: {}", drive_.axis(), status.fault_words()));
       drive_.disarm();
     } catch (const std::exception& error) {
-      context_.note(fmt::format("the axis could not be disarmed: {}; {}", error.what(), what_then()));
+      context_.note(device::words_for_disarm_failure(link_timeout_, error.what()));
     }
   }
   Armed(const Armed&) = delete;
   Armed& operator=(const Armed&) = delete;
 
  private:
-  std::string what_then() const {
-    if (link_timeout_ > 0.0)
-      return fmt::format("link.timeout removes its force after {:g} s without a message", link_timeout_);
-    return "link.timeout is 0: its force MAY STILL BE ON, cut its power";
-  }
-
   Context& context_;
   device::Drive drive_;
   double link_timeout_;  // s
