@@ -158,10 +158,8 @@ void CaptureReader::arm(const CaptureSettings& settings) {
     command(device_, CaptureCommand::arm);
   } catch (const link::RefusedError& error) {
     running_ = false;
-    const firmware::Refusal reason = device_.last_refusal().reason;
-    throw DeviceError(fmt::format(
-        "{}: the capture could not be armed: {}", device_.description(),
-        reason == firmware::Refusal::none ? std::string_view(error.what()) : firmware::to_string(reason)));
+    throw DeviceError(fmt::format("{}: the capture could not be armed: {}", device_.description(),
+                                  refusal_words(device_.last_refusal().reason, error)));
   }
 }
 
