@@ -174,7 +174,7 @@ std::unique_ptr<link::Link> Context::open_link() {
 device::Device Context::connect() {
   const link::Notice notice = [this](const std::string& text) { note(text); };
   auto opened = open_link();
-  if (simulated())
+  if (!named_device())
     note(
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
         "names a lasting one");
