@@ -192,6 +192,16 @@ device::Device Context::connect_to_change() {
   return connect();
 }
 
+std::size_t Context::width() const {
+  if (fixed_width) return *fixed_width;
+  const auto terminal = terminal_behind(out);
+  return terminal ? std::max<std::size_t>(terminal->columns, 40) : 0;
+}
+
+void Context::say(const std::string& text, std::size_t indent) {
+  out << (width() == 0 ? text : wrapped(text, columns() - indent, indent)) << '\n';
+}
+
 void Context::note(const std::string& text) {
   Progress::make_room_on_terminal();
   const auto terminal = terminal_behind(messages_);

@@ -102,8 +102,8 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"files", names_json(files)}});
     return verdict;
   }
-  for (const std::string& line : words) print(context.out, "{}\n", wrapped(line, context.width));
-  print(context.out, "\n{}", report::terminal_text(experiment::contact_table(results), context.width));
+  for (const std::string& line : words) print(context.out, "{}\n", wrapped(line, context.width()));
+  print(context.out, "\n{}", report::terminal_text(experiment::contact_table(results), context.width()));
   print_names(context.out, files);
   for (const auto& result : results) {
     if (result.lost_records > 0)

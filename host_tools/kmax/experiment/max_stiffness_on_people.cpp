@@ -145,9 +145,9 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
 
 void print_section(const Context& context, const report::Section& section) {
   for (const std::string& paragraph : section.paragraphs)
-    print(context.out, "{}\n", wrapped(paragraph, context.width));
+    print(context.out, "{}\n", wrapped(paragraph, context.width()));
   for (const report::Table& table : section.tables)
-    print(context.out, "\n{}", report::terminal_text(table, context.width));
+    print(context.out, "\n{}", report::terminal_text(table, context.width()));
 }
 }  // namespace
 

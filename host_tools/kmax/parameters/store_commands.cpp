@@ -40,10 +40,10 @@ int run_save(Context& context) {
                    {"write_errors", status.write_errors}});
     return done;
   }
-  print(context.out, "saved {} as record {}, read back equal; {} before the next erase\n",
-        counted(status.saved_parameters, "parameter"), status.sequence,
-        status.free_saves == 1 ? std::string("1 more save fits")
-                               : fmt::format("{} more saves fit", status.free_saves));
+  context.say(fmt::format("saved {} as record {}, read back equal; {} before the next erase",
+                          counted(status.saved_parameters, "parameter"), status.sequence,
+                          status.free_saves == 1 ? std::string("1 more save fits")
+                                                 : fmt::format("{} more saves fit", status.free_saves)));
   return done;
 }
 

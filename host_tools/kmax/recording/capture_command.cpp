@@ -192,7 +192,7 @@ int run_capture(Context& context, const CaptureOptions& given) {
     write_csv(context.out, captured);
     context.note(summary);
   } else {
-    print(context.out, "{}: {}\n", options.file, summary);
+    context.say(fmt::format("{}: {}", options.file, summary));
   }
   return done;
 }
