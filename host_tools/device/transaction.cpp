@@ -26,7 +26,7 @@ constexpr milliseconds transaction_patience{2500};
 constexpr milliseconds retry_interval{100};
 // A write that reached the device after it has dropped the transaction would act at once and alone. So no
 // write is repeated inside a transaction, and if this program was stopped for this long (suspended, swapped
-// out), it gives the transaction up and begins anew.
+// out), it gives the transaction up and starts over.
 constexpr milliseconds silence_max{1000};
 
 constexpr std::string_view nothing_changed = "nothing was changed";
@@ -168,7 +168,7 @@ bool Device::transact(std::span<const Assignment> assignments, RefusalReport& re
     transaction->put_aside(values);
     transaction->apply();
     return true;
-  } catch (const RefusedError&) {
+  } catch (const RefusedError& error) {
     report = last_refusal();
     words = refusal_words(report.reason, error);
     return false;

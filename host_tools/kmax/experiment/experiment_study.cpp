@@ -63,7 +63,7 @@ std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, con
   require_folder_to_resume(folder, resume);
   if (folder.empty()) return nullptr;
   auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
-                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
+                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::fresh);
   if (resume) context.note(fmt::format("done already: {}", experiment::touch_words(journal->resumed())));
   return journal;
 }

@@ -118,7 +118,7 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   }
   std::optional<RunJournal> journal;
   if (!options.files.folder.empty()) {
-    const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::anew;
+    const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::fresh;
     journal.emplace(folder / ("max_stiffness" + suffix(set) + ".journal"), journal_settings(set, run), begin);
     run.journal = &*journal;
   }
