@@ -14,8 +14,8 @@ Progress::~Progress() {
 }
 
 void Progress::make_room() {
-  if (width_ > 0) messages_ << "\r\x1b[K" << std::flush;  // ECMA-48 EL
-  width_ = 0;
+  if (shown_) messages_ << "\r\x1b[K" << std::flush;  // ECMA-48 EL
+  shown_ = false;
   if (on_terminal_ == this) on_terminal_ = nullptr;
 }
 
@@ -29,8 +29,8 @@ void Progress::show(const std::string& text) {
   }
   // Asked each time, since the terminal may have been resized. The last column stays free: some wrap there.
   const TerminalSize size = terminal_behind(messages_).value_or(TerminalSize{});
-  width_ = std::min(text.size(), size.columns - 1);
-  messages_ << '\r' << text.substr(0, width_) << "\x1b[K" << std::flush;
+  messages_ << '\r' << beginning(text, size.columns - 1) << "\x1b[K" << std::flush;
+  shown_ = true;
   on_terminal_ = this;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
 #include <ostream>
 #include <string>
 
@@ -29,7 +28,7 @@ class Progress {
   std::ostream& messages_;
   bool terminal_;
   std::chrono::steady_clock::time_point last_{};
-  std::size_t width_ = 0;
+  bool shown_ = false;
   inline static Progress* on_terminal_ = nullptr;  ///< a process has one terminal
 };
 

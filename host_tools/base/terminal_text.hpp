@@ -19,12 +19,23 @@ std::optional<TerminalSize> terminal_size(int descriptor);
 /// Of the terminal on standard output if `out` is standard output.
 std::optional<TerminalSize> terminal_behind(const std::ostream& out);
 
-/// `text` in lines of at most `width` characters, broken at spaces and at its own line breaks. A longer word
-/// is broken where the line ends. At least one line; `width` is at least 1.
+/// Columns that a terminal of UTF-8 needs for `text`: accents that join the letter before them none,
+/// characters of East Asian width two (Unicode Standard Annex 11), all others one, each byte that is no UTF-8
+/// one too. Characters of one of these widths only in some newer version of Unicode count as one.
+std::size_t display_width(std::string_view text);
+
+/// `text` with a space in the place of every control character: a line's end, an escape sequence.
+std::string printable(std::string_view text);
+
+/// As much of the beginning of `text` as `width` columns hold, in whole characters.
+std::string_view beginning(std::string_view text, std::size_t width);
+
+/// `text` in lines of at most `width` columns, broken at spaces and at its own line breaks. A longer word is
+/// broken where the line ends; a character that is wider has a line of its own. At least one line.
 std::vector<std::string> lines_of(std::string_view text, std::size_t width);
 
 /// The same as one text, with `indent` spaces before every line but the first. `width` is that of the text,
-/// without them.
-std::string wrapped(std::string_view text, std::size_t width, std::size_t indent);
+/// without them; 0: as it is.
+std::string wrapped(std::string_view text, std::size_t width, std::size_t indent = 0);
 
 }  // namespace kmax::cli

@@ -17,15 +17,16 @@
 // Method: samples at which the shaft moved with 1/4 to 4 times the sweep's median speed, so that standing and
 // slipping do not count; means in 6000 places per turn; least squares. N is the whole number up to
 // `most_periods` whose fundamental leaves the smallest residual; half of it when that explains more (a strong
-// second harmonic). It is told when the sweep covers 2 periods or more. Gravity's once-per-turn terms need
-// `gravity_range` turns; below, or when they explain nothing, they are left out and the constant stands for
-// them over the swept range. Standard errors take the noise as white.
+// second harmonic). It is determined when the sweep covers 2 periods or more. Gravity's once-per-turn terms
+// need `gravity_range` turns; below, or when they explain nothing, they are left out and the constant stands
+// for them over the swept range. Standard errors take the noise as white.
 //
 // What it needs: a sweep each way over 0.3 turns or more, so slow that inertia does not show as cogging (a
 // mass m adds m (N v / transmission)^2 to the stiffness), from a position loop whose stiffness is above twice
-// the cogging's own (N x amplitude / transmission in N/m), 3000 samples or more a sweep. Found on three simulated motors with 0.1 to 0.18 N of cogging, worst of 5 seeds: amplitude within 6
-// mN, N right. Friction within 3 %, but 13 % too small where the current's noise (0.5 N) shakes the handle at
-// 1 mm/s by more than its friction (0.2 N): the motion fit's friction is the better one there.
+// the cogging's own (N x amplitude / transmission in N/m), 3000 samples or more a sweep. Found on three
+// simulated motors with 0.1 to 0.18 N of cogging, worst of 5 seeds: amplitude within 6 mN, N right. Friction
+// within 3 %, but 13 % too small where the current's noise (0.5 N) shakes the handle at 1 mm/s by more than
+// its friction (0.2 N): the motion fit's friction is the better one there.
 
 #include <span>
 

@@ -8,6 +8,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/calibration/step.hpp"
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/store.hpp"
 
 namespace kmax::calibration {
@@ -249,7 +250,7 @@ std::string restore(Bench& bench) {
   try {
     bench.disarm();
   } catch (const std::exception& error) {
-    trouble = fmt::format("the axis could not be disarmed ({}); ", error.what());
+    trouble = device::words_for_disarm_failure(bench.link_timeout(), error.what()) + "; ";
   }
   try {
     bench.journal().put_back();

@@ -39,7 +39,7 @@ std::vector<double> applied_along(const MotorKnowledge& known, std::span<const d
   return applied;
 }
 
-// What went before does not matter to these: a rotor falls in anew with the vector.
+// What went before does not matter to these: a rotor falls in again with the vector.
 Waveforms record(Bench& bench, const ExcitationPlan& excitation, const CapturePlan& plan) {
   return bench.repeat([&] { return bench.record_alone(excitation, plan); });
 }
@@ -276,7 +276,7 @@ void measure(Calibration& run, const WindingFit& rough) {
 
 void finish(Calibration& run) {
   MotorKnowledge& known = run.known;
-  // A dead time that scatters by more than this is not made up for; nothing else depends on it.
+  // A dead time that scatters by more than this is not compensated; nothing else depends on it.
   constexpr double fine_dead_time = 150e-9;  // s, 72 mV per leg at 24 V and 20 kHz
   for (IdentifiedValue& value : run.report.values) {
     if (value.name != "compensation.dead_time") {

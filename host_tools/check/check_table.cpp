@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::check {
@@ -43,7 +44,15 @@ std::string case_text(const control::StabilityCase<double>& c, const std::string
   const auto known = [](double value, const char* unit) {
     return value > 0 ? fmt::format("{:g} {}", value, unit) : std::string("not known");
   };
-  return text + fmt::format("; F_h {}, v {}\n", known(c.operator_force, "N"), known(c.operator_speed, "m/s"));
+  return text + fmt::format("; F_h {}, v {}", known(c.operator_force, "N"), known(c.operator_speed, "m/s"));
+}
+
+/// Lines of at most `width` columns, each line of `text` going on with `indent`.
+std::string fitted(const std::string& text, std::size_t width, std::size_t indent) {
+  std::string fitting;
+  for (const std::string& line : cli::lines_of(text, std::string::npos))
+    fitting += (line.size() <= width ? line : cli::wrapped(line, width - indent, indent)) + '\n';
+  return fitting;
 }
 
 /// Why the exact loop is not judged.
@@ -82,14 +91,14 @@ std::string changes_text(const std::vector<Change>& changes, bool facts) {
   return text;
 }
 
-std::string remedies(const Judgement& judgement) {
+std::string remedies(const Judgement& judgement, std::size_t width) {
   std::string text;
-  const auto add = [&text](std::string_view name, const std::vector<Change>& changes) {
+  const auto add = [&text, width](std::string_view name, const std::vector<Change>& changes) {
     const std::string settings = changes_text(changes, false), facts = changes_text(changes, true);
     constexpr std::string_view indent = "                       ";
-    const std::string first = wrapped(settings.empty() ? "no single setting" : settings, indent);
+    const std::string first = wrapped(settings.empty() ? "no single setting" : settings, indent, width);
     text += fmt::format("  {:<20} {}", name, std::string_view(first).substr(indent.size()));
-    if (!facts.empty()) text += wrapped("if the device or the operator is so: " + facts, indent);
+    if (!facts.empty()) text += wrapped("if the device or the operator is so: " + facts, indent, width);
   };
   for (const Verdict& verdict : judgement.verdicts) {
     if (!verdict.result.pass) add(text_of(verdict.result.criterion).name(), verdict.changes);
@@ -101,7 +110,7 @@ std::string remedies(const Judgement& judgement) {
   return "\nWhat would meet them, each change by itself:\n" + text;
 }
 
-std::string conclusion(const Judgement& judgement) {
+std::string conclusion(const Judgement& judgement, std::size_t width) {
   const auto of = [&judgement](Criterion criterion) -> const control::CriterionResult<double>& {
     return judgement.verdicts[static_cast<std::size_t>(criterion)].result;
   };
@@ -140,7 +149,7 @@ std::string conclusion(const Judgement& judgement) {
         "covered. ";
   if (judgement.follows_velocity) text += "Not judged: how the adaptive law's field follows the velocity. ";
   text.pop_back();
-  return "\n" + wrapped(text, "");
+  return "\n" + wrapped(text, "", width);
 }
 
 std::string region_text(const control::StabilityCase<double>& c) {
@@ -158,18 +167,19 @@ std::string text_of(const Change& change) {
                      device::value_with_unit(change.parameter, std::bit_cast<std::uint32_t>(change.value)));
 }
 
-std::string judgement_text(const Judgement& judgement, const std::string& hand) {
-  std::string text = case_text(judgement.stability_case, hand);
+std::string judgement_text(const Judgement& judgement, const std::string& hand, std::size_t width) {
+  std::string text = fitted(case_text(judgement.stability_case, hand), width, 8);
   text += fmt::format("\n  {:<20} {:>10}    {:>10}  {:<4} {:>9}  {}\n", "criterion", "value", "bound", "unit",
                       "margin", "verdict");
   for (const Worth worth : {Worth::guarantee, Worth::necessary, Worth::heuristic}) {
-    text += fmt::format("{} ({})\n", name_of(worth), meaning_of(worth));
+    text += fitted(fmt::format("{} ({})", name_of(worth), meaning_of(worth)), width, 2);
     for (const Verdict& verdict : judgement.verdicts) {
-      if (text_of(verdict.result.criterion).worth == worth) text += row(verdict, judgement.stability_case);
+      if (text_of(verdict.result.criterion).worth == worth)
+        text += fitted(row(verdict, judgement.stability_case), width, 23);
     }
   }
   text += region_text(judgement.stability_case);
-  return text + remedies(judgement) + conclusion(judgement);
+  return text + remedies(judgement, width) + conclusion(judgement, width);
 }
 
 }  // namespace kmax::check

@@ -88,8 +88,7 @@ static_assert(in_order());
 
 }  // namespace
 
-std::string wrapped(std::string_view text, std::string_view indent) {
-  constexpr std::size_t width = 110;
+std::string wrapped(std::string_view text, std::string_view indent, std::size_t width) {
   std::string out;
   for (const std::string& line : cli::lines_of(text, width - indent.size()))
     out += fmt::format("{}{}\n", indent, line);
@@ -149,26 +148,30 @@ std::string_view meaning_of(Worth worth) {
 
 std::string_view symbols_text() {
   return "  K, B     stiffness and damping of the wall            wall.stiffness, wall.damping\n"
-         "  F_MC     largest magnetic coefficient of the law      wall.magnetic_coefficient, "
-         "wall.adaptive_*\n"
+         "  F_MC     largest magnetic coefficient of the law      wall.magnetic_coefficient,\n"
+         "                                                        wall.adaptive_*\n"
          "  x_0      length of the field                          wall.magnetic_length\n"
          "  T        period of the haptic loop                    1 / haptic.rate\n"
-         "  T_d      from a command to its force                  guard.delay, 1 / current.bandwidth, 0.65 "
-         "ticks\n"
-         "  quantum  step of the position in use                  encoder count, position.resolution\n"
+         "  T_d      from a command to its force                  guard.delay,\n"
+         "                                                        1 / current.bandwidth,\n"
+         "                                                        0.65 ticks\n"
+         "  quantum  step of the position in use                  encoder count,\n"
+         "                                                        position.resolution\n"
          "  m        mass at the handle                           device.mass\n"
-         "  b, f_c   viscous damping and Coulomb friction of it   guard.damping, guard.friction\n"
-         "  F_h, v   force and speed of the operator; 0: unknown  guard.operator_force, "
-         "guard.operator_speed\n";
+         "  b, f_c   viscous damping and Coulomb friction of it   guard.damping,\n"
+         "                                                        guard.friction\n"
+         "  F_h, v   force and speed of the operator; 0: unknown  guard.operator_force,\n"
+         "                                                        guard.operator_speed\n";
 }
 
-std::string explanation(Criterion criterion) {
+std::string explanation(Criterion criterion, std::size_t width) {
   const CriterionText& text = text_of(criterion);
   std::string out = fmt::format("{} ({})\n", text.name(), name_of(text.worth));
-  out += wrapped(fmt::format("{} {} {}   [{}]", text.value, text.relation, text.bound, text.unit), "  ");
-  if (!text.needs.empty()) out += wrapped(fmt::format("Judged only with {}.", text.needs), "  ");
-  out += wrapped(text.assumptions, "  ");
-  return out + wrapped(fmt::format("Source: {}", text.source), "  ");
+  out +=
+      wrapped(fmt::format("{} {} {}   [{}]", text.value, text.relation, text.bound, text.unit), "  ", width);
+  if (!text.needs.empty()) out += wrapped(fmt::format("Judged only with {}.", text.needs), "  ", width);
+  out += wrapped(text.assumptions, "  ", width);
+  return out + wrapped(fmt::format("Source: {}", text.source), "  ", width);
 }
 
 }  // namespace kmax::check

@@ -49,10 +49,10 @@ std::string_view meaning_of(Worth worth);
 /// What the letters in the formulas are, and which parameter each comes from.
 std::string_view symbols_text();
 
-/// All of it about one criterion, in lines of at most 110 characters.
-std::string explanation(control::Criterion criterion);
+/// All of it about one criterion, in lines of at most `width` columns.
+std::string explanation(control::Criterion criterion, std::size_t width = 110);
 
-/// Words in lines of at most 110 characters, each beginning with `indent`.
-std::string wrapped(std::string_view text, std::string_view indent);
+/// Words in lines of at most `width` columns, 40 or more, each beginning with `indent`.
+std::string wrapped(std::string_view text, std::string_view indent, std::size_t width = 110);
 
 }  // namespace kmax::check

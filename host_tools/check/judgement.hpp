@@ -94,7 +94,7 @@ std::vector<Change> find_changes(const firmware::ParameterValues& values, std::s
 
 /// The verdicts for people: what went in, the criteria by what they are worth, what each failed one would
 /// need, and what follows.
-std::string judgement_text(const Judgement& judgement, const std::string& hand);
+std::string judgement_text(const Judgement& judgement, const std::string& hand, std::size_t width = 110);
 
 /// "wall.stiffness at most 1990 N/m".
 std::string text_of(const Change& change);

@@ -38,10 +38,6 @@ CaptureChannel channel_of(std::string_view name) {
                   meant.empty() ? fmt::format("; channels are {}", fmt::join(names, ", ")) : meant));
 }
 
-std::string_view name_of(CaptureTrigger trigger) {
-  return firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name;
-}
-
 /// Checked here against the dictionary, so that a wrong setting is found before anything is sent.
 template <firmware::FixedName name>
 Assignment assignment(double value) {
@@ -113,6 +109,24 @@ std::string capture_channel_unit(std::string_view name) {
   return std::string(text_of(channel_of(name)).unit);
 }
 
+std::vector<std::string> capture_trigger_names() {
+  std::vector<std::string> names;
+  for (const auto& trigger : firmware::names::capture_trigger) names.emplace_back(trigger.name);
+  return names;
+}
+
+std::string_view name_of(CaptureTrigger trigger) {
+  return firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name;
+}
+
+CaptureTrigger capture_trigger_of(std::string_view name) {
+  for (const auto& trigger : firmware::names::capture_trigger) {
+    if (trigger.name == name) return static_cast<CaptureTrigger>(trigger.value);
+  }
+  throw ValueError(fmt::format("there is no trigger '{}'; triggers are {}", name,
+                               fmt::join(capture_trigger_names(), ", ")));
+}
+
 const std::vector<double>& Captured::column(std::string_view name) const {
   std::vector<std::string> names;
   for (const CaptureColumn& one : columns) {
@@ -144,10 +158,8 @@ void CaptureReader::arm(const CaptureSettings& settings) {
     command(device_, CaptureCommand::arm);
   } catch (const link::RefusedError& error) {
     running_ = false;
-    const firmware::Refusal reason = device_.last_refusal().reason;
-    throw DeviceError(fmt::format(
-        "{}: the capture could not be armed: {}", device_.description(),
-        reason == firmware::Refusal::none ? std::string_view(error.what()) : firmware::to_string(reason)));
+    throw DeviceError(fmt::format("{}: the capture could not be armed: {}", device_.description(),
+                                  refusal_words(device_.last_refusal().reason, error)));
   }
 }
 

@@ -62,6 +62,11 @@ std::vector<std::string> capture_channel_names();
 /// Its unit; empty for a pure number. ValueError for an unknown name.
 std::string capture_channel_unit(std::string_view name);
 
+std::vector<std::string> capture_trigger_names();
+std::string_view name_of(firmware::CaptureTrigger trigger);
+/// ValueError for an unknown name.
+firmware::CaptureTrigger capture_trigger_of(std::string_view name);
+
 /// The device's triggered full-rate capture (firmware/capture/capture.hpp): up to four channels, 12288
 /// values.
 ///

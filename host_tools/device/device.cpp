@@ -64,6 +64,11 @@ void Device::write(const Parameter& parameter, std::uint32_t raw, bool idempoten
   link_->write({&value, 1}, idempotent ? link::Repeat::if_lost : link::Repeat::never);
 }
 
+std::string refusal_words(firmware::Refusal reason, const link::RefusedError& error) {
+  if (reason == firmware::Refusal::none) return error.what();
+  return fmt::format("the device refused: {}", firmware::to_string(reason));
+}
+
 RefusalReport Device::last_refusal() {
   const Parameter report[] = {Parameter::of<"refusal.reason">(), Parameter::of<"refusal.register">()};
   const auto values = read(report);

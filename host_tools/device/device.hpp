@@ -22,6 +22,10 @@ struct RefusalReport {
   std::uint16_t address = 0;  ///< of the holding register it is about
 };
 
+/// Why a write was refused: the device's reason; if it shows none, since another program has written
+/// meanwhile, what the link said.
+std::string refusal_words(firmware::Refusal reason, const link::RefusedError& error);
+
 /// A Kmax device by the names of its object dictionary.
 ///
 /// The constructor makes sure that device and program have the same dictionary. Values are 32-bit patterns
@@ -74,13 +78,14 @@ class Device {
   };
 
   void check_dictionary();
-  /// One transaction. True: applied. False: refused, and `report` says why.
-  bool transact(std::span<const Assignment> assignments, RefusalReport& report);
+  /// One transaction. False: refused; `report` says why, and `words` in words.
+  bool transact(std::span<const Assignment> assignments, RefusalReport& report, std::string& words);
   void settle_lost_commit(std::span<const Assignment> assignments, const std::string& what);
   std::optional<Difference> first_difference(std::span<const Assignment> assignments);
   void verify(std::span<const Assignment> assignments);
   void follow_serial_settings(std::span<const Assignment> assignments);
-  [[noreturn]] void fail_refused(std::span<const Assignment> assignments, const RefusalReport& report);
+  [[noreturn]] void fail_refused(std::span<const Assignment> assignments, const RefusalReport& report,
+                                 const std::string& words);
 
   std::unique_ptr<link::Link> link_;
   link::Notice notice_;

@@ -6,11 +6,13 @@
 
 namespace kmax::device {
 
-std::string words_for_disarm_failure(double link_timeout) {
+std::string words_for_disarm_failure(double link_timeout, std::string_view why) {
+  const std::string failed = why.empty() ? "the axis could not be disarmed"
+                                         : fmt::format("the axis could not be disarmed ({})", why);
   if (link_timeout > 0)
-    return fmt::format("the axis could not be disarmed; link.timeout removes its force after {} s",
+    return fmt::format("{}; link.timeout removes its force after {} s without a message", failed,
                        number_text(static_cast<float>(link_timeout)));
-  return "the axis could not be disarmed and link.timeout is 0: its force MAY STILL BE ON, cut its power";
+  return failed + "; link.timeout is 0: its force MAY STILL BE ON, cut its power";
 }
 
 }  // namespace kmax::device

@@ -157,9 +157,9 @@ firmware::GuardFinding Drive::guard() {
 void Drive::command(std::uint16_t controlword, bool idempotent) {
   try {
     device_.write(Parameter::of<"drive.controlword">(axis_), controlword, idempotent);
-  } catch (const link::RefusedError&) {
-    throw DeviceError(fmt::format("axis {}: the device refused controlword {}: {}", axis_, controlword,
-                                  firmware::to_string(device_.last_refusal().reason)));
+  } catch (const link::RefusedError& error) {
+    throw DeviceError(fmt::format("axis {}: controlword {}: {}", axis_, controlword,
+                                  refusal_words(device_.last_refusal().reason, error)));
   }
 }
 

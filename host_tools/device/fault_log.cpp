@@ -48,9 +48,9 @@ std::vector<LogEntry> read_fault_log(link::Link& link) {
 void erase_fault_log(Device& device) {
   try {
     device.write(Parameter::of<"log.command">(), 1, true);
-  } catch (const link::RefusedError&) {
-    throw DeviceError(fmt::format("the fault log was not erased: the device refused: {}",
-                                  firmware::to_string(device.last_refusal().reason)));
+  } catch (const link::RefusedError& error) {
+    throw DeviceError(
+        fmt::format("the fault log was not erased: {}", refusal_words(device.last_refusal().reason, error)));
   }
 }
 

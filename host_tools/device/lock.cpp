@@ -43,10 +43,10 @@ void Lock::write(const Parameter& parameter, std::uint32_t value, LockState want
   std::string lost;
   try {
     device_.write(parameter, value, false);
-  } catch (const link::RefusedError&) {
+  } catch (const link::RefusedError& error) {
     const Refusal reason = device_.last_refusal().reason;
     const LockStatus now = status();
-    std::string text = fmt::format("{}: the device refused: {}", what, firmware::to_string(reason));
+    std::string text = fmt::format("{}: {}", what, refusal_words(reason, error));
     if (reason == Refusal::wrong_code || reason == Refusal::code_waits)
       text += fmt::format("; {}, the next one is taken in {} s", wrong_codes(now.attempts), now.wait_s);
     throw DeviceError(text);

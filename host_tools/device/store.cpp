@@ -81,9 +81,8 @@ StoreStatus Store::status() {
 void Store::command(StoreCommand wanted, const char* what) {
   try {
     device_.write(Parameter::of<"store.command">(), static_cast<std::uint32_t>(wanted), false);
-  } catch (const link::RefusedError&) {
-    throw DeviceError(
-        fmt::format("{}: the device refused: {}", what, firmware::to_string(device_.last_refusal().reason)));
+  } catch (const link::RefusedError& error) {
+    throw DeviceError(fmt::format("{}: {}", what, refusal_words(device_.last_refusal().reason, error)));
   }
 }
 

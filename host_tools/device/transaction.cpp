@@ -26,7 +26,7 @@ constexpr milliseconds transaction_patience{2500};
 constexpr milliseconds retry_interval{100};
 // A write that reached the device after it has dropped the transaction would act at once and alone. So no
 // write is repeated inside a transaction, and if this program was stopped for this long (suspended, swapped
-// out), it gives the transaction up and begins anew.
+// out), it gives the transaction up and starts over.
 constexpr milliseconds silence_max{1000};
 
 constexpr std::string_view nothing_changed = "nothing was changed";
@@ -158,7 +158,7 @@ class Device::Transaction {
   bool open_ = false;
 };
 
-bool Device::transact(std::span<const Assignment> assignments, RefusalReport& report) {
+bool Device::transact(std::span<const Assignment> assignments, RefusalReport& report, std::string& words) {
   std::vector<link::SlotValue> values;
   for (const auto& [parameter, raw] : assignments) values.push_back({parameter.slot(), raw});
   std::optional<Transaction>
@@ -168,8 +168,9 @@ bool Device::transact(std::span<const Assignment> assignments, RefusalReport& re
     transaction->put_aside(values);
     transaction->apply();
     return true;
-  } catch (const RefusedError&) {
+  } catch (const RefusedError& error) {
     report = last_refusal();
+    words = refusal_words(report.reason, error);
     return false;
   }
 }
@@ -182,9 +183,10 @@ void Device::apply(std::span<const Assignment> assignments) {
       throw ValueError(fmt::format("{}: it is given twice", one->parameter.name()));
   }
   RefusalReport report;
+  std::string words;
   for (int attempt = 1;; ++attempt) {
     try {
-      if (!transact(assignments, report)) fail_refused(assignments, report);
+      if (!transact(assignments, report, words)) fail_refused(assignments, report, words);
       break;
     } catch (const LostCommit& error) {
       return settle_lost_commit(assignments, error.what());
@@ -257,7 +259,8 @@ void Device::follow_serial_settings(std::span<const Assignment> assignments) {
   if (unit || baud_rate) link_->follow_serial_settings(unit, baud_rate);
 }
 
-void Device::fail_refused(std::span<const Assignment> assignments, const RefusalReport& report) {
+void Device::fail_refused(std::span<const Assignment> assignments, const RefusalReport& report,
+                          const std::string& words) {
   if (report.reason == Refusal::no_transaction)
     throw DeviceError(
         "the device dropped the transaction because its values came too slowly; some of them may be set, "
@@ -278,8 +281,7 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
     }
     if (report.reason == Refusal::only_tightens) numbers = direction_words(*this, *owner);
   }
-  const std::string message = fmt::format("{}the device refused: {}{}; {}", about, to_string(report.reason),
-                                          numbers, nothing_changed);
+  const std::string message = fmt::format("{}{}{}; {}", about, words, numbers, nothing_changed);
   if (is_about_values(report.reason)) throw ValueError(message);
   throw DeviceError(message);
 }

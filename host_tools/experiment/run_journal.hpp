@@ -34,7 +34,7 @@ class RunJournal {
  public:
   using Json = nlohmann::ordered_json;
   enum class Begin {
-    anew,   ///< what is there is kept as FILE.previous, and no job is done yet
+    fresh,  ///< what is there is kept as FILE.previous, and no job is done yet
     resume  ///< jobs in a file of the same settings are done; no file: none is
   };
 

@@ -48,7 +48,7 @@ class ArmedAxes {
       if (!status.armed()) fail_without_force(drive.axis(), status);
     }
   }
-  /// An axis that stays armed is an error to be told.
+  /// An axis that stays armed is an error to report.
   void disarm() {
     for (device::Drive& drive : drives_) drive.disarm();
     armed_ = false;

@@ -5,7 +5,7 @@
 //
 // Who holds the handle stands outside the wall; the axes are armed, the touch is awaited, the hold is traced,
 // the axes are disarmed. They are disarmed however this ends. Where a hand comes to the wall before they are
-// armed, which is then refused, all this begins anew. What keeps a person safe meanwhile, from the
+// armed, which is then refused, all this starts over. What keeps a person safe meanwhile, from the
 // fastest: the device's own limits and trips (force.limit, velocity.limit); link.timeout, which removes the
 // force when this program or its link dies; the host, which disarms when the handle oscillates more than it
 // should (abort_amplitude). protective_assignments() sees to the first two.

@@ -38,8 +38,7 @@ Json capture_json(const Captured& captured, const CaptureSettings& settings, boo
   Json columns = Json::array();
   for (const CaptureColumn& column : captured.columns) columns.push_back(column_json(column, with_values));
   return {{"axis", settings.axis},
-          {"trigger",
-           std::string(firmware::names::capture_trigger[static_cast<std::size_t>(settings.trigger)].name)},
+          {"trigger", std::string(device::name_of(settings.trigger))},
           {"samples", captured.samples()},
           {"trigger_sample", captured.trigger_sample},
           {"first_tick", captured.first_tick},

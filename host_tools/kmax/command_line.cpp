@@ -171,7 +171,7 @@ std::unique_ptr<link::Link> Context::open_link() {
 device::Device Context::connect() {
   const link::Notice notice = [this](const std::string& text) { note(text); };
   auto opened = open_link();
-  if (simulated())
+  if (!named_device())
     note(
         "sim: a fresh simulated device that lives only for this command; --device serial:PATH or KMAX_DEVICE "
         "names a lasting one");
@@ -187,6 +187,16 @@ device::Device Context::connect_to_change() {
         "gone when the command ends",
         link::settings_file().string()));
   return connect();
+}
+
+std::size_t Context::width() const {
+  if (fixed_width) return *fixed_width;
+  const auto terminal = terminal_behind(out);
+  return terminal ? std::max<std::size_t>(terminal->columns, 40) : 0;
+}
+
+void Context::say(const std::string& text, std::size_t indent) {
+  out << (width() == 0 ? text : wrapped(text, columns() - indent, indent)) << '\n';
 }
 
 void Context::note(const std::string& text) {

@@ -48,8 +48,13 @@ class Context {
   /// One line on the messages' stream.
   void note(const std::string& text);
 
+  /// Columns of the terminal that `out` is, now, 40 at least; 0 for anything else: then lines are as long as
+  /// they are.
+  std::size_t width() const;
   /// How wide a text is best written to `out`: as the terminal, at most 120; 80 for a file or a pipe.
-  std::size_t columns() const { return width == 0 ? 80 : std::min<std::size_t>(width, 120); }
+  std::size_t columns() const { return width() == 0 ? 80 : std::min<std::size_t>(width(), 120); }
+  /// A line of the result: on a terminal in lines that fit, all but the first of them indented.
+  void say(const std::string& text, std::size_t indent = 2);
 
   /// For what a line at a time cannot show (Progress).
   std::ostream& messages() { return messages_; }
@@ -74,8 +79,8 @@ class Context {
 
   // Set by the command line.
   bool json = false;
-  /// Columns of the terminal that `out` is, 0 for anything else: then lines are as long as they are.
-  std::size_t width = 0;
+  /// In the place of the terminal's, for tests.
+  std::optional<std::size_t> fixed_width;
   std::string device_option;
   std::optional<std::size_t> axis_option;
   /// How a CAN bus is reached, besides the link to one device on it.

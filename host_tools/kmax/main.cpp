@@ -1,9 +1,5 @@
-#include <unistd.h>
-
-#include <algorithm>
 #include <iostream>
 
-#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/device/sim/open_link.hpp"
 #include "host_tools/kmax/commands.hpp"
 
@@ -12,7 +8,5 @@ int main(int argc, char** argv) {
     return kmax::link::open_link(kmax::link::parse_device_address(address), notice);
   };
   kmax::cli::Context context(std::cout, std::cerr, open);
-  if (const auto terminal = kmax::cli::terminal_size(STDOUT_FILENO))
-    context.width = std::max<std::size_t>(terminal->columns, 40);
   return kmax::cli::run({argv + 1, argv + argc}, context);
 }

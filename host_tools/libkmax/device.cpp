@@ -8,6 +8,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/device/forwarding_link.hpp"
 #include "host_tools/device/settings_file.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/libkmax/command_run.hpp"
@@ -202,7 +203,7 @@ CommandResult Device::command(const std::vector<std::string>& arguments) {
   Session& session = call.session();
   return translated([&] {
     return library::run_command_on(arguments, link::text_of(session.address), [&session] {
-      return std::make_unique<library::BorrowedLink>(session.link());
+      return std::make_unique<link::ForwardingLink>(session.link());
     });
   });
 }

@@ -118,8 +118,7 @@ class ArmedForLoop {
     try {
       session_.disarm(axis_);
     } catch (const std::exception& error) {
-      session_.options.notice(fmt::format("axis {} could not be disarmed: {}; link.timeout removes its force",
-                                          axis_, error.what()));
+      session_.options.notice(session_.disarm_failure(axis_, error.what()));
     }
   }
   ArmedForLoop(const ArmedForLoop&) = delete;

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
-#include "host_tools/base/suggestion.hpp"
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/forwarding_link.hpp"
 #include "host_tools/libkmax/force_channel.hpp"
 #include "host_tools/record/can_source.hpp"
 #include "host_tools/record/polled_source.hpp"
@@ -65,10 +65,10 @@ void take_rows(SharedLink& link, record::RowSource& source, double seconds, std:
 }
 
 /// The session's link, while nobody else sets anything.
-class SettingLink final : public BorrowedLink {
+class SettingLink final : public link::ForwardingLink {
  public:
   explicit SettingLink(Session& session)
-      : BorrowedLink(session.link()), hold_(session.settings, session.link()) {}
+      : ForwardingLink(session.link()), hold_(session.settings, session.link()) {}
 
  private:
   Sequence::Hold hold_;
@@ -87,16 +87,6 @@ Recording record_pdos(Session& session, double seconds, std::size_t axis,
                                             1000.0 * plan.period_ticks / firmware::tick_rate_hz)};
   take_rows(session.link(), source, seconds, axis, more, recording);
   return recording;
-}
-
-firmware::CaptureTrigger trigger_of(const std::string& name) {
-  std::vector<std::string> names;
-  for (const auto& trigger : firmware::names::capture_trigger) {
-    if (trigger.name == name) return static_cast<firmware::CaptureTrigger>(trigger.value);
-    names.emplace_back(trigger.name);
-  }
-  throw device::ValueError(
-      fmt::format("there is no trigger '{}'; triggers are {}", name, fmt::join(names, ", ")));
 }
 }  // namespace
 
@@ -133,7 +123,7 @@ Capture capture(Session& session, const CaptureRequest& request, const std::func
                 .interval = request.interval,
                 .samples = request.samples,
                 .pre_trigger = request.pre_trigger,
-                .trigger = trigger_of(request.trigger),
+                .trigger = device::capture_trigger_of(request.trigger),
                 .level = request.level});
   }
   if (armed) armed();

@@ -8,6 +8,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/sim/open_link.hpp"
 
 namespace kmax::library {
@@ -46,10 +47,13 @@ Session::~Session() {
     try {
       disarm(axis);
     } catch (const std::exception& error) {
-      options.notice(fmt::format("axis {} could not be disarmed: {}; link.timeout removes its force", axis,
-                                 error.what()));
+      options.notice(disarm_failure(axis, error.what()));
     }
   }
+}
+
+std::string Session::disarm_failure(std::size_t axis, std::string_view why) const {
+  return fmt::format("axis {}: {}", axis, device::words_for_disarm_failure(axes_[axis].timeout, why));
 }
 
 void Session::require_axis(std::size_t axis) const {
@@ -66,6 +70,7 @@ void Session::arm(std::size_t axis, bool keep_alive) {
   const std::lock_guard lock(axes_mutex_);
   axes_[axis].keeper.reset();
   axes_[axis].armed = true;
+  axes_[axis].timeout = timeout;
   if (timeout == 0)
     options.notice("link.timeout is 0: the force stays on until it is disarmed, even if this program dies");
   if (keep_alive && !link().virtual_time())

@@ -7,6 +7,8 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <string>
+#include <string_view>
 #include <thread>
 
 #include "host_tools/device/device.hpp"
@@ -31,6 +33,8 @@ class Session {
 
   void arm(std::size_t axis, bool keep_alive);
   std::string disarm(std::size_t axis);
+  /// What to tell when disarm() of an axis that was armed here failed because of `why`.
+  std::string disarm_failure(std::size_t axis, std::string_view why) const;
   /// RefusedError, or LinkError, if an axis that was armed here has lost its force.
   void require_armed_ones();
 
@@ -50,6 +54,7 @@ class Session {
  private:
   struct Axis {
     bool armed = false;
+    double timeout = 0.0;  ///< link.timeout when it was armed, s
     std::unique_ptr<Keeper> keeper;
   };
   /// With axes_mutex_.

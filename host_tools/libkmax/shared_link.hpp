@@ -87,37 +87,4 @@ class SharedLink final : public link::Link {
   mutable int depth_ = 0;  ///< of the owner's turns within each other
 };
 
-/// A link that belongs to somebody else, for an owner that wants one of its own.
-class BorrowedLink : public link::Link {
- public:
-  /// `lender` must outlive this.
-  explicit BorrowedLink(link::Link& lender) : lender_(lender) {}
-
-  std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override { return lender_.read(slots); }
-  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
-             const std::function<void()>& before_request) override {
-    lender_.write(values, repeat, before_request);
-  }
-  std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override {
-    return lender_.read_trace(first, count);
-  }
-  std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override {
-    return lender_.read_capture(count, progress);
-  }
-  std::vector<std::uint32_t> read_log_entry(std::size_t place) override {
-    return lender_.read_log_entry(place);
-  }
-  std::map<std::string, std::string> identify() override { return lender_.identify(); }
-  void follow_serial_settings(std::optional<std::uint8_t> unit,
-                              std::optional<std::uint32_t> baud_rate) override {
-    lender_.follow_serial_settings(unit, baud_rate);
-  }
-  std::chrono::microseconds now() const override { return lender_.now(); }
-  void wait(std::chrono::microseconds duration) override { lender_.wait(duration); }
-  std::string description() const override { return lender_.description(); }
-
- private:
-  link::Link& lender_;
-};
-
 }  // namespace kmax::library

@@ -1,4 +1,4 @@
-// The only file that knows libgpiod (1.6, C++). For version 2 this file is written anew.
+// The only file that knows libgpiod (1.6, C++). For version 2 this file is rewritten.
 
 #include <fmt/format.h>
 

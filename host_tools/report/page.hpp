@@ -1,7 +1,7 @@
 #pragma once
 // What an experiment reports, before it has a form: a page of sections with text, tables and pictures. The
-// same page becomes text for a terminal, Markdown, HTML and its tables CSV. All texts are plain UTF-8 text: the
-// writers escape whatever means something in their form, so that a name or a message is shown as it is.
+// same page becomes text for a terminal, Markdown, HTML and its tables CSV. All texts are plain UTF-8 text:
+// the writers escape whatever means something in their form, so that a name or a message is shown as it is.
 
 #include <filesystem>
 #include <string>
@@ -75,21 +75,12 @@ std::string markdown(const Page& page);
 /// `text` so that Markdown shows it as it is, in a table's cell too: a line's end becomes <br>.
 std::string markdown_escaped(const std::string& text);
 
-/// Columns that a terminal of `text` needs for it: accents that join the letter before them none, characters
-/// of East Asian width two (Unicode Standard Annex 11), all others one, each byte that is no UTF-8 one too.
-/// Characters of one of these widths only in some newer version of Unicode count as one.
-std::size_t display_width(std::string_view text);
-
 /// The table in columns two spaces apart, numbers with a straight right edge, the
 /// headings over a line, the caption before them. No space at the end of a line. A control character in a
 /// cell (a line's end, an escape sequence) becomes a space. A table without columns is its caption alone.
 /// `width` columns, if it is not 0, are not exceeded as long as words fit: headings and texts go on in
 /// further lines, numbers never.
 std::string terminal_text(const Table& table, std::size_t width = 0);
-
-/// `text` in lines of at most `width` columns, broken between words; a longer word has a line of its own. 0:
-/// as it is. Without a line's end at the end.
-std::string wrapped(std::string_view text, std::size_t width);
 
 /// The file's name alone as a relative reference (RFC 3986): every byte but letters, digits, '-', '.', '_'
 /// and '~' in per cent. It thus means the same in Markdown, in HTML and on a disk.

@@ -167,7 +167,7 @@ CheckResult check_phases(const Evidence& evidence) {
                        "motor winding or cable (B to C open)",
                        seen +
                            ": is the motor plugged in? A DC motor is one circuit: whether the lead of B, "
-                           "that of C, the brushes or the winding is open cannot be told from here");
+                           "that of C, the brushes or the winding is open cannot be seen from here");
     }
     case Circuit::short_circuit:
       return result.fail(

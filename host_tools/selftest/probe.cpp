@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/drive.hpp"
 
 namespace kmax::selftest {
@@ -26,10 +27,8 @@ bool Probe::disarm(std::string& words) {
   try {
     bench_.disarm();
   } catch (const std::exception& error) {
-    words += fmt::format(
-        "the axis could not be disarmed ({}); the device removes its force by itself after {:g} s without a "
-        "message (link.timeout): see that it has no force; ",
-        error.what(), bench_.link_timeout());
+    words += device::words_for_disarm_failure(bench_.link_timeout(), error.what()) +
+             ": see that it has no force; ";
     return false;
   }
   words += "the axis is disarmed; ";

@@ -8,7 +8,7 @@
 //
 // Defects:
 //   dropout     every edge is lost in the cable with this probability: edges() then lags, the index does not
-//   edge noise  the disc's count is taken at position + noise, drawn anew at every update: an edge chatters
+//   edge noise  the disc's count is taken at position + noise, drawn again at every update: an edge chatters
 //   unplugged   pull-ups hold all three lines high; edges() stays. What happens meanwhile is lost.
 //
 // Random numbers: noise_generator.hpp, the same for the same seed on every machine. With edge noise the

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/suggestion.hpp"
 
@@ -113,14 +114,11 @@ device::CaptureSettings capture_settings(const Received& message, std::size_t ax
   settings.interval = message.whole("interval", 1, 65535);
   if (settings.interval == 0) message.fail("\"interval\" is at least one tick");
   const std::string wanted = message.at("trigger").is_null() ? "now" : message.text("trigger");
-  std::vector<std::string> names;
-  for (const auto& trigger : firmware::names::capture_trigger) {
-    names.emplace_back(trigger.name);
-    if (trigger.name == wanted) settings.trigger = static_cast<firmware::CaptureTrigger>(trigger.value);
+  try {
+    settings.trigger = device::capture_trigger_of(wanted);
+  } catch (const device::ValueError& error) {
+    message.fail(fmt::format("\"trigger\": {}", error.what()));
   }
-  if (std::find(names.begin(), names.end(), wanted) == names.end())
-    message.fail(
-        fmt::format("\"trigger\": there is no '{}'; triggers are {}", wanted, fmt::join(names, ", ")));
   if (const Json& level = message.at("level"); !level.is_null()) {
     if (!level.is_number() || !(level.get<double>() >= 0))
       message.fail(fmt::format("\"level\": {} is no number from 0 up", level.dump()));

@@ -37,7 +37,7 @@ class CommandQueue {
   using Clock = std::chrono::steady_clock;
   /// How long a client that keeps an axis armed may say nothing.
   static constexpr std::chrono::milliseconds patience{3000};
-  /// Commands that wait. A client whose device answers slowly is told so instead of filling the memory.
+  /// Commands that wait. A client whose device answers slowly hears so instead of filling the memory.
   static constexpr std::size_t most = 64;
 
   using Now = std::function<Clock::time_point()>;

@@ -20,7 +20,7 @@ std::vector<std::uint32_t> UrgentLink::read(std::span<const std::size_t> slots) 
     if (request_ == Request::group)
       while (end < slots.size() && in_one_group(slots[first], slots[end])) ++end;
     urgent_();
-    const auto read = beneath_.read(slots.subspan(first, end - first));
+    const auto read = ForwardingLink::read(slots.subspan(first, end - first));
     values.insert(values.end(), read.begin(), read.end());
     first = end;
   }
@@ -29,7 +29,7 @@ std::vector<std::uint32_t> UrgentLink::read(std::span<const std::size_t> slots) 
 
 void UrgentLink::write(std::span<const link::SlotValue> values, link::Repeat repeat,
                        const std::function<void()>& before_request) {
-  beneath_.write(values, repeat, [&] {
+  ForwardingLink::write(values, repeat, [&] {
     urgent_();
     if (before_request) before_request();
   });
@@ -37,12 +37,12 @@ void UrgentLink::write(std::span<const link::SlotValue> values, link::Repeat rep
 
 std::vector<std::uint32_t> UrgentLink::read_trace(std::size_t first, std::size_t count) {
   urgent_();
-  return beneath_.read_trace(first, count);
+  return ForwardingLink::read_trace(first, count);
 }
 
 std::vector<std::uint32_t> UrgentLink::read_capture(std::size_t count, const Progress& progress) {
   urgent_();
-  return beneath_.read_capture(count, [&](std::size_t done) {
+  return ForwardingLink::read_capture(count, [&](std::size_t done) {
     urgent_();
     if (progress) progress(done);
   });
@@ -50,17 +50,12 @@ std::vector<std::uint32_t> UrgentLink::read_capture(std::size_t count, const Pro
 
 std::vector<std::uint32_t> UrgentLink::read_log_entry(std::size_t place) {
   urgent_();
-  return beneath_.read_log_entry(place);
+  return ForwardingLink::read_log_entry(place);
 }
 
 std::map<std::string, std::string> UrgentLink::identify() {
   urgent_();
-  return beneath_.identify();
-}
-
-void UrgentLink::follow_serial_settings(std::optional<std::uint8_t> unit,
-                                        std::optional<std::uint32_t> baud_rate) {
-  beneath_.follow_serial_settings(unit, baud_rate);
+  return ForwardingLink::identify();
 }
 
 void UrgentLink::wait(std::chrono::microseconds duration) {
@@ -68,7 +63,7 @@ void UrgentLink::wait(std::chrono::microseconds duration) {
   constexpr microseconds piece{5000};
   do {
     const microseconds now = std::min(duration, piece);
-    beneath_.wait(now);
+    ForwardingLink::wait(now);
     duration -= now;
     urgent_();
   } while (duration > microseconds(0));

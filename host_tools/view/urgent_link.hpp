@@ -2,11 +2,10 @@
 
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "host_tools/device/link.hpp"
+#include "host_tools/device/forwarding_link.hpp"
 
 namespace kmax::view {
 
@@ -15,13 +14,13 @@ namespace kmax::view {
 /// what it throws ends what was going on and comes through.
 ///
 /// Belongs to one thread, as the link beneath, which must outlive it.
-class UrgentLink final : public link::Link {
+class UrgentLink final : public link::ForwardingLink {
  public:
   /// Values of one request: a group of the dictionary over Modbus, a single object over CANopen.
   enum class Request { group, object };
 
   UrgentLink(link::Link& beneath, Request request, std::function<void()> urgent)
-      : beneath_(beneath), request_(request), urgent_(std::move(urgent)) {}
+      : ForwardingLink(beneath), request_(request), urgent_(std::move(urgent)) {}
 
   std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
   void write(std::span<const link::SlotValue> values, link::Repeat repeat,
@@ -30,15 +29,10 @@ class UrgentLink final : public link::Link {
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
   std::vector<std::uint32_t> read_log_entry(std::size_t place) override;
   std::map<std::string, std::string> identify() override;
-  void follow_serial_settings(std::optional<std::uint8_t> unit,
-                              std::optional<std::uint32_t> baud_rate) override;
-  std::chrono::microseconds now() const override { return beneath_.now(); }
   /// In pieces of 5 ms, after each of which `urgent` is called.
   void wait(std::chrono::microseconds duration) override;
-  std::string description() const override { return beneath_.description(); }
 
  private:
-  link::Link& beneath_;
   Request request_;
   std::function<void()> urgent_;
 };

@@ -9,7 +9,7 @@
 //
 // The processor runs until the earliest next_event() of all peripherals, which are then advanced, and so on.
 // Register accesses may create earlier events at any moment: after every block with an access the limit is
-// taken anew, and an access beyond the limit first advances what is due. An event is therefore late by less
+// taken again, and an access beyond the limit first advances what is due. An event is therefore late by less
 // than one block (see processor.hpp) for interrupts, and never for what firmware reads.
 //
 // The order of peripherals whose events fall on the same instant is the order of add(). A peripheral whose

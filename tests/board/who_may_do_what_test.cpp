@@ -1,6 +1,6 @@
 // What any node may do to a device that it does not command: each line tried by request, broadcast, SDO and
 // PDO, in every state that a drive can be in, whichever link commands it, and held against
-// docs/who_may_do_what.md. KMAX_WRITE_DOCS=1 in the environment writes the page's tables anew.
+// docs/who_may_do_what.md. KMAX_WRITE_DOCS=1 in the environment rewrites the page's tables.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

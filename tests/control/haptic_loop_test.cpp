@@ -377,7 +377,7 @@ TEST(HapticLoop, NoWallIsWatchedWhereItFollows) {
     const std::int64_t count = swinging(tick);
     ASSERT_FALSE(loop.follow(c, count, true, -0.005f * static_cast<float>(count)).unstable);
   }
-  // And it begins anew behind it: with only a part of each second rendered, nothing lasts.
+  // And it starts again behind it: with only a part of each second rendered, nothing lasts.
   for (int tick = 0; tick < 8 * in_time; ++tick) {
     const std::int64_t count = swinging(tick);
     if (tick % 1000 < 100)

@@ -146,7 +146,7 @@ TEST_F(MotorOfABoard, WhatWasFoundIsForgottenWithWhatItWasFoundWith) {
   EXPECT_EQ(bench.get("motor.commutation_known"), 1) << "has nothing to do with it";
   ++bench.device.reference_generation[0];
   bench.run_ms(1);
-  EXPECT_EQ(bench.get("motor.commutation_known"), 0) << "the counts were referred anew";
+  EXPECT_EQ(bench.get("motor.commutation_known"), 0) << "the counts were referred again";
   bench.set("motor.commutation_known", 1);
   bench.set("store.command", 2);
   EXPECT_EQ(bench.get("motor.commutation_known"), 0) << "the defaults are another motor's";

@@ -25,7 +25,7 @@ class Trips : public BenchOfWalls {
     bench.device.recording = false;
   }
 
-  // Whatever the host says short of clearing and arming anew, no force.
+  // Whatever the host says short of clearing and arming again, no force.
   void expect_force_stays_away() {
     bench.device.stand_at(-1000);
     bench.device.recording = true;

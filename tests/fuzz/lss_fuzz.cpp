@@ -81,7 +81,7 @@ class Master {
       require(heard && may_configure_, "in configuration without having been selected");
     if (action == LssAction::store) require(heard && was_configuring && service == 0x17, "stored unasked");
     if (action == LssAction::start_node) {
-      require(node_id_ > 127, "a node with a node ID was started anew");
+      require(node_id_ > 127, "a node with a node ID was started again");
       node_id_ = slave_.reset_communication();
       require(node_id_ <= 127, "started without a node ID");
     }

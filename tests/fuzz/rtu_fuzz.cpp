@@ -122,7 +122,7 @@ class Exchange {
       require(bank().holding[address] == shadow().holding[address], "another value was written than sent");
     require(bank().writes == shadow().writes, "written more or less often than asked");
     require(!bank().asked_beyond_contract, "registers were asked for beyond the bank's contract");
-    // The next input finds them as they were: to make them anew would take most of the time.
+    // The next input finds them as they were: to make them again would take most of the time.
     for (const std::uint16_t address : client_.written)
       bank().holding[address] = shadow().holding[address] =
           address == 0x48 ? std::uint16_t{7} : static_cast<std::uint16_t>(address ^ 0x5A00U);

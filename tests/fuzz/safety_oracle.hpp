@@ -25,8 +25,8 @@
 // 7. While the write lock is locked, as lock.state says, nothing changes that can be set, but what commands
 // an axis and what is recorded, over neither link; nor do the memory of the parameters, the bit rate and the
 // node ID in use, unless NMT resets the communication, and no log is erased. Locked is what has a code, after
-// every start, and only its code opens it, while no axis is armed. No value, nothing that is sent contains the
-// code.
+// every start, and only its code opens it, while no axis is armed. No value, nothing that is sent contains
+// the code.
 //
 // Where the bytes leave open what they mean (a PDO whose mapping is anybody's, a block transfer), the oracle
 // allows what they could mean at most: it never complains of what is right.
@@ -204,7 +204,7 @@ class SafetyOracle {
   static constexpr bool lowers(std::uint16_t word) { return (word & 0x08) == 0; }
 
   /// States that only a shutdown leads out of, perhaps after other words.
-  static constexpr bool must_start_anew(DriveState state) {
+  static constexpr bool must_start_over(DriveState state) {
     return state != DriveState::ready_to_switch_on && state != DriveState::switched_on &&
            state != DriveState::operation_enabled;
   }
@@ -465,8 +465,8 @@ class SafetyOracle {
     const bool armed = states_[axis] == DriveState::operation_enabled;
     const bool was_armed = before == DriveState::operation_enabled;
     if (armed && !was_armed) judge_arming(axis);
-    if (must_start_anew(states_[axis])) shut_down_[axis] = false;
-    if (armed || must_start_anew(states_[axis])) {
+    if (must_start_over(states_[axis])) shut_down_[axis] = false;
+    if (armed || must_start_over(states_[axis])) {
       for (const Word& word : words_[axis])
         if (settled(word.when) && word.lowers) holds_[axis][word.link] = false;
       std::erase_if(words_[axis], [this](const Word& word) { return settled(word.when); });

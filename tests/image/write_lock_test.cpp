@@ -84,7 +84,7 @@ TEST(ImageWriteLock, HoldsOverEveryStartUntilItsCodeOrAFactoryResetOpensIt) {
   bench.write(0x6040, 0, 0, 2);
   bench.board->run_for(5e-3);
 
-  // A wrong code makes both links wait, and a reset begins the wait anew.
+  // A wrong code makes both links wait, and a reset starts the wait again.
   EXPECT_EQ(bench.turn_key(another), Abort::value_range);
   EXPECT_EQ(bench.write_register("lock.key", code), 6);
   bench.board->run_for(0.8);

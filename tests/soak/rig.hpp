@@ -33,7 +33,7 @@ class Rig {
   virtual void reach_for(std::size_t axis, double position) = 0;
   /// By the encoder itself, since the same moment.
   virtual std::int64_t true_count(std::size_t axis) = 0;
-  /// By the bus, or by power. Positions and counts begin anew.
+  /// By the bus, or by power. Positions and counts start from 0.
   virtual void restart(bool by_command) = 0;
   /// What the rig itself has seen that is wrong; empty: nothing.
   virtual std::string complaint() = 0;

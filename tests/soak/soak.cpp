@@ -41,7 +41,7 @@ class Soak {
   void act() {
     constexpr std::array uses{&Soak::set_some,  &Soak::set_some,   &Soak::set_some, &Soak::read_some,
                               &Soak::read_some, &Soak::touch,      &Soak::touch,    &Soak::rest,
-                              &Soak::rest,      &Soak::make_noise, &Soak::save,     &Soak::start_anew};
+                              &Soak::rest,      &Soak::make_noise, &Soak::save,     &Soak::start_over};
     (this->*uses[below(uses.size())])();
     if (one_in(100)) forget_all();
     judge();
@@ -285,7 +285,7 @@ class Soak {
         wait_ms(2'500);  // silence
         break;
       case 1:
-        return start_anew();
+        return start_over();
       case 2:
         control(axis, {0x02}, link);
         break;
@@ -333,7 +333,7 @@ class Soak {
     go_home();
     ++counts_["defaults"];
   }
-  void start_anew() {
+  void start_over() {
     (void)rig_.heard_frames();
     rig_.restart(one_in(2));
     for (int tries = 0;; ++tries) {

@@ -154,7 +154,7 @@ class BadInput(unittest.TestCase):
     def test_silence_of_the_host_removes_the_force(self):
         kmax("set", "link.timeout=1", device=self.board.device)
         self.arm()
-        # Its time may pass slower than here, and each question begins the silence anew: ever longer ones.
+        # Its time may pass slower than here, and each question ends the silence: ever longer ones.
         for silence in (1.2, 2.4, 5, 10, 20, 40):
             time.sleep(silence)
             state = kmax_json("state", "--axis", "0", device=self.board.device)["axes"][0]

@@ -21,7 +21,7 @@ struct Page {
   std::optional<std::uint8_t> next_object;  ///< set: ask again from there
 };
 
-/// How many bytes the frame that begins with `received` has in all, 0 if that cannot be told yet.
+/// How many bytes the frame that begins with `received` has in all, 0 if that is not known yet.
 /// A frame of another function counts as 5 bytes, an exception's length.
 std::size_t frame_length(std::span<const std::uint8_t> received);
 

@@ -7,7 +7,7 @@
 
 namespace kmax::link {
 
-/// Opens the link an address names. `notice` is told when opening has to wait.
+/// Opens the link an address names. `notice` is called when opening has to wait.
 /// Errors: LinkError, or AddressError for a kind of link this version does not have.
 std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& notice = {});
 

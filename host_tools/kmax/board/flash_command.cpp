@@ -277,15 +277,13 @@ int run_flash(Context& context, const FlashOptions& options) try {
   if (context.json) {
     context.print(document);
   } else if (image) {
-    print(context.out,
-          "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 "
-          "{})\n",
-          image->size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc));
+    context.say(fmt::format(
+        "flashed {} bytes, read back equal, CRC-32 {}; the stored parameters are as they were (CRC-32 {})",
+        image->size(), hexadecimal(report.image_crc), hexadecimal(report.parameters_crc)));
   } else {
-    print(
-        context.out,
+    context.say(
         "the stored parameters and the write lock's code are erased, read back blank; the device starts with "
-        "its defaults and open\n");
+        "its defaults and open");
   }
   if (!started) context.note(fmt::format("to start it: {}", board.to_application));
   return done;

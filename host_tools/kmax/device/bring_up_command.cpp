@@ -102,8 +102,11 @@ int list_stages(Context& context) {
     context.print({{"stages", list}});
     return done;
   }
-  for (const StageText& text : bring_up::all_stages())
-    print(context.out, "{}: {}\n  connect: {}\n  does: {}\n", text.name, text.title, text.connect, text.does);
+  for (const StageText& text : bring_up::all_stages()) {
+    context.say(fmt::format("{}: {}", text.name, text.title));
+    context.say(fmt::format("  connect: {}", text.connect), 4);
+    context.say(fmt::format("  does: {}", text.does), 4);
+  }
   return done;
 }
 
@@ -175,10 +178,11 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
     document["report"] = file;
     context.print(document);
   } else {
-    print(context.out, "{}: {}\n", file,
-          next ? fmt::format("next stage: {}", bring_up::text_of(*next).name)
-               : "all stages have passed; 'kmax save' keeps wall.stiffness. Positions count from each start: "
-                 "then 'kmax set wall.position=here-5mm'");
+    context.say(fmt::format(
+        "{}: {}", file,
+        next ? fmt::format("next stage: {}", bring_up::text_of(*next).name)
+             : "all stages have passed; 'kmax save' keeps wall.stiffness. Positions count from each start: "
+               "then 'kmax set wall.position=here-5mm'"));
   }
   return passed ? done : verdict_is_no;
 }

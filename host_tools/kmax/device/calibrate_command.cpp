@@ -73,22 +73,24 @@ Json step_json(const StepReport& step) {
       {"remarks", remarks},      {"failure", step.failure ? diagnosis_json(*step.failure) : Json(nullptr)}};
 }
 
-void print_step(std::ostream& out, const StepReport& step) {
-  print(out, "{}: {}\n", step.name,
+void print_step(Context& context, const StepReport& step) {
+  print(context.out, "{}: {}\n", step.name,
         step.pass      ? "done"
         : step.skipped ? "left out, a step before it has failed"
                        : "FAILED");
   for (const IdentifiedValue& value : step.values)
-    print(out, "  {:<32} {:>12.5g} +- {:<10.2g} {:<6} {}\n", value.name, value.value, value.spread,
-          value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : "");
+    context.say(fmt::format("  {:<27} {:>12.5g} +- {:<8.2g} {:<7} {}", value.name, value.value, value.spread,
+                            value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : ""),
+                30);
   for (const Diagnosis& remark : step.remarks)
-    print(out, "  {}: {}; {}\n", remark.cause, remark.words, remark.advice);
-  if (step.failure)
-    print(out, "  {}: {}\n  {}\n", step.failure->cause, step.failure->words, step.failure->advice);
+    context.say(fmt::format("  {}: {}; {}", remark.cause, remark.words, remark.advice), 4);
+  if (!step.failure) return;
+  context.say(fmt::format("  {}: {}", step.failure->cause, step.failure->words), 4);
+  context.say("  " + step.failure->advice, 2);
 }
 
 void print_report(Context& context, const CalibrateOptions& options, const CalibrationReport& report) {
-  for (const StepReport& step : report.steps) print_step(context.out, step);
+  for (const StepReport& step : report.steps) print_step(context, step);
   if (report.stored) {
     print(context.out, "saved\n");
   } else if (report.kept) {

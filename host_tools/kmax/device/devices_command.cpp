@@ -60,8 +60,9 @@ int run_devices(Context& context, const DevicesOptions& options) {
   std::size_t width = 0;
   for (const ReachableDevice& device : devices) width = std::max(width, device.address.size());
   for (const ReachableDevice& device : devices)
-    print(context.out, "{:<{}}  {}\n", device.address.empty() ? "-" : device.address, width,
-          device.description);
+    context.say(
+        fmt::format("{:<{}}  {}", device.address.empty() ? "-" : device.address, width, device.description),
+        std::min<std::size_t>(width + 2, 20));
   return code;
 }
 }  // namespace

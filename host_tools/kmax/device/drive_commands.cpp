@@ -64,7 +64,7 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
     } else {
       const std::string words = presence == AxisPresence::present ? status_line(axis, status, drive.guard())
                                                                   : absence_line(device, axis, presence);
-      print(context.out, "{}\n", words);
+      context.say(words);
     }
   }
   if (context.json) context.print({{"axes", list}});
@@ -159,7 +159,7 @@ int run_arm(Context& context, const ArmOptions& options) {
   const double timeout = device.read_number("link.timeout");
   drive.arm();
   try {
-    if (!context.json) print(context.out, "{}\n", status_line(drive.axis(), drive.status(), {}));
+    if (!context.json) context.say(status_line(drive.axis(), drive.status(), {}));
     context.out.flush();
     note_a_warning(context, drive);
     if (!holding) note_what_ends_the_force(context, timeout);

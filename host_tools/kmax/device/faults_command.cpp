@@ -118,7 +118,7 @@ void print_table(Context& context, const std::vector<LogEntry>& entries) {
 
 void print_entry(Context& context, const LogEntry& entry) {
   const auto line = [&context](const char* name, const std::string& text) {
-    if (!text.empty()) print(context.out, "{:<18} {}\n", name, text);
+    if (!text.empty()) context.say(fmt::format("{:<18} {}", name, text), 19);
   };
   line("number", std::to_string(entry.number));
   line("start", fmt::format("{} since power-on", entry.start));

@@ -110,7 +110,7 @@ int run_info(Context& context) {
 
   const auto line = [&context](std::string name, const std::string& text) {
     for (char& letter : name) letter = letter == '_' ? ' ' : letter;
-    print(context.out, "{:<20} {}\n", name, text);
+    context.say(fmt::format("{:<20} {}", name, text), 21);
   };
   line("device", device.description());
   line("program version", KMAX_VERSION);

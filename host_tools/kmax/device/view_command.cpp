@@ -65,9 +65,8 @@ int run_view(Context& context, const ViewOptions& options) {
                    {"device", context.device_address()},
                    {"plots", view::page_has_plots()}});
   } else {
-    print(context.out,
-          "{}#{}\nopen that in a browser on this computer; Ctrl-C ends, and disarms what the page armed\n",
-          address, token);
+    print(context.out, "{}#{}\n", address, token);
+    context.say("open that in a browser on this computer; Ctrl-C ends, and disarms what the page armed", 0);
   }
   context.out.flush();
   if (!view::page_has_plots())

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host_tools/base/print.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
@@ -101,8 +102,8 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"files", names_json(files)}});
     return verdict;
   }
-  for (const std::string& line : words) print(context.out, "{}\n", report::wrapped(line, context.width));
-  print(context.out, "\n{}", report::terminal_text(experiment::contact_table(results), context.width));
+  for (const std::string& line : words) print(context.out, "{}\n", wrapped(line, context.width()));
+  print(context.out, "\n{}", report::terminal_text(experiment::contact_table(results), context.width()));
   print_names(context.out, files);
   for (const auto& result : results) {
     if (result.lost_records > 0)

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "host_tools/base/print.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -62,7 +63,7 @@ std::unique_ptr<experiment::RunJournal> open_touch_journal(Context& context, con
   require_folder_to_resume(folder, resume);
   if (folder.empty()) return nullptr;
   auto journal = std::make_unique<RunJournal>(std::filesystem::path(folder) / (name + ".journal"), settings,
-                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::anew);
+                                              resume ? RunJournal::Begin::resume : RunJournal::Begin::fresh);
   if (resume) context.note(fmt::format("done already: {}", experiment::touch_words(journal->resumed())));
   return journal;
 }
@@ -78,9 +79,9 @@ int print_study(Context& context, StudyReport study, const std::vector<std::file
     context.print(study.document);
   } else {
     for (const std::string& words : study.paragraphs)
-      print(context.out, "{}\n\n", report::wrapped(words, context.width));
+      print(context.out, "{}\n\n", wrapped(words, context.width()));
     for (const report::Table& table : study.tables)
-      print(context.out, "{}\n", report::terminal_text(table, context.width));
+      print(context.out, "{}\n", report::terminal_text(table, context.width()));
     print_names(context.out, files);
   }
   return paper_exit_code(expect_paper, study.claim_met);

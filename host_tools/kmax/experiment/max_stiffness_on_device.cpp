@@ -29,9 +29,9 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
     for (const auto& file : files) context.note(file.string());
     return;
   }
-  for (const std::string& line : words) print(context.out, "{}\n", line);
+  for (const std::string& line : words) context.say(line, 0);
   print(context.out, "\n{}",
-        report::terminal_text(experiment::device_stiffness_table(results), context.width));
+        report::terminal_text(experiment::device_stiffness_table(results), context.width()));
   print_names(context.out, files);
 }
 }  // namespace

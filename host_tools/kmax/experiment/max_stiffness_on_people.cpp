@@ -6,6 +6,7 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
@@ -117,7 +118,7 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   }
   std::optional<RunJournal> journal;
   if (!options.files.folder.empty()) {
-    const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::anew;
+    const auto begin = options.resume ? RunJournal::Begin::resume : RunJournal::Begin::fresh;
     journal.emplace(folder / ("max_stiffness" + suffix(set) + ".journal"), journal_settings(set, run), begin);
     run.journal = &*journal;
   }
@@ -144,9 +145,9 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
 
 void print_section(const Context& context, const report::Section& section) {
   for (const std::string& paragraph : section.paragraphs)
-    print(context.out, "{}\n", report::wrapped(paragraph, context.width));
+    print(context.out, "{}\n", wrapped(paragraph, context.width()));
   for (const report::Table& table : section.tables)
-    print(context.out, "\n{}", report::terminal_text(table, context.width));
+    print(context.out, "\n{}", report::terminal_text(table, context.width()));
 }
 }  // namespace
 

@@ -72,7 +72,7 @@ int say(Context& context, const device::LockStatus& now, const std::string& what
   if (context.json) {
     context.print(lock_json(now));
   } else {
-    print(context.out, "{}\n", what);
+    context.say(what, 0);
   }
   return done;
 }

@@ -9,6 +9,7 @@
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/parameter_file.hpp"
+#include "host_tools/device/store.hpp"
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/parameters/store_text.hpp"
@@ -121,7 +122,9 @@ int run_dump(Context& context, const DumpOptions& options) {
                    {"firmware", origin.firmware},
                    {"parameters", all}});
   } else if (to_file) {
-    print(context.out, "{}: {} written\n", file, parameters_text(values.size()));
+    context.say(fmt::format(
+        "{}: {} written; CANopen's own {} settings, which 'kmax save' keeps as well, are not in files", file,
+        parameters_text(values.size()), device::persistent_parameters().size() - values.size()));
   } else {
     context.out << text;
   }

@@ -40,10 +40,10 @@ int run_save(Context& context) {
                    {"write_errors", status.write_errors}});
     return done;
   }
-  print(context.out, "saved {} as record {}, read back equal; {} before the next erase\n",
-        counted(status.saved_parameters, "parameter"), status.sequence,
-        status.free_saves == 1 ? std::string("1 more save fits")
-                               : fmt::format("{} more saves fit", status.free_saves));
+  context.say(fmt::format("saved {} as record {}, read back equal; {} before the next erase",
+                          counted(status.saved_parameters, "parameter"), status.sequence,
+                          status.free_saves == 1 ? std::string("1 more save fits")
+                                                 : fmt::format("{} more saves fit", status.free_saves)));
   return done;
 }
 
@@ -78,6 +78,7 @@ void add_store_commands(CLI::App& app, Context& context) {
       app, context,
       {"save", "Keeps all present parameters over a restart, and reads them back.",
        "  kmax set wall.stiffness=3.58N/mm && kmax save\n\n"
+       "All means those of 'kmax dump' and CANopen's own settings.\n"
        "Appends a record to the device's memory; the one before stays until this one is whole, so a loss\n"
        "of power leaves the one or the other. Refused while an axis is armed, since the memory may hold the\n"
        "processor up for half a second; no axis can be armed meanwhile."},

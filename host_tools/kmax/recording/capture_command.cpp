@@ -14,6 +14,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"
+#include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/drive.hpp"
 #include "host_tools/json/capture_json.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -30,7 +31,7 @@ using firmware::CaptureTrigger;
 namespace {
 struct CaptureOptions {
   CaptureSettings settings{.channels = {"position", "velocity", "force", "current"}};
-  std::string trigger{firmware::names::capture_trigger[0].name};
+  std::string trigger{device::name_of(CaptureTrigger::now)};
   std::optional<double> level;
   double timeout = 30;
   std::string file;
@@ -43,14 +44,12 @@ struct CaptureOptions {
         ->delimiter(',')
         ->type_name("NAME,...")
         ->capture_default_str();
-    std::vector<std::string> triggers;
-    for (const auto& one : firmware::names::capture_trigger) triggers.emplace_back(one.name);
     command
         .add_option(
             "--trigger", trigger,
             "What starts it: now, contact with the wall, |force| or |velocity| above --level, a fault of the "
             "axis, or the start of an excitation; default: now")
-        ->check(CLI::IsMember(triggers))
+        ->check(CLI::IsMember(device::capture_trigger_names()))
         ->type_name("now|contact|force|velocity|fault|excitation")
         ->option_text("TRIGGER");
     command.add_option("--level", level, "Level of the triggers force (N) and velocity (m/s)")
@@ -72,17 +71,6 @@ class Interrupted : public std::runtime_error {
   explicit Interrupted(const std::string& what_became) : std::runtime_error("interrupted; " + what_became) {}
 };
 
-std::string trigger_name(CaptureTrigger trigger) {
-  return std::string(firmware::names::capture_trigger[static_cast<std::size_t>(trigger)].name);
-}
-
-CaptureTrigger trigger_of(const std::string& name) {
-  for (const auto& trigger : firmware::names::capture_trigger) {
-    if (trigger.name == name) return static_cast<CaptureTrigger>(trigger.value);
-  }
-  throw UsageError(fmt::format("--trigger: there is no '{}'", name));
-}
-
 /// A float32 with no more digits than it has.
 std::string value_text(double value) {
   const auto narrow = static_cast<float>(value);
@@ -103,7 +91,7 @@ void write_csv(std::ostream& out, const Captured& captured) {
 std::string progress_text(const CaptureProgress& progress, CaptureTrigger trigger) {
   switch (progress.phase) {
     case CaptureProgress::Phase::waiting:
-      return fmt::format("waiting for the trigger '{}'", trigger_name(trigger));
+      return fmt::format("waiting for the trigger '{}'", device::name_of(trigger));
     case CaptureProgress::Phase::running:
       return fmt::format("{} of {} samples", progress.done, progress.all);
     case CaptureProgress::Phase::reading:
@@ -125,19 +113,13 @@ class Armed {
       if (status.faulty()) context_.note(fmt::format("axis {}: {}", drive_.axis(), status.fault_words()));
       drive_.disarm();
     } catch (const std::exception& error) {
-      context_.note(fmt::format("the axis could not be disarmed: {}; {}", error.what(), what_then()));
+      context_.note(device::words_for_disarm_failure(link_timeout_, error.what()));
     }
   }
   Armed(const Armed&) = delete;
   Armed& operator=(const Armed&) = delete;
 
  private:
-  std::string what_then() const {
-    if (link_timeout_ > 0.0)
-      return fmt::format("link.timeout removes its force after {:g} s without a message", link_timeout_);
-    return "link.timeout is 0: its force MAY STILL BE ON, cut its power";
-  }
-
   Context& context_;
   device::Drive drive_;
   double link_timeout_;  // s
@@ -175,13 +157,13 @@ Captured capture(Context& context, device::Device& device, const CaptureOptions&
 CaptureOptions checked(const CaptureOptions& given, const Context& context) {
   CaptureOptions options = given;
   options.settings.axis = context.axis();
-  const CaptureTrigger trigger = options.settings.trigger = trigger_of(options.trigger);
+  const CaptureTrigger trigger = options.settings.trigger = device::capture_trigger_of(options.trigger);
   const bool takes_level = trigger == CaptureTrigger::force || trigger == CaptureTrigger::velocity;
   if (takes_level && !options.level)
-    throw UsageError(fmt::format("--trigger {} needs --level", trigger_name(trigger)));
+    throw UsageError(fmt::format("--trigger {} needs --level", device::name_of(trigger)));
   if (!takes_level && options.level)
     throw UsageError(fmt::format("--level belongs to the triggers force and velocity, not to '{}'",
-                                 trigger_name(trigger)));
+                                 device::name_of(trigger)));
   if (options.level) options.settings.level = *options.level;
   return options;
 }
@@ -205,12 +187,12 @@ int run_capture(Context& context, const CaptureOptions& given) {
   const std::string summary =
       fmt::format("{} samples of axis {}, {:g} ms apart, {} of them before the trigger '{}'",
                   captured.samples(), options.settings.axis, 1e3 * captured.interval / captured.tick_rate,
-                  captured.trigger_sample, trigger_name(options.settings.trigger));
+                  captured.trigger_sample, device::name_of(options.settings.trigger));
   if (options.file.empty()) {
     write_csv(context.out, captured);
     context.note(summary);
   } else {
-    print(context.out, "{}: {}\n", options.file, summary);
+    context.say(fmt::format("{}: {}", options.file, summary));
   }
   return done;
 }

@@ -34,8 +34,8 @@ struct RecordOptions {
     command.add_option("file", file, "CSV file to write; -: standard output")
         ->option_text("FILE|-")
         ->required();
-    add_quantity(command, "--for", seconds, "s",
-                 "How long, s of the device's time; without it until Ctrl-C", 0.0, 1e9);
+    add_quantity(command, "--for", seconds, "s", "How long, s of the device's time; without it until Ctrl-C",
+                 0.0, 1e9);
   }
 };
 
@@ -193,7 +193,7 @@ int run_record(Context& context, const RecordOptions& options) {
   if (options.to_standard_output()) {
     context.note(text);
   } else {
-    print(context.out, "{}: {}\n", options.file, text);
+    context.say(fmt::format("{}: {}", options.file, text));
   }
   return done;
 }

@@ -74,7 +74,7 @@ class Display {
     } else if (const auto terminal = terminal_behind(context_.out)) {
       std::vector<std::string> lines = watch_table(axes, terminal->columns, colour_);
       std::string title = fmt::format("{}  {:.1f} s  {:.1f} readings/s  q ends", device_, seconds, rate);
-      if (title.size() > terminal->columns) title.resize(terminal->columns);
+      title.resize(beginning(title, terminal->columns).size());
       lines.insert(lines.begin(), title);
       live_.show(std::move(lines), terminal->rows);
     } else if (seconds >= next_line_) {

@@ -29,7 +29,7 @@ const char* colour_of(const WatchedAxis& axis) {
 /// Cut to `width` before the colour, whose letters take no place.
 std::string coloured(std::string line, std::size_t width, const char* colour) {
   line.erase(line.find_last_not_of(' ') + 1);
-  if (line.size() > width) line.resize(width);
+  line.resize(beginning(line, width).size());
   return colour == nullptr ? line : colour + line + "\x1b[0m";
 }
 }  // namespace

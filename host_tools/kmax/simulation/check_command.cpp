@@ -86,6 +86,11 @@ firmware::ParameterValues values_of(Context& context, const CheckOptions& option
   return values;
 }
 
+/// Of tables and paragraphs: the terminal's, or what a file is best read in.
+std::size_t text_width(const Context& context) {
+  return context.width() == 0 ? 110 : context.columns();
+}
+
 int judge_set(Context& context, const CheckOptions& options) {
   const check::HandChoice hand = check::choose_hand(options.hand);
   const firmware::ParameterValues values = values_of(context, options, {});
@@ -93,7 +98,7 @@ int judge_set(Context& context, const CheckOptions& options) {
   if (context.json) {
     context.print(json::judgement_json(judgement, hand.name));
   } else {
-    context.out << check::judgement_text(judgement, hand.name);
+    context.out << check::judgement_text(judgement, hand.name, text_width(context));
   }
   return judgement.pass ? done : verdict_is_no;
 }
@@ -162,7 +167,7 @@ int draw_map(Context& context, const CheckOptions& options) {
   print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
         map.results.size());
   if (const std::string nowhere = met_nowhere(map); passing["all"] == 0 && !nowhere.empty())
-    print(context.out, "{}\n", nowhere);
+    context.say(nowhere, 0);
   for (const std::string& file : {options.picture, options.csv}) {
     if (!file.empty()) print(context.out, "{}\n", file);
   }
@@ -200,10 +205,11 @@ int explain(Context& context, const std::vector<std::string>& names) {
     context.print({{"criteria", all}});
     return done;
   }
-  for (const control::Criterion criterion : chosen) print(context.out, "{}\n", check::explanation(criterion));
+  for (const control::Criterion criterion : chosen)
+    print(context.out, "{}\n", check::explanation(criterion, text_width(context)));
   if (!everything) return done;
   for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
-    print(context.out, "{}: {}\n", check::name_of(worth), check::meaning_of(worth));
+    context.say(fmt::format("{}: {}", check::name_of(worth), check::meaning_of(worth)));
   print(context.out, "\n{}", check::symbols_text());
   return done;
 }

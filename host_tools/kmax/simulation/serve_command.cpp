@@ -61,9 +61,8 @@ int run_serve(Context& context, const ServeOptions& options) {
   if (context.json) {
     context.print({{"device", addresses.front()}, {"devices", addresses}, {"scene", scene.name}});
   } else {
-    print(context.out,
-          "serving scene '{}' as {}\nset KMAX_DEVICE to that, or give it with --device; Ctrl-C ends\n",
-          scene.name, fmt::join(addresses, " and "));
+    context.say(fmt::format("serving scene '{}' as {}", scene.name, fmt::join(addresses, " and ")));
+    context.say("set KMAX_DEVICE to that, or give it with --device; Ctrl-C ends", 0);
   }
   context.out.flush();
   const auto report = serve::run_in_real_time(simulation, {line ? &*line : nullptr, can ? &*can : nullptr},

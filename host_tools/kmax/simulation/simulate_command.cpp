@@ -202,18 +202,21 @@ int run_simulate(Context& context, const SimulateOptions& options) {
   if (context.json) {
     context.print(result_json(scene, result));
   } else {
-    print(context.out, "{}: {}\n", scene.name, scene.description);
+    context.say(fmt::format("{}: {}", scene.name, scene.description));
     print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
           result.simulated_s / result.real_s);
     print(context.out, "  integrator: {}\n", simulation::to_string(scene.integrator));
     for (std::size_t n = 0; n < scene.axes.size(); ++n)
-      print(context.out, "  axis {} integrates: {}\n", n,
-            fmt::join(simulation::integrated_parts(scene.axes[n]), ", "));
+      context.say(fmt::format("  axis {} integrates: {}", n,
+                              fmt::join(simulation::integrated_parts(scene.axes[n]), ", ")),
+                  4);
     if (result.contact)
-      print(context.out,
-            "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm\n",
-            experiment::to_string(result.contact->verdict), result.contact->peak_to_peak * 1e3,
-            result.judged_from, result.judged_to, result.contact->deepest * 1e3);
+      context.say(
+          fmt::format(
+              "  held contact: {}, {:.3f} mm peak to peak between {:.2f} and {:.2f} s, deepest {:.3f} mm",
+              experiment::to_string(result.contact->verdict), result.contact->peak_to_peak * 1e3,
+              result.judged_from, result.judged_to, result.contact->deepest * 1e3),
+          4);
     if (result.first_alarm)
       print(context.out, "  the device called the wall unstable {} time{}, first at {:.2f} s\n",
             result.alarms, result.alarms == 1 ? "" : "s", *result.first_alarm);

@@ -109,7 +109,7 @@ void ExceptionStack::enter_handler(unsigned exception, ExceptionReturn exception
   const std::uint32_t flags = engine_.get(UC_ARM_REG_XPSR) & xpsr_flags;
   engine_.set(UC_ARM_REG_XPSR_NZCVQG, flags | xpsr_thumb | exception);
   engine_.set(UC_ARM_REG_LR, exception_return.value);
-  // The one write after which the emulator works out anew which mode it translates for.
+  // The one write after which the emulator works out again which mode it translates for.
   engine_.set(UC_ARM_REG_APSR_NZCV, flags & nzcv);
 }
 

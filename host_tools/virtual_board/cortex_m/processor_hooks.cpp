@@ -173,7 +173,7 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   }
 }
 
-/// Something is up: find out what. Also takes the limit anew when registers were accessed.
+/// Something is up: find out what. Also takes the limit again when registers were accessed.
 bool Processor::must_stop() {
   if (attention_) {
     attention_ = false;

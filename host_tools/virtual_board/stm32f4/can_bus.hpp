@@ -93,7 +93,7 @@ class CanBus {
   /// Between the first bit of a frame and the last of its intermission, or stuck.
   bool busy() const { return stuck_ || phase_ != Phase::idle; }
 
-  /// Destroys the next `count` frames, with this error for their senders; counts anew.
+  /// Destroys the next `count` frames, with this error for their senders; the count starts again.
   void destroy_frames(std::uint64_t count, CanOutcome kind = CanOutcome::dominant_bit_error);
   /// Only frames of this node; null: of all.
   void destroy_frames_of(const CanBusNode* node) { victim_ = node; }

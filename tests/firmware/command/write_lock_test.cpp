@@ -270,7 +270,7 @@ TEST(WriteLock, WrongCodesAreCountedAndSlowedAcrossTheWrapOfTheClock) {
         }
       }
       RC_ASSERT(device->reading("lock.attempts") == attempts);
-      // A reset forgets neither the number nor the wait, which it begins anew.
+      // A reset forgets neither the number nor the wait, which starts again.
       if (*rc::gen::inRange(0, 10) == 0) {
         start(*rc::gen::arbitrary<std::uint32_t>());
         elapsed = 0;

@@ -77,7 +77,7 @@ TEST(ParameterStore, ASectorIsErasedOnlyWhenTheOtherIsFullAndIsCounted) {
     EXPECT_EQ(store.survey().erases, static_cast<std::uint32_t>(erases));
   }
   EXPECT_EQ(erases, 4);
-  // A firmware that starts anew goes on counting.
+  // A firmware that restarts goes on counting.
   Store after(flash);
   for (std::uint32_t k = 0; k < saves_per_sector; ++k)
     ASSERT_EQ(save(after, some_values(k)), SaveProgress::done);

@@ -243,6 +243,12 @@ TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
   expect_thrown<DeviceError>([&] { reader.read(); }, "another program");
 }
 
+TEST(CaptureTriggers, GoByTheirNames) {
+  for (const std::string& name : capture_trigger_names()) EXPECT_EQ(name_of(capture_trigger_of(name)), name);
+  EXPECT_EQ(host_tools_test::thrown_message<ValueError>([] { capture_trigger_of("later"); }),
+            "there is no trigger 'later'; triggers are now, contact, force, velocity, fault, excitation");
+}
+
 TEST_F(CaptureReaderTest, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSent) {
   const int before = bench.link->requests;
   const auto refused = [&](auto change, const std::string& part) {

@@ -132,6 +132,24 @@ TEST(Device, EveryRefusalIsExplainedAndChangesNothing) {
   }
 }
 
+// A write of another program that succeeds in between clears the reason that the device shows.
+TEST_F(OpenDevice, ARefusalWhoseReasonIsGoneIsToldInTheLinksWords) {
+  connection.link->requests = 0;
+  connection.link->after_request = [this](int request) {
+    if (request != 2) return;  // the values; the first opened the transaction
+    auto& registers = connection.fake->registers;
+    EXPECT_EQ(registers.last_refusal().refusal, Refusal::out_of_range);
+    const std::uint16_t drop = 0;
+    registers.write(Parameter::of<"transaction.control">().address(), {&drop, 1}, false, 0);
+    EXPECT_EQ(registers.last_refusal().refusal, Refusal::none);
+  };
+  const Assignment huge{Parameter::of<"wall.stiffness">(), std::bit_cast<std::uint32_t>(2e6f)};
+  const auto message = thrown_message<DeviceError>([&] { device.apply({&huge, 1}); });
+  EXPECT_CONTAINS(message, "the device refused function 16 at register");
+  EXPECT_CONTAINS(message, "nothing was changed");
+  EXPECT_EQ(message.find("not refused"), std::string::npos) << message;
+}
+
 TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
     connection.fake->machines[1].command(word, firmware::Link::serial, Refusal::none, false);

@@ -59,7 +59,7 @@ TEST_F(JitterDevice, TouchesThatAreDoneSurviveAnErrorAndAreNotAskedForAgain) {
   report = [this](const std::string& text) {
     if (text.starts_with("F_B = 2 N") && forceful()) throw std::runtime_error("Ctrl-C");
   };
-  open_journal(settings, RunJournal::Begin::anew);
+  open_journal(settings, RunJournal::Begin::fresh);
   EXPECT_THROW(run(), std::runtime_error);
   EXPECT_EQ(person.requests.size(), 2u);
   report = [](const std::string&) {};
@@ -202,7 +202,7 @@ TEST_F(ResolutionDevice, ATouchThatSwingsTooFarIsTakenAsVibrating) {
 TEST_F(ResolutionDevice, EqualTouchesAreKeptApartInTheJournal) {
   settings.speeds = {0.1, 0.1};
   settings.resolutions = {0.0};
-  open_journal(settings, RunJournal::Begin::anew);
+  open_journal(settings, RunJournal::Begin::fresh);
   const ResolutionTouches made = run();
   EXPECT_EQ(journal->size(), 2u);
   open_journal(settings, RunJournal::Begin::resume);

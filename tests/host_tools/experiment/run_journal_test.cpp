@@ -32,7 +32,7 @@ class Journal : public testing::Test {
   }
   /// A journal of two jobs.
   std::string two_jobs() const {
-    RunJournal journal(file(), settings, Begin::anew);
+    RunJournal journal(file(), settings, Begin::fresh);
     journal.add("first", {{"stiffness", 3580.1}});
     journal.add("second", 8.41);
     return text();
@@ -63,13 +63,13 @@ TEST_F(Journal, ResumingWithoutAFileBeginsOne) {
 
 TEST_F(Journal, AnewKeepsWhatWasThereAside) {
   const std::string before = two_jobs();
-  const RunJournal journal(file(), settings, Begin::anew);
+  const RunJournal journal(file(), settings, Begin::fresh);
   EXPECT_EQ(journal.size(), 0u);
   EXPECT_EQ(folder.read("run.jsonl.previous"), before);
 }
 
 TEST_F(Journal, AJobIsInTheFileWhenAddReturns) {
-  RunJournal journal(file(), settings, Begin::anew);
+  RunJournal journal(file(), settings, Begin::fresh);
   journal.add("one", 1);
   EXPECT_TRUE(text().ends_with("{\"key\":\"one\",\"value\":1}\n")) << text();
   EXPECT_THROW(journal.add("one", 2), std::logic_error);
@@ -145,9 +145,9 @@ TEST_F(Journal, WhatIsNoJournalIsRefusedAndLeftAlone) {
 }
 
 TEST_F(Journal, AJournalInUseIsRefusedToOthers) {
-  const RunJournal journal(file(), settings, Begin::anew);
+  const RunJournal journal(file(), settings, Begin::fresh);
   const std::string before = text();
-  for (const Begin begin : {Begin::anew, Begin::resume})
+  for (const Begin begin : {Begin::fresh, Begin::resume})
     EXPECT_CONTAINS(refusal(settings, begin), "another program is writing this journal");
   const pid_t child = fork();
   if (child == 0) {
@@ -170,7 +170,7 @@ TEST_F(Journal, AProgramThatIsKilledLeavesItsJobsAndNoLock) {
   ASSERT_EQ(pipe(ready), 0);
   const pid_t child = fork();
   if (child == 0) {
-    RunJournal journal(file(), settings, Begin::anew);
+    RunJournal journal(file(), settings, Begin::fresh);
     for (int i = 0; i < 5; ++i) journal.add(std::to_string(i), i);
     [[maybe_unused]] const ssize_t reported = ::write(ready[1], "x", 1);
     for (;;) pause();
@@ -211,7 +211,7 @@ TEST_F(Journal, ALineThatCannotBeWrittenLeavesTheFileAsItWas) {
 
 TEST_F(Journal, PlacesThatCannotBeWrittenAreNamed) {
   const auto message = [&](const std::filesystem::path& path) {
-    return thrown_message<JournalError>([&] { const RunJournal journal(path, settings, Begin::anew); });
+    return thrown_message<JournalError>([&] { const RunJournal journal(path, settings, Begin::fresh); });
   };
   EXPECT_CONTAINS(message(folder / "none/run.jsonl"), "none/run.jsonl");
   EXPECT_CONTAINS(message(folder.path()), folder.path().string());
@@ -219,7 +219,7 @@ TEST_F(Journal, PlacesThatCannotBeWrittenAreNamed) {
 
 TEST_F(Journal, ThreadsAddSideBySide) {
   {
-    RunJournal journal(file(), settings, Begin::anew);
+    RunJournal journal(file(), settings, Begin::fresh);
     run_jobs(300, 8, [&](std::size_t index) { journal.add(std::to_string(index), index); });
   }
   const RunJournal journal(file(), settings, Begin::resume);
@@ -234,16 +234,16 @@ RC_GTEST_PROP(JournalProperty, KeysAndNumbersComeBackToTheLastBit, (const std::s
   // Arbitrary bytes are no UTF-8 and would come back as another key.
   std::string ascii = key;
   for (char& c : ascii) c = static_cast<char>(c & 0x7F);
-  { RunJournal(folder / "j", Json::object(), Begin::anew).add(ascii, number); }
+  { RunJournal(folder / "j", Json::object(), Begin::fresh).add(ascii, number); }
   const RunJournal journal(folder / "j", Json::object(), Begin::resume);
   RC_ASSERT(journal.find(ascii) != nullptr);
   RC_ASSERT(journal.find(ascii)->get<double>() == number);
 }
 
 TEST_F(Journal, BytesThatAreNoUtf8AreReplaced) {
-  RunJournal journal(file(), settings, Begin::anew);
+  RunJournal journal(file(), settings, Begin::fresh);
   EXPECT_NO_THROW(journal.add("bad \xFF", "\xC3"));
-  EXPECT_NO_THROW(RunJournal(folder / "other", {{"path", "\xFF"}}, Begin::anew));
+  EXPECT_NO_THROW(RunJournal(folder / "other", {{"path", "\xFF"}}, Begin::fresh));
   journal.add("nan", std::numeric_limits<double>::quiet_NaN());
   EXPECT_TRUE(journal.find("nan")->is_null());
 }
@@ -278,7 +278,7 @@ TEST(JournalFields, AreWrittenInTheirOrder) {
 TEST(JournalFields, ComeBackThroughTheFile) {
   const host_tools_test::TemporaryFolder folder;
   {
-    RunJournal journal(folder / "j", {{"settings", 1}}, RunJournal::Begin::anew);
+    RunJournal journal(folder / "j", {{"settings", 1}}, RunJournal::Begin::fresh);
     journal.add("one", written(some));
   }
   const RunJournal journal(folder / "j", {{"settings", 1}}, RunJournal::Begin::resume);

@@ -36,7 +36,7 @@ class TouchJournal : public testing::Test {
     journal.reset();
     journal = std::make_unique<RunJournal>(folder / "j", RunJournal::Json{{"settings", 1}}, begin);
   }
-  TouchJournal() { reopen(RunJournal::Begin::anew); }
+  TouchJournal() { reopen(RunJournal::Begin::fresh); }
 
   const TemporaryFolder folder;
   std::unique_ptr<RunJournal> journal;

@@ -84,7 +84,7 @@ TEST_F(DeviationDevice, WhoLeavesTheWallIsNotAveraged) {
 }
 
 TEST_F(DeviationDevice, ATouchComesBackFromTheJournal) {
-  open_journal(settings, RunJournal::Begin::anew);
+  open_journal(settings, RunJournal::Begin::fresh);
   const DeviationResult made = run().results.front();
   open_journal(settings, RunJournal::Begin::resume);
   const DeviationResult again = run().results.front();

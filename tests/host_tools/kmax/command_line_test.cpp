@@ -158,6 +158,9 @@ TEST_F(CommandLine, TheDeviceIsTheOptionThenTheEnvironmentThenSim) {
   EXPECT_EQ(kmax({"state"}), done);
   EXPECT_EQ(opened, "sim");
   EXPECT_CONTAINS(said, "lives only for this command");
+  // Whoever names it knows, and the library's lives longer.
+  EXPECT_EQ(kmax({"state", "--device", "sim"}), done);
+  EXPECT_EQ(said.find("lives only"), std::string::npos) << said;
 }
 
 TEST_F(CommandLine, NothingIsChangedOnADeviceThatNobodyNamed) {

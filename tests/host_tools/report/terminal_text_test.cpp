@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::report::terminal_text_test {
@@ -46,26 +47,6 @@ TEST(TerminalText, ALinesEndOrAnEscapeSequenceInACellCannotBreakTheTable) {
     EXPECT_EQ(text.find(control), std::string::npos);
 }
 
-TEST(DisplayWidth, OfUtf8) {
-  EXPECT_EQ(display_width(""), 0u);
-  EXPECT_EQ(display_width("N/mm"), 4u);
-  EXPECT_EQ(display_width("µm"), 2u);
-  EXPECT_EQ(display_width("γ = 0.57"), 8u);
-  EXPECT_EQ(display_width("e\xCC\x81"), 1u);  // e and a combining acute accent
-  EXPECT_EQ(display_width("力覚"), 4u);       // two wide characters
-  EXPECT_EQ(display_width("\xF0\x9F\x98\x80"), 2u);
-  EXPECT_EQ(display_width("a\xE2\x80\x8B"
-                          "b"),
-            2u);  // zero width space
-}
-
-TEST(DisplayWidth, BytesThatAreNoUtf8CountOneEach) {
-  EXPECT_EQ(display_width("\xFF\xFE"), 2u);
-  EXPECT_EQ(display_width("\xE2\x82"), 2u);  // the beginning of a character
-  EXPECT_EQ(display_width("\xC3(a"), 3u);
-  EXPECT_EQ(display_width("\x80"), 1u);
-}
-
 RC_GTEST_PROP(TerminalTextProperty, ColumnsBeginWhereTheirHeadingsDo, ()) {
   const auto cells = *rc::gen::container<std::vector<std::string>>(
       rc::gen::container<std::string>(rc::gen::inRange('a', 'f')));
@@ -76,7 +57,7 @@ RC_GTEST_PROP(TerminalTextProperty, ColumnsBeginWhereTheirHeadingsDo, ()) {
   std::getline(lines, line);
   const std::size_t second = line.find("second");
   std::getline(lines, line);
-  while (std::getline(lines, line)) RC_ASSERT(display_width(line.substr(0, line.find('|'))) == second);
+  while (std::getline(lines, line)) RC_ASSERT(cli::display_width(line.substr(0, line.find('|'))) == second);
 }
 
 RC_GTEST_PROP(TerminalTextProperty, AnyBytesGiveALinePerRow, (const std::vector<std::string>& cells)) {
@@ -133,13 +114,6 @@ TEST(TerminalText, FitsIntoAWidthBetweenWords) {
   // No word is cut, whatever is asked.
   EXPECT_NE(terminal_text(table, 1).find("oscillation"), std::string::npos);
   EXPECT_NE(terminal_text(table, 1).find("1.595"), std::string::npos);
-}
-
-TEST(Wrapped, BreaksBetweenWords) {
-  EXPECT_EQ(wrapped("one two three", 7), "one two\nthree");
-  EXPECT_EQ(wrapped("one two three", 0), "one two three");
-  EXPECT_EQ(wrapped("extraordinary a", 4), "extraordinary\na");
-  EXPECT_EQ(wrapped("", 4), "");
 }
 
 }  // namespace kmax::report::terminal_text_test

@@ -51,7 +51,7 @@ TEST(RealTime, SimulatedAndGivenUpTimeNeverExceedTheRealTime) {
   });
   const double real = std::chrono::duration<double>(Clock::now() - begin).count();
   EXPECT_EQ(asked, 20);
-  EXPECT_GE(report.behind_s, 0.1 - 1e-9) << "150 ms, of which 50 ms can be made up for";
+  EXPECT_GE(report.behind_s, 0.1 - 1e-9) << "150 ms, of which 50 ms can be caught up with";
   EXPECT_LE(report.behind_s + static_cast<double>(report.ticks) * 50e-6, real);
   EXPECT_GE(static_cast<double>(report.ticks) * 50e-6, 0.05 - 1e-4);
   EXPECT_EQ(served.simulation.board().now_us(), report.ticks * 50);

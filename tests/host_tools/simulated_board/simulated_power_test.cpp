@@ -218,7 +218,7 @@ TEST(SimulatedPower, AnAxisIsDeclaredAbsentAndTakenBackWhileNothingIsArmed) {
   ASSERT_EQ(bench.set<"drive.declared_absent">(0, 0), Refusal::none);
   bench.run(200e-6);
   EXPECT_FALSE(bench.arm(0));
-  EXPECT_EQ(bench.application().refusal(0), Refusal::power_stage_not_ready) << "its driver is written anew";
+  EXPECT_EQ(bench.application().refusal(0), Refusal::power_stage_not_ready) << "its driver is written again";
   bench.run(0.3);
   EXPECT_TRUE(bench.arm(0)) << firmware::to_string(bench.application().refusal(0));
 }

@@ -198,7 +198,7 @@ stepOfFirmware('TPDO mapping is refused while the TPDO exists', async () => {
   await set(0x1800, 1, tpdo | 0x40000000, 4);
   await refused('1A00h:0', undefined, set(0x1a00, 0, 0, 1));
 });
-step('TPDO mapped anew: 6041h, 6061h, 6064h at each SYNC', async () => {
+step('TPDO mapped again: 6041h, 6061h, 6064h at each SYNC', async () => {
   await set(0x1800, 1, 0xc0000000 | tpdo, 4);
   await set(0x1800, 2, 1, 1);
   await setCount(0x1a00, 0);
@@ -253,7 +253,7 @@ stepOfFirmware('TPDO at every third SYNC', async () => {
   bus.off('frame', listen);
   expect(count === 3, `${count} came at 9 SYNCs`);
 });
-step('RPDO mapped anew and taken over at once', async () => {
+step('RPDO mapped again and taken over at once', async () => {
   await set(0x1400, 1, 0x80000000 | rpdo, 4);
   await setCount(0x1600, 0);
   await set(0x1600, 1, 0x60720010, 4);

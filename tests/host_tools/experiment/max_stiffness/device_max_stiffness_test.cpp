@@ -115,7 +115,7 @@ TEST_F(DeviceStiffness, EverybodyIsAskedBeforeEachTouchAndNeverWhileThereIsForce
 
 TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
   {
-    const auto journal = open(RunJournal::Begin::anew);
+    const auto journal = open(RunJournal::Begin::fresh);
     std::set<std::string> touched;
     report = [&](const std::string& text) {
       touched.insert(text.substr(0, text.find(" N/mm")));
@@ -144,7 +144,7 @@ TEST_F(DeviceStiffness, ARunThatWasInterruptedGoesOnWithTheNextTouch) {
 }
 
 TEST_F(DeviceStiffness, AJournalOfOtherSettingsOrOfSomethingElseIsRefused) {
-  { open(RunJournal::Begin::anew)->add(wall_with(0).name + ", 3000 N/m, touch 1", "nonsense"); }
+  { open(RunJournal::Begin::fresh)->add(wall_with(0).name + ", 3000 N/m, touch 1", "nonsense"); }
   EXPECT_CONTAINS(thrown_message<JournalError>(
                       [&] { find(wall_with(0), nullptr, open(RunJournal::Begin::resume).get()); }),
                   "3000 N/m, touch 1' is not what");
@@ -154,7 +154,7 @@ TEST_F(DeviceStiffness, AJournalOfOtherSettingsOrOfSomethingElseIsRefused) {
 }
 
 TEST_F(DeviceStiffness, AFaultEndsTheRunWithItsWordsAndKeepsTheTouchesBefore) {
-  const auto journal = open(RunJournal::Begin::anew);
+  const auto journal = open(RunJournal::Begin::fresh);
   report = [&](const std::string& text) {
     if (text.find("3.5 N/mm, touch 1 of 1: holding") != std::string::npos)
       simulation().device().connect_encoder(0, false);
@@ -190,7 +190,7 @@ class DeviceStiffnessWithoutAPerson : public DeviceStiffness {
 
 TEST_F(DeviceStiffnessWithoutAPerson, IsAskedThreeTimesAndNotWithoutAPrompter) {
   AskedPerson person;
-  const auto journal = open(RunJournal::Begin::anew);
+  const auto journal = open(RunJournal::Begin::fresh);
   EXPECT_THROW(find(wall_with(0), &person, journal.get()), NobodyTouched);
   EXPECT_EQ(person.requests.size(), 3u);
   EXPECT_THROW(find(wall_with(0)), NobodyTouched);
@@ -201,7 +201,7 @@ TEST_F(DeviceStiffnessWithoutAPerson, IsAskedThreeTimesAndNotWithoutAPrompter) {
 // The simulated hand lets go after 3 s and is not in the wall any more when the touch is judged.
 TEST_F(DeviceStiffness, ATouchThatIsNotHeldIsMadeThreeTimesAndEndsTheSearch) {
   settings.touch.hold_time = 5.0;
-  const auto journal = open(RunJournal::Begin::anew);
+  const auto journal = open(RunJournal::Begin::fresh);
   const DeviceStiffnessResult result = find(wall_with(2), nullptr, journal.get());
   EXPECT_TRUE(result.found.never_touched);
   EXPECT_EQ(result.touches.size(), 1u);
@@ -248,7 +248,7 @@ TEST_F(DeviceStiffness, AgreesWithTheModelWithinAStep) {
 }
 
 TEST_F(DeviceStiffness, AJournalBelongsToTheHandleAndToTheSignalsOfItsTouches) {
-  { open(RunJournal::Begin::anew); }
+  { open(RunJournal::Begin::fresh); }
   { open(RunJournal::Begin::resume); }
   for (const char* changed : {"velocity.estimator=difference", "force.slew_limit=1000", "force.ramp_time=0.1",
                               "device.transmission=0.04", "encoder.counts_per_turn=4096"}) {

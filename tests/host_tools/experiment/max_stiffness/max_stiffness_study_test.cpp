@@ -29,7 +29,7 @@ TEST(MaxStiffnessStudy, ResumesFromItsJournal) {
   const auto whole = run_max_stiffness_study(few_people(3, 0.5), conditions, run);
   struct Stop {};
   {
-    RunJournal journal(folder / "run.journal", settings, RunJournal::Begin::anew);
+    RunJournal journal(folder / "run.journal", settings, RunJournal::Begin::fresh);
     run.journal = &journal;
     run.progress = [](std::size_t done, std::size_t) {
       if (done >= 2) throw Stop{};

@@ -49,7 +49,7 @@ TEST_F(ExperimentStudy, FitsIntoATerminal) {
                     {},
                     {"Words that go on and on and on, and would be cut by a terminal."},
                     {{"", {"a long heading", "another one"}, {{"some words", "1"}}}}};
-  context.width = 20;
+  context.fixed_width = 20;
   print_study(context, study, {}, false);
   std::istringstream lines(out.str());
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 20u) << line;

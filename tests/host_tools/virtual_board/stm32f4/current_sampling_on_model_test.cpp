@@ -80,7 +80,7 @@ TEST(CurrentSamplingOnModel, ThousandsOfTriggersNeverSwapTheAxes) {
     ASSERT_EQ(board.sampling.zero_current(other).phase_c, board.expected(Board::phase_c[other], n));
     ASSERT_FALSE(board.interrupts.level(Interrupt::adc));
     if (n == 0) continue;
-    // The slow ones are those of the trigger before; the first has just been converted anew.
+    // The slow ones are those of the trigger before; the first has just been converted again.
     ASSERT_EQ(sample.slow_age, 0U);
     ASSERT_EQ(sample.supply, board.expected(6, n));
     ASSERT_EQ(board.sampling.temperature(0), board.expected(15, n - 1));

@@ -248,7 +248,7 @@ TEST(ExternalInterruptOnModel, RoutingToAHighPinIsNotReportedAsAnEdge) {
   ASSERT_TRUE(board.lines.configure(index0, Edge::rising));
   board.lines.enable(9);
   EXPECT_FALSE(board.interrupts.level(Interrupt::exti9_5));
-  // Configured anew with the edges already selected: the route's change is an edge, and is forgotten.
+  // Configured again with the edges already selected: the route's change is an edge, and is forgotten.
   ASSERT_TRUE(board.lines.configure({GpioPort::a, 9}, Edge::both));
   ASSERT_TRUE(board.lines.configure(index0, Edge::both));
   board.lines.enable(9);

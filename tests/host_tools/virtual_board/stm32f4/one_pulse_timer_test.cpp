@@ -40,7 +40,8 @@ TEST(OnePulseOutput, EndsByItselfAfterItsLength) {
     bench.output.start();
     bench.run(1000 * tick);
     EXPECT_FALSE(bench.model.output());
-    EXPECT_EQ(bench.changes, (std::vector<BoardTime>{began + tick, began + 101 * tick})) << "not begun anew";
+    EXPECT_EQ(bench.changes, (std::vector<BoardTime>{began + tick, began + 101 * tick}))
+        << "not started again";
   }
 }
 
