@@ -105,6 +105,8 @@ class ReadsAndSets(AgainstAServedDevice):
                     self.assertIn("wall.stiffness", str(caught.exception))
                 with self.assertRaisesRegex(ValueError, "wall.stiffness"):
                     device["wall.stifness"]
+                with self.assertRaisesRegex(TypeError, "no mapping from names to values, such as"):
+                    device.set("wall.stiffness=5N/mm")
                 self.assertEqual(device["wall.stiffness"], 0.1)
 
     def test_errors_are_of_this_module(self):

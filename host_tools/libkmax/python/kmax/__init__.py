@@ -55,6 +55,8 @@ def _text(name: str, value: Setting) -> str:
 
 
 def _settings(values: Mapping[str, Setting]) -> list[tuple[str, str]]:
+    if not isinstance(values, Mapping):
+        raise TypeError(f"{values!r} is no mapping from names to values, such as {{'wall.stiffness': '0.5 N/mm'}}")
     return [(name, _text(name, value)) for name, value in values.items()]
 
 
