@@ -147,21 +147,20 @@ std::string_view meaning_of(Worth worth) {
 }
 
 std::string_view symbols_text() {
-  return "  K, B     stiffness and damping of the wall            wall.stiffness, wall.damping\n"
-         "  F_MC     largest magnetic coefficient of the law      wall.magnetic_coefficient,\n"
-         "                                                        wall.adaptive_*\n"
-         "  x_0      length of the field                          wall.magnetic_length\n"
-         "  T        period of the haptic loop                    1 / haptic.rate\n"
-         "  T_d      from a command to its force                  guard.delay,\n"
-         "                                                        1 / current.bandwidth,\n"
-         "                                                        0.65 ticks\n"
-         "  quantum  step of the position in use                  encoder count,\n"
-         "                                                        position.resolution\n"
-         "  m        mass at the handle                           device.mass\n"
-         "  b, f_c   viscous damping and Coulomb friction of it   guard.damping,\n"
-         "                                                        guard.friction\n"
-         "  F_h, v   force and speed of the operator; 0: unknown  guard.operator_force,\n"
-         "                                                        guard.operator_speed\n";
+  return "  K, B     stiffness and damping of the wall        wall.stiffness, wall.damping\n"
+         "  F_MC     largest magnetic coefficient of the law  wall.magnetic_coefficient,\n"
+         "                                                    wall.adaptive_*\n"
+         "  x_0      length of the field                      wall.magnetic_length\n"
+         "  T        period of the haptic loop                1 / haptic.rate\n"
+         "  T_d      from a command to its force              guard.delay, 0.65 ticks,\n"
+         "                                                    1 / current.bandwidth\n"
+         "  quantum  step of the position in use              encoder count,\n"
+         "                                                    position.resolution\n"
+         "  m        mass at the handle                       device.mass\n"
+         "  b, f_c   its damping and Coulomb friction         guard.damping,\n"
+         "                                                    guard.friction\n"
+         "  F_h, v   force and speed of the hand; 0: unknown  guard.operator_force,\n"
+         "                                                    guard.operator_speed\n";
 }
 
 std::string explanation(Criterion criterion, std::size_t width) {

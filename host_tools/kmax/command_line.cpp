@@ -48,15 +48,17 @@ std::string word_for_command(const std::vector<std::string>& arguments) {
   return {};
 }
 
-/// "experiment jitter": the command that the arguments name, as deep as they were understood; `word` if none
-/// was.
-std::string command_meant(const CLI::App& app, const std::string& word) {
-  std::vector<std::string> path;
-  for (const CLI::App* command = &app; !command->get_subcommands().empty();) {
-    command = command->get_subcommands().front();
-    path.push_back(command->get_name());
-  }
-  return path.empty() ? word : fmt::format("{}", fmt::join(path, " "));
+/// The command that the arguments name, as deep as they were understood; the whole program if none was.
+const CLI::App& command_meant(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  return *command;
+}
+
+/// "experiment jitter".
+std::string name_within(const CLI::App& app, const CLI::App& command) {
+  const std::string path = command_path(command);
+  return path.substr(std::min(path.size(), command_path(app).size() + 1));
 }
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
@@ -73,7 +75,12 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
     return fmt::format("there is no command '{}'{}", word,
                        meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
   }
-  const std::string command = command_meant(app, word);
+  const CLI::App& meant = command_meant(app);
+  const std::string command = &meant == &app ? word : name_within(app, meant);
+  if (const auto inner = command_names(meant);
+      !inner.empty() && dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
+    return fmt::format("{}: name one of {}; 'kmax {} --help' explains them", command, fmt::join(inner, ", "),
+                       command);
   return fmt::format("{}: {}{}; 'kmax {} --help' explains it", command, error.what(),
                      usage_suggestion(app, error, arguments), command);
 }
@@ -202,7 +209,7 @@ void Context::say(const std::string& text, std::size_t indent) {
 void Context::note(const std::string& text) {
   Progress::make_room_on_terminal();
   const auto terminal = terminal_behind(messages_);
-  messages_ << (terminal ? wrapped("kmax: " + text, terminal->columns - 1, 2) : "kmax: " + text) << std::endl;
+  messages_ << (terminal ? wrapped("kmax: " + text, terminal->columns - 3, 2) : "kmax: " + text) << std::endl;
 }
 
 }  // namespace kmax::cli

@@ -86,16 +86,23 @@ std::string hidden_line(Context& context, const std::string& prompt) {
   const Interruption interruption;
   const bool typed = input_is_terminal();
   if (typed) context.messages() << "kmax: " << prompt << ": " << std::flush;
+  // The end of the line, which did not show.
+  const auto end_line = [&] {
+    if (typed) context.messages() << std::endl;
+  };
   std::optional<std::string> line;
-  {
+  try {
     const TerminalMode echo_off(ECHO);
     line = next_line([&interruption] {
       if (interruption.requested()) throw std::runtime_error("interrupted; nothing was changed");
     });
+  } catch (const std::exception&) {
+    end_line();
+    throw;
   }
+  end_line();
   if (!line)
     throw UsageError("standard input ended before a code came; type it, or name a file with --code-file");
-  if (typed) context.messages() << std::endl;  // the one that was typed did not show
   return *line;
 }
 

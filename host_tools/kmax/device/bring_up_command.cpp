@@ -9,7 +9,6 @@
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
-#include "host_tools/base/terminal_text.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/quantity_option.hpp"
@@ -52,13 +51,13 @@ struct BringUpOptions {
   }
 };
 
-/// Asks whoever is at the terminal, in lines that fit there; or nobody, as if all were agreed to.
+/// Asks whoever is at the terminal; or nobody, as if all were agreed to.
 class StagePrompter final : public bench::Prompter {
  public:
   explicit StagePrompter(TerminalPrompter* terminal) : terminal_(terminal) {}
   void ask(const std::string& what_to_do) override {
     if (terminal_ == nullptr) return;
-    terminal_->ask(wrapped(what_to_do, 72, 2));
+    terminal_->ask(what_to_do);
   }
 
  private:
@@ -78,14 +77,13 @@ void print_result(Context& context, const bring_up::Report& before, std::size_t 
                   const StageResult& result) {
   for (const CheckResult& check : result.checks) {
     print(context.out, "  {:<22} {}\n", check.name, selftest::name_of(check.verdict));
-    if (check.verdict != selftest::Verdict::pass)
-      print(context.out, "    {}\n", wrapped(check.message, 72, 4));
+    if (check.verdict != selftest::Verdict::pass) context.say("    " + check.message, 4);
     for (const MeasuredValue& value : check.values) {
       const auto was = before.number(axis, result.stage, check.name, value.name);
       std::string line = fmt::format("    {:<22}{:>11.5g} {:<7}{:<18}{}", value.name, value.value, value.unit,
                                      range_text(value), was ? fmt::format(" was {:.5g}", *was) : "");
       line.resize(line.find_last_not_of(' ') + 1);
-      print(context.out, "{}\n", line);
+      context.say(line, 26);
     }
   }
   context.out.flush();

@@ -97,7 +97,7 @@ Json entry_json(const LogEntry& entry) {
 
 void print_table(Context& context, const std::vector<LogEntry>& entries) {
   if (entries.empty()) {
-    print(context.out, "no fault and no reset since power-on, or since the log was erased\n");
+    context.say("no fault and no reset since power-on, or since the log was erased");
     return;
   }
   const auto row = [&context](const auto&... cells) {

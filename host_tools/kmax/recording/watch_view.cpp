@@ -58,12 +58,13 @@ std::string bar(float value, float end, std::size_t half) {
 }
 
 std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::size_t width, bool colour) {
-  constexpr std::size_t half = 14;
+  // Beside name, value, end and their units.
+  const std::size_t half = std::clamp<std::size_t>(width, 41, 67) / 2 - 19;
   std::vector<std::string> lines;
   const auto add = [&](const std::string& line, const char* its_colour = nullptr) {
     lines.push_back(coloured(line, width, colour ? its_colour : nullptr));
   };
-  const auto with_bar = [](std::string line, float value, float end, std::string_view unit) {
+  const auto with_bar = [half](std::string line, float value, float end, std::string_view unit) {
     if (end > 0) line += fmt::format("  {} {:.3g} {}", bar(value, end, half), end, unit);
     return line;
   };

@@ -218,10 +218,12 @@ int run_simulate(Context& context, const SimulateOptions& options) {
               result.judged_from, result.judged_to, result.contact->deepest * 1e3),
           4);
     if (result.first_alarm)
-      print(context.out, "  the device called the wall unstable {} time{}, first at {:.2f} s\n",
-            result.alarms, result.alarms == 1 ? "" : "s", *result.first_alarm);
-    print(context.out, "  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %\n",
-          result.limited_share * 100, result.clipped_share * 100);
+      context.say(fmt::format("  the device called the wall unstable {} time{}, first at {:.2f} s",
+                              result.alarms, result.alarms == 1 ? "" : "s", *result.first_alarm),
+                  4);
+    context.say(fmt::format("  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %",
+                            result.limited_share * 100, result.clipped_share * 100),
+                4);
     if (result.lost_edges > 0) print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
     print(context.out, "  at the end: {}\n", device::to_string(result.end_state));
     for (const std::string& file : {options.csv, options.picture}) {

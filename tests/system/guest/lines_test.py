@@ -1,15 +1,19 @@
 """The board's lines as wires: emergency stop, reset, fault and healthy, by kmax and by the tools of libgpiod."""
 
+import os
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 import unittest
+from pathlib import Path
 
+import json_schemas
 from board_on_bus import BoardOnBus, Holding, give_lines
 from can_capture import CanCapture
-from gpio_sim import SimulatedLine, held
-from kmax_under_test import KMAX, PATIENCE, kmax
+from gpio_sim import CHIP, SimulatedLine, held
+from kmax_under_test import KMAX, PATIENCE, kmax, kmax_json
 
 EMERGENCY_STOP = bytes.fromhex("02FF")  # 0xFF02, low byte first
 TICK_US = 50
@@ -117,6 +121,17 @@ class Lines(unittest.TestCase):
         self.assertRegex(shown, r"healthy .*input: high, healthy")
         self.assertRegex(shown, r"fault .*input: high, none")
         self.assertRegex(shown, r"emergency_stop .*put: high, run")
+
+    def test_documents_with_json_are_as_their_schemas_say(self):
+        SimulatedLine("HEALTHY").wait_for(1)
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(Path(os.environ["KMAX_LINES"]).read_text() + f'[lines.boot0]\nchip = "{CHIP}"\nname = "BOOT0"\n')
+            file.flush()
+            for command, *arguments in (("lines",), ("lines watch", "--line", "healthy", "--for", "0.2"),
+                                        ("lines set", "emergency_stop=run", "--for", "0.2"), ("reset",), ("bootloader",)):
+                document = kmax_json(*command.split(), *arguments, "--lines", file.name)
+                json_schemas.check(self, document, command.replace(" ", "-"))
+            self.assertIn("boot0", kmax_json("lines", "--lines", file.name))
 
 
 if __name__ == "__main__":

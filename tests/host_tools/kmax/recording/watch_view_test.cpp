@@ -45,6 +45,11 @@ TEST(WatchView, NoLineIsWiderThanTheTerminal) {
   }
 }
 
+TEST(WatchView, BarsGiveWayBeforeTheirEnds) {
+  EXPECT_CONTAINS(joined(watch_table(axes(), 60, false)),
+                  "  force          +1.250 N   [           |######     ] 2.5 N\n");
+}
+
 TEST(WatchView, ColourTakesNoPlace) {
   const auto plain = watch_table(axes(), 30, false), coloured = watch_table(axes(), 30, true);
   ASSERT_EQ(plain.size(), coloured.size());
