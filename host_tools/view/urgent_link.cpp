@@ -31,6 +31,7 @@ void UrgentLink::write(std::span<const link::SlotValue> values, link::Repeat rep
                        const std::function<void()>& before_request) {
   beneath_.write(values, repeat, [&] {
     urgent_();
+    write_allowed_(values);
     if (before_request) before_request();
   });
 }

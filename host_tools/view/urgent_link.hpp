@@ -12,7 +12,8 @@ namespace kmax::view {
 
 /// A link on which nothing urgent waits for more than one request: whatever is read or written through it is
 /// asked for in single requests, before each of which `urgent` is called. It may use the link beneath, and
-/// what it throws ends what was going on and comes through.
+/// what it throws ends what was going on and comes through. So does what `write_allowed` throws, which is
+/// shown all that is going to be written.
 ///
 /// Belongs to one thread, as the link beneath, which must outlive it.
 class UrgentLink final : public link::Link {
@@ -20,8 +21,12 @@ class UrgentLink final : public link::Link {
   /// Values of one request: a group of the dictionary over Modbus, a single object over CANopen.
   enum class Request { group, object };
 
-  UrgentLink(link::Link& beneath, Request request, std::function<void()> urgent)
-      : beneath_(beneath), request_(request), urgent_(std::move(urgent)) {}
+  UrgentLink(link::Link& beneath, Request request, std::function<void()> urgent,
+             std::function<void(std::span<const link::SlotValue>)> write_allowed)
+      : beneath_(beneath),
+        request_(request),
+        urgent_(std::move(urgent)),
+        write_allowed_(std::move(write_allowed)) {}
 
   std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
   void write(std::span<const link::SlotValue> values, link::Repeat repeat,
@@ -41,6 +46,7 @@ class UrgentLink final : public link::Link {
   link::Link& beneath_;
   Request request_;
   std::function<void()> urgent_;
+  std::function<void(std::span<const link::SlotValue>)> write_allowed_;
 };
 
 }  // namespace kmax::view
