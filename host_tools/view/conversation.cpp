@@ -9,7 +9,6 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/record/can_source.hpp"
-#include "host_tools/view/urgent_link.hpp"
 
 namespace kmax::view {
 
@@ -45,6 +44,7 @@ Conversation::Conversation(const Reach& reach, CommandQueue& commands, Analysis&
       procedure_(device_, commands_, removal_, publish_),
       yield_(device_.link()),
       link_began_(link_->now()) {
+  urgent_ = static_cast<const UrgentLink*>(&device_.link());
   mirror_.read_all(device_);
   publish_parameters();
   start_rows();
@@ -52,7 +52,7 @@ Conversation::Conversation(const Reach& reach, CommandQueue& commands, Analysis&
 
 Conversation::~Conversation() = default;
 
-std::unique_ptr<link::Link> Conversation::urgent_link() {
+std::unique_ptr<UrgentLink> Conversation::urgent_link() {
   // Also what was urgent while there was no connection.
   removal_.remove_if_urgent();
   const auto request = reach_.open_bus ? UrgentLink::Request::object : UrgentLink::Request::group;
@@ -146,7 +146,7 @@ void Conversation::attend_to_others() {
   removal_.interrupt_if_urgent();
   // A stop that comes now is answered when the force is off.
   while (const auto command = commands_.take(CommandQueue::Stops::leave)) carry_out(*command);
-  if (Clock::now() < next_state_) return;
+  if (Clock::now() < next_state_ || urgent_->in_transfer()) return;
   next_state_ = Clock::now() + state_interval_of_polled;
   read_state();
 }

@@ -18,6 +18,7 @@
 #include "host_tools/view/reach.hpp"
 #include "host_tools/view/row_batch.hpp"
 #include "host_tools/view/row_stream.hpp"
+#include "host_tools/view/urgent_link.hpp"
 
 namespace kmax::view {
 
@@ -47,7 +48,7 @@ class Conversation {
  private:
   using Clock = std::chrono::steady_clock;
 
-  std::unique_ptr<link::Link> urgent_link();
+  std::unique_ptr<UrgentLink> urgent_link();
   void start_rows();
   void look_after_rows();
   void settle();
@@ -75,6 +76,7 @@ class Conversation {
 
   std::unique_ptr<link::Link> link_;
   ForceRemoval removal_;
+  const UrgentLink* urgent_ = nullptr;  ///< the device's
   device::Device device_;
   CaptureRun capture_;
   ProcedureRun procedure_;

@@ -40,11 +40,15 @@ class UrgentLink final : public link::Link {
   std::chrono::microseconds now() const override { return beneath_.now(); }
   /// In pieces of 5 ms, after each of which `urgent` is called.
   void wait(std::chrono::microseconds duration) override;
+  /// Samples of a capture are under way, so that whoever hears of their progress must ask for nothing else:
+  /// over CANopen they come in one transfer.
+  bool in_transfer() const { return in_transfer_; }
   std::string description() const override { return beneath_.description(); }
 
  private:
   link::Link& beneath_;
   Request request_;
+  bool in_transfer_ = false;
   std::function<void()> urgent_;
   std::function<void(std::span<const link::SlotValue>)> write_allowed_;
 };

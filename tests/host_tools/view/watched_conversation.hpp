@@ -65,7 +65,10 @@ class WatchedLink final : public link::Link {
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override {
     return watched_.device.read_capture(count, [&](std::size_t done) {
       watched_.request("read");
+      const std::size_t before = watched_.requests.size();
       progress(done);
+      // One transfer over CANopen, which nothing but a stop may cut off.
+      for (std::size_t i = before; i < watched_.requests.size(); ++i) EXPECT_NE(watched_.requests[i], "read");
     });
   }
   std::vector<std::uint32_t> read_log_entry(std::size_t place) override {
