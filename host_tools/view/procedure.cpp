@@ -21,7 +21,7 @@ constexpr ProcedureText texts[] = {
     {"self_test", "Self-test",
      "Arms the axis with small voltages, which move the handle by well under 1 mm. Keep the handle free. The "
      "axis is disarmed afterwards, and every parameter is as it was.",
-     "then move the handle and press the emergency stop when asked to", 0},
+     "move the handle and press the emergency stop when asked to", 0},
     {"calibration", "Calibration",
      "Arms the axis: the handle trembles, and moves by up to 20 mm to either side. Nobody may hold it. "
      "Before: "

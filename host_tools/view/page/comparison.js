@@ -58,10 +58,7 @@ export class Comparison {
     this.draw();
   }
 
-  say(text) {
-    this.boxes.said.textContent = text;
-    this.boxes.said.classList.toggle("bad", Boolean(text));
-  }
+  say(trouble) { this.boxes.said.textContent = trouble; }
 
   freeStyle() {
     let place = 0;
@@ -92,6 +89,7 @@ export class Comparison {
     plane.inside((context) => {
       context.lineWidth = 1.6;
       context.lineJoin = "round";
+      context.globalAlpha = 0.75;  // one that oscillates covers the others
       for (const line of lines) {
         const { colour, dashes } = styleOf(line.style);
         context.strokeStyle = colour;
@@ -99,6 +97,7 @@ export class Comparison {
         plane.line(line[across].map((value, i) => [plane.x(value), plane.y(line.force[i])]));
       }
       context.setLineDash([]);
+      context.globalAlpha = 1;
     });
   }
 

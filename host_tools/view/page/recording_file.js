@@ -42,8 +42,7 @@ export function distances({ position }, wall) {
   return position.map((one) => (one - wall.position) * wall.side);
 }
 
-/** s of the first row inside the wall; else of the first row. */
+/** s of the first row inside the wall; without one, of the first row. */
 export function touchTime({ time }, distance) {
-  const first = distance.findIndex((one, i) => one <= 0 && i > 0 && distance[i - 1] > 0);
-  return time[Math.max(0, first)];
+  return time[Math.max(0, distance.findIndex((one) => one <= 0))];
 }
