@@ -139,6 +139,7 @@ void Conversation::conduct_procedure(const std::function<bool()>& ended) {
       commands_.armed_by(axis, std::nullopt);
   mirror_.read_all(device_);
   publish_parameters();
+  next_state_ = {};
 }
 
 /// While a procedure has the device.

@@ -68,14 +68,9 @@ ProcedureResult calibration_of(device::Device& device, const ProcedureSettings& 
   calibration::CalibrationSettings steps;
   steps.axis = settings.axis;
   steps.save = false;  // whoever has read the result decides
-  std::string step;
-  const calibration::CalibrationReport report = calibration::calibrate(
-      device, steps, settings.hand ? &party.prompter : nullptr,
-      [&](const std::string& text) { party.progress(text.empty() ? text : step + ": " + text); },
-      [&](std::string_view started) {
-        step = started;
-        party.progress(step);
-      });
+  const calibration::CalibrationReport report =
+      calibration::calibrate(device, steps, settings.hand ? &party.prompter : nullptr, party.progress,
+                             [&](std::string_view started) { party.progress(std::string(started)); });
   for (const StepReport& one : report.steps) party.found(finding_of(one));
   if (report.pass()) return {true, "Every step has passed.", report.kept};
   const auto failed =
