@@ -37,6 +37,12 @@ void CaptureRun::begin(const device::CaptureSettings& settings) {
   next_look_ = {};
 }
 
+void CaptureRun::end(const std::string& why) {
+  if (!reader_) return;
+  reader_.reset();
+  publish_(capture_failed(why));
+}
+
 void CaptureRun::look() {
   const auto now = std::chrono::steady_clock::now();
   if (!reader_ || now < next_look_) return;

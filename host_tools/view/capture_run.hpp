@@ -21,6 +21,9 @@ class CaptureRun {
   /// link::LinkError and ForceRemoved.
   void look();
 
+  /// Gives up the one that is under way, if any.
+  void end(const std::string& why);
+
   /// The one that is under way; null if none is.
   const device::CaptureSettings* settings() const { return reader_ ? &settings_ : nullptr; }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -16,17 +15,21 @@ using json::Json;
 using Kind = Command::Kind;
 
 namespace {
-constexpr std::array<std::pair<std::string_view, Kind>, 10> kinds = {{{"alive", Kind::alive},
-                                                                      {"stop", Kind::stop},
-                                                                      {"arm", Kind::arm},
-                                                                      {"disarm", Kind::disarm},
-                                                                      {"clear", Kind::clear},
-                                                                      {"set", Kind::set},
-                                                                      {"revert", Kind::revert},
-                                                                      {"save", Kind::save},
-                                                                      {"map", Kind::map},
-                                                                      {"capture", Kind::capture}}};
-constexpr std::size_t longest_id = 64, longest_value = 100, most_values = 64;
+constexpr std::pair<std::string_view, Kind> kinds[] = {{"alive", Kind::alive},
+                                                       {"stop", Kind::stop},
+                                                       {"arm", Kind::arm},
+                                                       {"disarm", Kind::disarm},
+                                                       {"clear", Kind::clear},
+                                                       {"set", Kind::set},
+                                                       {"revert", Kind::revert},
+                                                       {"save", Kind::save},
+                                                       {"map", Kind::map},
+                                                       {"capture", Kind::capture},
+                                                       {"procedure", Kind::procedure},
+                                                       {"answer", Kind::answer},
+                                                       {"cancel", Kind::cancel},
+                                                       {"keep", Kind::keep}};
+constexpr std::size_t longest_id = 64, longest_value = 100, most_values = 64, most_trials = 100;
 
 /// A message whose id is known, for what is wrong with the rest of it.
 class Received {
@@ -57,12 +60,21 @@ class Received {
     return value.get<std::string>();
   }
 
-  std::uint32_t whole(const char* key, std::uint32_t otherwise, std::uint32_t most) const {
+  std::uint32_t whole(const char* key, std::uint32_t otherwise, std::uint32_t most,
+                      std::uint32_t least = 0) const {
     const Json& value = at(key);
     if (value.is_null()) return otherwise;
-    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > most)
-      fail(fmt::format("\"{}\": {} is not a whole number from 0 to {}", key, value.dump(), most));
+    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > most ||
+        value.get<std::uint64_t>() < least)
+      fail(fmt::format("\"{}\": {} is not a whole number from {} to {}", key, value.dump(), least, most));
     return value.get<std::uint32_t>();
+  }
+
+  bool yes(const char* key, bool otherwise) const {
+    const Json& value = at(key);
+    if (value.is_null()) return otherwise;
+    if (!value.is_boolean()) fail(fmt::format("\"{}\": {} is neither true nor false", key, value.dump()));
+    return value.get<bool>();
   }
 
  private:
@@ -126,6 +138,22 @@ device::CaptureSettings capture_settings(const Received& message, std::size_t ax
   }
   return settings;
 }
+
+ProcedureSettings procedure_settings(const Received& message, std::size_t axis) {
+  ProcedureSettings settings{.name = message.text("name"), .axis = axis};
+  try {
+    const ProcedureText& text = procedure_named(settings.name.substr(0, longest_value));
+    settings.hand = message.yes("hand", false);
+    if (settings.hand && text.hand.empty())
+      message.fail(fmt::format("\"hand\": {} has no part with the hand", settings.name));
+    settings.trials = message.whole("trials", static_cast<std::uint32_t>(text.trials), most_trials, 1);
+    if (text.trials == 0 && !message.at("trials").is_null())
+      message.fail(fmt::format("\"trials\": {} has no touches to repeat", settings.name));
+  } catch (const device::ValueError& error) {
+    message.fail(fmt::format("\"name\": {}", error.what()));
+  }
+  return settings;
+}
 }  // namespace
 
 Command parse_command(std::string_view text) {
@@ -152,6 +180,12 @@ Command parse_command(std::string_view text) {
   if (command.kind == Kind::set) command.assignments = assignments(message);
   if (command.kind == Kind::map) command.map_side = message.text("up");
   if (command.kind == Kind::capture) command.capture = capture_settings(message, command.axis);
+  if (command.kind == Kind::procedure) command.procedure = procedure_settings(message, command.axis);
+  if (command.kind == Kind::answer) command.prompt = message.whole("prompt", 0, UINT32_MAX);
+  if (command.kind == Kind::keep) {
+    if (message.at("keep").is_null()) message.fail("\"keep\" is missing: true saves, false puts back");
+    command.keep = message.yes("keep", false);
+  }
   return command;
 }
 

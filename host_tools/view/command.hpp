@@ -7,6 +7,7 @@
 
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/json/json.hpp"
+#include "host_tools/view/procedure.hpp"
 
 namespace kmax::view {
 
@@ -14,7 +15,22 @@ using ClientId = std::uint64_t;
 
 /// What a client wants; docs/view.md says what each message means.
 struct Command {
-  enum class Kind : std::uint8_t { alive, stop, arm, disarm, clear, set, revert, save, map, capture };
+  enum class Kind : std::uint8_t {
+    alive,
+    stop,
+    arm,
+    disarm,
+    clear,
+    set,
+    revert,
+    save,
+    map,
+    capture,
+    procedure,
+    answer,
+    cancel,
+    keep
+  };
 
   Kind kind = Kind::alive;
   json::Json id{};  ///< comes back in the reply; null: there was none
@@ -22,6 +38,9 @@ struct Command {
   std::vector<std::string> assignments{};  ///< "NAME=VALUE" of set, as `kmax set` takes them
   std::string map_side{};                  ///< of map: the name of the parameter that goes up
   device::CaptureSettings capture{};
+  ProcedureSettings procedure{};
+  std::uint32_t prompt = 0;  ///< of answer
+  bool keep = false;         ///< of keep
   ClientId client = 0;
 };
 

@@ -34,9 +34,10 @@ bool CommandQueue::push(Command command) {
   return true;
 }
 
-std::optional<Command> CommandQueue::take() {
+std::optional<Command> CommandQueue::take(Stops stops) {
   const std::lock_guard lock(mutex_);
   if (waiting_.empty()) return std::nullopt;
+  if (stops == Stops::leave && waiting_.front().kind == Command::Kind::stop) return std::nullopt;
   Command first = std::move(waiting_.front());
   waiting_.pop_front();
   return first;
@@ -70,7 +71,7 @@ std::vector<Command> CommandQueue::settled(const Urgency& urgency) {
   });
   std::vector<Command> revoked;
   for (auto one = waiting_.begin(); one != last_stop.base();) {
-    const bool arms = one->kind == Command::Kind::arm;
+    const bool arms = one->kind == Command::Kind::arm || one->kind == Command::Kind::procedure;
     if (arms) revoked.push_back(std::move(*one));
     one = arms ? waiting_.erase(one) : std::next(one);
   }

@@ -52,15 +52,16 @@ class CommandQueue {
 
   // For the device.
 
-  /// The next one in order.
-  std::optional<Command> take();
+  enum class Stops : std::uint8_t { take, leave };
+  /// The next one in order; none if that is a stop which is to be left.
+  std::optional<Command> take(Stops stops = Stops::take);
   /// Until something is there or `duration` is over.
   void wait(std::chrono::microseconds duration);
 
   /// Also looks whether who armed has fallen silent.
   std::optional<Urgency> urgent();
-  /// The force is gone. Takes out the commands to arm that were given before the last stop, which must not
-  /// bring it back, and forgets who had armed.
+  /// The force is gone. Takes out the commands to arm and to start a procedure that were given before the
+  /// last stop, which must not bring it back, and forgets who had armed.
   std::vector<Command> settled(const Urgency& urgency);
 
   /// From before `axis` is armed until it is known to be disarmed. Urgent at once if that client is gone.

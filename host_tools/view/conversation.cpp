@@ -9,7 +9,6 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/record/can_source.hpp"
-#include "host_tools/view/urgent_link.hpp"
 
 namespace kmax::view {
 
@@ -42,8 +41,10 @@ Conversation::Conversation(const Reach& reach, CommandQueue& commands, Analysis&
       removal_(*link_, commands),
       device_(urgent_link()),
       capture_(device_, publish_),
+      procedure_(device_, commands_, removal_, publish_),
       yield_(device_.link()),
       link_began_(link_->now()) {
+  urgent_ = static_cast<const UrgentLink*>(&device_.link());
   mirror_.read_all(device_);
   publish_parameters();
   start_rows();
@@ -51,11 +52,13 @@ Conversation::Conversation(const Reach& reach, CommandQueue& commands, Analysis&
 
 Conversation::~Conversation() = default;
 
-std::unique_ptr<link::Link> Conversation::urgent_link() {
+std::unique_ptr<UrgentLink> Conversation::urgent_link() {
   // Also what was urgent while there was no connection.
   removal_.remove_if_urgent();
   const auto request = reach_.open_bus ? UrgentLink::Request::object : UrgentLink::Request::group;
-  return std::make_unique<UrgentLink>(*link_, request, [this] { removal_.interrupt_if_urgent(); });
+  return std::make_unique<UrgentLink>(
+      *link_, request, [this] { removal_.interrupt_if_urgent(); },
+      [this](std::span<const link::SlotValue> values) { removal_.refuse_to_arm(values); });
 }
 
 void Conversation::start_rows() {
@@ -87,11 +90,16 @@ void Conversation::look_after_rows() {
   start_rows();
 }
 
-void Conversation::step() {
+void Conversation::step(const std::function<bool()>& ended) {
   removal_.remove_if_urgent();
   settle();
   try {
-    while (const auto command = commands_.take()) carry_out(*command);
+    while (!procedure_.begun()) {
+      const auto command = commands_.take();
+      if (!command) break;
+      carry_out(*command);
+    }
+    if (procedure_.begun()) conduct_procedure(ended);
     if (Clock::now() >= next_state_) {
       next_state_ = Clock::now() + (polled_ ? state_interval_of_polled : state_interval);
       read_state();
@@ -116,8 +124,32 @@ void Conversation::settle() {
   last_stop_trouble_ = settled->report.trouble;
   publish_(stopped_message(settled->report));
   for (const Command& one : settled->revoked)
-    publish_(reply(one.id, false, "the axis was not armed: it was stopped meanwhile", one.client));
+    publish_(reply(one.id, false, "nothing was armed: it was stopped meanwhile", one.client));
   next_state_ = {};
+}
+
+void Conversation::conduct_procedure(const std::function<bool()>& ended) {
+  procedure_.run(!reach_.own_time, [this, &ended] {
+    if (ended && ended()) procedure_.cancel("kmax view ends");
+    attend_to_others();
+  });
+  settle();
+  for (const std::size_t axis : all_axes())
+    if (commands_.owner(axis) && !Drive(device_, axis).status().armed())
+      commands_.armed_by(axis, std::nullopt);
+  mirror_.read_all(device_);
+  publish_parameters();
+  next_state_ = {};
+}
+
+/// While a procedure has the device.
+void Conversation::attend_to_others() {
+  removal_.interrupt_if_urgent();
+  // A stop that comes now is answered when the force is off.
+  while (const auto command = commands_.take(CommandQueue::Stops::leave)) carry_out(*command);
+  if (Clock::now() < next_state_ || urgent_->in_transfer()) return;
+  next_state_ = Clock::now() + state_interval_of_polled;
+  read_state();
 }
 
 void Conversation::carry_out(const Command& command) {
@@ -133,10 +165,15 @@ void Conversation::carry_out(const Command& command) {
   } catch (const std::exception& error) {
     publish_(reply(command.id, false, error.what(), command.client));
   }
-  next_state_ = {};
+  if (!procedure_.begun()) next_state_ = {};
 }
 
 std::string Conversation::do_it(const Command& command) {
+  constexpr Command::Kind beside_a_procedure[] = {Command::Kind::map, Command::Kind::answer,
+                                                  Command::Kind::cancel};
+  if (procedure_.begun() &&
+      std::ranges::find(beside_a_procedure, command.kind) == std::end(beside_a_procedure))
+    throw device::ValueError("a procedure is under way: wait for its end, or cancel it");
   Drive drive(device_, command.axis);
   switch (command.kind) {
     case Command::Kind::alive:
@@ -163,10 +200,7 @@ std::string Conversation::do_it(const Command& command) {
       return back.empty() ? "nothing had been changed" : set(back);
     }
     case Command::Kind::save:
-      store_ = device::Store(device_).save();
-      mirror_.keep();
-      publish_parameters();
-      return "saved: the parameters outlast a restart";
+      return save();
     case Command::Kind::map:
       analysis_.want_map(command.axis, command.map_side);
       return {};
@@ -176,6 +210,17 @@ std::string Conversation::do_it(const Command& command) {
             fmt::format("an axis is armed, and the capture is too long for that: {}; or disarm first", why));
       capture_.begin(command.capture);
       return "the device looks for the trigger";
+    case Command::Kind::procedure:
+      return start(command);
+    case Command::Kind::answer:
+      procedure_.answer(command.client, command.prompt);
+      return {};
+    case Command::Kind::cancel:
+      if (!procedure_.begun()) throw device::ValueError("no procedure is under way");
+      procedure_.cancel("cancelled");
+      return "it ends, and the axis is disarmed";
+    case Command::Kind::keep:
+      return decide(command.keep);
   }
   return {};
 }
@@ -228,6 +273,30 @@ std::string Conversation::arm(const Command& command) {
   return fmt::format("axis {} is armed", command.axis);
 }
 
+std::string Conversation::start(const Command& command) {
+  if (any_armed()) throw device::ValueError("it was not started: an axis is armed; disarm it first");
+  capture_.end("a procedure has taken the device's capture");
+  Drive drive(device_, command.axis);
+  if (drive.status().state() == firmware::DriveState::quick_stop_active) drive.disarm();
+  // From now on its page has to be there, whether or not the axis is armed at the moment.
+  commands_.armed_by(command.axis, command.client);
+  procedure_.begin(command.procedure, command.client);
+  return fmt::format("{} has begun", procedure_named(command.procedure.name).title);
+}
+
+std::string Conversation::decide(bool keep) {
+  const std::string said = keep ? (procedure_.way_back(), save()) : "put back: " + set(procedure_.way_back());
+  procedure_.decided();
+  return said;
+}
+
+std::string Conversation::save() {
+  store_ = device::Store(device_).save();
+  mirror_.keep();
+  publish_parameters();
+  return "saved: the parameters outlast a restart";
+}
+
 std::string Conversation::set(const std::vector<device::Assignment>& assignments) {
   device_.apply(assignments);
   mirror_.set(assignments);
@@ -245,7 +314,7 @@ void Conversation::publish_parameters() {
 }
 
 void Conversation::read_state() {
-  const bool slow = Clock::now() >= next_slow_;
+  const bool slow = !procedure_.begun() && Clock::now() >= next_slow_;
   if (slow) next_slow_ = Clock::now() + slow_interval;
   axes_.resize(firmware::axis_count);
   for (const std::size_t axis : all_axes()) {
@@ -258,7 +327,8 @@ void Conversation::read_state() {
     const bool was_armed = state.status.armed();
     state.status = drive.status();
     if (slow || was_armed != state.status.armed()) state.guard = drive.guard();
-    if (!state.status.armed() && commands_.owner(axis)) commands_.armed_by(axis, std::nullopt);
+    if (!state.status.armed() && commands_.owner(axis) && !procedure_.begun())
+      commands_.armed_by(axis, std::nullopt);
     state.armed_by = commands_.owner(axis);
   }
   if (slow) store_ = device::Store(device_).status();

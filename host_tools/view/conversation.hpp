@@ -14,9 +14,11 @@
 #include "host_tools/view/force_removal.hpp"
 #include "host_tools/view/messages.hpp"
 #include "host_tools/view/parameter_mirror.hpp"
+#include "host_tools/view/procedure_run.hpp"
 #include "host_tools/view/reach.hpp"
 #include "host_tools/view/row_batch.hpp"
 #include "host_tools/view/row_stream.hpp"
+#include "host_tools/view/urgent_link.hpp"
 
 namespace kmax::view {
 
@@ -36,8 +38,9 @@ class Conversation {
 
   std::map<std::string, std::string> identify() { return device_.identify(); }
 
-  /// What there is to do now, and a moment's wait.
-  void step();
+  /// What there is to do now, and a moment's wait. A procedure that has been started goes on in it to its
+  /// end, and is cancelled when `ended`, which is asked a few times a second meanwhile.
+  void step(const std::function<bool()>& ended = {});
   /// Disarms what clients have armed (disarm_of_clients), also after a stop that comes
   /// meanwhile.
   void end();
@@ -45,15 +48,20 @@ class Conversation {
  private:
   using Clock = std::chrono::steady_clock;
 
-  std::unique_ptr<link::Link> urgent_link();
+  std::unique_ptr<UrgentLink> urgent_link();
   void start_rows();
   void look_after_rows();
   void settle();
+  void conduct_procedure(const std::function<bool()>& ended);
+  void attend_to_others();
   void carry_out(const Command& command);
   /// What to say about it.
   std::string do_it(const Command& command);
   std::string too_long_while_armed(const device::CaptureSettings& settings) const;
   bool any_armed();
+  std::string start(const Command& command);
+  std::string decide(bool keep);
+  std::string save();
   std::string arm(const Command& command);
   std::string set(const std::vector<device::Assignment>& assignments);
   void publish_parameters();
@@ -68,8 +76,10 @@ class Conversation {
 
   std::unique_ptr<link::Link> link_;
   ForceRemoval removal_;
+  const UrgentLink* urgent_ = nullptr;  ///< the device's
   device::Device device_;
   CaptureRun capture_;
+  ProcedureRun procedure_;
   std::optional<record::TelemetryRequest> telemetry_;
   std::optional<record::PolledSource> polled_;
   std::optional<RowBatch> batch_;

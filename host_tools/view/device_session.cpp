@@ -36,7 +36,7 @@ void DeviceSession::run(const std::function<bool()>& ended) {
     std::string trouble;
     try {
       if (!conversation_) connect();
-      while (!ended()) conversation_->step();
+      while (!ended()) conversation_->step(ended);
       break;
     } catch (const std::exception& error) {
       trouble = error.what();

@@ -63,6 +63,15 @@ void ForceRemoval::interrupt_if_urgent() {
   if (removed_) throw ForceRemoved("ended, because " + to_string(removed_->why));
 }
 
+void ForceRemoval::refuse_to_arm(std::span<const link::SlotValue> values) const {
+  if (!removed_ || removing_) return;
+  for (const link::SlotValue& value : values) {
+    if (Parameter::at(value.slot).entry() == firmware::entry_of<"drive.controlword">() &&
+        firmware::asks_for_operation(static_cast<std::uint16_t>(value.raw)))
+      throw ForceRemoved("not armed again, because " + to_string(removed_->why));
+  }
+}
+
 void disarm_of_clients(device::Device& device, CommandQueue& commands) {
   std::exception_ptr first_failure;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {

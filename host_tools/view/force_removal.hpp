@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include "host_tools/device/device.hpp"
@@ -28,6 +29,11 @@ class ForceRemoval {
   void remove_if_urgent();
   /// The same before every request: throws ForceRemoved if it took the force.
   void interrupt_if_urgent();
+  /// The force has been taken, and settle() has not followed yet.
+  bool removed() const { return removed_.has_value(); }
+  /// Before these are written: throws ForceRemoved if that would arm an axis between the two. What was going
+  /// on may go on to tidy up.
+  void refuse_to_arm(std::span<const link::SlotValue> values) const;
 
   struct Settled {
     StopReport report;

@@ -150,9 +150,17 @@ Message device_message(const DeviceFacts& facts) {
     channels.push_back({{"name", name}, {"unit", device::capture_channel_unit(name)}});
   Json triggers = Json::array();
   for (const auto& trigger : firmware::names::capture_trigger) triggers.push_back(std::string(trigger.name));
+  Json procedures = Json::array();
+  for (const ProcedureText& one : procedure_texts())
+    procedures.push_back({{"name", std::string(one.name)},
+                          {"title", std::string(one.title)},
+                          {"before", std::string(one.before)},
+                          {"hand", or_null(std::string(one.hand))},
+                          {"trials", one.trials == 0 ? Json(nullptr) : Json(one.trials)}});
   return {.text = text_of({{"type", "device"},
                            {"address", facts.address},
                            {"version", facts.version},
+                           {"program", facts.program},
                            {"identification", facts.identification},
                            {"axes", firmware::axis_count},
                            {"tick_rate_hz", firmware::tick_rate_hz},
@@ -160,6 +168,7 @@ Message device_message(const DeviceFacts& facts) {
                            {"hand", facts.hand},
                            {"flags", record::flag_texts()},
                            {"capture", {{"channels", channels}, {"triggers", triggers}}},
+                           {"procedures", procedures},
                            {"parameters", parameters}}),
           .key = "device"};
 }
@@ -263,6 +272,28 @@ Message map_message(const check::StabilityMap& map, std::size_t axis) {
                            {"unstable", outlines_json(outlines.unstable)},
                            {"bounds", bounds}}),
           .key = fmt::format("map {} {}", axis, map.y.parameter.name())};
+}
+
+Message procedure_message(const ProcedureState& state) {
+  static constexpr const char* phases[] = {"none",      "running", "passed",    "failed",
+                                           "cancelled", "stopped", "broken off"};
+  Json findings = Json::array();
+  for (const Finding& one : state.findings)
+    findings.push_back({{"name", one.name}, {"verdict", one.verdict}, {"words", one.words}});
+  return {.text = text_of({{"type", "procedure"},
+                           {"name", state.name},
+                           {"title", state.title},
+                           {"axis", state.axis},
+                           {"client", state.client},
+                           {"phase", phases[static_cast<std::size_t>(state.phase)]},
+                           {"progress", or_null(state.progress)},
+                           {"told", or_null(state.told)},
+                           {"prompt", state.waits ? Json(state.prompt_number) : Json(nullptr)},
+                           {"words", or_null(state.words)},
+                           {"findings", findings},
+                           {"notes", state.notes},
+                           {"changed", state.changed}}),
+          .key = "procedure"};
 }
 
 Message capture_progress(std::string_view phase, std::uint32_t done, std::uint32_t all) {

@@ -16,6 +16,7 @@
 #include "host_tools/device/store.hpp"
 #include "host_tools/record/recording.hpp"
 #include "host_tools/view/message.hpp"
+#include "host_tools/view/procedure.hpp"
 
 namespace kmax::view {
 
@@ -29,6 +30,7 @@ const std::vector<device::Parameter>& shown_parameters();
 
 struct DeviceFacts {
   std::string address{}, version{};
+  std::string program{};  ///< with its commit, and the image that comes with it
   std::map<std::string, std::string> identification{};
   bool counted_rows = false;  ///< rows are due at fixed times, so that a lost one is known
   std::string hand{};
@@ -70,6 +72,32 @@ Message rows_message(std::uint64_t first_row, std::span<const record::Row> rows,
 Message curve_message(const firmware::ParameterValues& values, std::size_t axis);
 Message judgement_message(const check::Judgement& judgement, const std::string& hand, std::size_t axis);
 Message map_message(const check::StabilityMap& map, std::size_t axis);
+
+/// A procedure, from its start on.
+struct ProcedureState {
+  enum class Phase : std::uint8_t {
+    none,
+    running,
+    passed,
+    failed,
+    cancelled,   ///< somebody asked for its end
+    stopped,     ///< the force was taken
+    broken_off,  ///< the device or the link
+  };
+  std::string name{}, title{};
+  std::size_t axis = 0;
+  ClientId client = 0;  ///< who has started it
+  Phase phase = Phase::none;
+  std::string progress{};
+  std::string told{};  ///< what somebody is to do
+  bool waits = false;  ///< until that has been answered, as prompt_number
+  std::uint32_t prompt_number = 0;
+  std::string words{};  ///< of its end
+  std::vector<Finding> findings{};
+  std::vector<std::string> notes{};
+  std::size_t changed = 0;  ///< parameters, which can still be put back
+};
+Message procedure_message(const ProcedureState& state);
 
 Message capture_progress(std::string_view phase, std::uint32_t done, std::uint32_t all);
 Message capture_failed(const std::string& why);

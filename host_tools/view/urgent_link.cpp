@@ -31,6 +31,7 @@ void UrgentLink::write(std::span<const link::SlotValue> values, link::Repeat rep
                        const std::function<void()>& before_request) {
   ForwardingLink::write(values, repeat, [&] {
     urgent_();
+    write_allowed_(values);
     if (before_request) before_request();
   });
 }
@@ -42,6 +43,11 @@ std::vector<std::uint32_t> UrgentLink::read_trace(std::size_t first, std::size_t
 
 std::vector<std::uint32_t> UrgentLink::read_capture(std::size_t count, const Progress& progress) {
   urgent_();
+  struct Transfer {
+    explicit Transfer(bool& state) : under_way(state) { under_way = true; }
+    ~Transfer() { under_way = false; }
+    bool& under_way;
+  } const transfer(in_transfer_);
   return ForwardingLink::read_capture(count, [&](std::size_t done) {
     urgent_();
     if (progress) progress(done);

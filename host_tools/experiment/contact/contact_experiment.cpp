@@ -100,4 +100,22 @@ ContactResult run_contact(Rig& rig, const ContactCondition& condition, const Con
   });
 }
 
+std::vector<ContactResult> run_contacts(Rig& rig, const ContactSettings& settings, std::size_t trials,
+                                        const std::function<void(std::size_t made, std::size_t all)>& touches,
+                                        const std::function<void(const ContactResult&)>& found) {
+  const std::vector<ContactCondition> conditions = contact_conditions();
+  const std::size_t all = conditions.size() * trials;
+  std::vector<ContactResult> results;
+  for (const ContactCondition& condition : conditions) {
+    std::vector<ContactResult> of_condition;
+    while (of_condition.size() < trials) {
+      touches(results.size() * trials + of_condition.size(), all);
+      of_condition.push_back(run_contact(rig, condition, settings));
+    }
+    results.push_back(worst_of(std::move(of_condition)));
+    if (found) found(results.back());
+  }
+  return results;
+}
+
 }  // namespace kmax::experiment

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -66,6 +67,13 @@ std::string press_request(const std::string& name, double hold_time);
 /// One trial: sets a condition up, asks for the touch and judges its hold. Whoever holds the handle presses
 /// it against the wall when the axis is armed and keeps pressing for hold_time. Errors: those of the rig.
 ContactResult run_contact(Rig& rig, const ContactCondition& condition, const ContactSettings& settings);
+
+/// The experiment: worst_of() `trials` touches under each of contact_conditions(). `touches` hears before
+/// each touch how many have been made of how many; `found`, which may be empty, each condition's result as
+/// soon as it is there. Errors: those of the rig, and what the two throw.
+std::vector<ContactResult> run_contacts(Rig& rig, const ContactSettings& settings, std::size_t trials,
+                                        const std::function<void(std::size_t made, std::size_t all)>& touches,
+                                        const std::function<void(const ContactResult&)>& found = {});
 
 // What is said of the results.
 

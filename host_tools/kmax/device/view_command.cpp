@@ -10,6 +10,7 @@
 #include "host_tools/check/hand_choice.hpp"
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/supplied_files.hpp"
 #include "host_tools/view/access.hpp"
 #include "host_tools/view/analysis.hpp"
 #include "host_tools/view/device_session.hpp"
@@ -55,8 +56,9 @@ int run_view(Context& context, const ViewOptions& options) {
   view::WebServer server({.port = options.port, .token = token}, commands, view::page_files());
   const view::Publish publish = [&server](view::Message message) { server.publish(std::move(message)); };
   view::Analysis analysis(check::choose_hand(options.hand), publish);
-  view::DeviceSession session(reach_of(context), {.version = KMAX_VERSION, .hand = options.hand}, commands,
-                              analysis, publish);
+  view::DeviceSession session(reach_of(context),
+                              {.version = KMAX_VERSION, .program = version_text(), .hand = options.hand},
+                              commands, analysis, publish);
   const std::string address = fmt::format("http://127.0.0.1:{}/", server.port());
   if (context.json) {
     context.print({{"url", address + "#" + token},
@@ -80,7 +82,7 @@ void add_view_command(CLI::App& app, Context& context) {
   add_command<ViewOptions>(app, context,
                            {"view",
                             "Serves a live page on this computer: state, STOP, parameters, the force over "
-                            "the wall's law, stability, scope.",
+                            "the wall's law, stability, scope, self-test, calibration, recordings compared.",
                             R"(  kmax view                              a simulated device
   kmax view --device can:can0
   kmax view --json                       the address as a document, then serves

@@ -56,22 +56,18 @@ Json contact_json(const experiment::ContactResult& result) {
 int run_contact_experiment(Context& context, const ContactOptions& options) {
   const Interruption interruption;
   const experiment::ContactSettings& settings = options.settings;
-  const auto conditions = experiment::contact_conditions();
   const auto trials = static_cast<std::size_t>(options.trials);
   make_folder(options.files);
   device::Device device = context.connect();
   TouchRun run{options.limits, !options.no_prompt && !context.simulated()};  // who presses by itself
-  std::size_t made = 0;
-  run.so_far = [&] { return fmt::format("{} of {}, ", made + 1, conditions.size() * trials); };
+  std::string so_far;
+  run.so_far = [&so_far] { return so_far; };
   std::vector<experiment::ContactResult> results;
   const std::string velocity_estimator =
       make_touches(context, device, interruption, run, [&](experiment::DeviceRig& rig) {
-        for (const experiment::ContactCondition& condition : conditions) {
-          std::vector<experiment::ContactResult> touches;
-          for (std::size_t trial = 0; trial < trials; ++trial, ++made)
-            touches.push_back(run_contact(rig, condition, settings));
-          results.push_back(experiment::worst_of(std::move(touches)));
-        }
+        results = run_contacts(rig, settings, trials, [&so_far](std::size_t made, std::size_t all) {
+          so_far = fmt::format("{} of {}, ", made + 1, all);
+        });
         return rig.velocity_estimator();
       });
   const auto words = experiment::contact_words(settings, trials, velocity_estimator);

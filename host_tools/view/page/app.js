@@ -2,9 +2,11 @@
 
 import { Controls } from "/controls.js";
 import { Criteria } from "/criteria.js";
-import { exportTable } from "/export.js";
+import { Comparison } from "/comparison.js";
+import { offer, tableOf } from "/export.js";
 import { LoopView } from "/loop_view.js";
 import { MapView } from "/map_view.js";
+import { Procedures } from "/procedures.js";
 import { Rows } from "/rows.js";
 import { Safety } from "/safety.js";
 import { Scope } from "/scope.js";
@@ -36,6 +38,7 @@ const heard = {
     at("axis").replaceChildren(...rows.map((_, i) => new Option(String(i), String(i))));
     at("axis").value = String(axis);
     scope.show(message);
+    procedures.show(message);
     chooseAxis(axis);
     if (first) document.body.dataset.ready = "yes";
   },
@@ -61,6 +64,10 @@ const heard = {
   map(message) { maps.set(`${message.axis} ${message.up.name}`, message); },
   rows(message) { message.axes.forEach((one) => rows[one.axis]?.take(message.tick, one)); },
   capture(message) { scope.heard(message); },
+  procedure(message) {
+    procedures.heard(message, client);
+    showState();
+  },
 };
 
 const token = location.hash.slice(1);
@@ -69,12 +76,19 @@ const stream = new Stream(token, (message) => {
   changed = true;
 }, (now) => {
   connected = now;
-  if (!now) state = null;
+  if (!now) {
+    state = null;
+    procedures.lost();
+  }
   showState();
   if (now) wantMap();
 });
 const ask = (message) => stream.ask(message);
-const safety = new Safety({ arm: at("arm"), words: at("arm-words"), progress: at("arm-progress"), stop: at("stop") }, stream, () => axis, say);
+const safety = new Safety({ arm: at("arm"), words: at("arm-words"), stop: at("stop") }, stream, () => axis, say);
+const procedures = new Procedures({
+  list: at("procedure-list"), said: at("procedure-said"), result: at("result"), prompt: at("prompt"), name: at("prompt-name"), words: at("prompt-words"),
+  answer: at("answer"), cancel: at("cancel"), other: at("prompt-other"),
+}, ask, safety, () => axis, say, () => view("procedures"));
 const controls = new Controls(at("sliders"), ask, say);
 const criteria = new Criteria(at("criteria"), async (name, value) => {
   const reply = await ask({ type: "set", axis, values: { [name]: value } });
@@ -86,9 +100,16 @@ const scope = new Scope({
   plots: at("plots"), kinds: document.querySelectorAll("[data-scope]"), capture: at("capture"), trigger: at("trigger"),
   level: at("level"), span: at("span"), signal: at("spectrum-signal"), words: at("scope-words"), captureControls: at("capture-controls"),
 }, ask);
+const comparison = new Comparison({
+  files: at("recording-files"), area: at("recordings"), align: at("align"), said: at("recordings-said"), empty: at("recordings-empty"),
+  legend: at("legend"), overDistance: at("over-distance"), overTime: at("over-time"),
+}, () => axis, () => wall() ?? { position: 0, side: 1 });
 
 function full(name) { return axis ? `axis${axis}.${name}` : name; }
 function present(name) { return values?.[name]?.value ?? NaN; }
+function wall() {
+  return values && { position: present(full("wall.position")), side: Number(present(full("wall.side"))), limit: present(full("force.limit")) };
+}
 function thisAxis() { return state?.axes.find((one) => one.axis === axis); }
 
 function banner(text, bad) {
@@ -113,8 +134,10 @@ function showState() {
   const unsaved = state?.unsaved;
   saved.textContent = unsaved === null || unsaved === undefined ? "" : unsaved ? `${unsaved} not saved` : "saved";
   saved.classList.toggle("attention", Boolean(unsaved));
-  const mine = Boolean(state?.axes.some((each) => each.armed && each.armed_by === client));
-  safety.show(Boolean(one?.armed), mine, Boolean(reachable));
+  const mine = procedures.mine || Boolean(state?.axes.some((each) => each.armed && each.armed_by === client));
+  const armed = Boolean(one?.armed);
+  safety.show(armed, mine, Boolean(reachable) && (armed || !procedures.running));
+  procedures.allow(Boolean(reachable) && !state.axes.some((each) => each.armed));
   changed = true;
 }
 
@@ -174,9 +197,27 @@ at("copy").onclick = async () => {
     say(command);
   }
 };
+/** What the scope holds, as a table; null: nothing yet, which is said. */
+function scopeTable() {
+  if (device && values && rows[axis].length) return tableOf({ device, axis, values, rows: rows[axis], taken: scope.kind === "capture" ? scope.captured ?? null : null });
+  for (const words of [at("said"), at("recordings-said")]) words.textContent = "the scope holds nothing yet";
+  return null;
+}
+
+function view(name) {
+  document.body.dataset.view = name;
+  for (const button of document.querySelectorAll("nav button")) button.setAttribute("aria-pressed", String(button.dataset.view === name));
+  changed = true;
+}
+
+for (const button of document.querySelectorAll("nav button")) button.onclick = () => view(button.dataset.view);
 at("export").onclick = () => {
-  if (!device || !values || !rows[axis].length) return say("there is nothing to export yet", false);
-  exportTable({ device, axis, values, rows: rows[axis], taken: scope.kind === "capture" ? scope.captured ?? null : null });
+  const table = scopeTable();
+  if (table) offer(table);
+};
+at("take").onclick = () => {
+  const table = scopeTable();
+  if (table) comparison.add(table.name, table.text);
 };
 at("banner").onclick = () => banner("", false);
 addEventListener("resize", () => { changed = true; });
@@ -184,6 +225,7 @@ followTheme(at("theme"), () => {
   changed = true;
   scope.rebuild();
   showStability();
+  comparison.draw();
 });
 showState();
 
@@ -194,10 +236,8 @@ function draw(now) {
   if (!changed || now - drawn < 30 || !device) return;
   changed = false;
   drawn = now;
-  const wall = values && {
-    position: present(full("wall.position")), side: Number(present(full("wall.side"))), limit: present(full("force.limit")),
-  };
-  loop.draw(curves.get(axis), wall, rows[axis]);
+  if (document.body.dataset.view !== "live") return;
+  loop.draw(curves.get(axis), wall(), rows[axis]);
   map.draw(maps.get(`${axis} ${full(at("map-up").value)}`), present);
   scope.draw(rows[axis], now);
 }

@@ -1,27 +1,8 @@
 // The criteria's verdicts in words: which fails, by how much, and what would mend it.
 
+import { element, swatch } from "/elements.js";
 import { styleOf } from "/map_view.js";
 import { digits, withUnit } from "/units.js";
-
-function element(tag, attributes = {}, ...children) {
-  const made = Object.assign(document.createElement(tag), attributes);
-  made.append(...children);
-  return made;
-}
-
-function swatch(place) {
-  const { colour, dashes } = styleOf(place);
-  const line = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  line.setAttribute("viewBox", "0 0 24 8");
-  line.setAttribute("aria-hidden", "true");
-  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  path.setAttribute("d", "M0 4H24");
-  path.setAttribute("stroke", colour);
-  path.setAttribute("stroke-width", "3");
-  path.setAttribute("stroke-dasharray", dashes.join(" "));
-  line.append(path);
-  return line;
-}
 
 export class Criteria {
   /** `set(name, value)` is called for a remedy that is chosen. */
@@ -49,7 +30,7 @@ export class Criteria {
   list(judgement) {
     const rows = judgement.criteria.map((one, place) => ({ one, place })).filter(({ one }) => one.applies);
     rows.sort((a, b) => a.one.pass - b.one.pass);
-    return rows.map(({ one, place }) => element("div", { className: "criterion" }, swatch(place),
+    return rows.map(({ one, place }) => element("div", { className: "criterion" }, swatch(styleOf(place)),
       element("div", {},
         element("b", {}, one.name.replaceAll("_", " ")), ` ${one.worth}, ${one.pass ? "met" : "fails"}`,
         element("span", { className: "quiet" }, this.numbers(one)),

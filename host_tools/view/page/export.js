@@ -4,15 +4,16 @@ import { SIGNALS } from "/rows.js";
 
 const HEADINGS = { position: "position_m", velocity: "velocity_m_per_s", force: "force_n", current: "current_a" };
 
-/** Lines of comment: when, by which program, of which device, with which parameters. */
+/** Lines of comment: when, by which program of which commit, of which device and firmware, with which parameters. */
 function provenance(device, axis, values, what) {
   const prefix = axis ? `axis${axis}.` : "";
   const own = Object.entries(values).filter(([name]) => (axis ? name.startsWith(prefix) : !/^axis\d/.test(name)));
   const identity = Object.values(device.identification).join(", ");
   return [
     `date: ${new Date().toISOString()}`,
-    `program: kmax view ${device.version}`,
+    ...device.program.split("\n").map((line, i) => (i ? `that program's ${line}` : `program: kmax view of ${line}`)),
     `device: ${device.address} (${identity}), axis ${axis}`,
+    `firmware: ${device.identification.revision}`,
     `data: ${what}`,
     ...own.map(([name, { value, unit }]) => `${name} = ${value} ${unit}`.trim()),
   ].map((line) => `# ${line}`);
@@ -40,13 +41,18 @@ function captureTable(taken) {
   return lines;
 }
 
-/** Offers the file to the browser. `taken`: the capture that is shown, or null for the rows. */
-export function exportTable({ device, axis, values, rows, taken }) {
+/** The table as a text, and a name for it. `taken`: the capture that is shown, or null for the rows. */
+export function tableOf({ device, axis, values, rows, taken }) {
   const what = taken ? `capture, trigger ${taken.trigger}` : `the last ${rows.length} rows`;
   const lines = [...provenance(device, axis, values, what), ...(taken ? captureTable(taken) : rollingTable(rows))];
+  return { name: `kmax_${new Date().toISOString().slice(0, 19).replaceAll(":", "")}.csv`, text: `${lines.join("\n")}\n` };
+}
+
+/** Offers the file to the browser. */
+export function offer({ name, text }) {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([`${lines.join("\n")}\n`], { type: "text/csv" }));
-  link.download = `kmax_${new Date().toISOString().slice(0, 19).replaceAll(":", "")}.csv`;
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  link.download = name;
   link.click();
   URL.revokeObjectURL(link.href);
 }

@@ -1,7 +1,7 @@
-// STOP, and arming by press-and-hold.
+// STOP, and buttons that have to be held: what arms an axis takes a press that lasts.
 //
-// The space bar stops, wherever the focus is. Arming takes a press that lasts; if the focus is lost meanwhile, nobody knows
-// what was meant: every axis is stopped. So it is when the page that armed is hidden: nobody could press STOP on it.
+// The space bar stops, wherever the focus is. If the focus is lost while a button is held, nobody knows what was meant: every
+// axis is stopped. So it is when the page that armed is hidden: nobody could press STOP on it.
 
 const HOLD_MS = 800;
 
@@ -10,25 +10,32 @@ export class Safety {
   constructor(buttons, stream, axis, say) {
     this.arm = buttons.arm;
     this.words = buttons.words;
-    this.progress = buttons.progress;
     this.stream = stream;
     this.axis = axis;
     this.say = say;
     this.armed = false;
     this.mine = false;
+    this.held = new Map();
     buttons.stop.addEventListener("pointerdown", () => this.stop());
     buttons.stop.addEventListener("click", () => this.stop());
     addEventListener("keydown", (event) => this.keyDown(event), { capture: true });
     addEventListener("keyup", (event) => this.keyUp(event), { capture: true });
-    this.arm.addEventListener("pointerdown", (event) => event.button === 0 && this.press());
-    for (const name of ["pointerup", "pointerleave"]) this.arm.addEventListener(name, () => this.release());
-    this.arm.addEventListener("pointercancel", () => this.lose());
-    this.arm.addEventListener("contextmenu", (event) => event.preventDefault());
-    this.arm.addEventListener("blur", () => this.lose());
     addEventListener("blur", () => this.lose());
     document.addEventListener("visibilitychange", () => {
       if (document.hidden && (this.holding || this.mine)) this.stop();
     });
+    this.hold(this.arm, () => this.send("arm"));
+  }
+
+  /** `done()` once `button` has been held, by a pointer or by the Enter key. */
+  hold(button, done) {
+    this.held.set(button, done);
+    button.classList.add("hold");
+    button.append(document.createElement("i"));
+    button.addEventListener("pointerdown", (event) => event.button === 0 && this.press(button));
+    for (const name of ["pointerup", "pointerleave"]) button.addEventListener(name, () => this.release());
+    for (const name of ["pointercancel", "blur"]) button.addEventListener(name, () => this.lose());
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
   async stop() {
@@ -42,9 +49,10 @@ export class Safety {
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) this.stop();
-    } else if (event.key === "Enter" && event.target === this.arm) {
+    } else if (event.key === "Enter" && this.held.has(event.target)) {
       event.preventDefault();
-      if (!event.repeat) this.press();
+      event.stopPropagation();
+      if (!event.repeat) this.press(event.target);
     } else if (event.key === "Escape") {
       this.stop();
     }
@@ -52,29 +60,31 @@ export class Safety {
 
   keyUp(event) {
     if (event.code === "Space") event.preventDefault();
-    if (event.key === "Enter" && event.target === this.arm) this.release();
+    if (event.key === "Enter" && this.held.has(event.target)) this.release();
   }
 
-  press() {
-    if (this.armed) {
+  press(button) {
+    if (button === this.arm && this.armed) {
       this.send("disarm");
       return;
     }
-    if (this.holding) return;
-    this.arm.classList.add("holding");
-    this.holding = setTimeout(() => {
+    if (this.holding || button.disabled) return;
+    button.classList.add("holding");
+    const timer = setTimeout(() => {
       this.release();
-      this.send("arm");
+      this.held.get(button)();
     }, HOLD_MS);
+    this.holding = { button, timer };
   }
 
   release() {
-    clearTimeout(this.holding);
+    if (!this.holding) return;
+    clearTimeout(this.holding.timer);
+    this.holding.button.classList.remove("holding");
     this.holding = null;
-    this.arm.classList.remove("holding");
   }
 
-  /** The focus went while the button was held. */
+  /** The focus went while a button was held. */
   lose() {
     if (this.holding) this.stop();
   }
@@ -84,12 +94,12 @@ export class Safety {
     this.say(reply.message, reply.ok);
   }
 
-  /** `mine`: this page armed an axis. */
-  show(armed, mine, connected) {
+  /** `mine`: this page armed an axis, or started a procedure that does; `usable`: the axis can be armed from here. */
+  show(armed, mine, usable) {
     this.armed = armed;
     this.mine = mine;
     this.words.textContent = armed ? "Disarm" : "Hold to arm";
     this.arm.classList.toggle("armed", armed);
-    this.arm.disabled = !connected;
+    this.arm.disabled = !usable;
   }
 }

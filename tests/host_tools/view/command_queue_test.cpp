@@ -34,15 +34,17 @@ TEST_F(CommandQueueTest, CommandsComeInOrderAndAStopIsUrgentAtOnce) {
 }
 
 TEST_F(CommandQueueTest, WhatArmsIsRevokedByALaterStopAndNotByAnEarlierOne) {
-  queue.push(command(Kind::arm, 1, 11));
-  queue.push(command(Kind::set));
-  queue.push(command(Kind::stop));
-  queue.push(command(Kind::arm, 1, 12));
-  const auto revoked = queue.settled(*queue.urgent());
-  ASSERT_EQ(revoked.size(), 1U);
-  EXPECT_EQ(revoked[0].id, 11);
-  EXPECT_EQ(all(), (std::vector{Kind::set, Kind::stop, Kind::arm}));
-  EXPECT_FALSE(queue.urgent());
+  for (const Kind kind : {Kind::arm, Kind::procedure}) {
+    queue.push(command(kind, 1, 11));
+    queue.push(command(Kind::set));
+    queue.push(command(Kind::stop));
+    queue.push(command(kind, 1, 12));
+    const auto revoked = queue.settled(*queue.urgent());
+    ASSERT_EQ(revoked.size(), 1U);
+    EXPECT_EQ(revoked[0].id, 11);
+    EXPECT_EQ(all(), (std::vector{Kind::set, Kind::stop, kind}));
+    EXPECT_FALSE(queue.urgent());
+  }
 }
 
 TEST_F(CommandQueueTest, AStopIsTakenHoweverManyCommandsWait) {
@@ -100,6 +102,14 @@ TEST_F(CommandQueueTest, SilenceOfWhoHasNotArmedIsNobodysBusiness) {
   queue.joined(1);
   now += 10 * CommandQueue::patience;
   EXPECT_FALSE(queue.urgent());
+}
+
+TEST_F(CommandQueueTest, AStopMayBeLeftForLaterAndKeepsItsPlace) {
+  for (const Kind kind : {Kind::cancel, Kind::stop, Kind::save}) queue.push(command(kind));
+  EXPECT_EQ(queue.take(CommandQueue::Stops::leave)->kind, Kind::cancel);
+  EXPECT_FALSE(queue.take(CommandQueue::Stops::leave));
+  EXPECT_EQ(queue.take()->kind, Kind::stop);
+  EXPECT_EQ(queue.take(CommandQueue::Stops::leave)->kind, Kind::save);
 }
 
 }  // namespace kmax::view::command_queue_test

@@ -46,6 +46,23 @@ TEST(ParseCommand, Capture) {
   EXPECT_EQ(capture.capture.interval, 2U);
 }
 
+TEST(ParseCommand, Procedures) {
+  const Command contact = parse_command(R"({"type":"procedure","axis":1,"name":"contact","trials":2})");
+  EXPECT_EQ(contact.procedure.name, "contact");
+  EXPECT_EQ(contact.procedure.axis, 1U);
+  EXPECT_EQ(contact.procedure.trials, 2U);
+  EXPECT_TRUE(parse_command(R"({"type":"procedure","name":"self_test","hand":true})").procedure.hand);
+  EXPECT_EQ(parse_command(R"({"type":"answer","prompt":7})").prompt, 7U);
+  EXPECT_TRUE(parse_command(R"({"type":"keep","keep":true})").keep);
+  EXPECT_CONTAINS(refusal(R"({"type":"procedure","name":"dance"})"),
+                  "no procedure 'dance'; procedures are self_test, calibration, contact");
+  EXPECT_CONTAINS(refusal(R"({"type":"procedure","name":"contact","hand":true})"), "no part with the hand");
+  EXPECT_CONTAINS(refusal(R"({"type":"procedure","name":"self_test","hand":1})"), "neither true nor false");
+  EXPECT_CONTAINS(refusal(R"({"type":"procedure","name":"self_test","trials":2})"), "no touches to repeat");
+  EXPECT_CONTAINS(refusal(R"({"type":"procedure","name":"contact","trials":0})"), "from 1 to 100");
+  EXPECT_CONTAINS(refusal(R"({"type":"keep"})"), "\"keep\" is missing");
+}
+
 TEST(ParseCommand, SaysWhatWasWrong) {
   EXPECT_CONTAINS(refusal("{"), "no JSON");
   EXPECT_CONTAINS(refusal("[]"), "a JSON object");

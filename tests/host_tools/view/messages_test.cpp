@@ -42,8 +42,9 @@ Examples examples() {
 /// A key of examples and messages: messages of one have the same members.
 std::string name_of(const Json& message) {
   std::string name = message.value("type", "");
-  if (name != "capture") return name;
   const std::string phase = message.value("phase", "");
+  if (name == "procedure") return name + (phase == "running" ? " running" : " ended");
+  if (name != "capture") return name;
   return name + " " + (phase == "complete" || phase == "failed" ? phase : "progress");
 }
 
@@ -98,9 +99,11 @@ std::map<std::string, Json> all_that_is_heard() {
   commands.push({.kind = Kind::arm, .id = 1, .client = 1});
   bool stopped = false;
   session.run([&] {
-    if (has("capture complete") && has("capture progress") && has("rows") && !std::exchange(stopped, true))
+    if (has("capture complete") && has("capture progress") && has("rows") && !std::exchange(stopped, true)) {
       commands.push({.kind = Kind::stop, .client = 1});
-    return has("stopped") && has("map") && has("judgement") && has("curve");
+      commands.push({.kind = Kind::procedure, .procedure = {.name = "self_test"}, .client = 1});
+    }
+    return has("stopped") && has("map") && has("judgement") && has("curve") && has("procedure ended");
   });
   publish(capture_failed("why"));
   return heard;
@@ -113,7 +116,7 @@ TEST(ViewDocument, EveryExampleThatAClientSendsIsTakenAndEveryKindHasOne) {
     EXPECT_TRUE(kinds.insert(command.kind).second) << example;
     EXPECT_EQ(command.id, example.value("id", Json()));
   }
-  EXPECT_EQ(kinds.size(), 10U);
+  EXPECT_EQ(kinds.size(), 14U);
 }
 
 TEST(ViewDocument, EveryExampleThatAClientHearsIsLikeWhatIsSentAndEveryMessageHasOne) {

@@ -2,12 +2,13 @@
 // The live page in a browser, against a device on a bus. Each step prints a line.
 // usage: page_check.mjs all|short COMMAND...        COMMAND starts the device; BUS in it is the bus's socket
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { arm, launch, open } from "./browser.mjs";
-import { PATIENCE, device, kmax, until, view } from "./kmax_processes.mjs";
+import { KMAX, PATIENCE, device, kmax, until, view } from "./kmax_processes.mjs";
 
 const [extent, ...command] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), "kmax-view-"));
@@ -28,8 +29,21 @@ const set = async (name, text) => {
   await field(name).fill(text);
   await field(name).press("Tab");
 };
+let exported;  // the file
+/** Presses the start of a procedure until it has begun. */
+const hold = async (name) => {
+  const button = page.locator(`#start-${name}`);
+  await button.scrollIntoViewIfNeeded();
+  await page.waitForFunction((id) => !document.getElementById(id).disabled, `start-${name}`);
+  const box = await button.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.waitForSelector("#prompt:not([hidden])");
+  await page.mouse.up();
+};
 /** The person lets go when the force is off: until the handle is out of the wall, it cannot be armed. */
-const outside = () => page.waitForFunction(() => Number.parseFloat(document.getElementById("loop-values").textContent.replace("−", "-")) > 1);
+const outside = () => until("the handle is out of the wall", () =>
+  (page.heard.rows.axes[0].position.at(-1) - value("wall.position")) * Number(value("wall.side")) > 1e-3);
 
 const steps = {
   async "a fresh page says what there is"() {
@@ -113,9 +127,92 @@ const steps = {
     const [file] = await Promise.all([page.waitForEvent("download"), page.click("#export")]);
     const lines = readFileSync(await file.path(), "utf8").trim().split("\n");
     const comments = lines.filter((line) => line.startsWith("#"));
-    assert.ok(comments.some((line) => line.includes("wall.stiffness = 1000 N/m")) && comments.some((line) => line.includes("kmax view")), comments);
+    const [program, image] = spawnSync(KMAX, ["--version"], { encoding: "utf8" }).stdout.trim().split("\n");
+    for (const part of ["# date: 20", `# program: kmax view of ${program}`, image, `# device: can:${bus}`, "# firmware: ", "# wall.stiffness = 1000 N/m"])
+      assert.ok(comments.some((line) => line.includes(part)), `${part} is not in ${comments.join("\n")}`);
+    exported = await file.path();
     assert.deepEqual([lines[comments.length], lines.length - comments.length], ["time_s,position_m,velocity_m_per_s,force_n,current_a", 501]);
     await page.click("[data-scope=rolling]");
+  },
+  async "recordings are drawn over each other, and a bad file is named"() {
+    await page.click("nav [data-view=recordings]");
+    const row = (i) => `${i / 1000},${i},${0.01 - i * 1e-5},${-0.01},0.1,0,0,0.02,0,1.5,0,0\n`;
+    const heading = ["time_s,tick", ...[0, 1].map((i) => ["position_m", "velocity_m_per_s", "force_n", "current_a", "flags"].map((name) => `axis${i}_${name}`))].join(",");
+    const record = { name: "record.csv", mimeType: "text/csv", buffer: Buffer.from(`${heading}\n${Array.from({ length: 2000 }, (_, i) => row(i)).join("")}1.5,2`) };
+    const bad = { name: "bad.csv", mimeType: "text/csv", buffer: Buffer.from("time_s,volume\n0,1\n") };
+    const wrong = { name: "wrong.csv", mimeType: "text/csv", buffer: Buffer.from("time_s,position_m,force_n\n0,1,2\n1,x,2\n2,1,2\n") };
+    await page.setInputFiles("#recording-files", [record, { name: "export.csv", mimeType: "text/csv", buffer: readFileSync(exported) }, bad, wrong]);
+    await page.waitForFunction(() => document.querySelectorAll("#legend li").length === 2);
+    await page.click("#take");
+    await page.waitForFunction(() => document.querySelectorAll("#legend li").length === 3);
+    const legend = await page.locator("#legend").textContent();
+    assert.match(legend, /record\.csv2000 rows, 2 s, 0\.1 to 0\.1 N; it does not say where its wall is/);
+    assert.match(legend, /export\.csv500 rows/);
+    await page.setInputFiles("#recording-files", [bad, wrong]);
+    await page.waitForFunction(() => document.getElementById("recordings-said").textContent.includes("wrong.csv"));
+    const said = await page.locator("#recordings-said").textContent();
+    assert.match(said, /bad\.csv: there is no column position_m/);
+    assert.match(said, /wrong\.csv, line 3: "x" is no number/);
+    // Each in its own colour or dashes, and drawn.
+    const inked = () => page.evaluate(() => ["over-distance", "over-time"].map((id) => {
+      const canvas = document.getElementById(id);
+      return canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.filter((value, i) => i % 4 === 3 && value > 0).length;
+    }));
+    const withThree = await inked();
+    for (let i = 0; i < 3; ++i) await page.click("#legend button");
+    await page.waitForFunction(() => !document.querySelector("#legend li"));
+    assert.ok(withThree.every((count) => count > 1000) && (await inked()).every((count) => count === 0), `${withThree}, then ${await inked()}`);
+    await page.click("nav [data-view=live]");
+  },
+  async "a self-test is started by holding its button, and judged in words"() {
+    await outside();
+    await page.click("nav [data-view=procedures]");
+    await hold("self_test");
+    await page.waitForSelector("#prompt:not([hidden])");
+    assert.ok(await page.locator("#start-contact").isDisabled());
+    await page.waitForSelector("#prompt", { state: "hidden" });
+    // The simulated person may move the handle meanwhile, which is found.
+    assert.match(await page.locator("#result").textContent(), /(✓ Self-test passed|✗ Self-test did not pass).*✓ link.*50 exchanges/);
+    assert.equal(await page.locator("#result .finding").count(), 9);
+    assert.equal(armed(), false);
+  },
+  async "contact: its prompts are huge, Enter answers; the other page sees it and cannot answer"() {
+    await hold("contact");
+    await page.waitForSelector("#answer:not([hidden])");
+    const size = await page.evaluate(() => Number.parseFloat(getComputedStyle(document.getElementById("prompt-words")).fontSize));
+    assert.ok(size >= 70, `${size} px`);
+    const other = await open(browser, served.address.url);
+    await other.waitForFunction(() => document.getElementById("prompt-words").textContent.includes("press it against the wall"));
+    assert.ok(await other.locator("#answer").isHidden());
+    await other.close();
+    const prompt = page.heard.procedure.prompt;
+    await page.keyboard.press("Enter");
+    await page.waitForSelector("#state[data-state=armed]");
+    await page.waitForFunction(() => document.getElementById("prompt-words").textContent.includes("holding"));
+    await until("the next prompt", () => page.heard.procedure.prompt > prompt);
+    await page.waitForSelector("#answer:not([hidden])");
+  },
+  async "a procedure is cancelled, and one under way is stopped by the space bar"() {
+    await page.click("#cancel");
+    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was cancelled"));
+    assert.equal(armed(), false);
+    await hold("contact");
+    await page.waitForSelector("#answer:not([hidden])");
+    await page.click("#answer");
+    await page.waitForSelector("#state[data-state=armed]");
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was stopped"));
+    await until("the axis is not armed", () => !armed());
+  },
+  async "a reload in the middle of a procedure ends it"() {
+    await outside();
+    await hold("contact");
+    await page.waitForSelector("#answer:not([hidden])");
+    await page.keyboard.press("Enter");
+    await page.waitForSelector("#state[data-state=armed]");
+    await page.reload();
+    await until("it is over", () => page.heard.procedure.phase === "stopped" && !armed());
+    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was stopped"));
   },
   async "two pages: the other one sees and stops"() {
     const other = await open(browser, served.address.url);

@@ -8,6 +8,7 @@ import { join } from "node:path";
 import { arm, launch, open } from "./browser.mjs";
 import { device, view } from "./kmax_processes.mjs";
 
+const FIELDS = [0, 1, 2];  // N, of the recordings
 const SIZES = { desk: [1280, 720], tablet: [1024, 768], portrait: [768, 1024], telephone: [412, 915] };
 const FRAMES = 70;
 
@@ -53,9 +54,52 @@ for (const scheme of ["light", "dark"]) {
   await picture(`spectrum_${scheme}`);
   await page.click("[data-scope=rolling]");
 }
+const inEverySize = async (name) => {
+  for (const scheme of ["light", "dark"]) {
+    await page.emulateMedia({ colorScheme: scheme });
+    for (const size of ["desk", "tablet"]) {
+      await page.setViewportSize({ width: SIZES[size][0], height: SIZES[size][1] });
+      await page.waitForTimeout(400);
+      await picture(`${name}_${size}_${scheme}`);
+    }
+  }
+};
+for (const field of FIELDS) {
+  await drag(2, field);
+  await page.waitForTimeout(4000);
+  await page.click("nav [data-view=recordings]");
+  await page.click("#take");
+  await page.click("nav [data-view=live]");
+}
+await page.click("nav [data-view=recordings]");
+await inEverySize("recordings");
 await page.keyboard.press("Space");
 await page.waitForSelector("#state[data-state=stopped]");
+await page.click("nav [data-view=live]");
 await picture("stopped");
+await page.click("nav [data-view=procedures]");
+await inEverySize("procedures");
+const start = async (name) => {
+  await page.locator(`#start-${name}`).scrollIntoViewIfNeeded();
+  const box = await page.locator(`#start-${name}`).boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.waitForSelector("#prompt:not([hidden])");
+  await page.mouse.up();
+};
+await start("self_test");
+await page.waitForSelector("#prompt", { state: "hidden" });
+await inEverySize("result");
+await start("contact");
+await page.waitForSelector("#answer:not([hidden])");
+await inEverySize("prompt");
+await page.keyboard.press("Enter");
+await page.waitForSelector("#answer", { state: "hidden" });
+await page.waitForTimeout(400);
+await picture("touch");
+await page.click("nav [data-view=live]");
+await picture("touch_live");
+await page.keyboard.press("Space");
 await running.end("SIGKILL");
 await page.waitForSelector("#state[data-state=lost]");
 await picture("lost");

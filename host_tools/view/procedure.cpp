@@ -1,0 +1,134 @@
+#include "host_tools/view/procedure.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "host_tools/base/errors.hpp"
+#include "host_tools/calibration/procedure.hpp"
+#include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/selftest/selftest.hpp"
+
+namespace kmax::view {
+
+namespace {
+using calibration::StepReport;
+using experiment::ContactResult;
+
+constexpr ProcedureText texts[] = {
+    {"self_test", "Self-test",
+     "Arms the axis with small voltages, which move the handle by well under 1 mm. Keep the handle free. The "
+     "axis is disarmed afterwards, and every parameter is as it was.",
+     "move the handle and press the emergency stop when asked to", 0},
+    {"calibration", "Calibration",
+     "Arms the axis: the handle trembles, and moves by up to 20 mm to either side. Nobody may hold it. "
+     "Before: "
+     "motor.kind, encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be "
+     "right.",
+     "move the handle by hand when asked to, which shows where positive is", 0},
+    {"contact", "Contact with a stiff wall",
+     "Arms the axis for each touch. Some of these walls oscillate under the hand: that is what is measured. "
+     "Approach at 0.2 m/s or so, and hold the handle firmly. Forces stay below 3.3 N.",
+     "", 3},
+};
+
+ProcedureResult self_test(device::Device& device, const ProcedureSettings& settings,
+                          const ProcedureParty& party) {
+  selftest::SelfTestSettings test{.axis = settings.axis, .say = party.tell};
+  if (settings.hand) test.hand.emplace();
+  const selftest::Report report = selftest::run_selftest(device, test, party.progress);
+  if (const auto& before = report.fault_at_start)
+    party.note(fmt::format("fault before the test: {} ({})", before->words,
+                           before->cleared ? "cleared" : "its cause remains"));
+  for (const selftest::CheckResult& check : report.checks)
+    party.found({check.name, selftest::name_of(check.verdict), check.message});
+  return {report.pass(), selftest::conclusion(report)};
+}
+
+Finding finding_of(const StepReport& step) {
+  Finding finding{step.name, step.pass ? "pass" : step.skipped ? "not judged" : "fail"};
+  std::vector<std::string> parts;
+  if (step.skipped) parts.emplace_back("left out, a step before it has failed");
+  const auto add = [&](const calibration::Diagnosis& one) {
+    parts.push_back(fmt::format("{}: {}; {}", one.cause, one.words, one.advice));
+  };
+  if (step.failure) add(*step.failure);
+  std::for_each(step.remarks.begin(), step.remarks.end(), add);
+  for (const calibration::IdentifiedValue& value : step.values)
+    parts.push_back(fmt::format("{} {:.4g} {}{}", value.name, value.value, value.unit,
+                                value.previous ? fmt::format(" (was {:.4g})", *value.previous) : ""));
+  finding.words = fmt::format("{}", fmt::join(parts, ". "));
+  return finding;
+}
+
+ProcedureResult calibration_of(device::Device& device, const ProcedureSettings& settings,
+                               const ProcedureParty& party) {
+  calibration::CalibrationSettings steps;
+  steps.axis = settings.axis;
+  steps.save = false;  // whoever has read the result decides
+  const calibration::CalibrationReport report =
+      calibration::calibrate(device, steps, settings.hand ? &party.prompter : nullptr, party.progress,
+                             [&](std::string_view started) { party.progress(std::string(started)); });
+  for (const StepReport& one : report.steps) party.found(finding_of(one));
+  if (report.pass()) return {true, "Every step has passed.", report.kept};
+  const auto failed =
+      std::ranges::find_if(report.steps, [](const StepReport& one) { return !one.pass && !one.skipped; });
+  const std::string advice =
+      failed != report.steps.end() && failed->failure ? ": " + failed->failure->advice : std::string();
+  return {false, fmt::format("A step has failed, so that every parameter is as before{}.", advice)};
+}
+
+ProcedureResult contact(device::Device& device, const ProcedureSettings& settings,
+                        const ProcedureParty& party) {
+  experiment::TouchLimits limits = experiment::contact_limits();
+  limits.axis = settings.axis;
+  std::string so_far;
+  const experiment::ReportText report = [&](const std::string& text) { party.progress(so_far + text); };
+  const experiment::ReportText notice = party.note;
+  experiment::DeviceRig rig(device, limits,
+                            {party.asks_before_touches ? &party.prompter : nullptr, nullptr, report, notice});
+  const auto results = experiment::run_contacts(
+      rig, {}, settings.trials,
+      [&](std::size_t made, std::size_t all) {
+        so_far = fmt::format("touch {} of {}, ", made + 1, all);
+        party.progress("");
+      },
+      [&](const ContactResult& result) {
+        party.found(
+            {result.condition.name, result.agrees_with_paper() ? "pass" : "fail",
+             fmt::format("{}, {:.3f} mm peak to peak; {} of {} touches unstable; paper 1, Fig. {}: {}",
+                         experiment::to_string(result.measure.verdict), result.measure.peak_to_peak * 1e3,
+                         result.unstable_trials, result.trials, result.condition.figure,
+                         result.condition.paper_words)});
+      });
+  const auto agree = std::ranges::count_if(results, [](const auto& one) { return one.agrees_with_paper(); });
+  return {static_cast<std::size_t>(agree) == results.size(),
+          fmt::format("{} of {} walls came out as in paper 1.", agree, results.size())};
+}
+}  // namespace
+
+std::span<const ProcedureText> procedure_texts() {
+  return texts;
+}
+
+const ProcedureText& procedure_named(std::string_view name) {
+  std::vector<std::string_view> names;
+  for (const ProcedureText& text : texts) {
+    if (text.name == name) return text;
+    names.push_back(text.name);
+  }
+  throw device::ValueError(
+      fmt::format("there is no procedure '{}'; procedures are {}", name, fmt::join(names, ", ")));
+}
+
+ProcedureResult run_procedure(device::Device& device, const ProcedureSettings& settings,
+                              const ProcedureParty& party) {
+  const std::string_view name = procedure_named(settings.name).name;
+  return (name == "self_test"     ? self_test
+          : name == "calibration" ? calibration_of
+                                  : contact)(device, settings, party);
+}
+
+}  // namespace kmax::view
