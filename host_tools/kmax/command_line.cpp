@@ -79,7 +79,7 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
   const std::string command = &meant == &app ? word : name_within(app, meant);
   if (const auto inner = command_names(meant);
       !inner.empty() && dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
-    return fmt::format("{}: name one of {}; 'kmax {} --help' explains them", command, fmt::join(inner, ", "),
+    return fmt::format("{}: name one of {}; 'kmax {} --help' explains it", command, fmt::join(inner, ", "),
                        command);
   return fmt::format("{}: {}{}; 'kmax {} --help' explains it", command, error.what(),
                      usage_suggestion(app, error, arguments), command);
