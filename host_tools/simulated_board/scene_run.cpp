@@ -86,6 +86,10 @@ RunResult run_scene(const simulation::Scene& scene, RunTicks which) {
   for (std::size_t axis = 0; axis < axes; ++axis)
     lengths[axis] = firmware::count_length(application.values(), axis);
   const auto ticks = static_cast<std::uint64_t>(scene.duration * firmware::tick_rate_hz + 0.5);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const auto divider = firmware::haptic_configuration(application.values(), axis).divider;
+    result.samples[axis].reserve(ticks / divider + 1);
+  }
   const simulation::CoupledHandle& handle = simulation.device().handle(0);
   for (std::uint64_t tick = 0; tick < ticks; ++result.firmware_ticks) {
     std::array<RunSample, firmware::axis_count> samples{};

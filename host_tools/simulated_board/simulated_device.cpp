@@ -67,7 +67,7 @@ void SimulatedDevice::advance(double duration, std::uint32_t times) {
     if (!axis || (!axis->let_go && !axis->handle.has_operator())) continue;
     const auto force = static_cast<double>(axis->output.force);
     const double background = background_force(*axis);
-    for (std::uint32_t n = 0; n < times; ++n) axis->handle.advance(force, background, duration);
+    axis->handle.advance(force, background, duration, times);
   }
   for (std::uint32_t n = 0; power_ && n < times; ++n) power_->advance(duration);
 }
