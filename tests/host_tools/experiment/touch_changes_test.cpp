@@ -83,8 +83,14 @@ TEST(TouchChanges, SayWhatTheyAre) {
   EXPECT_TRUE(changes.simulated_device().parameters.empty()) << "as from the factory";
 }
 
+/// Of a name or of a value: errors of different kinds.
 std::string refusal(const std::string& text, Touching touching = Touching::set_of_people) {
-  return thrown_message<std::exception>([&] { TouchChanges({text}, touching); });
+  try {
+    TouchChanges({text}, touching);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
 }
 
 TEST(TouchChanges, WhatIsNotToBeChangedIsRefusedWithWhatToDo) {
