@@ -372,11 +372,10 @@ TEST(AdaptiveGapSection, NeverSaysThatTheWaysItKnowsAreAll) {
   EXPECT_CONTAINS(words, "Others were not looked for");
 }
 
-TEST(Slopes, ASteeperLawCommandsMoreInEveryTouch) {
+TEST(Slopes, ASteeperLawIsWorthMoreWhereItFollowsTheVelocity) {
   const auto results = run_slopes(few_people(2), {2.4, 0.18}, quick_run());
   ASSERT_EQ(results.size(), 2U);
-  for (std::size_t mode = 0; mode < 3; ++mode)
-    EXPECT_GT(results[1].modes[mode].mean, results[0].modes[mode].mean) << mode;
+  EXPECT_GT(results[1].modes[0].mean, results[0].modes[0].mean + 500.0);
   const auto printed = run_approaches(few_people(2), {0.1}, quick_run());
   StiffnessRun one = quick_run();
   one.protocol.approach_speeds = {0.1};
