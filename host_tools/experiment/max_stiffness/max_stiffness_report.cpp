@@ -102,7 +102,7 @@ std::string speed_words(const MaxStiffnessStudy& study) {
   }
   return fmt::format(
       "Approach speeds are those that the hand intends. After a run-up of {:g} mm the handle "
-      "meets the wall at {} m/s where {} m/s were intended (plain wall, mean of the people).",
+      "meets the wall at {} m/s where {} m/s were intended (plain wall, mean of people and pushes).",
       study.run_up * 1e3, fmt::join(at_contact, ", "), fmt::join(intended, ", "));
 }
 

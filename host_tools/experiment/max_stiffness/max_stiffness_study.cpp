@@ -110,16 +110,18 @@ MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
   }
   const std::vector<MaxStiffness> results = run_stiffness_jobs(jobs, run);
   MaxStiffnessStudy study{set, run.protocol, run.steps, run.changes, 0.0, {}, {}};
+  const double touches_at_speed = static_cast<double>(set.subjects.size() * run.protocol.pushes.size());
   for (const double speed : run.protocol.approach_speeds) {
     study.contact_speeds.push_back({speed, 0.0});
     for (const Subject& subject : set.subjects) {
       TouchSetup setup = setup_of(subject, {});
       study.run_up = std::abs(setup.motion.start_position - setup.motion.wall_position);
       setup.motion.approach_speed = speed;
-      setup.motion.push_force = run.protocol.pushes.front();
       setup.wall.wall.stiffness = static_cast<float>(run.steps.first);
-      study.contact_speeds.back().at_contact +=
-          simulate_touch(setup).contact_speed / static_cast<double>(set.subjects.size());
+      for (const double push : run.protocol.pushes) {
+        setup.motion.push_force = push;
+        study.contact_speeds.back().at_contact += simulate_touch(setup).contact_speed / touches_at_speed;
+      }
     }
   }
   auto next = results.begin();

@@ -51,7 +51,7 @@ struct ConditionResult {
 };
 
 // How fast the hand wants to be, and how fast the handle is when it meets the plain wall: slower, where the
-// run-up is too short for the speed. m/s, mean of the people.
+// run-up is too short for the speed. m/s, mean of people and pushes.
 struct ContactSpeed {
   double intended, at_contact;
 };
@@ -62,7 +62,7 @@ struct MaxStiffnessStudy {
   StiffnessSteps steps;
   TouchChanges changes;
   double run_up = 0.0;                       // m
-  std::vector<ContactSpeed> contact_speeds;  // of the protocol's speeds, with its first push
+  std::vector<ContactSpeed> contact_speeds;  // of the protocol's speeds
   std::vector<ConditionResult> conditions;
   double simulated_time = 0.0;  // s
   std::uint64_t touches = 0;
