@@ -179,7 +179,7 @@ class HapticLoop {
   /// Ticks from now that would only hold what the last one gave.
   std::uint32_t held_ticks() const { return ticks_until_sample_; }
   /// In place of `ticks` > 0 calls of tick() or follow() that would only hold, with `enabled` as in the last
-  /// one. Beyond held_ticks() samples are left out. For a simulation; no board calls it, and none pays for it.
+  /// one. Beyond held_ticks() samples are left out. For a simulation; no board calls it or pays for it.
   void pass_held(std::uint32_t ticks) {
     ticks_until_sample_ -= ticks < ticks_until_sample_ ? ticks : ticks_until_sample_;
     held_.new_sample = false;

@@ -45,12 +45,12 @@ struct RunResult {
 /// Which of the 20,000 ticks a second the firmware runs.
 enum class RunTicks : std::uint8_t {
   every,
-  needed,  ///< not those that only hold a force between two haptic samples, board::NativeBoard::advance_held()
+  needed,  ///< not those that only hold a force between two samples, board::NativeBoard::advance_held()
 };
 
 /// Powers the scene's board up, arms its axes and lets the scene's duration pass. Everything goes through the
-/// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers, whichever
-/// ticks it runs; a scene without motor or encoder defects pays for its haptic ticks only, else for all.
+/// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers,
+/// whichever ticks it runs; a scene without motor or encoder defects pays for its haptic ticks only, else for all.
 RunResult run_scene(const simulation::Scene& scene, RunTicks ticks = RunTicks::needed);
 
 }  // namespace kmax::simulated_board
