@@ -105,8 +105,8 @@ class AxesTick {
       reports_[axis].ISR_publish([this, axis](AxisReport& report) { axes_[axis].ISR_fill(report); });
   }
   /// Ticks from now that would change nothing but the time on the first `present` axes, whose counts are
-  /// valid and which have no power stage; those beyond stand still. For a simulation that has nothing to gain from
-  /// ticks between two haptic samples: no board calls it, and none pays for it.
+  /// valid and which have no power stage; those beyond stand still. For a simulation that has nothing to gain
+  /// from ticks between two haptic samples: no board calls it, and none pays for it.
   std::uint32_t ISR_held_ticks(std::size_t present) const;
   /// In place of so many ticks, at most ISR_held_ticks().
   void ISR_pass_held(std::uint32_t ticks) {

@@ -50,7 +50,8 @@ enum class RunTicks : std::uint8_t {
 
 /// Powers the scene's board up, arms its axes and lets the scene's duration pass. Everything goes through the
 /// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers,
-/// whichever ticks it runs; a scene without motor or encoder defects pays for its haptic ticks only, else for all.
+/// whichever ticks it runs; a scene without motor or encoder defects pays for its haptic ticks only, else for
+/// all.
 RunResult run_scene(const simulation::Scene& scene, RunTicks ticks = RunTicks::needed);
 
 }  // namespace kmax::simulated_board
