@@ -43,6 +43,9 @@ inline constexpr int saturation_quanta = 3;
 ///
 ///   step = 2 (f_c/Delta - |B|/T)
 ///
+/// abbott_okamura by itself guarantees nothing where Td > 0: its source has no delay, and 2 b/T takes none
+/// into account. Where colgate is met its first part is met too; what it adds is the step, as in field_slope.
+///
 /// Finite inputs give finite values and bounds; what is not a number never passes where it is read. Float is
 /// enough: a handful of roundings, 1e-6 of the bound. Outside the interrupt: one or two divisions each.
 ///

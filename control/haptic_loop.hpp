@@ -176,6 +176,15 @@ class HapticLoop {
   /// What the last tick() or follow() gave.
   const Output& output() const { return held_; }
 
+  /// Ticks from now that would only hold what the last one gave.
+  std::uint32_t held_ticks() const { return ticks_until_sample_; }
+  /// In place of `ticks` > 0 calls of tick() or follow() that would only hold, with `enabled` as in the last
+  /// one. Beyond held_ticks() samples are left out. For a simulation; no board calls it or pays for it.
+  void pass_held(std::uint32_t ticks) {
+    ticks_until_sample_ -= ticks < ticks_until_sample_ ? ticks : ticks_until_sample_;
+    held_.new_sample = false;
+  }
+
   /// Distance of a count from the surface, m, > 0 in free space.
   static Scalar outside_distance(const Coefficients& c, std::int64_t position) {
     std::int64_t difference = position - c.wall_count;

@@ -78,6 +78,11 @@ class Application {
   /// main loop should be woken: what it reads then is of this tick.
   bool ISR_round_begins() const { return axes_.tick().ISR_round_begins(); }
 
+  /// For a simulation, see AxesTick: ticks from now that would change nothing but the time on the first
+  /// `present` axes, and what stands in place of so many of them.
+  std::uint32_t ISR_held_ticks(std::size_t present) const { return axes_.tick().ISR_held_ticks(present); }
+  void ISR_pass_held(std::uint32_t ticks) { axes_.tick().ISR_pass_held(ticks); }
+
   void poll(std::uint32_t now_us);
   /// Before poll(), as often as they change.
   void set_readings(const BoardReadings& readings) { axes_.set_readings(readings); }
@@ -108,6 +113,9 @@ class Application {
   Fault fault(std::size_t axis) const { return axes_.supervisor(axis).machine().fault(); }
   /// Of the last tick; for interrupt context, or where nothing interrupts.
   AxisReport ISR_report(std::size_t axis) const { return axes_.tick().ISR_report(axis); }
+  const control::HapticLoop<float>::Output& ISR_haptic(std::size_t axis) const {
+    return axes_.tick().ISR_haptic(axis);
+  }
   /// Likewise, N, outwards: what a simulated person answers to.
   float ISR_background_force(std::size_t axis) const { return axes_.tick().ISR_background_force(axis); }
 

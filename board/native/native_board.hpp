@@ -44,6 +44,17 @@ concept HeldDevice = requires(Device device, std::size_t axis, float force) {
   {device.set_background_force(axis, force)};
 };
 
+/// A device of which, at times, nothing but its mechanics passes between two haptic samples.
+template <typename Device>
+concept HoldingDevice = SimulatedDevice<Device> && requires(Device device, double s, std::uint32_t times) {
+  /// No currents, and no encoder whose every look shows something else: no look is missed.
+  { device.only_moves() } -> std::same_as<bool>;
+  /// Axes beyond these stand still.
+  { device.axis_count() } -> std::same_as<std::size_t>;
+  /// advance(s), so many times, under what drives it now.
+  {device.advance(s, times)};
+};
+
 /// The firmware on x86: the same Application, fed by a simulated device, in virtual time.
 ///
 /// Time passes only in advance(), in ticks of 50 us, and everything in it is deterministic: the same calls
@@ -108,6 +119,26 @@ class NativeBoard {
     for (std::uint64_t i = 0; i < ticks; ++i) tick();
   }
 
+  /// Lets pass, of the next `most` ticks, those that would only hold the force between two haptic samples,
+  /// without running them: the device moves through each of them all the same, so that every number is the
+  /// one that advance() would have given, to the last bit. The main loop runs again in the next tick. Returns
+  /// how many passed: none unless nobody speaks to the board, its device only moves, and the axes are as they
+  /// were in the tick before.
+  std::uint64_t advance_held(std::uint64_t most) {
+    if constexpr (HoldingDevice<Device>) {
+      if (!device_.only_moves() || somebody_speaks()) return 0;
+      const std::uint64_t held = application_->ISR_held_ticks(device_.axis_count());
+      const auto ticks = static_cast<std::uint32_t>(held < most ? held : most);
+      if (ticks == 0) return 0;
+      device_.advance(static_cast<double>(tick_us) * 1e-6, ticks);
+      now_us_ += std::uint64_t{tick_us} * ticks;
+      application_->ISR_pass_held(ticks);
+      return ticks;
+    } else {
+      return 0;
+    }
+  }
+
   std::uint64_t now_us() const { return now_us_; }
   const firmware::TickOutput& output() const { return output_; }
 
@@ -120,6 +151,11 @@ class NativeBoard {
 
   std::uint64_t character_us() const {
     return firmware::modbus::rtu_timing(application_->serial().settings().baud_rate, {}).character_us;
+  }
+
+  bool somebody_speaks() const {
+    return !incoming_.empty() || sending_until_us_ != 0 || !can_incoming_.empty() ||
+           can_.state == firmware::CanState::active;
   }
 
   firmware::AxisInput sample(std::size_t axis) {

@@ -104,6 +104,18 @@ class AxesTick {
     if (ISR_round_begins())
       reports_[axis].ISR_publish([this, axis](AxisReport& report) { axes_[axis].ISR_fill(report); });
   }
+  /// Ticks from now that would change nothing but the time on the first `present` axes, whose counts are
+  /// valid and which have no power stage; those beyond stand still. For a simulation that has nothing to gain
+  /// from ticks between two haptic samples: no board calls it, and none pays for it.
+  std::uint32_t ISR_held_ticks(std::size_t present) const;
+  /// In place of so many ticks, at most ISR_held_ticks().
+  void ISR_pass_held(std::uint32_t ticks) {
+    ticks_ += ticks;
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      axes_[axis].ISR_pass_held(ticks);
+      reports_[axis].ISR_publish([this, axis](AxisReport& report) { axes_[axis].ISR_fill(report); });
+    }
+  }
   /// What the slot of `axis` needs of samples that were all taken at the same time.
   static const SlotInput& ISR_slot_input(const Inputs& inputs, std::size_t axis) {
     if constexpr (needs_all_positions) {
@@ -117,6 +129,9 @@ class AxesTick {
   bool ISR_round_begins() const { return ticks_ % round_ticks == 1; }
   /// Of the last tick; also where nothing interrupts.
   AxisReport ISR_report(std::size_t axis) const { return axes_[axis].ISR_report(); }
+  const control::HapticLoop<float>::Output& ISR_haptic(std::size_t axis) const {
+    return axes_[axis].ISR_haptic();
+  }
   float ISR_background_force(std::size_t axis) const {
     return axes_[axis].ISR_background_force(settings_.ISR_current().axis[axis]);
   }
@@ -175,6 +190,22 @@ const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axi
   if (capture_.ISR_wants(axis)) [[unlikely]]
     ISR_capture(axis, input, output);
   return output;
+}
+
+template <std::size_t axes, typename Law>
+requires AxesLaw<Law, axes> std::uint32_t AxesTick<axes, Law>::ISR_held_ticks(std::size_t present)
+const {
+  if (!settings_.taken() || main_loop_stands_) return 0;
+  std::uint32_t least = UINT32_MAX;
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    if (capture_.ISR_wants(axis)) return 0;
+    if (axis >= present) continue;
+    if (force_share_[axis].load(std::memory_order_relaxed) != 1.0f) return 0;
+    const bool enable = enabled_[axis].load(std::memory_order_relaxed);
+    const std::uint32_t held = axes_[axis].ISR_held_ticks(settings_.ISR_current().axis[axis], enable);
+    least = held < least ? held : least;
+  }
+  return present == 0 ? 0 : least;
 }
 
 template <std::size_t axes, typename Law>

@@ -151,6 +151,20 @@ class Axis {
     const bool rendering = output_.enabled && setting.mode == DriveMode::haptic;
     return rendering ? loop_.background_force(setting.haptic) : 0.0f;
   }
+  /// Ticks from now that would change nothing but the time, on an axis without a power stage: it follows its
+  /// wall, or is idle, between two haptic samples. 0 wherever a tick may do more. `enable`: as it will be.
+  /// For a simulation, as ISR_pass_held().
+  std::uint32_t ISR_held_ticks(const AxisSetting& setting, bool enable) const {
+    const bool steady = changes_ == 0 && trip_ == Fault::none && output_.enabled == enable &&
+                        generation_ == setting.generation && setting.mode != DriveMode::excitation &&
+                        !(setting.compensation.limit > 0.0f);
+    return steady ? loop_.held_ticks() : 0;
+  }
+  /// In place of so many ticks.
+  void ISR_pass_held(std::uint32_t ticks) {
+    tick_ += ticks;
+    loop_.pass_held(ticks);
+  }
   /// Of the last tick: the encoder's extended count, before offset and direction.
   std::int64_t ISR_counted() const { return extender_.count(); }
   Fault ISR_fault() const { return trip_; }

@@ -117,7 +117,7 @@ std::string conclusion(const Judgement& judgement, std::size_t width) {
   const control::CriterionResult<double>&exact = of(Criterion::sampled_eigenvalues),
         &gil = of(Criterion::gil);
   const control::StabilityCase<double>& c = judgement.stability_case;
-  const bool guaranteed = judgement.pass_of(Worth::guarantee);
+  const bool guaranteed = judgement.guarantees_met();
   const bool held = c.hand.hand_mass > 0;
   std::string text = judgement.pass ? "pass: every criterion that applies is met. "
                                     : "no pass: at least one criterion that applies is not met. ";

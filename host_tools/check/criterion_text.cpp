@@ -36,12 +36,14 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "a device.mass and a delay of at most 8 periods",
      "K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, chapter on sampling of continuous-time "
      "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012."},
-    {Criterion::abbott_okamura, Worth::guarantee, "N/m", "K",
+    {Criterion::abbott_okamura, Worth::heuristic, "N/m", "K",
      "<=", "min(2 b / T, 2 (f_c / quantum - |B| / T))",
      "A spring wall without delay on a mass with Coulomb and viscous friction whose encoder has this "
      "quantum; any hand. Necessary and sufficient for passivity of that wall without B. A damper by "
      "difference or low_pass adds up to |B| quantum / T to the step of the force, which friction must hold "
-     "too (own derivation). 2 b / T knows neither T_d nor B: read it together with colgate.",
+     "too (own derivation). 2 b / T knows neither T_d nor B, and no device is "
+     "without T_d: by itself it guarantees nothing. A guarantee needs colgate, which has the delay, and from "
+     "here the step.",
      "",
      "J. J. Abbott and A. M. Okamura, Effects of position quantization and sampling rate on virtual-wall "
      "passivity, IEEE Trans. Robotics 21(5), 2005."},

@@ -36,9 +36,14 @@ bool Judgement::pass_of(Worth worth) const {
   });
 }
 
+bool Judgement::guarantees_met() const {
+  return pass_of(Worth::guarantee) &&
+         verdicts[static_cast<std::size_t>(control::Criterion::abbott_okamura)].result.pass;
+}
+
 bool Judgement::guaranteed() const {
   const bool anything = !has_no_wall(stability_case) || stability_case.magnetic_coefficient > 0;
-  return anything && pass_of(Worth::guarantee) && !follows_velocity && !uncovered_damper;
+  return anything && guarantees_met() && !follows_velocity && !uncovered_damper;
 }
 
 bool has_no_wall(const control::StabilityCase<double>& c) {

@@ -42,6 +42,8 @@ struct Judgement {
   bool uncovered_damper = false;  ///< B with a velocity that is neither a difference nor a low-passed one
 
   bool pass_of(Worth worth) const;
+  /// All that a guarantee asks for: what guarantees, and the step of abbott_okamura, which no delay changes.
+  bool guarantees_met() const;
 
   /// Stable with every passive hand, as far as the assumptions hold: the guarantees are met, there is
   /// something to guarantee, and nothing of the law is left out of them.

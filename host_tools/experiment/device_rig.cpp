@@ -63,6 +63,11 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
     case control::WallKind::adaptive:
       add_field("wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode));
   }
+  for (const std::string& change : wall.changes) {
+    const std::string name = change.substr(0, change.find('=') + 1);
+    std::erase_if(all, [&](const std::string& one) { return one.starts_with(name); });
+    all.push_back(change);
+  }
   if (axes == RigAxes::wall_along)
     for (const std::string& one :
          {std::string("wall.law=none"), std::string("position.resolution=0"),

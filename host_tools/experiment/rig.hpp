@@ -29,6 +29,8 @@ struct RigWall {
   control::WallKind law = control::WallKind::plain;
   double magnetic_coefficient = 0.0;  ///< N, of the magnetic law
   control::AdaptiveMode mode = control::AdaptiveMode::instant;
+  /// NAME=VALUE, on a device, in place of what is said above or beside it.
+  std::vector<std::string> changes{};
 };
 
 /// F_I or F_B during a touch.

@@ -10,9 +10,16 @@ namespace kmax::simulated_board {
 namespace {
 constexpr std::size_t controlword_entry = firmware::entry_of<"drive.controlword">();
 
+/// One tick, and those behind it that only hold: at most `most` in all.
+std::uint64_t advance(SimulatedBoard& simulation, RunTicks ticks, std::uint64_t most) {
+  simulation.board().advance(1);
+  return 1 + (ticks == RunTicks::every ? 0 : simulation.board().advance_held(most - 1));
+}
+
 /// Lets the settings arrive, then walks all axes of the scene to "operation enabled" together.
-void arm(SimulatedBoard& simulation, std::size_t axes) {
-  simulation.board().advance(firmware::tick_rate_hz / 10);
+void arm(SimulatedBoard& simulation, std::size_t axes, RunTicks ticks) {
+  constexpr std::uint64_t settling = firmware::tick_rate_hz / 10;
+  for (std::uint64_t tick = 0; tick < settling;) tick += advance(simulation, ticks, settling - tick);
   for (const std::uint32_t word : {0x06u, 0x07u, 0x0Fu}) {
     for (std::size_t axis = 0; axis < axes; ++axis)
       simulation.board().application().preset(controlword_entry, axis, word);
@@ -61,7 +68,7 @@ std::optional<simulation::ContactMeasure> judge(const simulation::Scene& scene, 
 }
 }  // namespace
 
-RunResult run_scene(const simulation::Scene& scene) {
+RunResult run_scene(const simulation::Scene& scene, RunTicks which) {
   const auto real_begin = std::chrono::steady_clock::now();
   SimulatedBoard simulation(scene);
   firmware::Application& application = simulation.board().application();
@@ -70,7 +77,7 @@ RunResult run_scene(const simulation::Scene& scene) {
   RunResult result;
   const std::size_t axes = scene.axes.size();
   result.samples.resize(axes);
-  arm(simulation, axes);
+  arm(simulation, axes, which);
   result.axis = axis_to_report(application, axes);
   result.end_state = application.state(result.axis);
   result.refusal = application.refusal(result.axis);
@@ -79,21 +86,27 @@ RunResult run_scene(const simulation::Scene& scene) {
   for (std::size_t axis = 0; axis < axes; ++axis)
     lengths[axis] = firmware::count_length(application.values(), axis);
   const auto ticks = static_cast<std::uint64_t>(scene.duration * firmware::tick_rate_hz + 0.5);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const auto divider = firmware::haptic_configuration(application.values(), axis).divider;
+    result.samples[axis].reserve(ticks / divider + 1);
+  }
   const simulation::CoupledHandle& handle = simulation.device().handle(0);
-  for (std::uint64_t tick = 0; tick < ticks; ++tick) {
+  for (std::uint64_t tick = 0; tick < ticks; ++result.firmware_ticks) {
     std::array<RunSample, firmware::axis_count> samples{};
     const double time = static_cast<double>(tick) / firmware::tick_rate_hz;
     for (std::size_t axis = 0; axis < axes; ++axis)
       samples[axis] = seen(simulation.device().handle(axis), time);
     simulation.board().advance(1);
+    ++tick;
     for (std::size_t axis = 0; axis < axes; ++axis) {
-      const auto& haptic = application.ISR_report(axis).haptic;
+      const auto& haptic = application.ISR_haptic(axis);
       if (!haptic.new_sample) continue;
       add_report(samples[axis], haptic, lengths[axis]);
       if (axis == 0 && haptic.unstable && !result.first_alarm) result.first_alarm = time;
       samples[axis].applied_force = simulation.device().handle(axis).applied_force();
       result.samples[axis].push_back(samples[axis]);
     }
+    if (which == RunTicks::needed) tick += simulation.board().advance_held(ticks - tick);
   }
   const auto& report = application.ISR_report(0);
   result.axis = axis_to_report(application, axes);

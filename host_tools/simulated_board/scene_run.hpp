@@ -39,10 +39,19 @@ struct RunResult {
   double clipped_share = 0;                           ///< of the ticks, by the device
   std::int64_t lost_edges = 0;                        ///< by an encoder without a motor that loses some
   double simulated_s = 0, real_s = 0;
+  std::uint64_t firmware_ticks = 0;  ///< since arming, that the firmware ran
+};
+
+/// Which of the 20,000 ticks a second the firmware runs.
+enum class RunTicks : std::uint8_t {
+  every,
+  needed,  ///< not those that only hold a force between two samples, board::NativeBoard::advance_held()
 };
 
 /// Powers the scene's board up, arms its axes and lets the scene's duration pass. Everything goes through the
-/// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers.
-RunResult run_scene(const simulation::Scene& scene);
+/// firmware: no shortcut around its sampling, limits or states. The same scene gives the same numbers,
+/// whichever ticks it runs; a scene without motor or encoder defects pays for its haptic ticks only, else for
+/// all.
+RunResult run_scene(const simulation::Scene& scene, RunTicks ticks = RunTicks::needed);
 
 }  // namespace kmax::simulated_board

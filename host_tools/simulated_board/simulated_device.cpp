@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -58,11 +59,22 @@ void SimulatedDevice::set_background_force(std::size_t axis, float force) {
 }
 
 void SimulatedDevice::advance(double duration) {
+  advance(duration, 1);
+}
+
+void SimulatedDevice::advance(double duration, std::uint32_t times) {
   for (auto& axis : axes_) {
     if (!axis || (!axis->let_go && !axis->handle.has_operator())) continue;
-    axis->handle.advance(static_cast<double>(axis->output.force), background_force(*axis), duration);
+    const auto force = static_cast<double>(axis->output.force);
+    const double background = background_force(*axis);
+    axis->handle.advance(force, background, duration, times);
   }
-  if (power_) power_->advance(duration);
+  for (std::uint32_t n = 0; power_ && n < times; ++n) power_->advance(duration);
+}
+
+bool SimulatedDevice::only_moves() const {
+  return !power_ && std::none_of(axes_.begin(), axes_.end(),
+                                 [](const auto& axis) { return axis && !axis->encoder.ideal(); });
 }
 
 /// What the hand on the axis answers to: the axes that one person holds stand at right angles.

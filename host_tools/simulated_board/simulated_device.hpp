@@ -38,6 +38,10 @@ class SimulatedDevice {
   /// N, outwards, from now on.
   void set_background_force(std::size_t axis, float force);
   void advance(double duration);
+  /// So many times, with what drives it unchanged.
+  void advance(double duration, std::uint32_t times);
+  /// board::HoldingDevice: no axis has a motor, and every encoder that is there is ideal.
+  bool only_moves() const;
   firmware::BoardReadings readings() const { return power_ ? power_->readings() : firmware::BoardReadings{}; }
   float supply_ceiling() const { return power_ ? power_->supply_ceiling() : 0.0f; }
   void poll(const firmware::Application& application, std::uint32_t now_us) {

@@ -169,6 +169,26 @@ void CoupledHandle::advance(double force, double background_force, double durati
   }
 }
 
+void CoupledHandle::advance(double force, double background_force, double duration, std::uint32_t times) {
+  if (times == 0) return;
+  // What is asked of the arguments, and whatever takes more than one piece.
+  advance(force, background_force, duration);
+  if (device_.delay != 0.0 || duration > longest_piece) {
+    for (std::uint32_t n = 1; n < times; ++n) advance(force, background_force, duration);
+    return;
+  }
+  const bool clipped = applied_force_ != force;
+  samples_ += times - 1;
+  clipped_samples_ += clipped ? times - 1 : 0;
+  const double background = std::abs(background_force);
+  std::visit(
+      [&](auto& motion) {
+        for (std::uint32_t n = 1; n < times; ++n)
+          advance_piece_of(motion, applied_force_, background, duration);
+      },
+      chain_motion_);
+}
+
 void CoupledHandle::advance_in_pieces(double force, double background, double duration) {
   applied_force_ = force;
   const int pieces = duration <= longest_piece || !has_operator_

@@ -83,6 +83,8 @@ class CoupledHandle {
   // push, and is not added to `force`. Throws std::invalid_argument for a value that is not finite or a
   // duration out of range.
   void advance(double force, double background_force, double duration);
+  // So many times, to the last bit, and faster.
+  void advance(double force, double background_force, double duration, std::uint32_t times);
 
   // Holds the handle where it is, at once and against any force, or lets it go again; the person goes on.
   void block(bool blocked);

@@ -87,6 +87,9 @@ class AxisEncoder {
     return lines_ ? static_cast<std::uint32_t>(lines_->edges()) : ideal_.counts(position);
   }
 
+  // Every look shows where the handle is, however many there were before.
+  bool ideal() const { return !lines_; }
+
   // By dropouts, number of.
   std::int64_t lost_edges() const { return lines_ ? lines_->lost_edges() : 0; }
 

@@ -67,10 +67,11 @@ int main(int argc, char** argv) {
   }
   try {
     using namespace benchmark;
-    const report::Page page{"Speed and error",
-                            {introduction(), integrator_section(pictures), velocity_section(pictures),
-                             sine_section(pictures), square_root_section(pictures), field_section(pictures),
-                             tick_section(pictures), image_section(pictures, budget)}};
+    const report::Page page{
+        "Speed and error",
+        {introduction(), integrator_section(pictures), scene_section(), velocity_section(pictures),
+         sine_section(pictures), square_root_section(pictures), field_section(pictures),
+         tick_section(pictures), image_section(pictures, budget)}};
     const std::string folder =
         pictures.has_filename() ? pictures.filename().string() : pictures.parent_path().filename().string();
     fmt::print("{}", with_folder(report::markdown(page), page, folder));

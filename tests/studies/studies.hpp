@@ -95,7 +95,8 @@ struct HeldWallResult {
   double median_worst() const;  ///< m
 };
 
-/// Nothing is fitted to it. The paper shows one person, about whom it says nothing.
+/// Nothing is fitted to it itself, but without a field and with 2 N the fitted means imply it. The paper
+/// shows one person, about whom it says nothing.
 std::vector<HeldWallResult> hold_walls(const SubjectSet& set, double stiffness, const StiffnessRun& run);
 report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results);
 
@@ -174,10 +175,11 @@ report::Section variation_section(const std::string& heading, const std::vector<
 // --- What would make the adaptive wall reach the 8.02 N/mm of Fig. 8 (adaptive_gap.cpp) --------------------
 
 struct ApproachResult {
-  double approach_speed = 0.0;  ///< m/s, the only one of the touches
+  double approach_speed = 0.0;  ///< m/s, intended, the only one of the touches
   /// F_MC = 2 N constant; instant, latched, peak_hold; peak_hold whose hold is far longer than the touch.
   std::array<PeopleMean, 5> walls{};
   double coefficient_at_contact = 0.0;  ///< N, mean, of the last wall at its largest stiffness
+  double speed_at_contact = 0.0;        ///< m/s, likewise
 };
 std::vector<ApproachResult> run_approaches(const SubjectSet& set, const std::vector<double>& speeds,
                                            const StiffnessRun& run);
@@ -189,6 +191,16 @@ struct NeededCoefficient {
 };
 /// Searched between 0 and 4 N, all touches of the run's protocol.
 NeededCoefficient coefficient_for(const SubjectSet& set, double target, const StiffnessRun& run);
+
+/// Eq. 7 with another V_max: what it would be if the speed were counted in another unit.
+struct SlopeResult {
+  double velocity_max = 0.0;          ///< m/s
+  std::array<PeopleMean, 3> modes{};  ///< instant, latched, peak_hold
+};
+std::vector<SlopeResult> run_slopes(const SubjectSet& set, const std::vector<double>& velocities,
+                                    const StiffnessRun& run);
+/// As a hypothesis, with what speaks against it.
+report::Section slope_section(const SubjectSet& set, const std::vector<SlopeResult>& slopes);
 
 report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<ApproachResult>& approaches,
                                      const NeededCoefficient& needed);

@@ -109,6 +109,28 @@ TEST(HeldWalls, TheTableSaysWhatAgreesWithThePaper) {
   EXPECT_EQ(table.rows[1][5], "yes");
 }
 
+TEST(HeldWalls, WhatLiesBetweenTheFittedMeansIsNoTest) {
+  std::vector<HeldWallResult> results(3);
+  const auto conditions = experiment::stiffness_conditions();
+  for (std::size_t n = 0; n < results.size(); ++n) results[n].condition = conditions[2 * n];
+  const auto worth_of = [&](const SubjectSet& set) {
+    Row worth;
+    const report::Table table = held_wall_section(set, results).tables.at(0);
+    for (const Row& row : table.rows) worth.push_back(row.back());
+    return worth;
+  };
+  SubjectSet set = two_people();
+  EXPECT_EQ(worth_of(set), (Row{"predicted", "predicted", "predicted"}));
+  EXPECT_CONTAINS(paragraphs_of(held_wall_section(set, results)), "Nothing was fitted to these people");
+  set.fitted = experiment::Fitted{3580.0, 8410.0, set.device.force_limit};
+  EXPECT_EQ(worth_of(set), (Row{"implied by the fit", "predicted", "implied by the fit"}));
+  const std::string words = paragraphs_of(held_wall_section(set, results));
+  EXPECT_CONTAINS(words, "Figs. 9 and 11 are implied by that fit");
+  EXPECT_EQ(words.find("Nothing was fitted"), std::string::npos) << words;
+  set.fitted->force_limit = 0.0;  // of another device
+  EXPECT_EQ(worth_of(set)[0], "predicted");
+}
+
 // --- Causes -----------------------------------------------------------------------------------------------
 
 TEST(CauseCondition, NothingOfTheFieldIsLeftWhereItIsSwitchedOff) {
@@ -257,6 +279,7 @@ TEST(VariationSection, AMissedFitIsSaidAndNothingIsRobustWithIt) {
   EXPECT_EQ(clean.tables[0].rows[0][3], "met");
   EXPECT_EQ(clean.tables[0].rows[1][3], "-");
   EXPECT_TRUE(clean.paragraphs[0].starts_with("Robust: ")) << clean.paragraphs[0];
+  EXPECT_CONTAINS(clean.paragraphs.back(), "fitted again, all three means of the paper come out");
   EXPECT_CONTAINS(clean.paragraphs[0], "(2 of 2)");
   const report::Section missed = variation_section("x", {good, plain, magnetic, both});
   EXPECT_EQ(missed.tables[0].rows[1][3], "missed: plain");
@@ -318,7 +341,7 @@ TEST(AdaptiveGap, AHeldCoefficientIsWorthMoreTheFasterTheApproach) {
 }
 
 ApproachResult approach(double speed, double best) {
-  ApproachResult result{speed, {}, 1.3};
+  ApproachResult result{speed, {}, 1.3, 0.04};
   const auto means = means_of({9000.0, best - 500.0, best, best - 100.0, 7000.0});
   std::copy(means.begin(), means.end(), result.walls.begin());
   return result;
@@ -329,16 +352,52 @@ TEST(AdaptiveGapSection, TheWordsFollowTheNumbers) {
       adaptive_gap_section(two_people(), {approach(0.05, 8300.0), approach(0.5, 5000.0)}, {1.9, 8000.0, 1.1});
   EXPECT_CONTAINS(slow_helps.heading, "8.02 N/mm");
   EXPECT_CONTAINS(paragraphs_of(slow_helps), "a constant F_MC of 1.90 N gives 8.00 N/mm");
-  EXPECT_CONTAINS(paragraphs_of(slow_helps), "approach of 1.10 m/s");
+  EXPECT_CONTAINS(paragraphs_of(slow_helps), "where the handle moves at 1.10 m/s");
   EXPECT_CONTAINS(paragraphs_of(slow_helps), "at 0.05 m/s alone the best mode reaches 8.30 N/mm");
   EXPECT_CONTAINS(paragraphs_of(slow_helps), "the study \"assumptions\"");
-  EXPECT_EQ(slow_helps.tables[0].rows[0], (Row{"0.05", "9.00", "7.80", "8.30", "8.20", "7.00", "1.30"}));
+  EXPECT_EQ(slow_helps.tables[0].rows[0],
+            (Row{"0.05", "0.04", "9.00", "7.80", "8.30", "8.20", "7.00", "1.30"}));
   const std::string neither = paragraphs_of(adaptive_gap_section(
       two_people(), {approach(0.05, 5000.0), approach(0.5, 5000.0)}, {4.0, 6000.0, 3.2}));
-  EXPECT_EQ(neither.find("as the law is printed"), std::string::npos) << neither;
-  EXPECT_EQ(neither.find("The other way"), std::string::npos) << neither;
+  EXPECT_EQ(neither.find("One way"), std::string::npos) << neither;
+  EXPECT_EQ(neither.find("Another is"), std::string::npos) << neither;
   EXPECT_CONTAINS(neither, "gives 6.00 N/mm, the nearest to 8.02 N/mm");
   EXPECT_CONTAINS(neither, "is no way");
+}
+
+TEST(AdaptiveGapSection, NeverSaysThatTheWaysItKnowsAreAll) {
+  const std::string words = paragraphs_of(adaptive_gap_section(
+      two_people(), {approach(0.05, 8300.0), approach(0.5, 5000.0)}, {1.9, 8000.0, 1.1}));
+  EXPECT_EQ(words.find("needs touches"), std::string::npos) << words;
+  EXPECT_CONTAINS(words, "Others were not looked for");
+}
+
+TEST(Slopes, ASteeperLawIsWorthMoreWhereItFollowsTheVelocity) {
+  const auto results = run_slopes(few_people(2), {2.4, 0.18}, quick_run());
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_GT(results[1].modes[0].mean, results[0].modes[0].mean + 500.0);
+  const auto printed = run_approaches(few_people(2), {0.1}, quick_run());
+  StiffnessRun one = quick_run();
+  one.protocol.approach_speeds = {0.1};
+  EXPECT_EQ(run_slopes(few_people(2), {2.4}, one)[0].modes[0].mean, printed[0].walls[1].mean);
+}
+
+TEST(SlopeSection, IsAHypothesisWithWhatSpeaksAgainstIt) {
+  const auto slope = [](double velocity_max, double instant) {
+    SlopeResult result{velocity_max, {}};
+    const auto means = means_of({instant, 5000.0, 5000.0});
+    std::copy(means.begin(), means.end(), result.modes.begin());
+    return result;
+  };
+  const report::Section reached = slope_section(two_people(), {slope(2.4, 4900.0), slope(0.18, 7900.0)});
+  EXPECT_CONTAINS(reached.heading, "hypothesis");
+  EXPECT_EQ(reached.tables[0].rows[1], (Row{"0.18", "x 13.3", "7.90", "5.00", "5.00"}));
+  EXPECT_CONTAINS(paragraphs_of(reached), "instant with 0.18 m/s (7.90)");
+  for (const char* part : {"For it:", "Against it:", "What would decide it:"})
+    EXPECT_CONTAINS(paragraphs_of(reached), part);
+  const std::string not_reached = paragraphs_of(slope_section(two_people(), {slope(0.18, 6000.0)}));
+  EXPECT_CONTAINS(not_reached, "With none of these");
+  EXPECT_EQ(not_reached.find("For it:"), std::string::npos) << not_reached;
 }
 
 TEST(AdaptiveGapSection, MarksMeansThatHoldBounds) {
@@ -347,7 +406,8 @@ TEST(AdaptiveGapSection, MarksMeansThatHoldBounds) {
   slow.walls[2].ends = {0, 2};
   slow.walls[4].ends = {0, 1};
   const report::Section section = adaptive_gap_section(two_people(), {slow}, {});
-  EXPECT_EQ(section.tables[0].rows[0], (Row{"0.05", "<9.00", "7.80", ">8.30", "8.20", ">7.00", "1.30"}));
+  EXPECT_EQ(section.tables[0].rows[0],
+            (Row{"0.05", "0.04", "<9.00", "7.80", ">8.30", "8.20", ">7.00", "1.30"}));
   EXPECT_CONTAINS(paragraphs_of(section), "constant 2 N at 0.05 m/s: 1 of 2");
   EXPECT_CONTAINS(paragraphs_of(section),
                   "latched at 0.05 m/s: 2 of 2; held for the whole touch at 0.05 m/s: 1 of 2");

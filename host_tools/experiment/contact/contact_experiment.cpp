@@ -75,9 +75,8 @@ ContactResult worst_of(std::vector<ContactResult> trials) {
 }
 
 ContactResult run_contact(Rig& rig, const ContactCondition& condition, const ContactSettings& settings) {
-  RigWall wall = condition.wall;
+  RigWall wall = settings.wall_of(condition.wall);
   wall.stiffness = settings.stiffness;
-  wall.haptic_rate = settings.haptic_rate;
   TouchPlan plan;
   plan.wall = wall;
   plan.name = condition.name;
@@ -87,11 +86,13 @@ ContactResult run_contact(Rig& rig, const ContactCondition& condition, const Con
   return rig.touch<ContactResult>(plan, [&](RigTouch touch) {
     ContactResult result;
     result.condition = condition;
+    result.papers_wall = settings.papers_wall();
     result.measure = touch.judgement;
     result.surface = touch.surface;
     result.side = touch.side;
     result.judged_to = settings.hold_time;
     result.judged_from = settings.hold_time - std::min(1.0, settings.hold_time);
+    result.contact_speed = touch.speed;
     result.limited_share = touch.limited_share;
     result.lost_records = touch.lost_records;
     result.aborted_at = touch.aborted_at;

@@ -30,12 +30,11 @@ DeviceStiffnessTouch touch_once(Rig& rig, const StiffnessCondition& condition,
                                 std::size_t trial) {
   RigWall wall;
   wall.stiffness = stiffness;
-  wall.haptic_rate = settings.touch.haptic_rate;
   wall.law = condition.law;
   wall.magnetic_coefficient = condition.magnetic_coefficient;
   wall.mode = condition.mode;
   TouchPlan plan;
-  plan.wall = wall;
+  plan.wall = settings.touch.wall_of(wall);
   plan.name =
       fmt::format("{}, {:g} N/mm, touch {} of {}", condition.name, stiffness / 1000, trial, settings.trials);
   plan.key = fmt::format("{}, {} N/m, touch {}", condition.name, stiffness, trial);
@@ -78,6 +77,7 @@ RunJournal::Json journal_settings(device::Device& device, const TouchLimits& lim
   return touch_settings("max-stiffness", device, limits,
                         {{"position_resolution_m", 0},
                          {"haptic_rate_hz", settings.touch.haptic_rate},
+                         {"changed", settings.touch.changes.words()},
                          {"hold_time_s", settings.touch.hold_time},
                          {"threshold_m", settings.touch.threshold},
                          {"start_n_per_m", settings.start},

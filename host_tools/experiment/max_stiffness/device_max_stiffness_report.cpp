@@ -92,7 +92,7 @@ report::Table device_touch_table(const std::vector<DeviceStiffnessResult>& resul
 std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& settings,
                                                 const TouchLimits& limits, const std::string& device) {
   const ContactSettings& touch = settings.touch;
-  return {
+  std::vector<std::string> words = {
       fmt::format("Largest stable stiffness on {}, axis {}, at {:g} Hz: from {:g} N/mm ({:g} N/mm for "
                   "adaptive walls) in steps of {:g} N/mm, {} at each, held for {:g} s.",
                   device, limits.axis, touch.haptic_rate, settings.start / 1000,
@@ -103,6 +103,8 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
           "Unstable: more than {:g} mm peak to peak in every quarter of the last second, or more than {:g} "
           "mm within 0.25 s, at which the host ended the touch. The force is limited to {:g} N or less.",
           touch.threshold * 1000, limits.abort_amplitude * 1000, limits.force_limit)};
+  if (!touch.changes.empty()) words.push_back(touch.changes.sentence());
+  return words;
 }
 
 std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,

@@ -75,6 +75,44 @@ report::Table marked_table(const std::vector<MaxStiffnessStudy>& studies, Marked
   return table;
 }
 
+std::string start_words(const MaxStiffnessStudy& study) {
+  const StiffnessSteps& steps = study.steps;
+  const double adaptive = steps.first_adaptive.value_or(steps.first);
+  std::string words = fmt::format("The search begins at {:g} N/mm", steps.first / 1e3);
+  if (adaptive != steps.first) words += fmt::format(" ({:g} N/mm for the adaptive wall)", adaptive / 1e3);
+  if (steps.goes_down) words += " and goes down where that is unstable, of which the paper says nothing";
+  if (steps.first == paper::search_start && adaptive == paper::search_start_adaptive)
+    return words + ". It is the paper's start.";
+  words += fmt::format("; the paper's at {:g}, and at {:g} for the adaptive wall", paper::search_start / 1e3,
+                       paper::search_start_adaptive / 1e3);
+  const ConditionResult* plain = constant_of(study, 0.0);
+  if (plain == nullptr) return words + ".";
+  const auto below = std::count_if(
+      plain->subjects.begin(), plain->subjects.end(),
+      [](const MaxStiffness& one) { return !one.never_touched && one.stiffness < paper::search_start; });
+  return words + fmt::format(". Of {} people {} have no stable plain wall there ({}).",
+                             plain->subjects.size(), below, clip_words(study.set.device));
+}
+
+std::string speed_words(const MaxStiffnessStudy& study) {
+  std::vector<std::string> intended, at_contact;
+  for (const ContactSpeed& speed : study.contact_speeds) {
+    intended.push_back(fmt::format("{:g}", speed.intended));
+    at_contact.push_back(fmt::format("{:.2g}", speed.at_contact));
+  }
+  return fmt::format(
+      "Approach speeds are those that the hand intends. After a run-up of {:g} mm the handle "
+      "meets the wall at {} m/s where {} m/s were intended (plain wall, mean of people and pushes).",
+      study.run_up * 1e3, fmt::join(at_contact, ", "), fmt::join(intended, ", "));
+}
+
+/// What of the numbers can be right by itself.
+constexpr auto worth_words =
+    "Two numbers of the model were fitted to two of the paper's three means, so those two test nothing, and "
+    "that a constant 2 N allows more than no field is implied by the fit. The paper prints no other mean of "
+    "a "
+    "constant field. The only mean that tests the model is the adaptive wall's.";
+
 void append(std::vector<std::string>& to, const std::vector<std::string>& more) {
   to.insert(to.end(), more.begin(), more.end());
 }
@@ -149,7 +187,12 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
       any_calibrated(studies) ? "\"Calibrated\" means that friction and activation were fitted to this very "
                                 "number; everything else is predicted, without another fit."
                               : "Everything is predicted: friction and activation are as the set has them, "
-                                "and were not fitted for these people and this force limit."));
+                                "and were not fitted for these people, this force limit and these touches."));
+  if (any_calibrated(studies)) section.paragraphs.emplace_back(worth_words);
+  section.paragraphs.push_back(start_words(first));
+  if (!first.contact_speeds.empty()) section.paragraphs.push_back(speed_words(first));
+  if (!first.changes.empty())
+    section.paragraphs.push_back(first.changes.sentence() + " Nothing was fitted again.");
   for (const MaxStiffnessStudy& study : studies) {
     section.paragraphs.push_back(
         fmt::format("{}: gamma = {:.4g} /N, friction {:.4g} N; {} touches, {:.0f} s simulated.",

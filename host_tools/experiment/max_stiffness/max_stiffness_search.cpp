@@ -12,12 +12,70 @@ namespace {
 void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
   if (protocol.touches() == 0)
     throw std::invalid_argument("no touch: name at least one approach speed and one push force");
-  if (!(steps.first > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 && steps.last >= steps.first &&
-        steps.last <= 1e7))
+  const double first_adaptive = steps.first_adaptive.value_or(steps.first);
+  if (!(steps.first > 0.0 && first_adaptive > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 &&
+        steps.last >= std::max(steps.first, first_adaptive) && steps.last <= 1e7))
     throw std::invalid_argument(
-        fmt::format("stiffness from {} N/m by {} N/m (or {} of it) to {} N/m: allowed are steps above 0 and "
+        fmt::format("stiffness from {} N/m (adaptive {}) by {} N/m (or {} of it) to {} N/m: allowed are "
+                    "steps above 0 and "
                     "an end from the first one to 1e7 N/m",
-                    steps.first, steps.step, steps.growth, steps.last));
+                    steps.first, first_adaptive, steps.step, steps.growth, steps.last));
+}
+
+/// Every touch of the protocol at one stiffness, up to the first one that is unstable.
+class TouchesOfStiffness {
+ public:
+  TouchesOfStiffness(const TouchSetup& setup, const TouchProtocol& protocol)
+      : touch_(setup), protocol_(protocol), period_(1.0 / setup.wall.tick_rate) {
+    if (!touch_.matrices)
+      touch_.matrices =
+          std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, study_gain_bits);
+    touch_.threshold = protocol.threshold;
+    touch_.force_threshold = protocol.force_threshold;
+  }
+
+  /// True: none was unstable, and `result` has this stiffness unless there was no touch.
+  bool stable(double stiffness, MaxStiffness& result) {
+    touch_.wall.wall.stiffness = static_cast<float>(stiffness);
+    double saturated = 0.0;
+    bool touched = false;
+    for (const double speed : protocol_.approach_speeds) {
+      for (const double push : protocol_.pushes) {
+        touch_.motion.approach_speed = speed;
+        touch_.motion.push_force = push;
+        const TouchOutcome outcome = simulate_touch(touch_);
+        ++result.touches;
+        result.simulated_time += static_cast<double>(outcome.samples) * period_;
+        result.event_limit_hits += outcome.event_limit_hits;
+        saturated = std::max(saturated, outcome.saturated_share);
+        touched = touched || outcome.verdict != simulation::ContactVerdict::no_contact;
+        if (!outcome.unstable()) continue;
+        result.ending_speed = speed;
+        result.ending_push = push;
+        result.ending_peak_to_peak = outcome.peak_to_peak;
+        return false;
+      }
+    }
+    result.never_touched = !touched;
+    if (!touched) return true;
+    result.stiffness = stiffness;
+    result.saturated_share = saturated;
+    return true;
+  }
+
+ private:
+  TouchSetup touch_;
+  const TouchProtocol& protocol_;
+  double period_;
+};
+
+/// Below a first stiffness that is unstable.
+void go_down(TouchesOfStiffness& touches, double first, double step, MaxStiffness& result) {
+  for (std::uint64_t n = 1;; ++n) {
+    const double stiffness = first - step * static_cast<double>(n);
+    // Of a step: what is left of it where the way down ends at 0.
+    if (stiffness < 1e-9 * step || touches.stable(stiffness, result)) break;
+  }
 }
 
 }  // namespace
@@ -26,42 +84,19 @@ MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& 
                                   const StiffnessSteps& steps) {
   require(protocol, steps);
   MaxStiffness result;
-  TouchSetup touch = setup;
-  if (!touch.matrices)
-    touch.matrices =
-        std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, study_gain_bits);
-  touch.threshold = protocol.threshold;
-  touch.force_threshold = protocol.force_threshold;
-  const double period = 1.0 / setup.wall.tick_rate;
+  TouchesOfStiffness touches(setup, protocol);
+  const bool adaptive = control::follows_velocity(setup.wall.wall.kind);
+  const double first = adaptive ? steps.first_adaptive.value_or(steps.first) : steps.first;
   // Counted in steps, so that thousands of them add no rounding.
-  double stiffness = steps.first;
+  double stiffness = first;
   for (std::uint64_t n = 1; stiffness <= steps.last * (1.0 + 1e-12); ++n) {
-    touch.wall.wall.stiffness = static_cast<float>(stiffness);
-    double saturated = 0.0;
-    bool touched = false;
-    for (const double speed : protocol.approach_speeds) {
-      for (const double push : protocol.pushes) {
-        touch.motion.approach_speed = speed;
-        touch.motion.push_force = push;
-        const TouchOutcome outcome = simulate_touch(touch);
-        ++result.touches;
-        result.simulated_time += static_cast<double>(outcome.samples) * period;
-        result.event_limit_hits += outcome.event_limit_hits;
-        saturated = std::max(saturated, outcome.saturated_share);
-        touched = touched || outcome.verdict != simulation::ContactVerdict::no_contact;
-        if (!outcome.unstable()) continue;
-        result.ending_speed = speed;
-        result.ending_push = push;
-        result.ending_peak_to_peak = outcome.peak_to_peak;
-        return result;
-      }
+    if (!touches.stable(stiffness, result)) {
+      if (n == 1 && steps.goes_down) go_down(touches, first, steps.step, result);
+      return result;
     }
-    result.never_touched = !touched;
-    if (!touched) return result;
-    result.stiffness = stiffness;
-    result.saturated_share = saturated;
+    if (result.never_touched) return result;
     stiffness = steps.growth * stiffness > steps.step ? stiffness * (1.0 + steps.growth)
-                                                      : steps.first + steps.step * static_cast<double>(n);
+                                                      : first + steps.step * static_cast<double>(n);
   }
   result.beyond_last = true;
   return result;

@@ -7,6 +7,7 @@
 // nothing. The stiffness is not found by halving: whether a wall is stable need not change once only.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "host_tools/experiment/simulated_touch.hpp"
@@ -21,18 +22,24 @@ struct TouchProtocol {
   std::size_t touches() const { return approach_speeds.size() * pushes.size(); }
 };
 
+// The default begins far below the paper's 3.0 N/mm (5.0 for the adaptive wall): for a third of the simulated
+// people the plain wall is unstable there already, and a search from there says nothing of what lies below.
 struct StiffnessSteps {
   double first = 1000.0;  // N/m
   double step = 100.0;    // N/m: paper 1's
   double growth = 0.0;    // >= 0: a step of at least this share of the stiffness, for wide ranges
   double last = 40e3;     // N/m: the search ends there
+  std::optional<double> first_adaptive{};  // N/m, of a law that follows the velocity; none: the first
+  // From a first stiffness that is unstable in equal steps downwards, to the largest one that is not; else
+  // the result is 0 there. The paper does not say what it did.
+  bool goes_down = false;
 };
 
 struct MaxStiffness {
-  double stiffness = 0.0;      // N/m; 0: even the first one was unstable
+  double stiffness = 0.0;      // N/m; 0: even the first one was unstable (or all that lie below it)
   bool beyond_last = false;    // nothing was unstable up to `last`
   bool never_touched = false;  // not one touch at the last stiffness tried got into the wall
-  double ending_speed = 0.0;   // m/s and N: the touch that was unstable
+  double ending_speed = 0.0;   // m/s, intended, and N: the touch that was unstable
   double ending_push = 0.0;
   double ending_peak_to_peak = 0.0;  // m
   double saturated_share = 0.0;      // largest over the touches at `stiffness`, simulated_touch.hpp

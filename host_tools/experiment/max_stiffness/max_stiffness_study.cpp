@@ -98,19 +98,38 @@ double ConditionResult::largest_saturated_share() const {
 MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const std::vector<StiffnessCondition>& conditions,
                                           const StiffnessRun& run) {
+  const auto setup_of = [&](const Subject& subject, const StiffnessCondition& condition) {
+    TouchSetup setup = touch_setup(set.device, subject.person, condition);
+    run.changes.apply(setup);
+    return setup;
+  };
   std::vector<StiffnessJob> jobs;
   for (const StiffnessCondition& condition : conditions) {
     for (const Subject& subject : set.subjects)
-      jobs.push_back({fmt::format("{}, {}", condition.name, subject.name),
-                      touch_setup(set.device, subject.person, condition)});
+      jobs.push_back({fmt::format("{}, {}", condition.name, subject.name), setup_of(subject, condition)});
   }
   const std::vector<MaxStiffness> results = run_stiffness_jobs(jobs, run);
-  MaxStiffnessStudy study{set, run.protocol, run.steps, {}};
+  MaxStiffnessStudy study{set, run.protocol, run.steps, run.changes, 0.0, {}, {}};
+  const double touches_at_speed = static_cast<double>(set.subjects.size() * run.protocol.pushes.size());
+  for (const double speed : run.protocol.approach_speeds) {
+    study.contact_speeds.push_back({speed, 0.0});
+    for (const Subject& subject : set.subjects) {
+      TouchSetup setup = setup_of(subject, {});
+      study.run_up = std::abs(setup.motion.start_position - setup.motion.wall_position);
+      setup.motion.approach_speed = speed;
+      setup.wall.wall.stiffness = static_cast<float>(run.steps.first);
+      for (const double push : run.protocol.pushes) {
+        setup.motion.push_force = push;
+        study.contact_speeds.back().at_contact += simulate_touch(setup).contact_speed / touches_at_speed;
+      }
+    }
+  }
   auto next = results.begin();
   for (const StiffnessCondition& condition : conditions) {
     const auto end = next + static_cast<std::ptrdiff_t>(set.subjects.size());
     study.conditions.push_back({condition, {next, end}});
-    study.conditions.back().condition.origin = origin_of(set, condition);
+    study.conditions.back().condition.origin =
+        run.changes.empty() ? origin_of(set, condition) : report::Origin::predicted;
     next = end;
   }
   for (const MaxStiffness& result : results) {

@@ -16,6 +16,7 @@
 #include "host_tools/experiment/max_stiffness/stiffness_condition.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/experiment/run_journal.hpp"
+#include "host_tools/experiment/touch_changes.hpp"
 
 namespace kmax::experiment {
 
@@ -28,6 +29,8 @@ struct StiffnessJob {
 struct StiffnessRun {
   TouchProtocol protocol;
   StiffnessSteps steps;
+  // Of every touch of a study; run_stiffness_jobs() takes the touches as they are.
+  TouchChanges changes{};
   simulation::IntegratorConfig integrator{};
   std::size_t threads = 1;
   // Of jobs; what it throws ends the run (job_pool.hpp).
@@ -47,10 +50,19 @@ struct ConditionResult {
   double largest_saturated_share() const;
 };
 
+// How fast the hand wants to be, and how fast the handle is when it meets the plain wall: slower, where the
+// run-up is too short for the speed. m/s, mean of people and pushes.
+struct ContactSpeed {
+  double intended, at_contact;
+};
+
 struct MaxStiffnessStudy {
   SubjectSet set;
   TouchProtocol protocol;
   StiffnessSteps steps;
+  TouchChanges changes;
+  double run_up = 0.0;                       // m
+  std::vector<ContactSpeed> contact_speeds;  // of the protocol's speeds
   std::vector<ConditionResult> conditions;
   double simulated_time = 0.0;  // s
   std::uint64_t touches = 0;
@@ -58,7 +70,7 @@ struct MaxStiffnessStudy {
 };
 
 // A condition's number is calibrated if the set says that it was fitted to this very number with the force
-// limit it has now, and predicted otherwise.
+// limit it has now and nothing of the touches is changed, and predicted otherwise.
 MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const std::vector<StiffnessCondition>& conditions,
                                           const StiffnessRun& run);

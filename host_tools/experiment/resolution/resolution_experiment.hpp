@@ -45,11 +45,13 @@ struct ResolutionWall {
   double hold = 3.0;                               ///< s from the touch; the last second is judged
   double threshold = 0.165e-3;                     ///< m peak to peak, contact_measure.hpp
   control::Rounding rounding = control::Rounding::nearest;
+  bool operator==(const ResolutionWall&) const = default;
 };
 
 struct ResolutionHand {
   double grip = 1.0;   ///< factor of grip stiffness and grip damping
   double delay = 0.0;  ///< s from a command to its force
+  bool operator==(const ResolutionHand&) const = default;
 };
 
 struct ResolutionSettings {
@@ -178,6 +180,9 @@ struct ResolutionStudy {
   /// One touch at 0.4 mm and one at 0.1 mm with the last hand, 0.05 m/s; empty for a device.
   std::vector<double> trace_time, trace_coarse, trace_fine;  ///< s, m, m
 
+  /// The last hand's numbers are those that were chosen so that both claims appear on this wall; else they
+  /// are as somebody asked for.
+  bool chosen_to_agree() const { return runs.back().hand == weak_hand && wall == ResolutionWall(); }
   ResolutionVerdict verdict() const { return judge_resolution(runs.back().cells); }
 };
 

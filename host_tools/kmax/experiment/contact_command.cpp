@@ -5,7 +5,9 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/terminal_text.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
 #include "host_tools/kmax/quantity_option.hpp"
@@ -19,11 +21,13 @@ struct ContactOptions {
   int trials = 3;
   ExperimentFiles files;
   bool no_prompt = false, expect_paper = false;
+  std::vector<std::string> changed;  ///< --set
+  const CLI::Option* rate = nullptr;
 
   void declare(CLI::App& command) {
     add_quantity(command, "--stiffness", settings.stiffness, "N/m", "Stiffness of the wall, N/m", 0.0, 1e6);
-    add_quantity(command, "--rate", settings.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
-                 20000.0);
+    rate = add_quantity(command, "--rate", settings.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
+                        20000.0);
     add_quantity(command, "--hold", settings.hold_time, "s",
                  "Time from the first touch to the end of judging, s", 1.0, 60.0);
     add_quantity(command, "--threshold", settings.threshold, "m",
@@ -31,6 +35,7 @@ struct ContactOptions {
     add_number(command, "--trials", trials, "Touches per condition; the worst one counts", 1, 1000);
     add_file_options(command, files, "Folder for a page, and a picture and a CSV file per condition");
     add_expect_paper_option(command, expect_paper);
+    add_touch_settings_option(command, changed);
     add_safety_options(command, limits);
     add_touch_options(command, no_prompt, limits.patience);
   }
@@ -45,7 +50,8 @@ Json contact_json(const experiment::ContactResult& result) {
           {"trials", result.trials},
           {"unstable_trials", result.unstable_trials},
           {"paper_verdict", result.condition.paper_stable ? "stable" : "unstable"},
-          {"agrees", result.agrees_with_paper()},
+          {"agrees", json::optional_json(result.agrees_with_paper())},
+          {"contact_speed_m_per_s", result.contact_speed},
           {"limited_share", result.limited_share},
           {"deepest_m", result.measure.deepest},
           {"aborted", result.aborted_at.has_value()},
@@ -53,12 +59,29 @@ Json contact_json(const experiment::ContactResult& result) {
           {"lost_records", result.lost_records}};
 }
 
+/// The device in use; a simulated one with what is changed of it.
+device::Device connect(Context& context, const experiment::TouchChanges& changes) {
+  if (!changes.of_simulation()) return context.connect();
+  return device::Device(std::make_unique<link::SimLink>(changes.simulated_device()),
+                        [&context](const std::string& text) { context.note(text); });
+}
+
 int run_contact_experiment(Context& context, const ContactOptions& options) {
   const Interruption interruption;
-  const experiment::ContactSettings& settings = options.settings;
+  experiment::ContactSettings settings = options.settings;
+  using experiment::Touching;
+  change_touches(
+      settings,
+      touch_changes(options.changed, context.simulated() ? Touching::simulated_person : Touching::device),
+      *options.rate);
   const auto trials = static_cast<std::size_t>(options.trials);
+  if (options.expect_paper && !settings.papers_wall())
+    throw UsageError(
+        fmt::format("--expect-paper: the paper's verdicts are of {}; leave --stiffness, --rate and "
+                    "--set out, or --expect-paper",
+                    experiment::papers_wall_words()));
   make_folder(options.files);
-  device::Device device = context.connect();
+  device::Device device = connect(context, settings.changes);
   TouchRun run{options.limits, !options.no_prompt && !context.simulated()};  // who presses by itself
   std::string so_far;
   run.so_far = [&so_far] { return so_far; };
@@ -70,7 +93,9 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
         });
         return rig.velocity_estimator();
       });
-  const auto words = experiment::contact_words(settings, trials, velocity_estimator);
+  const auto words = experiment::contact_words(
+      settings, trials, velocity_estimator,
+      context.simulated() ? settings.changes.simulated_device().axes[0].motion : std::nullopt);
   std::vector<std::filesystem::path> files, pictures;
   if (!options.files.folder.empty()) {
     for (const experiment::ContactResult& result : results) {
@@ -83,7 +108,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
     files.insert(files.end(), pages.begin(), pages.end());
   }
   const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {
-    return r.agrees_with_paper();
+    return r.agrees_with_paper() == true;
   });
   const int verdict = paper_exit_code(options.expect_paper, all_agree);
   if (context.json) {
@@ -93,6 +118,7 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"haptic_rate_hz", settings.haptic_rate},
                    {"hold_time_s", settings.hold_time},
                    {"threshold_m", settings.threshold},
+                   {"changed", settings.changes.words()},
                    {"velocity_estimator", velocity_estimator},
                    {"conditions", list},
                    {"files", names_json(files)}});

@@ -82,6 +82,34 @@ int paper_exit_code(bool expect, bool as_paper) {
   return expect && !as_paper ? verdict_is_no : done;
 }
 
+void add_touch_settings_option(CLI::App& command, std::vector<std::string>& settings) {
+  command
+      .add_option(
+          "--set", settings,
+          "Of every touch, in place of what it would have: a parameter of wall, estimator or loop, or, "
+          "simulated, a number of device, structure, operator or motion; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->take_all();
+}
+
+experiment::TouchChanges touch_changes(const std::vector<std::string>& settings,
+                                       experiment::Touching touching) {
+  try {
+    return {settings, touching};
+  } catch (const simulation::SceneError& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void change_touches(experiment::ContactSettings& touch, const experiment::TouchChanges& changes,
+                    const CLI::Option& rate) {
+  touch.changes = changes;
+  const auto asked = changes.haptic_rate();
+  if (!asked) return;
+  if (rate.count() > 0) throw UsageError("--rate and --set haptic.rate say the same: leave one of them out");
+  touch.haptic_rate = *asked;
+}
+
 void add_safety_options(CLI::App& command, experiment::TouchLimits& limits) {
   add_quantity(command, "--force-limit", limits.force_limit, "N",
                "Largest force on a device, N: lowers force.limit, never raises it", 0.01, 1000.0);

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/device_rig.hpp"
+#include "host_tools/experiment/touch_changes.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/simulation/device_model.hpp"
 #include "host_tools/simulation/operator_model.hpp"
@@ -59,6 +61,15 @@ std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
 void add_expect_paper_option(CLI::App& command, bool& expect);
 /// done, or verdict_is_no where the paper's result is expected and is not there.
 int paper_exit_code(bool expect, bool as_paper);
+
+/// --set NAME=VALUE, of every touch.
+void add_touch_settings_option(CLI::App& command, std::vector<std::string>& settings);
+/// UsageError for what is not to be changed, or not to that value.
+experiment::TouchChanges touch_changes(const std::vector<std::string>& settings,
+                                       experiment::Touching touching);
+/// `rate`: the option that says haptic.rate too; UsageError for both.
+void change_touches(experiment::ContactSettings& touch, const experiment::TouchChanges& changes,
+                    const CLI::Option& rate);
 
 /// --force-limit and --abort-amplitude, which every experiment on a device takes.
 void add_safety_options(CLI::App& command, experiment::TouchLimits& limits);

@@ -63,6 +63,15 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
   add_resume_option(command, resume);
   add_format_option(command, files.ending);
   add_expect_paper_option(command, expect_paper);
+  add_quantity(
+      command, "--start", start, "N/m",
+      "First stiffness, N/m; else 1000, on a device the paper's 3000, at which the plain wall of some "
+      "simulated people is unstable",
+      1.0, 1e6);
+  add_quantity(command, "--start-adaptive", start_adaptive, "N/m",
+               "First stiffness of adaptive walls, N/m; else as --start, on a device the paper's 5000", 1.0,
+               1e6);
+  add_touch_settings_option(command, settings);
 
   simulated = command.add_option_group("Simulated people", "Without --device");
   simulated
@@ -84,15 +93,12 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
 
   on_device = command.add_option_group("Device", "With --device");
   add_axis_option(*on_device, context, "Axis that the wall is on");
-  add_quantity(*on_device, "--start", device.start, "N/m", "First stiffness, N/m", 1.0, 1e6);
-  add_quantity(*on_device, "--start-adaptive", device.start_adaptive, "N/m",
-               "First stiffness of adaptive walls, N/m", 1.0, 1e6);
   add_quantity(*on_device, "--step", device.step, "N/m", "Step, N/m", 1.0, 1e6);
   add_quantity(*on_device, "--last", device.last, "N/m", "The search ends there, N/m", 1.0, 1e6);
   add_number(*on_device, "--trials", device.trials, "Touches at each stiffness; one unstable touch decides",
              1, 1000);
-  add_quantity(*on_device, "--rate", device.touch.haptic_rate, "Hz", "Rate of the haptic loop, Hz", 100.0,
-               20000.0);
+  rate = add_quantity(*on_device, "--rate", device.touch.haptic_rate, "Hz", "Rate of the haptic loop, Hz",
+                      100.0, 20000.0);
   add_quantity(*on_device, "--hold", device.touch.hold_time, "s",
                "Time from the first touch to the end of judging, s", 1.0, 60.0);
   add_quantity(*on_device, "--threshold", device.touch.threshold, "m",
@@ -105,14 +111,21 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
 }
 
 namespace {
-int run_max_stiffness(Context& context, const MaxStiffnessOptions& options) {
-  require_folder_to_resume(options.files.folder, options.resume);
+int run_max_stiffness(Context& context, const MaxStiffnessOptions& given) {
+  require_folder_to_resume(given.files.folder, given.resume);
   const Interruption interruption;
+  MaxStiffnessOptions options = given;
+  using experiment::Touching;
+  options.changes =
+      touch_changes(given.settings, context.simulated() ? Touching::set_of_people : Touching::device);
   if (context.simulated()) {
     require_none(options.on_device->get_options(), for_a_device);
     return run_model_max_stiffness(context, options, interruption);
   }
   require_none(options.simulated->get_options(), for_simulated_people);
+  options.device.start = options.start.value_or(options.device.start);
+  options.device.start_adaptive = options.start_adaptive.value_or(options.device.start_adaptive);
+  change_touches(options.device.touch, options.changes, *options.rate);
   return run_device_max_stiffness(context, options, interruption);
 }
 }  // namespace
@@ -125,6 +138,7 @@ void add_max_stiffness_experiment(CLI::App& experiment, Context& context) {
        "8).",
        R"(  kmax experiment max-stiffness                                  twelve simulated people, seconds
   kmax experiment max-stiffness --clip both --out results        a page with tables and pictures
+  kmax experiment max-stiffness --set wall.damping=8 --set velocity.estimator=difference --set device.delay=0.5ms
   kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results
   kmax experiment max-stiffness --device serial:/dev/ttyUSB0 --out results --resume
 
@@ -133,7 +147,13 @@ Simulated people touch each stiffness at several speeds with several pushes. On 
 before each touch take the handle out of the wall and press Enter, then press against the wall until the time is
 over. The axis is disarmed after each touch, at once when the handle oscillates too much, and on Ctrl-C; its
 parameters are put back at the end. Every touch is in the journal in --out: --resume goes on from there.
-With --expect-paper the exit code is 3 if, simulated, a calibrated number is missed or F_MC does not raise the
+)"
+       "--set takes the parameters of wall, estimator and loop, and of simulated people and their device "
+       "what 'kmax\n"
+       "simulate --keys' shows as device.*, structure.* (a compliance), operator.* and motion.start_position "
+       "(the\n"
+       "run-up). From a --start that is unstable the search goes down, on a device always.\n"
+       R"(With --expect-paper the exit code is 3 if, simulated, a calibrated number is missed or F_MC does not raise the
 stiffness; on a device, if 2 N or an adaptive wall does not allow more than the plain wall.)"},
       Takes::device, run_max_stiffness);
 }

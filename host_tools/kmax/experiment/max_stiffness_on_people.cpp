@@ -86,6 +86,9 @@ RunJournal::Json journal_settings(SubjectSet set, const experiment::StiffnessRun
           {"first_n_per_m", run.steps.first},
           {"step_n_per_m", run.steps.step},
           {"growth", run.steps.growth},
+          {"first_adaptive_n_per_m", run.steps.first_adaptive.value_or(run.steps.first)},
+          {"goes_down", run.steps.goes_down},
+          {"changed", run.changes.words()},
           {"last_n_per_m", run.steps.last}};
 }
 
@@ -103,6 +106,10 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   Progress progress(context.messages());
   experiment::StiffnessRun run;
   run.threads = options.jobs;
+  run.changes = options.changes;
+  run.steps.first = options.start.value_or(run.steps.first);
+  run.steps.first_adaptive = options.start_adaptive;
+  run.steps.goes_down = options.start || options.start_adaptive;
   if (options.calibrate) {
     run.progress = reporter(progress, interruption, "calibrating, " + experiment::clip_words(set.device), 0);
     experiment::CalibrationSettings settings = experiment::paper_targets();
@@ -156,6 +163,10 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
   const auto conditions = conditions_for(options.conditions);
   if (options.calibrate && options.files.folder.empty())
     throw UsageError("--calibrate writes the subject set to a folder: name it with --out");
+  if (options.calibrate && !options.changes.empty())
+    throw UsageError(
+        "--calibrate fits a set of people with their device, which knows nothing of --set: write a set with "
+        "another device (--subjects FILE), or leave one of them out");
   if (!options.subjects.empty() && options.clip == "both")
     throw UsageError("--clip both takes two sets of people, and --subjects names one; run it twice");
   make_folder(options.files);

@@ -17,6 +17,9 @@ struct MaxStiffnessOptions {
   std::vector<std::string> conditions;  ///< keys of conditions_for(); empty: all
   ExperimentFiles files;
   bool resume = false, expect_paper = false;
+  std::optional<double> start, start_adaptive;  ///< N/m; none: as usual for whoever touches
+  std::vector<std::string> settings;            ///< --set
+  experiment::TouchChanges changes{};           ///< the same, understood
 
   // On simulated people.
   std::string subjects;  ///< file or name of a set
@@ -32,6 +35,7 @@ struct MaxStiffnessOptions {
 
   CLI::App* simulated = nullptr;  ///< the options for simulated people, in a group
   CLI::App* on_device = nullptr;  ///< and those for a device
+  const CLI::Option* rate = nullptr;
   void declare(CLI::App& command, Context& context);
 };
 

@@ -9,6 +9,7 @@
 namespace kmax::benchmark {
 
 report::Section integrator_section(const std::filesystem::path& pictures);
+report::Section scene_section();
 report::Section velocity_section(const std::filesystem::path& pictures);
 report::Section sine_section(const std::filesystem::path& pictures);
 report::Section square_root_section(const std::filesystem::path& pictures);

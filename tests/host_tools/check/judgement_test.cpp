@@ -397,6 +397,19 @@ TEST(CheckTable, TheLastWordsSayWhatFollows) {
   EXPECT_CONTAINS(words_for(adaptive), "adaptive law's field follows the velocity");
 }
 
+// Its source has no delay, and every device has one. Its step is asked for all the same.
+TEST(CheckTable, AbbottAndOkamuraGuaranteeNothingByThemselves) {
+  const std::string text = text_for(with_damping(5, 1));
+  EXPECT_GT(text.find("abbott_okamura"), text.find("\nheuristic (")) << text;
+  EXPECT_LT(text.find("colgate"), text.find("\nnecessary (")) << text;
+  // Enough damping, and friction that does not hold one step of the force.
+  const Judgement rough = judge_parameters(with_damping(50, 1e-4f), 0, {});
+  EXPECT_TRUE(rough.pass_of(Worth::guarantee));
+  EXPECT_FALSE(rough.guarantees_met());
+  EXPECT_FALSE(rough.guaranteed());
+  EXPECT_CONTAINS(text_for(with_damping(50, 1e-4f)), "Nothing is guaranteed");
+}
+
 TEST(CheckTable, AFieldOrADamperAloneIsAWallToo) {
   ParameterValues field = with_damping(5, 1);
   field.set_whole<"wall.law">(static_cast<std::uint32_t>(control::WallKind::magnetic));

@@ -6,7 +6,9 @@
 #include <bit>
 #include <cmath>
 #include <set>
+#include <tuple>
 
+#include "host_tools/simulated_board/setting_names.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
 namespace kmax::simulated_board::scene_run_test {
@@ -54,6 +56,73 @@ TEST(SceneRun, TheSameSceneGivesTheSameBits) {
   set(changed, "wall.stiffness", 5499.0);
   EXPECT_NE(bits_of(run_scene(touch(0.8))), bits_of(run_scene(changed)))
       << "a test that must be able to fail";
+}
+
+void expect_same(const RunResult& every, const RunResult& needed, const std::string& name) {
+  ASSERT_GT(every.samples[0].size(), 100u) << name;
+  EXPECT_EQ(bits_of(every), bits_of(needed)) << name;
+  const auto numbers = [](const RunResult& r) {
+    return std::tuple(r.axis, r.end_state, r.fault, r.judged_from, r.judged_to, r.alarms, r.first_alarm,
+                      r.limited_share, r.clipped_share, r.lost_edges, r.simulated_s);
+  };
+  EXPECT_EQ(numbers(every), numbers(needed)) << name;
+  ASSERT_EQ(every.contact.has_value(), needed.contact.has_value()) << name;
+  if (!every.contact) return;
+  EXPECT_EQ(every.contact->verdict, needed.contact->verdict) << name;
+  EXPECT_EQ(every.contact->peak_to_peak, needed.contact->peak_to_peak) << name;
+  EXPECT_EQ(every.contact->deepest, needed.contact->deepest) << name;
+}
+
+// Whichever ticks the firmware runs: every number of the run, to the last bit.
+TEST(SceneRun, TicksThatOnlyHoldChangeNoBit) {
+  for (const char* name : {"touch", "two_axes", "free_handle", "noisy_encoder", "compliant_structure",
+                           "paper1_fig_9", "paper1_fig_10", "paper1_fig_11", "paper1_fig_12",
+                           "paper1_deviation", "paper1_jitter", "paper2_fig_2"}) {
+    const simulation::Scene scene = open_scene(name);
+    expect_same(run_scene(scene, RunTicks::every), run_scene(scene), name);
+  }
+}
+
+// Delays, faults, softening and rates of their own: what happens at other times than haptic samples too.
+TEST(SceneRun, TicksThatOnlyHoldChangeNoBitOfUnusualScenes) {
+  const std::vector<std::vector<std::string>> unusual = {
+      {"device.delay=0.37ms"},
+      {"velocity.limit=0.1"},
+      {"instability.action=soften"},
+      {"instability.action=trip"},
+      {"haptic.rate=20000"},
+      {"haptic.rate=625", "velocity.estimator=difference", "wall.damping=5"},
+      {"guard.friction=0.1", "compensation.limit=0.05", "compensation.friction=0.05"},
+      {"force.slew_limit=200", "force.ramp_time=0.5"},
+      {"integrator.kind=rk4"},
+      {"interference.mode=perpendicular", "interference.force=1", "interference.background_force=0.5"}};
+  for (const std::vector<std::string>& settings : unusual) {
+    simulation::Scene scene = open_scene("touch", parse_settings(settings));
+    scene.duration = 2.0;
+    expect_same(run_scene(scene, RunTicks::every), run_scene(scene), settings[0]);
+  }
+  for (const std::vector<std::string>& settings : std::vector<std::vector<std::string>>{
+           {"axis1.haptic.rate=1250"}, {"axis1.velocity.limit=0.01"}, {"interference.mode=parallel"}}) {
+    simulation::Scene scene = open_scene("two_axes", parse_settings(settings));
+    scene.duration = 2.0;
+    expect_same(run_scene(scene, RunTicks::every), run_scene(scene), settings[0]);
+  }
+}
+
+// 500 haptic samples a second are 500 of the 20,000 ticks; a motor's currents need them all, and so does a
+// force that changes between two samples.
+TEST(SceneRun, OnlyWhatNeedsEveryTickPaysForIt) {
+  EXPECT_LT(run_scene(touch(1.0)).firmware_ticks, 600u);
+  EXPECT_EQ(run_scene(touch(1.0), RunTicks::every).firmware_ticks, 20000u);
+  for (const char* name : {"motor_axes", "noisy_encoder"}) {
+    simulation::Scene scene = open_scene(name);
+    scene.duration = 0.2;
+    EXPECT_EQ(run_scene(scene).firmware_ticks, 4000u) << name;
+  }
+  simulation::Scene compensated = touch(0.2);
+  set(compensated, "guard.friction", 0.1);
+  set(compensated, "compensation.limit", 0.05);
+  EXPECT_EQ(run_scene(compensated).firmware_ticks, 4000u);
 }
 
 // The whole way: counts, firmware, currents, motor, handle, and a person who presses 1 N against 2 N/mm.

@@ -172,11 +172,11 @@ RC_GTEST_PROP(WorstOfProperty, OrderDoesNotMatterAndNothingIsWorse, ()) {
 TEST(ContactResult, NoContactNeverAgreesWithThePaper) {
   ContactResult result = trial(ContactVerdict::no_contact, 0);
   result.condition.paper_stable = false;
-  EXPECT_FALSE(result.agrees_with_paper());
+  EXPECT_EQ(result.agrees_with_paper(), TestedClaim(false));
   result.measure.verdict = ContactVerdict::unstable;
-  EXPECT_TRUE(result.agrees_with_paper());
+  EXPECT_EQ(result.agrees_with_paper(), TestedClaim(true));
   result.condition.paper_stable = true;
-  EXPECT_FALSE(result.agrees_with_paper());
+  EXPECT_EQ(result.agrees_with_paper(), TestedClaim(false));
 }
 
 using host_tools_test::TemporaryFolder;
@@ -187,6 +187,7 @@ ContactResult result_of(const std::string& name) {
   result.condition = {name, "9", {}, "stable", true, {}};
   result.measure.verdict = simulation::ContactVerdict::stable;
   result.measure.peak_to_peak = 0.1234e-3;
+  result.contact_speed = 0.19;
   result.judged_to = 1.0;
   result.trials = 3;
   for (int i = 0; i < 100; ++i)
@@ -197,12 +198,47 @@ ContactResult result_of(const std::string& name) {
 TEST(ContactReport, TableHasALineForEachConditionUnderItsHeadings) {
   const std::string table = report::terminal_text(contact_table({result_of("first"), result_of("second")}));
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 4);
-  for (const char* text : {"first", "second", "0.123 mm", "0 of 3", "Fig. 9", "yes"})
+  for (const char* text : {"first", "second", "0.19 m/s", "0.123 mm", "0 of 3", "Fig. 9", "yes"})
     EXPECT_CONTAINS(table, text);
   const auto column = table.find("verdict");
   EXPECT_EQ(table.substr(table.find("first") + column, 6), "stable") << table;
   const std::string empty = report::terminal_text(contact_table({}));
   EXPECT_EQ(std::count(empty.begin(), empty.end(), '\n'), 2);
+}
+
+// A run-up can be too short for the speed that is intended.
+TEST_F(Contact, TheSpeedAtContactIsTheHandles) {
+  EXPECT_NEAR(run(0).contact_speed, 0.2, 0.06) << "the arm swings: it is not quite what is intended";
+  const auto intended = simulated_board::factory_scene().axes[0].motion;
+  const auto words = contact_words(settings, 1, "foaw", intended);
+  EXPECT_CONTAINS(words.back(), "intends 0.2 m/s after a run-up of 20 mm");
+  EXPECT_EQ(contact_words(settings, 1, "foaw").size() + 1, words.size());
+}
+
+TEST(ContactReport, SaysWhichVerdictsTheFitImplies) {
+  const TemporaryFolder folder;
+  std::vector<ContactResult> results;
+  std::vector<std::filesystem::path> pictures;
+  for (const ContactCondition& condition : contact_conditions()) {
+    results.push_back(result_of(condition.name));
+    results.back().condition = condition;
+    pictures.emplace_back("a.svg");
+  }
+  for (const auto& picture : pictures) folder.write(picture.string(), "");
+  const auto rows_with = [&](const char* text, report::Origin origin) {
+    std::vector<std::filesystem::path> here;
+    for (const auto& picture : pictures) here.push_back(folder / picture.string());
+    write_contact_page(results, {}, here, folder / "", origin);
+    const std::string page = folder.read("contact.md");
+    std::size_t count = 0;
+    for (std::size_t at = page.find(text); at != std::string::npos; at = page.find(text, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 2u);
+  EXPECT_EQ(rows_with("| a test |", report::Origin::predicted), 4u);
+  EXPECT_EQ(rows_with("implied by the fit", report::Origin::measured), 0u);
+  for (ContactResult& result : results) result.papers_wall = false;
+  EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 0u);
 }
 
 TEST(ContactReport, PictureAndTableShareASafeName) {

@@ -36,6 +36,36 @@ TEST(MaxStiffnessSection, SaysCalibratedOnlyOfWhatWasFitted) {
   for (const report::Table& table : both.tables) EXPECT_NO_THROW(report::require_rectangular(table));
 }
 
+TEST(MaxStiffnessSection, SaysWhatOfTheFitIsNoTest) {
+  const std::string fitted = paragraphs_of(max_stiffness_section({made_up_study(as_in_the_paper, true)}));
+  EXPECT_CONTAINS(fitted, "is implied by the fit");
+  EXPECT_CONTAINS(fitted, "The only mean that tests the model is the adaptive wall's");
+  EXPECT_LACKS(paragraphs_of(max_stiffness_section({made_up_study(as_in_the_paper, false)})), "implied");
+}
+
+TEST(MaxStiffnessSection, SaysWhereTheSearchBeginsAndWhy) {
+  MaxStiffnessStudy study = made_up_study(as_in_the_paper, false);
+  study.conditions[0].subjects[1].stiffness = 2900.0;
+  EXPECT_CONTAINS(paragraphs_of(max_stiffness_section({study})),
+                  "begins at 1 N/mm; the paper's at 3, and at 5 for the adaptive wall. Of 2 people 1 have no "
+                  "stable plain wall there");
+  study.steps.first = 3000.0;
+  study.steps.first_adaptive = 5000.0;
+  study.steps.goes_down = true;
+  EXPECT_CONTAINS(paragraphs_of(max_stiffness_section({study})),
+                  "begins at 3 N/mm (5 N/mm for the adaptive wall) and goes down where that is unstable");
+}
+
+TEST(MaxStiffnessSection, SaysIntendedAndActualSpeedAndWhatIsChanged) {
+  MaxStiffnessStudy study = made_up_study(as_in_the_paper, false);
+  study.run_up = 0.02;
+  study.contact_speeds = {{0.1, 0.098}, {1.0, 0.67}};
+  study.changes = TouchChanges({"wall.damping=8"}, Touching::set_of_people);
+  const std::string words = paragraphs_of(max_stiffness_section({study}));
+  EXPECT_CONTAINS(words, "a run-up of 20 mm the handle meets the wall at 0.098, 0.67 m/s where 0.1, 1 m/s");
+  EXPECT_CONTAINS(words, "Changed for every touch: wall.damping=8. Nothing was fitted again.");
+}
+
 TEST(MaxStiffnessSection, ComparesTheAdaptiveWallAsItIs) {
   const auto words = [](double adaptive, double two) {
     std::vector<double> means = as_in_the_paper;

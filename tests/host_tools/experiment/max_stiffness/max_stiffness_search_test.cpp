@@ -43,6 +43,34 @@ TEST(MaxStiffnessSearch, TheResultIsStableAndTheNextStepIsNot) {
   }
 }
 
+// Where a start as high as the paper's is unstable.
+TEST(MaxStiffnessSearch, GoesDownFromAnUnstableStartWhereItIsAskedTo) {
+  const TouchSetup setup = plain({});
+  const double from_below = search_max_stiffness(setup, {}, {}).stiffness;
+  StiffnessSteps steps{.first = from_below + 300.0};
+  const MaxStiffness stays = search_max_stiffness(setup, {}, steps);
+  EXPECT_EQ(stays.stiffness, 0.0);
+  steps.goes_down = true;
+  const MaxStiffness found = search_max_stiffness(setup, {}, steps);
+  EXPECT_EQ(found.stiffness, from_below);
+  EXPECT_GT(found.touches, stays.touches);
+  EXPECT_GT(found.ending_peak_to_peak, 0.165e-3);
+  EXPECT_FALSE(found.beyond_last);
+  TouchSetup never = setup;
+  never.device.delay = 0.1;
+  steps.step = 400.0;
+  EXPECT_EQ(search_max_stiffness(never, {}, steps).stiffness, 0.0) << "and ends above 0";
+}
+
+TEST(MaxStiffnessSearch, AdaptiveWallsMayBeginElsewhere) {
+  TouchSetup setup = plain({});
+  const StiffnessSteps steps{.first = 100.0, .last = 500.0, .first_adaptive = 300.0};
+  const auto touches_per_step = TouchProtocol().touches();
+  EXPECT_EQ(search_max_stiffness(setup, {}, steps).touches, 5 * touches_per_step);
+  setup.wall.wall.kind = control::WallKind::adaptive;
+  EXPECT_EQ(search_max_stiffness(setup, {}, steps).touches, 3 * touches_per_step);
+}
+
 TEST(MaxStiffnessSearch, SaysWhenItHasNoAnswer) {
   TouchSetup setup = plain({});
   const MaxStiffness soft = search_max_stiffness(setup, {}, {.first = 100, .step = 100, .last = 300});

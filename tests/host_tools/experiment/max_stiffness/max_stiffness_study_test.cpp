@@ -83,6 +83,34 @@ TEST(MaxStiffnessStudy, IsCalibratedOnlyWhereTheSetWasFitted) {
   EXPECT_EQ(origins(set), "pppppppp");
 }
 
+TEST(MaxStiffnessStudy, WhatIsChangedIsOfEveryTouchAndCalibratedNoMore) {
+  SubjectSet set = few_people(2);
+  set.fitted = Fitted{3580.0, 8410.0, set.device.force_limit};
+  const std::vector<StiffnessCondition> plain{stiffness_conditions()[0]};
+  StiffnessRun run = quick_run();
+  const MaxStiffnessStudy as_it_is = run_max_stiffness_study(set, plain, run);
+  run.changes = TouchChanges({"device.delay=1ms"}, Touching::set_of_people);
+  const MaxStiffnessStudy late = run_max_stiffness_study(set, plain, run);
+  EXPECT_EQ(as_it_is.conditions[0].condition.origin, report::Origin::calibrated);
+  EXPECT_EQ(late.conditions[0].condition.origin, report::Origin::predicted);
+  EXPECT_LT(late.conditions[0].mean(), 0.8 * as_it_is.conditions[0].mean());
+}
+
+// 20 mm are too few for 1 m/s, and enough for 0.1.
+TEST(MaxStiffnessStudy, KnowsHowFastTheHandleWasAtContact) {
+  StiffnessRun run = quick_run();
+  run.protocol.approach_speeds = {0.1, 1.0};
+  const std::vector<StiffnessCondition> plain{stiffness_conditions()[0]};
+  const auto speeds = [&] { return run_max_stiffness_study(few_people(2), plain, run).contact_speeds; };
+  const auto usual = speeds();
+  ASSERT_EQ(usual.size(), 2U);
+  EXPECT_EQ(usual[1].intended, 1.0);
+  EXPECT_NEAR(usual[0].at_contact, 0.1, 0.02);
+  EXPECT_LT(usual[1].at_contact, 0.85);
+  run.changes = TouchChanges({"motion.start_position=100mm"}, Touching::set_of_people);
+  EXPECT_GT(speeds()[1].at_contact, usual[1].at_contact + 0.1);
+}
+
 TEST(MaxStiffnessStudy, CountsThePeopleWhoseNumberIsABound) {
   std::vector<MaxStiffness> found(4);
   found[0].stiffness = found[1].stiffness = 40e3;

@@ -200,6 +200,20 @@ TEST(ResolutionReport, SaysWhatHoldsAndWhatDoesNot) {
   EXPECT_GT(resolution_variations_table(study).rows.size(), 10u);
 }
 
+TEST(ResolutionReport, NumbersOfTheUsersWereNotChosenToAgree) {
+  const auto study_with = [](const ResolutionHand& hand, double stiffness) {
+    ResolutionSettings settings = few();
+    settings.wall.stiffness = stiffness;
+    return study_resolution(settings, hand, resolution_hands(), std::vector<simulation::OperatorModel>(1));
+  };
+  const auto asked_for = study_with({0.2, 0.5e-3}, paper::resolution_stiffness);
+  EXPECT_CONTAINS(all_words(asked_for), "both claims appear. Hand and wall are as asked for");
+  EXPECT_EQ(asked_for.origin, report::Origin::predicted);
+  EXPECT_EQ(study_of(few()).origin, report::Origin::calibrated);
+  for (const ResolutionStudy& study : {asked_for, study_with(weak_hand, 1250.0)})
+    EXPECT_EQ(all_words(study).find("chosen so"), std::string::npos) << all_words(study);
+}
+
 TEST(ResolutionReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
   const ResolutionStudy study = study_of(few());

@@ -13,8 +13,9 @@ TEST_F(ContactCommand, ContactIsADocumentWithAConditionForEachWall) {
   const int code = kmax({"experiment", "contact", "--trials", "1", "--hold", "1s", "--rate", "0.5kHz",
                          "--expect-paper", "--out", in("results"), "--json"});
   ASSERT_TRUE(code == done || code == verdict_is_no) << said;
-  EXPECT_EQ(keys(), (std::vector<std::string>{"stiffness_n_per_m", "haptic_rate_hz", "hold_time_s",
-                                              "threshold_m", "velocity_estimator", "conditions", "files"}));
+  EXPECT_EQ(keys(),
+            (std::vector<std::string>{"stiffness_n_per_m", "haptic_rate_hz", "hold_time_s", "threshold_m",
+                                      "changed", "velocity_estimator", "conditions", "files"}));
   const Json conditions = document()["conditions"];
   ASSERT_EQ(conditions.size(), 6u);
   for (const Json& condition : conditions) {
@@ -60,13 +61,53 @@ TEST_F(ContactCommand, BadOptionsAreWrongUsage) {
 }
 
 TEST_F(ContactCommand, ADifferenceToThePaperIsAResultLikeAnyOther) {
-  // A wall that no law holds: the paper's stable conditions come out unstable.
+  // By a threshold that no touch keeps to, the paper's stable conditions come out unstable.
   const std::vector<std::string> arguments{"experiment", "contact", "--trials",    "1",
-                                           "--hold",     "1",       "--stiffness", "40N/mm"};
+                                           "--hold",     "1",       "--threshold", "1e-9"};
   EXPECT_EQ(kmax(arguments), done) << said;
   EXPECT_CONTAINS(output, "agrees");
   EXPECT_CONTAINS(output, " no\n");
   EXPECT_EQ(output.find("trials counts"), std::string::npos) << "one touch has no worst";
+}
+
+TEST_F(ContactCommand, AnotherWallThanThePapersIsNotJudgedAgainstItsVerdicts) {
+  const std::vector<std::string> arguments{"experiment", "contact", "--trials", "1",           "--hold",
+                                           "1",          "--rate",  "800",      "--stiffness", "4700"};
+  EXPECT_EQ(kmax(arguments), done) << said;
+  EXPECT_CONTAINS(output, "verdicts are of a wall of 5.5 N/mm at 500 Hz");
+  EXPECT_CONTAINS(output, "not compared\n");
+  auto with = [&](const char* more) {
+    auto all = arguments;
+    all.emplace_back(more);
+    return all;
+  };
+  EXPECT_EQ(kmax(with("--json")), done) << said;
+  for (const Json& condition : document()["conditions"]) EXPECT_TRUE(condition["agrees"].is_null());
+  EXPECT_EQ(kmax(with("--expect-paper")), wrong_usage);
+  EXPECT_CONTAINS(said, "leave --stiffness, --rate and");
+}
+
+TEST_F(ContactCommand, EveryTouchIsAsItIsSetToBe) {
+  const auto plain_with = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"experiment", "contact", "--trials", "1", "--hold", "1", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(kmax(arguments), done) << said;
+    return document();
+  };
+  const Json usual = plain_with({});
+  EXPECT_TRUE(usual["changed"].empty());
+  const Json changed = plain_with({"--set", "motion.approach_speed=0.05", "--set", "haptic.rate=1kHz",
+                                   "--set", "wall.damping=5", "--set", "velocity.estimator=difference"});
+  EXPECT_EQ(changed["haptic_rate_hz"], 1000);
+  EXPECT_EQ(changed["velocity_estimator"], "difference");
+  EXPECT_EQ(changed["changed"].size(), 4u);
+  EXPECT_TRUE(changed["conditions"][0]["agrees"].is_null());
+  EXPECT_EQ(usual["conditions"][0]["verdict"], "unstable");
+  EXPECT_EQ(changed["conditions"][0]["verdict"], "stable");
+  EXPECT_NEAR(usual["conditions"][0]["contact_speed_m_per_s"].get<double>(), 0.2, 0.06);
+  EXPECT_NEAR(changed["conditions"][0]["contact_speed_m_per_s"].get<double>(), 0.05, 0.02);
+  EXPECT_EQ(kmax({"experiment", "contact", "--set", "wall.stiffness=3"}), wrong_usage);
+  EXPECT_CONTAINS(said, "--stiffness");
 }
 
 TEST_F(ContactCommand, AFolderThatCannotBeMadeIsAFailure) {

@@ -143,6 +143,40 @@ TEST_F(MaxStiffness, OfSimulatedPeopleIsTheContractsDocument) {
   EXPECT_EQ(document(), first);
 }
 
+TEST_F(MaxStiffness, EveryTouchIsAsItIsSetToBe) {
+  const auto with = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"experiment", "max-stiffness", "--conditions", "0", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(kmax(arguments), done) << said;
+    return document()["conditions"][0]["max_stiffness_n_per_m"].get<double>();
+  };
+  const double usual = with({});
+  EXPECT_LT(with({"--set", "device.delay=1ms"}), 0.8 * usual);
+  EXPECT_GT(with({"--set", "wall.damping=4", "--set", "velocity.estimator=difference"}), 1.2 * usual);
+  EXPECT_GE(with({"--start", "3000", "--start-adaptive", "5000"}), usual - 100.0);
+  EXPECT_EQ(kmax({"experiment", "max-stiffness", "--conditions", "0", "--set", "haptic.rate=1kHz"}), done);
+  EXPECT_CONTAINS(output, "Changed for every touch: haptic.rate=1kHz");
+  EXPECT_EQ(output.find("alibrated"), std::string::npos) << output;
+}
+
+TEST_F(MaxStiffness, WhatIsNotToBeSetIsWrongUsage) {
+  for (const auto& [text, why] :
+       std::vector<std::pair<std::string, std::string>>{{"wall.stiffness=5000", "--start"},
+                                                        {"wall.law=plain", "--conditions"},
+                                                        {"device.mass=1t", "mass"}}) {
+    EXPECT_EQ(kmax({"experiment", "max-stiffness", "--set", text}), wrong_usage) << text << ": " << said;
+    EXPECT_CONTAINS(said, why);
+  }
+  EXPECT_EQ(
+      kmax({"experiment", "max-stiffness", "--set", "device.delay=1ms", "--calibrate", "--out", in("x")}),
+      wrong_usage);
+  EXPECT_CONTAINS(said, "knows nothing of --set");
+  EXPECT_EQ(on_device({"--set", "device.delay=1ms"}), wrong_usage);
+  EXPECT_CONTAINS(said, "is as it is");
+  EXPECT_EQ(on_device({"--set", "haptic.rate=1kHz", "--rate", "500"}), wrong_usage);
+  EXPECT_CONTAINS(said, "leave one of them out");
+}
+
 TEST(ConditionsFor, KeysChooseInTheExperimentsOrder) {
   const auto chosen = conditions_for({"latched", "0.5", "0.5"});
   ASSERT_EQ(chosen.size(), 2u);
