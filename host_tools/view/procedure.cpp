@@ -97,13 +97,14 @@ ProcedureResult contact(device::Device& device, const ProcedureSettings& setting
       },
       [&](const ContactResult& result) {
         party.found(
-            {result.condition.name, result.agrees_with_paper() ? "pass" : "fail",
+            {result.condition.name, result.agrees_with_paper() == true ? "pass" : "fail",
              fmt::format("{}, {:.3f} mm peak to peak; {} of {} touches unstable; paper 1, Fig. {}: {}",
                          experiment::to_string(result.measure.verdict), result.measure.peak_to_peak * 1e3,
                          result.unstable_trials, result.trials, result.condition.figure,
                          result.condition.paper_words)});
       });
-  const auto agree = std::ranges::count_if(results, [](const auto& one) { return one.agrees_with_paper(); });
+  const auto agree =
+      std::ranges::count_if(results, [](const auto& one) { return one.agrees_with_paper() == true; });
   return {static_cast<std::size_t>(agree) == results.size(),
           fmt::format("{} of {} walls came out as in paper 1.", agree, results.size())};
 }
