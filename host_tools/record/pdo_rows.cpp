@@ -9,8 +9,8 @@ using std::chrono::nanoseconds;
 
 namespace {
 constexpr std::size_t closing = recorded_pdos - 1;
-// The factory's mapping (communication_entries.hpp) has one PDO for each of two axes, one with both velocities
-// and one with both currents and flags.
+// The factory's mapping (communication_entries.hpp) has one PDO for each of two axes, one with both
+// velocities and one with both currents and flags.
 static_assert(firmware::axis_count <= 2 && recorded_pdos == 4);
 constexpr std::int64_t nanoseconds_per_tick = 1'000'000'000 / firmware::tick_rate_hz;
 

@@ -44,7 +44,8 @@ void SystemControl::reset(BoardTime /*now*/) {
 
 std::uint32_t SystemControl::interrupt_control_state() const {
   bool interrupt_pending = false;
-  for (unsigned exception = number::first_interrupt; exception < number::first_interrupt + exceptions_.interrupts(); ++exception) {
+  for (unsigned exception = number::first_interrupt;
+       exception < number::first_interrupt + exceptions_.interrupts(); ++exception) {
     interrupt_pending = interrupt_pending || exceptions_.pending(exception);
   }
   return scb_icsr::ActiveVector::bits(active_exception_) |

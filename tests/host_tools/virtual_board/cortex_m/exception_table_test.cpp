@@ -23,7 +23,8 @@ TEST(ExceptionTable, HasNothingToDoAfterReset) {
   table.reset();
   EXPECT_EQ(table.candidate(), 0U);
   EXPECT_FALSE(table.preempting());
-  for (unsigned exception = exception_number::first_interrupt; exception < exception_number::first_interrupt + interrupts; ++exception) {
+  for (unsigned exception = exception_number::first_interrupt;
+       exception < exception_number::first_interrupt + interrupts; ++exception) {
     table.pend(exception);
     EXPECT_EQ(table.candidate(), 0U) << "not enabled";
   }
