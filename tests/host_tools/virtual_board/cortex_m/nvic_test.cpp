@@ -30,6 +30,20 @@ constexpr std::size_t icpr = offsetof(NvicRegisters, icpr);
 constexpr std::size_t iabr = offsetof(NvicRegisters, iabr);
 constexpr std::size_t ipr = offsetof(NvicRegisters, ipr);
 
+TEST(Nvic, HasAsManyInterruptsAsTheChip) {
+  ExceptionTable exceptions{40};
+  exceptions.reset();
+  Nvic nvic{exceptions};
+  const auto enable = [&](unsigned interrupt) {
+    nvic.write({static_cast<std::uint32_t>(iser + 4 * (interrupt / 32)), 4, 0}, 1U << (interrupt % 32));
+  };
+  enable(39);
+  EXPECT_TRUE(exceptions.enabled(Controller::exception(39)));
+  exceptions.set_line(Controller::exception(39), true);
+  EXPECT_EQ(exceptions.candidate(), Controller::exception(39));
+  EXPECT_THROW(enable(40), RefusedAccess);
+}
+
 TEST(Nvic, SetsAndClearsEnablesByOnes_IserIcer) {
   Controller controller;
   for (unsigned interrupt = 0; interrupt < 82; ++interrupt) {
