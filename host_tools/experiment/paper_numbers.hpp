@@ -35,6 +35,13 @@ inline constexpr std::array<MaxStiffness, 3> max_stiffness{{
     {"F_MC = 2 N", 2.0, false, 8410.0, "section 4.2, Fig. 6"},
     {"adaptive", 0.0, true, 8020.0, "section 4.3, Fig. 8"},
 }};
+// The simulated people are fitted to those of them with a constant field (operator_calibration.hpp).
+constexpr bool fitted_to(double constant_coefficient) {
+  for (const MaxStiffness& one : max_stiffness) {
+    if (!one.adaptive && one.magnetic_coefficient == constant_coefficient) return true;
+  }
+  return false;
+}
 // The coefficients that Fig. 6 was measured at, N; the means between 0 and 2 N are only in the picture.
 inline constexpr std::array<double, 5> magnetic_coefficients{0.0, 0.5, 1.0, 1.5, 2.0};
 

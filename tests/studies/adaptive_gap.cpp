@@ -151,26 +151,20 @@ report::Section slope_section(const SubjectSet& set, const std::vector<SlopeResu
   if (!reach.empty()) {
     section.paragraphs.emplace_back(
         "For it: CHAI3D's model of the Touch has a workspace radius of 0.075 m; a program that scales that "
-        "to 1 "
-        "sees every velocity 13.3 times as large. And as printed the paper is at odds with itself: a "
-        "constant "
-        "1 N is unstable at 5.5 N/mm (Fig. 10), a law that commands 0.8 N at rest is stable (Fig. 12).");
+        "to 1 sees every velocity 13.3 times as large. And as printed the paper is at odds with itself: a "
+        "constant 1 N is unstable at 5.5 N/mm (Fig. 10), a law that commands 0.8 N at rest is stable (Fig. "
+        "12).");
     section.paragraphs.emplace_back(
         "Against it: nothing in the paper says so; positions and stiffness would have to be in metres while "
         "the velocity is not; other slopes do as well, so V_max is a number chosen to fit; and with such a "
-        "slope "
-        "the instant law mostly damps the way in, which the paper's explanation, a hand that stiffens under "
-        "a "
-        "field, does not need.");
+        "slope the instant law mostly damps the way in, which the paper's explanation, a hand that stiffens "
+        "under a field, does not need.");
     section.paragraphs.emplace_back(
         "What would decide it: the hand's speed in m/s and F_MC recorded in one touch of the paper's "
-        "program. "
-        "At 0.2 m/s the law as printed commands 1 N, the scaled one its cap of 2 N. Without that program, a "
-        "person on a device with both laws ('kmax experiment max-stiffness --conditions instant --device "
-        "...', "
-        "and with --set wall.adaptive_velocity_max=0.18): the printed law can be right only if it reaches "
-        "the "
-        "printed stiffness.");
+        "program. At 0.2 m/s the law as printed commands 1 N, the scaled one its cap of 2 N. Without that "
+        "program, a person on a device with both laws ('kmax experiment max-stiffness --conditions instant "
+        "--device ...', and with --set wall.adaptive_velocity_max=0.18): the printed law can be right only "
+        "if it reaches the printed stiffness.");
   }
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;

@@ -92,11 +92,6 @@ bool between_targets(const SubjectSet& set, double stiffness) {
          set.fitted->plain_target < stiffness && stiffness < set.fitted->magnetic_target;
 }
 
-bool fitted_condition(const StiffnessCondition& condition) {
-  return !condition.adaptive() &&
-         (condition.magnetic_coefficient == 0.0 || condition.magnetic_coefficient == 2.0);
-}
-
 }  // namespace
 
 report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results) {
@@ -113,7 +108,8 @@ report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldW
          fmt::format("{:.2f}", result.named.worst * 1e3), result.named.stable() ? "stable" : "unstable",
          result.named.stable() == result.paper_stable ? "yes" : "no",
          fmt::format("{}", result.stable_people()), fmt::format("{:.2f}", result.median_worst() * 1e3),
-         implied && fitted_condition(result.condition)
+         implied && !result.condition.adaptive() &&
+                 experiment::paper::fitted_to(result.condition.magnetic_coefficient)
              ? "implied by the fit"
              : std::string(report::to_string(report::Origin::predicted))});
   }

@@ -67,11 +67,10 @@ struct ContactResult {
   /// Held until it was judged; else to be made again.
   bool counts() const { return measure.verdict != simulation::ContactVerdict::no_contact; }
   bool papers_wall = true;  ///< ContactSettings::papers_wall()
-  /// On the simulated person, whose numbers were fitted to the paper's means of 3.58 N/mm without a field and
-  /// 8.41 N/mm with 2 N: what lies between them follows from the fit.
+  /// On the simulated person: the wall lies between the means that its numbers were fitted to.
   bool implied_by_the_fit() const {
     return papers_wall && condition.wall.law == control::WallKind::magnetic &&
-           (condition.wall.magnetic_coefficient == 0.0 || condition.wall.magnetic_coefficient == 2.0);
+           paper::fitted_to(condition.wall.magnetic_coefficient);
   }
   /// Not tested on another wall than the paper's.
   TestedClaim agrees_with_paper() const {

@@ -163,13 +163,12 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
   }
   section.tables.push_back(table);
   if (simulated)
-    section.paragraphs.emplace_back(
+    section.paragraphs.push_back(fmt::format(
         "The device and the person are simulated. Friction and stiffening were fitted, on other simulated "
-        "hands, to the paper's means without a field, 3.58 N/mm, and with 2 N, 8.41 N/mm. That a wall "
-        "between "
-        "them is unstable without a field (Fig. 9) and stable with 2 N (Fig. 11) is implied by that fit; "
-        "only "
-        "Figs. 10 and 12 are tests. One simulated person proves no method.");
+        "hands, to the paper's means without a field, {:g} N/mm, and with 2 N, {:g} N/mm. That a wall "
+        "between them is unstable without a field (Fig. 9) and stable with 2 N (Fig. 11) is implied by that "
+        "fit; only Figs. 10 and 12 are tests. One simulated person proves no method.",
+        paper::max_stiffness[0].stiffness / 1e3, paper::max_stiffness[1].stiffness / 1e3));
   return report::write_page({"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section}}, folder,
                             "contact");
 }

@@ -110,8 +110,7 @@ std::string speed_words(const MaxStiffnessStudy& study) {
 constexpr auto worth_words =
     "Two numbers of the model were fitted to two of the paper's three means, so those two test nothing, and "
     "that a constant 2 N allows more than no field is implied by the fit. The paper prints no other mean of "
-    "a "
-    "constant field. The only mean that tests the model is the adaptive wall's.";
+    "a constant field. The only mean that tests the model is the adaptive wall's.";
 
 void append(std::vector<std::string>& to, const std::vector<std::string>& more) {
   to.insert(to.end(), more.begin(), more.end());
