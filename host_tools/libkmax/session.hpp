@@ -33,7 +33,7 @@ class Session {
 
   void arm(std::size_t axis, bool keep_alive);
   std::string disarm(std::size_t axis);
-  /// What to tell when disarm() of an axis that was armed here failed because of `why`.
+  /// What to say when disarm() of an axis that was armed here failed because of `why`.
   std::string disarm_failure(std::size_t axis, std::string_view why) const;
   /// RefusedError, or LinkError, if an axis that was armed here has lost its force.
   void require_armed_ones();

@@ -285,7 +285,8 @@ std::string Conversation::start(const Command& command) {
 }
 
 std::string Conversation::decide(bool keep) {
-  const std::string said = keep ? (procedure_.way_back(), save()) : "put back: " + set(procedure_.way_back());
+  const std::vector<device::Assignment>& back = procedure_.way_back();
+  const std::string said = keep ? save() : "put back: " + set(back);
   procedure_.decided();
   return said;
 }

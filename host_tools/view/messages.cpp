@@ -287,7 +287,7 @@ Message procedure_message(const ProcedureState& state) {
                            {"client", state.client},
                            {"phase", phases[static_cast<std::size_t>(state.phase)]},
                            {"progress", or_null(state.progress)},
-                           {"told", or_null(state.told)},
+                           {"instruction", or_null(state.instruction)},
                            {"prompt", state.waits ? Json(state.prompt_number) : Json(nullptr)},
                            {"words", or_null(state.words)},
                            {"findings", findings},

@@ -89,8 +89,8 @@ struct ProcedureState {
   ClientId client = 0;  ///< who has started it
   Phase phase = Phase::none;
   std::string progress{};
-  std::string told{};  ///< what somebody is to do
-  bool waits = false;  ///< until that has been answered, as prompt_number
+  std::string instruction{};  ///< what somebody is to do
+  bool waits = false;         ///< until that has been answered, as prompt_number
   std::uint32_t prompt_number = 0;
   std::string words{};  ///< of its end
   std::vector<Finding> findings{};

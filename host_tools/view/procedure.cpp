@@ -24,9 +24,8 @@ constexpr ProcedureText texts[] = {
      "move the handle and press the emergency stop when asked to", 0},
     {"calibration", "Calibration",
      "Arms the axis: the handle trembles, and moves by up to 20 mm to either side. Nobody may hold it. "
-     "Before: "
-     "motor.kind, encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must be "
-     "right.",
+     "Before: motor.kind, encoder.kind, encoder.counts_per_turn, device.transmission and current.limit must "
+     "be right.",
      "move the handle by hand when asked to, which shows where positive is", 0},
     {"contact", "Contact with a stiff wall",
      "Arms the axis for each touch. Some of these walls oscillate under the hand: that is what is measured. "
@@ -36,7 +35,7 @@ constexpr ProcedureText texts[] = {
 
 ProcedureResult self_test(device::Device& device, const ProcedureSettings& settings,
                           const ProcedureParty& party) {
-  selftest::SelfTestSettings test{.axis = settings.axis, .say = party.tell};
+  selftest::SelfTestSettings test{.axis = settings.axis, .say = party.instruct};
   if (settings.hand) test.hand.emplace();
   const selftest::Report report = selftest::run_selftest(device, test, party.progress);
   if (const auto& before = report.fault_at_start)

@@ -51,7 +51,7 @@ struct ProcedureParty {
   bench::Prompter& prompter;
   bool asks_before_touches = true;                     ///< a simulated person needs no asking
   std::function<void(const std::string&)> progress{};  ///< a few times a second
-  std::function<void(const std::string&)> tell{};      ///< what to do, without waiting for an answer
+  std::function<void(const std::string&)> instruct{};  ///< what to do, without waiting for an answer
   std::function<void(const std::string&)> note{};      ///< what went wrong and was lived with
   std::function<void(const Finding&)> found{};         ///< as soon as it is known
 };

@@ -55,9 +55,9 @@ void ProcedureRun::run(bool asks_before_touches, const std::function<void()>& at
   const ProcedureParty party{.prompter = *this,
                              .asks_before_touches = asks_before_touches,
                              .progress = [this](const std::string& text) { progress(text); },
-                             .tell =
+                             .instruct =
                                  [this](const std::string& text) {
-                                   state_.told = text;
+                                   state_.instruction = text;
                                    publish();
                                  },
                              .note = [this](const std::string& text) { state_.notes.push_back(text); },
@@ -103,10 +103,14 @@ void ProcedureRun::put_back(const std::vector<Assignment>& before) {
     } catch (const link::LinkError&) {
       throw;
     } catch (const std::exception& error) {
-      state_.notes.push_back(fmt::format("parameters could not be put back: {}", error.what()));
-      return;
+      return note_left(error.what());
     }
   }
+  note_left("it was stopped meanwhile");
+}
+
+void ProcedureRun::note_left(const std::string& why) {
+  state_.notes.push_back(fmt::format("parameters could not be put back: {}", why));
 }
 
 void ProcedureRun::look() {
@@ -123,7 +127,7 @@ void ProcedureRun::progress(const std::string& text) {
 }
 
 void ProcedureRun::ask(const std::string& what_to_do) {
-  state_.told = what_to_do;
+  state_.instruction = what_to_do;
   state_.waits = true;
   ++state_.prompt_number;
   publish();
@@ -132,7 +136,7 @@ void ProcedureRun::ask(const std::string& what_to_do) {
     device_.link().wait(loan_of_link);
     look();
   }
-  state_.told.clear();
+  state_.instruction.clear();
   publish();
 }
 
@@ -152,7 +156,7 @@ void ProcedureRun::conclude(Phase phase, std::string words) {
   }
   state_.phase = phase;
   state_.words = std::move(words);
-  state_.told.clear();
+  state_.instruction.clear();
   state_.waits = false;
   state_.changed = before_.size();
   publish();

@@ -42,6 +42,7 @@ class ProcedureRun final : private bench::Prompter {
   void ask(const std::string& what_to_do) override;
   void look();
   void put_back(const std::vector<device::Assignment>& before);
+  void note_left(const std::string& why);
   void progress(const std::string& text);
   void conclude(ProcedureState::Phase phase, std::string words);
   void publish();

@@ -17,7 +17,7 @@ export class Procedures {
     Object.assign(this, { boxes, ask, safety, axis, say, begun });
     this.starts = [];
     boxes.answer.onclick = () => this.answer();
-    boxes.cancel.onclick = () => this.tell({ type: "cancel" });
+    boxes.cancel.onclick = () => this.send({ type: "cancel" });
     addEventListener("keydown", (event) => {
       if (event.key !== "Enter" || !this.canAnswer || safety.held.has(event.target)) return;
       event.preventDefault();
@@ -60,7 +60,7 @@ export class Procedures {
     for (const start of this.starts) start.disabled = !usable || this.running;
   }
 
-  async tell(message) {
+  async send(message) {
     const reply = await this.ask(message);
     this.say(reply.message, reply.ok);
     this.boxes.said.textContent = reply.ok ? "" : reply.message;
@@ -68,11 +68,11 @@ export class Procedures {
   }
 
   async start(wanted) {
-    if (await this.tell({ type: "procedure", axis: this.axis(), ...wanted })) this.begun();
+    if (await this.send({ type: "procedure", axis: this.axis(), ...wanted })) this.begun();
   }
 
   answer() {
-    if (this.canAnswer) this.tell({ type: "answer", prompt: this.state.prompt });
+    if (this.canAnswer) this.send({ type: "answer", prompt: this.state.prompt });
   }
 
   /** The message "procedure"; `client`: who this page is. */
@@ -94,7 +94,7 @@ export class Procedures {
     const { prompt, name, words, answer, other } = this.boxes;
     prompt.hidden = !this.running;
     if (!this.running) return;
-    const text = this.state.told ?? this.state.progress ?? "begins";
+    const text = this.state.instruction ?? this.state.progress ?? "begins";
     // "F_MC = 1 N: press ...": what it is about in front, smaller.
     const [, about, rest] = text.match(/^(.{1,60}?): (.+)$/s) ?? [null, "", text];
     name.textContent = [this.state.title, about].filter(Boolean).join(": ");
@@ -121,7 +121,7 @@ export class Procedures {
     if (!this.state.changed) return "";
     const button = (keep, words) => {
       const made = element("button", { type: "button", className: "plain", id: keep ? "keep" : "put-back" }, words);
-      made.onclick = () => this.tell({ type: "keep", keep });
+      made.onclick = () => this.send({ type: "keep", keep });
       return made;
     };
     return element("p", { className: "row" }, button(true, "Save the result"), button(false, "Put everything back"),

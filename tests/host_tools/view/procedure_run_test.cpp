@@ -100,7 +100,7 @@ TEST_F(ProcedureTest, AContactAsksBeforeEachTouchAndTellsEachWallAtOnce) {
     answer(message);
     if (message["type"] != "procedure") return;
     if (!message["prompt"].is_null()) {
-      EXPECT_CONTAINS(message["told"].get<std::string>(), "press it against the wall");
+      EXPECT_CONTAINS(message["instruction"].get<std::string>(), "press it against the wall");
       EXPECT_FALSE(armed(0));
       ++prompts;
     }
