@@ -196,8 +196,7 @@ std::string Drive::way_out() {
   if (!(depth >= 0.0)) return {};  // it has been moved meanwhile
   return fmt::format(
       ": it is at {:.2f} mm, the wall begins at {:.2f} mm, so by more than {:.2f} mm towards {} positions; "
-      "or put "
-      "the wall behind it: 'kmax set {}wall.position=here{}1mm'",
+      "or put the wall behind it: 'kmax set {}wall.position=here{}1mm'",
       position, surface, depth, free_above ? "larger" : "smaller",
       axis_ == 0 ? "" : fmt::format("axis{}.", axis_), free_above ? '-' : '+');
 }

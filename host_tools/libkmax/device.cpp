@@ -29,8 +29,7 @@ link::DeviceAddress address_of(const std::string& text) {
   if (!named)
     throw device::ValueError(
         "no device is named: give its address, serial:PATH, can:IFACE or sim, or set KMAX_DEVICE; 'kmax "
-        "devices' "
-        "shows what can be reached");
+        "devices' shows what can be reached");
   return link::parse_device_address(*named);
 }
 

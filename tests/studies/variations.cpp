@@ -113,8 +113,7 @@ std::string all_three_words(const VariationResult& result) {
   if (std::abs(adaptive - experiment::paper::max_stiffness.back().stiffness) > 400.0) return {};
   return fmt::format(
       "{}, fitted again, all three means of the paper come out, {}, {} and {} N/mm, with gamma = {:.2g} /N: "
-      "a "
-      "hand stiffer by {:.0f} % under 2 N. The means alone do not show that hands stiffen.",
+      "a hand stiffer by {:.0f} % under 2 N. The means alone do not show that hands stiffen.",
       result.variation.name, n_per_mm(plain), n_per_mm(two), n_per_mm(adaptive), result.activation_gain,
       200.0 * result.activation_gain);
 }

@@ -115,10 +115,8 @@ device::Device connect_or_advise(Context& context) {
   } catch (const link::LinkError& error) {
     throw link::LinkError(
         fmt::format("stage 'logic': {}. PWR must be green (motor supply on); serial line: 3.3 V adapter, RXD "
-                    "to GPIO3 and "
-                    "TXD to GPIO4, 8E1 (even parity); CAN: H, L and ground on J3, 120 ohm at both ends; SW1 "
-                    "on RUN, and the "
-                    "firmware written ('kmax flash')",
+                    "to GPIO3 and TXD to GPIO4, 8E1 (even parity); CAN: H, L and ground on J3, 120 ohm at "
+                    "both ends; SW1 on RUN, and the firmware written ('kmax flash')",
                     error.what()));
   }
 }

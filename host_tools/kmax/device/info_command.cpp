@@ -57,8 +57,7 @@ std::string reading_text(const Parameter& parameter, std::uint32_t raw) {
   if (parameter == Parameter::of<"info.brown_out_level">() && raw != wanted && raw != unknown)
     return value_with_unit(parameter, raw) +
            ": between 1.8 and 2.7 V the processor would run outside its specification; 'kmax flash' by SWD "
-           "sets "
-           "level_3";
+           "sets level_3";
   return value_with_unit(parameter, raw);
 }
 

@@ -121,8 +121,7 @@ std::string met_nowhere(const check::StabilityMap& map) {
   if (names.empty()) return {};
   return fmt::format(
       "Met nowhere on this map: {0}. 'kmax check --explain {1}' says what it needs; 'kmax check' says what "
-      "to "
-      "change. A handle whose friction and damping are not entered (guard.friction, guard.damping) meets "
+      "to change. A handle whose friction and damping are not entered (guard.friction, guard.damping) meets "
       "few.",
       fmt::join(names, ", "), names.front());
 }

@@ -53,18 +53,14 @@ report::Section scene_section() {
   report::Section section{"Scenes through the firmware", {}, {}, {}};
   section.paragraphs.emplace_back(
       "Compared: a run of 'kmax simulate' in which the firmware runs all of its 20,000 ticks a second, with "
-      "the "
-      "one that it does: of a scene without motor or encoder defects only the ticks that do more than hold "
-      "the "
-      "force between two haptic samples. The handle moves through every tick in both, in pieces of 50 us.");
+      "the one that it does: of a scene without motor or encoder defects only the ticks that do more than "
+      "hold the force between two haptic samples. The handle moves through every tick in both, in pieces of "
+      "50 us.");
   section.paragraphs.emplace_back(
       "The results are equal bit for bit (tests/host_tools/simulated_board/scene_run_test.cpp), so there is "
-      "no "
-      "error to weigh against the speed. The ratio is what 'kmax simulate' prints, from building the board "
-      "to "
-      "the last sample, but of processor time; a field changes the hand's stiffness in every piece, which "
-      "then "
-      "takes most of the time.");
+      "no error to weigh against the speed. The ratio is what 'kmax simulate' prints, from building the "
+      "board to the last sample, but of processor time; a field changes the hand's stiffness in every piece, "
+      "which then takes most of the time.");
   report::Table table{"Simulated seconds per second:",
                       {"scene", "haptic rate (Hz)", "every tick", "as run", "factor",
                        "ticks run of each 1000", "handle alone, about"},
