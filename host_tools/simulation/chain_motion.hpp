@@ -36,7 +36,10 @@ struct MovingChain {
 template <std::size_t masses>
 class ChainMotion {
  public:
-  static constexpr std::size_t durations = 4;
+  // On the virtual board a PWM period of two drives falls into about ten pieces of recurring lengths. With 4
+  // slots each was forgotten before it came again, and the matrices built for it: a fifth of the board's
+  // time.
+  static constexpr std::size_t durations = 16;
 
   // `chain`: at a gain of 1, which multiplies the springs and dampers from number `first_scaled` on.
   ChainMotion(const ChainDynamics& chain, std::size_t first_scaled);
