@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "host_tools/device/parameter.hpp"
@@ -12,6 +13,19 @@
 namespace kmax::experiment {
 
 namespace {
+/// What no experiment varies. The defaults are paper 1's constants, and no damping.
+constexpr std::array papers_constants{"wall.damping",
+                                      "interference.onset_time",
+                                      "wall.magnetic_length",
+                                      "wall.adaptive_gain",
+                                      "wall.adaptive_offset",
+                                      "wall.adaptive_velocity_max",
+                                      "wall.adaptive_relation",
+                                      "wall.adaptive_velocity",
+                                      "wall.adaptive_force_min",
+                                      "wall.adaptive_force_max",
+                                      "wall.adaptive_hold_time"};
+
 /// The wall's last, as TouchWatch has them.
 std::vector<std::size_t> axes_of(const TouchLimits& limits, RigAxes axes) {
   if (axes == RigAxes::wall) return {limits.axis};
@@ -33,35 +47,25 @@ std::string force_text(const ForceChange& change) {
 }  // namespace
 
 std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis, RigAxes axes) {
-  const auto choice = [](const device::Parameter& parameter, auto value) {
-    return device::value_text(parameter, static_cast<std::uint32_t>(value));
+  const auto text = [](const device::Parameter& parameter, std::uint32_t raw) {
+    return fmt::format("{}={}", parameter.definition().name, device::value_text(parameter, raw));
   };
-  std::vector<std::string> all = {
-      fmt::format("wall.stiffness={}", wall.stiffness),
-      fmt::format("haptic.rate={}", wall.haptic_rate),
-      "wall.damping=0",
-      fmt::format("position.resolution={}", wall.resolution),
-      "position.rounding=" + choice(device::Parameter::of<"position.rounding">(), wall.rounding),
-      "interference.mode=" + choice(device::Parameter::of<"interference.mode">(), wall.interference),
-      fmt::format("interference.force={}", wall.force),
-      fmt::format("interference.background_force={}", wall.background_force),
-      "interference.onset_time=0",
-      "wall.law=" + choice(device::Parameter::of<"wall.law">(), wall.law)};
-  const auto add_field = [&all](const std::string& own) {
-    all.insert(all.end(), {"wall.magnetic_length=0.001", "wall.adaptive_gain=2.4", "wall.adaptive_offset=0.8",
-                           "wall.adaptive_velocity_max=2.4", "wall.adaptive_relation=linear",
-                           "wall.adaptive_velocity=approach", "wall.adaptive_force_min=0.8",
-                           "wall.adaptive_force_max=2", "wall.adaptive_hold_time=1.2", own});
+  const auto choice = [&text](const device::Parameter& parameter, auto value) {
+    return text(parameter, static_cast<std::uint32_t>(value));
   };
-  switch (wall.law) {
-    case control::WallKind::none:
-    case control::WallKind::plain:
-      break;
-    case control::WallKind::magnetic:
-      add_field(fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient));
-      break;
-    case control::WallKind::adaptive:
-      add_field("wall.adaptive_mode=" + choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode));
+  std::vector<std::string> all = {fmt::format("wall.stiffness={}", wall.stiffness),
+                                  fmt::format("haptic.rate={}", wall.haptic_rate),
+                                  fmt::format("position.resolution={}", wall.resolution),
+                                  choice(device::Parameter::of<"position.rounding">(), wall.rounding),
+                                  choice(device::Parameter::of<"interference.mode">(), wall.interference),
+                                  fmt::format("interference.force={}", wall.force),
+                                  fmt::format("interference.background_force={}", wall.background_force),
+                                  choice(device::Parameter::of<"wall.law">(), wall.law),
+                                  fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
+                                  choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)};
+  for (const char* name : papers_constants) {
+    const device::Parameter parameter = device::resolve(name);
+    all.push_back(text(parameter, parameter.default_raw()));
   }
   for (const std::string& change : wall.changes) {
     const std::string name = change.substr(0, change.find('=') + 1);
@@ -129,7 +133,6 @@ void DeviceRig::set_with_limits(const RigWall& wall) {
   wall_ = wall;
   std::vector<std::string> assignments = wall_assignments(wall, limits_.axis, axes_);
   for (const std::string& one : protective_of(device_, limits_, axes_)) assignments.push_back(one);
-  before_.note(std::vector<std::string>{"wall.magnetic_coefficient", "wall.adaptive_mode"});
   apply(assignments);
   const device::Parameter estimator(firmware::entry_of<"velocity.estimator">(), limits_.axis);
   velocity_estimator_ = device::value_text(estimator, device_.read(estimator));

@@ -96,8 +96,8 @@ class DeviceRig final : public Rig {
   std::string velocity_estimator_;
 };
 
-/// What a device is set to for a wall, NAME=VALUE, on the wall's axis unless it says otherwise: all of
-/// it, whatever its law. What only other laws use stays as it is.
+/// What a device is set to for a wall, NAME=VALUE, on the wall's axis unless it says otherwise: the same
+/// parameters whatever its law.
 std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis, RigAxes axes);
 
 /// Towards the wall, m/s, over the last 30 ms before time 0; 0 without samples there.

@@ -181,8 +181,10 @@ TEST_F(ResolutionDevice, EveryTouchHasItsOwnStepAndSpeed) {
   const double steps[] = {0.055e-3, 0.11e-3, 0.385e-3};  // whole counts of 0.055 mm
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(result.cells[i].step, steps[i], 1e-8);
-    // The scene's person comes at 0.2 m/s whoever asks; the hand overtakes what it intends.
-    EXPECT_NEAR(result.cells[i].speed, 0.22, 0.05);
+    // The scene's person comes at 0.2 m/s whoever asks; the hand overtakes what it intends, by how much
+    // depends on the moment.
+    EXPECT_GT(result.cells[i].speed, 0.2);
+    EXPECT_LT(result.cells[i].speed, 0.3);
     EXPECT_TRUE(result.cells[i].judged());
   }
   EXPECT_EQ(result.aborted, 0u);
