@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "host_tools/virtual_board/cortex_m/processor.hpp"
+#include "host_tools/virtual_board/cortex_m/stores_beside_code.hpp"
 
 namespace kmax::virtual_board {
 namespace {
@@ -144,7 +145,10 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
     return;
   }
   const Block* block = blocks_.find(address, size);
-  if (block == nullptr) block = &blocks_.add(address, bus_.memory(address, size));
+  if (block == nullptr) {
+    if (!memory_map::flash.contains(address)) note_code_in_ram();
+    block = &blocks_.add(address, bus_.memory(address, size));
+  }
   if (block->floating_point) {
     if (!core_.system_control.fpu_enabled()) {
       fail(fmt::format("floating-point instruction at {} while CPACR keeps the FPU off",

@@ -257,4 +257,23 @@ TEST(Processor, KeepsTheConditionOfAnIfThenThatThePageEndCuts_IfThenBlocks) {
   }
 }
 
+// Written, run, written over and run again: stores_beside_code.hpp.
+TEST(Processor, RunsWhatWasStoredToRamLast) {
+  constexpr std::uint32_t place = 0x2000'0800;
+  for (int engine = 0; engine < 2; ++engine) {
+    ProgramOnCore board({0x8013,                                          // strh r3, [r2]
+                         0x4780,                                          // blx r0
+                         0x460C,                                          // mov r4, r1
+                         0x8015,                                          // strh r5, [r2]
+                         0x4780,                                          // blx r0
+                         0xBE01});                                        // bkpt 1
+    board.place(place, {0xBE02, 0x4770});                                 // bkpt 2, bx lr
+    board.set(0, place | 1).set(2, place).set(3, 0x2101).set(5, 0x2102);  // movs r1, #1 or #2
+    ASSERT_EQ(board.run(), RunEnd::stopped);
+    ASSERT_EQ(board.processor.breakpoint(), 1);
+    EXPECT_EQ(board.get(4), 1U);
+    EXPECT_EQ(board.get(1), 2U);
+  }
+}
+
 }  // namespace kmax::virtual_board::processor_test
