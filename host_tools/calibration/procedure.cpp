@@ -166,35 +166,50 @@ bool always(const Calibration&) {
 // All steps in their order.
 const std::vector<Step>& calibration_steps() {
   static const std::vector<Step> steps = {
-      {"current_offsets", StepSet::electrical, {}, always, check_current_sensors},
-      {"winding", StepSet::electrical, {"current_offsets"}, always, find_winding},
+      {"current_offsets", StepSet::electrical, {}, always, {1, 1}, check_current_sensors},
+      {"winding", StepSet::electrical, {"current_offsets"}, always, {15, 50}, find_winding},
       {"hand_direction",
        StepSet::encoder,
        {},
        [](const Calibration& run) { return run.prompter != nullptr; },
+       {0, 0},
        find_direction_by_hand},
-      {"direction", StepSet::encoder, {"winding", "hand_direction"}, brushed, find_direction_by_pushes},
+      {"direction",
+       StepSet::encoder,
+       {"winding", "hand_direction"},
+       brushed,
+       {2, 0},
+       find_direction_by_pushes},
       // Not with an encoder that knows its angle anyway, and not without an index line.
       {"index_search",
        StepSet::encoder,
        {"winding", "hand_direction"},
        [](const Calibration& run) { return synchronous(run) && run.known.searches_index; },
+       {0, 10},
        search_index},
       {"field_turn",
        StepSet::encoder,
        {"winding", "hand_direction", "index_search"},
        synchronous,
+       {0, 25},
        find_field_angle},
       {"torque_constant",
        StepSet::mechanical,
        {"winding", "direction", "field_turn"},
        always,
+       {15, 20},
        find_torque_constant},
-      {"motion", StepSet::mechanical, {"direction", "field_turn", "torque_constant"}, always, find_motion},
+      {"motion",
+       StepSet::mechanical,
+       {"direction", "field_turn", "torque_constant"},
+       always,
+       {75, 75},
+       find_motion},
       {"compensation_map",
        StepSet::compensation,
        {"direction", "field_turn", "torque_constant", "motion"},
        always,
+       {80, 80},
        map_compensation}};
   return steps;
 }
@@ -203,6 +218,14 @@ bool blocked(const Step& step, const Reports& before) {
   return std::any_of(before.begin(), before.end(), [&](const StepReport& report) {
     return !report.pass && std::find(step.needs.begin(), step.needs.end(), report.name) != step.needs.end();
   });
+}
+
+bool is_to_be_run(const Step& step, const Calibration& run) {
+  return run.settings.has(step.set) && step.applies(run);
+}
+
+std::chrono::seconds usual_time(const Step& step, const Calibration& run) {
+  return std::chrono::seconds(step.usual_s[static_cast<std::size_t>(run.known.kind)]);
 }
 
 void run_step(const Step& step, Calibration& run) {
@@ -263,14 +286,19 @@ std::string restore(Bench& bench) {
   return trouble + "not put back: switch the device off and on before 'kmax save'";
 }
 
-void run_steps(Calibration& run, const std::function<void(std::string_view)>& started,
-               CalibrationReport& report) {
+void run_steps(Calibration& run, const StepStarted& started, CalibrationReport& report) {
   run.bench.begin();
   run.known = knowledge_of(run.bench, run.settings);
   // What is to be identified must not be corrected meanwhile.
   run.bench.set_temporary({"compensation.dead_time=0", "compensation.limit=0"});
+  std::chrono::seconds to_go{};
   for (const Step& step : calibration_steps()) {
-    if (!run.settings.has(step.set) || !step.applies(run)) continue;
+    if (is_to_be_run(step, run)) to_go += usual_time(step, run);
+  }
+  for (const Step& step : calibration_steps()) {
+    if (!is_to_be_run(step, run)) continue;
+    const std::chrono::seconds to_go_from_here = to_go;
+    to_go -= usual_time(step, run);
     if (run.bench.unusable() || blocked(step, report.steps)) {
       StepReport skipped;
       skipped.name = step.name;
@@ -278,7 +306,7 @@ void run_steps(Calibration& run, const std::function<void(std::string_view)>& st
       report.steps.push_back(skipped);
       continue;
     }
-    if (started) started(step.name);
+    if (started) started(step.name, to_go_from_here);
     run_step(step, run);
     report.steps.push_back(run.report);
   }
@@ -294,7 +322,7 @@ void run_steps(Calibration& run, const std::function<void(std::string_view)>& st
 CalibrationReport calibrate(device::Device& device, const CalibrationSettings& settings,
                             bench::Prompter* prompter,
                             const std::function<void(const std::string&)>& progress,
-                            const std::function<void(std::string_view)>& started) {
+                            const StepStarted& started) {
   require_ready(device, settings.axis);
   CalibrationReport report;
   Bench bench(device, settings.axis, settings.travel, progress);

@@ -3,6 +3,7 @@
 // is.
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -104,6 +105,7 @@ struct Step {
   // count.
   std::vector<std::string_view> needs;
   bool (*applies)(const Calibration&);  // whether there is anything to do on this axis
+  std::array<int, 2> usual_s;           // by MotorKind, as StepStarted says
   void (*run)(Calibration&);
 };
 

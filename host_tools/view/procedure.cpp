@@ -67,9 +67,9 @@ ProcedureResult calibration_of(device::Device& device, const ProcedureSettings& 
   calibration::CalibrationSettings steps;
   steps.axis = settings.axis;
   steps.save = false;  // whoever has read the result decides
-  const calibration::CalibrationReport report =
-      calibration::calibrate(device, steps, settings.hand ? &party.prompter : nullptr, party.progress,
-                             [&](std::string_view started) { party.progress(std::string(started)); });
+  const calibration::CalibrationReport report = calibration::calibrate(
+      device, steps, settings.hand ? &party.prompter : nullptr, party.progress,
+      [&](std::string_view started, std::chrono::seconds) { party.progress(std::string(started)); });
   for (const StepReport& one : report.steps) party.found(finding_of(one));
   if (report.pass()) return {true, "Every step has passed.", report.kept};
   const auto failed =

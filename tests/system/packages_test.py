@@ -57,11 +57,32 @@ class Packages(unittest.TestCase):
         left = {path for path in root.rglob("*") if path.is_file() and "var/lib/dpkg" not in str(path)} - before
         self.assertEqual(left, set())
 
-    def test_the_release_folder_needs_no_library_but_the_smallest_systems(self):
-        release = next(self.made.glob("kmax-*/environment")).parent
+    @property
+    def release(self):
+        return next(self.made.glob("kmax-*/environment")).parent
+
+    def run_bare(self, shell, script, folder):
+        """In a shell that knows nothing of Kmax but what the script reads."""
         environment = {"PATH": "/usr/bin:/bin", "HOME": self.folder.name, "KMAX_DEVICE": "sim"}
-        said = subprocess.run(["sh", "-c", ". ./environment && kmax get wall.stiffness && ldd bin/kmax bin/kmax-board"], cwd=release,
-                              env=environment, capture_output=True, text=True, check=True, timeout=300).stdout
+        return subprocess.run([shell, "-c", script], cwd=folder, env=environment, capture_output=True, text=True, check=True,
+                              timeout=300)
+
+    def test_the_environment_finds_its_own_folder_from_any_other(self):
+        found = self.run_bare("bash", f'. "{self.release}/environment" && command -v kmax && kmax get wall.stiffness && '
+                                      '/usr/bin/python3 -c "import kmax; print(kmax.__file__)"', self.folder.name)
+        self.assertEqual(found.stderr, "")
+        program, stiffness, module = found.stdout.splitlines()
+        self.assertEqual(program, f"{self.release}/bin/kmax")
+        self.assertEqual(stiffness, "wall.stiffness = 1000 N/m")
+        self.assertTrue(module.startswith(f"{self.release}/lib/"), module)
+
+    def test_a_shell_that_cannot_tell_where_the_environment_is_says_to_go_there(self):
+        self.assertIn("go to the release folder first", self.run_bare("sh", f'. "{self.release}/environment"',
+                                                                      self.folder.name).stderr)
+
+    def test_the_release_folder_needs_no_library_but_the_smallest_systems(self):
+        release = self.release
+        said = self.run_bare("sh", ". ./environment && kmax get wall.stiffness && ldd bin/kmax bin/kmax-board", release).stdout
         self.assertIn("wall.stiffness = 1000 N/m", said)
         smallest = ("libc.so", "libm.so", "libstdc++.so", "libgcc_s.so", "libpthread.so", "libdl.so", "librt.so", "linux-vdso",
                     "/lib64/ld-linux")

@@ -1,7 +1,9 @@
 // kmax calibrate.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <string>
+#include <utility>
 
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
@@ -102,6 +104,13 @@ void print_report(Context& context, const CalibrateOptions& options, const Calib
   }
 }
 
+/// Roughly, as it is known: in tens of seconds, from a minute and a half on in minutes.
+std::string rough(std::chrono::seconds time) {
+  const auto count = time.count();
+  return count < 90 ? fmt::format("{} s", (count + 9) / 10 * 10)
+                    : fmt::format("{} minutes", (count + 30) / 60);
+}
+
 int run_calibrate(Context& context, const CalibrateOptions& options) {
   const Interruption interruption;
   CalibrationSettings settings = options.settings;
@@ -123,7 +132,12 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
     };
     report = calibration::calibrate(
         device, settings, options.hand ? &prompter : nullptr, show,
-        [&](std::string_view step) { context.note(fmt::format("calibrating: {}", step)); });
+        [&, first = true](std::string_view step, std::chrono::seconds to_go) mutable {
+          if (std::exchange(first, false))
+            context.note(fmt::format("this takes about {} over a serial line of 115200 baud, less over CAN",
+                                     rough(to_go)));
+          context.note(fmt::format("calibrating: {}", step));
+        });
   }
   if (context.json) {
     Json steps = Json::array();

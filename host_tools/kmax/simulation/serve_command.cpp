@@ -65,11 +65,12 @@ int run_serve(Context& context, const ServeOptions& options) {
     context.say("set KMAX_DEVICE to that, or give it with --device; Ctrl-C ends", 0);
   }
   context.out.flush();
-  const auto report = serve::run_in_real_time(simulation, {line ? &*line : nullptr, can ? &*can : nullptr},
-                                              [&] { return interruption.requested(); });
-  if (report.behind_s > 0)
+  serve::Pace pace([&](const std::string& words) { context.note(words); });
+  serve::run_in_real_time(simulation, {line ? &*line : nullptr, can ? &*can : nullptr}, pace,
+                          [&] { return interruption.requested(); });
+  if (pace.behind_s() > 0)
     context.note(
-        fmt::format("this process was held up: {:.3f} s of real time were not simulated", report.behind_s));
+        fmt::format("this process was held up: {:.3f} s of real time were not simulated", pace.behind_s()));
   if (can && can->lost() != 0)
     context.note(fmt::format(
         "{} CAN frames were lost on their way to other programs, whose queues (or the interface's) were full",

@@ -104,15 +104,16 @@ int run(const Options& options) {
                options.elf, scene.name, fmt::join(addresses, " and "));
     std::cout.flush();
   }
-  const auto report =
-      virtual_board::run_board(board, {line ? &*line : nullptr, can ? &*can : nullptr},
-                               gpio ? &*gpio : nullptr, bench ? &*bench : nullptr, options.duration,
-                               options.free_running, [&] { return interruption.requested(); });
-  fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", report.simulated_s,
+  serve::Pace pace([](const std::string& words) { fmt::print(stderr, "kmax-board: {}\n", words); });
+  const double simulated_s = virtual_board::run_board(
+      board, {line ? &*line : nullptr, can ? &*can : nullptr}, gpio ? &*gpio : nullptr,
+      bench ? &*bench : nullptr, options.duration, options.free_running ? nullptr : &pace,
+      [&] { return interruption.requested(); });
+  fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", simulated_s,
              board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
-  if (report.behind_s > 0.0)
+  if (pace.behind_s() > 0.0)
     fmt::print(stderr, "this machine was too slow or busy: {:.3f} s of real time were not simulated\n",
-               report.behind_s);
+               pace.behind_s());
   return cli::done;
 }
 

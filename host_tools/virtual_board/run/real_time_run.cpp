@@ -11,12 +11,11 @@ namespace kmax::virtual_board {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double most_behind_s = 0.05;
-constexpr double piece_s = 0.001;
+constexpr serve::Pace::Time piece = std::chrono::milliseconds(1);
 constexpr auto rest = std::chrono::microseconds(300);
 
-BoardTime board_time(double duration_s) {
-  return static_cast<BoardTime>(duration_s * static_cast<double>(units_per_second));
+BoardTime board_time(std::chrono::duration<double> duration) {
+  return static_cast<BoardTime>(duration.count() * static_cast<double>(units_per_second));
 }
 
 /// The board's CAN bus, with its bits and their time, as one node among others on a bus of the host's.
@@ -51,17 +50,16 @@ class CanBridge {
 
 }  // namespace
 
-PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, BenchPipe* bench,
-                     double duration_s, bool free_running, const std::function<bool()>& stop) {
-  PaceReport report;
+double run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, BenchPipe* bench,
+                 double duration_s, serve::Pace* pace, const std::function<bool()>& stop) {
   std::optional<CanBridge> can;
   if (host.can != nullptr) can.emplace(board, *host.can);
   const BoardTime begin = board.now();
-  const BoardTime end = duration_s > 0.0 ? begin + board_time(duration_s) : never;
+  const BoardTime end =
+      duration_s > 0.0 ? begin + board_time(std::chrono::duration<double>(duration_s)) : never;
   auto reached = Clock::now();
-  double due_s = 0.0;
   while (!stop() && board.now() < end) {
-    if (!free_running && due_s == 0.0) serve::wait_for_host(host, rest);
+    if (pace != nullptr && pace->due() == serve::Pace::Time{}) serve::wait_for_host(host, rest);
     if (host.line != nullptr) {
       const auto received = host.line->read(0);
       if (!received.empty()) board.receive(received);
@@ -69,28 +67,23 @@ PaceReport run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridg
     if (can) can->exchange();
     if (bench != nullptr) bench->exchange();
     const bool runs = gpio == nullptr || gpio->exchange();
-    if (!free_running) {
+    if (pace != nullptr) {
       const auto now = Clock::now();
-      due_s += std::chrono::duration<double>(now - reached).count();
-      if (due_s > most_behind_s) {
-        report.behind_s += due_s - most_behind_s;
-        due_s = most_behind_s;
-      }
+      pace->passed(now - reached);
       reached = now;
     }
     if (!runs) {
-      due_s = 0.0;
+      if (pace != nullptr) pace->hold();
       continue;
     }
     // What is due at most, and not at once: a host waits for the answers of a board that lags behind.
-    const double step_s = free_running ? piece_s : std::min(due_s, piece_s);
-    board.run_until(std::min(end, board.now() + board_time(step_s)));
-    if (!free_running) due_s -= step_s;
+    const auto step = pace != nullptr ? std::min(pace->due(), piece) : piece;
+    board.run_until(std::min(end, board.now() + board_time(step)));
+    if (pace != nullptr) pace->ran(step);
     const auto transmitted = board.transmitted();
     if (host.line != nullptr && !transmitted.empty()) host.line->write(transmitted);
   }
-  report.simulated_s = seconds(board.now() - begin);
-  return report;
+  return seconds(board.now() - begin);
 }
 
 }  // namespace kmax::virtual_board

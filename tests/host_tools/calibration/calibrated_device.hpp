@@ -30,10 +30,12 @@ inline std::vector<const char*> representative_scenes() {
   return {"dc_coreless_a", "gimbal_b"};
 }
 
-/// How often a calibration reported its progress.
+/// How often a calibration reported its progress, and how long it said at the beginning that it usually
+/// takes.
 struct CalibrationLength {
   int whole = 0;
   std::map<std::string, int> in_step;
+  std::chrono::seconds usual{};
 };
 
 /// A simulated board with one of the motor scenes, on a fast line, that can be calibrated.
@@ -56,6 +58,7 @@ class CalibratedDevice {
   calibration::CalibrationReport calibrate(const calibration::CalibrationSettings& settings = {},
                                            bench::Prompter* prompter = nullptr) {
     length = {};
+    step.clear();
     return calibration::calibrate(
         device_, settings, prompter,
         [this](const std::string&) {
@@ -63,7 +66,10 @@ class CalibratedDevice {
           ++length.in_step[step];
           if (on_progress) on_progress();
         },
-        [this](std::string_view begun) { step = begun; });
+        [this](std::string_view begun, std::chrono::seconds usual) {
+          if (step.empty()) length.usual = usual;
+          step = begun;
+        });
   }
 
   std::vector<std::uint32_t> parameters() { return all_settings(device_); }

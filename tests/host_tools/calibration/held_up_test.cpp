@@ -43,7 +43,7 @@ struct HeldUpDevice {
   CalibrationReport calibrate(const CalibrationSettings& settings) {
     return calibration::calibrate(
         device, settings, nullptr, [](const std::string&) {},
-        [this](std::string_view begun) {
+        [this](std::string_view begun, std::chrono::seconds) {
           step = begun;
           messages = 0;
         });

@@ -73,6 +73,21 @@ TEST(Procedure, AnInterruptionAnywherePutsEverythingBackSaysSoAndDisarms) {
   }
 }
 
+TEST(Procedure, TakesAboutAsLongAsItSaysAtTheBeginning) {
+  for (const char* scene : representative_scenes()) {
+    CalibratedDevice device(scene);
+    device.set({"modbus.baud_rate=115200"});
+    const auto seconds_of = [&] {
+      return static_cast<double>(device.link().simulation().board().now_us()) * 1e-6;
+    };
+    const double begin = seconds_of();
+    ASSERT_TRUE(device.calibrate().pass()) << scene;
+    const double took = seconds_of() - begin, said = static_cast<double>(device.length.usual.count());
+    EXPECT_GT(took, 0.8 * said) << scene;
+    EXPECT_LT(took, 1.2 * said) << scene;
+  }
+}
+
 TEST(Procedure, StepsThatNeedAFailedOneAreLeftOut) {
   CalibratedDevice device("gimbal_a");
   device.plant(simulation::Defect::phase_b_open);

@@ -30,7 +30,8 @@ TEST(RealTime, AnswersWhatComesOverTheLine) {
   ASSERT_EQ(write(served.other, request, sizeof request), 8);
   std::vector<std::uint8_t> reply;
   const auto patience = Clock::now() + std::chrono::seconds(30);
-  run_in_real_time(served.simulation, {.line = &served.line}, [&] {
+  Pace pace;
+  run_in_real_time(served.simulation, {.line = &served.line}, pace, [&] {
     std::uint8_t byte = 0;
     while (read(served.other, &byte, 1) == 1) reply.push_back(byte);
     return reply.size() >= 7 || Clock::now() > patience;
@@ -45,21 +46,23 @@ TEST(RealTime, SimulatedAndGivenUpTimeNeverExceedTheRealTime) {
   Served served;
   int asked = 0;
   const auto begin = Clock::now();
-  const PaceReport report = run_in_real_time(served.simulation, {.line = &served.line}, [&] {
+  Pace pace;
+  const std::uint64_t ticks = run_in_real_time(served.simulation, {.line = &served.line}, pace, [&] {
     if (++asked == 10) std::this_thread::sleep_for(milliseconds(150));
     return asked >= 20;
   });
   const double real = std::chrono::duration<double>(Clock::now() - begin).count();
   EXPECT_EQ(asked, 20);
-  EXPECT_GE(report.behind_s, 0.1 - 1e-9) << "150 ms, of which 50 ms can be caught up with";
-  EXPECT_LE(report.behind_s + static_cast<double>(report.ticks) * 50e-6, real);
-  EXPECT_GE(static_cast<double>(report.ticks) * 50e-6, 0.05 - 1e-4);
-  EXPECT_EQ(served.simulation.board().now_us(), report.ticks * 50);
+  EXPECT_GE(pace.behind_s(), 0.1 - 1e-9) << "150 ms, of which 50 ms can be caught up with";
+  EXPECT_LE(pace.behind_s() + static_cast<double>(ticks) * 50e-6, real);
+  EXPECT_GE(static_cast<double>(ticks) * 50e-6, 0.05 - 1e-4);
+  EXPECT_EQ(served.simulation.board().now_us(), ticks * 50);
 }
 
 TEST(RealTime, StopsBeforeItBegins) {
   Served served;
-  EXPECT_EQ(run_in_real_time(served.simulation, {.line = &served.line}, [] { return true; }).ticks, 0u);
+  Pace pace;
+  EXPECT_EQ(run_in_real_time(served.simulation, {.line = &served.line}, pace, [] { return true; }), 0u);
 }
 
 }  // namespace kmax::serve::real_time_test

@@ -61,6 +61,7 @@ TEST_F(Calibrate, ADefectIsAVerdictWithItsName) {
   EXPECT_EQ(all["kept"], false);
   EXPECT_EQ(all["steps"][1]["failure"]["cause"], "phase_b_open");
   EXPECT_EQ(on_scene("gimbal_a", {"calibrate"}, simulation::Defect::phase_b_open), verdict_is_no);
+  EXPECT_CONTAINS(said, "this takes about 3 minutes over a serial line of 115200 baud, less over CAN");
   EXPECT_CONTAINS(output, "phase_b_open");
   EXPECT_CONTAINS(output, "nothing was kept");
 }
@@ -69,6 +70,7 @@ TEST_F(Calibrate, TheTableSaysWhatWasBefore) {
   ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--dry-run"}), done) << said;
   EXPECT_CONTAINS(output, "motor.resistance");
   EXPECT_CONTAINS(output, "was 1");
+  EXPECT_CONTAINS(said, "this takes about 20 s over a serial line");
   EXPECT_CONTAINS(output, "dry run");
   ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--no-save"}), done) << said;
   EXPECT_CONTAINS(output, "kmax save");
