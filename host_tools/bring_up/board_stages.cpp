@@ -333,8 +333,7 @@ StageResult try_gate_drivers(device::Device& device, const Settings& settings, c
                    check_cold_offsets(device, settings.axis), check_no_motor(evidence)};
   if (!result.passed() || !settings.has_button) return result;
   party.person.ask(
-      "Put a hand on the emergency stop, and do not press it yet. Next the axis is armed with 0 V; press it "
-      "then.");
+      "Next the axis is armed with 0 V: press the emergency stop then, and not before. Put a hand on it");
   Probe probe(device, settings.axis, party.progress);
   result.checks.push_back(check_hand_stop(probe, {.patience = settings.patience}, party.progress));
   put_back(probe);

@@ -61,7 +61,7 @@ class WallTrial {
     plan.name = fmt::format("wall of {:.2f} N/mm", stiffness * 1e-3);
     plan.request = fmt::format(
         "{}: take the handle, and be ready to move it slowly by {:.0f} mm, towards {} positions, to press "
-        "lightly against the wall for 2 s, and to let go: the wall is gone when the verdict is there",
+        "lightly against the wall for 2 s, and to let go when the verdict has come and the wall is gone",
         plan.name, way_to_wall * 1e3,
         device_.read_number(fmt::format("axis{}.wall.side", settings_.axis)) > 0.0 ? "smaller" : "larger");
     plan.hold_time = 2.0;

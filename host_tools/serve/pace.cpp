@@ -28,7 +28,7 @@ void Pace::watch(Time real, Time given_up) {
   if (share >= slow) return;
   std::exchange(say_, nullptr)(fmt::format(
       "this machine is too slow or busy: over the last 5 s the simulation ran at {:.0f} % of real "
-      "time, so a second of it takes {:.1f} s. Waits take that much longer; nothing else changes",
+      "time, so a second of it takes {:.1f} s. Waits take that much longer, and links may report errors",
       100.0 * share, 1.0 / share));
 }
 

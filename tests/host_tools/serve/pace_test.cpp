@@ -58,7 +58,7 @@ TEST(Pace, SaysOnceAndEarlyHowSlowItIs) {
   EXPECT_EQ(
       watched.said[0],
       "this machine is too slow or busy: over the last 5 s the simulation ran at 26 % of real time, so a "
-      "second of it takes 3.8 s. Waits take that much longer; nothing else changes");
+      "second of it takes 3.8 s. Waits take that much longer, and links may report errors");
 }
 
 TEST(Pace, SaysSoOfAMachineThatGetsSlowLater) {
