@@ -130,6 +130,20 @@ TEST(Emergency, ClearedInAnyOrder) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
+// Whichever byte of its code is not 0: the master has been told of an error, and is told that it has gone.
+TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
+  for (const std::uint16_t code : std::vector<std::uint16_t>{0x8100, 0x0010}) {
+    Emergency emergency = configured();
+    emergency.raise({code, error_register::communication, {}});
+    ASSERT_TRUE(next_of(emergency));
+    emergency.configure(own_cob_id | cob_id::invalid, 0);
+    emergency.clear(code);
+    emergency.configure(own_cob_id, 0);
+    EXPECT_EQ(next_of(emergency), recovered) << code;
+    EXPECT_FALSE(next_of(emergency));
+  }
+}
+
 TEST(Emergency, InhibitTimeAcrossTheWrap) {
   for (const std::uint16_t inhibit : std::vector<std::uint16_t>{1, 100, 65535}) {
     for (const std::uint32_t start : {0U, 0x7FFF'FFFFU, 0xFFFF'FFFFU, 0U - 50U}) {

@@ -148,7 +148,7 @@ RC_GTEST_PROP(CyclicTorque, NewtonsArriveAsTheCurrentThatMakesThem, ()) {
   values.set_real<"device.transmission">(in(1e-3, 1e-1));
   AxisSetting setting;
   setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, 0), 0);
-  setting.motor = MotorControl::prepare(motor_configuration(values, 0));
+  setting.motor = MotorControl::prepare(motor_configuration(values, 0, 25.0f, 1.0f));
   setting.mode = DriveMode::torque;
   Axis axis;
   const Axis::Input input{.count = 0, .count_valid = true, .condition = Fault::none, .motor = {}};

@@ -7,7 +7,7 @@
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/board/canopen_host.hpp"
 
-namespace kmax::board::application_canopen_test {
+namespace kmax::board::canopen_edge_bus_test {
 namespace {
 
 using firmware::Fault;
@@ -363,4 +363,4 @@ TEST_F(OnCan, ATwinIsToldAndForgotten) {
 }
 
 }  // namespace
-}  // namespace kmax::board::application_canopen_test
+}  // namespace kmax::board::canopen_edge_bus_test
