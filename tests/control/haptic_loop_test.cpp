@@ -406,4 +406,17 @@ TEST(HapticLoop, ParallelInterferenceIsReportedForTheOtherAxis) {
   EXPECT_EQ(loop.at(-1000, false).tangential_force, 0.0f) << "not while disabled";
 }
 
+TEST(HapticLoopConfig, ItsDefaults) {
+  const HapticLoopConfig<double> defaults;
+  EXPECT_EQ(defaults.count_length, 1e-6);
+  EXPECT_EQ(defaults.wall_position, 0.0);
+  EXPECT_EQ(defaults.wall_side, 1);
+  EXPECT_EQ(defaults.position_resolution, 0.0);
+  EXPECT_EQ(defaults.position_rounding, Rounding::nearest);
+  EXPECT_EQ(defaults.velocity_limit, 0.0);
+  EXPECT_EQ(defaults.instability_action, InstabilityAction::off);
+  EXPECT_EQ(defaults.tick_rate, 20000.0);
+  EXPECT_EQ(defaults.divider, 1u);
+}
+
 }  // namespace kmax::control::haptic_loop_test

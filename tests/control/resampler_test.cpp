@@ -195,4 +195,10 @@ TEST(ResamplerStep, NonsenseAndExcessAreBounded) {
   EXPECT_EQ(resampler_step(1e9, 1e-9), resampler_step_max);
 }
 
+TEST(ResamplerConfig, ItsDefaults) {
+  const ResamplerConfig defaults;
+  EXPECT_EQ(defaults.step, 1);
+  EXPECT_EQ(defaults.rounding, Rounding::nearest);
+}
+
 }  // namespace kmax::control::resampler_test

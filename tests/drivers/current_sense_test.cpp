@@ -222,4 +222,20 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
   RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
 }
 
+TEST(CurrentSenseConfig, ItsDefaults) {
+  const CurrentSenseConfig defaults;
+  EXPECT_EQ(defaults.shunt_ohm, 0.0005F);
+  EXPECT_EQ(defaults.gain, CurrentSenseGain::x40);
+  EXPECT_EQ(defaults.reference_volt, 3.3F);
+  EXPECT_EQ(defaults.lowest_linear_code, 373u);
+  EXPECT_EQ(defaults.highest_linear_code, 3723u);
+}
+
+TEST(OffsetCalibrationConfig, ItsDefaults) {
+  const OffsetCalibrationConfig defaults;
+  EXPECT_EQ(defaults.log2_samples, 10u);
+  EXPECT_EQ(defaults.window, offset_window(CurrentSenseGain::x40));
+  EXPECT_EQ(defaults.largest_spread, 64u);
+}
+
 }  // namespace kmax::drivers::current_sense_test

@@ -173,4 +173,11 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
   EXPECT_EQ(encoder.reading.reference_generation, 0u);
 }
 
+TEST(ReferencedQuadratureConfig, ItsDefaults) {
+  const ReferencedQuadratureConfig defaults;
+  EXPECT_FALSE(defaults.has_index);
+  EXPECT_FALSE(defaults.from_index);
+  EXPECT_EQ(defaults.counts_per_turn, 8192u);
+}
+
 }  // namespace kmax::drivers::referenced_quadrature_counter_test

@@ -178,4 +178,17 @@ RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
   }
 }
 
+TEST(ThreePhasePwmConfig, ItsDefaults) {
+  const ThreePhasePwmConfig defaults;
+  EXPECT_EQ(defaults.half_period_ticks, 4200u);
+  EXPECT_EQ(defaults.minimum_low_ticks, 252u);
+}
+
+TEST(PwmLegs, ItsDefaults) {
+  const PwmLegs defaults;
+  EXPECT_TRUE(defaults.a);
+  EXPECT_TRUE(defaults.b);
+  EXPECT_TRUE(defaults.c);
+}
+
 }  // namespace kmax::drivers::stm32f4::three_phase_pwm_test

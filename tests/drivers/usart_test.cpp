@@ -152,4 +152,10 @@ TEST(Usart, ConfiguringDropsWhatIsBeingSentAndWhatHasComeIn) {
   EXPECT_TRUE(registers.dr.writes.empty());
 }
 
+TEST(UsartConfig, ItsDefaults) {
+  const UsartConfig defaults;
+  EXPECT_EQ(defaults.baud_rate, 115'200u);
+  EXPECT_EQ(defaults.parity, UsartParity::even);
+}
+
 }  // namespace kmax::drivers::stm32f4::usart_test

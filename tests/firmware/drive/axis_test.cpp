@@ -203,5 +203,36 @@ TEST_F(AxisTest, SaysWhenTheMainLoopMustSeeItsReport) {
   EXPECT_FALSE(axis.ISR_changed());
 }
 
+TEST(AxisReport, ItsDefaults) {
+  const AxisReport defaults;
+  EXPECT_EQ(defaults.counted, 0);
+  EXPECT_EQ(defaults.tick, 0u);
+  EXPECT_EQ(defaults.generation, 0u);
+  EXPECT_EQ(defaults.reference_generation, 0u);
+  EXPECT_EQ(defaults.armed_samples, 0u);
+  EXPECT_EQ(defaults.limited_samples, 0u);
+  EXPECT_EQ(defaults.alarms, 0u);
+  EXPECT_EQ(defaults.softening, 1.0f);
+  EXPECT_EQ(defaults.force, 0.0f);
+  EXPECT_EQ(defaults.fault, Fault::none);
+  EXPECT_EQ(defaults.condition, Fault::none);
+  EXPECT_EQ(defaults.fault_value, 0.0f);
+  EXPECT_FALSE(defaults.enabled);
+  EXPECT_FALSE(defaults.count_valid);
+  EXPECT_FALSE(defaults.referenced);
+}
+
+TEST(AxisSetting, ItsDefaults) {
+  const AxisSetting defaults;
+  EXPECT_EQ(defaults.supply_voltage_min, 0.0f);
+  EXPECT_EQ(defaults.supply_voltage_max, 0.0f);
+  EXPECT_EQ(defaults.encoder_offset, 0);
+  EXPECT_EQ(defaults.encoder_direction, 1);
+  EXPECT_EQ(defaults.generation, 0u);
+  EXPECT_EQ(defaults.mode, DriveMode::haptic);
+  EXPECT_FALSE(defaults.watch_motion);
+  EXPECT_TRUE(defaults.commutated);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::axis_test

@@ -273,5 +273,27 @@ TEST(MotorControl, CurrentsOfADcMotorThatDoNotAddUpAreTold) {
   EXPECT_LT(ticks, 100);
 }
 
+TEST(MotorControlConfig, ItsDefaults) {
+  const MotorControlConfig defaults;
+  EXPECT_EQ(defaults.kind, MotorKind::dc);
+  EXPECT_EQ(defaults.transmission, 0.05f);
+  EXPECT_EQ(defaults.torque_constant, 0.05f);
+  EXPECT_EQ(defaults.resistance, 1.0f);
+  EXPECT_EQ(defaults.winding_temperature, 25.0f);
+  EXPECT_EQ(defaults.reference_temperature, 25.0f);
+  EXPECT_EQ(defaults.inductance, 1e-3f);
+  EXPECT_EQ(defaults.inductance_q, 0.0f);
+  EXPECT_EQ(defaults.pole_pairs, 7);
+  EXPECT_EQ(defaults.electrical_offset, 0.0f);
+  EXPECT_EQ(defaults.counts_per_turn, 8192u);
+  EXPECT_EQ(defaults.current_limit, 5.0f);
+  EXPECT_EQ(defaults.current_share, 1.0f);
+  EXPECT_EQ(defaults.bandwidth, 3000.0f);
+  EXPECT_EQ(defaults.modulation_limit, 0.88f);
+  EXPECT_EQ(defaults.dead_time, 0.0f);
+  EXPECT_EQ(defaults.dead_time_current, 0.1f);
+  EXPECT_EQ(defaults.tick_rate, 20000.0f);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::motor_control_test
