@@ -257,4 +257,10 @@ TEST(DcCurrentController, ResetEmptiesTheIntegrator) {
   EXPECT_EQ(loop.controller.update(loop.c, 1.0, 1.0, 0.0, 24.0).voltage, 0.0);
 }
 
+TEST(DcCurrentControllerOutput, ItsDefaults) {
+  const DcCurrentController<double>::Output defaults{};
+  EXPECT_FALSE(defaults.saturated);
+  EXPECT_FALSE(defaults.not_finite);
+}
+
 }  // namespace kmax::control::dc_current_controller_test

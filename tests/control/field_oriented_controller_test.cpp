@@ -530,4 +530,10 @@ TEST(FieldOrientedControllerConfig, ItsDefaults) {
   EXPECT_EQ(defaults.pwm_frequency, 20000.0);
 }
 
+TEST(FieldOrientedControllerVerdict, ItsDefaults) {
+  const FieldOrientedController<double>::Verdict defaults{};
+  EXPECT_FALSE(defaults.saturated);
+  EXPECT_FALSE(defaults.not_finite);
+}
+
 }  // namespace kmax::control::field_oriented_controller_test

@@ -97,4 +97,12 @@ TEST(ForceLimiter, NotFiniteGivesZeroAndTheSoftStartAgain) {
   }
 }
 
+TEST(ForceLimiterOutput, ItsDefaults) {
+  const ForceLimiter<double>::Output defaults{};
+  EXPECT_FALSE(defaults.limited);
+  EXPECT_FALSE(defaults.slew_limited);
+  EXPECT_FALSE(defaults.ramping);
+  EXPECT_FALSE(defaults.not_finite);
+}
+
 }  // namespace kmax::control::force_limiter_test

@@ -419,4 +419,20 @@ TEST(HapticLoopConfig, ItsDefaults) {
   EXPECT_EQ(defaults.divider, 1u);
 }
 
+TEST(HapticLoopOutput, ItsDefaults) {
+  const HapticLoop<double>::Output defaults{};
+  EXPECT_FALSE(defaults.inside);
+  EXPECT_FALSE(defaults.limited);
+  EXPECT_FALSE(defaults.slew_limited);
+  EXPECT_FALSE(defaults.ramping);
+  EXPECT_FALSE(defaults.unstable);
+  EXPECT_FALSE(defaults.new_sample);
+}
+
+TEST(HapticLoopCoefficients, ItsDefaults) {
+  const HapticLoop<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.wall_count, 0);
+  EXPECT_EQ(defaults.divider, 1u);
+}
+
 }  // namespace kmax::control::haptic_loop_test

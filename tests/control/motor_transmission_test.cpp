@@ -78,4 +78,10 @@ TEST(MotorTransmission, ALimitOfZeroMeansNoCurrent) {
   EXPECT_TRUE(out.limited);
 }
 
+TEST(MotorTransmissionOutput, ItsDefaults) {
+  const MotorTransmission<double>::Output defaults{};
+  EXPECT_FALSE(defaults.limited);
+  EXPECT_FALSE(defaults.not_finite);
+}
+
 }  // namespace kmax::control::motor_transmission_test

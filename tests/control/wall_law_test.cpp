@@ -165,4 +165,9 @@ TEST(WallLaw, NotANumberIsNotHidden) {
   EXPECT_TRUE(std::isnan(force_at(damped, -1e-3f, nan)));
 }
 
+TEST(WallLawOutput, ItsDefaults) {
+  const WallLaw<double>::Output defaults{};
+  EXPECT_FALSE(defaults.inside);
+}
+
 }  // namespace kmax::control::wall_law_test

@@ -97,7 +97,15 @@ TEST(Can, ConfigureInOrder) {
   EXPECT_EQ(bench.can.fs1r.value, 3U);
   EXPECT_EQ(bench.can.ffa1r.value, 2U);
   EXPECT_EQ(bench.can.fmr.value, 0x2A1C'0E00U);
-  EXPECT_EQ(bench.can.ier.value, 0x0000'865BU);
+  EXPECT_EQ(bench.can.ier.writes, (std::vector<std::uint32_t>{0, 0x0000'865B}));
+  EXPECT_EQ(bench.can.bank[0].fr1.value | bench.can.bank[0].fr2.value, 0U);
+  EXPECT_EQ(bench.can.bank[1].fr1.value, 0U);
+  EXPECT_EQ(bench.can.bank[1].fr2.value, 0x80U << 21);
+  // What an earlier life has left: three frames in each FIFO, the mailboxes, the error interrupt.
+  for (const FakeRegister& each : bench.can.rfr)
+    EXPECT_EQ(each.writes, (std::vector<std::uint32_t>{0x38, 0x38, 0x38})) << "RFOM, FOVR, FULL";
+  EXPECT_EQ(bench.can.tsr.writes, (std::vector<std::uint32_t>{0x0080'8080, 0x0001'0101}));
+  EXPECT_EQ(bench.can.msr.writes, (std::vector<std::uint32_t>{1U << 2})) << "ERRI";
 }
 
 TEST(Can, SilentHardwareIsNamed) {

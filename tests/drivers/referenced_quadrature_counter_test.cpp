@@ -180,4 +180,12 @@ TEST(ReferencedQuadratureConfig, ItsDefaults) {
   EXPECT_EQ(defaults.counts_per_turn, 8192u);
 }
 
+TEST(ReferencedQuadratureCounterReading, ItsDefaults) {
+  const ReferencedQuadratureCounter<>::Reading defaults{};
+  EXPECT_EQ(defaults.count, 0u);
+  EXPECT_FALSE(defaults.valid);
+  EXPECT_FALSE(defaults.referenced);
+  EXPECT_EQ(defaults.reference_generation, 0u);
+}
+
 }  // namespace kmax::drivers::referenced_quadrature_counter_test

@@ -67,6 +67,41 @@ TEST(ThreePhasePwm, OutputsAreOffBeforeAnythingElseIsTouched) {
   EXPECT_EQ(order.back(), 'e') << "the legs come last";
 }
 
+TEST(ThreePhasePwm, IsSetUpInTheManualsOrder) {
+  FakeTimer timer;
+  timer.cr1.value = 1U | 1U << 4 | 3U << 5;  // runs down, centre-aligned
+  WriteOrder order;
+  timer.tell(order);
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  constexpr std::uint32_t loading = 1U << 2 | 1U << 7;
+  EXPECT_EQ(order.all, (WriteOrder::Writes{{"bdtr", disarmed},
+                                           {"cr1", 1U << 4 | 3U << 5},
+                                           {"cr1", 1U << 4},
+                                           {"cr1", loading},
+                                           {"smcr", 0},
+                                           {"dier", 0},
+                                           {"ccr4", 0xFFFF},
+                                           {"cr2", 1U << 4},
+                                           {"ccer", 0},
+                                           {"ccmr1", 0x7878},
+                                           {"ccmr2", 0x0078},
+                                           {"psc", 0},
+                                           {"rcr", 0},
+                                           {"arr", 4200},
+                                           {"ccr1", 4200},
+                                           {"ccr2", 4200},
+                                           {"ccr3", 4200},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"egr", 1},
+                                           {"cr1", loading | 3U << 5},
+                                           {"sr", 0},
+                                           {"ccer", 0x555}}));
+}
+
 TEST(ThreePhasePwm, RefusesImpossibleConfigurations) {
   for (const ThreePhasePwmConfig& config :
        {ThreePhasePwmConfig{.half_period_ticks = 252}, ThreePhasePwmConfig{.minimum_low_ticks = 4200},

@@ -234,5 +234,12 @@ TEST(AxisSetting, ItsDefaults) {
   EXPECT_TRUE(defaults.commutated);
 }
 
+TEST(AxisDemand, ItsDefaults) {
+  const Axis::Demand defaults{};
+  EXPECT_EQ(defaults.from_axes, 0.0f);
+  EXPECT_EQ(defaults.from_host, 0.0f);
+  EXPECT_EQ(defaults.share, 1.0f);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::axis_test

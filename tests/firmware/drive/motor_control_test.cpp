@@ -295,5 +295,24 @@ TEST(MotorControlConfig, ItsDefaults) {
   EXPECT_EQ(defaults.tick_rate, 20000.0f);
 }
 
+TEST(MotorControlMeasured, ItsDefaults) {
+  const MotorControl::Measured defaults{};
+  EXPECT_FALSE(defaults.present);
+  EXPECT_EQ(defaults.supply_voltage, 0.0f);
+  EXPECT_EQ(defaults.current_b, 0.0f);
+  EXPECT_EQ(defaults.current_c, 0.0f);
+}
+
+TEST(MotorControlReport, ItsDefaults) {
+  const MotorControl::Report defaults{};
+  EXPECT_EQ(defaults.current_reference, 0.0f);
+  EXPECT_EQ(defaults.current, 0.0f);
+  EXPECT_EQ(defaults.force_made, 0.0f);
+  EXPECT_EQ(defaults.current_square, 0.0f);
+  EXPECT_FALSE(defaults.saturated);
+  EXPECT_FALSE(defaults.excitation_started);
+  EXPECT_FALSE(defaults.excitation_finished);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::motor_control_test
