@@ -71,6 +71,13 @@ TEST(As5047pDiagnostics, EachBitIsItsOwn) {
   }
 }
 
+// By the data sheet: ERRFL.
+TEST(As5047pErrors, EachBitIsItsOwn) {
+  EXPECT_EQ(as5047p::framing_error, 1U);
+  EXPECT_EQ(as5047p::invalid_command, 2U);
+  EXPECT_EQ(as5047p::parity_error, 4U);
+}
+
 TEST(As5047pAngle, FollowsThroughManyTurnsBothWaysOneTickLate) {
   for (const int speed : {1, -1, 82, -82, 511, -511}) {
     Encoder encoder;

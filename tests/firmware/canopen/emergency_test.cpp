@@ -144,6 +144,22 @@ TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
   }
 }
 
+// CiA 301, object 0x1001, and docs/canopen.md.
+TEST(Emergency, ItsNumbersAreTheProtocols) {
+  EXPECT_EQ(error_register::generic, 0x01);
+  EXPECT_EQ(error_register::current, 0x02);
+  EXPECT_EQ(error_register::voltage, 0x04);
+  EXPECT_EQ(error_register::temperature, 0x08);
+  EXPECT_EQ(error_register::communication, 0x10);
+  EXPECT_EQ(error_register::device_profile, 0x20);
+  EXPECT_EQ(error_register::manufacturer, 0x80);
+  EXPECT_EQ(bus_source, 127);
+  EXPECT_EQ(watched_source, 128);
+  EXPECT_EQ(present_error_count, 16U);
+  EXPECT_EQ(emergency_queue_length, 8U);
+  EXPECT_EQ(error_history_length, 8U);
+}
+
 TEST(Emergency, InhibitTimeAcrossTheWrap) {
   for (const std::uint16_t inhibit : std::vector<std::uint16_t>{1, 100, 65535}) {
     for (const std::uint32_t start : {0U, 0x7FFF'FFFFU, 0xFFFF'FFFFU, 0U - 50U}) {
