@@ -105,4 +105,11 @@ TEST(ForceLimiterOutput, ItsDefaults) {
   EXPECT_FALSE(defaults.not_finite);
 }
 
+TEST(ForceLimiterConfig, ItsDefaults) {
+  const ForceLimiterConfig<double> defaults;
+  EXPECT_EQ(defaults.limit, 3.3);
+  EXPECT_EQ(defaults.slew_limit, 0.0);
+  EXPECT_EQ(defaults.ramp_time, 0.2);
+}
+
 }  // namespace kmax::control::force_limiter_test

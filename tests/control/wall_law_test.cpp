@@ -170,4 +170,13 @@ TEST(WallLawOutput, ItsDefaults) {
   EXPECT_FALSE(defaults.inside);
 }
 
+TEST(WallLawConfig, ItsDefaults) {
+  const WallLawConfig<double> defaults;
+  EXPECT_EQ(defaults.kind, WallKind::plain);
+  EXPECT_EQ(defaults.stiffness, 1000.0);
+  EXPECT_EQ(defaults.damping, 0.0);
+  EXPECT_EQ(defaults.magnetic_coefficient, 2.0);
+  EXPECT_EQ(defaults.magnetic_length, 0.001);
+}
+
 }  // namespace kmax::control::wall_law_test
