@@ -298,6 +298,19 @@ TEST(InstabilityDetector, KeepsTheLastAlarmAtItsStrongestAndCountsThem) {
   EXPECT_NEAR(static_cast<double>(detector.last_alarm().frequency), 30.0, 1.5);
 }
 
+TEST(InstabilityDetector, ForgetsItsAlarmsWhenItIsTold) {
+  const double rate = 5000.0;
+  const auto c = at_rate(rate);
+  Detector detector;
+  ASSERT_GE(found_after(detector, c, rate, sine(rate, 30.0, 0.0, 1.5, 1.5, 1.0)), 0.0);
+  ASSERT_EQ(detector.alarms(), 1U);
+  detector.forget_alarms();
+  EXPECT_EQ(detector.alarms(), 0U);
+  EXPECT_EQ(detector.last_alarm().force, 0.0F);
+  EXPECT_EQ(detector.last_alarm().frequency, 0.0F);
+  EXPECT_TRUE(detector.unstable()) << "what is, is";
+}
+
 TEST(InstabilityDetector, TakesAnyConfiguration) {
   for (const float odd : {0.0F, -1.0F, std::numeric_limits<float>::quiet_NaN(),
                           std::numeric_limits<float>::infinity(), 1e-30F}) {

@@ -170,6 +170,18 @@ TEST(WallLawOutput, ItsDefaults) {
   EXPECT_FALSE(defaults.inside);
 }
 
+TEST(WallLaw, AResetForgetsTheContact) {
+  WallLawConfig<double> config;
+  config.kind = WallKind::adaptive;
+  config.adaptive.mode = AdaptiveMode::latched;
+  WallLaw<double> law;
+  const auto c = WallLaw<double>::prepare(config, 0.002);
+  EXPECT_NEAR(law.update(c, -1e-6, -1.0).magnetic_coefficient, 1.8, 1e-12);
+  EXPECT_NEAR(law.update(c, -1e-6, -0.1).magnetic_coefficient, 1.8, 1e-12);
+  law.reset();
+  EXPECT_NEAR(law.update(c, -1e-6, -0.1).magnetic_coefficient, 0.9, 1e-12);
+}
+
 TEST(WallLawConfig, ItsDefaults) {
   const WallLawConfig<double> defaults;
   EXPECT_EQ(defaults.kind, WallKind::plain);

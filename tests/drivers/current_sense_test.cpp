@@ -37,6 +37,16 @@ TEST(CurrentSense, AboveTheMiddleFlowsIntoTheMotor) {
   EXPECT_LT(sense.ISR_amperes(2047), 0.0F);
 }
 
+TEST(CurrentSense, AnOffsetInAmperesIsThatOfItsCodes) {
+  const CurrentSense sense;
+  EXPECT_EQ(sense.offset(), 2048.0F);
+  EXPECT_EQ(sense.offset_amperes(), 0.0F);
+  CurrentSense moved;
+  moved.track_offset(2058, 0);
+  EXPECT_EQ(moved.offset(), 2048.0F + 10.0F / 4.0F);
+  EXPECT_FLOAT_EQ(moved.offset_amperes(), 2.5F * amperes_per_code(moved));
+}
+
 // From amperes to volts as the amplifier does it, to a code as the converter does it, and back.
 RC_GTEST_PROP(CurrentSense, InvertsTheAnalogChain, ()) {
   const auto gain = *rc::gen::element(CurrentSenseGain::x10, CurrentSenseGain::x20, CurrentSenseGain::x40,

@@ -51,6 +51,16 @@ TEST(ReferencedQuadratureCounter, ExtendsSixteenBitsBothWays) {
   EXPECT_FALSE(encoder.reading.referenced);
 }
 
+TEST(ReferencedQuadratureCounter, APeekSaysWhatAReadWouldAndChangesNothing) {
+  ReferencedQuadratureCounter<> counter;
+  EXPECT_EQ(counter.ISR_peek(5), 5u);
+  EXPECT_EQ(counter.ISR_peek(0xFFFF), word(-1));
+  const auto low = [] { return false; };
+  EXPECT_EQ(counter.ISR_read(0x7000, low, false).count, 0x7000u);
+  EXPECT_EQ(counter.ISR_peek(0xE000), 0xE000u);
+  EXPECT_EQ(counter.ISR_peek(0x7000), 0x7000u);
+}
+
 TEST(ReferencedQuadratureCounter, TakesStepsOfUpToHalfTheCountersRange) {
   const auto low = [] { return false; };
   ReferencedQuadratureCounter<> counter;

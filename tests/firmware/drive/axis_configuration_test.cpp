@@ -240,6 +240,16 @@ TEST(AxisConfiguration, TheWatchAndTheDetectorHaveTheirParameters) {
   EXPECT_EQ(haptic.instability_action, control::InstabilityAction::trip);
 }
 
+TEST(AxisConfiguration, TheSuppliesCeilingBoundsItsTripLevelIfItIsKnown) {
+  ParameterValues v;
+  v.set_real<"supply.voltage_max">(30.0f);
+  EXPECT_EQ(highest_supply(v), 30.0f) << "no ceiling is known";
+  v.set_real<"supply.ceiling">(26.0f);
+  EXPECT_EQ(highest_supply(v), 26.0f);
+  v.set_real<"supply.ceiling">(31.0f);
+  EXPECT_EQ(highest_supply(v), 30.0f);
+}
+
 TEST(AxisConfiguration, EveryAllowedRateGivesItsDivider) {
   for (std::uint32_t divider = 1; divider <= 200; ++divider) {
     ParameterValues v;

@@ -22,6 +22,14 @@ float share_of(const ParameterValues& values, std::size_t axis = 0) {
   return commanded_force(values, axis, true, false);
 }
 
+TEST(CyclicTorque, ItsTargetsAreTwo) {
+  int targets = 0;
+  for (std::size_t entry = 0; entry < entry_count; ++entry) targets += is_target(entry) ? 1 : 0;
+  EXPECT_EQ(targets, 2);
+  EXPECT_TRUE(is_target(entry_of<"profile.target_torque">()));
+  EXPECT_TRUE(is_target(entry_of<"profile.target_force">()));
+}
+
 TEST(CyclicTorque, RatedValuesAreWholeAndAtLeastOne) {
   struct Case {
     float limit, constant;

@@ -221,6 +221,33 @@ TEST_F(OnCan, AWatchedNodeThatIsLostTripsAndMustBeBackFirst) {
   EXPECT_EQ(bench.refusal(), Refusal::heartbeat_missing);
 }
 
+// CiA 301: 0x8130, of the node that is meant, while it is silent and no longer than it is watched.
+TEST_F(OnCan, ANodeThatFallsSilentIsAnErrorUntilItIsBackOrNoLongerWatched) {
+  const auto emergency = [this] {
+    for (const drivers::CanFrame& frame : heard) {
+      if (frame.identifier == 0x081) return frame.data;
+    }
+    return std::array<std::uint8_t, 8>{0xEE};
+  };
+  for (const bool comes_back : {true, false}) {
+    EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+    heartbeat_of(5);
+    EXPECT_EQ(read(0x1001, 0), 0U);
+    heard.clear();
+    run_ms(200);
+    EXPECT_EQ(emergency(), (std::array<std::uint8_t, 8>{0x30, 0x81, 0x11, 0x85}));
+    EXPECT_EQ(read(0x1001, 0), 0x11U);
+    heard.clear();
+    if (comes_back) {
+      heartbeat_of(5);
+    } else {
+      EXPECT_EQ(write(0x1016, 1, 0, 4), 0U);
+      run_ms(200);
+    }
+    EXPECT_EQ(read(0x1001, 0), 0U);
+  }
+}
+
 TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
   EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
   heartbeat_of(5);
