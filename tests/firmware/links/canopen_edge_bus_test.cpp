@@ -248,6 +248,30 @@ TEST_F(OnCan, ANodeThatFallsSilentIsAnErrorUntilItIsBackOrNoLongerWatched) {
   }
 }
 
+TEST(CanopenEdge, TheFaultOfEachAxisIsToldWithItsNumber) {
+  for (std::uint8_t axis = 0; axis < firmware::axis_count; ++axis) {
+    CanOpenHost host;
+    host.bench.set_up_plain_wall(axis);
+    host.bench.preset("velocity.limit", 0.01, axis);
+    host.bench.device.stand_at(1000, axis);
+    host.run_ms(5);
+    ASSERT_TRUE(host.bench.arm(axis));
+    host.run_ms(1);
+    host.heard.clear();
+    host.bench.device.stand_at(100'000, axis);
+    host.run_ms(5);
+    ASSERT_EQ(host.bench.application().fault(axis), Fault::over_speed);
+    const auto told = std::find_if(host.heard.begin(), host.heard.end(),
+                                   [](const auto& frame) { return frame.identifier == 0x081; });
+    ASSERT_NE(told, host.heard.end()) << int{axis};
+    const auto& data = told->data;
+    EXPECT_EQ(data[0] | data[1] << 8, 0x8480);
+    EXPECT_EQ(data[3], axis);
+    EXPECT_EQ(std::bit_cast<float>(data[4] | data[5] << 8 | data[6] << 16 | data[7] << 24),
+              static_cast<float>(host.bench.get("drive.fault_value", axis)));
+  }
+}
+
 TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
   EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
   heartbeat_of(5);
