@@ -140,6 +140,23 @@ TEST(Can, FrameIntoTheMailbox) {
   EXPECT_EQ(bench.can.mailbox[0].tdhr.value, 0x0807'0605U);
 }
 
+TEST(Can, HasRoomOnTheBusForAsManyAsItHasSlots) {
+  Bench off;
+  EXPECT_FALSE(off.driver.has_room()) << "not on the bus";
+  OnTheBus bench;
+  EXPECT_EQ(bench.driver.state(), CanBusState::on_bus);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    EXPECT_TRUE(bench.driver.has_room()) << i;
+    EXPECT_EQ(bench.driver.send({.identifier = i}), CanSendResult::queued);
+  }
+  EXPECT_FALSE(bench.driver.has_room());
+  EXPECT_EQ(bench.driver.send({.identifier = 9}), CanSendResult::queue_full);
+  bench.driver.ISR_serve_transmit();
+  bench.complete(0, true);
+  EXPECT_TRUE(bench.driver.has_room());
+  EXPECT_EQ(bench.driver.bus_off_counters().bus_offs, 0U);
+}
+
 TEST(Can, OneIdentifierIsNeverInTwoMailboxes) {
   OnTheBus bench;
   for (std::uint8_t i = 0; i < 4; ++i) bench.send(0x200, i);
