@@ -22,6 +22,29 @@ TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
   }
 }
 
+TEST(AxesSettings, WhatTheTickLooksAtItselfIsOfEachAxis) {
+  ParameterValues values;
+  values.set_whole<"encoder.offset">(static_cast<std::uint32_t>(-77), 1);
+  values.set_whole<"drive.mode">(static_cast<std::uint32_t>(DriveMode::torque), 1);
+  values.set_real<"device.hand_force">(0.0f, 1);
+  values.set_real<"supply.voltage_min">(9.0f);
+  AxesSettings settings(values);
+  EXPECT_EQ(settings.of(0).encoder_offset, 0);
+  EXPECT_EQ(settings.of(1).encoder_offset, -77);
+  EXPECT_EQ(settings.of(0).mode, DriveMode::haptic);
+  EXPECT_EQ(settings.of(1).mode, DriveMode::torque);
+  EXPECT_TRUE(settings.of(0).watch_motion);
+  EXPECT_FALSE(settings.of(1).watch_motion) << "0 turns it off";
+  values.set_real<"device.hand_force">(0.5f, 1);
+  settings.make(values, 6, {}, {});
+  EXPECT_TRUE(settings.of(1).watch_motion);
+  EXPECT_EQ(settings.of(1).supply_voltage_min, 9.0f);
+  EXPECT_EQ(settings.generation(), 7u);
+  EXPECT_EQ(&settings.all().axis[1], &settings.of(1));
+  // Per tick of 50 us: m/s for 1 N.
+  EXPECT_FLOAT_EQ(settings.of(0).plausibility.acceleration, 5e-5f / values.real<"device.mass">(0));
+}
+
 TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
   for (const auto& [ceiling, trips_above] : {std::pair{0.0f, 31.0f}, {25.68f, 25.68f}, {58.0f, 31.0f}}) {
     ParameterValues values;

@@ -244,6 +244,42 @@ TEST(MotorControl, CurrentShareBoundsTheReferenceOnly) {
   }
 }
 
+TEST(MotorControl, AnglesSpeedsAndBoundsFollowTheMotor) {
+  MotorControlConfig config;
+  config.transmission = 0.1f;
+  config.electrical_offset = 1.5707963f;
+  auto c = MotorControl::prepare(config);
+  EXPECT_EQ(c.angle_per_count, 7u << 19) << "7 pole pairs, 8192 counts";
+  EXPECT_EQ(c.shaft_angle_per_count, 1u << 19);
+  EXPECT_NEAR(static_cast<double>(c.angle_offset), 0x4000'0000, 300.0) << "a float's last place";
+  EXPECT_FLOAT_EQ(c.electrical_speed_per_velocity, 70.0f);
+  EXPECT_FLOAT_EQ(c.slow_velocity, 8.0f) << "half of 8 V over 0.05 V s, at 0.1 m";
+  EXPECT_NEAR(c.current_square_step, -std::expm1(-5e-5 / 0.01), 1e-8);
+  EXPECT_EQ(c.watch.over_current, 7.5f) << "half as much again as 5 A";
+  config.electrical_offset = -1.5707963f;
+  config.torque_constant = -0.05f;
+  config.pole_pairs = 2;
+  config.counts_per_turn = 3;
+  c = MotorControl::prepare(config);
+  EXPECT_NEAR(static_cast<double>(c.angle_offset), 0xC000'0000, 300.0);
+  EXPECT_FLOAT_EQ(c.slow_velocity, 8.0f);
+  EXPECT_EQ(c.angle_per_count, 2863311531u) << "to the nearest";
+  EXPECT_EQ(c.shaft_angle_per_count, 1431655765u);
+}
+
+TEST(MotorControl, AShareIsWithinNothingAndAll) {
+  for (const auto& [share, limit] : {std::pair{0.5f, 2.5f},
+                                     {0.0f, 0.0f},
+                                     {-0.1f, 0.0f},
+                                     {1.0f, 5.0f},
+                                     {1.5f, 5.0f},
+                                     {std::numeric_limits<float>::quiet_NaN(), 0.0f}}) {
+    MotorControlConfig config;
+    config.current_share = share;
+    EXPECT_EQ(MotorControl::prepare(config).transmission.current_limit, limit) << share;
+  }
+}
+
 TEST(MotorControl, SaliencyAndDeadTimeReachTheControllers) {
   MotorControlConfig config = pmsm();
   EXPECT_EQ(MotorControl::prepare(config).pmsm.inductance_q, 3e-4f) << "0: as inductance";
