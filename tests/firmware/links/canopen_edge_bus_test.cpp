@@ -272,6 +272,16 @@ TEST(CanopenEdge, TheFaultOfEachAxisIsToldWithItsNumber) {
   }
 }
 
+TEST_F(OnCan, AWatchedNodeThatIsLostDoesNotTripWhatSerialHasArmed) {
+  EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+  heartbeat_of(5);
+  ASSERT_TRUE(bench.arm());
+  run_ms(200);
+  EXPECT_EQ(bench.get("can.heartbeats_lost"), 1);
+  EXPECT_TRUE(armed());
+  EXPECT_EQ(fault(), Fault::none);
+}
+
 TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
   EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
   heartbeat_of(5);
