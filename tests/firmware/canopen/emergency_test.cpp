@@ -141,6 +141,12 @@ TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
     emergency.configure(own_cob_id, 0);
     EXPECT_EQ(next_of(emergency), recovered) << code;
     EXPECT_FALSE(next_of(emergency));
+    // One that came and went before anybody was told is not.
+    emergency.configure(own_cob_id | cob_id::invalid, 0);
+    emergency.raise({code, error_register::communication, {}});
+    emergency.clear(code);
+    emergency.configure(own_cob_id, 0);
+    EXPECT_FALSE(next_of(emergency)) << code;
   }
 }
 
