@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 namespace kmax::control {
 
 /// 1 - e^-x for x >= 0, to a few units in the last place and without the cancellation of the literal form.
@@ -86,7 +88,7 @@ struct CurrentLoopGains {
   static constexpr CurrentLoopGains prepare(Scalar resistance, Scalar inductance, Scalar bandwidth,
                                             Scalar period) {
     const Scalar ceiling = current_bandwidth_ceiling(period);
-    const Scalar angle = (bandwidth < ceiling ? bandwidth : ceiling) * period;
+    const Scalar angle = std::min(ceiling, bandwidth) * period;
     CurrentLoopGains gains;
     if (inductance > Scalar(0)) {
       const Scalar ticks = resistance * period / inductance;  // T R/L

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "control/current_loop_gains.hpp"
 #include "control/dead_time_compensation.hpp"
 #include "control/finite.hpp"
@@ -65,7 +67,7 @@ class DcCurrentController {
     c.dead_time = DeadTimeCompensation<Scalar>::prepare(config.dead_time, config.dead_time_current,
                                                         config.pwm_frequency);
     const Scalar limit = Scalar(0.5) * bounded_share(config.modulation_limit) - c.dead_time.share;
-    c.share_limit = limit > Scalar(0) ? limit : Scalar(0);
+    c.share_limit = std::max(Scalar(0), limit);
     return c;
   }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "control/finite.hpp"
 
 namespace kmax::control {
@@ -45,13 +47,13 @@ struct DeadTimeCompensation {
   /// positive numbers switches it off.
   static constexpr DeadTimeCompensation prepare(Scalar dead_time, Scalar current, Scalar frequency) {
     DeadTimeCompensation c;
-    const Scalar lost = dead_time * frequency;
-    const Scalar gain = (lost < largest_share ? lost : largest_share) * Scalar(0.5) / current;
+    const Scalar lost = std::min(largest_share, dead_time * frequency);
+    const Scalar gain = lost * Scalar(0.5) / current;
     if (!(dead_time > Scalar(0)) || !(frequency > Scalar(0)) || !(current > Scalar(0)) || !is_finite(gain))
       return c;
     c.band = current;
     c.gain = gain;
-    c.share = lost < largest_share ? lost : largest_share;
+    c.share = lost;
     c.active = true;
     return c;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -60,14 +61,12 @@ class FoawVelocity {
   static constexpr Coefficients prepare(std::int32_t window, Scalar period, Scalar count_length,
                                         std::int32_t step) {
     Coefficients coefficients;
-    coefficients.step = step < 1 ? 1 : step;
-    coefficients.window = window < 1 ? 1 : window > foaw_window_max ? foaw_window_max : window;
+    coefficients.step = std::max(step, std::int32_t{1});
+    coefficients.window = std::clamp(window, std::int32_t{1}, foaw_window_max);
     coefficients.scale = count_length * static_cast<Scalar>(coefficients.step) / period;
     coefficients.per_sample = Scalar{1} / coefficients.scale;
     return coefficients;
   }
-
-  FoawVelocity() { reset(0); }
 
   // As if the handle had always stood on this count.
   void reset(std::int64_t count) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -95,7 +96,7 @@ class ForceCompensation {
                        config.cogging_cosine_2 * cosine_2 + config.cogging_sine_2 * sine_2);
     }
     const Scalar left = config.limit - largest(c.gravity) - largest(c.cogging);
-    const Scalar share = left < config.friction ? left : config.friction;
+    const Scalar share = std::min(config.friction, left);
     if (share > Scalar(0) && config.friction_velocity > Scalar(0)) {
       c.friction = share;
       c.friction_slope = share / config.friction_velocity;

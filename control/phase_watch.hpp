@@ -70,12 +70,12 @@ class PhaseWatch {
     Coefficients c;
     // A limit that is no number, or below 0, lets no current pass.
     const Scalar over_current = config.over_current_factor * config.current_limit;
-    c.over_current = over_current > Scalar(0) ? over_current : Scalar(0);
+    c.over_current = std::max(Scalar(0), over_current);
     const Scalar share = Scalar(0.05) * config.current_limit;
-    c.present = share > Scalar(0.25) ? share : Scalar(0.25);
+    c.present = std::max(Scalar(0.25), share);
     c.absent = c.present / Scalar(3);
     const Scalar tenth = Scalar(0.1) * config.current_limit;
-    c.unbalanced = Scalar(0.25) + (tenth > Scalar(0) ? tenth : Scalar(0));
+    c.unbalanced = Scalar(0.25) + std::max(Scalar(0), tenth);
     const Scalar samples = Scalar(5) * config.rate / config.bandwidth;
     const Scalar least = config.rate / Scalar(1000);
     const Scalar most = Scalar(1e9);

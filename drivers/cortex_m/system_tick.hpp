@@ -33,7 +33,7 @@ class SystemTick {
   /// counter.
   [[nodiscard]] bool start(std::uint32_t core_clock_hz, std::uint32_t tick_hz) {
     constexpr std::uint32_t million = 1'000'000;
-    if (core_clock_hz == 0 || core_clock_hz % million != 0) return false;
+    if (core_clock_hz % million != 0) return false;
     if (tick_hz == 0 || million % tick_hz != 0) return false;
     const std::uint32_t cycles = core_clock_hz / tick_hz;
     if (cycles < 2 || cycles - 1 > system_tick_load::Reload::maximum) return false;

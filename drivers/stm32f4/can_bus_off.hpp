@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 // When to leave bus-off: what a CAN node does that the others have silenced, as a state machine without
@@ -36,7 +37,7 @@ enum class CanBusOffAction : std::uint8_t {
 
 struct CanBusOffConfig {
   std::uint32_t shortest_wait_us = 100'000;
-  std::uint32_t longest_wait_us = 2'000'000;
+  std::uint32_t longest_wait_us = 2'000'000;  ///< below 2^31
   std::uint32_t stable_us = 1'000'000;  ///< on the bus for this long: the next wait is the shortest again
 };
 
@@ -56,7 +57,6 @@ class CanBusOff {
   CanBusState state() const { return state_; }
   bool may_send() const { return state_ == CanBusState::joining || state_ == CanBusState::on_bus; }
   const CanBusOffCounters& counters() const { return counters_; }
-  /// Of the next bus-off.
 
   /// `bus_off`: BOFF; `in_initialization`: INAK. One action at most, which the caller carries out.
   CanBusOffAction poll(std::uint32_t now_us, bool bus_off, bool in_initialization) {
@@ -94,8 +94,7 @@ class CanBusOff {
   CanBusOffAction fall(std::uint32_t now_us) {
     ++counters_.bus_offs;
     this_wait_us_ = wait_us_;
-    const bool at_the_top = wait_us_ > config_.longest_wait_us / 2;
-    wait_us_ = at_the_top ? config_.longest_wait_us : 2 * wait_us_;
+    wait_us_ = std::min(2 * wait_us_, config_.longest_wait_us);
     enter(CanBusState::waiting, now_us);
     return CanBusOffAction::drop_frames;
   }
@@ -108,8 +107,7 @@ class CanBusOff {
   CanBusOffConfig config_{};
   CanBusState state_ = CanBusState::off;
   std::uint32_t since_us_ = 0;
-  std::uint32_t wait_us_ = 100'000;
-  std::uint32_t this_wait_us_ = 0;
+  std::uint32_t wait_us_{}, this_wait_us_{};  ///< of the next bus-off, and of this one
   CanBusOffCounters counters_{};
 };
 

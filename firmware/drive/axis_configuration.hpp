@@ -79,8 +79,7 @@ constexpr control::HapticLoopConfig<float> haptic_configuration(const ParameterV
 /// `winding_temperature`: degC, which the controllers' resistance follows. `current_share`: what the
 /// temperatures leave of the current limit.
 constexpr MotorControlConfig motor_configuration(const ParameterValues& v, std::size_t axis,
-                                                 float winding_temperature = 25.0f,
-                                                 float current_share = 1.0f) {
+                                                 float winding_temperature, float current_share) {
   MotorControlConfig config;
   config.winding_temperature = winding_temperature;
   config.current_share = current_share;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "control/thermal_derating.hpp"
@@ -82,7 +83,7 @@ class ThermalSupervisor {
     if (!(config_.motor_limit > 0.0f)) return stage;
     const float motor =
         control::thermal_derating(winding_, config_.motor_limit - config_.derating, config_.motor_limit);
-    return motor < stage ? motor : stage;
+    return std::min(stage, motor);
   }
 
   ThermalSupervisorConfig config_{};

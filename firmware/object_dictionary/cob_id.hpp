@@ -34,8 +34,7 @@ inline constexpr std::uint32_t identifier = 0x7FF;
 /// Identifiers that no object may be set to (CiA 301, table "restricted CAN-IDs").
 constexpr bool restricted(std::uint32_t id) {
   return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5FF) ||
-         (id >= 0x601 && id <= 0x67F) || (id >= 0x6E0 && id <= 0x6FF) || (id >= 0x701 && id <= 0x77F) ||
-         (id >= 0x780 && id <= 0x7FF);
+         (id >= 0x601 && id <= 0x67F) || (id >= 0x6E0 && id <= 0x6FF) || id >= 0x701;
 }
 }  // namespace cob_id
 

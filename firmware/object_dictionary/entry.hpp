@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -223,8 +224,8 @@ constexpr Entry choice(std::string_view name, Group group, std::uint8_t subindex
                        std::string_view help) {
   std::int32_t low = values[0].value, high = values[0].value;
   for (const NamedValue& v : values) {
-    low = v.value < low ? v.value : low;
-    high = v.value > high ? v.value : high;
+    low = std::min(low, v.value);
+    high = std::max(high, v.value);
   }
   Entry e{name, group,       subindex,     low < 0 ? Type::integer8 : Type::unsigned8,
           "",   double(low), double(high), double(default_value),

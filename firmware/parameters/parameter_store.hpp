@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -75,7 +76,7 @@ class ParameterStore {
         const record::Header& header = here.header;
         if (!any || record::later(header.sequence + 1, found.next_sequence))
           found.next_sequence = header.sequence + 1;
-        found.erases = found.erases < header.erases ? header.erases : found.erases;
+        found.erases = std::max(found.erases, header.erases);
         any = true;
         if (here.condition == record::Condition::valid &&
             (!found.newest || !record::later(found.header.sequence, header.sequence))) {

@@ -149,6 +149,31 @@ TEST(AdaptiveCoefficient, NoModeGivesMoreThanAtTheTopSpeedNotByRoundingEither) {
   }
 }
 
+TEST(AdaptiveCoefficient, AResetForgetsContactAndPeak) {
+  for (const AdaptiveMode mode : {AdaptiveMode::latched, AdaptiveMode::peak_hold}) {
+    Config config;
+    config.mode = mode;
+    Coefficient coefficient;
+    const auto c = Coefficient::prepare(config, period);
+    EXPECT_NEAR(coefficient.update(c, -1.0, true), 1.8, 1e-12);
+    coefficient.reset();
+    EXPECT_NEAR(coefficient.update(c, -0.1, true), 0.9, 1e-12) << "a contact of its own";
+  }
+}
+
+// A bound that has been lowered holds for what was latched before.
+TEST(AdaptiveCoefficient, ALatchedValueKeepsWithinNewBounds) {
+  Config config;
+  config.mode = AdaptiveMode::latched;
+  Coefficient coefficient;
+  EXPECT_NEAR(coefficient.update(Coefficient::prepare(config, period), -1.0, true), 1.8, 1e-12);
+  config.force_max = 1.5;
+  EXPECT_EQ(coefficient.update(Coefficient::prepare(config, period), -1.0, true), 1.5);
+  config.force_max = 3.0;
+  config.force_min = 2.5;
+  EXPECT_EQ(coefficient.update(Coefficient::prepare(config, period), -1.0, true), 2.5);
+}
+
 TEST(AdaptiveCoefficient, ZeroHoldTimeIsInstant) {
   Config config;
   config.mode = AdaptiveMode::peak_hold;
@@ -168,6 +193,19 @@ TEST(AdaptiveCoefficient, ANotANumberDoesNotPoisonTheMemory) {
     coefficient.update(c, std::nan(""), false);
     EXPECT_NEAR(coefficient.update(c, 0.0, false), 0.8, 1e-12);
   }
+}
+
+TEST(AdaptiveCoefficientConfig, ItsDefaults) {
+  const AdaptiveCoefficientConfig<double> defaults;
+  EXPECT_EQ(defaults.gain, 2.4);
+  EXPECT_EQ(defaults.offset, 0.8);
+  EXPECT_EQ(defaults.velocity_max, 2.4);
+  EXPECT_EQ(defaults.force_min, 0.8);
+  EXPECT_EQ(defaults.force_max, 2.0);
+  EXPECT_EQ(defaults.hold_time, 1.2);
+  EXPECT_EQ(defaults.relation, AdaptiveRelation::linear);
+  EXPECT_EQ(defaults.velocity, AdaptiveVelocity::approach);
+  EXPECT_EQ(defaults.mode, AdaptiveMode::instant);
 }
 
 }  // namespace kmax::control::adaptive_coefficient_test

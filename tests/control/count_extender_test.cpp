@@ -32,6 +32,17 @@ TEST(CountExtender, HalfTheRangeIsReadAsNegative) {
   EXPECT_EQ(long_counter.update(0x80000005U), -2147483648LL);
 }
 
+TEST(CountExtender, APeekSaysWhatAnUpdateWouldAndChangesNothing) {
+  CountExtender<std::uint16_t> counter;
+  EXPECT_EQ(counter.count(), 0);
+  EXPECT_EQ(counter.peek(3), 3);
+  counter.reset(0xFFFE, 100'000);
+  EXPECT_EQ(counter.peek(3), 100'005);
+  EXPECT_EQ(counter.count(), 100'000);
+  EXPECT_EQ(counter.peek(0xFFF0), 99'986);
+  EXPECT_EQ(counter.update(3), 100'005);
+}
+
 template <typename Counter>
 void follows_every_legal_walk(std::int64_t start, const std::vector<std::int32_t>& steps) {
   constexpr int shift = 32 - 8 * static_cast<int>(sizeof(Counter));

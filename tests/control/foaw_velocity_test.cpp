@@ -242,6 +242,26 @@ TEST(FoawVelocity, AStartOnAKnownVelocityLeavesTheSumsOfThatRamp) {
   }
 }
 
+TEST(FoawVelocity, BeginsAsIfItHadAlwaysStoodAtZero) {
+  const auto coefficients = FoawVelocity<double>::prepare(16, 1.0, 1.0, 1);
+  FoawVelocity<double> fresh, reset;
+  reset.reset(0);
+  EXPECT_EQ(fresh.window(), 1);
+  EXPECT_EQ(reset.window(), 1);
+  for (const std::int64_t count : {0, 1, 1, 2, 4, 4, 3}) {
+    for (const FoawFit fit : {FoawFit::best, FoawFit::end}) {
+      FoawVelocity<double> one = fresh, other = reset;
+      EXPECT_EQ(one.update(coefficients, count, fit), other.update(coefficients, count, fit)) << count;
+    }
+    EXPECT_EQ(fresh.update(coefficients, count, FoawFit::best),
+              reset.update(coefficients, count, FoawFit::best));
+    EXPECT_EQ(fresh.window(), reset.window());
+  }
+  FoawVelocity<double> standing;
+  EXPECT_EQ(standing.update(coefficients, 0, FoawFit::best), 0.0);
+  EXPECT_EQ(standing.window(), 16);
+}
+
 TEST(FoawVelocity, CountsBetweenTheStepsAreCarriedNotLost) {
   const auto coefficients = FoawVelocity<double>::prepare(1, 1.0, 1.0, 10);
   FoawVelocity<double> velocity;

@@ -406,4 +406,83 @@ TEST(HapticLoop, ParallelInterferenceIsReportedForTheOtherAxis) {
   EXPECT_EQ(loop.at(-1000, false).tangential_force, 0.0f) << "not while disabled";
 }
 
+TEST(HapticLoop, TellsHowLongItHoldsAndPassesOverIt) {
+  auto config = plain_wall<double>();
+  config.divider = 5;
+  Loop<double> loop(config);
+  EXPECT_EQ(loop.loop().held_ticks(), 0u);
+  EXPECT_TRUE(loop.at(-10).new_sample);
+  EXPECT_EQ(loop.loop().held_ticks(), 4u);
+  EXPECT_FALSE(loop.at(-10).new_sample);
+  EXPECT_EQ(loop.loop().held_ticks(), 3u);
+  loop.loop().pass_held(2);
+  EXPECT_EQ(loop.loop().held_ticks(), 1u);
+  EXPECT_FALSE(loop.loop().output().new_sample);
+  loop.loop().pass_held(10);
+  EXPECT_EQ(loop.loop().held_ticks(), 0u);
+  const auto& out = loop.at(-20);
+  EXPECT_TRUE(out.new_sample);
+  EXPECT_NEAR(out.force, 0.02, 1e-12);
+  EXPECT_EQ(loop.loop().held_ticks(), 4u);
+}
+
+TEST(HapticLoop, TheBackgroundForceIsFieldAndBackgroundOfTheLastSample) {
+  auto config = plain_wall<double>();
+  config.wall.kind = WallKind::magnetic;
+  config.wall.magnetic_coefficient = 2.0;
+  config.wall.magnetic_length = 1e-3;
+  config.interference = {InterferenceMode::perpendicular, 5.0, 3.0, 0.0};
+  const auto c = HapticLoop<double>::prepare(config, 0);
+  HapticLoop<double> loop;
+  EXPECT_EQ(loop.background_force(c), 3.0);
+  loop.tick(c, 1000, true);  // one length outside: a quarter of the field is left
+  EXPECT_NEAR(loop.background_force(c), 3.5, 1e-9);
+  loop.tick(c, -1000, true);
+  EXPECT_NEAR(loop.background_force(c), 5.0, 1e-9) << "without the spring and F_I";
+}
+
+TEST(HapticLoop, TheSoftStartsShareComesUpWhileEnabled) {
+  auto config = plain_wall<double>();
+  config.force.ramp_time = 10.0 / config.tick_rate;
+  Loop<double> loop(config);
+  loop.at(-10, false);
+  EXPECT_EQ(loop.loop().ramp(), 0.0);
+  for (int i = 0; i < 5; ++i) loop.at(-10);
+  EXPECT_GT(loop.loop().ramp(), 0.3);
+  EXPECT_LT(loop.loop().ramp(), 0.7);
+  for (int i = 0; i < 10; ++i) loop.at(-10);
+  EXPECT_EQ(loop.loop().ramp(), 1.0);
+  loop.at(-10, false);
+  EXPECT_EQ(loop.loop().ramp(), 0.0);
+}
+
+TEST(HapticLoopConfig, ItsDefaults) {
+  const HapticLoopConfig<double> defaults;
+  EXPECT_EQ(defaults.count_length, 1e-6);
+  EXPECT_EQ(defaults.wall_position, 0.0);
+  EXPECT_EQ(defaults.wall_side, 1);
+  EXPECT_EQ(defaults.position_resolution, 0.0);
+  EXPECT_EQ(defaults.position_rounding, Rounding::nearest);
+  EXPECT_EQ(defaults.velocity_limit, 0.0);
+  EXPECT_EQ(defaults.instability_action, InstabilityAction::off);
+  EXPECT_EQ(defaults.tick_rate, 20000.0);
+  EXPECT_EQ(defaults.divider, 1u);
+}
+
+TEST(HapticLoopOutput, ItsDefaults) {
+  const HapticLoop<double>::Output defaults{};
+  EXPECT_FALSE(defaults.inside);
+  EXPECT_FALSE(defaults.limited);
+  EXPECT_FALSE(defaults.slew_limited);
+  EXPECT_FALSE(defaults.ramping);
+  EXPECT_FALSE(defaults.unstable);
+  EXPECT_FALSE(defaults.new_sample);
+}
+
+TEST(HapticLoopCoefficients, ItsDefaults) {
+  const HapticLoop<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.wall_count, 0);
+  EXPECT_EQ(defaults.divider, 1u);
+}
+
 }  // namespace kmax::control::haptic_loop_test

@@ -298,6 +298,19 @@ TEST(InstabilityDetector, KeepsTheLastAlarmAtItsStrongestAndCountsThem) {
   EXPECT_NEAR(static_cast<double>(detector.last_alarm().frequency), 30.0, 1.5);
 }
 
+TEST(InstabilityDetector, ForgetsItsAlarmsWhenItIsTold) {
+  const double rate = 5000.0;
+  const auto c = at_rate(rate);
+  Detector detector;
+  ASSERT_GE(found_after(detector, c, rate, sine(rate, 30.0, 0.0, 1.5, 1.5, 1.0)), 0.0);
+  ASSERT_EQ(detector.alarms(), 1U);
+  detector.forget_alarms();
+  EXPECT_EQ(detector.alarms(), 0U);
+  EXPECT_EQ(detector.last_alarm().force, 0.0F);
+  EXPECT_EQ(detector.last_alarm().frequency, 0.0F);
+  EXPECT_TRUE(detector.unstable()) << "what is, is";
+}
+
 TEST(InstabilityDetector, TakesAnyConfiguration) {
   for (const float odd : {0.0F, -1.0F, std::numeric_limits<float>::quiet_NaN(),
                           std::numeric_limits<float>::infinity(), 1e-30F}) {
@@ -311,6 +324,15 @@ TEST(InstabilityDetector, TakesAnyConfiguration) {
     for (int n = 0; n < 1000; ++n) detector.update(c, n % 8 < 4 ? 1e-3F : -1e-3F, n % 8 < 4 ? 1.0F : -1.0F);
     EXPECT_TRUE(is_finite(detector.force_amplitude()));
   }
+}
+
+TEST(InstabilityDetectorConfig, ItsDefaults) {
+  const InstabilityDetectorConfig<double> defaults;
+  EXPECT_EQ(defaults.force_threshold, 0.3);
+  EXPECT_EQ(defaults.displacement_threshold, 8e-5);
+  EXPECT_EQ(defaults.lowest_frequency, 15.0);
+  EXPECT_EQ(defaults.settling_time, 0.055);
+  EXPECT_EQ(defaults.rate, 20000.0);
 }
 
 }  // namespace kmax::control::instability_detector_test

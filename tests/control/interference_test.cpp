@@ -47,12 +47,42 @@ TEST(Interference, AnAbsurdOnsetNeverComesAndNeverWraps) {
   EXPECT_EQ(c.onset_samples, 0x80000000u);
 }
 
+TEST(Interference, AResetBeginsTheTimeOfTheContactAnew) {
+  Interference<double> interference;
+  const auto c = Interference<double>::prepare({InterferenceMode::parallel, 5.0, 3.0, 0.004}, 0.002);
+  for (int sample = 0; sample < 5; ++sample) interference.update(c, true);
+  EXPECT_EQ(interference.background(c), 3.0);
+  interference.reset();
+  EXPECT_EQ(interference.background(c), 0.0);
+  for (const double normal : {0.0, 0.0, 3.0}) EXPECT_EQ(interference.update(c, true).normal, normal);
+}
+
+TEST(Interference, TheOnsetIsRoundedUpAndBounded) {
+  const auto samples = [](double onset, double period = 1.0) {
+    return Interference<double>::prepare({InterferenceMode::parallel, 1.0, 1.0, onset}, period).onset_samples;
+  };
+  EXPECT_EQ(samples(-1.0), 0u);
+  EXPECT_EQ(samples(0.0), 0u);
+  EXPECT_EQ(samples(0.5), 1u);
+  EXPECT_EQ(samples(2.0), 2u);
+  EXPECT_EQ(samples(2.0009), 2u) << "within a thousandth";
+  EXPECT_EQ(samples(2.0011), 3u);
+  EXPECT_EQ(samples(2147483647.0), 0x7FFF'FFFFu);
+  EXPECT_EQ(samples(2147483648.0), 0x8000'0000u);
+  EXPECT_EQ(samples(4294967296.0), 0x8000'0000u);
+}
+
 TEST(Interference, NoneDoesNothing) {
   Interference<float> interference;
   const auto c = Interference<float>::prepare({InterferenceMode::none, 5.0f, 3.0f, 0.0f}, 0.002f);
   EXPECT_EQ(interference.update(c, true).normal, 0.0f);
   EXPECT_EQ(interference.update(c, true).tangential, 0.0f);
   EXPECT_EQ(interference.background(c), 0.0f);
+}
+
+TEST(InterferenceConfig, ItsDefaults) {
+  const InterferenceConfig<double> defaults;
+  EXPECT_EQ(defaults.mode, InterferenceMode::none);
 }
 
 }  // namespace kmax::control::interference_test

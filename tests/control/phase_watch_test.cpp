@@ -199,4 +199,12 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
   expect(watch, {{dc(0.0f), dc(1.0f)}}, "after a reset");
 }
 
+TEST(PhaseWatchConfig, ItsDefaults) {
+  const PhaseWatchConfig<double> defaults;
+  EXPECT_EQ(defaults.current_limit, 5.0);
+  EXPECT_EQ(defaults.over_current_factor, 1.5);
+  EXPECT_EQ(defaults.bandwidth, 3000.0);
+  EXPECT_EQ(defaults.rate, 20000.0);
+}
+
 }  // namespace kmax::control::phase_watch_test

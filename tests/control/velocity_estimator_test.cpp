@@ -254,4 +254,11 @@ TEST(VelocityEstimator, NumbersOfTheKindsStay) {
     EXPECT_EQ(static_cast<int>(one), number++);
 }
 
+TEST(VelocityEstimatorConfig, ItsDefaults) {
+  const VelocityEstimatorConfig<double> defaults;
+  EXPECT_EQ(defaults.kind, VelocityEstimatorKind::foaw);
+  EXPECT_EQ(defaults.window, 16);
+  EXPECT_EQ(defaults.bandwidth, 100.0);
+}
+
 }  // namespace kmax::control::velocity_estimator_test

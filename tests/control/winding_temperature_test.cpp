@@ -157,6 +157,12 @@ TEST(WindingTemperature, ManySmallStepsAreAsGoodAsOne) {
   EXPECT_GT(truth.winding, 45.0);
 }
 
+TEST(WindingTemperature, BeginsAtRoomTemperature) {
+  EXPECT_EQ(Model{}.winding(), 25.0f);
+  EXPECT_EQ(Model{}.motor_case(), 25.0f);
+  EXPECT_EQ(Model::highest, 1000.0f);
+}
+
 // The two time constants are seen: the winding leads at once, the case follows.
 TEST(WindingTemperature, AShortPulseHeatsTheWindingAlone) {
   Model model;
@@ -243,6 +249,18 @@ TEST(WindingTemperature, DeratingSettlesBelowTheLimit) {
   EXPECT_LT(highest, 120.0f);
   EXPECT_NEAR(100.0 * static_cast<double>(share * share),
               current_for(config, static_cast<double>(model.winding()) - 25.0), 0.01);
+}
+
+TEST(WindingTemperatureConfig, ItsDefaults) {
+  const WindingTemperatureConfig<double> defaults;
+  EXPECT_EQ(defaults.resistance, 1.0);
+  EXPECT_EQ(defaults.reference_temperature, 25.0);
+  EXPECT_EQ(defaults.loss_factor, 1.0);
+  EXPECT_EQ(defaults.winding_capacity, 15.0);
+  EXPECT_EQ(defaults.winding_to_case, 3.0);
+  EXPECT_EQ(defaults.case_capacity, 150.0);
+  EXPECT_EQ(defaults.case_to_ambient, 8.0);
+  EXPECT_EQ(defaults.ambient_temperature, 25.0);
 }
 
 }  // namespace kmax::control::winding_temperature_test

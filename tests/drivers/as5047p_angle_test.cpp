@@ -71,6 +71,13 @@ TEST(As5047pDiagnostics, EachBitIsItsOwn) {
   }
 }
 
+// By the data sheet: ERRFL.
+TEST(As5047pErrors, EachBitIsItsOwn) {
+  EXPECT_EQ(as5047p::framing_error, 1U);
+  EXPECT_EQ(as5047p::invalid_command, 2U);
+  EXPECT_EQ(as5047p::parity_error, 4U);
+}
+
 TEST(As5047pAngle, FollowsThroughManyTurnsBothWaysOneTickLate) {
   for (const int speed : {1, -1, 82, -82, 511, -511}) {
     Encoder encoder;
@@ -311,6 +318,69 @@ TEST(As5047pAngle, TheFirstStartIsNoNewReference) {
   EXPECT_EQ(after_unseen(encoder, 1000, 20'000).reference_generation, 0U);
 }
 
+TEST(As5047pAngle, TheTurnsAreKnownForAHundredFramesAndNoLonger) {
+  // Of the restart itself come a reply that belongs to nobody and three that agree.
+  for (const int ticks : {96, 97}) {
+    Encoder encoder = at_twenty_thousand();
+    EXPECT_EQ(after_unseen(encoder, ticks, 20'000).reference_generation, ticks == 96 ? 0U : 1U);
+  }
+}
+
+// A step may differ from the one before by 64 counts, and be 512.
+TEST(As5047pAngle, ABoundOfAMovementIsWithinIt) {
+  for (const int sign : {1, -1}) {
+    for (const int change : {64, 65}) {
+      Encoder encoder;
+      encoder.start(8000);
+      encoder.tick(8000 + sign * change);
+      EXPECT_EQ(encoder.tick(8000 + sign * change).held, change == 65) << sign;
+    }
+    for (const int speed : {512, 513}) {
+      Encoder encoder;
+      encoder.start(8000);
+      std::int64_t position = 8000;
+      for (int step = 64; step <= 512; step += 64) encoder.tick(position += sign * step);
+      for (int i = 0; i < 5; ++i) ASSERT_FALSE(encoder.tick(position += sign * 512).held);
+      encoder.tick(position += sign * speed);
+      EXPECT_EQ(encoder.tick(position).held, speed == 513) << sign;
+      Encoder started;
+      for (int i = 0; i < 10; ++i) started.tick(8000 + sign * i * speed);
+      EXPECT_EQ(started.tick(8000 + sign * 10 * speed).valid, speed == 512) << sign;
+    }
+  }
+}
+
+TEST(As5047pAngle, NoBoundReachesBeyondAQuarterTurn) {
+  for (const int step : {4096, 4097}) {
+    Encoder encoder({.maximum_step = 4096, .maximum_step_change = 4096});
+    encoder.start(8000);
+    encoder.tick(8000 + step);
+    EXPECT_TRUE(encoder.driver.ISR_missed().held);
+    encoder.tick(8000 + step);
+    EXPECT_EQ(encoder.tick(8000 + step).held, step == 4097);
+  }
+}
+
+TEST(As5047pAngle, WithoutHoldingTheFirstBadFrameIsFinal) {
+  Encoder encoder({.maximum_held = 0});
+  encoder.start(8000);
+  encoder.line = [](std::uint16_t word) { return static_cast<std::uint16_t>(word ^ 1U); };
+  EXPECT_FALSE(encoder.tick(8000).valid);
+  EXPECT_EQ(encoder.driver.fault(), As5047pFault::parity);
+}
+
+TEST(As5047pAngle, ProbesAfterThirtyTwoZerosOrNever) {
+  Encoder encoder;
+  for (int i = 0; i < 100; ++i) encoder.tick(0);
+  // Behind the reply that belongs to nobody.
+  EXPECT_EQ(std::find(encoder.commands.begin(), encoder.commands.end(), 0xFFFC) - encoder.commands.begin(),
+            33);
+  Encoder never({.zeros_until_probe = 0});
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(never.tick(0).valid, i == 3);
+  for (int i = 0; i < 1000; ++i) never.tick(0);
+  EXPECT_EQ(std::count(never.commands.begin(), never.commands.end(), 0xFFFC), 0);
+}
+
 // A line that flips bits at random: no turn is ever lost, and when it is quiet again the count is the truth.
 RC_GTEST_PROP(As5047pAngle, RandomNoiseNeverLosesATurn, ()) {
   Encoder encoder;
@@ -334,6 +404,23 @@ RC_GTEST_PROP(As5047pAngle, RandomNoiseNeverLosesATurn, ()) {
   for (int i = 0; i < 10; ++i) encoder.tick(position += speed);
   const As5047pSample sample = encoder.tick(position + speed);
   if (sample.valid && !sample.held) RC_ASSERT(sample.count == static_cast<std::uint32_t>(position));
+}
+
+TEST(As5047pAngleConfig, ItsDefaults) {
+  const As5047pAngleConfig defaults;
+  EXPECT_EQ(defaults.maximum_step, 512u);
+  EXPECT_EQ(defaults.maximum_step_change, 64u);
+  EXPECT_EQ(defaults.maximum_held, 4u);
+  EXPECT_EQ(defaults.zeros_until_probe, 32u);
+  EXPECT_EQ(defaults.maximum_unseen, 100u);
+}
+
+TEST(As5047pSample, ItsDefaults) {
+  const As5047pSample defaults;
+  EXPECT_EQ(defaults.count, 0u);
+  EXPECT_FALSE(defaults.valid);
+  EXPECT_TRUE(defaults.held);
+  EXPECT_EQ(defaults.reference_generation, 0u);
 }
 
 }  // namespace kmax::drivers::as5047p_angle_test

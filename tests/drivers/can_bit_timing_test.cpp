@@ -77,6 +77,51 @@ TEST(CanBitTiming, OutsideOfToleranceIsNotUsable) {
   EXPECT_FALSE(solve_can_bit_timing(0, 500'000).usable);
   EXPECT_FALSE(solve_can_bit_timing(2'000'000, 1'000'000).usable) << "two clocks are no bit";
   EXPECT_TRUE(solve_can_bit_timing(168'000'000, 10'000).usable);
+  EXPECT_FALSE(solve_can_bit_timing(168'000'001, 500'000).usable);
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 9'999).usable);
+  EXPECT_FALSE(solve_can_bit_timing(board_clock, 1'000'001).usable);
+}
+
+// Three clocks a bit at best are four at 750 kbit/s, a quarter too slow; what is farther off is no solution.
+TEST(CanBitTiming, ToleranceIsInclusiveUpToAQuarterOfTheRate) {
+  CanBitTimingGoal goal{
+      .sample_point_permille = 770, .sample_point_tolerance_permille = 20, .rate_tolerance_ppm = 250'000};
+  const auto solution = solve_can_bit_timing(3'000'000, 1'000'000, goal);
+  EXPECT_TRUE(solution.usable);
+  EXPECT_EQ(solution.timing, (CanBitTiming{1, 2, 1, 1}));
+  EXPECT_EQ(solution.rate_error_ppm, 250'000U);
+  EXPECT_EQ(solution.sample_error_permille, 20U);
+  goal.rate_tolerance_ppm = 249'999;
+  EXPECT_FALSE(solve_can_bit_timing(3'000'000, 1'000'000, goal).usable);
+  goal.rate_tolerance_ppm = 1'000'000;
+  EXPECT_TRUE(solve_can_bit_timing(3'000'000, 1'000'000, goal).usable);
+  EXPECT_FALSE(solve_can_bit_timing(2'999'999, 1'000'000, goal).usable);
+  goal.sample_point_tolerance_permille = 19;
+  EXPECT_FALSE(solve_can_bit_timing(3'000'000, 1'000'000, goal).usable);
+}
+
+TEST(CanBitTiming, ARateThatIsNotExactIsNeverCalledSo) {
+  const auto solution = solve_can_bit_timing(board_clock + 1, 1'000'000, {.rate_tolerance_ppm = 0});
+  EXPECT_EQ(solution.rate_error_ppm, 1U);
+  EXPECT_FALSE(solution.usable);
+  EXPECT_TRUE(solve_can_bit_timing(board_clock, 1'000'000, {.rate_tolerance_ppm = 0}).usable);
+}
+
+TEST(CanBitTiming, UsesTheWholeRangeOfThePrescalerAndNothingBeyond) {
+  const auto last = solve_can_bit_timing(1024 * 160'000, 10'000);
+  EXPECT_EQ(last.timing, (CanBitTiming{1024, 13, 2, 2}));
+  EXPECT_EQ(last.rate_error_ppm, 0U);
+  const auto beyond = solve_can_bit_timing(1025 * 160'000, 10'000);
+  EXPECT_EQ(beyond.timing, (CanBitTiming{820, 16, 3, 3})) << "16 quanta would sample where it is wanted";
+  EXPECT_EQ(beyond.sample_error_permille, 25U);
+}
+
+TEST(CanBitTiming, TheJumpIsAsWideAsTheSecondSegmentUpToFour) {
+  for (const std::uint32_t sample_point : {875U, 800U, 750U, 700U, 600U, 500U}) {
+    const auto timing =
+        solve_can_bit_timing(board_clock, 250'000, {.sample_point_permille = sample_point}).timing;
+    EXPECT_EQ(timing.jump_width, std::min<int>(timing.segment_2, 4)) << sample_point;
+  }
 }
 
 TEST(CanBitTiming, ValidKnowsTheFields) {
@@ -92,6 +137,21 @@ TEST(CanBitTiming, ValidKnowsTheFields) {
   EXPECT_FALSE((CanBitTiming{1, 16, 8, 0}.valid()));
   EXPECT_FALSE((CanBitTiming{1, 16, 8, 5}.valid()));
   EXPECT_FALSE((CanBitTiming{1, 5, 1, 2}.valid())) << "jump wider than the segment that is shortened";
+}
+
+TEST(CanBitTimingGoal, ItsDefaults) {
+  const CanBitTimingGoal defaults;
+  EXPECT_EQ(defaults.sample_point_permille, 875u);
+  EXPECT_EQ(defaults.sample_point_tolerance_permille, 25u);
+  EXPECT_EQ(defaults.rate_tolerance_ppm, 1000u);
+}
+
+TEST(CanBitTiming, ItsDefaults) {
+  const CanBitTiming defaults;
+  EXPECT_EQ(defaults.prescaler, 0u);
+  EXPECT_EQ(defaults.segment_1, 0u);
+  EXPECT_EQ(defaults.segment_2, 0u);
+  EXPECT_EQ(defaults.jump_width, 0u);
 }
 
 }  // namespace kmax::drivers::stm32f4::can_bit_timing_test

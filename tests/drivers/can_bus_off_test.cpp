@@ -86,4 +86,11 @@ TEST(CanBusOff, StoppedDoesNothing) {
   EXPECT_EQ(node.machine.state(), State::off);
 }
 
+TEST(CanBusOffConfig, ItsDefaults) {
+  const CanBusOffConfig defaults;
+  EXPECT_EQ(defaults.shortest_wait_us, 100'000u);
+  EXPECT_EQ(defaults.longest_wait_us, 2'000'000u);
+  EXPECT_EQ(defaults.stable_us, 1'000'000u);
+}
+
 }  // namespace kmax::drivers::stm32f4::can_bus_off_test

@@ -24,6 +24,9 @@ TEST(CanFilter, AcceptWhatTheySay) {
     EXPECT_FALSE(accepts(two, {.identifier = identifier << 18, .extended = true}));
     EXPECT_TRUE(accepts({}, frame));
   }
+  EXPECT_EQ(two.fifo, 0);
+  EXPECT_EQ(can_filter_standard_list(1, 2, 1).fifo, 1);
+  EXPECT_EQ(CanFilter{}.fifo, 0);
 }
 
 }  // namespace kmax::drivers::stm32f4::can_filter_test

@@ -97,7 +97,15 @@ TEST(Can, ConfigureInOrder) {
   EXPECT_EQ(bench.can.fs1r.value, 3U);
   EXPECT_EQ(bench.can.ffa1r.value, 2U);
   EXPECT_EQ(bench.can.fmr.value, 0x2A1C'0E00U);
-  EXPECT_EQ(bench.can.ier.value, 0x0000'865BU);
+  EXPECT_EQ(bench.can.ier.writes, (std::vector<std::uint32_t>{0, 0x0000'865B}));
+  EXPECT_EQ(bench.can.bank[0].fr1.value | bench.can.bank[0].fr2.value, 0U);
+  EXPECT_EQ(bench.can.bank[1].fr1.value, 0U);
+  EXPECT_EQ(bench.can.bank[1].fr2.value, 0x80U << 21);
+  // What an earlier life has left: three frames in each FIFO, the mailboxes, the error interrupt.
+  for (const FakeRegister& each : bench.can.rfr)
+    EXPECT_EQ(each.writes, (std::vector<std::uint32_t>{0x38, 0x38, 0x38})) << "RFOM, FOVR, FULL";
+  EXPECT_EQ(bench.can.tsr.writes, (std::vector<std::uint32_t>{0x0080'8080, 0x0001'0101}));
+  EXPECT_EQ(bench.can.msr.writes, (std::vector<std::uint32_t>{1U << 2})) << "ERRI";
 }
 
 TEST(Can, SilentHardwareIsNamed) {
@@ -130,6 +138,23 @@ TEST(Can, FrameIntoTheMailbox) {
   EXPECT_EQ(bench.can.mailbox[0].tdtr.value, 8U);
   EXPECT_EQ(bench.can.mailbox[0].tdlr.value, 0x0403'0201U);
   EXPECT_EQ(bench.can.mailbox[0].tdhr.value, 0x0807'0605U);
+}
+
+TEST(Can, HasRoomOnTheBusForAsManyAsItHasSlots) {
+  Bench off;
+  EXPECT_FALSE(off.driver.has_room()) << "not on the bus";
+  OnTheBus bench;
+  EXPECT_EQ(bench.driver.state(), CanBusState::on_bus);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    EXPECT_TRUE(bench.driver.has_room()) << i;
+    EXPECT_EQ(bench.driver.send({.identifier = i}), CanSendResult::queued);
+  }
+  EXPECT_FALSE(bench.driver.has_room());
+  EXPECT_EQ(bench.driver.send({.identifier = 9}), CanSendResult::queue_full);
+  bench.driver.ISR_serve_transmit();
+  bench.complete(0, true);
+  EXPECT_TRUE(bench.driver.has_room());
+  EXPECT_EQ(bench.driver.bus_off_counters().bus_offs, 0U);
 }
 
 TEST(Can, OneIdentifierIsNeverInTwoMailboxes) {
@@ -264,6 +289,21 @@ TEST(Can, ErrorsByName) {
   bench.can.esr.value = 4;
   EXPECT_TRUE(bench.driver.ISR_serve_status());
   EXPECT_EQ(bench.can.msr.value, 4U) << "ERRI is written 1";
+}
+
+TEST(CanConfig, ItsDefaults) {
+  const CanConfig defaults;
+  EXPECT_FALSE(defaults.self_test);
+  EXPECT_EQ(defaults.polls, 10'000u);
+}
+
+TEST(CanErrors, ItsDefaults) {
+  const CanErrors defaults;
+  EXPECT_EQ(defaults.transmit, 0u);
+  EXPECT_EQ(defaults.receive, 0u);
+  EXPECT_FALSE(defaults.warning);
+  EXPECT_FALSE(defaults.passive);
+  EXPECT_FALSE(defaults.bus_off);
 }
 
 }  // namespace kmax::drivers::stm32f4::can_test

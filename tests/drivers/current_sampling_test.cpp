@@ -110,6 +110,76 @@ TEST(CurrentSampling, RefusesWhatCannotWorkAndTouchesNothing) {
   EXPECT_TRUE(refused({.slow_sampling_code = 8}, apb2));
 }
 
+// Each converter has two results: the axis asked for, and the other one while no current passes its shunts.
+TEST(CurrentSampling, EachAxisGetsItsOwnCodesAndTheOtherItsZeros) {
+  Started board;
+  EXPECT_EQ(board.sampling.latest().phase_b, 0U);
+  const auto list = [](unsigned own, unsigned other) { return 1U << 20 | other << 15 | own << 10; };
+  for (unsigned tick = 0; tick < 6; ++tick) {
+    const unsigned axis = tick % 2, base = 100 * (tick + 1);
+    board.trigger(base + 1, base + 2);
+    board.adc2.jdr[1].value = base + 3;
+    board.adc3.jdr[1].value = base + 4;
+    const CurrentSample sample = board.sampling.ISR_read(axis + 2 * (tick % 3));  // the lowest bit counts
+    EXPECT_TRUE(sample.valid);
+    EXPECT_EQ(sample.phase_b, base + 1);
+    EXPECT_EQ(sample.phase_c, base + 2);
+    EXPECT_EQ(board.sampling.zero_current(axis ^ 1U).phase_b, base + 3);
+    EXPECT_EQ(board.sampling.zero_current(axis ^ 1U).phase_c, base + 4);
+    EXPECT_EQ(board.sampling.zero_current(axis).phase_b, tick == 0 ? 0 : base - 97);
+    EXPECT_EQ(board.sampling.zero_current(axis).phase_c, tick == 0 ? 0 : base - 96);
+    EXPECT_EQ(board.adc2.jsqr.value, axis == 1 ? list(10, 13) : list(13, 10)) << "the other axis is next";
+    EXPECT_EQ(board.adc3.jsqr.value, axis == 1 ? list(11, 12) : list(12, 11));
+    EXPECT_EQ(board.adc2.flags | board.adc3.flags, 0U);
+  }
+  const auto& counters = board.sampling.counters();
+  EXPECT_EQ(counters.overruns + counters.axis_mismatches + counters.missing_phase_c + counters.spurious, 0U);
+}
+
+TEST(CurrentSampling, TheSameAxisTwiceIsALostTriggerAndOutOfStep) {
+  Started board;
+  board.trigger(1, 2);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  board.trigger(3, 4);
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+  board.trigger(5, 6);
+  EXPECT_TRUE(board.sampling.ISR_read(1).valid) << "one good interrupt is enough to be in step again";
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+  EXPECT_EQ(board.sampling.counters().axis_mismatches, 1U);
+}
+
+TEST(CurrentSampling, AStartForgetsWhatWasBefore) {
+  Started board;
+  board.trigger(1, 2);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  board.sampling.start(2);
+  EXPECT_FALSE(board.sampling.latest().valid);
+  EXPECT_EQ(board.sampling.latest().phase_b, 0U);
+  board.trigger(3, 4);
+  EXPECT_TRUE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().overruns, 0U);
+}
+
+TEST(CurrentSampling, ATriggerThatHasEndedBeforeArmingIsCountedToo) {
+  Started board;
+  board.trigger(1, 2);
+  board.adc2.jsqr.on_write = [&](std::uint32_t) { board.adc2.flags |= jeoc; };
+  EXPECT_FALSE(board.sampling.ISR_read(0).valid);
+  EXPECT_EQ(board.sampling.counters().overruns, 1U);
+}
+
+TEST(CurrentSampling, SamplingTimesAreThoseOfEachConvertersChannels) {
+  Board board{{.axes = {{{9, 11}, {13, 12}}}, .current_sampling_code = 5}};
+  ASSERT_TRUE(board.sampling.configure(apb2));
+  // RM0090: SMPR1 has channels 10 to 18, SMPR2 0 to 9, three bits each.
+  EXPECT_EQ(board.adc2.smpr1.value, 5U << 9);
+  EXPECT_EQ(board.adc2.smpr2.value, 5U << 27);
+  EXPECT_EQ(board.adc3.smpr1.value, 5U << 3 | 5U << 6);
+  EXPECT_EQ(board.adc3.smpr2.value, 0U);
+}
+
 TEST(CurrentSampling, TriggerBetweenReadingAndArmingIsCounted) {
   Started board;
   board.trigger(1, 2);
@@ -179,6 +249,30 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   }
   EXPECT_EQ(sample.supply, 1111) << "the last complete sequence";
   EXPECT_EQ(sample.slow_age, 255U);
+}
+
+TEST(CurrentSamplingConfig, ItsDefaults) {
+  const CurrentSamplingConfig defaults;
+  EXPECT_EQ(defaults.supply, 6u);
+  EXPECT_EQ(defaults.current_sampling_code, 0u);
+  EXPECT_EQ(defaults.slow_sampling_code, 2u);
+}
+
+TEST(CurrentSample, ItsDefaults) {
+  const CurrentSample defaults;
+  EXPECT_FALSE(defaults.valid);
+  EXPECT_EQ(defaults.phase_b, 0u);
+  EXPECT_EQ(defaults.phase_c, 0u);
+  EXPECT_EQ(defaults.supply, 0u);
+  EXPECT_EQ(defaults.slow_age, 0u);
+}
+
+TEST(CurrentSamplingCounters, ItsDefaults) {
+  const CurrentSamplingCounters defaults;
+  EXPECT_EQ(defaults.axis_mismatches, 0u);
+  EXPECT_EQ(defaults.overruns, 0u);
+  EXPECT_EQ(defaults.missing_phase_c, 0u);
+  EXPECT_EQ(defaults.spurious, 0u);
 }
 
 }  // namespace kmax::drivers::stm32f4::current_sampling_test

@@ -37,6 +37,16 @@ TEST(CurrentSense, AboveTheMiddleFlowsIntoTheMotor) {
   EXPECT_LT(sense.ISR_amperes(2047), 0.0F);
 }
 
+TEST(CurrentSense, AnOffsetInAmperesIsThatOfItsCodes) {
+  const CurrentSense sense;
+  EXPECT_EQ(sense.offset(), 2048.0F);
+  EXPECT_EQ(sense.offset_amperes(), 0.0F);
+  CurrentSense moved;
+  moved.track_offset(2058, 0);
+  EXPECT_EQ(moved.offset(), 2048.0F + 10.0F / 4.0F);
+  EXPECT_FLOAT_EQ(moved.offset_amperes(), 2.5F * amperes_per_code(moved));
+}
+
 // From amperes to volts as the amplifier does it, to a code as the converter does it, and back.
 RC_GTEST_PROP(CurrentSense, InvertsTheAnalogChain, ()) {
   const auto gain = *rc::gen::element(CurrentSenseGain::x10, CurrentSenseGain::x20, CurrentSenseGain::x40,
@@ -220,6 +230,22 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
   const double mean = std::accumulate(codes.begin(), codes.end(), 0.0) / static_cast<double>(codes.size());
   RC_ASSERT(calibration.result() == OffsetResult::accepted);
   RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
+}
+
+TEST(CurrentSenseConfig, ItsDefaults) {
+  const CurrentSenseConfig defaults;
+  EXPECT_EQ(defaults.shunt_ohm, 0.0005F);
+  EXPECT_EQ(defaults.gain, CurrentSenseGain::x40);
+  EXPECT_EQ(defaults.reference_volt, 3.3F);
+  EXPECT_EQ(defaults.lowest_linear_code, 373u);
+  EXPECT_EQ(defaults.highest_linear_code, 3723u);
+}
+
+TEST(OffsetCalibrationConfig, ItsDefaults) {
+  const OffsetCalibrationConfig defaults;
+  EXPECT_EQ(defaults.log2_samples, 10u);
+  EXPECT_EQ(defaults.window, offset_window(CurrentSenseGain::x40));
+  EXPECT_EQ(defaults.largest_spread, 64u);
 }
 
 }  // namespace kmax::drivers::current_sense_test

@@ -156,6 +156,28 @@ TEST(Drv8301, ControlWords) {
   static_assert(drv8301_control_2({.gain = CurrentSenseGain::x10}) == 0);
 }
 
+// Data sheet, tables of the status and control registers.
+TEST(Drv8301, EachBitIsItsOwn) {
+  using enum Drv8301Fault;
+  unsigned bit = 0;
+  for (const Drv8301Fault fault :
+       {over_current_c_low, over_current_c_high, over_current_b_low, over_current_b_high, over_current_a_low,
+        over_current_a_high, over_temperature_warning, over_temperature, supply_under_voltage,
+        gate_supply_under_voltage, Drv8301Fault::fault, gate_supply_over_voltage, no_answer})
+    EXPECT_EQ(static_cast<unsigned>(fault), 1U << bit++);
+  EXPECT_EQ(drv8301::status_2_device_mask, 0x00F);
+  EXPECT_EQ(drv8301::status_2_gate_supply_over_voltage, 0x080);
+  EXPECT_EQ(drv8301::gate_reset, 0x004);
+  EXPECT_EQ(drv8301::three_inputs, 0x008);
+  EXPECT_EQ(drv8301::calibrate_channel_1, 0x010);
+  EXPECT_EQ(drv8301::calibrate_channel_2, 0x020);
+  EXPECT_EQ(drv8301::control_2_mask, 0x07F);
+  EXPECT_EQ(drv8301::read_word(Drv8301Register::control_2), 0x9800);
+  EXPECT_EQ(drv8301::write_word(Drv8301Register::control_1, 0xFFFF), 0x17FF);
+  EXPECT_EQ(drv8301::address_of(0x9FFF), 3U);
+  EXPECT_EQ(drv8301::address_of(0x7FFF), 15U);
+}
+
 // The faults as the chip keeps them, those of its second register above; at the next look what is over is
 // gone.
 TEST(Drv8301, TellsItsFaultsOnceAndGateSupplyOverVoltageAboveThem) {

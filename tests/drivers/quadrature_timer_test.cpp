@@ -33,6 +33,32 @@ TEST(QuadratureTimer, ThirtyTwoBitTimerUsesItsWholeRange) {
   EXPECT_EQ(encoder.count(), 0x8000'0000U);
 }
 
+// RM0090: CCxS only while the channel is off, the direction only outside encoder mode.
+TEST(QuadratureTimer, IsSetUpInTheManualsOrder) {
+  for (const bool reversed : {false, true}) {
+    FakeTimer timer;
+    WriteOrder order;
+    timer.tell(order);
+    QuadratureTimer<FakeTimer> encoder{timer};
+    ASSERT_TRUE(encoder.configure({.input_filter = 15, .reversed = reversed}));
+    EXPECT_EQ(order.all, (WriteOrder::Writes{{"cr1", 0},
+                                             {"ccer", 0},
+                                             {"cr2", 0},
+                                             {"smcr", 0},
+                                             {"dier", 0},
+                                             {"ccmr1", 0xF1F1},
+                                             {"ccmr2", 0},
+                                             {"psc", 0},
+                                             {"arr", 0xFFFF},
+                                             {"cr1", 1U << 2},
+                                             {"egr", 1},
+                                             {"sr", 0},
+                                             {"smcr", 3},
+                                             {"ccer", reversed ? 2 : 0},
+                                             {"cr1", 1U | 1U << 2}}));
+  }
+}
+
 TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   FakeTimer timer;
   QuadratureTimer<FakeTimer> encoder{timer};
@@ -40,6 +66,12 @@ TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   EXPECT_TRUE(timer.cr1.writes.empty());
   EXPECT_TRUE(timer.ccer.writes.empty());
   EXPECT_TRUE(timer.smcr.writes.empty());
+}
+
+TEST(QuadratureTimerConfig, ItsDefaults) {
+  const QuadratureTimerConfig defaults;
+  EXPECT_EQ(defaults.input_filter, 11u);
+  EXPECT_FALSE(defaults.reversed);
 }
 
 }  // namespace kmax::drivers::stm32f4::quadrature_timer_test

@@ -51,6 +51,16 @@ TEST(ReferencedQuadratureCounter, ExtendsSixteenBitsBothWays) {
   EXPECT_FALSE(encoder.reading.referenced);
 }
 
+TEST(ReferencedQuadratureCounter, APeekSaysWhatAReadWouldAndChangesNothing) {
+  ReferencedQuadratureCounter<> counter;
+  EXPECT_EQ(counter.ISR_peek(5), 5u);
+  EXPECT_EQ(counter.ISR_peek(0xFFFF), word(-1));
+  const auto low = [] { return false; };
+  EXPECT_EQ(counter.ISR_read(0x7000, low, false).count, 0x7000u);
+  EXPECT_EQ(counter.ISR_peek(0xE000), 0xE000u);
+  EXPECT_EQ(counter.ISR_peek(0x7000), 0x7000u);
+}
+
 TEST(ReferencedQuadratureCounter, TakesStepsOfUpToHalfTheCountersRange) {
   const auto low = [] { return false; };
   ReferencedQuadratureCounter<> counter;
@@ -171,6 +181,21 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
   EXPECT_EQ(encoder.move_to(1001).count, 1001u);
   EXPECT_TRUE(encoder.reading.valid);
   EXPECT_EQ(encoder.reading.reference_generation, 0u);
+}
+
+TEST(ReferencedQuadratureConfig, ItsDefaults) {
+  const ReferencedQuadratureConfig defaults;
+  EXPECT_FALSE(defaults.has_index);
+  EXPECT_FALSE(defaults.from_index);
+  EXPECT_EQ(defaults.counts_per_turn, 8192u);
+}
+
+TEST(ReferencedQuadratureCounterReading, ItsDefaults) {
+  const ReferencedQuadratureCounter<>::Reading defaults{};
+  EXPECT_EQ(defaults.count, 0u);
+  EXPECT_FALSE(defaults.valid);
+  EXPECT_FALSE(defaults.referenced);
+  EXPECT_EQ(defaults.reference_generation, 0u);
 }
 
 }  // namespace kmax::drivers::referenced_quadrature_counter_test

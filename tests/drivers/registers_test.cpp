@@ -12,6 +12,7 @@
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "drivers/stm32f4/registers/can.hpp"
 #include "drivers/stm32f4/registers/dbgmcu.hpp"
+#include "drivers/stm32f4/registers/dma.hpp"
 #include "drivers/stm32f4/registers/exti.hpp"
 #include "drivers/stm32f4/registers/flash.hpp"
 #include "drivers/stm32f4/registers/gpio.hpp"
@@ -54,7 +55,9 @@ TEST(Registers, FieldsOfTheCoreAreThoseOfTheManual) {
   }
   {
     using namespace scb_aircr;
-    EXPECT_EQ((bits_of<SystemResetRequest, Key>()), 0xFFFF'0004U);
+    EXPECT_EQ((bits_of<SystemResetRequest, PriorityGroup, Key>()), 0xFFFF'0704U);
+    EXPECT_EQ(key, 0x05FAU);
+    EXPECT_EQ(key_read, 0xFA05U);
   }
   {
     using namespace scb_ccr;
@@ -74,8 +77,8 @@ TEST(Registers, FieldsOfTheCoreAreThoseOfTheManual) {
     EXPECT_EQ((bits_of<FetchViolation, DataViolation, MemoryFaultUnstacking, MemoryFaultStacking,
                        MemoryFaultLazyFloat, MemoryFaultAddressValid, FetchBusFault, PreciseBusFault,
                        ImpreciseBusFault, BusFaultUnstacking, BusFaultStacking, BusFaultLazyFloat,
-                       BusFaultAddressValid, UndefinedInstruction, InvalidState, InvalidReturn,
-                       NoCoprocessor, UnalignedAccess, DivisionByZero>()),
+                       BusFaultAddressValid, UndefinedInstruction, InvalidState, InvalidReturn, NoCoprocessor,
+                       UnalignedAccess, DivisionByZero>()),
               0x030F'BFBBU);
   }
   {
@@ -183,6 +186,26 @@ TEST(Registers, FieldsOfTheChipAreThoseOfTheManual) {
                        ErrorInterrupt, Lock>()),
               0x8301'037FU);
   }
+  {
+    using namespace flash_optcr;
+    EXPECT_EQ((bits_of<BrownOutLevel>()), 0x0000'000CU);
+  }
+  {
+    using namespace dma_cr;
+    EXPECT_EQ((bits_of<dma_cr::Enable, Direction, Circular, PeripheralSize, MemorySize, Priority, Channel>()),
+              0x0E03'79C1U);
+    EXPECT_EQ(memory_to_peripheral, 1U);
+    EXPECT_EQ(words, 2U);
+    EXPECT_EQ(very_high, 3U);
+  }
+  {
+    using namespace timer_dier;
+    EXPECT_EQ(UpdateDma::mask, 1U << 8);
+    EXPECT_EQ(
+        (bits_of<CaptureCompareDma<1>, CaptureCompareDma<2>, CaptureCompareDma<3>, CaptureCompareDma<4>>()),
+        0x0000'1E00U);
+  }
+  EXPECT_EQ(rcc_ahb1enr::Dma2::mask, 1U << 22);
   {
     using namespace dbgmcu_idcode;
     EXPECT_EQ((bits_of<Device, Revision>()), 0xFFFF'0FFFU);
@@ -530,6 +553,18 @@ TEST(Registers, KeysAndCodesAreThoseOfTheManual) {
   EXPECT_EQ(syscfg_exticr::port_mask, 0xFU);
   EXPECT_EQ(syscfg_exticr::index(11), 2U);
   EXPECT_EQ(syscfg_exticr::position(11), 12U);
+}
+
+// RM0090, DMA2 request mapping.
+TEST(Registers, RequestsOfTheTimersToDma2) {
+  using namespace stm32f4;
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(&dma2()), 0x4002'6400U);
+  EXPECT_EQ(dma2_tim8_update.stream, 1U);
+  EXPECT_EQ(dma2_tim8_update.channel, 7U);
+  EXPECT_EQ(dma2_tim1_compare_4.stream, 4U);
+  EXPECT_EQ(dma2_tim1_compare_4.channel, 6U);
+  EXPECT_EQ(dma2_tim8_compare_4.stream, 7U);
+  EXPECT_EQ(dma2_tim8_compare_4.channel, 7U);
 }
 
 }  // namespace

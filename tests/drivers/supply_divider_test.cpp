@@ -22,4 +22,10 @@ TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {
   EXPECT_TRUE(divider.saturated(4095));
 }
 
+TEST(SupplyDividerConfig, ItsDefaults) {
+  const SupplyDividerConfig defaults;
+  EXPECT_EQ(defaults.ratio, 19.0F);
+  EXPECT_EQ(defaults.reference_volt, 3.3F);
+}
+
 }  // namespace kmax::drivers::supply_divider_test

@@ -106,7 +106,7 @@ TEST_F(PlainSystemTick, ReloadAndControlAt168MHz) {
 }
 
 TEST_F(PlainSystemTick, RefusesWhatWouldNotBeExact) {
-  EXPECT_FALSE(tick.start(0, 20'000));
+  EXPECT_FALSE(tick.start(0, 20'000)) << "no cycle in a period";
   EXPECT_FALSE(tick.start(168'000'000, 0));
   EXPECT_FALSE(tick.start(168'000'000, 30'000)) << "33.3 us";
   EXPECT_FALSE(tick.start(168'500'000, 20'000)) << "168.5 cycles in a microsecond";

@@ -67,6 +67,41 @@ TEST(ThreePhasePwm, OutputsAreOffBeforeAnythingElseIsTouched) {
   EXPECT_EQ(order.back(), 'e') << "the legs come last";
 }
 
+TEST(ThreePhasePwm, IsSetUpInTheManualsOrder) {
+  FakeTimer timer;
+  timer.cr1.value = 1U | 1U << 4 | 3U << 5;  // runs down, centre-aligned
+  WriteOrder order;
+  timer.tell(order);
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  constexpr std::uint32_t loading = 1U << 2 | 1U << 7;
+  EXPECT_EQ(order.all, (WriteOrder::Writes{{"bdtr", disarmed},
+                                           {"cr1", 1U << 4 | 3U << 5},
+                                           {"cr1", 1U << 4},
+                                           {"cr1", loading},
+                                           {"smcr", 0},
+                                           {"dier", 0},
+                                           {"ccr4", 0xFFFF},
+                                           {"cr2", 1U << 4},
+                                           {"ccer", 0},
+                                           {"ccmr1", 0x7878},
+                                           {"ccmr2", 0x0078},
+                                           {"psc", 0},
+                                           {"rcr", 0},
+                                           {"arr", 4200},
+                                           {"ccr1", 4200},
+                                           {"ccr2", 4200},
+                                           {"ccr3", 4200},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"cr1", loading},
+                                           {"egr", 1},
+                                           {"cr1", loading | 3U << 5},
+                                           {"sr", 0},
+                                           {"ccer", 0x555}}));
+}
+
 TEST(ThreePhasePwm, RefusesImpossibleConfigurations) {
   for (const ThreePhasePwmConfig& config :
        {ThreePhasePwmConfig{.half_period_ticks = 252}, ThreePhasePwmConfig{.minimum_low_ticks = 4200},
@@ -149,6 +184,47 @@ TEST(ThreePhasePwm, DutyIsTicksAboveTheCompareValue) {
   EXPECT_EQ(timer.ccr[2], 252U) << "the low-side window stays open";
 }
 
+TEST(ThreePhasePwm, NoVoltageIsTheMiddleOnAllLegs) {
+  Configured configured;
+  configured.pwm.ISR_set_no_voltage();
+  for (unsigned leg = 0; leg < 3; ++leg) EXPECT_EQ(configured.timer.ccr[leg], 2100U);
+}
+
+TEST(ThreePhasePwm, TheStepsOfAStartInStep) {
+  FakeTimer timer;
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_FALSE(pwm.counting_down());
+  pwm.load_counter(true);
+  EXPECT_TRUE(pwm.counting_down());
+  EXPECT_EQ(timer.cr1.value, 1U << 2 | 1U << 4 | 3U << 5 | 1U << 7) << "URS, DIR, CMS, ARPE";
+  EXPECT_FALSE(pwm.running());
+  pwm.enable_counter();
+  EXPECT_TRUE(pwm.running());
+  pwm.select_trigger_output(2);
+  EXPECT_EQ(timer.cr2.value, 2U << 4);
+  pwm.start_on_internal_trigger_0();
+  EXPECT_EQ(timer.smcr.writes, (std::vector<std::uint32_t>{0, 0, 6})) << "TS = 0 before SMS = 6";
+  pwm.ignore_triggers();
+  EXPECT_EQ(timer.smcr.value, 0U);
+  EXPECT_EQ(timer.sr.value, ~(1U << 6)) << "TIF alone is cleared";
+  timer.cnt.value = 1234;
+  EXPECT_EQ(pwm.counter(), 1234U);
+  EXPECT_EQ(pwm.half_period_ticks(), 4200);
+}
+
+TEST(ThreePhasePwm, TellsThatTheTicksStayedAwaySinceItWasArmed) {
+  FakeTimer timer;
+  ThreePhasePwm<FakeTimer> pwm{timer};
+  ASSERT_TRUE(pwm.configure());
+  EXPECT_FALSE(pwm.ISR_ticks_stayed_away());
+  timer.sr.value = 1U << 4;
+  EXPECT_TRUE(pwm.ISR_ticks_stayed_away()) << "CC4IF";
+  pwm.enable_counter();
+  ASSERT_TRUE(pwm.arm());
+  EXPECT_EQ(timer.sr.value, ~(1U << 4)) << "is cleared, and nothing else";
+}
+
 TEST(ThreePhasePwm, NotANumberLeavesTheDutyAlone) {
   Configured configured;
   auto& [timer, pwm] = configured;
@@ -176,6 +252,19 @@ RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
     const double error = static_cast<double>(half - timer.ccr[0]) - limited * half;
     RC_ASSERT(error <= 0.51 && error >= -0.51);
   }
+}
+
+TEST(ThreePhasePwmConfig, ItsDefaults) {
+  const ThreePhasePwmConfig defaults;
+  EXPECT_EQ(defaults.half_period_ticks, 4200u);
+  EXPECT_EQ(defaults.minimum_low_ticks, 252u);
+}
+
+TEST(PwmLegs, ItsDefaults) {
+  const PwmLegs defaults;
+  EXPECT_TRUE(defaults.a);
+  EXPECT_TRUE(defaults.b);
+  EXPECT_TRUE(defaults.c);
 }
 
 }  // namespace kmax::drivers::stm32f4::three_phase_pwm_test

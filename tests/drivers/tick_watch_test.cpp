@@ -31,6 +31,24 @@ TEST(TickWatch, WiresTheFollowersTurnsAndComparisonsToBothBridges) {
   EXPECT_EQ(follower.dier, 1U << 12 | 1U << 8) << "CC4DE, UDE";
 }
 
+TEST(TickWatch, CarriesTheMiddleABreakOfOneBridgeAndTheOffOfTheOther) {
+  TimerRegisters leader{}, follower{};
+  DmaRegisters dma{};
+  TickWatch<> watch{leader, follower, dma};
+  follower.bdtr = 0xBC15;
+  watch.start(4200);
+  // The words are the watch's own; the register holds the lower half of their address on this host.
+  const auto carried = [&](unsigned stream) {
+    const auto own = reinterpret_cast<std::uintptr_t>(&watch);
+    const std::uint32_t offset = dma.stream[stream].m0ar - address_of(&watch);
+    EXPECT_LT(offset, sizeof(watch));
+    return *reinterpret_cast<const std::uint32_t*>(own + offset);
+  };
+  EXPECT_EQ(carried(1), 2100U);
+  EXPECT_EQ(carried(4), 0x3C15U) << "without MOE";
+  EXPECT_EQ(carried(7), 1U << 7 | 1U << 4) << "BG, CC4G";
+}
+
 TEST(TickWatch, ATickPutsTheComparisonOutOfReach) {
   TimerRegisters leader{}, follower{};
   DmaRegisters dma{};

@@ -86,6 +86,19 @@ struct FakeUsart {
   FakeRegister sr, dr, brr, cr1, cr2, cr3;
 };
 
+TEST(Usart, IsOffWhileItsLineIsSetUp) {
+  FakeUsart registers;
+  WriteOrder order;
+  order.watch(registers.sr, "sr"), order.watch(registers.dr, "dr"), order.watch(registers.brr, "brr");
+  order.watch(registers.cr1, "cr1"), order.watch(registers.cr2, "cr2"), order.watch(registers.cr3, "cr3");
+  Usart usart{registers};
+  ASSERT_TRUE(usart.configure({}, apb1));
+  EXPECT_EQ(order.all,
+            (WriteOrder::Writes{{"cr1", 0}, {"brr", 0x16D}, {"cr2", 0}, {"cr3", 0}, {"cr1", 0x342C}}));
+  EXPECT_EQ(registers.sr.reads, 1U) << "clears old errors";
+  EXPECT_EQ(registers.dr.reads, 1U);
+}
+
 // RM0090, status register: PE 0, FE 1, NF 2, ORE 3, RXNE 5, TC 6, TXE 7.
 TEST(Usart, EveryStatusGivesTheByteAndItsErrors) {
   for (std::uint32_t status = 0; status < 0x100; ++status) {
@@ -150,6 +163,12 @@ TEST(Usart, ConfiguringDropsWhatIsBeingSentAndWhatHasComeIn) {
   registers.sr.value = 0xC0;
   EXPECT_FALSE(usart.ISR_serve().transmission_complete);
   EXPECT_TRUE(registers.dr.writes.empty());
+}
+
+TEST(UsartConfig, ItsDefaults) {
+  const UsartConfig defaults;
+  EXPECT_EQ(defaults.baud_rate, 115'200u);
+  EXPECT_EQ(defaults.parity, UsartParity::even);
 }
 
 }  // namespace kmax::drivers::stm32f4::usart_test

@@ -130,6 +130,36 @@ TEST(Emergency, ClearedInAnyOrder) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
+// Whichever byte of its code is not 0: the master has been told of an error, and is told that it has gone.
+TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
+  for (const std::uint16_t code : std::vector<std::uint16_t>{0x8100, 0x0010}) {
+    Emergency emergency = configured();
+    emergency.raise({code, error_register::communication, {}});
+    ASSERT_TRUE(next_of(emergency));
+    emergency.configure(own_cob_id | cob_id::invalid, 0);
+    emergency.clear(code);
+    emergency.configure(own_cob_id, 0);
+    EXPECT_EQ(next_of(emergency), recovered) << code;
+    EXPECT_FALSE(next_of(emergency));
+  }
+}
+
+// CiA 301, object 0x1001, and docs/canopen.md.
+TEST(Emergency, ItsNumbersAreTheProtocols) {
+  EXPECT_EQ(error_register::generic, 0x01);
+  EXPECT_EQ(error_register::current, 0x02);
+  EXPECT_EQ(error_register::voltage, 0x04);
+  EXPECT_EQ(error_register::temperature, 0x08);
+  EXPECT_EQ(error_register::communication, 0x10);
+  EXPECT_EQ(error_register::device_profile, 0x20);
+  EXPECT_EQ(error_register::manufacturer, 0x80);
+  EXPECT_EQ(bus_source, 127);
+  EXPECT_EQ(watched_source, 128);
+  EXPECT_EQ(present_error_count, 16U);
+  EXPECT_EQ(emergency_queue_length, 8U);
+  EXPECT_EQ(error_history_length, 8U);
+}
+
 TEST(Emergency, InhibitTimeAcrossTheWrap) {
   for (const std::uint16_t inhibit : std::vector<std::uint16_t>{1, 100, 65535}) {
     for (const std::uint32_t start : {0U, 0x7FFF'FFFFU, 0xFFFF'FFFFU, 0U - 50U}) {
@@ -369,6 +399,12 @@ RC_GTEST_PROP(Emergency, InTheEndTheBusKnowsTheState, ()) {
   now_us += 3000;
   RC_ASSERT(!step(operational));
   RC_ASSERT(last == (model.empty() ? recovered : message(numbered(model.back()), 0x81)));
+}
+
+TEST(EmergencyError, ItsDefaults) {
+  const EmergencyError defaults;
+  EXPECT_EQ(defaults.code, 0u);
+  EXPECT_EQ(defaults.register_bits, 0u);
 }
 
 }  // namespace

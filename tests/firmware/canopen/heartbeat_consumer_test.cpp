@@ -28,6 +28,10 @@ HeartbeatConsumer watching(std::uint8_t node_id, std::uint16_t time_ms) {
   return consumer;
 }
 
+TEST(HeartbeatConsumer, WatchesFourNodes) {
+  EXPECT_EQ(watched_node_count, 4U);
+}
+
 TEST(HeartbeatConsumer, ChecksWhatIsWrittenToAnEntry) {
   const Entries entries{entry(5, 100), entry(6, 0), 0, entry(127, 65535)};
   EXPECT_EQ(HeartbeatConsumer::check(2, entry(7, 50), entries), Abort::none);

@@ -239,6 +239,41 @@ TEST(LssSlave, ActivationIsQuietForTheDelayBeforeAndAfterTheSwitch) {
   }
 }
 
+// Nobody who holds a device that makes force loses it with the bus; what has been switched is finished.
+TEST(LssSlave, ArmedItKeepsItsBitRate) {
+  Bench bench(1);
+  bench.configure();
+  bench.ask(request({0x13, 0, 4}));
+  bench.slave.hold(true, false);
+  EXPECT_FALSE(bench.ask(request({0x15, 0, 0})));
+  EXPECT_FALSE(bench.slave.quiet()) << "it does not begin";
+  EXPECT_EQ(bench.ask(request({0x11, 9})), response({0x11, 0})) << "but is not locked";
+  bench.slave.hold(false, false);
+  bench.ask(request({0x15, 10, 0}));
+  EXPECT_TRUE(bench.slave.quiet());
+  bench.slave.hold(true, false);
+  EXPECT_FALSE(bench.slave.quiet()) << "it is given up";
+  EXPECT_EQ(bench.slave.poll(bench.now_us + 10'000), LssAction::none);
+  bench.slave.hold(false, false);
+  bench.ask(request({0x15, 10, 0}));
+  EXPECT_EQ(bench.slave.poll(bench.now_us + 10'000), LssAction::switch_bit_rate);
+  bench.slave.hold(true, false);
+  EXPECT_TRUE(bench.slave.quiet()) << "the second delay is waited for";
+  EXPECT_EQ(bench.slave.active_bit_rate(), 125'000U);
+}
+
+TEST(LssSlave, BeforeItsStartItHasNoNodeIdAndTheFactorysBitRate) {
+  LssSlave slave(identity);
+  EXPECT_EQ(slave.active_node_id(), unconfigured_node_id);
+  EXPECT_EQ(slave.pending_node_id(), unconfigured_node_id);
+  EXPECT_EQ(slave.active_bit_rate(), 1'000'000U);
+  EXPECT_EQ(slave.pending_bit_rate(), 1'000'000U);
+  EXPECT_FALSE(slave.quiet());
+  EXPECT_FALSE(slave.configuring());
+  CanFrame frame;
+  EXPECT_FALSE(slave.next_frame(frame));
+}
+
 TEST(LssSlave, ActivationWithoutDelayOrWithoutANewBitRate) {
   Bench bench(1);
   bench.configure();
@@ -475,6 +510,14 @@ RC_GTEST_PROP(LssSlave, FastscanFindsEveryDeviceOnTheBus, ()) {
     RC_ASSERT(answers == 1U);
   }
   RC_ASSERT(!fastscan(bus).has_value());
+}
+
+TEST(LssIdentity, ItsDefaults) {
+  const LssIdentity defaults;
+  EXPECT_EQ(defaults.vendor, 0u);
+  EXPECT_EQ(defaults.product, 0u);
+  EXPECT_EQ(defaults.revision, 0u);
+  EXPECT_EQ(defaults.serial, 0u);
 }
 
 }  // namespace

@@ -15,6 +15,13 @@ Abort find(PdoKind kind, std::uint16_t index, std::uint8_t subindex, unsigned bi
   return find_mapped(kind, mapping_of(index, subindex, bits), object);
 }
 
+// CiA 301: 64 bits in a PDO, the dummies of objects 0x0001 to 0x0007.
+TEST(PdoMapping, ItsBoundsAreTheStandards) {
+  EXPECT_EQ(pdo_bits_max, 64U);
+  EXPECT_EQ(mapped_max, 8U);
+  EXPECT_EQ(dummy_bits, (std::array<std::uint8_t, 7>{1, 8, 16, 32, 8, 16, 32}));
+}
+
 TEST(PdoMapping, FindsAValueOfEachAxisAndItsLength) {
   MappedObject object;
   ASSERT_EQ(find_mapped(receive, mapping_of(0x6071, 0, 16), object), Abort::none);

@@ -33,6 +33,26 @@ TEST(PdoSettings, TheDefaultsAreAllUsable) {
   EXPECT_EQ(states.settings.mapping.bytes(), 6);
 }
 
+TEST(PdoSettings, TypesGoBySyncOrByTime) {
+  for (std::uint32_t type = 0; type < 300; ++type) {
+    EXPECT_EQ(transmission_type_allowed(type), type <= 240 || type == 254 || type == 255) << type;
+    PdoSettings settings;
+    settings.transmission_type = static_cast<std::uint8_t>(type);
+    if (type < 256) {
+      EXPECT_EQ(settings.synchronous(), type <= 240) << type;
+    }
+  }
+}
+
+TEST(PdoSettings, NothingGoesOftenerThanAMillisecondOfAMegabit) {
+  EXPECT_EQ(least_period_us(1'000'000), 1'000U);
+  EXPECT_EQ(least_period_us(2'000'000), 1'000U);
+  EXPECT_EQ(least_period_us(500'000), 2'000U);
+  EXPECT_EQ(least_period_us(125'000), 8'000U);
+  EXPECT_EQ(least_period_us(1'000), 1'000'000U);
+  EXPECT_EQ(least_period_us(0), 1'000'000U) << "no division by 0";
+}
+
 TEST(PdoSettings, TimesAreInMicroseconds) {
   ParameterValues values;
   values.set_whole<"tpdo1.inhibit_time">(65535);
@@ -68,6 +88,15 @@ TEST(PdoSettings, WhatDoesNotExistMayHoldAnything) {
   const Read read(values);
   EXPECT_TRUE(read.good);
   EXPECT_FALSE(read.settings.exists);
+}
+
+TEST(PdoSettings, ItsDefaults) {
+  const PdoSettings defaults;
+  EXPECT_FALSE(defaults.exists);
+  EXPECT_EQ(defaults.identifier, 0u);
+  EXPECT_EQ(defaults.transmission_type, 255u);
+  EXPECT_EQ(defaults.inhibit_us, 0u);
+  EXPECT_EQ(defaults.event_us, 0u);
 }
 
 }  // namespace

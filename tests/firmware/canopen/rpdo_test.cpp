@@ -115,6 +115,32 @@ TEST(Rpdo, SynchronousOnesWaitForSyncAndTheNewestWins) {
   }
 }
 
+// What a host wanted a tenth of a second ago it need not want now.
+TEST(Rpdo, WhatIsKeptGetsOldAndIsDroppedWhenOperationalIsLeft) {
+  Node node{Mapped({controlword}, 1).values};
+  for (const std::uint32_t start : {0U, 0xFFFF'FF00U}) {
+    for (const std::uint32_t age : {0U, 99'999U, 100'000U, 100'001U}) {
+      node.rpdos.receive(frame(0x205, {1, 0}), node.writer(), start);
+      node.rpdos.on_sync(node.writer(), start + age);
+      EXPECT_EQ(node.take().size(), age <= 100'000 ? 1U : 0U) << age;
+      node.rpdos.on_sync(node.writer(), start);
+      EXPECT_TRUE(node.take().empty()) << "nor by a later SYNC";
+    }
+  }
+  node.receive(frame(0x205, {1, 0}));
+  node.rpdos.drop_kept();
+  node.sync();
+  EXPECT_TRUE(node.take().empty());
+}
+
+TEST(Rpdo, SaysWhatMustBeListenedTo) {
+  const Node node{ParameterValues{}};
+  EXPECT_EQ(node.rpdos.identifier(0), 0x205U);
+  EXPECT_EQ(node.rpdos.identifier(1), 0x305U);
+  EXPECT_FALSE(node.rpdos.identifier(2));
+  EXPECT_FALSE(node.rpdos.identifier(3));
+}
+
 TEST(Rpdo, SeveralAtOneSyncInTheOrderOfTheirNumbers) {
   Mapped mapped({mode}, 1);
   ASSERT_EQ(mapped.remap(0x1401, {torque}, 0x305, 2), Abort::none);

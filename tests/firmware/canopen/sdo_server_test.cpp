@@ -5,7 +5,7 @@
 #include "tests/firmware/canopen/sdo_bench.hpp"
 
 // Requests and answers byte by byte, after the frame tables of CiA 301 v4.2, 7.2.4.3. Whole transfers of all
-// sizes are in sdo_transfers_test.cpp.
+// sizes are in sdo_server_transfers_test.cpp.
 
 namespace kmax::firmware::canopen::sdo_server_test {
 namespace {
@@ -298,6 +298,21 @@ TEST_F(SdoServerTest, AnotherNodeIdTakesEffectWithTheStart) {
   drivers::CanFrame frame;
   ASSERT_TRUE(bench.server.next_frame(frame, 0));
   EXPECT_EQ(frame, (drivers::CanFrame{.identifier = 0x5FF, .length = 8, .data = device_type_answer}));
+}
+
+TEST(SdoConfig, ItsDefaults) {
+  const SdoConfig defaults;
+  EXPECT_EQ(defaults.timeout_us, 1'000'000u);
+  EXPECT_EQ(defaults.resume_after_us, 250'000u);
+  EXPECT_EQ(defaults.download_block_size, 31u);
+}
+
+TEST(SdoCounters, ItsDefaults) {
+  const SdoCounters defaults;
+  EXPECT_EQ(defaults.aborts_sent, 0u);
+  EXPECT_EQ(defaults.timeouts, 0u);
+  EXPECT_EQ(defaults.segments_lost, 0u);
+  EXPECT_EQ(defaults.segments_repeated, 0u);
 }
 
 }  // namespace

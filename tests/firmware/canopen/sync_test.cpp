@@ -75,6 +75,27 @@ TEST(Sync, ChecksWhatIsWritten) {
     EXPECT_EQ(Sync::check(bad, 0x80), Abort::value_range) << bad;
 }
 
+// CiA 301, object 0x1005: the identifier stays while the device makes the SYNC.
+TEST(Sync, AnotherIdentifierNotWhileItIsMade) {
+  EXPECT_EQ(Sync::check(0x81, 0x80), Abort::none);
+  EXPECT_EQ(Sync::check(0x4000'0081, 0x80), Abort::none);
+  EXPECT_EQ(Sync::check(0x81, 0x4000'0080), Abort::device_state);
+  EXPECT_EQ(Sync::check(0x4000'0081, 0x4000'0080), Abort::device_state);
+  EXPECT_EQ(Sync::check(0x80, 0x4000'0080), Abort::none);
+  EXPECT_EQ(Sync::check(0xC000'0080, 0x4000'0080), Abort::none);
+}
+
+TEST(Sync, WhatIsInStepIsWholeMillisecondsFromIt) {
+  EXPECT_EQ(Sync().in_step(1234), 1234U);
+  for (const std::uint32_t start : {0U, 0xFFFF'F000U}) {
+    SyncBench bench({.cob_id = makes, .period_us = 4000}, start);
+    for (std::uint32_t us = 0; us <= 6'000; us += 250) {
+      const std::uint32_t asked = start + us, answer = bench.sync.in_step(asked);
+      EXPECT_EQ(answer, start + (us + 999) / 1000 * 1000) << us;
+    }
+  }
+}
+
 TEST(Sync, NoneIsMadeUnlessBothAreAskedFor) {
   for (const Sync::Settings& settings :
        {Sync::Settings{}, Sync::Settings{.cob_id = makes}, Sync::Settings{.period_us = 1000}}) {
@@ -162,6 +183,12 @@ RC_GTEST_PROP(Sync, OverAnyPollsThereAreAsManyAsPeriodsAndEachIsOnTheGrid, ()) {
     made += due ? 1 : 0;
   }
   RC_ASSERT(made == (bench.now_us - start) / period);
+}
+
+TEST(SyncSettings, ItsDefaults) {
+  const Sync::Settings defaults{};
+  EXPECT_EQ(defaults.period_us, 0u);
+  EXPECT_EQ(defaults.counter_overflow, 0u);
 }
 
 }  // namespace

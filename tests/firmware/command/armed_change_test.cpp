@@ -176,6 +176,20 @@ TEST_F(WhileArmed, AnotherLinkLoosensNothingUpToACeiling) {
   EXPECT_EQ(set_armed("force.limit", 2, 0, over_can, Link::serial), Refusal::none);
 }
 
+// A force that goes does not come back; the number of a commander is for the next arming.
+TEST_F(WhileArmed, WhileAForceFadesItsCommanderChangesNothingButItsNumber) {
+  ASSERT_EQ(set("force.ceiling", 10), Refusal::none);
+  ArmedAxes fading = only(0, Link::can);
+  fading.fades[0] = true;
+  EXPECT_EQ(set_armed("wall.stiffness", 900, 0, fading, Link::can), Refusal::while_armed);
+  EXPECT_EQ(set_armed("excitation.bias", 1, 0, fading, Link::can), Refusal::while_armed);
+  EXPECT_EQ(set_armed("drive.commander", 5, 0, fading, Link::can), Refusal::none);
+  EXPECT_EQ(set_armed("drive.commander", 6, 0, fading, Link::serial), Refusal::other_commander);
+  EXPECT_EQ(set_armed("force.limit", 3, 0, fading, Link::can), Refusal::none) << "a bound is tightened";
+  EXPECT_EQ(set_armed("force.limit", 5, 0, fading, Link::can), Refusal::only_tightens) << "no ceiling now";
+  EXPECT_EQ(set_armed("wall.stiffness", 900, 1, fading, Link::can), Refusal::none) << "the other axis";
+}
+
 TEST_F(WhileArmed, AStoredSetIsNoWayRound) {
   ParameterValues looser = registers.values();
   looser.set_real<"force.limit">(10.0f, 0);

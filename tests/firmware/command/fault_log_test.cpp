@@ -270,6 +270,57 @@ TEST(FaultLog, ErasedItGoesOnCounting) {
   EXPECT_EQ(later.start(), 2U);
 }
 
+// From the first poll on, over the wrap of its clock and however late the next poll is.
+TEST(FaultLog, CountsWholeSecondsAndEntriesHaveThem) {
+  Memory memory{};
+  Log log(memory, ResetCause::native, {});
+  constexpr std::uint32_t begin = 0xFFFF'FF00;
+  log.count_time(begin);
+  EXPECT_EQ(log.uptime_s(), 0U);
+  log.count_time(begin + 999'999);
+  EXPECT_EQ(log.uptime_s(), 0U);
+  log.count_time(begin + 1'000'000);
+  EXPECT_EQ(log.uptime_s(), 1U);
+  log.count_time(begin + 3'999'999);
+  EXPECT_EQ(log.uptime_s(), 3U);
+  log.count_time(begin + 4'000'000);
+  log.add_trip(0, 0x7305, 0, {});
+  EXPECT_EQ(shown(log).back().uptime_s, 4U);
+}
+
+TEST(FaultLog, AStartOfTheNativeBoardIsAPowerOn) {
+  Memory memory{};
+  Log(memory, ResetCause::power_on, {}).add_trip(0, 0x7305, 0, {});
+  const Log log(memory, ResetCause::native, {});
+  EXPECT_TRUE(shown(log).empty());
+  EXPECT_EQ(log.start(), 1U);
+}
+
+// Hosts read the words, and the next release what this one has left.
+TEST(FaultLog, ItsLayoutIsTheProtocols) {
+  EXPECT_EQ(fault_log_entries, 16U);
+  EXPECT_EQ(fault_log_words, 16U);
+  EXPECT_EQ(Log::memory_words, 17U * 16U);
+  const LogEntry entry{.number = 0x0102'0304,
+                       .start = 0x0506,
+                       .count = 0x0708,
+                       .uptime_s = 9,
+                       .tick = 10,
+                       .event = LogEvent::start,
+                       .axis = 1,
+                       .code = 0x8130};
+  const auto words = std::bit_cast<LogWords>(entry);
+  EXPECT_EQ(words[0], 0x0102'0304U);
+  EXPECT_EQ(words[1], 0x0708'0506U);
+  EXPECT_EQ(words[2], 9U);
+  EXPECT_EQ(words[3], 10U);
+  EXPECT_EQ(words[4], 0x8130'0100U | static_cast<unsigned>(LogEvent::start));
+  Crc32 crc;
+  for (const std::uint32_t word : {0x4B4C'0001U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U})
+    crc.add(word);
+  EXPECT_EQ(log_crc({}), crc.value());
+}
+
 TEST(FaultLog, WithTooLittleMemoryKeepsNothing) {
   std::array<Word, Log::memory_words - 1> memory{};
   Log log(memory, ResetCause::pin, {});
@@ -277,6 +328,18 @@ TEST(FaultLog, WithTooLittleMemoryKeepsNothing) {
   log.erase();
   EXPECT_TRUE(shown(log).empty());
   EXPECT_TRUE(std::ranges::all_of(memory, [](const Word& word) { return word.value == 0; }));
+}
+
+TEST(LogEntry, ItsDefaults) {
+  const LogEntry defaults;
+  EXPECT_EQ(defaults.number, 0u);
+  EXPECT_EQ(defaults.start, 0u);
+  EXPECT_EQ(defaults.count, 1u);
+  EXPECT_EQ(defaults.uptime_s, 0u);
+  EXPECT_EQ(defaults.tick, 0u);
+  EXPECT_EQ(defaults.event, LogEvent::none);
+  EXPECT_EQ(defaults.axis, 0u);
+  EXPECT_EQ(defaults.code, 0u);
 }
 
 }  // namespace

@@ -138,6 +138,35 @@ TEST_F(Setpoints, AndCommandsAreNoPartOfASetOfParameters) {
   EXPECT_EQ(registers.changes(), 1u);
 }
 
+// docs/who_may_do_what.md: a locked device still does what moves nothing but values on their way.
+TEST_F(Setpoints, LockedOnlySetpointsAndWhatMeasuresAreTaken) {
+  EXPECT_FALSE(registers.locked());
+  registers.set_locked(true);
+  EXPECT_TRUE(registers.locked());
+  const auto before = registers.bits();
+  EXPECT_EQ(set("wall.stiffness", 900), Refusal::locked);
+  EXPECT_EQ(set("node.id", 5), Refusal::locked);
+  EXPECT_EQ(set("excitation.run", 5), Refusal::locked);
+  EXPECT_EQ(registers.bits(), before);
+  EXPECT_EQ(set("wall.stiffness", 1000), Refusal::none) << "as it is";
+  for (const std::string_view name : {"drive.controlword", "drive.commander", "link.sign_of_life"})
+    EXPECT_EQ(set(name, 7), Refusal::none) << name;
+  for (const std::string_view name : {"trace.interval", "trace.axis", "capture.axis", "capture.samples"})
+    EXPECT_EQ(set(name, 1), Refusal::none) << name;
+  const std::size_t heartbeat = slot_of(entry_of<"canopen.heartbeat_time">(), 0);
+  EXPECT_EQ(registers.write_communication(heartbeat, 123, false).refusal, Refusal::locked);
+  registers.set_locked(false);
+  EXPECT_EQ(control(1), Refusal::none);
+  EXPECT_EQ(set("wall.stiffness", 900), Refusal::none);
+  registers.set_locked(true);
+  EXPECT_EQ(control(2), Refusal::locked) << "locked since";
+  EXPECT_EQ(get("wall.stiffness"), 1000);
+  ParameterValues wanted = registers.values();
+  wanted.set_real<"wall.stiffness">(800.0f);
+  EXPECT_EQ(registers.set_all(wanted, false).refusal, Refusal::none) << "the board's own are no host's";
+  EXPECT_EQ(get("wall.stiffness"), 800);
+}
+
 TEST_F(Communication, SettingsAreSetOneByOneWithinTheirRangeAndCountedApart) {
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& e = entry_at(i);

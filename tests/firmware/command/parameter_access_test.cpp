@@ -302,13 +302,16 @@ TEST(ParameterAccess, StoreCommandsAreForTheApplicationAndNeverAValue) {
 
 TEST(ParameterAccess, ControlwordsAreFetchedOncePerAxisAndAreNoParameterChange) {
   Written w;
+  EXPECT_FALSE(w.registers.controlword_waits());
   EXPECT_EQ(w.write(address_of("drive.controlword", 1), {0xABCD}, true).refusal, Refusal::none);
+  EXPECT_TRUE(w.registers.controlword_waits());
   EXPECT_FALSE(w.registers.fetch_controlword(0));
   const auto controlword = w.registers.fetch_controlword(1);
   ASSERT_TRUE(controlword);
   EXPECT_EQ(controlword->word, 0xABCD);
   EXPECT_EQ(controlword->by, Link::serial);
   EXPECT_FALSE(w.registers.fetch_controlword(1));
+  EXPECT_FALSE(w.registers.controlword_waits());
   // The same word again is a command again.
   w.write(address_of("drive.controlword", 1), {0xABCD}, true);
   EXPECT_TRUE(w.registers.fetch_controlword(1));

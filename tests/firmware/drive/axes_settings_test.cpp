@@ -22,6 +22,29 @@ TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
   }
 }
 
+TEST(AxesSettings, WhatTheTickLooksAtItselfIsOfEachAxis) {
+  ParameterValues values;
+  values.set_whole<"encoder.offset">(static_cast<std::uint32_t>(-77), 1);
+  values.set_whole<"drive.mode">(static_cast<std::uint32_t>(DriveMode::torque), 1);
+  values.set_real<"device.hand_force">(0.0f, 1);
+  values.set_real<"supply.voltage_min">(9.0f);
+  AxesSettings settings(values);
+  EXPECT_EQ(settings.of(0).encoder_offset, 0);
+  EXPECT_EQ(settings.of(1).encoder_offset, -77);
+  EXPECT_EQ(settings.of(0).mode, DriveMode::haptic);
+  EXPECT_EQ(settings.of(1).mode, DriveMode::torque);
+  EXPECT_TRUE(settings.of(0).watch_motion);
+  EXPECT_FALSE(settings.of(1).watch_motion) << "0 turns it off";
+  values.set_real<"device.hand_force">(0.5f, 1);
+  settings.make(values, 6, {}, {});
+  EXPECT_TRUE(settings.of(1).watch_motion);
+  EXPECT_EQ(settings.of(1).supply_voltage_min, 9.0f);
+  EXPECT_EQ(settings.generation(), 7u);
+  EXPECT_EQ(&settings.all().axis[1], &settings.of(1));
+  // Per tick of 50 us: m/s for 1 N.
+  EXPECT_FLOAT_EQ(settings.of(0).plausibility.acceleration, 5e-5f / values.real<"device.mass">(0));
+}
+
 TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
   for (const auto& [ceiling, trips_above] : {std::pair{0.0f, 31.0f}, {25.68f, 25.68f}, {58.0f, 31.0f}}) {
     ParameterValues values;
@@ -67,6 +90,20 @@ TEST(AxesSettings, TheScaleIsAWholeNumberOfResamplersSteps) {
   settings.make(values, 0, {}, {});
   EXPECT_FLOAT_EQ(settings.scale(1).resolution, static_cast<float>(10.0 * count));
   EXPECT_NE(settings.scale(0).resolution, settings.scale(1).resolution);
+}
+
+TEST(AxesSettingsCircumstances, ItsDefaults) {
+  const AxesSettings::Circumstances defaults{};
+  EXPECT_EQ(defaults.current_share, 1.0f);
+  EXPECT_EQ(defaults.winding_temperature, 25.0f);
+  EXPECT_TRUE(defaults.commutated);
+  EXPECT_EQ(defaults.modulation_limit, 0.0f);
+}
+
+TEST(AxesSettingsScale, ItsDefaults) {
+  const AxesSettings::Scale defaults{};
+  EXPECT_EQ(defaults.count_length, 0.0);
+  EXPECT_EQ(defaults.resolution, 0.0f);
 }
 
 }  // namespace kmax::firmware::axes_settings_test

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
 
 #include "firmware/drive/axis_configuration.hpp"
@@ -270,6 +271,124 @@ TEST(AxesTick, TripsEveryEnabledAxisWhenTheMainLoopStands) {
   EXPECT_EQ(tick.ISR_report(1).fault, Fault::main_loop);
   EXPECT_EQ(tick.ISR_report(0).fault, Fault::none) << "there was nothing to trip";
   EXPECT_EQ(tick.report(2).tick % AxesTick<3>::round_ticks, 1u) << "every axis reports once a round";
+}
+
+/// Two plain walls, both handles a millimetre inside.
+class TwoWalls : public testing::Test {
+ protected:
+  explicit TwoWalls(float rate = 20000.0f) {
+    ParameterValues values = micrometre_counts();
+    values.set_real<"haptic.rate">(rate);
+    settings = settings_of<2>(values);
+    tick.offer(settings);
+    ticks(1);
+    for (const std::size_t axis : {0u, 1u}) tick.enable(axis, true);
+  }
+  void ticks(int number) {
+    for (int i = 0; i < number; ++i) {
+      tick.keep_alive();
+      for (const std::size_t axis : {0u, 1u}) force[axis] = tick.ISR_tick(axis, at(-1000)).force;
+    }
+  }
+  AxesTick<2>::Settings settings = settings_of<2>(micrometre_counts());
+  AxesTick<2> tick{settings};
+  std::array<float, 2> force{};
+};
+
+TEST_F(TwoWalls, EachReportsInEveryFourthTickAndAtOnceWhenSomethingHasChanged) {
+  EXPECT_TRUE(tick.ISR_round_begins()) << "the first tick";
+  for (std::uint32_t number = 2; number < 20; ++number) {
+    ticks(1);
+    EXPECT_EQ(tick.ISR_round_begins(), number % 4 == 1) << number;
+    const std::uint32_t reported = number == 2 ? 2 : (number - 1) / 4 * 4 + 1;
+    for (const std::size_t axis : {0u, 1u})
+      EXPECT_EQ(tick.report(axis).tick, number < 5 ? 2 : reported) << number;
+  }
+  tick.enable(1, false);
+  ticks(1);
+  EXPECT_EQ(tick.report(0).tick, 17u);
+  EXPECT_EQ(tick.report(1).tick, 20u);
+  EXPECT_FALSE(tick.report(1).enabled);
+  EXPECT_EQ(tick.ISR_report(0).tick, 20u);
+}
+
+TEST_F(TwoWalls, LessIsLeftOfTheForceOfTheAxisThatFades) {
+  ticks(1);
+  EXPECT_EQ(force, (std::array{1.0f, 1.0f}));
+  tick.leave_share(1, 0.25f);
+  ticks(1);
+  EXPECT_EQ(force, (std::array{1.0f, 0.25f}));
+  tick.leave_share(1, 1.0f);
+  ticks(1);
+  EXPECT_EQ(force, (std::array{1.0f, 1.0f}));
+}
+
+TEST_F(TwoWalls, TheTraceIsOfOneAxisAtEverySoManySamples) {
+  ticks(10);
+  EXPECT_EQ(tick.trace().next(), 0u) << "none is asked for";
+  const auto tick_of = [this](std::uint32_t record) {
+    const auto address = static_cast<std::uint16_t>(trace_window + 8 * record);
+    return std::uint32_t{tick.trace().word_at(address)} << 16 |
+           tick.trace().word_at(static_cast<std::uint16_t>(address + 1));
+  };
+  tick.trace_axis(1, 3);
+  ticks(7);
+  ASSERT_EQ(tick.trace().next(), 3u);
+  for (const std::uint32_t record : {0u, 1u, 2u}) EXPECT_EQ(tick_of(record), 12 + 3 * record);
+  tick.trace_axis(1, 1'000'000);
+  ticks(10);
+  const std::uint32_t before = tick.trace().next();
+  tick.trace_axis(0, 2);
+  ticks(4);
+  EXPECT_EQ(tick.trace().next(), before + 2) << "a countdown from a longer interval is cut";
+  tick.trace_axis(0, 0);
+  ticks(10);
+  EXPECT_EQ(tick.trace().next(), before + 2);
+}
+
+TEST_F(TwoWalls, AnAxisThatIsNotThereTakesSettingsAndReportsInItsRounds) {
+  settings.axis[0].generation = settings.axis[1].generation = 9;
+  tick.offer(settings);
+  EXPECT_FALSE(tick.settings_taken());
+  tick.ISR_pass(0);
+  EXPECT_TRUE(tick.settings_taken());
+  tick.ISR_pass(1);
+  for (int number = 3; number <= 5; ++number) {
+    EXPECT_NE(tick.report(1).generation, 9u) << "not before its round";
+    tick.ISR_pass(0);
+    tick.ISR_pass(1);
+  }
+  EXPECT_EQ(tick.report(1).generation, 9u);
+  EXPECT_EQ(tick.report(1).tick, 5u);
+  EXPECT_FALSE(tick.report(1).count_valid);
+}
+
+struct TwoSlowWalls : TwoWalls {
+  TwoSlowWalls() : TwoWalls(2000.0f) { ticks(25); }
+};
+
+TEST_F(TwoSlowWalls, TellHowManyTicksWouldChangeNothing) {
+  while (!tick.ISR_haptic(0).new_sample) ticks(1);
+  ticks(1);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 8u);
+  EXPECT_EQ(tick.ISR_held_ticks(1), 8u);
+  EXPECT_EQ(tick.ISR_held_ticks(0), 0u);
+  tick.leave_share(1, 0.5f);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 0u);
+  EXPECT_EQ(tick.ISR_held_ticks(1), 8u) << "of the one that is there";
+  tick.leave_share(1, 1.0f);
+  tick.enable(1, false);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 0u);
+  tick.enable(1, true);
+  const std::uint32_t now = tick.ISR_report(0).tick;
+  tick.ISR_pass_held(5);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 3u);
+  for (const std::size_t axis : {0u, 1u}) EXPECT_EQ(tick.report(axis).tick, now + 5);
+  ticks(1);
+  EXPECT_EQ(tick.ISR_report(1).tick, now + 6);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 2u);
+  tick.offer(settings);
+  EXPECT_EQ(tick.ISR_held_ticks(2), 0u) << "settings are on their way";
 }
 
 }  // namespace

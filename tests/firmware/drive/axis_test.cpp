@@ -203,5 +203,113 @@ TEST_F(AxisTest, SaysWhenTheMainLoopMustSeeItsReport) {
   EXPECT_FALSE(axis.ISR_changed());
 }
 
+TEST_F(AxisTest, TellsItsCountItsFaultAndWhereAnotherSlotFindsIt) {
+  EXPECT_EQ(axis.ISR_fault(), Fault::none);
+  EXPECT_FALSE(axis.ISR_follows({0, true})) << "before its first count";
+  tick(at(-300), false);
+  EXPECT_EQ(axis.ISR_counted(), -300);
+  EXPECT_EQ(axis.ISR_position(at(-290), setting), -290);
+  setting.encoder_offset = 10;
+  EXPECT_EQ(axis.ISR_position(at(-290), setting), -300);
+  setting.encoder_direction = -1;
+  EXPECT_EQ(axis.ISR_position(at(-290), setting), 300);
+  EXPECT_EQ(axis.ISR_counted(), -300) << "a look from there changes nothing";
+  Axis::Input input{at(-290), true};
+  EXPECT_TRUE(axis.ISR_follows(input));
+  input.reference_generation = 1;
+  EXPECT_FALSE(axis.ISR_follows(input)) << "of another origin";
+  EXPECT_FALSE(axis.ISR_follows({at(-290), false}));
+  axis.ISR_trip(Fault::main_loop);
+  EXPECT_EQ(axis.ISR_fault(), Fault::main_loop);
+  axis.ISR_trip(Fault::tick_missed);
+  EXPECT_EQ(axis.ISR_fault(), Fault::main_loop) << "the first is kept";
+}
+
+TEST_F(AxisTest, HoldsBetweenTwoSamplesWhereNothingElseCanHappen) {
+  ParameterValues values = plain_wall();
+  values.set_real<"haptic.rate">(2000.0f);
+  setting = setting_from(values);
+  const auto sampled = [this](bool enable) {
+    do tick(at(1000), enable);
+    while (!axis.ISR_haptic().new_sample);
+    tick(at(1000), enable);
+  };
+  for (const bool enable : {false, true}) {
+    sampled(enable);
+    sampled(enable);
+    EXPECT_EQ(axis.ISR_held_ticks(setting, enable), 8u);
+    EXPECT_EQ(axis.ISR_held_ticks(setting, !enable), 0u) << "is to be enabled or disabled";
+    AxisSetting other = setting;
+    ++other.generation;
+    EXPECT_EQ(axis.ISR_held_ticks(other, enable), 0u);
+    other = setting;
+    other.mode = DriveMode::excitation;
+    EXPECT_EQ(axis.ISR_held_ticks(other, enable), 0u);
+    other = setting;
+    other.compensation.limit = 0.1f;
+    EXPECT_EQ(axis.ISR_held_ticks(other, enable), 0u);
+  }
+  const std::uint32_t before = axis.ISR_report().tick;
+  axis.ISR_pass_held(5);
+  EXPECT_EQ(axis.ISR_held_ticks(setting, true), 3u);
+  EXPECT_EQ(axis.ISR_report().tick, before + 5);
+  tick(at(1000), true, false);
+  EXPECT_EQ(axis.ISR_held_ticks(setting, true), 0u) << "tripped";
+}
+
+TEST_F(AxisTest, OneThatIsNotThereHasNoCountAndNothingIsNew) {
+  tick(at(-1000), true);
+  ASSERT_TRUE(axis.ISR_changed());
+  setting.generation = 7;
+  axis.ISR_pass(setting, 1234);
+  EXPECT_FALSE(axis.ISR_changed());
+  EXPECT_FALSE(axis.ISR_follows({at(-1000), true}));
+  const AxisReport report = axis.ISR_report();
+  EXPECT_EQ(report.tick, 1234u);
+  EXPECT_EQ(report.generation, 7u);
+  EXPECT_FALSE(report.enabled);
+  EXPECT_FALSE(report.count_valid);
+  EXPECT_FALSE(report.referenced);
+  EXPECT_EQ(report.condition, Fault::none);
+}
+
+TEST(AxisReport, ItsDefaults) {
+  const AxisReport defaults;
+  EXPECT_EQ(defaults.counted, 0);
+  EXPECT_EQ(defaults.tick, 0u);
+  EXPECT_EQ(defaults.generation, 0u);
+  EXPECT_EQ(defaults.reference_generation, 0u);
+  EXPECT_EQ(defaults.armed_samples, 0u);
+  EXPECT_EQ(defaults.limited_samples, 0u);
+  EXPECT_EQ(defaults.alarms, 0u);
+  EXPECT_EQ(defaults.softening, 1.0f);
+  EXPECT_EQ(defaults.force, 0.0f);
+  EXPECT_EQ(defaults.fault, Fault::none);
+  EXPECT_EQ(defaults.condition, Fault::none);
+  EXPECT_EQ(defaults.fault_value, 0.0f);
+  EXPECT_FALSE(defaults.enabled);
+  EXPECT_FALSE(defaults.count_valid);
+  EXPECT_FALSE(defaults.referenced);
+}
+
+TEST(AxisSetting, ItsDefaults) {
+  const AxisSetting defaults;
+  EXPECT_EQ(defaults.supply_voltage_min, 0.0f);
+  EXPECT_EQ(defaults.supply_voltage_max, 0.0f);
+  EXPECT_EQ(defaults.encoder_offset, 0);
+  EXPECT_EQ(defaults.encoder_direction, 1);
+  EXPECT_EQ(defaults.generation, 0u);
+  EXPECT_EQ(defaults.mode, DriveMode::haptic);
+  EXPECT_FALSE(defaults.watch_motion);
+  EXPECT_TRUE(defaults.commutated);
+}
+
+TEST(AxisDemand, ItsDefaults) {
+  const Axis::Demand defaults{};
+  EXPECT_EQ(defaults.from_axes, 0.0f);
+  EXPECT_EQ(defaults.from_host, 0.0f);
+  EXPECT_EQ(defaults.share, 1.0f);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::axis_test

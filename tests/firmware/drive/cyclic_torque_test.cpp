@@ -22,6 +22,14 @@ float share_of(const ParameterValues& values, std::size_t axis = 0) {
   return commanded_force(values, axis, true, false);
 }
 
+TEST(CyclicTorque, ItsTargetsAreTwo) {
+  int targets = 0;
+  for (std::size_t entry = 0; entry < entry_count; ++entry) targets += is_target(entry) ? 1 : 0;
+  EXPECT_EQ(targets, 2);
+  EXPECT_TRUE(is_target(entry_of<"profile.target_torque">()));
+  EXPECT_TRUE(is_target(entry_of<"profile.target_force">()));
+}
+
 TEST(CyclicTorque, RatedValuesAreWholeAndAtLeastOne) {
   struct Case {
     float limit, constant;
@@ -148,7 +156,7 @@ RC_GTEST_PROP(CyclicTorque, NewtonsArriveAsTheCurrentThatMakesThem, ()) {
   values.set_real<"device.transmission">(in(1e-3, 1e-1));
   AxisSetting setting;
   setting.haptic = control::HapticLoop<float>::prepare(haptic_configuration(values, 0), 0);
-  setting.motor = MotorControl::prepare(motor_configuration(values, 0));
+  setting.motor = MotorControl::prepare(motor_configuration(values, 0, 25.0f, 1.0f));
   setting.mode = DriveMode::torque;
   Axis axis;
   const Axis::Input input{.count = 0, .count_valid = true, .condition = Fault::none, .motor = {}};

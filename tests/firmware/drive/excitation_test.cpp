@@ -61,6 +61,7 @@ TEST_F(ExcitationTest, SquareWaveOfHalfPeriodOneTickChangesInEveryTick) {
   for (int i = 0; i < 1000; ++i) {
     const auto out = update(config);
     ASSERT_EQ(out.along, i % 2 == 0 ? 2.5f : 1.5f) << i;
+    ASSERT_EQ(out.across, 0.0f) << i;
     ASSERT_TRUE(out.alternating);
   }
 }
@@ -432,6 +433,18 @@ TEST_F(ExcitationTest, AnotherRunStartsAnewInMidRamp) {
   out = update(config);
   EXPECT_FALSE(out.started);
   EXPECT_NEAR(out.along, 3.0f / 200.0f, 1e-6f) << "the square wave begins with its positive half again";
+}
+
+TEST(ExcitationOutput, ItsDefaults) {
+  const Excitation::Output defaults{};
+  EXPECT_EQ(defaults.along, 0.0f);
+  EXPECT_EQ(defaults.across, 0.0f);
+  EXPECT_EQ(defaults.force, 0.0f);
+  EXPECT_EQ(defaults.angle, 0u);
+  EXPECT_EQ(defaults.electrical_speed, 0.0f);
+  EXPECT_FALSE(defaults.alternating);
+  EXPECT_FALSE(defaults.started);
+  EXPECT_FALSE(defaults.finished);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 namespace kmax::firmware::fault_test {
@@ -21,11 +22,37 @@ TEST(Fault, EveryFaultHasItsOwnCodeAndWords) {
   EXPECT_EQ(text_of(Fault::none).error_code, 0);
 }
 
+// Hosts and logs go by them. CiA 402, table of error codes; from 0xFF00 on they are the manufacturer's.
 TEST(Fault, CodesOfTheFieldArePinned) {
-  EXPECT_EQ(text_of(Fault::over_speed).error_code, 0x8480);  // CiA 402: velocity speed controller, over-speed
-  EXPECT_EQ(text_of(Fault::encoder).error_code, 0x7305);     // CiA 402: incremental encoder 1
-  EXPECT_EQ(text_of(Fault::link_silent).error_code, 0x8130);  // CiA 301: life guard or heartbeat error
-  EXPECT_EQ(text_of(Fault::not_finite).error_code, 0xFF01);   // manufacturer's
+  const std::map<Fault, std::uint16_t> pinned{
+      {Fault::none, 0x0000},
+      {Fault::not_finite, 0xFF01},
+      {Fault::over_speed, 0x8480},   // velocity speed controller, over-speed
+      {Fault::encoder, 0x7305},      // incremental encoder 1
+      {Fault::link_silent, 0x8130},  // CiA 301: life guard or heartbeat error
+      {Fault::main_loop, 0x6100},
+      {Fault::emergency_stop, 0xFF02},
+      {Fault::gate_driver, 0x5440},
+      {Fault::under_voltage, 0x3220},
+      {Fault::over_voltage, 0x3210},
+      {Fault::over_current, 0x2310},
+      {Fault::phase_open, 0x3331},
+      {Fault::current_sense, 0x5210},
+      {Fault::over_temperature, 0x4310},
+      {Fault::power_stage, 0x5400},
+      {Fault::tick_missed, 0xFF03},
+      {Fault::current_sum, 0x2330},
+      {Fault::spin_out, 0xFF04},
+      {Fault::motor_too_hot, 0x4210},
+      {Fault::excitation_travel, 0xFF05},
+      {Fault::bus_off, 0x8140},
+      {Fault::heartbeat_lost, 0xFF06},
+      {Fault::unstable_wall, 0xFF07}};
+  EXPECT_EQ(pinned.size(), fault_texts.size());
+  for (const auto& [fault, code] : pinned) {
+    EXPECT_EQ(text_of(fault).error_code, code) << text_of(fault).name;
+    EXPECT_EQ(error_code_of(fault), code) << text_of(fault).name;
+  }
 }
 
 TEST(Fault, UnknownCodeIsNoFault) {

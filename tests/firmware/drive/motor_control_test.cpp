@@ -244,6 +244,42 @@ TEST(MotorControl, CurrentShareBoundsTheReferenceOnly) {
   }
 }
 
+TEST(MotorControl, AnglesSpeedsAndBoundsFollowTheMotor) {
+  MotorControlConfig config;
+  config.transmission = 0.1f;
+  config.electrical_offset = 1.5707963f;
+  auto c = MotorControl::prepare(config);
+  EXPECT_EQ(c.angle_per_count, 7u << 19) << "7 pole pairs, 8192 counts";
+  EXPECT_EQ(c.shaft_angle_per_count, 1u << 19);
+  EXPECT_NEAR(static_cast<double>(c.angle_offset), 0x4000'0000, 300.0) << "a float's last place";
+  EXPECT_FLOAT_EQ(c.electrical_speed_per_velocity, 70.0f);
+  EXPECT_FLOAT_EQ(c.slow_velocity, 8.0f) << "half of 8 V over 0.05 V s, at 0.1 m";
+  EXPECT_NEAR(c.current_square_step, -std::expm1(-5e-5 / 0.01), 1e-8);
+  EXPECT_EQ(c.watch.over_current, 7.5f) << "half as much again as 5 A";
+  config.electrical_offset = -1.5707963f;
+  config.torque_constant = -0.05f;
+  config.pole_pairs = 2;
+  config.counts_per_turn = 3;
+  c = MotorControl::prepare(config);
+  EXPECT_NEAR(static_cast<double>(c.angle_offset), 0xC000'0000, 300.0);
+  EXPECT_FLOAT_EQ(c.slow_velocity, 8.0f);
+  EXPECT_EQ(c.angle_per_count, 2863311531u) << "to the nearest";
+  EXPECT_EQ(c.shaft_angle_per_count, 1431655765u);
+}
+
+TEST(MotorControl, AShareIsWithinNothingAndAll) {
+  for (const auto& [share, limit] : {std::pair{0.5f, 2.5f},
+                                     {0.0f, 0.0f},
+                                     {-0.1f, 0.0f},
+                                     {1.0f, 5.0f},
+                                     {1.5f, 5.0f},
+                                     {std::numeric_limits<float>::quiet_NaN(), 0.0f}}) {
+    MotorControlConfig config;
+    config.current_share = share;
+    EXPECT_EQ(MotorControl::prepare(config).transmission.current_limit, limit) << share;
+  }
+}
+
 TEST(MotorControl, SaliencyAndDeadTimeReachTheControllers) {
   MotorControlConfig config = pmsm();
   EXPECT_EQ(MotorControl::prepare(config).pmsm.inductance_q, 3e-4f) << "0: as inductance";
@@ -271,6 +307,47 @@ TEST(MotorControl, CurrentsOfADcMotorThatDoNotAddUpAreTold) {
   EXPECT_EQ(out.fault, Fault::current_sum);
   EXPECT_FLOAT_EQ(out.fault_value, 1.2f);
   EXPECT_LT(ticks, 100);
+}
+
+TEST(MotorControlConfig, ItsDefaults) {
+  const MotorControlConfig defaults;
+  EXPECT_EQ(defaults.kind, MotorKind::dc);
+  EXPECT_EQ(defaults.transmission, 0.05f);
+  EXPECT_EQ(defaults.torque_constant, 0.05f);
+  EXPECT_EQ(defaults.resistance, 1.0f);
+  EXPECT_EQ(defaults.winding_temperature, 25.0f);
+  EXPECT_EQ(defaults.reference_temperature, 25.0f);
+  EXPECT_EQ(defaults.inductance, 1e-3f);
+  EXPECT_EQ(defaults.inductance_q, 0.0f);
+  EXPECT_EQ(defaults.pole_pairs, 7);
+  EXPECT_EQ(defaults.electrical_offset, 0.0f);
+  EXPECT_EQ(defaults.counts_per_turn, 8192u);
+  EXPECT_EQ(defaults.current_limit, 5.0f);
+  EXPECT_EQ(defaults.current_share, 1.0f);
+  EXPECT_EQ(defaults.bandwidth, 3000.0f);
+  EXPECT_EQ(defaults.modulation_limit, 0.88f);
+  EXPECT_EQ(defaults.dead_time, 0.0f);
+  EXPECT_EQ(defaults.dead_time_current, 0.1f);
+  EXPECT_EQ(defaults.tick_rate, 20000.0f);
+}
+
+TEST(MotorControlMeasured, ItsDefaults) {
+  const MotorControl::Measured defaults{};
+  EXPECT_FALSE(defaults.present);
+  EXPECT_EQ(defaults.supply_voltage, 0.0f);
+  EXPECT_EQ(defaults.current_b, 0.0f);
+  EXPECT_EQ(defaults.current_c, 0.0f);
+}
+
+TEST(MotorControlReport, ItsDefaults) {
+  const MotorControl::Report defaults{};
+  EXPECT_EQ(defaults.current_reference, 0.0f);
+  EXPECT_EQ(defaults.current, 0.0f);
+  EXPECT_EQ(defaults.force_made, 0.0f);
+  EXPECT_EQ(defaults.current_square, 0.0f);
+  EXPECT_FALSE(defaults.saturated);
+  EXPECT_FALSE(defaults.excitation_started);
+  EXPECT_FALSE(defaults.excitation_finished);
 }
 
 }  // namespace

@@ -279,5 +279,23 @@ TEST_F(Guard, NamesTheOneFartherBeyondWhenNoValueCouldPass) {
   EXPECT_EQ(finding().criterion, Criterion::abbott_okamura) << "not the step of 10 mN over 1";
 }
 
+TEST(GuardFinding, NumbersOfModesAndVerdictsAreTheProtocols) {
+  EXPECT_EQ(static_cast<int>(GuardMode::off), 0);
+  EXPECT_EQ(static_cast<int>(GuardMode::warn), 1);
+  EXPECT_EQ(static_cast<int>(GuardMode::refuse), 2);
+  EXPECT_EQ(static_cast<int>(Verdict::not_judged), 0);
+  EXPECT_EQ(static_cast<int>(Verdict::pass), 1);
+  EXPECT_EQ(static_cast<int>(Verdict::fail), 2);
+}
+
+TEST(GuardFinding, ItsDefaults) {
+  const GuardFinding defaults;
+  EXPECT_EQ(defaults.verdict, Verdict::not_judged);
+  EXPECT_EQ(defaults.criterion, control::Criterion::colgate);
+  EXPECT_EQ(defaults.failed, 0u);
+  EXPECT_EQ(defaults.value, 0.0f);
+  EXPECT_EQ(defaults.bound, 0.0f);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::stability_guard_test

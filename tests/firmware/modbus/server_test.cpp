@@ -268,6 +268,17 @@ TEST(ModbusServer, ATaggedRequestIsTheOneWithinAndItsAnswerBearsTheTag) {
   }
 }
 
+TEST(ModbusServer, WhatATaggedRequestAsksForIsWithin) {
+  const auto within = [](const Bytes& request) {
+    const auto asked = untagged(request);
+    return Bytes(asked.begin(), asked.end());
+  };
+  EXPECT_EQ(within({65, 1, 2, 6}), (Bytes{6}));
+  EXPECT_EQ(within({65, 1, 2, 6, 0, 7}), (Bytes{6, 0, 7}));
+  for (const Bytes& itself : {Bytes{}, {65}, {65, 1, 2}, {64, 1, 2, 6}, {6, 0, 7, 1, 2}})
+    EXPECT_EQ(within(itself), itself);
+}
+
 TEST(ModbusServer, ATaggedRequestWithNothingOrItselfWithinIsRefused) {
   Fixture f;
   EXPECT_EQ(f.exception_of({65, 1, 2}), 3);

@@ -33,10 +33,10 @@ TEST(CobId, TheBitsOfItsObjects) {
 
 // CiA 301, table of the restricted CAN-IDs.
 TEST(CobId, NothingMayBeSetToARestrictedIdentifier) {
-  constexpr std::pair<unsigned, unsigned> table[] = {{0x000, 0x000}, {0x001, 0x07F}, {0x101, 0x180},
-                                                     {0x581, 0x5FF}, {0x601, 0x67F}, {0x6E0, 0x6FF},
-                                                     {0x701, 0x77F}, {0x780, 0x7FF}};
-  for (unsigned id = 0; id <= 0x7FF; ++id) {
+  constexpr std::pair<unsigned, unsigned> table[] = {
+      {0x000, 0x000}, {0x001, 0x07F}, {0x101, 0x180}, {0x581, 0x5FF},      {0x601, 0x67F},
+      {0x6E0, 0x6FF}, {0x701, 0x77F}, {0x780, 0x7FF}, {0x800, 0x1FFF'FFFF}};  // no identifier of 11 bits
+  for (unsigned id = 0; id <= 0x900; ++id) {
     const bool listed = std::any_of(std::begin(table), std::end(table), [id](const auto& range) {
       return id >= range.first && id <= range.second;
     });

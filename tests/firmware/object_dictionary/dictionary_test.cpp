@@ -143,6 +143,21 @@ TEST(Dictionary, HasEveryNameOfTheVocabularyWithItsUnitAndChoices) {
   }
 }
 
+// Hosts send the number, people read the name: where the name is a number it is that one, else the choices
+// are counted in their order.
+TEST(Dictionary, NumbersOfChoicesAreTheirNamesOrTheirOrder) {
+  for (std::size_t i = 0; i < entry_count; ++i) {
+    int place = 0;
+    for (const NamedValue& choice : entry_at(i).values) {
+      char* end = nullptr;
+      const std::string name(choice.name);
+      const long number = std::strtol(name.c_str(), &end, 10);
+      EXPECT_EQ(choice.value, *end == '\0' ? number : place) << entry_at(i).name << " = " << name;
+      ++place;
+    }
+  }
+}
+
 // A setting that is kept and is not in the vocabulary would be an undocumented name. CANopen's own settings
 // are named by CiA 301.
 TEST(Dictionary, HasNoPersistentNameOutsideTheVocabulary) {

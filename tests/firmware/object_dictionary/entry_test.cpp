@@ -95,6 +95,50 @@ TEST(Entry, WordsOfARowSetWhatTheySay) {
   EXPECT_EQ(torque.maximum, 32767);
 }
 
+TEST(Entry, ARowSaysNothingThatItWasNotAskedTo) {
+  const Entry plain = real("group.plain", plain_group, 1, "m", -1, 2, 0.5, "h");
+  EXPECT_EQ(plain.type, Type::float32);
+  EXPECT_EQ(plain.minimum, -1);
+  EXPECT_EQ(plain.maximum, 2);
+  EXPECT_EQ(plain.default_value, 0.5);
+  EXPECT_EQ(plain.access, Access::read_write);
+  EXPECT_EQ(plain.change, Change::any_time);
+  EXPECT_TRUE(plain.persistent);
+  EXPECT_TRUE(plain.values.empty());
+  EXPECT_EQ(plain.standard_index, 0);
+  EXPECT_EQ(plain.standard_subindex, 0);
+  EXPECT_FALSE(plain.node_relative);
+  EXPECT_FALSE(plain.unbounded_at_zero);
+  EXPECT_EQ(plain.ceiling, "");
+  EXPECT_EQ(plain.scope(), Scope::axis);
+  EXPECT_FALSE(plain_group.of_commander);
+
+  EXPECT_EQ(plain.only_lower().change, Change::only_lower);
+  EXPECT_EQ(plain.only_lower("group.top").ceiling, "group.top");
+  EXPECT_EQ(plain.only_higher().change, Change::only_higher);
+  EXPECT_EQ(plain.only_higher().ceiling, "");
+  EXPECT_EQ(plain.only_nearer_zero("group.top").change, Change::only_nearer_zero);
+  EXPECT_EQ(plain.only_nearer_zero("group.top").ceiling, "group.top");
+  EXPECT_TRUE(plain.off_at_zero().unbounded_at_zero);
+  EXPECT_EQ(plain.at_standard_index(0x1018, 3).object_subindex(), 3);
+
+  static constexpr NamedValue states[] = {{"second", 2}, {"first", 1}, {"third", 3}};
+  const Entry state = named_reading("group.state", plain_group, 1, states, "h");
+  EXPECT_EQ(state.type, Type::unsigned8);
+  EXPECT_EQ(state.minimum, 1);
+  EXPECT_EQ(state.maximum, 3);
+  EXPECT_EQ(state.default_value, 2) << "the one that is named first";
+  EXPECT_EQ(state.access, Access::read_only);
+  EXPECT_FALSE(state.persistent);
+}
+
+// CiA 402 has several axes 0x800 apart.
+TEST(Entry, PlacesOfFurtherAxes) {
+  EXPECT_EQ(axis_index_offset, 0x800);
+  EXPECT_EQ(axis_modbus_offset, 0x400);
+  EXPECT_EQ(most_axes, 7U);
+}
+
 TEST(Entry, AReadingMayBeAllThatItsTypeHolds) {
   const auto range = [](Type type) {
     const Entry e = reading("group.reading", plain_group, 1, type, "", "h");

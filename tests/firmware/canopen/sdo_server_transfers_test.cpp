@@ -12,7 +12,7 @@
 #include "firmware/canopen/sdo_server.hpp"
 #include "tests/firmware/canopen/sdo_bench.hpp"
 
-namespace kmax::firmware::canopen::sdo_transfers_test {
+namespace kmax::firmware::canopen::sdo_server_transfers_test {
 namespace {
 
 constexpr ObjectAddress domain = InMemoryObjects::domain;
@@ -602,4 +602,4 @@ RC_GTEST_PROP(SdoGarbage, ASegmentedDownloadIsWrittenWholeOrNotAtAll, ()) {
 }
 
 }  // namespace
-}  // namespace kmax::firmware::canopen::sdo_transfers_test
+}  // namespace kmax::firmware::canopen::sdo_server_transfers_test

@@ -7,7 +7,7 @@
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "tests/board/canopen_host.hpp"
 
-namespace kmax::board::application_canopen_test {
+namespace kmax::board::canopen_edge_bus_test {
 namespace {
 
 using firmware::Fault;
@@ -221,6 +221,67 @@ TEST_F(OnCan, AWatchedNodeThatIsLostTripsAndMustBeBackFirst) {
   EXPECT_EQ(bench.refusal(), Refusal::heartbeat_missing);
 }
 
+// CiA 301: 0x8130, of the node that is meant, while it is silent and no longer than it is watched.
+TEST_F(OnCan, ANodeThatFallsSilentIsAnErrorUntilItIsBackOrNoLongerWatched) {
+  const auto emergency = [this] {
+    for (const drivers::CanFrame& frame : heard) {
+      if (frame.identifier == 0x081) return frame.data;
+    }
+    return std::array<std::uint8_t, 8>{0xEE};
+  };
+  for (const bool comes_back : {true, false}) {
+    EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+    heartbeat_of(5);
+    EXPECT_EQ(read(0x1001, 0), 0U);
+    heard.clear();
+    run_ms(200);
+    EXPECT_EQ(emergency(), (std::array<std::uint8_t, 8>{0x30, 0x81, 0x11, 0x85}));
+    EXPECT_EQ(read(0x1001, 0), 0x11U);
+    heard.clear();
+    if (comes_back) {
+      heartbeat_of(5);
+    } else {
+      EXPECT_EQ(write(0x1016, 1, 0, 4), 0U);
+      run_ms(200);
+    }
+    EXPECT_EQ(read(0x1001, 0), 0U);
+  }
+}
+
+TEST(CanopenEdge, TheFaultOfEachAxisIsToldWithItsNumber) {
+  for (std::uint8_t axis = 0; axis < firmware::axis_count; ++axis) {
+    CanOpenHost host;
+    host.bench.set_up_plain_wall(axis);
+    host.bench.preset("velocity.limit", 0.01, axis);
+    host.bench.device.stand_at(1000, axis);
+    host.run_ms(5);
+    ASSERT_TRUE(host.bench.arm(axis));
+    host.run_ms(1);
+    host.heard.clear();
+    host.bench.device.stand_at(100'000, axis);
+    host.run_ms(5);
+    ASSERT_EQ(host.bench.application().fault(axis), Fault::over_speed);
+    const auto told = std::find_if(host.heard.begin(), host.heard.end(),
+                                   [](const auto& frame) { return frame.identifier == 0x081; });
+    ASSERT_NE(told, host.heard.end()) << int{axis};
+    const auto& data = told->data;
+    EXPECT_EQ(data[0] | data[1] << 8, 0x8480);
+    EXPECT_EQ(data[3], axis);
+    EXPECT_EQ(std::bit_cast<float>(data[4] | data[5] << 8 | data[6] << 16 | data[7] << 24),
+              static_cast<float>(host.bench.get("drive.fault_value", axis)));
+  }
+}
+
+TEST_F(OnCan, AWatchedNodeThatIsLostDoesNotTripWhatSerialHasArmed) {
+  EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
+  heartbeat_of(5);
+  ASSERT_TRUE(bench.arm());
+  run_ms(200);
+  EXPECT_EQ(bench.get("can.heartbeats_lost"), 1);
+  EXPECT_TRUE(armed());
+  EXPECT_EQ(fault(), Fault::none);
+}
+
 TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
   EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
   heartbeat_of(5);
@@ -363,4 +424,4 @@ TEST_F(OnCan, ATwinIsToldAndForgotten) {
 }
 
 }  // namespace
-}  // namespace kmax::board::application_canopen_test
+}  // namespace kmax::board::canopen_edge_bus_test
