@@ -14,7 +14,7 @@ class Pace {
  public:
   using Time = std::chrono::nanoseconds;
 
-  /// `say` (may be empty) is told once, in words, when the simulated time has gone at less than 80 % of the
+  /// `say` (may be empty) gets a sentence once, when the simulated time has gone at less than 80 % of the
   /// real time for 5 s. A single hold-up, such as a computer that slept, is no slow machine: it counts as
   /// half a second at most.
   explicit Pace(std::function<void(const std::string&)> say = {}) : say_(std::move(say)) {}

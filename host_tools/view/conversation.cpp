@@ -285,6 +285,7 @@ std::string Conversation::start(const Command& command) {
 }
 
 std::string Conversation::decide(bool keep) {
+  // Refuses when there is nothing to decide, whichever way.
   const std::vector<device::Assignment>& back = procedure_.way_back();
   const std::string said = keep ? save() : "put back: " + set(back);
   procedure_.decided();

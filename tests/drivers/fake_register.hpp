@@ -46,7 +46,7 @@ struct FakeTimer {
   FakeRegister ccr[4];
   FakeRegister bdtr;
 
-  void tell(WriteOrder& order) {
+  void add_to(WriteOrder& order) {
     order.watch(cr1, "cr1"), order.watch(cr2, "cr2"), order.watch(smcr, "smcr"), order.watch(dier, "dier");
     order.watch(sr, "sr"), order.watch(egr, "egr"), order.watch(ccmr[0], "ccmr1"),
         order.watch(ccmr[1], "ccmr2");

@@ -38,7 +38,7 @@ TEST(QuadratureTimer, IsSetUpInTheManualsOrder) {
   for (const bool reversed : {false, true}) {
     FakeTimer timer;
     WriteOrder order;
-    timer.tell(order);
+    timer.add_to(order);
     QuadratureTimer<FakeTimer> encoder{timer};
     ASSERT_TRUE(encoder.configure({.input_filter = 15, .reversed = reversed}));
     EXPECT_EQ(order.all, (WriteOrder::Writes{{"cr1", 0},

@@ -71,7 +71,7 @@ TEST(ThreePhasePwm, IsSetUpInTheManualsOrder) {
   FakeTimer timer;
   timer.cr1.value = 1U | 1U << 4 | 3U << 5;  // runs down, centre-aligned
   WriteOrder order;
-  timer.tell(order);
+  timer.add_to(order);
   ThreePhasePwm<FakeTimer> pwm{timer};
   ASSERT_TRUE(pwm.configure());
   constexpr std::uint32_t loading = 1U << 2 | 1U << 7;

@@ -130,7 +130,7 @@ TEST(Emergency, ClearedInAnyOrder) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-// Whichever byte of its code is not 0: the master has been told of an error, and is told that it has gone.
+// Whichever byte of its code is not 0: an error that was reported is also reported to have gone.
 TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
   for (const std::uint16_t code : std::vector<std::uint16_t>{0x8100, 0x0010}) {
     Emergency emergency = configured();
@@ -141,7 +141,7 @@ TEST(Emergency, AnErrorThatWentWhileNobodyWasToldIsToldToHaveGone) {
     emergency.configure(own_cob_id, 0);
     EXPECT_EQ(next_of(emergency), recovered) << code;
     EXPECT_FALSE(next_of(emergency));
-    // One that came and went before anybody was told is not.
+    // One that came and went before it was reported is not.
     emergency.configure(own_cob_id | cob_id::invalid, 0);
     emergency.raise({code, error_register::communication, {}});
     emergency.clear(code);

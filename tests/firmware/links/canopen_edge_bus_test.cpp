@@ -261,10 +261,10 @@ TEST(CanopenEdge, TheFaultOfEachAxisIsToldWithItsNumber) {
     host.bench.device.stand_at(100'000, axis);
     host.run_ms(5);
     ASSERT_EQ(host.bench.application().fault(axis), Fault::over_speed);
-    const auto told = std::find_if(host.heard.begin(), host.heard.end(),
-                                   [](const auto& frame) { return frame.identifier == 0x081; });
-    ASSERT_NE(told, host.heard.end()) << int{axis};
-    const auto& data = told->data;
+    const auto report = std::find_if(host.heard.begin(), host.heard.end(),
+                                     [](const auto& frame) { return frame.identifier == 0x081; });
+    ASSERT_NE(report, host.heard.end()) << int{axis};
+    const auto& data = report->data;
     EXPECT_EQ(data[0] | data[1] << 8, 0x8480);
     EXPECT_EQ(data[3], axis);
     EXPECT_EQ(std::bit_cast<float>(data[4] | data[5] << 8 | data[6] << 16 | data[7] << 24),

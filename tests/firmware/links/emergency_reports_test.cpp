@@ -22,7 +22,7 @@ class Reports : public testing::Test {
     now_us += us;
     reports.poll(causes, emergency, now_us);
   }
-  /// What is told next.
+  /// The next frame's data.
   std::optional<Data> next() {
     drivers::CanFrame frame;
     return emergency.next_frame(frame, canopen::NmtState::operational, now_us) ? std::optional(frame.data)
@@ -38,7 +38,7 @@ class Reports : public testing::Test {
 constexpr Data recovered{};
 
 // CiA 301: the error register's bits by the group of the code; the source, then the number that tripped it.
-TEST_F(Reports, AFaultIsToldWithItsGroupItsAxisAndItsNumber) {
+TEST_F(Reports, AFaultIsReportedWithItsGroupItsAxisAndItsNumber) {
   const std::map<Fault, std::uint8_t> bits{
       {Fault::over_current, 0x03}, {Fault::current_sum, 0x03},      {Fault::under_voltage, 0x05},
       {Fault::phase_open, 0x05},   {Fault::over_temperature, 0x09}, {Fault::motor_too_hot, 0x09},
@@ -55,7 +55,7 @@ TEST_F(Reports, AFaultIsToldWithItsGroupItsAxisAndItsNumber) {
                               register_bits, axis, 0x00, 0x00, 0xC0, 0x3F}))
           << text_of(fault).name;
       poll();
-      EXPECT_FALSE(next()) << "told once";
+      EXPECT_FALSE(next()) << "reported once";
       causes.faults[axis] = Fault::none;
       poll();
       EXPECT_EQ(next(), recovered);
@@ -94,7 +94,7 @@ TEST_F(Reports, AnErrorPassiveControllerIsAnErrorAndBusOffIsToldWhenItIsOver) {
   EXPECT_TRUE(emergency.present(0x8140, 127)) << "until it is active";
   causes.can_state = CanState::active;
   poll();
-  EXPECT_TRUE(emergency.present(0x8140, 127)) << "for a poll, so that it is told";
+  EXPECT_TRUE(emergency.present(0x8140, 127)) << "for a poll, so that it is reported";
   poll();
   EXPECT_EQ(emergency.present(), 0U);
 }
