@@ -62,6 +62,31 @@ TEST(MaxStiffnessSearch, GoesDownFromAnUnstableStartWhereItIsAskedTo) {
   EXPECT_EQ(search_max_stiffness(never, {}, steps).stiffness, 0.0) << "and ends above 0";
 }
 
+// Where within a sample the surface is met decides near the limit.
+TEST(MaxStiffnessSearch, MorePhasesOfATouchFindWhatOneMisses) {
+  double one = 0.0, more = 0.0;
+  for (const Subject& subject : draw_subjects(4, 1)) {
+    const TouchSetup setup = plain(subject.person);
+    one += search_max_stiffness(setup, {}, {}).stiffness;
+    const MaxStiffness found = search_max_stiffness(setup, {.phases = 8}, {});
+    more += found.stiffness;
+    // One of the touches at the next step, and only a whole share of a sample's way further out.
+    bool met = false;
+    for (int phase = 0; phase < 8; ++phase) {
+      TouchSetup again = setup;
+      again.wall.wall.stiffness = static_cast<float>(found.stiffness + 100.0);
+      again.motion.approach_speed = found.ending_speed;
+      again.motion.push_force = found.ending_push;
+      again.motion.start_position += phase / 8.0 * found.ending_speed / 500.0;
+      met = met || simulate_touch(again).unstable();
+    }
+    EXPECT_TRUE(met);
+  }
+  EXPECT_LT(more, one);
+  const StiffnessSteps two_steps{.first = 100.0, .last = 200.0};
+  EXPECT_EQ(search_max_stiffness(plain({}), {.phases = 8}, two_steps).touches, 2 * 15 * 8U);
+}
+
 TEST(MaxStiffnessSearch, AdaptiveWallsMayBeginElsewhere) {
   TouchSetup setup = plain({});
   const StiffnessSteps steps{.first = 100.0, .last = 500.0, .first_adaptive = 300.0};
@@ -124,6 +149,7 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
   const TouchSetup setup = plain({});
   EXPECT_THROW(search_max_stiffness(setup, {.approach_speeds = {}}, {}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {.pushes = {}}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.phases = 0}, {}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.step = 0.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = -1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = 2.0, .last = 1.0}), std::invalid_argument);
