@@ -128,6 +128,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   const std::int64_t start = counts(setup.motion.start_position, per_metre);
   const Loop::Coefficients coefficients = Loop::prepare(setup.wall, start);
   Loop loop;
+  const AddedForce added = setup.added_force ? setup.added_force(setup) : AddedForce{};
 
   TouchOutcome outcome;
   const double period = 1.0 / setup.wall.tick_rate;
@@ -143,7 +144,8 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     if (time >= end - 1e-9) break;
     const double position = handle.position();
     const std::int64_t count = counts(position, per_metre);
-    const Loop::Output& out = loop.tick(coefficients, count, true);
+    const auto more = added ? static_cast<float>(added(count, loop.output())) : 0.0F;
+    const Loop::Output& out = loop.tick(coefficients, count, true, more);
     const Resisted resisted = resisted_force(loop, coefficients);
     handle.resist_across(resisted.across);
     if (out.inside && since_contact == 0) {

@@ -14,6 +14,7 @@
 // certain: unless told otherwise, one that is still in a quarter of the judged window is not simulated to the
 // window's end.
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -43,6 +44,10 @@ Resisted resisted_force(const control::HapticLoop<float>& loop,
 // larger than the processor's cache, and takes twice as long.
 inline constexpr int study_gain_bits = 9;
 
+// What a law that the firmware does not have adds to the wall's force, N along +x: asked at every sample with
+// the encoder's count and what the sample before gave.
+using AddedForce = std::function<double(std::int64_t count, const control::HapticLoop<float>::Output& last)>;
+
 struct TouchSetup {
   simulation::DeviceModel device;  // force_limit: the device's own clip; keep it as the loop's
   simulation::OperatorModel person;
@@ -56,6 +61,8 @@ struct TouchSetup {
   // N peak to peak. Above 0: judged is the force asked for, by the same rule, instead of the position. A
   // stiff wall on a coarse encoder swings by newtons while the handle moves by less than a count.
   double force_threshold = 0.0;
+  // Makes what is added in one touch, which begins without a memory. None: nothing is.
+  std::function<AddedForce(const TouchSetup&)> added_force{};
 };
 
 struct TouchSample {
