@@ -138,10 +138,13 @@ RigTouch SimulatedRig::record(const TouchPlan& plan) const {
       beyond +=
           std::abs(force) > paper::touch_force_limit || std::abs(along) > paper::touch_force_limit ? 1 : 0;
     }
-    const double felt = parallel ? (out.inside ? wall.background_force : 0.0)
-                                 : wall.background_force + (out.inside ? hands_.reaction * wall.force : 0.0);
-    normal.advance(force, felt, period);
-    if (tangential) tangential->advance(along, felt, period);
+    const Resisted resisted = resisted_force(loop, coefficients, hands_.reaction);
+    const auto advance = [&](simulation::CoupledHandle& handle, double commanded) {
+      handle.resist_across(resisted.across);
+      handle.advance(commanded, resisted.along, period);
+    };
+    advance(normal, force);
+    if (tangential) advance(*tangential, along);
   }
   if (!touch.touched) return touch;
   for (RigSample& sample : touch.samples) sample.time -= begin;

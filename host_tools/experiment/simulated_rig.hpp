@@ -2,12 +2,11 @@
 // Simulated people at a simulated handle: control::HapticLoop<float>, the firmware's own code, on
 // simulation::CoupledHandle, with an encoder of its own.
 //
-// Recorded touches: what a person answers to with activation and push is F_B, and inside the wall `reaction`
-// times F_I as well where it acts along the normal (InterferenceMode::perpendicular). With
-// InterferenceMode::parallel the loop's own interference gives both forces inside the wall, and a second
-// handle of the same person lies along the surface, whose arm is activated by the background force of the
-// first one and who intends to stay where the handle is. That the hand is the same in both directions is an
-// assumption. Judged touches: simulated_touch.hpp.
+// Recorded touches: a person answers to resisted_force(), with `reaction` as the share of F_I along the
+// normal (InterferenceMode::perpendicular). With InterferenceMode::parallel the loop's own interference gives
+// both forces inside the wall, and a second handle of the same person lies along the surface, whose arm is
+// activated by the same forces as the first one's and who intends to stay where the handle is. That the hand
+// is the same in both directions is an assumption. Judged touches: simulated_touch.hpp.
 
 #include <vector>
 

@@ -97,6 +97,15 @@ void require(const TouchSetup& setup) {
 
 }  // namespace
 
+Resisted resisted_force(const HapticLoop<float>& loop, const HapticLoop<float>::Coefficients& c,
+                        double interference_share) {
+  const HapticLoop<float>::Output& out = loop.output();
+  const bool pushed = c.interference.mode == control::InterferenceMode::perpendicular && out.inside;
+  return {std::abs(static_cast<double>(loop.background_force(c))) +
+              (pushed ? interference_share * static_cast<double>(c.interference.force) : 0.0),
+          static_cast<double>(out.tangential_force)};
+}
+
 control::HapticLoopConfig<float> touched_wall(double rate, double count_length, double force_limit) {
   control::HapticLoopConfig<float> wall;
   wall.count_length = count_length;
@@ -119,9 +128,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   const std::int64_t start = counts(setup.motion.start_position, per_metre);
   const Loop::Coefficients coefficients = Loop::prepare(setup.wall, start);
   Loop loop;
-  const bool pressed_everywhere = setup.wall.interference.mode == control::InterferenceMode::perpendicular;
-  const double uniform =
-      pressed_everywhere ? std::abs(static_cast<double>(setup.wall.interference.background_force)) : 0.0;
+  const AddedForce added = setup.added_force ? setup.added_force(setup) : AddedForce{};
 
   TouchOutcome outcome;
   const double period = 1.0 / setup.wall.tick_rate;
@@ -137,8 +144,10 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     if (time >= end - 1e-9) break;
     const double position = handle.position();
     const std::int64_t count = counts(position, per_metre);
-    const Loop::Output& out = loop.tick(coefficients, count, true);
-    const double background = std::abs(static_cast<double>(out.magnetic_force)) + uniform;
+    const auto more = added ? static_cast<float>(added(count, loop.output())) : 0.0F;
+    const Loop::Output& out = loop.tick(coefficients, count, true, more);
+    const Resisted resisted = resisted_force(loop, coefficients);
+    handle.resist_across(resisted.across);
     if (out.inside && since_contact == 0) {
       outcome.contact_speed = -setup.motion.wall_side * handle.velocity();
       outcome.coefficient_at_contact = static_cast<double>(out.magnetic_coefficient);
@@ -149,14 +158,14 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
       if (recording == nullptr && judge->certain()) break;
     }
     if (recording != nullptr)
-      recording->push_back({time, position, handle.velocity(), handle.hand_position(), force, background,
+      recording->push_back({time, position, handle.velocity(), handle.hand_position(), force, resisted.along,
                             static_cast<double>(out.magnetic_coefficient)});
     const double limit = setup.device.force_limit;
     if (out.inside || since_contact > 0) {
       ++since_contact;
       if (out.limited || (limit > 0.0 && std::abs(force) > limit)) ++saturated;
     }
-    handle.advance(force, background, period);
+    handle.advance(force, resisted.along, period);
   }
   judge->finish(outcome);
   outcome.event_limit_hits = handle.event_limit_hits();

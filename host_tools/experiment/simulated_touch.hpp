@@ -6,8 +6,7 @@
 // trips, soft start, motor) has no part in a touch that went well and is not run: `kmax simulate` runs all of
 // it and gives the same positions (tests/host_tools/experiment/simulated_touch_test.cpp).
 //
-// The person answers with activation and push to the background force: the field, and the background force of
-// the interference where it acts everywhere (paper 1, eq. 2).
+// The person answers to resisted_force().
 //
 // Judged are the true positions at the haptic samples, which is what an encoder without quantum would give.
 //
@@ -15,6 +14,7 @@
 // certain: unless told otherwise, one that is still in a quarter of the judged window is not simulated to the
 // window's end.
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -29,10 +29,24 @@ namespace kmax::experiment {
 // above, no soft start, no trip, the force clipped at `force_limit` N (0: not clipped).
 control::HapticLoopConfig<float> touched_wall(double rate, double count_length, double force_limit);
 
+// What the hand resists, N: with activation and push along the wall's normal, the field, F_B and inside
+// `interference_share` times F_I (paper 1, eq. 2); with activation alone across it, F_I of eq. 4. Of the
+// loop's last sample.
+struct Resisted {
+  double along, across;
+};
+Resisted resisted_force(const control::HapticLoop<float>& loop,
+                        const control::HapticLoop<float>::Coefficients& coefficients,
+                        double interference_share = 1.0);
+
 // Bits of the activation that a table of many touches keeps: at most 0.1 % of g, which shifts the largest
 // stable stiffness by less than 0.01 N/mm (propagator_table.hpp gives the slope). A table of 12 bits is
 // larger than the processor's cache, and takes twice as long.
 inline constexpr int study_gain_bits = 9;
+
+// What a law that the firmware does not have adds to the wall's force, N along +x: asked at every sample with
+// the encoder's count and what the sample before gave.
+using AddedForce = std::function<double(std::int64_t count, const control::HapticLoop<float>::Output& last)>;
 
 struct TouchSetup {
   simulation::DeviceModel device;  // force_limit: the device's own clip; keep it as the loop's
@@ -47,6 +61,8 @@ struct TouchSetup {
   // N peak to peak. Above 0: judged is the force asked for, by the same rule, instead of the position. A
   // stiff wall on a coarse encoder swings by newtons while the handle moves by less than a count.
   double force_threshold = 0.0;
+  // Makes what is added in one touch, which begins without a memory. None: nothing is.
+  std::function<AddedForce(const TouchSetup&)> added_force{};
 };
 
 struct TouchSample {
@@ -55,7 +71,7 @@ struct TouchSample {
   double velocity;              // m/s, true
   double hand_position;         // m
   double force;                 // N, asked for
-  double background_force;      // N, what the person answers to
+  double background_force;      // N, what the person presses against
   double magnetic_coefficient;  // N
 };
 

@@ -98,6 +98,14 @@ void CoupledHandle::set_integrator(const IntegratorConfig& integrator) {
   exact_ = integrator.kind == IntegratorKind::exact;
 }
 
+void CoupledHandle::resist_across(double force) {
+  if (force == across_) return;
+  if (!(std::abs(force) <= 1e6))
+    throw std::invalid_argument(fmt::format("resist_across({} N): allowed is -1e6 to 1e6 N", force));
+  across_ = force;
+  settled_background_ = -1.0;
+}
+
 void CoupledHandle::begin_motion() {
   if (!has_operator_)
     throw std::logic_error("begin_motion: this scene has no operator who could move the handle");
@@ -220,8 +228,9 @@ template <std::size_t masses>
     if (background != settled_background_) {
       respond_to(background);
       if (rounds_) {
-        const double excess = (activation_ - background) * paces_[pace_].half_decay;
-        motion.expect(grid_.nearest(1.0 + person_.activation_gain * (background + excess)), pace_);
+        const double driver = driver_of(background);
+        const double excess = (activation_ - driver) * paces_[pace_].half_decay;
+        motion.expect(grid_.nearest(1.0 + person_.activation_gain * (driver + excess)), pace_);
       }
     }
     if (!motion_.advance_without_corner(duration, target_, whole)) [[unlikely]]
@@ -251,18 +260,25 @@ template <std::size_t masses>
   }
 }
 
+// What the activation goes to.
+[[gnu::always_inline]] inline double CoupledHandle::driver_of(double background) const {
+  const double resisted = across_ == 0.0 ? background : std::hypot(background, across_);
+  return std::min(resisted, person_.activation_limit);
+}
+
 // Activation, push and the target that follows from them, over a piece of the present pace.
 [[gnu::always_inline]] inline void CoupledHandle::respond_to(double background) {
   const Pace& pace = paces_[pace_];
-  const double excess = activation_ - background;
-  const double gain = 1.0 + person_.activation_gain * (background + excess * pace.half_decay);
+  const double driver = driver_of(background);
+  const double excess = activation_ - driver;
+  const double gain = 1.0 + person_.activation_gain * (driver + excess * pace.half_decay);
   gain_ = rounds_ ? grid_.nearest(gain) : gain;
-  activation_ = background + excess * pace.decay;
+  activation_ = driver + excess * pace.decay;
   push_ = background + (push_ - background) * pace.push_decay;
   const double stiffness = series_stiffness_ * (1.0 + person_.activation_gain * activation_);
   target_ = motion_.target_for(motion_.config().push_force + push_, stiffness);
   // Twice at rest: the target moves within the piece in which they arrive.
-  settled_background_ = excess == 0.0 && activation_ == background && push_ == background ? background : -1.0;
+  settled_background_ = excess == 0.0 && activation_ == driver && push_ == background ? background : -1.0;
 }
 
 void CoupledHandle::move_by_reference(const ChainInput& input, double duration) {

@@ -79,12 +79,16 @@ class CoupledHandle {
   void begin_motion();
 
   // Holds `force` (N, along +x, before clipping) for `duration` (s, > 0 and <= 10). `background_force`:
-  // magnitude in N of the field commanded at the same time (its sign is ignored); it drives activation and
-  // push, and is not added to `force`. Throws std::invalid_argument for a value that is not finite or a
-  // duration out of range.
+  // magnitude in N of the background force commanded at the same time (its sign is ignored); it drives
+  // activation, up to the person's limit, and push, and is not added to `force`. Throws std::invalid_argument
+  // for a value that is not finite or a duration out of range.
   void advance(double force, double background_force, double duration);
   // So many times, to the last bit, and faster.
   void advance(double force, double background_force, double duration, std::uint32_t times);
+
+  // N, from now on: a force on the same hand across this axis. It drives the activation together with the
+  // background force, at right angles, and nobody presses against it along this axis.
+  void resist_across(double force);
 
   // Holds the handle where it is, at once and against any force, or lets it go again; the person goes on.
   void block(bool blocked);
@@ -143,6 +147,7 @@ class CoupledHandle {
   template <std::size_t masses>
   void advance_round_corners(ChainMotion<masses>& motion, double force, double duration);
   void respond_to(double background);
+  double driver_of(double background) const;
   std::size_t pace_for(double duration);
   void move_by_reference(const ChainInput& input, double duration);
 
@@ -159,7 +164,8 @@ class CoupledHandle {
 
   MovingChain chain_;
   double activation_ = 0.0;
-  double push_ = 0.0;  // lagged background force, N
+  double push_ = 0.0;    // lagged background force, N
+  double across_ = 0.0;  // N
   double gain_ = 1.0;
   double target_ = 0.0;  // of the intended motion
   double settled_background_ =

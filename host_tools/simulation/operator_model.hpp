@@ -6,7 +6,15 @@
 // (structure and orders of magnitude: Fu & Cavusoglu 2012, hand on a stylus). A force field that a person has
 // to push through makes the person co-contract: grip and arm, k1, b1, k2, b2, are multiplied by
 //
-//   g = 1 + gamma a,   a = first-order lag (activation time) of the commanded background force in N.
+//   g = 1 + gamma a,   a = first-order lag (activation time) of the force in N that the hand resists, or of
+//                      the activation limit where that is less.
+//
+// What it resists is all that is commanded but the wall's own spring and damper: the field, F_B and F_I,
+// along and across the axis, the same in every experiment on simulated people (experiment::resisted_force()).
+// Behind the firmware, which passes no F_I on, it is the field and F_B. What the wall answers to a push adds
+// nothing: that is the same whatever the field, and k1 to k2 are those of a hand that pushes. gamma is fitted
+// between 0 and 2 N. 7 N is the largest force that the people of paper 1 still held (Table I): nothing says
+// that a hand stiffens beyond it, and one that stops at 6 N does not settle under all of its forces.
 //
 // The hand mass is not scaled. That the impedance rises with the background force is what paper 1 sets out to
 // show; this linear law and its gain are a calibration.
@@ -40,6 +48,7 @@ struct OperatorModel {
   double arm_damping = 9.1;        // b2, N s/m
   double activation_gain = 0.574;  // gamma, 1/N
   double activation_time = 0.4;    // s
+  double activation_limit = 7.0;   // N
   double push_lag = 0.15;  // s, how fast the push follows the background force (see intended_motion.hpp)
 };
 
@@ -58,6 +67,8 @@ inline constexpr std::array operator_fields{
                               "gamma: how much grip and arm stiffen per newton of background force"},
     ModelField<OperatorModel>{"activation_time", &OperatorModel::activation_time, 1e-3, 100.0, "s",
                               "time constant of that stiffening"},
+    ModelField<OperatorModel>{"activation_limit", &OperatorModel::activation_limit, 0.0, 1000.0, "N",
+                              "force beyond which they stiffen no further"},
     ModelField<OperatorModel>{"push_lag", &OperatorModel::push_lag, 1e-3, 100.0, "s",
                               "how fast the push follows the background force"},
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "host_tools/device/value_text.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "tests/studies/studies.hpp"
 
@@ -42,10 +41,8 @@ ByName by_name(const std::vector<RateResult>& results, double count_length, Rate
 }  // namespace
 
 std::string RateCase::name() const {
-  constexpr device::Parameter kinds = device::Parameter::of<"velocity.estimator">();
   if (wall_damping > 0.0)
-    return fmt::format("damping {:g} N s/m, {}", wall_damping,
-                       device::value_text(kinds, static_cast<std::uint32_t>(estimator)));
+    return fmt::format("damping {:g} N s/m, {}", wall_damping, estimator_name(estimator));
   if (delay_samples > 0.0) return fmt::format("{:g} sample of delay", delay_samples);
   if (delay > 0.0) return fmt::format("{:g} ms of delay", delay * 1e3);
   return "no damping";
@@ -58,12 +55,10 @@ std::vector<RateCase> rate_cases(double count_length, RateMeasure measure) {
     cases.insert(cases.end(), 3, plain);
     cases.end()[-2].delay_samples = 1.0;
     cases.end()[-1].delay = 0.5e-3;
-    using Kind = control::VelocityEstimatorKind;
-    for (const Kind kind :
-         {Kind::difference, Kind::low_pass, Kind::foaw, Kind::foaw_end_fit, Kind::tracking}) {
+    for (const control::VelocityEstimatorKind estimator : all_estimators) {
       cases.push_back(plain);
       cases.back().wall_damping = 2.0;
-      cases.back().estimator = kind;
+      cases.back().estimator = estimator;
     }
   }
   return cases;
@@ -80,7 +75,7 @@ std::vector<RateResult> run_rates(const std::vector<RateCase>& cases, const simu
         if (setting.measure == RateMeasure::moves) {
           protocol.threshold = 3.0 * setting.count_length;
         } else {
-          protocol.force_threshold = 1.0;
+          protocol.force_threshold = felt_force;
         }
         return RateResult{setting, experiment::search_max_stiffness(
                                        setup_of(setting, device), protocol,

@@ -6,6 +6,7 @@
 // Each has a file of its own. Its sweep over walls and people is data; its section has a table with the
 // paper's value beside ours where there is one, and words that follow the numbers.
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 #include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
+#include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::studies {
@@ -40,18 +42,28 @@ struct Study {
 std::vector<report::Section> held_walls(const StudyInput& input);
 std::vector<report::Section> causes(const StudyInput& input);
 std::vector<report::Section> assumptions(const StudyInput& input);
+std::vector<report::Section> compliance(const StudyInput& input);
 std::vector<report::Section> draws(const StudyInput& input);
 std::vector<report::Section> adaptive_gap(const StudyInput& input);
+std::vector<report::Section> baselines(const StudyInput& input);
+std::vector<report::Section> damping_map(const StudyInput& input);
 std::vector<report::Section> loop_rates(const StudyInput& input);
 
 /// In the order of the page.
-inline constexpr std::array<Study, 6> all_studies{{
+inline constexpr std::array<Study, 9> all_studies{{
     {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), predicted", held_walls},
     {"causes", "the four causes of the gain at 2 N, one by one", causes},
     {"assumptions", "threshold, pushes, approach speeds, device, integrator: what hangs on them",
      assumptions},
+    {"compliance", "a device that bends between motor and hand, and more touches within a sample",
+     compliance},
     {"draws", "25 other groups of people, each calibrated for itself; the first set is used", draws},
     {"adaptive", "what would make the adaptive wall reach the paper's 8.02 N/mm", adaptive_gap},
+    {"baselines", "damping, passivity control, relation and interval of eq. 7, and what each wall costs",
+     baselines},
+    {"damping",
+     "stiffness against damping for each estimator, rate, encoder, delay and compliance; the first set",
+     damping_map},
     {"rates",
      "500 Hz to 20 kHz, two encoders, delays and velocity estimators; the first set's device is used",
      loop_rates},
@@ -61,6 +73,13 @@ inline constexpr std::array<Study, 6> all_studies{{
 std::vector<report::Section> run_studies(const std::vector<std::string>& names, const StudyInput& input);
 
 std::string n_per_mm(double stiffness);
+/// As the parameter velocity.estimator has it.
+std::string estimator_name(control::VelocityEstimatorKind estimator);
+inline constexpr std::array all_estimators{
+    control::VelocityEstimatorKind::difference, control::VelocityEstimatorKind::low_pass,
+    control::VelocityEstimatorKind::foaw, control::VelocityEstimatorKind::foaw_end_fit,
+    control::VelocityEstimatorKind::tracking};
+inline constexpr double felt_force = 1.0;  ///< N peak to peak: what is unstable by the force
 
 // --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
 
@@ -149,8 +168,14 @@ struct Variation {
   experiment::TouchProtocol protocol;
   simulation::IntegratorConfig integrator{};
 };
-/// All but the draws, from a calibrated set.
+/// Puts a compliance of `stiffness` N/m between motor and hand, and of the mass what a structure has by
+/// default behind it. Published stiffnesses of the Touch are 1.0 to 2.3 N/mm.
+void bend(simulation::DeviceModel& device, double stiffness);
+/// From a calibrated set: all but the two below.
 std::vector<Variation> assumption_variations(const SubjectSet& set,
+                                             const experiment::TouchProtocol& protocol);
+/// A structure that bends, and more phases of a touch.
+std::vector<Variation> compliance_variations(const SubjectSet& set,
                                              const experiment::TouchProtocol& protocol);
 /// Other people: the seeds 1 to `groups`, each fitted again.
 std::vector<Variation> draw_variations(const SubjectSet& set, const experiment::TouchProtocol& protocol,
@@ -204,6 +229,89 @@ report::Section slope_section(const SubjectSet& set, const std::vector<SlopeResu
 
 report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<ApproachResult>& approaches,
                                      const NeededCoefficient& needed);
+
+// --- Walls that the paper did not compare its own with, and what each costs (baselines.cpp) ----------------
+
+/// Time-domain passivity control of the wall (Hannaford and Ryu, IEEE Trans. Robotics and Automation 18(1),
+/// 2002): what the wall has given the handle since it came in, by the force held over the last interval and
+/// the displacement made in it, is taken back by a damper of at most `most` N s/m. Asked for nothing outside
+/// and where the handle has not moved by a count.
+class PassivityController {
+ public:
+  /// `stored_stiffness`: N/m; above 0 the wall may give back only what such a spring holds, else what it
+  /// took.
+  PassivityController(double count_length, double period, double most, double stored_stiffness)
+      : count_length_(count_length), period_(period), most_(most), stored_stiffness_(stored_stiffness) {}
+  /// N along +x; the surface is at 0, free space above.
+  double added(std::int64_t count, const control::HapticLoop<float>::Output& last);
+
+ private:
+  double count_length_, period_, most_, stored_stiffness_;
+  double position_ = 0.0, given_ = 0.0;  ///< m, J
+};
+
+WallChange damped(double damping, control::VelocityEstimatorKind estimator);
+WallChange passivity_controlled(double most, bool keeps_spring);
+
+struct Baseline {
+  std::string name;
+  WallChange wall;
+  const experiment::paper::MaxStiffness* paper = nullptr;  ///< of the same wall
+};
+/// Those of paper 1.
+Baseline plain_wall();
+Baseline field_of_two();
+Baseline adaptive_as_printed();
+std::vector<Baseline> law_baselines();
+/// The adaptive wall with each relation in each mode, and with other intervals of F_MC.
+std::vector<Baseline> relation_baselines();
+
+/// What a person pays: of one touch, mean of the people.
+struct WallPrice {
+  double field_at_rest = 0.0;  ///< N, on a handle that rests on the surface
+  double work = 0.0;           ///< J, against the field until the surface is met
+  double depth = 0.0;          ///< m, deepest in the wall
+};
+WallPrice price_of(const SubjectSet& set, const WallChange& wall);
+
+struct BaselineResult {
+  Baseline law;
+  PeopleMean moves, phases, feels;  ///< by the position, the same with four phases, by the force
+  WallPrice price;
+};
+std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vector<Baseline>& laws,
+                                          const StiffnessRun& run);
+report::Section baseline_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
+report::Section relation_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
+
+// --- Stiffness against damping (damping_map.cpp)
+// ------------------------------------------------------------
+
+/// What is changed of loop and device, one thing at a time.
+struct LoopSetting {
+  std::string name;
+  WallChange change;
+};
+std::vector<LoopSetting> loop_settings();
+inline constexpr std::array map_dampings{2.0, 4.0, 8.0, 12.0, 24.0};  ///< N s/m
+
+/// By the position and by the force.
+struct TwoMeans {
+  PeopleMean moves, feels;
+  double least() const { return std::min(moves.mean, feels.mean); }  ///< N/m: stable by both
+};
+struct DampingMap {
+  LoopSetting setting;
+  std::array<TwoMeans, 3> laws;  ///< plain_wall(), field_of_two(), adaptive_as_printed()
+  std::array<std::array<TwoMeans, map_dampings.size()>, all_estimators.size()> damped;
+};
+/// Plain walls with damping, and the paper's without, in steps of 3 %.
+std::vector<DampingMap> run_damping_map(const SubjectSet& set, const std::vector<LoopSetting>& settings,
+                                        const StiffnessRun& run);
+/// Of the first setting the whole map, of each the best damping with each estimator.
+report::Section damping_section(const SubjectSet& set, const std::vector<DampingMap>& maps);
+/// Throws plot::FigureError.
+report::Picture draw_damping_map(const DampingMap& map, const std::filesystem::path& file);
 
 // --- Rate of the loop, encoder and velocity estimator (loop_rates.cpp) -------------------------------------
 

@@ -228,19 +228,41 @@ VariationResult result_with(const std::vector<double>& means, bool refit = false
 }
 
 TEST(Variations, ChangeOneThingAtATime) {
-  const auto variations = assumption_variations(few_people(2), {});
+  auto variations = assumption_variations(few_people(2), {});
   ASSERT_GT(variations.size(), 15U);
+  for (Variation& one : compliance_variations(few_people(2), {})) variations.push_back(std::move(one));
   EXPECT_EQ(variations.front().group, "none");
   const experiment::TouchProtocol usual;
   for (const Variation& variation : variations) {
     const simulation::DeviceModel& device = variation.set.device;
-    const int changed = (variation.protocol.threshold != usual.threshold) +
-                        (variation.protocol.pushes != usual.pushes) +
-                        (variation.protocol.approach_speeds != usual.approach_speeds) +
-                        (device.mass != 0.045 || device.damping != 0.05 || device.delay != 0.0) +
-                        (variation.integrator.kind != simulation::IntegratorKind::exact);
+    const int changed =
+        (variation.protocol.threshold != usual.threshold) + (variation.protocol.pushes != usual.pushes) +
+        (variation.protocol.approach_speeds != usual.approach_speeds) +
+        (device.structure || device.mass != 0.045 || device.damping != 0.05 || device.delay != 0.0) +
+        (variation.protocol.phases != usual.phases) +
+        (variation.integrator.kind != simulation::IntegratorKind::exact);
     EXPECT_EQ(changed, variation.group == "none" ? 0 : 1) << variation.name;
   }
+}
+
+TEST(Variations, ADeviceThatBendsWeighsTheSame) {
+  std::size_t compliant = 0;
+  for (const Variation& variation : compliance_variations(few_people(1), {})) {
+    const simulation::DeviceModel& device = variation.set.device;
+    if (!device.structure) continue;
+    ++compliant;
+    EXPECT_DOUBLE_EQ(device.mass + device.structure->handle_mass, 0.045);
+  }
+  EXPECT_EQ(compliant, 4U);
+}
+
+TEST(VariationSection, SaysWhatTheHandFeelsBehindACompliance) {
+  VariationResult bends = result_with({2000, 2, 3, 4, 5, 1, 1, 1});
+  bends.variation.set.device.structure = simulation::StructureModel{.stiffness = 2000.0};
+  EXPECT_CONTAINS(paragraphs_of(variation_section("x", {bends})),
+                  "without a field, 2.00 N/mm with a structure of 2.00 N/mm are 1.00 at the tip");
+  EXPECT_EQ(paragraphs_of(variation_section("x", {result_with(as_in_the_paper)})).find("at the tip"),
+            std::string::npos);
 }
 
 TEST(Variations, OtherPeopleAreNotTheFittedOnes) {

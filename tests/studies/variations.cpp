@@ -118,6 +118,36 @@ std::string all_three_words(const VariationResult& result) {
       200.0 * result.activation_gain);
 }
 
+/// Of variations that begin with the set as it was calibrated.
+auto adder(std::vector<Variation>& variations, const SubjectSet& set,
+           const experiment::TouchProtocol& protocol) {
+  variations = {{"as calibrated", "none", false, set, protocol}};
+  return [&](std::string group, std::string name, bool refit, const auto& change) {
+    variations.push_back({std::move(name), std::move(group), refit, set, protocol});
+    change(variations.back());
+  };
+}
+
+/// What a device that bends makes of the plain wall's number, where the motor does not bend with it.
+std::string compliance_words(const std::vector<VariationResult>& results) {
+  std::string found;
+  for (const VariationResult& result : results) {
+    const auto& structure = result.variation.set.device.structure;
+    if (!structure || result.variation.refit) continue;
+    const double motor = result.means.front().mean;
+    found += fmt::format("{}{} N/mm with a structure of {} N/mm are {} at the tip", found.empty() ? "" : ", ",
+                         n_per_mm(motor), n_per_mm(structure->stiffness),
+                         n_per_mm(motor * structure->stiffness / (motor + structure->stiffness)));
+  }
+  if (found.empty()) return {};
+  return fmt::format(
+      "Elsewhere the device does not bend; the Touch's published stiffness is 1.0 to 2.3 N/mm. What is found "
+      "is the stiffness on the motor's side, where the encoder is. The hand feels the structure in series "
+      "with it, and never more than the structure: without a field, {}. The structure's damping and how the "
+      "mass divides are assumed.",
+      found);
+}
+
 std::vector<report::Section> variation_sections(
     const std::string& heading, const std::vector<SubjectSet>& sets, const StiffnessRun& run,
     const std::function<std::vector<Variation>(const SubjectSet&)>& make) {
@@ -132,14 +162,15 @@ std::vector<report::Section> variation_sections(
 
 }  // namespace
 
+void bend(simulation::DeviceModel& device, double stiffness) {
+  device.structure = simulation::StructureModel{.stiffness = stiffness};
+  device.mass -= device.structure->handle_mass;
+}
+
 std::vector<Variation> assumption_variations(const SubjectSet& set,
                                              const experiment::TouchProtocol& protocol) {
   std::vector<Variation> variations;
-  const auto add = [&](std::string group, std::string name, bool refit, const auto& change) {
-    variations.push_back({std::move(name), std::move(group), refit, set, protocol});
-    change(variations.back());
-  };
-  add("none", "as calibrated", false, [](Variation&) {});
+  const auto add = adder(variations, set, protocol);
   for (const double threshold : {0.055e-3, 0.33e-3, 0.66e-3})
     add("threshold", fmt::format("{:g} mm peak to peak", threshold * 1e3), false,
         [&](Variation& v) { v.protocol.threshold = threshold; });
@@ -172,6 +203,19 @@ std::vector<Variation> assumption_variations(const SubjectSet& set,
       v.integrator.substeps = substeps;
     });
   }
+  return variations;
+}
+
+std::vector<Variation> compliance_variations(const SubjectSet& set,
+                                             const experiment::TouchProtocol& protocol) {
+  std::vector<Variation> variations;
+  const auto add = adder(variations, set, protocol);
+  for (const bool refit : {false, true}) {
+    for (const double stiffness : {1020.0, 2310.0})
+      add("compliance", fmt::format("structure of {:g} N/mm", stiffness / 1e3), refit,
+          [&](Variation& v) { bend(v.set.device, stiffness); });
+  }
+  add("phase", "4 touches at each speed with each push", false, [](Variation& v) { v.protocol.phases = 4; });
   return variations;
 }
 
@@ -225,6 +269,8 @@ report::Section variation_section(const std::string& heading, const std::vector<
     if (std::string words = all_three_words(result); !words.empty())
       section.paragraphs.push_back("With " + std::move(words));
   }
+  if (std::string words = compliance_words(results); !words.empty())
+    section.paragraphs.push_back(std::move(words));
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;
 }
@@ -233,6 +279,12 @@ std::vector<report::Section> assumptions(const StudyInput& input) {
   return variation_sections("What nobody knows", input.sets, input.run, [&](const SubjectSet& set) {
     return assumption_variations(set, input.run.protocol);
   });
+}
+
+std::vector<report::Section> compliance(const StudyInput& input) {
+  return variation_sections(
+      "A device that bends, and more touches", input.sets, input.run,
+      [&](const SubjectSet& set) { return compliance_variations(set, input.run.protocol); });
 }
 
 std::vector<report::Section> draws(const StudyInput& input) {

@@ -179,10 +179,12 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
   report::Section section{"Largest stable stiffness (paper 1, Figs. 6 and 8)", {}, {}, {}};
   const MaxStiffnessStudy& first = studies.front();
   section.paragraphs.push_back(fmt::format(
-      "{} simulated people, {} touches at every stiffness (approach speeds and pushes), in steps of {:g} "
+      "{} simulated people, {} touches at every stiffness (approach speeds and pushes{}), in steps of {:g} "
       "N/m. A wall counts as unstable when the handle moves by more than {:g} mm in every quarter of the "
       "last second of a hold. {}",
-      first.set.subjects.size(), first.protocol.touches(), first.steps.step, first.protocol.threshold * 1e3,
+      first.set.subjects.size(), first.protocol.touches(),
+      first.protocol.phases > 1 ? fmt::format(", {} times within a sample", first.protocol.phases) : "",
+      first.steps.step, first.protocol.threshold * 1e3,
       any_calibrated(studies) ? "\"Calibrated\" means that friction and activation were fitted to this very "
                                 "number; everything else is predicted, without another fit."
                               : "Everything is predicted: friction and activation are as the set has them, "

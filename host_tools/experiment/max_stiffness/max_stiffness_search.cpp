@@ -11,7 +11,7 @@ namespace {
 
 void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
   if (protocol.touches() == 0)
-    throw std::invalid_argument("no touch: name at least one approach speed and one push force");
+    throw std::invalid_argument("no touch: name at least one approach speed, one push force and one phase");
   const double first_adaptive = steps.first_adaptive.value_or(steps.first);
   if (!(steps.first > 0.0 && first_adaptive > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 &&
         steps.last >= std::max(steps.first, first_adaptive) && steps.last <= 1e7))
@@ -26,7 +26,10 @@ void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
 class TouchesOfStiffness {
  public:
   TouchesOfStiffness(const TouchSetup& setup, const TouchProtocol& protocol)
-      : touch_(setup), protocol_(protocol), period_(1.0 / setup.wall.tick_rate) {
+      : touch_(setup),
+        protocol_(protocol),
+        period_(1.0 / setup.wall.tick_rate),
+        start_position_(setup.motion.start_position) {
     if (!touch_.matrices)
       touch_.matrices =
           std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, study_gain_bits);
@@ -37,36 +40,48 @@ class TouchesOfStiffness {
   /// True: none was unstable, and `result` has this stiffness unless there was no touch.
   bool stable(double stiffness, MaxStiffness& result) {
     touch_.wall.wall.stiffness = static_cast<float>(stiffness);
-    double saturated = 0.0;
-    bool touched = false;
+    Found found;
     for (const double speed : protocol_.approach_speeds) {
       for (const double push : protocol_.pushes) {
-        touch_.motion.approach_speed = speed;
-        touch_.motion.push_force = push;
-        const TouchOutcome outcome = simulate_touch(touch_);
-        ++result.touches;
-        result.simulated_time += static_cast<double>(outcome.samples) * period_;
-        result.event_limit_hits += outcome.event_limit_hits;
-        saturated = std::max(saturated, outcome.saturated_share);
-        touched = touched || outcome.verdict != simulation::ContactVerdict::no_contact;
-        if (!outcome.unstable()) continue;
-        result.ending_speed = speed;
-        result.ending_push = push;
-        result.ending_peak_to_peak = outcome.peak_to_peak;
-        return false;
+        for (std::size_t phase = 0; phase < protocol_.phases; ++phase) {
+          if (unstable(speed, push, phase, result, found)) return false;
+        }
       }
     }
-    result.never_touched = !touched;
-    if (!touched) return true;
+    result.never_touched = !found.touched;
+    if (!found.touched) return true;
     result.stiffness = stiffness;
-    result.saturated_share = saturated;
+    result.saturated_share = found.saturated;
     return true;
   }
 
  private:
+  struct Found {
+    double saturated = 0.0;
+    bool touched = false;
+  };
+
+  bool unstable(double speed, double push, std::size_t phase, MaxStiffness& result, Found& found) {
+    touch_.motion.approach_speed = speed;
+    touch_.motion.push_force = push;
+    const double share = static_cast<double>(phase) / static_cast<double>(protocol_.phases);
+    touch_.motion.start_position = start_position_ + touch_.motion.wall_side * share * speed * period_;
+    const TouchOutcome outcome = simulate_touch(touch_);
+    ++result.touches;
+    result.simulated_time += static_cast<double>(outcome.samples) * period_;
+    result.event_limit_hits += outcome.event_limit_hits;
+    found.saturated = std::max(found.saturated, outcome.saturated_share);
+    found.touched = found.touched || outcome.verdict != simulation::ContactVerdict::no_contact;
+    if (!outcome.unstable()) return false;
+    result.ending_speed = speed;
+    result.ending_push = push;
+    result.ending_peak_to_peak = outcome.peak_to_peak;
+    return true;
+  }
+
   TouchSetup touch_;
   const TouchProtocol& protocol_;
-  double period_;
+  double period_, start_position_;
 };
 
 /// Below a first stiffness that is unstable.

@@ -124,12 +124,13 @@ MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
       }
     }
   }
+  // More touches find less: the sets were fitted with the usual ones.
+  const bool usual = run.changes.empty() && run.protocol.phases == TouchProtocol{}.phases;
   auto next = results.begin();
   for (const StiffnessCondition& condition : conditions) {
     const auto end = next + static_cast<std::ptrdiff_t>(set.subjects.size());
     study.conditions.push_back({condition, {next, end}});
-    study.conditions.back().condition.origin =
-        run.changes.empty() ? origin_of(set, condition) : report::Origin::predicted;
+    study.conditions.back().condition.origin = usual ? origin_of(set, condition) : report::Origin::predicted;
     next = end;
   }
   for (const MaxStiffness& result : results) {

@@ -70,7 +70,8 @@ struct MaxStiffnessStudy {
 };
 
 // A condition's number is calibrated if the set says that it was fitted to this very number with the force
-// limit it has now and nothing of the touches is changed, and predicted otherwise.
+// limit it has now, nothing of the touches is changed and there are no more of them than usual, and predicted
+// otherwise.
 MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const std::vector<StiffnessCondition>& conditions,
                                           const StiffnessRun& run);

@@ -88,6 +88,9 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
   simulated->add_flag(
       "--calibrate", calibrate,
       "Fit friction and gamma to the paper's 3.58 and 8.41 N/mm first, and write the set to --out");
+  add_number(*simulated, "--phases", phases,
+             "Touches at each speed with each push, that meet the surface at other times within a sample", 1,
+             100);
   simulated->add_option("--jobs", jobs, "Searches at a time; all processors without it")
       ->check(CLI::Range(1, 4096));
 

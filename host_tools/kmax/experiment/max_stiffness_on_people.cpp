@@ -82,6 +82,7 @@ RunJournal::Json journal_settings(SubjectSet set, const experiment::StiffnessRun
           {"subjects", experiment::subject_set_text(set)},
           {"approach_speeds_m_per_s", run.protocol.approach_speeds},
           {"pushes_n", run.protocol.pushes},
+          {"phases", run.protocol.phases},
           {"threshold_m", run.protocol.threshold},
           {"first_n_per_m", run.steps.first},
           {"step_n_per_m", run.steps.step},
@@ -107,6 +108,7 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   experiment::StiffnessRun run;
   run.threads = options.jobs;
   run.changes = options.changes;
+  run.protocol.phases = options.phases;
   run.steps.first = options.start.value_or(run.steps.first);
   run.steps.first_adaptive = options.start_adaptive;
   run.steps.goes_down = options.start || options.start_adaptive;
@@ -167,6 +169,11 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
     throw UsageError(
         "--calibrate fits a set of people with their device, which knows nothing of --set: write a set with "
         "another device (--subjects FILE), or leave one of them out");
+  if (options.calibrate && options.phases != experiment::TouchProtocol{}.phases)
+    throw UsageError(
+        fmt::format("--phases {}: --calibrate fits a set of people to one touch at each speed with each "
+                    "push; leave one of them out",
+                    options.phases));
   if (!options.subjects.empty() && options.clip == "both")
     throw UsageError("--clip both takes two sets of people, and --subjects names one; run it twice");
   make_folder(options.files);

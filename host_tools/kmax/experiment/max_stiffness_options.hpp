@@ -26,7 +26,8 @@ struct MaxStiffnessOptions {
   std::string clip;      ///< on, off, both; empty: on, or as the set that --subjects names has it
   std::optional<std::uint64_t> seed;
   bool calibrate = false;
-  std::size_t jobs = 0;  ///< 0: all processors
+  std::size_t phases = 1;  ///< experiment::TouchProtocol
+  std::size_t jobs = 0;    ///< 0: all processors
 
   // On a device.
   experiment::DeviceStiffnessSettings device;

@@ -213,4 +213,29 @@ TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
   refused([](TouchSetup& s) { s.person.grip_stiffness = std::numeric_limits<double>::infinity(); });
 }
 
+// One rule for what a person answers to, whatever the experiment.
+TEST(ResistedForce, IsAllThatIsCommandedButTheWall) {
+  using Loop = control::HapticLoop<float>;
+  const auto at = [](control::InterferenceMode mode, std::int64_t count, double share) {
+    control::HapticLoopConfig<float> wall = touched_wall(500.0, 0.055e-3, 0.0);
+    wall.wall.kind = control::WallKind::magnetic;
+    wall.wall.magnetic_coefficient = 2.0F;
+    wall.interference = {mode, 5.0F, 3.0F, 0.0F};
+    const Loop::Coefficients coefficients = Loop::prepare(wall, 0);
+    Loop loop;
+    loop.tick(coefficients, count, true);
+    const Resisted resisted = resisted_force(loop, coefficients, share);
+    return std::pair(resisted.along, resisted.across);
+  };
+  using control::InterferenceMode;
+  constexpr std::int64_t inside = -20, outside = 100'000;
+  EXPECT_EQ(at(InterferenceMode::none, inside, 1.0), std::pair(2.0, 0.0));
+  EXPECT_EQ(at(InterferenceMode::perpendicular, inside, 1.0), std::pair(10.0, 0.0));
+  EXPECT_EQ(at(InterferenceMode::perpendicular, inside, 0.5), std::pair(7.5, 0.0));
+  EXPECT_EQ(at(InterferenceMode::parallel, inside, 0.5), std::pair(5.0, 5.0));
+  EXPECT_NEAR(at(InterferenceMode::perpendicular, outside, 1.0).first, 3.0, 1e-3);
+  EXPECT_NEAR(at(InterferenceMode::parallel, outside, 1.0).first, 0.0, 1e-3);
+  EXPECT_EQ(at(InterferenceMode::parallel, outside, 1.0).second, 0.0);
+}
+
 }  // namespace kmax::experiment::simulated_touch_test

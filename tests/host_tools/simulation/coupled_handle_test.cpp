@@ -187,6 +187,30 @@ TEST(CoupledHandle, ActivationIsAFirstOrderLagOfTheBackgroundForce) {
   EXPECT_NEAR(handle.gain(), 1.0 + 0.574 * 2.0 * (1.0 - std::exp(-0.399 / 0.4)), 1e-12);
 }
 
+// A hand does not stiffen without end, and what acts across is not pressed against.
+TEST(CoupledHandle, ActivationIsOfAllThatTheHandResistsUpToItsLimit) {
+  const IntendedMotionConfig motion{.start_position = 0.0, .hold_time = 60.0};
+  const auto pressing = [](const CoupledHandle& handle) {
+    return handle.gain() * OperatorModel{}.grip_stiffness * (handle.position() - handle.hand_position());
+  };
+  struct Case {
+    double along, across, activation;
+  };
+  for (const Case& one :
+       {Case{9.0, 0.0, 7.0}, Case{1.2, -1.6, 2.0}, Case{0.0, 3.0, 3.0}, Case{1.0, 7.0, 7.0}}) {
+    CoupledHandle handle = held({.friction = 100.0}, motion);
+    handle.resist_across(one.across);
+    for (int n = 0; n < 10000; ++n) handle.advance(0.0, one.along, period);
+    EXPECT_NEAR(handle.activation(), one.activation, 1e-9);
+    EXPECT_NEAR(handle.gain(), 1.0 + 0.574 * one.activation, 1e-9);
+    EXPECT_NEAR(pressing(handle), motion.push_force + one.along, 1e-6);
+    handle.resist_across(0.0);
+    for (int n = 0; n < 10000; ++n) handle.advance(0.0, 0.0, period);
+    EXPECT_NEAR(handle.activation(), 0.0, 1e-9) << "after it had arrived";
+    EXPECT_THROW(handle.resist_across(std::nan("")), std::invalid_argument);
+  }
+}
+
 TEST(CoupledHandle, MirroredSceneMovesMirrored) {
   CoupledHandle right = held(), left = held({}, {.start_position = -0.02, .wall_side = -1.0});
   for (int n = 0; n < 1000; ++n) {

@@ -210,7 +210,7 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
             "delay, start_position, start_velocity; did you mean mass?"},
            {"[device]\n[operator]\ngrip = 1\n",
             "3:1: operator.grip = 1: unknown key; allowed here: grip_stiffness, grip_damping, hand_mass, "
-            "arm_stiffness, arm_damping, activation_gain, activation_time, push_lag"},
+            "arm_stiffness, arm_damping, activation_gain, activation_time, activation_limit, push_lag"},
            {"[device]\n[axis1.device]\n[axis1.encodr]\n",
             "3:8: axis1.encodr = {table}: unknown key; allowed here: device, structure, operator, motion, "
             "encoder, motor, inverter, current_sensor; did you mean encoder?"},

@@ -102,8 +102,9 @@ std::vector<DeviationResult> simulated(const simulation::OperatorModel& person) 
   return run_deviation(rig, {quick()}).results;
 }
 
-RigTouch touch_of(const DeviationProtocol& protocol, double background, double interference) {
-  SimulatedRig rig("deviation", {simulation::OperatorModel{}}, deviation_hands());
+RigTouch touch_of(const DeviationProtocol& protocol, double background, double interference,
+                  const simulation::OperatorModel& person = {}) {
+  SimulatedRig rig("deviation", {person}, deviation_hands());
   rig.set({protocol.stiffness, protocol.haptic_rate, control::InterferenceMode::parallel});
   return rig.record(deviation_plan(protocol, {background, interference, 0.0}));
 }
@@ -133,11 +134,18 @@ TEST(SimulatedDeviation, AHandThatDoesNotStiffenShowsNoTrend) {
 TEST(SimulatedDeviation, ALongPulseMovesTheHandAsFarAsItsSpringsSay) {
   DeviationProtocol protocol = quick();
   protocol.pulse_on = protocol.pulse_off = 3.0;
-  const RigTouch touch = touch_of(protocol, 0.0, 3.0);
+  simulation::OperatorModel person;
+  person.activation_gain = 0.0;
+  const auto deviation = [&](double interference) {
+    const RigTouch touch = touch_of(protocol, 0.0, interference, person);
+    const std::vector<double> begins{protocol.pulse_begin(0) - 0.001, protocol.pulse_begin(2) - 0.001};
+    return measure_deviation(touch.samples, begins, protocol.pulse_on).without;
+  };
   const double stiffness = simulation::series_stiffness(simulation::OperatorModel{});
-  const std::vector<double> begins{protocol.pulse_begin(0) - 0.001, protocol.pulse_begin(2) - 0.001};
-  EXPECT_NEAR(measure_deviation(touch.samples, begins, protocol.pulse_on).without, 3.0 / stiffness,
-              deviation_hands().device.friction / stiffness + 1e-4);
+  EXPECT_NEAR(deviation(3.0), 3.0 / stiffness, deviation_hands().device.friction / stiffness + 1e-4);
+  // One who stiffens does so for the force along the surface too: the hand is the same.
+  person.activation_gain = simulation::OperatorModel{}.activation_gain;
+  EXPECT_LT(deviation(3.0), 0.8 * 3.0 / stiffness);
 }
 
 TEST(SimulatedDeviation, TheForceAlongTheSurfaceComesInPulses) {

@@ -164,6 +164,19 @@ TEST(SimulatedJitter, AHandThatDoesNotStiffenShowsNoTrend) {
     EXPECT_GT(trend.with.value(), 0.8 * trend.without.value());
 }
 
+// gamma was fitted between 0 and 2 N: 11 N make nobody stiffer than 7 N.
+TEST(SimulatedJitter, NobodyStiffensWithoutEnd) {
+  const auto amplitude = [](double limit) {
+    simulation::OperatorModel person;
+    person.activation_limit = limit;
+    SimulatedRig rig("jitter", {person}, jitter_hands());
+    rig.set({1000.0, 500.0, control::InterferenceMode::perpendicular, 7.0, 4.0});
+    return measure_jitter(rig.record({}).samples, {}).amplitude;
+  };
+  EXPECT_EQ(amplitude(simulation::OperatorModel{}.activation_limit), amplitude(7.0));
+  EXPECT_NE(amplitude(7.0), amplitude(1000.0));
+}
+
 TEST(SimulatedJitter, APersonWhoNeverPressesHarderNeverSettles) {
   SimulatedHands indifferent = jitter_hands();
   indifferent.reaction = 0.0;

@@ -62,6 +62,30 @@ TEST(MaxStiffnessSearch, GoesDownFromAnUnstableStartWhereItIsAskedTo) {
   EXPECT_EQ(search_max_stiffness(never, {}, steps).stiffness, 0.0) << "and ends above 0";
 }
 
+// Where within a sample the surface is met decides near the limit.
+TEST(MaxStiffnessSearch, MorePhasesOfATouchFindWhatOneMisses) {
+  const SubjectSet set = open_subject_set("clipped");
+  TouchSetup setup = plain(set.subjects[4].person);
+  setup.device = set.device;
+  const MaxStiffness one = search_max_stiffness(setup, {}, {});
+  const MaxStiffness found = search_max_stiffness(setup, {.phases = 4}, {});
+  EXPECT_LT(found.stiffness, one.stiffness);
+  // The one that ended it, which a touch that begins where it usually does misses.
+  setup.wall.wall.stiffness = static_cast<float>(found.stiffness + 100.0);
+  setup.motion.approach_speed = found.ending_speed;
+  setup.motion.push_force = found.ending_push;
+  std::vector<bool> unstable;
+  for (int phase = 0; phase < 4; ++phase) {
+    TouchSetup again = setup;
+    again.motion.start_position += phase / 4.0 * found.ending_speed / 500.0;
+    unstable.push_back(simulate_touch(again).unstable());
+  }
+  EXPECT_FALSE(unstable.front());
+  EXPECT_TRUE(unstable[1] || unstable[2] || unstable[3]);
+  const StiffnessSteps two_steps{.first = 100.0, .last = 200.0};
+  EXPECT_EQ(search_max_stiffness(plain({}), {.phases = 8}, two_steps).touches, 2 * 15 * 8U);
+}
+
 TEST(MaxStiffnessSearch, AdaptiveWallsMayBeginElsewhere) {
   TouchSetup setup = plain({});
   const StiffnessSteps steps{.first = 100.0, .last = 500.0, .first_adaptive = 300.0};
@@ -124,6 +148,7 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
   const TouchSetup setup = plain({});
   EXPECT_THROW(search_max_stiffness(setup, {.approach_speeds = {}}, {}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {.pushes = {}}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.phases = 0}, {}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.step = 0.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = -1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = 2.0, .last = 1.0}), std::invalid_argument);

@@ -64,6 +64,16 @@ TEST_F(MaxStiffnessOnPeople, AnotherForceLimitIsNot) {
   EXPECT_FALSE(says_calibrated()) << output;
 }
 
+TEST_F(MaxStiffnessOnPeople, MoreTouchesThanTheFitHadAreNot) {
+  options.phases = 2;
+  EXPECT_EQ(measure(), done);
+  EXPECT_FALSE(says_calibrated()) << output;
+  EXPECT_CONTAINS(output, "30 touches at every stiffness");
+  options.calibrate = true;
+  options.files.folder = folder.path().string();
+  EXPECT_CONTAINS(host_tools_test::thrown_message<UsageError>([&] { measure(); }), "--phases 2");
+}
+
 TEST_F(MaxStiffnessOnPeople, AHandWrittenSetIsNotAndNeedNotMeetThePaper) {
   options.subjects = own_set("", 0.5);
   EXPECT_EQ(measure(), done);

@@ -1,0 +1,180 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
+#include "tests/host_tools/temporary_folder.hpp"
+#include "tests/host_tools/thrown_message.hpp"
+#include "tests/studies/studies.hpp"
+
+namespace kmax::studies::baselines_test {
+
+using experiment::few_people;
+using experiment::paragraphs_of;
+using experiment::quick_run;
+using experiment::two_people;
+using Row = std::vector<std::string>;
+
+PeopleMean mean_of(double mean) {
+  return {mean, {}, 0.0};
+}
+
+TEST(Baselines, DampingAllowsMoreThanThePlainWallAndCostsNoField) {
+  std::vector<Baseline> laws{
+      plain_wall(), field_of_two(), {"damped", damped(8.0, control::VelocityEstimatorKind::difference)}};
+  const auto results = run_baselines(few_people(3), laws, quick_run());
+  ASSERT_EQ(results.size(), 3U);
+  const BaselineResult &plain = results[0], &field = results[1], &damper = results[2];
+  EXPECT_GT(damper.moves.mean, 1.5 * plain.moves.mean);
+  EXPECT_EQ(damper.price.field_at_rest, 0.0);
+  EXPECT_EQ(damper.price.work, 0.0);
+  EXPECT_LT(damper.price.depth, plain.price.depth);
+  EXPECT_EQ(field.price.field_at_rest, 2.0);
+  // F_MC x_0 from infinity, a twentieth less from 20 mm, and less still where a sample is the first inside.
+  EXPECT_GT(field.price.work, 1.0e-3);
+  EXPECT_LT(field.price.work, 1.9e-3);
+  EXPECT_EQ(plain.law.paper->stiffness, 3580.0);
+  for (const BaselineResult& result : results) EXPECT_LE(result.phases.mean, result.moves.mean + 100.0);
+}
+
+TEST(Baselines, AreAllDifferentWalls) {
+  for (const auto& laws : {law_baselines(), relation_baselines()}) {
+    std::set<std::string> names;
+    for (const Baseline& law : laws) EXPECT_TRUE(names.insert(law.name).second) << law.name;
+  }
+  TouchSetup square;
+  for (const Baseline& law : relation_baselines())
+    if (law.name == "square, latched, 0.8 to 2 N") law.wall(square);
+  EXPECT_EQ(square.wall.wall.adaptive.relation, control::AdaptiveRelation::square);
+  EXPECT_EQ(square.wall.wall.adaptive.mode, control::AdaptiveMode::latched);
+  EXPECT_EQ(square.wall.wall.adaptive.offset, 0.8F);
+}
+
+using LoopOutput = control::HapticLoop<float>::Output;
+
+TEST(PassivityController, TakesBackWhatTheWallHasGivenAndNoMore) {
+  constexpr double count = 1e-4, period = 0.01;
+  PassivityController controller(count, period, 1e6, 0.0);
+  EXPECT_EQ(controller.added(5, {}), 0.0);
+  LoopOutput pushes;
+  pushes.force = 1.0F;
+  EXPECT_EQ(controller.added(-10, {}), 0.0) << "nothing was given on the way in";
+  EXPECT_EQ(controller.added(-12, pushes), 0.0) << "the wall took 0.2 mJ";
+  pushes.force = 3.0F;
+  // Given: 3 N over 0.2 mm, of which 0.2 mJ were taken before; back over the next interval at this speed.
+  const double added = controller.added(-10, pushes);
+  EXPECT_NEAR(added * 2.0 * count, -0.4e-3, 1e-9);
+  EXPECT_EQ(controller.added(-10, pushes), 0.0) << "at rest there is nothing to damp";
+  EXPECT_EQ(controller.added(3, pushes), 0.0) << "free space";
+  EXPECT_EQ(controller.added(-1, {}), 0.0) << "and forgets";
+  PassivityController weak(count, period, 0.5, 0.0);
+  weak.added(-10, {});
+  // 0.5 N s/m at 2 counts in 10 ms.
+  EXPECT_NEAR(weak.added(-8, pushes), -0.5 * 2.0 * count / period, 1e-9);
+}
+
+TEST(PassivityController, AgainstTheSpringsEnergyBeginsEarlier) {
+  constexpr double count = 1e-4, period = 0.01;
+  PassivityController controller(count, period, 1e6, 1000.0);
+  EXPECT_EQ(controller.added(0, {}), 0.0);
+  LoopOutput spring;
+  // 1 mm deep such a spring holds 0.5 mJ; the wall took none on the way in.
+  EXPECT_NEAR(controller.added(-10, spring) * -10 * count, -0.5e-3, 1e-9);
+  spring.force = 1.0F;
+  spring.magnetic_force = 1.0F;
+  // A field is a spring of its own.
+  PassivityController same(count, period, 1e6, 1000.0);
+  EXPECT_NEAR(same.added(-10, spring) * -10 * count, -0.5e-3, 1e-9);
+}
+
+TEST(PassivityController, BeginsEachTouchWithoutAMemory) {
+  TouchSetup setup;
+  passivity_controlled(15.0, true)(setup);
+  setup.wall.wall.kind = control::WallKind::plain;
+  setup.wall.wall.stiffness = 6000.0F;
+  std::vector<experiment::TouchSample> one, two, without;
+  experiment::simulate_touch(setup, &one);
+  experiment::simulate_touch(setup, &two);
+  setup.added_force = nullptr;
+  experiment::simulate_touch(setup, &without);
+  ASSERT_EQ(one.size(), two.size());
+  bool differs = false;
+  for (std::size_t n = 0; n < one.size(); ++n) {
+    ASSERT_EQ(one[n].position, two[n].position);
+    differs = differs || one[n].position != without[n].position;
+  }
+  EXPECT_TRUE(differs);
+}
+
+std::vector<BaselineResult> made_up(const std::vector<Baseline>& laws, const WallPrice& price) {
+  std::vector<BaselineResult> results;
+  for (const Baseline& law : laws)
+    results.push_back({law, mean_of(4000.0), mean_of(3900.0), mean_of(4000.0), price});
+  return results;
+}
+
+TEST(BaselineSection, TheFrontAndTheRatingsFollowTheNumbers) {
+  std::vector<BaselineResult> results = made_up(law_baselines(), {1.0, 1e-3, 1e-3});
+  results[0].price = {0.0, 0.0, 2e-3};
+  results[1].price = {2.0, 1.5e-3, 1e-3};
+  results[1].moves.ends = {0, 1};
+  for (BaselineResult& result : results) {
+    if (result.law.name != "damping 8 N s/m, difference") continue;
+    result.moves.mean = 9600.0;
+    result.price = {0.0, 0.0, 0.5e-3};
+  }
+  const report::Section section = baseline_section(two_people(), results);
+  EXPECT_EQ(section.tables[0].rows[1],
+            (Row{"field of 2 N", ">4.00", "3.90", "4.00", "2.00", "1.50", "1.00", "2.58"}));
+  const std::string said = paragraphs_of(section);
+  EXPECT_CONTAINS(said, "Damping of 8 N s/m without any field allows 9.60 N/mm, the paper's 2 N field 4.00");
+  EXPECT_CONTAINS(said, "deeper in: damping 8 N s/m, difference.");
+  EXPECT_CONTAINS(said, "fall as the field at rest rises: yes; as the work rises: yes");
+  EXPECT_CONTAINS(said, "field of 2 N, moves: 1 of 2");
+  results[1].price.field_at_rest = 0.5;
+  EXPECT_CONTAINS(paragraphs_of(baseline_section(two_people(), results)), "field at rest rises: no");
+}
+
+TEST(RelationSection, SaysWhatIsBetterThanThePapersChoice) {
+  std::vector<BaselineResult> results = made_up(relation_baselines(), {0.8, 1e-3, 1e-3});
+  EXPECT_CONTAINS(paragraphs_of(relation_section(two_people(), results)), "at no higher cost: none of these");
+  for (BaselineResult& result : results)
+    if (result.law.name == "square root, latched, 0.8 to 2 N") result.moves.mean = 6000.0;
+  const report::Section section = relation_section(two_people(), results);
+  EXPECT_CONTAINS(paragraphs_of(section), "at no higher cost: square root, latched, 0.8 to 2 N");
+  EXPECT_NO_THROW(report::require_rectangular(section.tables[0]));
+}
+
+// --- Stiffness against damping ----------------------------------------------------------------------------
+
+TEST(DampingMap, FindsTheMostThatIsStableByBothCriteria) {
+  StiffnessRun run = quick_run();
+  const std::vector<LoopSetting> all = loop_settings();
+  const auto maps = run_damping_map(few_people(1), {all[0], all[5]}, run);
+  ASSERT_EQ(maps.size(), 2U);
+  EXPECT_EQ(maps[1].setting.name, "0.5 ms of delay");
+  EXPECT_LT(maps[1].laws[0].moves.mean, maps[0].laws[0].moves.mean);
+  // The more damping by differences the more a count is felt.
+  EXPECT_LT(maps[0].damped[0].back().feels.mean, maps[0].damped[0].back().moves.mean);
+  const report::Section section = damping_section(few_people(1), maps);
+  ASSERT_EQ(section.tables.size(), 3U);
+  EXPECT_EQ(section.tables[0].rows.size(), all_estimators.size());
+  EXPECT_EQ(section.tables[2].rows.size(), 2U);
+  for (const report::Table& table : section.tables) EXPECT_NO_THROW(report::require_rectangular(table));
+}
+
+TEST(DampingSection, NamesTheBestDampingOfEachEstimator) {
+  DampingMap map{loop_settings().front(), {}, {}};
+  map.laws[1] = {mean_of(8400.0), mean_of(8000.0)};
+  map.damped[2][2] = {mean_of(9000.0), mean_of(8600.0)};
+  map.damped[2][3] = {mean_of(12000.0), mean_of(3000.0)};
+  const report::Section section = damping_section(two_people(), {map});
+  EXPECT_EQ(section.tables[2].rows[0][2], "8.0");
+  EXPECT_EQ(section.tables[2].rows[0][6], "8.6 (B 8)");
+  EXPECT_CONTAINS(paragraphs_of(section), "than the field of 2 N in 1 of 1 rows");
+  const host_tools_test::TemporaryFolder folder;
+  draw_damping_map(map, folder / "map.svg");
+  EXPECT_CONTAINS(folder.read("map.svg"), "foaw_end_fit");
+}
+
+}  // namespace kmax::studies::baselines_test
