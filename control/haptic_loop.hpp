@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "control/damper_velocity.hpp"
 #include "control/finite.hpp"
 #include "control/force_limiter.hpp"
 #include "control/instability_detector.hpp"
@@ -35,6 +36,7 @@ struct HapticLoopConfig {
   double position_resolution = 0.0;  ///< m, 0: the encoder's own
   Rounding position_rounding = Rounding::nearest;
   VelocityEstimatorConfig<Scalar> velocity;
+  std::int32_t damping_window = 0;  ///< samples that the wall's damper differences over; 0: it has `velocity`
   WallLawConfig<Scalar> wall;
   InterferenceConfig<Scalar> interference;
   ForceLimiterConfig<Scalar> force;
@@ -86,6 +88,8 @@ class HapticLoop {
     std::uint32_t divider = 1;
     Resampler::Coefficients resampler{};
     typename VelocityEstimator<Scalar>::Coefficients velocity{};
+    bool damper_has_its_own = false;  ///< velocity
+    typename DamperVelocity<Scalar>::Coefficients damper{};
     typename WallLaw<Scalar>::Coefficients wall{};
     typename Interference<Scalar>::Coefficients interference{};
     typename ForceLimiter<Scalar>::Coefficients force{};
@@ -118,6 +122,7 @@ class HapticLoop {
   /// scale or the origin of the counts has changed.
   void reset() {
     resampler_.reset();
+    damper_.forget();
     settled_ = false;
     wall_.reset();
     interference_.reset();
@@ -138,7 +143,8 @@ class HapticLoop {
     if (!sample_is_due(c)) return hold(enabled);
     counted_ = static_cast<std::uint32_t>(count);
     const Motion motion = observe(c, count);
-    const auto wall = wall_.update(c.wall, motion.outside_distance, c.side * motion.velocity);
+    const Scalar outwards = c.side * motion.velocity;
+    const auto wall = wall_.update(c.wall, motion.outside_distance, outwards, damper_velocity(c, outwards));
     const auto disturbance = interference_.update(c.interference, wall.inside);
     show(wall, disturbance);
     const Scalar outward = softening_.factor() * (wall.force + disturbance.normal);
@@ -230,6 +236,14 @@ class HapticLoop {
     return {held_.velocity, held_.outside_distance};
   }
 
+  /// m/s outwards.
+  Scalar damper_velocity(const Coefficients& c, Scalar outwards) {
+    if (c.damper_has_its_own) [[unlikely]]
+      return c.side * damper_.update(c.damper, held_.position);
+    damper_.forget();
+    return outwards;
+  }
+
   void show(const typename WallLaw<Scalar>::Output& wall,
             const typename Interference<Scalar>::Output& disturbance) {
     held_.inside = wall.inside;
@@ -307,6 +321,7 @@ class HapticLoop {
 
   Resampler resampler_;
   VelocityEstimator<Scalar> velocity_;
+  DamperVelocity<Scalar> damper_;
   WallLaw<Scalar> wall_;
   Interference<Scalar> interference_;
   ForceLimiter<Scalar> limiter_;
@@ -338,6 +353,8 @@ typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const Hapt
   const std::int32_t step = resampler_step(config.position_resolution, config.count_length);
   c.resampler = Resampler::prepare({step, config.position_rounding}, count_near);
   c.velocity = VelocityEstimator<Scalar>::prepare(config.velocity, period, c.count_length, step);
+  c.damper_has_its_own = config.damping_window > 0;
+  c.damper = DamperVelocity<Scalar>::prepare(config.damping_window, period, c.count_length, step);
   c.wall = WallLaw<Scalar>::prepare(config.wall, period);
   c.interference = Interference<Scalar>::prepare(config.interference, period);
   c.force = ForceLimiter<Scalar>::prepare(config.force, period);

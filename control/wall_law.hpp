@@ -5,6 +5,7 @@
 
 #include "control/adaptive_coefficient.hpp"
 #include "control/finite.hpp"
+#include "control/growing_stiffness.hpp"
 
 namespace kmax::control {
 
@@ -33,10 +34,11 @@ constexpr bool follows_velocity(WallKind kind) {
 template <typename Scalar>
 struct WallLawConfig {
   WallKind kind = WallKind::plain;
-  Scalar stiffness = Scalar(1000);          ///< K, N/m, >= 0
-  Scalar damping = Scalar(0);               ///< B, N s/m, >= 0
-  Scalar magnetic_coefficient = Scalar(2);  ///< F_MC, N, >= 0; constant law only
-  Scalar magnetic_length = Scalar(0.001);   ///< x_0, m, > 0
+  Scalar stiffness = Scalar(1000);           ///< K, N/m, >= 0
+  GrowingStiffnessConfig<Scalar> growing{};  ///< how K comes about after a contact
+  Scalar damping = Scalar(0);                ///< B, N s/m, >= 0
+  Scalar magnetic_coefficient = Scalar(2);   ///< F_MC, N, >= 0; constant law only
+  Scalar magnetic_length = Scalar(0.001);    ///< x_0, m, > 0
   AdaptiveCoefficientConfig<Scalar> adaptive;
 };
 
@@ -50,20 +52,22 @@ struct WallLawConfig {
 ///   outside   F = F_MC / (s / x_0 + 1)^2
 ///   inside    F = max(0, K (-s) - B w) + F_MC
 ///
-/// with F_MC = 0 for the plain wall. The damper acts inside only and is bounded together with the spring:
+/// with F_MC = 0 for the plain wall. K may grow after the contact (growing_stiffness.hpp), and B may go by
+/// another velocity than eq. 7. The damper acts inside only and is bounded together with the spring:
 /// the sum never pulls the handle in, and on the way out the force meets the field's F_MC at the surface
 /// without a step. Every finite input gives a finite, non-negative force: what overflows is brought back
 /// to the largest number (the force limiter downstream is what bounds it to something sensible). A NaN
 /// passes through as a NaN: HapticLoop turns it into zero force and a fault.
 ///
-/// Cost on a Cortex-M4F, executed instructions: adaptive at most 90 (81 as configured by default), constant
-/// field at most 36, one division outside (tests/benchmarks/instruction_budget counts them).
+/// Cost on a Cortex-M4F, executed instructions: adaptive at most 95 (85 as configured by default), where K
+/// grows 118; one division outside (tests/benchmarks/instruction_budget counts them).
 template <typename Scalar>
 class WallLaw {
  public:
   struct Coefficients {
     WallKind kind = WallKind::none;
-    Scalar stiffness{}, damping{}, magnetic_coefficient{}, inverse_magnetic_length{};
+    Scalar damping{}, magnetic_coefficient{}, inverse_magnetic_length{};
+    typename GrowingStiffness<Scalar>::Coefficients stiffness{};
     typename AdaptiveCoefficient<Scalar>::Coefficients adaptive{};
   };
 
@@ -78,7 +82,7 @@ class WallLaw {
   static constexpr Coefficients prepare(const WallLawConfig<Scalar>& config, Scalar period) {
     Coefficients c;
     c.kind = config.kind;
-    c.stiffness = config.stiffness;
+    c.stiffness = GrowingStiffness<Scalar>::prepare(config.growing, config.stiffness, period);
     c.damping = config.damping;
     c.magnetic_coefficient = config.kind == WallKind::magnetic ? config.magnetic_coefficient : Scalar(0);
     c.inverse_magnetic_length = saturate(Scalar(1) / config.magnetic_length);
@@ -86,10 +90,19 @@ class WallLaw {
     return c;
   }
 
-  void reset() { adaptive_.reset(); }
+  void reset() {
+    adaptive_.reset();
+    stiffness_.leave();
+  }
 
   Output update(const Coefficients& c, Scalar outside_distance, Scalar outward_velocity) {
+    return update(c, outside_distance, outward_velocity, outward_velocity);
+  }
+  /// `damper_velocity`: m/s outwards, what B is multiplied by.
+  Output update(const Coefficients& c, Scalar outside_distance, Scalar outward_velocity,
+                Scalar damper_velocity) {
     if (outside_distance > Scalar(0)) {
+      stiffness_.leave();
       if (c.kind == WallKind::none) return {Scalar(0), Scalar(0), Scalar(0), false};
       const Scalar coefficient = c.kind == WallKind::adaptive
                                      ? adaptive_.update_outside(c.adaptive, outward_velocity)
@@ -108,9 +121,9 @@ class WallLaw {
     // largest number just as the largest number itself would, and not in the reaction before the field is
     // added.
     constexpr Scalar largest = std::numeric_limits<Scalar>::max();
-    Scalar spring = c.stiffness * -outside_distance;
+    Scalar spring = stiffness_.inside(c.stiffness, outward_velocity) * -outside_distance;
     if (spring > largest) spring = largest;
-    Scalar reaction = spring - c.damping * outward_velocity;
+    Scalar reaction = spring - c.damping * damper_velocity;
     if (reaction < Scalar(0)) reaction = Scalar(0);
     Scalar force = reaction + coefficient;
     if (force > largest) force = largest;
@@ -119,6 +132,7 @@ class WallLaw {
 
  private:
   AdaptiveCoefficient<Scalar> adaptive_;
+  GrowingStiffness<Scalar> stiffness_;
 };
 
 }  // namespace kmax::control

@@ -30,6 +30,9 @@ constexpr control::WallLawConfig<Scalar> wall_configuration(const ParameterValue
   control::WallLawConfig<Scalar> wall;
   wall.kind = v.choice<control::WallKind, "wall.law">(axis);
   wall.stiffness = Scalar(v.real<"wall.stiffness">(axis));
+  wall.growing.touch_stiffness = Scalar(v.real<"wall.touch_stiffness">(axis));
+  wall.growing.growth_time = Scalar(v.real<"wall.growth_time">(axis));
+  wall.growing.calm_velocity = Scalar(v.real<"wall.calm_velocity">(axis));
   wall.damping = Scalar(v.real<"wall.damping">(axis));
   wall.magnetic_coefficient = Scalar(v.real<"wall.magnetic_coefficient">(axis));
   wall.magnetic_length = Scalar(v.real<"wall.magnetic_length">(axis));
@@ -56,6 +59,7 @@ constexpr control::HapticLoopConfig<float> haptic_configuration(const ParameterV
   config.velocity.kind = v.choice<control::VelocityEstimatorKind, "velocity.estimator">(axis);
   config.velocity.window = v.whole<"velocity.window">(axis);
   config.velocity.bandwidth = v.real<"velocity.bandwidth">(axis);
+  config.damping_window = v.whole<"wall.damping_window">(axis);
   config.velocity_limit = v.real<"velocity.limit">(axis);
   config.wall = wall_configuration<float>(v, axis);
   config.interference.mode = v.choice<control::InterferenceMode, "interference.mode">(axis);

@@ -13,7 +13,6 @@ inline constexpr Group position{"position", 0x2002, Scope::axis, 0x0060};
 inline constexpr Group velocity{"velocity", 0x2003, Scope::axis, 0x0070};
 inline constexpr Group haptic{"haptic", 0x2004, Scope::axis, 0x0080};
 inline constexpr Group force{"force", 0x2005, Scope::axis, 0x0090};
-inline constexpr Group passivity{"passivity", 0x2006, Scope::axis, 0x00A0};
 inline constexpr Group guard{"guard", 0x2007, Scope::axis, 0x00B0};
 inline constexpr Group device{"device", 0x2008, Scope::axis, 0x00D0};
 inline constexpr Group motor{"motor", 0x2009, Scope::axis, 0x00E0};
@@ -68,7 +67,6 @@ inline constexpr NamedValue velocity_estimator[] = {
     named("tracking", VelocityEstimatorKind::tracking)};
 // Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
 // ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
-inline constexpr NamedValue passivity_mode[] = {{"off", 0}};
 inline constexpr NamedValue guard_mode[] = {{"off", 0}, {"warn", 1}, {"refuse", 2}};
 inline constexpr NamedValue guard_verdict[] = {{"not_judged", 0}, {"pass", 1}, {"fail", 2}};
 /// In the numbers of control::Criterion.

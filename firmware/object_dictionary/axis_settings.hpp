@@ -63,6 +63,20 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
     real("wall.damping_ceiling", group::wall, 18, "N s/m", 0, 1000, 0,
          "How far wall.damping may be raised while the axis is armed; 0: it can only be lowered.")
         .disarmed_only(),
+    whole("wall.damping_window", group::wall, 19, unsigned8, "samples", 0, 16, 0,
+          "Haptic samples that wall.damping takes its velocity over, as a difference; 0: it has that of "
+          "velocity.estimator.")
+        .disarmed_only(),
+    real("wall.touch_stiffness", group::wall, 20, "N/m", 0, 1e6, 0,
+         "Stiffness at the moment of contact, which grows to wall.stiffness while the contact is calm; 0: "
+         "all of it at once.")
+        .disarmed_only(),
+    real("wall.growth_time", group::wall, 21, "s", 0.001, 60, 0.2,
+         "Time constant of that growth; a contact that is not calm falls back four times as fast.")
+        .disarmed_only(),
+    real("wall.calm_velocity", group::wall, 22, "m/s", 0, 100, 0.01,
+         "A contact is calm while the handle is no faster than this.")
+        .disarmed_only(),
 
     choice("interference.mode", group::interference, 1, names::interference_mode, 0,
            "Disturbance of paper 1 section 2: none, along the wall's normal (eq. 2), or along its surface "
@@ -117,10 +131,6 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
          "How far force.limit, and what acts without a push of the hand (field, interference, background), "
          "may "
          "be raised while the axis is armed; 0: they can only be lowered.")
-        .disarmed_only(),
-
-    choice("passivity.mode", group::passivity, 1, names::passivity_mode, 0,
-           "Time-domain passivity control. This firmware offers only 'off'.")
         .disarmed_only(),
 
     choice("guard.mode", group::guard, 1, names::guard_mode, 0,

@@ -145,8 +145,12 @@ std::string conclusion(const Judgement& judgement, std::size_t width) {
     text += "guard.damping is 0: without a measured b no wall is guaranteed (docs/stability_check.md). ";
   if (judgement.uncovered_damper)
     text +=
-        "No guarantee covers wall.damping with this velocity.estimator: difference and low_pass are "
-        "covered. ";
+        "No guarantee covers wall.damping with this velocity: wall.damping_window=1 is covered, and so are "
+        "the estimators difference and low_pass. ";
+  if (judgement.grows)
+    text +=
+        "All of wall.stiffness is judged, which this wall grows to from wall.touch_stiffness, as long as the "
+        "contact is calm: it may hold where the same stiffness at once does not. ";
   if (judgement.follows_velocity) text += "Not judged: how the adaptive law's field follows the velocity. ";
   text.pop_back();
   return "\n" + wrapped(text, "", width);

@@ -76,13 +76,16 @@ std::string_view to_string(control::DiolaitiRegion region) {
 
 Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
                            const control::Hand<double>& hand) {
-  Judgement judgement{parameter_case(values, axis, hand), {}, true, {}, false, false};
+  Judgement judgement{parameter_case(values, axis, hand), {}, true, {}};
   judgement.follows_velocity = control::follows_velocity(values.choice<control::WallKind, "wall.law">(axis));
   using control::VelocityEstimatorKind;
   const auto estimator = values.choice<VelocityEstimatorKind, "velocity.estimator">(axis);
-  judgement.uncovered_damper = judgement.stability_case.wall_damping != 0 &&
-                               estimator != VelocityEstimatorKind::difference &&
-                               estimator != VelocityEstimatorKind::low_pass;
+  const std::int32_t window = values.whole<"wall.damping_window">(axis);
+  const bool covered = window == 1 || (window == 0 && (estimator == VelocityEstimatorKind::difference ||
+                                                       estimator == VelocityEstimatorKind::low_pass));
+  const double touch_stiffness = static_cast<double>(values.real<"wall.touch_stiffness">(axis));
+  judgement.grows = touch_stiffness > 0 && touch_stiffness < judgement.stability_case.stiffness;
+  judgement.uncovered_damper = judgement.stability_case.wall_damping != 0 && !covered;
   std::vector<control::Criterion> failed;
   for (std::size_t i = 0; i < control::criterion_count; ++i) {
     const auto criterion = static_cast<control::Criterion>(i);

@@ -40,6 +40,7 @@ struct Judgement {
   bool follows_velocity = false;  ///< the law is adaptive, whose dependence on velocity no criterion judges
 
   bool uncovered_damper = false;  ///< B with a velocity that is neither a difference nor a low-passed one
+  bool grows = false;             ///< the stiffness begins lower than what is judged
 
   bool pass_of(Worth worth) const;
   /// All that a guarantee asks for: what guarantees, and the step of abbott_okamura, which no delay changes.

@@ -31,6 +31,11 @@ constexpr auto copy_adaptive = [](Loop& to, const Loop& from) {
   to.wall.adaptive = from.wall.adaptive;
   to.wall.adaptive.mode = mode;
 };
+// What is calm is judged by the velocity: see wall.damping.
+constexpr auto copy_growing = [](Loop& to, const Loop& from) {
+  to.wall.growing = from.wall.growing;
+  to.velocity = from.velocity;
+};
 constexpr auto copy_velocity = [](Loop& to, const Loop& from) { to.velocity = from.velocity; };
 
 constexpr std::array changeable_parameters{
@@ -42,6 +47,11 @@ constexpr std::array changeable_parameters{
                           to.wall.damping = from.wall.damping;
                           to.velocity = from.velocity;
                         }},
+    ChangeableParameter{"wall.damping_window",
+                        [](Loop& to, const Loop& from) { to.damping_window = from.damping_window; }},
+    ChangeableParameter{"wall.touch_stiffness", copy_growing},
+    ChangeableParameter{"wall.growth_time", copy_growing},
+    ChangeableParameter{"wall.calm_velocity", copy_growing},
     ChangeableParameter{
         "wall.magnetic_length",
         [](Loop& to, const Loop& from) { to.wall.magnetic_length = from.wall.magnetic_length; }},

@@ -11,10 +11,20 @@
 
 namespace kmax::wall {
 
+namespace {
+
+/// As it is once all of its stiffness has grown.
+control::WallLawConfig<double> grown_wall(const firmware::ParameterValues& values, std::size_t axis) {
+  auto wall = firmware::wall_configuration<double>(values, axis);
+  wall.growing.touch_stiffness = 0.0;
+  return wall;
+}
+
+}  // namespace
+
 WallEvaluator::WallEvaluator(const firmware::ParameterValues& values, std::size_t axis)
-    : coefficients_(
-          control::WallLaw<double>::prepare(firmware::wall_configuration<double>(values, axis),
-                                            1.0 / static_cast<double>(values.real<"haptic.rate">(axis)))),
+    : coefficients_(control::WallLaw<double>::prepare(
+          grown_wall(values, axis), 1.0 / static_cast<double>(values.real<"haptic.rate">(axis)))),
       position_(static_cast<double>(values.real<"wall.position">(axis))),
       side_(values.whole<"wall.side">(axis)) {}
 

@@ -76,6 +76,8 @@ TEST(HapticLoop, ASurfaceBetweenTwoCountsKeepsItsFraction) {
 
 RC_GTEST_PROP(HapticLoop, TheOtherSideIsTheMirrorImageToTheBit, ()) {
   auto config = plain_wall<float>();
+  config.damping_window = *rc::gen::inRange(0, 17);
+  config.wall.growing.touch_stiffness = *rc::gen::element(0.0F, 200.0F);
   config.wall.kind = any_law();
   config.wall.damping = static_cast<float>(*rc::gen::inRange(0, 10));
   config.interference.mode = *rc::gen::element(InterferenceMode::none, InterferenceMode::perpendicular);
@@ -108,6 +110,54 @@ TEST(HapticLoop, TheWallPushesTowardsItsSide) {
   config.wall_side = -1;
   EXPECT_LT(Loop<float>(config).at(1000).force, 0.0f);
   EXPECT_EQ(Loop<float>(config).at(-1000).force, 0.0f);
+}
+
+TEST(HapticLoop, TheDamperMayDifferenceWhereTheEstimatorSmooths) {
+  auto config = plain_wall<double>();
+  config.tick_rate = 500.0;
+  config.count_length = 55e-6;
+  config.wall.stiffness = 0.0;
+  config.wall.damping = 8.0;
+  config.velocity = {VelocityEstimatorKind::low_pass, 16, 1.0};
+  const auto force = [&](int window) {
+    config.damping_window = window;
+    Loop<double> loop(config);
+    for (int n = 0; n < 5; ++n) loop.at(-10);
+    return loop.at(-14).force;
+  };
+  // Four counts in 2 ms, in one sample or in three; the low-pass has hardly begun.
+  EXPECT_NEAR(force(1), 8.0 * 4 * 55e-6 / 0.002, 1e-9);
+  EXPECT_NEAR(force(3), 8.0 * 4 * 55e-6 / 0.006, 1e-9);
+  EXPECT_LT(force(0), 0.02 * force(1));
+  EXPECT_GT(force(0), 0.0);
+}
+
+TEST(HapticLoop, ADampersOwnVelocityDoesNotSeeAnotherResolution) {
+  auto config = plain_wall<double>();
+  config.wall.stiffness = 0.0;
+  config.wall.damping = 8.0;
+  config.damping_window = 2;
+  HapticLoop<double> loop;
+  const auto fine = HapticLoop<double>::prepare(config, 0);
+  config.position_resolution = 1e-4;
+  const auto coarse = HapticLoop<double>::prepare(config, 0);
+  for (int n = 0; n < 20; ++n) EXPECT_EQ(loop.tick(fine, -149, true).force, 0.0);
+  for (int n = 0; n < 20; ++n) EXPECT_EQ(loop.tick(coarse, -149, true).force, 0.0);
+}
+
+TEST(HapticLoop, AWallThatGrowsPushesAsItsTouchAtFirstAndAsItsStiffnessAtLast) {
+  auto config = plain_wall<double>();
+  config.wall.stiffness = 10000.0;
+  config.wall.growing.touch_stiffness = 2000.0;
+  Loop<double> loop(config);
+  loop.at(100);
+  EXPECT_NEAR(loop.at(-100).force, 2000.0 * 100e-6, 1e-9);
+  for (int n = 0; n < 60000; ++n) loop.at(-100);
+  EXPECT_NEAR(loop.at(-100).force, 10000.0 * 100e-6, 1e-5);
+  loop.at(100);
+  EXPECT_NEAR(loop.at(-100).force, 2000.0 * 100e-6, 1e-9);
+  loop.loop().reset();
+  EXPECT_NEAR(loop.at(-100).force, 2000.0 * 100e-6, 1e-9);
 }
 
 TEST(HapticLoop, HoldsTheForceBetweenHapticSamples) {
@@ -161,7 +211,7 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
       config.wall.damping = 1.0f;
       auto c = HapticLoop<float>::prepare(config, 0);
       *std::array{
-          &c.wall.stiffness,     &c.wall.magnetic_coefficient, &c.count_length, &c.wall_fraction,
+          &c.wall.stiffness.full,     &c.wall.magnetic_coefficient, &c.count_length, &c.wall_fraction,
           &c.wall.adaptive.gain, &c.wall.adaptive.offset,      &c.side,         &c.force.limit}[field] =
           value;
       HapticLoop<float> loop;

@@ -143,6 +143,9 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       write("wall.side", axis, world.uniform(0, 1) < 0.5 ? 0xFFFFu : 1u);
       write("wall.stiffness", axis, real(world.uniform(0, 20000)));
       write("wall.damping", axis, real(world.uniform(0, 20)));
+      write("wall.damping_window", axis, static_cast<std::uint32_t>(world.uniform(0, 17)));
+      write("wall.touch_stiffness", axis, real(std::max(0.0, world.uniform(-5000, 5000))));
+      write("wall.growth_time", axis, real(world.uniform(0.001, 0.3)));
       write("wall.adaptive_mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
       write("wall.adaptive_relation", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
       write("interference.mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));

@@ -274,6 +274,20 @@ INSTANTIATE_TEST_SUITE_P(Papers, SceneParity,
                          testing::Combine(testing::Values("paper1_fig_9", "paper1_fig_12"),
                                           testing::Values(500.0, 20000.0)));
 
+// Three times what the plain wall holds, at the papers' rate: docs/experiments/max_stiffness.md.
+TEST(SceneParityOfGrowingWalls, AWholeContactIsBitIdentical) {
+  const simulation::Scene scene = scene_of("paper1_fig_9", {{"haptic.rate", 500.0},
+                                                            {"wall.stiffness", 10700.0},
+                                                            {"wall.touch_stiffness", 3000.0},
+                                                            {"wall.damping", 6.0},
+                                                            {"wall.damping_window", 1.0}});
+  const Trace trace = expect_equal_traces(scene, 3.5);
+  const Touched contact = touched(trace, 0, 0.0);
+  EXPECT_GT(contact.driven, 60'000u) << "3 s";
+  EXPECT_GT(contact.deepest, 0.1e-3);
+  EXPECT_GT(contact.forces, 100u);
+}
+
 // A delay and a coarse position; a structure; an encoder with noise and lost edges; two axes, one person.
 class SceneParityOfParts : public testing::TestWithParam<const char*> {};
 

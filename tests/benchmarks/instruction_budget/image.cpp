@@ -60,7 +60,7 @@ void report(const char* step, const Counts& counts, std::uint32_t budget) {
   if (worst > budget) within = false;
 }
 
-void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
+void measure_wall(const char* name, WallKind kind, float touch_stiffness, std::uint32_t budget) {
   static Wall wall;
   static Wall::Output out;
   Counts counts;
@@ -68,6 +68,7 @@ void measure_wall(const char* name, WallKind kind, std::uint32_t budget) {
     WallLawConfig<float> config;
     config.kind = kind;
     config.damping = (inputs.random() & 1U) != 0 ? 5.0F : 0.0F;
+    config.growing.touch_stiffness = touch_stiffness;
     if (i > 0) {
       config.adaptive.relation = static_cast<AdaptiveRelation>(inputs.random() % 3);
       config.adaptive.velocity = static_cast<AdaptiveVelocity>(inputs.random() % 2);
@@ -269,8 +270,9 @@ int main() {
   // An empty function is its return alone, which counts.
   overhead = count(Registers{}, &nothing_step) - 1;
   print("Executed instructions, Cortex-M4F       usual  worst budget\n");
-  measure_wall("adaptive wall law                      ", kmax::control::WallKind::adaptive, 91);
-  measure_wall("magnetic wall law                      ", kmax::control::WallKind::magnetic, 0);
+  measure_wall("adaptive wall law                      ", kmax::control::WallKind::adaptive, 0.0F, 95);
+  measure_wall("adaptive wall law that grows           ", kmax::control::WallKind::adaptive, 300.0F, 120);
+  measure_wall("magnetic wall law                      ", kmax::control::WallKind::magnetic, 0.0F, 0);
   measure_instability();
   measure_position("32-bit position, FOAW best fit         ", &position32_step, Kind::foaw, 220);
   measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 220);

@@ -47,6 +47,10 @@ const std::vector<Word> vocabulary = {
     {"wall.adaptive_hold_time", "s"},
     {"wall.stiffness_ceiling", "N/m"},
     {"wall.damping_ceiling", "N s/m"},
+    {"wall.damping_window", "samples"},
+    {"wall.touch_stiffness", "N/m"},
+    {"wall.growth_time", "s"},
+    {"wall.calm_velocity", "m/s"},
     {"interference.mode", "", {"none", "perpendicular", "parallel"}},
     {"interference.force", "N"},
     {"interference.background_force", "N"},
@@ -61,7 +65,6 @@ const std::vector<Word> vocabulary = {
     {"force.slew_limit", "N/s"},
     {"force.ramp_time", "s"},
     {"force.ceiling", "N"},
-    {"passivity.mode", "", {"off"}},  // 'observe' and 'control' when the firmware has them
     {"guard.mode", "", {"off", "warn", "refuse"}},
     {"guard.damping", "N s/m"},
     {"guard.friction", "N"},
