@@ -211,8 +211,8 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
       config.wall.damping = 1.0f;
       auto c = HapticLoop<float>::prepare(config, 0);
       *std::array{
-          &c.wall.stiffness.full,     &c.wall.magnetic_coefficient, &c.count_length, &c.wall_fraction,
-          &c.wall.adaptive.gain, &c.wall.adaptive.offset,      &c.side,         &c.force.limit}[field] =
+          &c.wall.stiffness.full, &c.wall.magnetic_coefficient, &c.count_length, &c.wall_fraction,
+          &c.wall.adaptive.gain,  &c.wall.adaptive.offset,      &c.side,         &c.force.limit}[field] =
           value;
       HapticLoop<float> loop;
       for (int i = 0; i < 10; ++i) {

@@ -108,6 +108,10 @@ std::vector<Baseline> law_baselines() {
                                VelocityEstimatorKind::foaw_end_fit, VelocityEstimatorKind::tracking})
     laws.push_back({fmt::format("damping 8 N s/m, {}", estimator_name(estimator)), damped(8.0, estimator)});
   laws.push_back({"field of 2 N, damping 8 N s/m, difference", both(field(2.0), damped(8.0, difference))});
+  laws.push_back({"grows from 2 N/mm in 0.2 s", growing(2000.0, 0.2, 0.0)});
+  laws.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m", growing(3000.0, 0.2, 6.0)});
+  laws.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m, field of 2 N",
+                  both(growing(3000.0, 0.2, 6.0), field(2.0))});
   laws.push_back({"passivity controller, alpha <= 15 N s/m", passivity_controlled(15.0, false)});
   laws.push_back({"the same against the spring's energy", passivity_controlled(15.0, true)});
   laws.push_back(
@@ -132,25 +136,34 @@ std::vector<Baseline> relation_baselines() {
   return laws;
 }
 
-WallPrice price_of(const SubjectSet& set, const WallChange& wall) {
+WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffness) {
   WallPrice price;
   const auto people = static_cast<double>(set.subjects.size());
   for (const experiment::Subject& subject : set.subjects) {
     TouchSetup setup = experiment::touch_setup(set.device, subject.person, {});
     wall(setup);
     setup.motion.approach_speed = priced_speed;
-    setup.wall.wall.stiffness = static_cast<float>(priced_stiffness);
+    setup.wall.wall.stiffness = static_cast<float>(stiffness);
     std::vector<experiment::TouchSample> touch;
     experiment::simulate_touch(setup, &touch);
-    double deepest = 0.0, work = 0.0;
+    double deepest = 0.0, work = 0.0, hardness = 0.0;
+    std::size_t contact = 0;
     bool touched = false;
     for (std::size_t n = 0; n < touch.size(); ++n) {
       deepest = std::max(deepest, -touch[n].position);
-      touched = touched || touch[n].position <= 0.0;
+      if (!touched && touch[n].position <= 0.0) {
+        touched = true;
+        contact = n;
+      }
+      if (touched && n > 0 && touch[n].time <= touch[contact].time + 0.02 &&
+          touch[contact].velocity < 0)
+        hardness = std::max(hardness, (touch[n].force - touch[n - 1].force) /
+                                          (touch[n].time - touch[n - 1].time) / -touch[contact].velocity);
       if (!touched && n > 0) work += touch[n - 1].force * (touch[n - 1].position - touch[n].position);
     }
     price.depth += deepest / people;
     price.work += work / people;
+    price.rate_hardness += hardness / people;
     // A handle that rests on the surface, until whatever was held has decayed.
     using Loop = control::HapticLoop<float>;
     const Loop::Coefficients coefficients = Loop::prepare(setup.wall, 0);
@@ -172,7 +185,8 @@ std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vect
                                 phases = sweep(set, walls, more);
   std::vector<BaselineResult> results;
   for (std::size_t n = 0; n < laws.size(); ++n)
-    results.push_back({laws[n], moves[n], phases[n], feels[n], price_of(set, laws[n].wall)});
+    results.push_back(
+        {laws[n], moves[n], phases[n], feels[n], price_of(set, laws[n].wall, priced_stiffness)});
   return results;
 }
 
@@ -180,10 +194,11 @@ namespace {
 
 report::Table baseline_table(std::string caption, const SubjectSet& set,
                              const std::vector<BaselineResult>& results, experiment::MarkedMeans& marks) {
-  report::Table table{std::move(caption),
-                      {"wall", "moves, N/mm", "moves, 4 phases, N/mm", "swings by 1 N, N/mm",
-                       "field at rest, N", "work on the way in, mJ", "deepest, mm", "rated by people"},
-                      {}};
+  report::Table table{
+      std::move(caption),
+      {"wall", "moves, N/mm", "moves, 4 phases, N/mm", "swings by 1 N, N/mm", "field at rest, N",
+       "work on the way in, mJ", "deepest, mm", "rate-hardness, N/mm", "rated by people"},
+      {}};
   for (const BaselineResult& result : results) {
     const auto cell = [&](const PeopleMean& found, const char* which) {
       return marks.cell(found.mean, found.ends, set.subjects.size(),
@@ -193,6 +208,7 @@ report::Table baseline_table(std::string caption, const SubjectSet& set,
                           cell(result.feels, "swings"), fmt::format("{:.2f}", result.price.field_at_rest),
                           fmt::format("{:.2f}", result.price.work * 1e3),
                           fmt::format("{:.2f}", result.price.depth * 1e3),
+                          n_per_mm(result.price.rate_hardness),
                           result.law.paper ? fmt::format("{:g}", result.law.paper->transparency) : "-"});
   }
   return table;
@@ -205,8 +221,9 @@ bool beats(const BaselineResult& one, const BaselineResult& other) {
   constexpr double same_field = 0.01, same_work = 1e-5, same_depth = 1e-5;
   return one.price.field_at_rest <= other.price.field_at_rest + same_field &&
          one.price.work <= other.price.work + same_work &&
-         one.price.depth <= other.price.depth + same_depth && one.moves.mean >= other.moves.mean - same &&
-         one.feels.mean >= other.feels.mean - same &&
+         one.price.depth <= other.price.depth + same_depth &&
+         one.price.rate_hardness >= 0.99 * other.price.rate_hardness &&
+         one.moves.mean >= other.moves.mean - same && one.feels.mean >= other.feels.mean - same &&
          one.moves.mean + one.feels.mean > other.moves.mean + other.feels.mean + 2.0 * same;
 }
 
@@ -218,7 +235,7 @@ std::string front_words(const std::vector<BaselineResult>& results) {
   }
   return fmt::format(
       "Not beaten, which is by a wall that allows as much by both criteria, costs no more field and no more "
-      "work and lets nobody deeper in: {}.",
+      "work, lets nobody deeper in and meets the hand as hard: {}.",
       fmt::join(front, "; "));
 }
 
@@ -270,7 +287,7 @@ report::Section baseline_section(const SubjectSet& set, const std::vector<Baseli
       front_words(results), rating_words(results),
       "The passivity controller (Hannaford and Ryu 2002) damps with at most alpha once the wall has given "
       "more energy than it took; against the spring's energy, once it has given more than the spring would "
-      "hold. It is not in the firmware, whose passivity.mode offers only 'off'."};
+      "hold. It is not in the firmware."};
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;
 }

@@ -125,10 +125,10 @@ TEST(BaselineSection, TheFrontAndTheRatingsFollowTheNumbers) {
   }
   const report::Section section = baseline_section(two_people(), results);
   EXPECT_EQ(section.tables[0].rows[1],
-            (Row{"field of 2 N", ">4.00", "3.90", "4.00", "2.00", "1.50", "1.00", "2.58"}));
+            (Row{"field of 2 N", ">4.00", "3.90", "4.00", "2.00", "1.50", "1.00", "0.00", "2.58"}));
   const std::string said = paragraphs_of(section);
   EXPECT_CONTAINS(said, "Damping of 8 N s/m without any field allows 9.60 N/mm, the paper's 2 N field 4.00");
-  EXPECT_CONTAINS(said, "deeper in: damping 8 N s/m, difference.");
+  EXPECT_CONTAINS(said, "hard: damping 8 N s/m, difference.");
   EXPECT_CONTAINS(said, "fall as the field at rest rises: yes; as the work rises: yes");
   EXPECT_CONTAINS(said, "field of 2 N, moves: 1 of 2");
   results[1].price.field_at_rest = 0.5;
@@ -175,6 +175,65 @@ TEST(DampingSection, NamesTheBestDampingOfEachEstimator) {
   const host_tools_test::TemporaryFolder folder;
   draw_damping_map(map, folder / "map.svg");
   EXPECT_CONTAINS(folder.read("map.svg"), "foaw_end_fit");
+}
+
+// --- Walls that grow stiff --------------------------------------------------------------------------------
+
+TEST(GrowingWalls, HoldMoreThanThePlainWallAlsoWhenPushed) {
+  const auto walls = run_growing_walls(few_people(1), quick_run());
+  EXPECT_EQ(walls[6].wall, "grows from 2 N/mm in 0.4 s, damping 6 N s/m");
+  ASSERT_EQ(walls[6].situations.size(), growing_situations().size());
+  for (std::size_t n = 0; n < walls[6].situations.size(); ++n)
+    EXPECT_GT(walls[6].situations[n].least(), 2.0 * walls.front().situations[n].least()) << n;
+  const report::Section section = growing_section(few_people(1), walls);
+  EXPECT_NO_THROW(report::require_rectangular(section.tables[0]));
+  EXPECT_TRUE(section.tables[0].rows[0][1].ends_with(" (1.0)"));
+}
+
+TEST(GrowingWalls, APulsePushesIntoTheWallAndOut) {
+  TouchSetup setup;
+  pulse(setup);
+  const experiment::AddedForce added = setup.added_force(setup);
+  control::HapticLoop<float>::Output outside, inside;
+  inside.inside = true;
+  for (int n = 0; n < 1000; ++n) EXPECT_EQ(added(0, outside), 0.0) << "it counts from the contact";
+  double in = 0.0, out = 0.0;
+  for (int n = 0; n < 1500; ++n) {
+    const double force = added(0, n % 2 == 0 ? inside : outside);
+    (force < 0.0 ? in : out) += force / 500.0;
+  }
+  EXPECT_NEAR(in, -1.5 * 0.02, 1.5 / 500.0);
+  EXPECT_NEAR(out, 1.5 * 0.02, 1.5 / 500.0);
+}
+
+TEST(DrawnDevices, AreTheSameForTheSameSeedAndWithinTheirBounds) {
+  const SubjectSet set = few_people(2);
+  const auto devices = draw_devices(set, 100, 5), again = draw_devices(set, 100, 5),
+             other = draw_devices(set, 1, 6);
+  EXPECT_NE(devices[0].device.mass, other[0].device.mass);
+  std::size_t bent = 0;
+  for (std::size_t n = 0; n < devices.size(); ++n) {
+    EXPECT_EQ(devices[n].device.friction, again[n].device.friction);
+    EXPECT_GE(devices[n].mass(), 0.02 * (1.0 - 1e-12));
+    EXPECT_LE(devices[n].mass(), 0.2);
+    EXPECT_GE(devices[n].device.force_limit, 3.3);
+    EXPECT_LE(devices[n].device.delay, 0.5e-3);
+    EXPECT_LT(devices[n].person, 2U);
+    bent += devices[n].device.structure ? 1 : 0;
+  }
+  EXPECT_EQ(bent, 50U);
+}
+
+TEST(DrawnSection, CountsWhatIsTripledByBothCriteria) {
+  const auto result = [](double moves, double feels, double depth) {
+    return DrawnResult{{}, 2000.0, 1000.0, moves, feels, 1e-3, depth};
+  };
+  const report::Section section =
+      drawn_section({result(6000.0, 3000.0, 0.9e-3), result(60000.0, 2900.0, 1.1e-3), {}});
+  EXPECT_CONTAINS(paragraphs_of(section),
+                  "at least three times the plain wall: 1 of 3; smallest ratio 0.00, median 2.90");
+  EXPECT_CONTAINS(paragraphs_of(section), "largest stiffness: 1 of 3.");
+  EXPECT_EQ(section.tables[0].rows[1][3], "2.95");
 }
 
 }  // namespace kmax::studies::baselines_test

@@ -47,10 +47,11 @@ std::vector<report::Section> draws(const StudyInput& input);
 std::vector<report::Section> adaptive_gap(const StudyInput& input);
 std::vector<report::Section> baselines(const StudyInput& input);
 std::vector<report::Section> damping_map(const StudyInput& input);
+std::vector<report::Section> growing_walls(const StudyInput& input);
 std::vector<report::Section> loop_rates(const StudyInput& input);
 
 /// In the order of the page.
-inline constexpr std::array<Study, 9> all_studies{{
+inline constexpr std::array<Study, 10> all_studies{{
     {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), predicted", held_walls},
     {"causes", "the four causes of the gain at 2 N, one by one", causes},
     {"assumptions", "threshold, pushes, approach speeds, device, integrator: what hangs on them",
@@ -64,6 +65,8 @@ inline constexpr std::array<Study, 9> all_studies{{
     {"damping",
      "stiffness against damping for each estimator, rate, encoder, delay and compliance; the first set",
      damping_map},
+    {"growing", "walls that grow stiff while the contact is calm, on 12 people and 200 drawn devices",
+     growing_walls},
     {"rates",
      "500 Hz to 20 kHz, two encoders, delays and velocity estimators; the first set's device is used",
      loop_rates},
@@ -271,8 +274,12 @@ struct WallPrice {
   double field_at_rest = 0.0;  ///< N, on a handle that rests on the surface
   double work = 0.0;           ///< J, against the field until the surface is met
   double depth = 0.0;          ///< m, deepest in the wall
+  /// N/m: the steepest rise of the force within 20 ms after the contact, by the speed at contact (Lawrence,
+  /// Pao, Dougherty, Salada, Pavlou 2000: rate-hardness, which people call hard).
+  double rate_hardness = 0.0;
 };
-WallPrice price_of(const SubjectSet& set, const WallChange& wall);
+/// Of a touch at 0.2 m/s of a wall of `stiffness` N/m.
+WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffness);
 
 struct BaselineResult {
   Baseline law;
@@ -312,6 +319,49 @@ std::vector<DampingMap> run_damping_map(const SubjectSet& set, const std::vector
 report::Section damping_section(const SubjectSet& set, const std::vector<DampingMap>& maps);
 /// Throws plot::FigureError.
 report::Picture draw_damping_map(const DampingMap& map, const std::filesystem::path& file);
+
+// --- Walls that grow stiff (growing_walls.cpp)
+// ---------------------------------------------------------------
+
+/// wall.touch_stiffness, wall.growth_time, and a damper over one sample. N/m, s, N s/m.
+WallChange growing(double touch_stiffness, double growth_time, double damping);
+/// Adds -1.5 N, into the wall, and then +1.5 N for 20 ms each, 1.9 and 2.05 s after the first contact.
+void pulse(TouchSetup& setup);
+
+/// A device, who holds it, and what a wall is set to for it.
+struct DrawnDevice {
+  simulation::DeviceModel device;
+  std::size_t person = 0;  ///< of the set
+  double mass() const { return device.mass + (device.structure ? device.structure->handle_mass : 0.0); }
+};
+/// The same for the same seed: 20 to 200 g, 0.04 to 0.4 N of friction, 0.02 to 0.5 N s/m, 3.3 to 20 N, all
+/// evenly by their logarithm; up to 0.5 ms of delay; every other one bends by 2 to 20 N/mm.
+std::vector<DrawnDevice> draw_devices(const SubjectSet& set, std::size_t count, std::uint32_t seed);
+
+struct DrawnResult {
+  DrawnDevice drawn;
+  double plain_moves = 0.0, plain_feels = 0.0, growing_moves = 0.0, growing_feels = 0.0;  ///< N/m
+  double plain_depth = 0.0, growing_depth = 0.0;  ///< m, of one touch at the plain wall's largest stiffness
+  double ratio() const;                           ///< the smaller of the two
+};
+/// How a wall is set to a device whose largest plain stiffness is known.
+struct GrowthRule {
+  double touch_share = 0.8;    ///< of what the plain wall allows by both criteria
+  double growth_time = 0.2;    ///< s
+  double damping_share = 0.1;  ///< of m / T
+};
+std::vector<DrawnResult> run_drawn_devices(const SubjectSet& set, const std::vector<DrawnDevice>& devices,
+                                           const GrowthRule& rule, const StiffnessRun& run);
+
+/// One wall in one situation: the people's mean by the worse of the two criteria, N/m.
+struct GrowingResult {
+  std::string wall;
+  std::vector<TwoMeans> situations;  ///< of growing_situations()
+};
+std::vector<LoopSetting> growing_situations();
+std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const StiffnessRun& run);
+report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls);
+report::Section drawn_section(const std::vector<DrawnResult>& results);
 
 // --- Rate of the loop, encoder and velocity estimator (loop_rates.cpp) -------------------------------------
 

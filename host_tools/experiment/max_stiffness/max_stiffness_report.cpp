@@ -48,9 +48,10 @@ bool any_calibrated(const std::vector<MaxStiffnessStudy>& studies) {
 
 /// The table, and in `marks` the notes to it.
 report::Table marked_table(const std::vector<MaxStiffnessStudy>& studies, MarkedMeans& marks) {
-  report::Table table{"Largest stable stiffness, N/mm, mean of the people (standard deviation)",
-                      {"condition", "paper 1"},
-                      {}};
+  report::Table table{
+      "Largest stable stiffness, N/mm, mean of the people with its 95 % interval (standard deviation)",
+      {"condition", "paper 1"},
+      {}};
   for (const MaxStiffnessStudy& study : studies) {
     table.columns.push_back(clip_words(study.set.device));
     table.columns.push_back("saturated");
@@ -66,7 +67,8 @@ report::Table marked_table(const std::vector<MaxStiffnessStudy>& studies, Marked
       const std::string mean =
           marks.cell(result.mean(), counted_ends(result.subjects), result.subjects.size(),
                      fmt::format("{}, {}", condition.name, clip_words(study.set.device)));
-      row.push_back(fmt::format("{} ({})", mean, n_per_mm(result.standard_deviation())));
+      row.push_back(fmt::format("{} ± {} ({})", mean, n_per_mm(result.interval()),
+                                n_per_mm(result.standard_deviation())));
       row.push_back(fmt::format("{:.1f} %", result.largest_saturated_share() * 100));
     }
     row.push_back(origin_words(studies, n));

@@ -1,6 +1,7 @@
 #include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 
 #include <fmt/format.h>
+#include <boost/math/distributions/students_t.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -87,6 +88,13 @@ double ConditionResult::standard_deviation() const {
   double sum = 0.0;
   for (const MaxStiffness& subject : subjects) sum += std::pow(subject.stiffness - centre, 2);
   return std::sqrt(sum / static_cast<double>(subjects.size() - 1));
+}
+
+double ConditionResult::interval() const {
+  const auto people = static_cast<double>(subjects.size());
+  if (people < 2.0) return 0.0;
+  return boost::math::quantile(boost::math::students_t(people - 1.0), 0.975) * standard_deviation() /
+         std::sqrt(people);
 }
 
 double ConditionResult::largest_saturated_share() const {

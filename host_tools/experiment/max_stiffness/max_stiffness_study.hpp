@@ -47,6 +47,9 @@ struct ConditionResult {
   std::vector<MaxStiffness> subjects;  // in the order of the set's
   double mean() const;                 // N/m
   double standard_deviation() const;   // N/m, of the sample
+  // N/m: the mean of all such people lies within this of the sample's with 95 % (Student); 0 for fewer than
+  // two. A search that ended before somebody's largest stiffness makes mean and interval too low.
+  double interval() const;
   double largest_saturated_share() const;
 };
 

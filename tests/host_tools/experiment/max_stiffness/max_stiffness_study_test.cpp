@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "tests/host_tools/experiment/max_stiffness/made_up_study.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
@@ -58,6 +60,10 @@ TEST(MaxStiffnessStudy, MeanAndDeviationAreThoseOfTheBook) {
   }
   EXPECT_DOUBLE_EQ(result.mean(), 5000.0);
   EXPECT_NEAR(result.standard_deviation(), 2138.09, 0.01);
+  // t of a table, 2.3646 with seven degrees of freedom.
+  EXPECT_NEAR(result.interval(), 2.3646 * 2138.09 / std::sqrt(8.0), 0.1);
+  result.subjects.resize(1);
+  EXPECT_EQ(result.interval(), 0.0);
   EXPECT_EQ(ConditionResult{}.mean(), 0.0);
 }
 

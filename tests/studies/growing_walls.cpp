@@ -1,0 +1,249 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "tests/studies/studies.hpp"
+
+namespace kmax::studies {
+namespace {
+
+constexpr auto difference = control::VelocityEstimatorKind::difference;
+constexpr std::uint32_t drawn_seed = 5;
+constexpr std::size_t drawn_count = 200;
+
+/// Evenly by the logarithm, from bits that are the same with every standard library.
+double drawn(std::mt19937& random, double from, double to) {
+  const double share = static_cast<double>(random()) / 4294967296.0;
+  return from * std::exp(share * std::log(to / from));
+}
+
+double least(const TwoMeans& found) {
+  return found.least();
+}
+
+}  // namespace
+
+WallChange growing(double touch_stiffness, double growth_time, double damping) {
+  return [=](TouchSetup& setup) {
+    setup.wall.wall.growing.touch_stiffness = static_cast<float>(touch_stiffness);
+    setup.wall.wall.growing.growth_time = static_cast<float>(growth_time);
+    setup.wall.wall.damping = static_cast<float>(damping);
+    setup.wall.damping_window = 1;
+  };
+}
+
+void pulse(TouchSetup& setup) {
+  setup.added_force = [](const TouchSetup& made) -> experiment::AddedForce {
+    return [period = 1.0 / made.wall.tick_rate, since = -1.0](
+               std::int64_t, const control::HapticLoop<float>::Output& last) mutable {
+      if (since >= 0.0 || last.inside) since = std::max(since, 0.0) + period;
+      if (since >= 1.9 && since < 1.92) return -1.5;
+      return since >= 2.05 && since < 2.07 ? 1.5 : 0.0;
+    };
+  };
+}
+
+std::vector<LoopSetting> growing_situations() {
+  return {{"usual", [](TouchSetup&) {}},
+          {"pulses", pulse},
+          {"0.5 ms of delay", [](TouchSetup& setup) { setup.device.delay = 0.5e-3; }},
+          {"structure of 2.31 N/mm", [](TouchSetup& setup) { bend(setup.device, 2310.0); }}};
+}
+
+std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const StiffnessRun& run) {
+  std::vector<Baseline> laws{plain_wall(), field_of_two(), {"damping 8 N s/m", damped(8.0, difference)}};
+  for (const double touch : {2000.0, 3000.0})
+    for (const double time : {0.2, 0.4})
+      for (const double damping : {0.0, 6.0})
+        laws.push_back({fmt::format("grows from {:g} N/mm in {:g} s{}", touch / 1e3, time,
+                                    damping > 0.0 ? fmt::format(", damping {:g} N s/m", damping) : ""),
+                        growing(touch, time, damping)});
+  std::vector<WallChange> walls;
+  const std::vector<LoopSetting> situations = growing_situations();
+  for (const Baseline& law : laws)
+    for (const LoopSetting& situation : situations)
+      walls.push_back([law, situation](TouchSetup& setup) {
+        law.wall(setup);
+        situation.change(setup);
+      });
+  StiffnessRun feeling = run;
+  feeling.protocol.force_threshold = felt_force;
+  const std::vector<PeopleMean> moves = sweep(set, walls, run), feels = sweep(set, walls, feeling);
+  std::vector<GrowingResult> results;
+  std::size_t next = 0;
+  for (const Baseline& law : laws) {
+    results.push_back({law.name, {}});
+    for (std::size_t n = 0; n < situations.size(); ++n, ++next)
+      results.back().situations.push_back({moves[next], feels[next]});
+  }
+  return results;
+}
+
+report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls) {
+  report::Section section{
+      fmt::format("Walls that grow while the contact is calm ({})", experiment::clip_words(set.device)),
+      {},
+      {},
+      {}};
+  report::Table table{
+      "Largest stiffness, N/mm, stable by both criteria, mean of the people (of the plain wall's)",
+      {"wall"},
+      {}};
+  for (const LoopSetting& situation : growing_situations()) table.columns.push_back(situation.name);
+  const auto best = std::max_element(walls.begin(), walls.end(), [](const auto& one, const auto& other) {
+    return least(one.situations.front()) < least(other.situations.front());
+  });
+  for (const GrowingResult& wall : walls) {
+    table.rows.push_back({wall.wall});
+    for (std::size_t n = 0; n < wall.situations.size(); ++n) {
+      const double found = least(wall.situations[n]), plain = least(walls.front().situations[n]);
+      table.rows.back().push_back(
+          fmt::format("{} ({:.1f})", n_per_mm(found), plain > 0.0 ? found / plain : 0.0));
+    }
+  }
+  section.tables = {std::move(table)};
+  section.paragraphs = {
+      "A wall with wall.touch_stiffness meets the handle with that, and grows to wall.stiffness while the "
+      "handle "
+      "is slower than wall.calm_velocity (0.01 m/s). Its damper takes the difference over one sample "
+      "(wall.damping_window = 1). No field, so nothing is felt at rest in front of it.",
+      fmt::format("Best where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
+                  best->wall, n_per_mm(least(best->situations.front())),
+                  least(best->situations.front()) / least(walls.front().situations.front())),
+      "It is paid for at the contact: a tap meets the touch stiffness and the damper, and the stiffness "
+      "comes "
+      "within three growth times. The rate-hardness above says how hard the contact itself is."};
+  return section;
+}
+
+std::vector<DrawnDevice> draw_devices(const SubjectSet& set, std::size_t count, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<DrawnDevice> devices;
+  for (std::size_t n = 0; n < count; ++n) {
+    DrawnDevice drawn_device{set.device, n % set.subjects.size()};
+    simulation::DeviceModel& device = drawn_device.device;
+    device.mass = drawn(random, 0.02, 0.2);
+    device.friction = drawn(random, 0.04, 0.4);
+    device.damping = drawn(random, 0.02, 0.5);
+    device.force_limit = drawn(random, 3.3, 20.0);
+    device.delay = 0.5e-3 * static_cast<double>(random()) / 4294967296.0;
+    const double structure = drawn(random, 2e3, 2e4);
+    if (n % 2 == 1) {
+      device.structure = simulation::StructureModel{structure, 1.0, 0.4 * device.mass};
+      device.mass *= 0.6;
+    }
+    devices.push_back(drawn_device);
+  }
+  return devices;
+}
+
+double DrawnResult::ratio() const {
+  return plain_moves > 0.0 && plain_feels > 0.0
+             ? std::min(growing_moves / plain_moves, growing_feels / plain_feels)
+             : 0.0;
+}
+
+std::vector<DrawnResult> run_drawn_devices(const SubjectSet& set, const std::vector<DrawnDevice>& devices,
+                                           const GrowthRule& rule, const StiffnessRun& run) {
+  StiffnessRun moving = run;
+  moving.steps = {.first = 100.0, .step = 10.0, .growth = 0.03, .last = 200e3};
+  StiffnessRun feeling = moving;
+  feeling.protocol.force_threshold = felt_force;
+  const auto setup_of = [&](const DrawnDevice& drawn_device) {
+    return experiment::touch_setup(drawn_device.device, set.subjects[drawn_device.person].person, {});
+  };
+  const auto largest = [&](const std::function<WallChange(std::size_t)>& wall, const StiffnessRun& judged) {
+    std::vector<experiment::StiffnessJob> jobs;
+    for (std::size_t n = 0; n < devices.size(); ++n) {
+      jobs.push_back({"", setup_of(devices[n])});
+      jobs.back().setup.wall.force.limit = static_cast<float>(devices[n].device.force_limit);
+      wall(n)(jobs.back().setup);
+    }
+    return experiment::run_stiffness_jobs(jobs, judged);
+  };
+  const auto plain = [](std::size_t) -> WallChange { return [](TouchSetup&) {}; };
+  const auto plain_moves = largest(plain, moving), plain_feels = largest(plain, feeling);
+  const auto grown = [&](std::size_t n) {
+    const double touch = rule.touch_share * std::min(plain_moves[n].stiffness, plain_feels[n].stiffness);
+    // m / T
+    const double most = devices[n].mass() * setup_of(devices[n]).wall.tick_rate;
+    return growing(touch, rule.growth_time, rule.damping_share * most);
+  };
+  const auto growing_moves = largest(grown, moving), growing_feels = largest(grown, feeling);
+  std::vector<DrawnResult> results;
+  for (std::size_t n = 0; n < devices.size(); ++n) {
+    DrawnResult result{devices[n],
+                       plain_moves[n].stiffness,
+                       plain_feels[n].stiffness,
+                       growing_moves[n].stiffness,
+                       growing_feels[n].stiffness,
+                       0.0,
+                       0.0};
+    SubjectSet one{set};
+    one.device = devices[n].device;
+    one.subjects = {set.subjects[devices[n].person]};
+    const double stiffness = std::min(result.plain_moves, result.plain_feels);
+    result.plain_depth = price_of(one, plain(n), stiffness).depth;
+    result.growing_depth = price_of(one, grown(n), stiffness).depth;
+    results.push_back(result);
+  }
+  return results;
+}
+
+report::Section drawn_section(const std::vector<DrawnResult>& results) {
+  report::Section section{"The same on drawn devices", {}, {}, {}};
+  if (results.empty()) return section;
+  report::Table table{
+      "Largest stiffness, N/mm, by who decides", {"criterion", "plain", "grows", "mean's ratio"}, {}};
+  const auto mean = [&](double DrawnResult::*value) {
+    double sum = 0.0;
+    for (const DrawnResult& result : results) sum += result.*value;
+    return sum / static_cast<double>(results.size());
+  };
+  const auto row = [&](const char* name, double DrawnResult::*plain, double DrawnResult::*grown) {
+    table.rows.push_back({name, n_per_mm(mean(plain)), n_per_mm(mean(grown)),
+                          fmt::format("{:.2f}", mean(plain) > 0.0 ? mean(grown) / mean(plain) : 0.0)});
+  };
+  row("moves by 0.165 mm", &DrawnResult::plain_moves, &DrawnResult::growing_moves);
+  row("swings by 1 N", &DrawnResult::plain_feels, &DrawnResult::growing_feels);
+  std::vector<double> ratios;
+  std::size_t tripled = 0, deeper = 0, coarse = 0, coarse_tripled = 0;
+  for (const DrawnResult& result : results) {
+    ratios.push_back(result.ratio());
+    const bool three = result.ratio() >= 3.0, by_count = 3.0 * result.plain_feels > 1.0 / 55e-6;
+    tripled += three ? 1 : 0;
+    coarse += by_count ? 1 : 0;
+    coarse_tripled += three && by_count ? 1 : 0;
+    deeper += result.growing_depth > result.plain_depth ? 1 : 0;
+  }
+  std::sort(ratios.begin(), ratios.end());
+  section.tables = {std::move(table)};
+  section.paragraphs = {
+      fmt::format(
+          "{} devices: 20 to 200 g, 0.04 to 0.4 N of friction, 3.3 to 20 N, up to 0.5 ms of delay, every "
+          "other one bends; each in the hand of one of the people, at 500 Hz with 55 um. The wall grows from "
+          "{:g} of what the plain wall allows, in {:g} s, with a damper of {:g} m/T over one sample.",
+          results.size(), GrowthRule().touch_share, GrowthRule().growth_time, GrowthRule().damping_share),
+      fmt::format(
+          "By both criteria at least three times the plain wall: {} of {}; smallest ratio {:.2f}, median "
+          "{:.2f}. Three times the plain wall would be more than one count at 1 N (18.2 N/mm) on {} of "
+          "them, {} of which are tripled all the same: a handle at rest swings by no count.",
+          tripled, results.size(), ratios.front(), ratios[ratios.size() / 2], coarse, coarse_tripled),
+      fmt::format("Deeper in than the plain wall at that wall's own largest stiffness: {} of {}.", deeper,
+                  results.size())};
+  return section;
+}
+
+std::vector<report::Section> growing_walls(const StudyInput& input) {
+  StiffnessRun run = input.run;
+  const SubjectSet& set = input.sets.front();
+  StiffnessRun drawn_run = run;
+  drawn_run.protocol.approach_speeds = {0.1, 0.5, 1.0};
+  drawn_run.protocol.pushes = {0.3, 1.0};
+  return {growing_section(set, run_growing_walls(set, run)),
+          drawn_section(run_drawn_devices(set, draw_devices(set, drawn_count, drawn_seed), {}, drawn_run))};
+}
+
+}  // namespace kmax::studies
