@@ -225,6 +225,17 @@ TEST(FoawVelocity, StartsOnAKnownVelocityWithAFullWindow) {
   }
 }
 
+TEST(FoawVelocity, AStartThatIsTooFastIsCutInBothDirections) {
+  constexpr double fastest = 1 << 18;
+  const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);
+  for (const double side : {1.0, -1.0}) {
+    FoawVelocity<double> velocity;
+    velocity.reset(coefficients, 0, side * 1e9 * coefficients.scale);
+    EXPECT_NEAR(velocity.update(coefficients, static_cast<std::int64_t>(side * fastest), FoawFit::end),
+                side * fastest * coefficients.scale, coefficients.scale);
+  }
+}
+
 // As if it had seen the ramp: what the start puts into the sums is what samples would have.
 TEST(FoawVelocity, AStartOnAKnownVelocityLeavesTheSumsOfThatRamp) {
   const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);

@@ -305,6 +305,20 @@ TEST(HapticLoop, NumbersOfTheActionsStay) {
     EXPECT_EQ(static_cast<int>(one), number++);
 }
 
+TEST(HapticLoop, WhatIsNotEnabledIsNotLimitedEither) {
+  auto config = plain_wall<float>();
+  config.force.limit = 1.0f;
+  config.force.slew_limit = 1.0f;
+  config.force.ramp_time = 1.0f;
+  Loop<float> loop(config);
+  for (int n = 0; n < 3; ++n) loop.at(-5000);
+  EXPECT_TRUE(loop.loop().output().ramping);
+  const auto& out = loop.at(-5000, false);
+  EXPECT_FALSE(out.limited);
+  EXPECT_FALSE(out.slew_limited);
+  EXPECT_FALSE(out.ramping);
+}
+
 HapticLoopConfig<float> watched_wall(InstabilityAction action) {
   auto config = plain_wall<float>();
   config.wall.stiffness = 5000.0f;

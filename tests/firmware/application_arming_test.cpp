@@ -189,6 +189,13 @@ TEST_F(Arming, StatuswordTellsTheStateAndTheLimit) {
   EXPECT_EQ(bench.force(), 3.3f);
   EXPECT_EQ(word() & 0x0800, 0x0800u);
   EXPECT_EQ(static_cast<unsigned>(bench.get("measured.flags")), 1u | 2u | 16u);
+  // Each bit alone: the slew limit is in the way, the force limit is not.
+  bench.device.stand_at(-1000);
+  bench.run_ms(2);
+  bench.set("force.slew_limit", 0.1);
+  bench.device.stand_at(-2000);
+  bench.run_ms(2);
+  EXPECT_EQ(static_cast<unsigned>(bench.get("measured.flags")), 1u | 4u | 16u);
   EXPECT_GT(bench.get("measured.limited_samples"), 30);
   EXPECT_GE(bench.get("measured.armed_samples"), bench.get("measured.limited_samples"));
 }

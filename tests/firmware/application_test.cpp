@@ -23,6 +23,7 @@ TEST(Application, IdentifiesItself) {
   bench.run_ms(2500);
   EXPECT_EQ(bench.get("info.product_code"), firmware::product_code);
   EXPECT_EQ(bench.get("info.firmware_version"), firmware::firmware_version);
+  EXPECT_EQ(bench.get("info.vendor_id"), 0) << "CiA has assigned none";
   EXPECT_EQ(bench.get("info.dictionary_checksum"), firmware::dictionary_checksum);
   EXPECT_EQ(bench.get("info.tick_rate"), 20000);
   EXPECT_EQ(bench.get("info.clock_source"), 4);

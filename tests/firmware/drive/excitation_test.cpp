@@ -255,7 +255,8 @@ TEST_F(ExcitationTest, WhatIsNotANumberOrHasNoMeaningExcitesNothingAndAllowsNoTr
       &ExcitationConfig::force_limit, &ExcitationConfig::tick_rate};
   for (const ExcitationKind kind : {ExcitationKind::voltage, ExcitationKind::position}) {
     for (const Field field : fields) {
-      for (const float bad : {nan, infinity, -infinity}) {
+      for (const float bad : {nan, infinity, -infinity, 0.0f}) {
+        if (bad == 0.0f && field != &ExcitationConfig::tick_rate) continue;
         auto config = of_kind(kind);
         config.half_period = 3;
         config.stroke = 0.1f;

@@ -52,6 +52,7 @@ TEST(MotorControl, WithoutMeasuredCurrentsOnlyTheReferenceIsMade) {
   EXPECT_FLOAT_EQ(out.current_reference, 1.0f);
   EXPECT_EQ(out.duty_a, 0.5f);
   EXPECT_EQ(out.duty_b, 0.5f);
+  EXPECT_EQ(out.electrical_angle, 0u);
   EXPECT_EQ(out.fault, Fault::none);
 }
 
