@@ -140,23 +140,10 @@ WallPrice price_of(const SubjectSet& set, const WallChange& wall) {
     wall(setup);
     setup.motion.approach_speed = priced_speed;
     setup.wall.wall.stiffness = static_cast<float>(priced_stiffness);
-    std::vector<experiment::TouchSample> touch;
-    experiment::simulate_touch(setup, &touch);
-    double deepest = 0.0, work = 0.0;
-    bool touched = false;
-    for (std::size_t n = 0; n < touch.size(); ++n) {
-      deepest = std::max(deepest, -touch[n].position);
-      touched = touched || touch[n].position <= 0.0;
-      if (!touched && n > 0) work += touch[n - 1].force * (touch[n - 1].position - touch[n].position);
-    }
-    price.depth += deepest / people;
-    price.work += work / people;
-    // A handle that rests on the surface, until whatever was held has decayed.
-    using Loop = control::HapticLoop<float>;
-    const Loop::Coefficients coefficients = Loop::prepare(setup.wall, 0);
-    Loop loop;
-    for (int n = 0; n < 5000; ++n) loop.tick(coefficients, 0, true);
-    price.field_at_rest += static_cast<double>(loop.output().magnetic_force) / people;
+    const WallPrice paid = experiment::price_of(setup);
+    price.depth += paid.depth / people;
+    price.work += paid.work / people;
+    price.field_at_rest += paid.field_at_rest / people;
   }
   return price;
 }

@@ -14,10 +14,13 @@
 #include <string_view>
 #include <vector>
 
+#include "host_tools/experiment/design/design_task.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 #include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/report_words.hpp"
+#include "host_tools/experiment/touch_price.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::studies {
@@ -73,13 +76,12 @@ inline constexpr std::array<Study, 9> all_studies{{
 std::vector<report::Section> run_studies(const std::vector<std::string>& names, const StudyInput& input);
 
 std::string n_per_mm(double stiffness);
-/// As the parameter velocity.estimator has it.
-std::string estimator_name(control::VelocityEstimatorKind estimator);
+using experiment::estimator_name;
+using experiment::felt_force;
 inline constexpr std::array all_estimators{
     control::VelocityEstimatorKind::difference, control::VelocityEstimatorKind::low_pass,
     control::VelocityEstimatorKind::foaw, control::VelocityEstimatorKind::foaw_end_fit,
     control::VelocityEstimatorKind::tracking};
-inline constexpr double felt_force = 1.0;  ///< N peak to peak: what is unstable by the force
 
 // --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
 
@@ -168,9 +170,7 @@ struct Variation {
   experiment::TouchProtocol protocol;
   simulation::IntegratorConfig integrator{};
 };
-/// Puts a compliance of `stiffness` N/m between motor and hand, and of the mass what a structure has by
-/// default behind it. Published stiffnesses of the Touch are 1.0 to 2.3 N/mm.
-void bend(simulation::DeviceModel& device, double stiffness);
+using simulation::bend;
 /// From a calibrated set: all but the two below.
 std::vector<Variation> assumption_variations(const SubjectSet& set,
                                              const experiment::TouchProtocol& protocol);
@@ -266,12 +266,8 @@ std::vector<Baseline> law_baselines();
 /// The adaptive wall with each relation in each mode, and with other intervals of F_MC.
 std::vector<Baseline> relation_baselines();
 
-/// What a person pays: of one touch, mean of the people.
-struct WallPrice {
-  double field_at_rest = 0.0;  ///< N, on a handle that rests on the surface
-  double work = 0.0;           ///< J, against the field until the surface is met
-  double depth = 0.0;          ///< m, deepest in the wall
-};
+/// What a person pays: of one touch, mean of the people. The rate-hardness is left out.
+using WallPrice = experiment::TouchPrice;
 WallPrice price_of(const SubjectSet& set, const WallChange& wall);
 
 struct BaselineResult {
