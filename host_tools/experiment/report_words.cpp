@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "host_tools/device/value_text.hpp"
+
 namespace kmax::experiment {
 
 std::string yes_no(bool value) {
@@ -41,6 +43,11 @@ std::string cause_words(std::string_view number, const TestedClaim& falls, const
   else if (*falls_without)
     rest = "falls at every F_I: the stiffening is not what would make the trend.";
   return fmt::format("With a hand that does not stiffen {} {}", number, rest);
+}
+
+std::string estimator_name(control::VelocityEstimatorKind estimator) {
+  constexpr device::Parameter kinds = device::Parameter::of<"velocity.estimator">();
+  return device::value_text(kinds, static_cast<std::uint32_t>(estimator));
 }
 
 std::string clipping_words(const simulation::DeviceModel& device) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "control/velocity_estimator.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/simulation/device_model.hpp"
 
@@ -33,6 +34,9 @@ std::string fall_words(const TestedClaim& falls, std::string_view untested);
 /// stiffening is its cause only where it falls with it and not without. `number` is the sentence's subject,
 /// "Jit" or "it".
 std::string cause_words(std::string_view number, const TestedClaim& falls, const TestedClaim& falls_without);
+
+/// As the parameter velocity.estimator has it.
+std::string estimator_name(control::VelocityEstimatorKind estimator);
 
 /// What the simulated device makes of a force: "clipped at 3.3 N", "not clipped".
 std::string clipping_words(const simulation::DeviceModel& device);

@@ -23,10 +23,11 @@ std::int64_t counts(double position, double per_metre) {
 /// The judged window while it passes.
 class WindowJudge {
  public:
-  WindowJudge(double begin, double end, const TouchSetup& setup)
+  WindowJudge(double begin, double end, bool by_force, const TouchSetup& setup)
       : begin_(begin),
         quarter_length_((end - begin) / 4.0),
-        threshold_(setup.force_threshold > 0.0 ? setup.force_threshold : setup.threshold),
+        by_force_(by_force),
+        threshold_(by_force ? setup.force_threshold : setup.threshold),
         setup_(setup) {
     low_.fill(std::numeric_limits<double>::infinity());
     high_.fill(-std::numeric_limits<double>::infinity());
@@ -34,7 +35,7 @@ class WindowJudge {
 
   void take(double time, double position, double force) {
     if (time < begin_) return;
-    const double judged = setup_.force_threshold > 0.0 ? force : position;
+    const double judged = by_force_ ? force : position;
     const auto quarter =
         std::min<std::size_t>(3, static_cast<std::size_t>((time - begin_) / quarter_length_));
     if (quarter > quarter_) close_quarters(quarter);
@@ -53,6 +54,7 @@ class WindowJudge {
     outcome.peak_to_peak = std::max(
         0.0, *std::max_element(high_.begin(), high_.end()) - *std::min_element(low_.begin(), low_.end()));
     outcome.deepest = deepest_;
+    outcome.by_force = by_force_;
     if (!touched_) {
       outcome.verdict = simulation::ContactVerdict::no_contact;
     } else {
@@ -65,7 +67,9 @@ class WindowJudge {
     for (; quarter_ < next; ++quarter_) still_ = still_ || !(high_[quarter_] - low_[quarter_] > threshold_);
   }
 
-  double begin_, quarter_length_, threshold_;
+  double begin_, quarter_length_;
+  bool by_force_;
+  double threshold_;
   const TouchSetup& setup_;
   std::array<double, 4> low_{}, high_{};
   std::size_t quarter_ = 0;
@@ -133,13 +137,15 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   TouchOutcome outcome;
   const double period = 1.0 / setup.wall.tick_rate;
   std::uint64_t saturated = 0, since_contact = 0;
-  std::optional<WindowJudge> judge;
+  std::optional<WindowJudge> judge, second;
   double end = std::numeric_limits<double>::infinity();
   for (;; ++outcome.samples) {
     const double time = handle.motion().elapsed();
     if (!judge && handle.motion().hold_end()) {
       end = *handle.motion().hold_end();
-      judge.emplace(end - setup.window, end, setup);
+      const bool by_force = setup.force_threshold > 0.0;
+      judge.emplace(end - setup.window, end, by_force && !setup.judges_both, setup);
+      if (by_force && setup.judges_both) second.emplace(end - setup.window, end, true, setup);
     }
     if (time >= end - 1e-9) break;
     const double position = handle.position();
@@ -155,7 +161,8 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     const auto force = static_cast<double>(out.force);
     if (judge) {
       judge->take(time, position, force);
-      if (recording == nullptr && judge->certain()) break;
+      if (second) second->take(time, position, force);
+      if (recording == nullptr && judge->certain() && (!second || second->certain())) break;
     }
     if (recording != nullptr)
       recording->push_back({time, position, handle.velocity(), handle.hand_position(), force, resisted.along,
@@ -168,6 +175,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     handle.advance(force, resisted.along, period);
   }
   judge->finish(outcome);
+  if (second && !outcome.unstable()) second->finish(outcome);
   outcome.event_limit_hits = handle.event_limit_hits();
   if (since_contact > 0)
     outcome.saturated_share = static_cast<double>(saturated) / static_cast<double>(since_contact);

@@ -61,6 +61,8 @@ struct TouchSetup {
   // N peak to peak. Above 0: judged is the force asked for, by the same rule, instead of the position. A
   // stiff wall on a coarse encoder swings by newtons while the handle moves by less than a count.
   double force_threshold = 0.0;
+  // With a force threshold: the position is judged as well, and a touch is unstable by either.
+  bool judges_both = false;
   // Makes what is added in one touch, which begins without a memory. None: nothing is.
   std::function<AddedForce(const TouchSetup&)> added_force{};
 };
@@ -77,7 +79,8 @@ struct TouchSample {
 
 struct TouchOutcome {
   simulation::ContactVerdict verdict = simulation::ContactVerdict::no_contact;
-  double peak_to_peak = 0.0;            // m (N with a force threshold), over what was simulated of the window
+  double peak_to_peak = 0.0;            // m (N by the force), over what was simulated of the window
+  bool by_force = false;                // the criterion that peak_to_peak and verdict are of
   double deepest = 0.0;                 // m, in it
   double saturated_share = 0.0;         // of the samples since the first contact: force limited or clipped
   double contact_speed = 0.0;           // m/s, true, towards the wall at the first sample inside

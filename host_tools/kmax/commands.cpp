@@ -30,6 +30,7 @@ void add_check_command(CLI::App& app, Context& context);
 void add_simulate_command(CLI::App& app, Context& context);
 void add_sweep_command(CLI::App& app, Context& context);
 void add_experiment_command(CLI::App& app, Context& context);
+void add_design_command(CLI::App& app, Context& context);
 void add_plot_command(CLI::App& app, Context& context);
 void add_lines_commands(CLI::App& app, Context& context);  // lines, reset, bootloader
 void add_flash_command(CLI::App& app, Context& context);
@@ -52,7 +53,7 @@ void add_all_commands(CLI::App& app, Context& context) {
       {"Commissioning", {add_bring_up_command, add_calibrate_command, add_selftest_command}},
       {"Walls and experiments",
        {add_wall_command, add_check_command, add_simulate_command, add_sweep_command, add_experiment_command,
-        add_serve_command}},
+        add_design_command, add_serve_command}},
       {"Board", {add_lines_commands, add_flash_command}},
       {"Documents", {add_describe_command, add_completion_commands}},
   };

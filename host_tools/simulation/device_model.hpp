@@ -3,6 +3,7 @@
 // friction, driven by a force that the motor can supply only up to a limit and, if wanted, late; and behind
 // it, if wanted, a structure that bends.
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
@@ -67,6 +68,14 @@ inline constexpr std::array device_fields{
     ModelField<DeviceModel>{"delay", &DeviceModel::delay, 0.0, 1.0, "s",
                             "from a command to its force at the handle"},
 };
+
+// Puts a compliance of `stiffness` N/m between motor and hand, and of the mass behind it what a structure has
+// by default, at most half.
+inline void bend(DeviceModel& device, double stiffness) {
+  device.structure = StructureModel{.stiffness = stiffness};
+  device.structure->handle_mass = std::min(device.structure->handle_mass, 0.5 * device.mass);
+  device.mass -= device.structure->handle_mass;
+}
 
 // Throws std::invalid_argument.
 inline void validate(const DeviceModel& device) {

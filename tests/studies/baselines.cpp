@@ -144,32 +144,11 @@ WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffne
     wall(setup);
     setup.motion.approach_speed = priced_speed;
     setup.wall.wall.stiffness = static_cast<float>(stiffness);
-    std::vector<experiment::TouchSample> touch;
-    experiment::simulate_touch(setup, &touch);
-    double deepest = 0.0, work = 0.0, hardness = 0.0;
-    std::size_t contact = 0;
-    bool touched = false;
-    for (std::size_t n = 0; n < touch.size(); ++n) {
-      deepest = std::max(deepest, -touch[n].position);
-      if (!touched && touch[n].position <= 0.0) {
-        touched = true;
-        contact = n;
-      }
-      if (touched && n > 0 && touch[n].time <= touch[contact].time + 0.02 &&
-          touch[contact].velocity < 0)
-        hardness = std::max(hardness, (touch[n].force - touch[n - 1].force) /
-                                          (touch[n].time - touch[n - 1].time) / -touch[contact].velocity);
-      if (!touched && n > 0) work += touch[n - 1].force * (touch[n - 1].position - touch[n].position);
-    }
-    price.depth += deepest / people;
-    price.work += work / people;
-    price.rate_hardness += hardness / people;
-    // A handle that rests on the surface, until whatever was held has decayed.
-    using Loop = control::HapticLoop<float>;
-    const Loop::Coefficients coefficients = Loop::prepare(setup.wall, 0);
-    Loop loop;
-    for (int n = 0; n < 5000; ++n) loop.tick(coefficients, 0, true);
-    price.field_at_rest += static_cast<double>(loop.output().magnetic_force) / people;
+    const WallPrice paid = experiment::price_of(setup);
+    price.depth += paid.depth / people;
+    price.work += paid.work / people;
+    price.field_at_rest += paid.field_at_rest / people;
+    price.rate_hardness += paid.rate_hardness / people;
   }
   return price;
 }

@@ -14,10 +14,13 @@
 #include <string_view>
 #include <vector>
 
+#include "host_tools/experiment/design/design_task.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 #include "host_tools/experiment/max_stiffness/operator_calibration.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/report_words.hpp"
+#include "host_tools/experiment/touch_price.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::studies {
@@ -76,13 +79,12 @@ inline constexpr std::array<Study, 10> all_studies{{
 std::vector<report::Section> run_studies(const std::vector<std::string>& names, const StudyInput& input);
 
 std::string n_per_mm(double stiffness);
-/// As the parameter velocity.estimator has it.
-std::string estimator_name(control::VelocityEstimatorKind estimator);
+using experiment::estimator_name;
+using experiment::felt_force;
 inline constexpr std::array all_estimators{
     control::VelocityEstimatorKind::difference, control::VelocityEstimatorKind::low_pass,
     control::VelocityEstimatorKind::foaw, control::VelocityEstimatorKind::foaw_end_fit,
     control::VelocityEstimatorKind::tracking};
-inline constexpr double felt_force = 1.0;  ///< N peak to peak: what is unstable by the force
 
 // --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
 
@@ -171,9 +173,7 @@ struct Variation {
   experiment::TouchProtocol protocol;
   simulation::IntegratorConfig integrator{};
 };
-/// Puts a compliance of `stiffness` N/m between motor and hand, and of the mass what a structure has by
-/// default behind it. Published stiffnesses of the Touch are 1.0 to 2.3 N/mm.
-void bend(simulation::DeviceModel& device, double stiffness);
+using simulation::bend;
 /// From a calibrated set: all but the two below.
 std::vector<Variation> assumption_variations(const SubjectSet& set,
                                              const experiment::TouchProtocol& protocol);
@@ -269,16 +269,8 @@ std::vector<Baseline> law_baselines();
 /// The adaptive wall with each relation in each mode, and with other intervals of F_MC.
 std::vector<Baseline> relation_baselines();
 
-/// What a person pays: of one touch, mean of the people.
-struct WallPrice {
-  double field_at_rest = 0.0;  ///< N, on a handle that rests on the surface
-  double work = 0.0;           ///< J, against the field until the surface is met
-  double depth = 0.0;          ///< m, deepest in the wall
-  /// N/m: the steepest rise of the force within 20 ms after the contact, by the speed at contact (Lawrence,
-  /// Pao, Dougherty, Salada, Pavlou 2000: rate-hardness, which people call hard).
-  double rate_hardness = 0.0;
-};
-/// Of a touch at 0.2 m/s of a wall of `stiffness` N/m.
+/// What a person pays: of one touch at 0.2 m/s of a wall of `stiffness` N/m, mean of the people.
+using WallPrice = experiment::TouchPrice;
 WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffness);
 
 struct BaselineResult {

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "host_tools/device/value_text.hpp"
 #include "tests/studies/studies.hpp"
 
 namespace kmax::studies {
 
 std::string n_per_mm(double stiffness) {
   return fmt::format("{:.2f}", stiffness / 1e3);
-}
-
-std::string estimator_name(control::VelocityEstimatorKind estimator) {
-  constexpr device::Parameter kinds = device::Parameter::of<"velocity.estimator">();
-  return device::value_text(kinds, static_cast<std::uint32_t>(estimator));
 }
 
 std::vector<PeopleMean> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,

@@ -162,11 +162,6 @@ std::vector<report::Section> variation_sections(
 
 }  // namespace
 
-void bend(simulation::DeviceModel& device, double stiffness) {
-  device.structure = simulation::StructureModel{.stiffness = stiffness};
-  device.mass -= device.structure->handle_mass;
-}
-
 std::vector<Variation> assumption_variations(const SubjectSet& set,
                                              const experiment::TouchProtocol& protocol) {
   std::vector<Variation> variations;

@@ -137,6 +137,9 @@ class Documents(unittest.TestCase):
         "experiment jitter": [(*SIM, "--touches", "1")],
         "experiment deviation": [(*SIM, "--pulses", "1", "--out", "FOLDER/deviation")],
         "experiment resolution": [(*SIM, "--touches", "1", "--speeds", "0.05,0.3")],
+        "design wall": [("--subjects", "FOLDER/one.toml", "--delay", "0.2ms"),
+                        ("--subjects", "FOLDER/one.toml", "--depth", "0.001mm"),
+                        ("--subjects", "FOLDER/one.toml", "--shard", "1/9", "--out", "FOLDER/shares")],
         "serve": None,  # Serving
         "flash": [("--dry-run", "--method", "dfu", ELF), ("--dry-run", "--method", "openocd-stlink", "--factory-reset")],
         "describe": [(), ("--format", "json")],
@@ -144,7 +147,7 @@ class Documents(unittest.TestCase):
         "manual": [("FOLDER",)],
     }
     LINES = {"watch"}  # a document on each line
-    VERDICTS = {"diff", "check", "bring-up", "calibrate", "selftest"}  # 3: it is no
+    VERDICTS = {"diff", "check", "design wall", "bring-up", "calibrate", "selftest"}  # 3: it is no
 
     @classmethod
     def setUpClass(cls):
@@ -152,6 +155,7 @@ class Documents(unittest.TestCase):
         cls.board = cls.enterClassContext(Serve())
         path = Path(cls.folder)
         (path / "code").write_text("123456\n")
+        (path / "one.toml").write_text("[[subject]]\n")
         (path / "other.toml").write_text('[wall]\ndamping = 4.5\n')
         (path / "points.csv").write_text("position_m,velocity_m_per_s\n0,0\n-0.001,0.1\n")
 

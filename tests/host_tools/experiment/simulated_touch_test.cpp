@@ -129,6 +129,22 @@ TEST(SimulatedTouch, TheForceCanBeJudgedInstead) {
   EXPECT_EQ(simulate_touch(setup).verdict, ContactVerdict::unstable);
 }
 
+TEST(SimulatedTouch, CanBeJudgedByBothAtOnce) {
+  const auto judged = [](double stiffness, double threshold, double force) {
+    TouchSetup setup = plain(stiffness);
+    setup.threshold = threshold;
+    setup.force_threshold = force;
+    setup.judges_both = true;
+    return simulate_touch(setup);
+  };
+  EXPECT_EQ(judged(5500, 0.165e-3, 1e6).verdict, ContactVerdict::unstable) << "by the position";
+  EXPECT_FALSE(judged(5500, 0.165e-3, 1e6).by_force);
+  EXPECT_EQ(judged(5500, 1.0, 0.5).verdict, ContactVerdict::unstable) << "by the force";
+  EXPECT_TRUE(judged(5500, 1.0, 0.5).by_force);
+  EXPECT_EQ(judged(5500, 1.0, 1e6).verdict, ContactVerdict::stable);
+  EXPECT_EQ(judged(5500, 0.165e-3, 0.0).verdict, ContactVerdict::unstable) << "without a force threshold";
+}
+
 TEST(SimulatedTouch, ReportsSaturationOnlyOfAForceThatIsClipped) {
   TouchSetup setup = plain(5500);
   EXPECT_GT(simulate_touch(setup).saturated_share, 0.01);

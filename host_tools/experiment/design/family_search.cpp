@@ -1,0 +1,133 @@
+#include "host_tools/experiment/design/family_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kmax::experiment {
+namespace {
+
+/// A quarter below the bound: the best damping may lie between two that are tried first.
+constexpr int slack = 29;
+
+class FamilySearch {
+ public:
+  FamilySearch(const DesignTask& task, const WallFamily& family, std::vector<std::size_t> hard)
+      : task_(task), family_(family), trials_(task), hard_(std::move(hard)) {
+    if (!hard_.empty()) return;
+    // The quickest and hardest touch of each.
+    const std::size_t each = task.protocol.touches();
+    for (std::size_t person = 0; person < task.set.subjects.size(); ++person)
+      hard_.push_back((person + 1) * each - 1);
+  }
+
+  FamilyResult run(int bound) {
+    best_.rung = bound;
+    double centre = 0.0;
+    try_all(centre);
+    // The least above 0, by which a step beside 0 goes.
+    const double least = dampings_of(task_)[1];
+    double ratio = damping_ratio;
+    for (int level = 0; level < 3; ++level) {
+      ratio = std::sqrt(ratio);
+      const bool damped = found_ ? best_.damping > 0.0 : centre > 0.0;
+      const double around = damped ? (found_ ? best_.damping : centre) : least * std::pow(0.5, level);
+      for (const double damping : {around / ratio, around * ratio})
+        if (damping <= most_damping) improve(damping, highest(damping, best_.rung + 1, top_rung));
+    }
+    if (!found_) best_.rung = -1;
+    best_.hard = hard_;
+    best_.touches = trials_.touches();
+    best_.event_limit_hits = trials_.event_limit_hits();
+    return best_;
+  }
+
+  /// The highest rung from `least` to `most` that holds for the hard touches; least - 1 if none.
+  int highest(double damping, int least, int most) {
+    if (least > most || !holds(damping, least)) return least - 1;
+    int low = least, step = 16;
+    while (low + step <= most && holds(damping, low + step)) {
+      low += step;
+      step *= 2;
+    }
+    int high = std::min(low + step, most + 1);
+    while (high - low > 1) {
+      const int middle = low + (high - low) / 2;
+      (holds(damping, middle) ? low : high) = middle;
+    }
+    return low;
+  }
+
+ private:
+  DesignedWall wall_at(double damping, int rung) const { return {family_, damping, stiffness_of(rung)}; }
+  bool holds(double damping, int rung) { return !trials_.first_unstable(wall_at(damping, rung), hard_); }
+
+  /// Every damping against the hard touches, then the best ones against everybody. `centre`: the best of the
+  /// first, which need not be above the bound.
+  void try_all(double& centre) {
+    const int least = std::max(0, best_.rung - slack);
+    std::vector<TriedDamping> order;
+    for (const double damping : dampings_of(task_))
+      if (const int rung = highest(damping, least, top_rung); rung >= least) order.push_back({damping, rung});
+    std::stable_sort(order.begin(), order.end(),
+                     [](const auto& one, const auto& other) { return one.rung > other.rung; });
+    if (!order.empty()) centre = order.front().damping;
+    for (const TriedDamping& one : order)
+      if (one.rung > best_.rung) improve(one.damping, highest(one.damping, best_.rung + 1, one.rung));
+  }
+
+  /// Takes a damping that holds up to `rung` for the hard touches as the best, if it is for everybody.
+  void improve(double damping, int rung) {
+    while (rung > best_.rung) {
+      const auto unstable = trials_.first_unstable(wall_at(damping, rung));
+      if (!unstable) return accept(damping, rung);
+      hard_.insert(hard_.begin(), unstable->number);
+      rung = highest(damping, best_.rung + 1, rung - 1);
+    }
+  }
+
+  void accept(double damping, int rung) {
+    // What nobody gets to is no wall: a field may hold the hand off.
+    if (!trials_.everybody_touched()) return;
+    if (task_.depth) {
+      const double depth = trials_.deepest({family_, damping, stiffness_with_margin(task_, rung)}).depth;
+      if (depth > *task_.depth) {
+        best_.least_depth = best_.least_depth > 0.0 ? std::min(best_.least_depth, depth) : depth;
+        return;
+      }
+    }
+    found_ = true;
+    best_.rung = rung;
+    best_.damping = damping;
+  }
+
+  const DesignTask& task_;
+  const WallFamily& family_;
+  WallTrials trials_;
+  std::vector<std::size_t> hard_;
+  FamilyResult best_;
+  bool found_ = false;
+};
+
+}  // namespace
+
+FamilyResult search_family(const DesignTask& task, const WallFamily& family, int bound,
+                           std::vector<std::size_t> hard) {
+  return FamilySearch(task, family, std::move(hard)).run(bound);
+}
+
+std::vector<TriedDamping> stiffness_over_damping(const DesignTask& task, const WallFamily& family,
+                                                 const std::vector<double>& dampings,
+                                                 std::vector<std::size_t> hard) {
+  FamilySearch search(task, family, std::move(hard));
+  std::vector<TriedDamping> found;
+  for (const double damping : dampings) found.push_back({damping, search.highest(damping, 0, top_rung)});
+  return found;
+}
+
+double stiffness_with_margin(const DesignTask& task, int rung) {
+  const double stiffness = (1.0 - task.margin) * stiffness_of(rung);
+  const double unit = std::pow(10.0, std::floor(std::log10(stiffness)) - 2.0);
+  return std::floor(stiffness / unit * (1.0 + 1e-12)) * unit;
+}
+
+}  // namespace kmax::experiment

@@ -1,0 +1,93 @@
+#include "tests/studies/wall_design.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "host_tools/experiment/job_pool.hpp"
+
+namespace kmax::studies {
+namespace {
+
+using experiment::DesignTask;
+using experiment::WallFamily;
+
+GridOptimum optimum_of(const DesignTask& task, const WallGrid& grid, const WallFamily& family, int floor) {
+  experiment::WallTrials trials(task);
+  std::vector<std::size_t> touches(task.touches());
+  std::iota(touches.begin(), touches.end(), 0U);
+  GridOptimum best{floor};
+  bool found = false;
+  const auto holds = [&](double damping, int rung) {
+    return !trials.first_unstable({family, damping, experiment::stiffness_of(rung)}, touches);
+  };
+  for (const double damping : grid.dampings) {
+    const int steps = best.rung < grid.first ? 0 : (best.rung - grid.first) / grid.step + 1;
+    const int better = grid.first + steps * grid.step;
+    if (better > experiment::top_rung || !holds(damping, better)) continue;
+    int rung = grid.first;
+    while (rung <= experiment::top_rung && (rung == better || holds(damping, rung))) rung += grid.step;
+    rung -= grid.step;
+    if (rung < better) continue;
+    found = true;
+    best.rung = rung;
+    best.family = family;
+    best.damping = damping;
+  }
+  if (!found) best.rung = -1;
+  best.touches = trials.touches();
+  return best;
+}
+
+}  // namespace
+
+WallGrid fine_grid(const DesignTask& task) {
+  const std::vector<double> coarse = experiment::dampings_of(task);
+  WallGrid grid{{0.0}};
+  for (std::size_t n = 1; n < coarse.size(); ++n)
+    for (int part = 0; part < 8; ++part)
+      grid.dampings.push_back(coarse[n] * std::pow(experiment::damping_ratio, (part - 7) / 8.0));
+  return grid;
+}
+
+GridOptimum grid_optimum(const DesignTask& task, const WallGrid& grid, int floor,
+                         const experiment::DesignRun& run) {
+  const std::vector<WallFamily> families = experiment::families_of(task);
+  const auto found = experiment::collect_jobs<GridOptimum>(
+      families.size(), run.threads, [&](std::size_t n) { return optimum_of(task, grid, families[n], floor); },
+      run.progress);
+  GridOptimum best;
+  std::uint64_t touches = 0;
+  for (const GridOptimum& one : found) {
+    touches += one.touches;
+    if (one.rung > best.rung) best = one;
+  }
+  best.touches = touches;
+  const int rungs = (std::max(best.rung, floor) - grid.first) / grid.step + 1;
+  best.points = families.size() * grid.dampings.size() * static_cast<std::uint64_t>(std::max(rungs, 0));
+  return best;
+}
+
+DesignTask random_device(std::uint64_t seed) {
+  // The engine's numbers are fixed by the standard, those of its distributions are not.
+  std::mt19937_64 random(seed);
+  const auto share = [&random] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
+  const auto between = [&share](double least, double most) {
+    return least * std::pow(most / least, share());
+  };
+  DesignTask task;
+  task.set = experiment::open_subject_set("clipped");
+  simulation::DeviceModel& device = task.set.device;
+  device.mass = between(0.02, 0.2);
+  device.damping = between(0.01, 0.5);
+  device.friction = between(0.02, 0.3);
+  device.force_limit = between(2.5, 20.0);
+  if (share() < 0.5) device.delay = between(0.1e-3, 1e-3);
+  if (share() < 0.5) simulation::bend(device, between(2e3, 5e4));
+  task.rate = share() < 0.5 ? 500.0 : 1000.0;
+  task.count_length = between(5e-6, 100e-6);
+  return task;
+}
+
+}  // namespace kmax::studies

@@ -1,0 +1,37 @@
+#pragma once
+// How far `kmax design wall` stays behind a fine grid, on random devices. kmax-wall-design-study
+// (wall_design_main.cpp) makes the table of docs/design_wall.md.
+
+#include <cstdint>
+#include <vector>
+
+#include "host_tools/experiment/design/wall_design.hpp"
+
+namespace kmax::studies {
+
+struct WallGrid {
+  std::vector<double> dampings;  ///< N s/m
+  int first = 162, step = 2;     ///< rungs: from 100 N/m on, 2 % apart
+};
+/// 0 and 192 more, 4.4 % apart, over the range that a design looks at.
+WallGrid fine_grid(const experiment::DesignTask& task);
+
+struct GridOptimum {
+  int rung = -1;  ///< -1: none above the floor
+  experiment::WallFamily family{};
+  double damping = 0.0;
+  std::uint64_t touches = 0;  ///< made
+  std::uint64_t points = 0;   ///< of the grid, up to the rung that was found or else the floor
+};
+
+/// The wall of the grid whose every rung from the first to its own holds for everybody by all touches, the
+/// highest of all families, if it is above the rung `floor`. That is what going through the whole grid finds:
+/// left out is only a wall of which one touch is unstable at the rung that would make it better than the best
+/// so far.
+GridOptimum grid_optimum(const experiment::DesignTask& task, const WallGrid& grid, int floor,
+                         const experiment::DesignRun& run);
+
+/// The same device and loop on every machine.
+experiment::DesignTask random_device(std::uint64_t seed);
+
+}  // namespace kmax::studies

@@ -1,0 +1,59 @@
+#include "tests/studies/wall_design.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/host_tools/experiment/design/design_case.hpp"
+
+namespace kmax::studies::wall_design_test {
+
+using experiment::DesignTask;
+
+/// A random device, touched seldom.
+DesignTask quick_device(std::uint64_t seed) {
+  DesignTask task = random_device(seed);
+  const DesignTask quick = experiment::quick_task();
+  task.set.subjects = quick.set.subjects;
+  task.protocol = quick.protocol;
+  task.rate = 500.0;
+  return task;
+}
+
+/// Every wall of the grid from the first stiffness upwards, and nothing left out.
+int plain_optimum(const DesignTask& task, const WallGrid& grid) {
+  experiment::WallTrials trials(task);
+  int best = -1;
+  for (const experiment::WallFamily& family : experiment::families_of(task)) {
+    for (const double damping : grid.dampings) {
+      for (int rung = grid.first; !trials.first_unstable({family, damping, experiment::stiffness_of(rung)});
+           rung += grid.step)
+        best = std::max(best, rung);
+    }
+  }
+  return best;
+}
+
+TEST(WallGrid, ItsOptimumIsThatOfGoingThroughAllOfIt) {
+  const DesignTask task = quick_device(1);
+  const WallGrid grid{{0.0, 2.0, 8.0}, 162, 20};
+  const int best = plain_optimum(task, grid);
+  ASSERT_GT(best, 0);
+  EXPECT_EQ(grid_optimum(task, grid, -1, {2}).rung, best);
+  EXPECT_EQ(grid_optimum(task, grid, best - 1, {2}).rung, best);
+  EXPECT_EQ(grid_optimum(task, grid, best, {2}).rung, -1) << "none above it";
+}
+
+TEST(WallGrid, ADesignIsHardlyBehindIt) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const DesignTask task = quick_device(seed);
+    const experiment::WallDesign design = experiment::design_wall(task, {2}, false);
+    ASSERT_TRUE(design.found) << seed;
+    WallGrid grid = fine_grid(task);
+    grid.step = 4;
+    const GridOptimum best = grid_optimum(task, grid, 0, {2});
+    ASSERT_GE(best.rung, 0) << seed;
+    EXPECT_GT(design.largest, 0.93 * experiment::stiffness_of(best.rung)) << seed;
+    EXPECT_LT(20 * design.touches, best.points * task.touches()) << seed;
+  }
+}
+
+}  // namespace kmax::studies::wall_design_test
