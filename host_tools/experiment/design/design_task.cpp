@@ -42,6 +42,8 @@ void validate(const DesignTask& task) {
           "nobody touches: name people and touches");
   require(task.rate >= 100.0 && task.rate <= 1e5,
           fmt::format("loop of {} Hz: allowed is 100 to 100000 Hz", task.rate));
+  require(task.growth_time >= 0.0 && task.growth_time <= 60.0,
+          fmt::format("growth time of {:g} s: allowed is 0 (walls do not grow) to 60 s", task.growth_time));
   require(task.margin >= 0.0 && task.margin < 1.0,
           fmt::format("margin of {:g} %: allowed is 0 to below 100 %", 100.0 * task.margin));
   const double limit = task.set.device.force_limit;
@@ -59,6 +61,7 @@ std::string name_of(const WallFamily& family) {
     name += fmt::format(" of {:g} Hz", velocity.bandwidth);
   if (velocity.kind == Kind::foaw || velocity.kind == Kind::foaw_end_fit)
     name += fmt::format(" of {} samples", velocity.window);
+  if (family.grows()) name = fmt::format("grows from {:g} %", 100.0 * family.touch_share);
   if (family.coefficient > 0.0)
     name += fmt::format(", field of {:g} N over {:g} mm", family.coefficient, family.length * 1e3);
   return name;
@@ -67,12 +70,14 @@ std::string name_of(const WallFamily& family) {
 std::vector<WallFamily> families_of(const DesignTask& task) {
   std::vector<WallFamily> families;
   for (const Velocity& velocity : estimators_for(task.rate)) families.push_back({velocity});
+  if (task.growth_time > 0.0)
+    for (const double share : {0.15, 0.25, 0.4}) families.push_back({Velocity{}, 0.0, 1e-3, share});
   if (task.field == 0.0) return families;
   const std::size_t without = families.size();
   for (const double share : {0.5, 1.0})
     for (const double length : {1e-3, 3e-3})
       for (std::size_t n = 0; n < without; ++n)
-        families.push_back({families[n].velocity, share * task.field, length});
+        families.push_back({families[n].velocity, share * task.field, length, families[n].touch_share});
   return families;
 }
 
@@ -104,6 +109,11 @@ TouchSetup touch_of(const DesignTask& task, const DesignedWall& wall, const Touc
   setup.wall.wall.magnetic_length = static_cast<float>(wall.family.length);
   setup.wall.wall.damping = static_cast<float>(wall.damping);
   setup.wall.wall.stiffness = static_cast<float>(wall.stiffness);
+  if (wall.family.grows()) {
+    setup.wall.damping_window = 1;
+    setup.wall.wall.growing.touch_stiffness = static_cast<float>(wall.family.touch_share * wall.stiffness);
+    setup.wall.wall.growing.growth_time = static_cast<float>(task.growth_time);
+  }
   setup.motion.approach_speed = touch.speed;
   setup.motion.push_force = touch.push;
   setup.threshold = task.protocol.threshold;

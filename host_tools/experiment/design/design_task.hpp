@@ -2,8 +2,8 @@
 // What a virtual wall is designed for: a device, the people who will touch it, and what counts as holding.
 //
 // What is looked for has two numbers, stiffness and damping, and a family: the velocity estimator that the
-// damping goes by, and the field in front of the wall. Stiffnesses are those of a ladder of equal ratios, so
-// that results do not hang on the way a search went.
+// damping goes by, the field in front of the wall, and how it grows. Stiffnesses are those of a ladder of
+// equal ratios, so that results do not hang on the way a search went.
 
 #include <cstdint>
 #include <optional>
@@ -28,6 +28,7 @@ struct DesignTask {
   double count_length = 55e-6;  ///< m, of the encoder at the handle
   TouchProtocol protocol{.force_threshold = felt_force};
   double field = 0.0;           ///< N, largest force of the field on a handle at rest; 0: no field
+  double growth_time = 0.0;     ///< s, wall.growth_time; 0: walls have all of their stiffness at once
   std::optional<double> depth;  ///< m, how deep the handle may get in any touch; none: however deep
   double margin = 0.2;          ///< share of the largest stable stiffness that is taken off, 0 to below 1
 
@@ -41,6 +42,10 @@ struct WallFamily {
   control::VelocityEstimatorConfig<float> velocity;
   double coefficient = 0.0;  ///< N, F_MC
   double length = 1e-3;      ///< m, x_0; of no meaning without a field
+  /// wall.touch_stiffness as a share of the stiffness; 1: all of it at once. Below, the damping goes by the
+  /// difference over one sample, and the velocity says what is calm.
+  double touch_share = 1.0;
+  bool grows() const { return touch_share < 1.0; }
 };
 /// "difference", "foaw of 8 samples, field of 1 N over 3 mm".
 std::string name_of(const WallFamily& family);

@@ -225,6 +225,7 @@ RunJournal::Json design_settings(const DesignTask& task) {
           {"moves_m", task.protocol.threshold},
           {"feels_n", task.protocol.force_threshold},
           {"field_n", task.field},
+          {"growth_time_s", task.growth_time},
           {"depth_m", task.depth ? RunJournal::Json(*task.depth) : RunJournal::Json(nullptr)},
           {"margin", task.margin}};
 }
@@ -328,6 +329,13 @@ std::vector<device::Assignment> parameters_of(const DesignTask& task, const Desi
                                  fmt::format("velocity.window={}", velocity.window),
                                  fmt::format("velocity.bandwidth={}", velocity.bandwidth),
                                  fmt::format("haptic.rate={}", static_cast<float>(task.rate))};
+  if (wall.family.grows()) {
+    const control::HapticLoopConfig<float> loop = touch_of(task, wall, case_of(task, 0)).wall;
+    texts.push_back(fmt::format("wall.damping_window={}", loop.damping_window));
+    texts.push_back(fmt::format("wall.touch_stiffness={}", loop.wall.growing.touch_stiffness));
+    texts.push_back(fmt::format("wall.growth_time={}", loop.wall.growing.growth_time));
+    texts.push_back(fmt::format("wall.calm_velocity={}", loop.wall.growing.calm_velocity));
+  }
   if (field) {
     texts.push_back(fmt::format("wall.magnetic_coefficient={}", static_cast<float>(wall.family.coefficient)));
     texts.push_back(fmt::format("wall.magnetic_length={}", static_cast<float>(wall.family.length)));

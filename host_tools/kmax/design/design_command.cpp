@@ -32,7 +32,7 @@ struct DesignWallOptions {
   std::optional<double> mass, friction, damping, delay, structure_stiffness, force_limit, rate, encoder,
       depth;
   double feels = experiment::felt_force, moves = experiment::TouchProtocol{}.threshold, margin = 20.0,
-         field = 0.0;
+         field = 0.0, growth = 0.0;
   std::optional<std::uint64_t> seed;
   std::size_t jobs = 0;
   ExperimentFiles files;
@@ -62,6 +62,9 @@ struct DesignWallOptions {
     add_number(command, "--margin", margin, "Taken off the largest stiffness that holds, %", 0.0, 99.0);
     add_quantity(command, "--field", field, "N",
                  "Largest force of a field on a handle at rest, N; 0: no field", 0.0, 100.0);
+    add_quantity(command, "--growth", growth, "s",
+                 "Time constant with which a wall may grow to its stiffness, s; 0: all of it at once", 0.0,
+                 60.0);
     add_quantity(command, "--depth", depth, "m", "Deepest that the handle may get, m; else however deep",
                  1e-6, 1.0);
     command
@@ -144,6 +147,7 @@ DesignTask task_of(Context& context, const DesignWallOptions& options) {
   task.protocol.force_threshold = options.feels;
   task.margin = options.margin / 100.0;
   task.field = options.field;
+  task.growth_time = options.growth;
   task.depth = options.depth;
   if (options.seed) {
     task.set.subjects =
@@ -325,11 +329,12 @@ void add_design_wall_command(CLI::App& design, Context& context) {
        R"(  kmax design wall                                       the papers' device, 500 Hz, a minute
   kmax design wall --mass 60g --friction 0.2N --delay 0.3ms --rate 2kHz --encoder 5um --save wall.toml
   kmax design wall --device handle.toml --field 1N       of 'kmax dump handle.toml'; a field is allowed
+  kmax design wall --growth 0.2s                         that grows stiff while the contact is calm
   kmax design wall --shard 1/4 --out shares              on four computers, 1/4 to 4/4; then
   kmax design wall --merge shares --save wall.toml
 
-Searched are wall.damping, velocity.estimator with its window or bandwidth, a field up to --field, and the
-stiffness. Nobody's touch may be unstable, neither by the handle's motion nor by the force. Exit code 3: no
+Searched are wall.damping, velocity.estimator with its window or bandwidth, a field up to --field, with --growth
+the stiffness at the moment of contact, and the stiffness. Nobody's touch may be unstable, neither by the handle's motion nor by the force. Exit code 3: no
 wall holds. See docs/design_wall.md.)"},
       Takes::nothing, run_design_wall);
 }

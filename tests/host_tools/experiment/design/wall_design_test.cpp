@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/drive/axis_configuration.hpp"
 #include "host_tools/experiment/design/wall_design_report.hpp"
 #include "tests/host_tools/experiment/design/design_case.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
@@ -35,6 +36,27 @@ TEST(DesignTask, LooksAtFieldsOnlyWhereOneIsAllowed) {
   for (const WallFamily& family : families) EXPECT_LE(family.coefficient, 1.0) << name_of(family);
 }
 
+TEST(DesignTask, LooksAtWallsThatGrowOnlyWhereTheyMay) {
+  DesignTask task = quick_task();
+  for (const WallFamily& family : families_of(task)) EXPECT_FALSE(family.grows()) << name_of(family);
+  task.growth_time = 0.3;
+  const auto families = families_of(task);
+  const WallFamily& last = families.back();
+  EXPECT_EQ(name_of(last), "grows from 40 %");
+  const TouchSetup touch = touch_of(task, {last, 6.0, 10000.0}, case_of(task, 0));
+  EXPECT_FLOAT_EQ(touch.wall.wall.growing.touch_stiffness, 4000.0F);
+  EXPECT_FLOAT_EQ(touch.wall.wall.growing.growth_time, 0.3F);
+  EXPECT_EQ(touch.wall.damping_window, 1);
+  EXPECT_FALSE(families.front().grows());
+  // As parameters they make the same wall.
+  firmware::ParameterValues values;
+  for (const device::Assignment& assignment : parameters_of(task, {last, 6.0, 10000.0}))
+    values.set_raw(assignment.parameter.slot(), assignment.raw);
+  const auto wall = firmware::wall_configuration<float>(values, 0);
+  EXPECT_EQ(wall.growing.touch_stiffness, touch.wall.wall.growing.touch_stiffness);
+  EXPECT_EQ(wall.growing.calm_velocity, touch.wall.wall.growing.calm_velocity);
+}
+
 TEST(DesignTask, SaysWhatIsNotAllowed) {
   const auto refused = [](const auto& change) {
     DesignTask task = quick_task();
@@ -43,6 +65,7 @@ TEST(DesignTask, SaysWhatIsNotAllowed) {
   };
   EXPECT_CONTAINS(refused([](DesignTask& task) { task.field = 5.0; }),
                   "field of 5 N on a device that makes 3.3 N");
+  EXPECT_CONTAINS(refused([](DesignTask& task) { task.growth_time = -1.0; }), "growth time of -1 s");
   EXPECT_CONTAINS(refused([](DesignTask& task) { task.margin = 1.0; }), "margin of 100 %");
   EXPECT_CONTAINS(refused([](DesignTask& task) { task.rate = 1.0; }), "loop of 1 Hz");
   EXPECT_CONTAINS(refused([](DesignTask& task) { task.set.subjects.clear(); }), "nobody touches");
