@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 
@@ -16,6 +15,7 @@ using std::chrono::milliseconds;
 
 namespace {
 constexpr auto longest_silence = std::chrono::seconds(2);  // of the trace; each request takes < 1 s
+constexpr double shortest_round = 0.03;                    // s, from one look at the trace to the next
 constexpr double longest_timeout = 1.0;                    // s an axis may push that nobody watches
 
 /// Somebody came to the wall between the look and the arming, which was refused.
@@ -89,19 +89,6 @@ class ArmedAxes {
   std::vector<device::Drive> drives_;
   bool armed_ = true;
 };
-
-/// Whether contact_measure.hpp has enough to judge: two samples in every quarter of the window.
-bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
-                   const simulation::ContactCriterion& criterion) {
-  std::array<std::size_t, 4> count{};
-  const double length = criterion.window_end - criterion.window_begin;
-  for (const simulation::ContactSample& sample : positions) {
-    if (sample.time < criterion.window_begin || sample.time >= criterion.window_end) continue;
-    const double part = (sample.time - criterion.window_begin) / length * 4.0;
-    ++count[std::min<std::size_t>(3, static_cast<std::size_t>(part))];
-  }
-  return *std::min_element(count.begin(), count.end()) >= 2;
-}
 
 class Watch {
  public:
@@ -225,13 +212,25 @@ class Watch {
   }
 
   void make_changes() {
-    while (touch_.change_times.size() < watch_.changes.size()) {
-      const double time = now();
-      const TimedChange& next = watch_.changes[touch_.change_times.size()];
-      if (time < touched_ + next.time) return;
+    const double begin = now();
+    const auto begun = device_.link().now();
+    double earlier = 0.0;  // s, when the change before was due
+    for (std::size_t first = touch_.change_times.size(), made = first; made < watch_.changes.size(); ++made) {
+      const TimedChange& next = watch_.changes[made];
+      const auto time = [&] {
+        return begin + std::chrono::duration<double>(device_.link().now() - begun).count();
+      };
+      if (made > first && next.time - earlier < shortest_round) {
+        const double left = touched_ + touch_.change_times.back() + next.time - earlier - time();
+        if (left > 0.0) device_.link().wait(std::chrono::microseconds(std::llround(left * 1e6)));
+      } else if (time() < touched_ + next.time) {
+        return;
+      }
+      earlier = next.time;
+      const double at = time();
       device_.apply(device::parse_assignments(next.assignments, wall()));
-      touch_.change_times.push_back(time - touched_);
-      if (next.moves_wall_axis) disturbed_ = time;
+      touch_.change_times.push_back(at - touched_);
+      if (next.moves_wall_axis) disturbed_ = at;
     }
   }
 
@@ -324,7 +323,7 @@ simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_
   criterion.threshold = threshold;
   criterion.wall_position = touch.surface;
   criterion.wall_side = touch.side;
-  if (!can_be_judged(positions, criterion)) return {};
+  if (!simulation::can_be_judged(positions, criterion)) return {};
   return simulation::measure_contact(positions, criterion);
 }
 
