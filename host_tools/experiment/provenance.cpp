@@ -38,15 +38,17 @@ report::Section provenance_section(const Provenance& provenance) {
   report::Section section{"Origin of these numbers", {}, {}, {}};
   section.paragraphs.push_back(fmt::format(
       "Made on {} with {}{}.", provenance.date, provenance.program,
-      provenance.device.empty() ? " on simulated people, without a device" : " on " + provenance.device));
+      provenance.device.empty() ? ", on simulated people, without a device" : ", on " + provenance.device));
   if (!provenance.device.empty())
     section.paragraphs.push_back(provenance.parameters.empty()
                                      ? std::string("All parameters are the defaults.")
                                      : fmt::format("Parameters that are not the defaults: {}.",
                                                    fmt::join(provenance.parameters, ", ")));
-  section.paragraphs.push_back(provenance.seed
-                                   ? fmt::format("Seed of what is simulated by chance: {}.", *provenance.seed)
-                                   : std::string("Nothing in it is drawn by chance."));
+  if (provenance.seed) {
+    section.paragraphs.push_back(fmt::format("Seed of what is simulated by chance: {}.", *provenance.seed));
+  } else if (provenance.device.empty()) {
+    section.paragraphs.emplace_back("Nothing in it is drawn by chance.");
+  }
   for (const std::string& reference : references()) section.paragraphs.push_back(reference);
   return section;
 }

@@ -20,7 +20,7 @@ struct Provenance {
   /// NAME=VALUE, of all parameters of that device that are kept over a restart and are not their defaults,
   /// while the experiment ran.
   std::vector<std::string> parameters;
-  std::optional<std::uint64_t> seed;  ///< of what is simulated by chance; nothing: nothing is
+  std::optional<std::uint64_t> seed;  ///< of a simulated device; of people and of a real one nothing
 };
 
 /// Who a device is, in a line: its address and its identification.

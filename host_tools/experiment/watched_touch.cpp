@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "host_tools/device/drive.hpp"
 
@@ -131,6 +132,10 @@ class Watch {
   bool wall_traced() const { return traced() == wall(); }
   bool touched() const { return touched_ >= 0.0; }
   double now() const { return touch_.samples.empty() ? 0.0 : touch_.samples.back().time; }
+  /// s
+  double link_time() const { return std::chrono::duration<double>(device_.link().now()).count(); }
+  /// Of the trace, as it is on the device: a slow link hands the records over late, but the least lag so far.
+  double device_time() const { return link_time() + ahead_; }
   bool over() const { return touched() && now() >= touched_ + watch_.hold_time + watch_.release; }
 
   /// Of the wall's axis from the surface, m, as the device has it when it refuses to be armed inside.
@@ -152,6 +157,7 @@ class Watch {
     for (int round = 0;; ++round) {
       device_.link().wait(milliseconds(20));
       trace.read(touch_.samples);
+      if (!touch_.samples.empty()) ahead_ = std::max(ahead_, now() - link_time());
       if (looked_at_ < touch_.samples.size()) last_record = device_.link().now();
       late_.looked(now());
       if (!wall_traced()) look_at_wall();
@@ -212,22 +218,17 @@ class Watch {
   }
 
   void make_changes() {
-    const double begin = now();
-    const auto begun = device_.link().now();
     double earlier = 0.0;  // s, when the change before was due
     for (std::size_t first = touch_.change_times.size(), made = first; made < watch_.changes.size(); ++made) {
       const TimedChange& next = watch_.changes[made];
-      const auto time = [&] {
-        return begin + std::chrono::duration<double>(device_.link().now() - begun).count();
-      };
       if (made > first && next.time - earlier < shortest_round) {
-        const double left = touched_ + touch_.change_times.back() + next.time - earlier - time();
+        const double left = touched_ + touch_.change_times.back() + next.time - earlier - device_time();
         if (left > 0.0) device_.link().wait(std::chrono::microseconds(std::llround(left * 1e6)));
-      } else if (time() < touched_ + next.time) {
+      } else if (device_time() < touched_ + next.time) {
         return;
       }
       earlier = next.time;
-      const double at = time();
+      const double at = device_time();
       device_.apply(device::parse_assignments(next.assignments, wall()));
       touch_.change_times.push_back(at - touched_);
       if (next.moves_wall_axis) disturbed_ = at;
@@ -248,6 +249,7 @@ class Watch {
   std::size_t looked_at_ = 0,
               first_ = 0;  ///< of the samples: the next to be looked at, the first of the touch
   double touched_ = -1.0;
+  double ahead_ = -std::numeric_limits<double>::infinity();  ///< s, of the trace's time against the link's
   double disturbed_ = -1.0;         ///< the touch or the last change that moved the wall's axis
   std::vector<TraceSample> looks_;  ///< at the wall's axis, since the touch
   std::size_t touching_ = 0;        ///< of the looks

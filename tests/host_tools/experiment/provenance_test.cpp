@@ -17,7 +17,7 @@ TEST(ProvenanceSection, SaysWhenWithWhatOnWhatAndAfterWhom) {
                                     "serial:/dev/x, serial 7",
                                     {"wall.stiffness=2000", "haptic.rate=500"},
                                     42});
-  for (const char* part : {"Made on 2026-01-02 with kmax 1.2.3, commit 1a2b3c4 on serial:/dev/x, serial 7.",
+  for (const char* part : {"Made on 2026-01-02 with kmax 1.2.3, commit 1a2b3c4, on serial:/dev/x, serial 7.",
                            "not the defaults: wall.stiffness=2000, haptic.rate=500.", "chance: 42.",
                            "Paper 1: A Human Arm's Mechanical Impedance Tuning Method", "Paper 2: "})
     EXPECT_CONTAINS(text, part);
@@ -25,10 +25,11 @@ TEST(ProvenanceSection, SaysWhenWithWhatOnWhatAndAfterWhom) {
 
 TEST(ProvenanceSection, SaysThatThereIsNothingToSay) {
   const std::string people = text_of({"2026-01-02", "kmax", "", {}, {}});
-  EXPECT_CONTAINS(people, "kmax on simulated people, without a device.");
+  EXPECT_CONTAINS(people, "kmax, on simulated people, without a device.");
   EXPECT_CONTAINS(people, "Nothing in it is drawn by chance.");
   EXPECT_EQ(people.find("defaults"), std::string::npos);
   EXPECT_CONTAINS(text_of({"2026-01-02", "kmax", "sim", {}, 1}), "All parameters are the defaults.");
+  EXPECT_EQ(text_of({"2026-01-02", "kmax", "serial:/dev/x", {}, {}}).find("chance"), std::string::npos);
 }
 
 using ChangedParameters = TouchedBoard;

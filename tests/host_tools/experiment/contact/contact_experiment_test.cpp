@@ -236,7 +236,7 @@ TEST(ContactReport, SaysWhichVerdictsTheFitImplies) {
   };
   EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 2u);
   EXPECT_EQ(rows_with("| a test |", report::Origin::predicted), 4u);
-  EXPECT_EQ(rows_with("Made on 2026-01-02 with kmax 9 on sim.", report::Origin::predicted), 1u);
+  EXPECT_EQ(rows_with("Made on 2026-01-02 with kmax 9, on sim.", report::Origin::predicted), 1u);
   EXPECT_EQ(rows_with("implied by the fit", report::Origin::measured), 0u);
   for (ContactResult& result : results) result.papers_wall = false;
   EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 0u);
