@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 
 #include "host_tools/device/parameter.hpp"
@@ -54,18 +55,22 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
     return text(parameter, static_cast<std::uint32_t>(value));
   };
   std::vector<std::string> all = {fmt::format("wall.stiffness={}", wall.stiffness),
-                                  fmt::format("haptic.rate={}", wall.haptic_rate),
-                                  fmt::format("position.resolution={}", wall.resolution),
-                                  choice(device::Parameter::of<"position.rounding">(), wall.rounding),
                                   choice(device::Parameter::of<"interference.mode">(), wall.interference),
                                   fmt::format("interference.force={}", wall.force),
-                                  fmt::format("interference.background_force={}", wall.background_force),
-                                  choice(device::Parameter::of<"wall.law">(), wall.law),
-                                  fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
-                                  choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)};
-  for (const char* name : papers_constants) {
-    const device::Parameter parameter = device::resolve(name);
-    all.push_back(text(parameter, parameter.default_raw()));
+                                  fmt::format("interference.background_force={}", wall.background_force)};
+  if (!wall.as_set) {
+    for (const std::string& one : std::initializer_list<std::string>{
+             fmt::format("haptic.rate={}", wall.haptic_rate),
+             fmt::format("position.resolution={}", wall.resolution),
+             choice(device::Parameter::of<"position.rounding">(), wall.rounding),
+             choice(device::Parameter::of<"wall.law">(), wall.law),
+             fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
+             choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)})
+      all.push_back(one);
+    for (const char* name : papers_constants) {
+      const device::Parameter parameter = device::resolve(name);
+      all.push_back(text(parameter, parameter.default_raw()));
+    }
   }
   for (const std::string& change : wall.changes) {
     const std::string name = change.substr(0, change.find('=') + 1);
@@ -149,13 +154,17 @@ void DeviceRig::note(const std::string& text) const {
 RigTouch DeviceRig::hold(const TouchPlan& plan) {
   // The touch before has left its last forces behind.
   if (!plan.changes.empty()) {
-    set(wall_);
+    set(plan.wall.value_or(wall_));
     // These changes come while the axis is armed, when forces are raised no farther than this.
     double largest = 0.0;
     for (const ForceChange& change : plan.changes) largest = std::max(largest, std::abs(change.force));
     apply({fmt::format("force.ceiling={}", largest)});
   }
-  if (session_.prompter != nullptr) session_.prompter->ask(plan.request);
+  if (session_.prompter != nullptr) {
+    session_.prompter->ask(plan.request);
+  } else if (plan.pause > 0.0) {
+    device_.link().wait(std::chrono::microseconds(std::llround(plan.pause * 1e6)));
+  }
   if (plan.wall) set_with_limits(*plan.wall);
   const bool two_axes = axes_ == RigAxes::wall_along;
   TouchWatch watch;

@@ -2,9 +2,8 @@
 // Every number of the two papers that an experiment compares itself with, in SI units, with the place where
 // it is printed. The only place in the program where they are written down.
 //
-// Paper 1: "A Human Arm's Mechanical Impedance Tuning Method for Improving the Stability of Haptic
-// Rendering", 2020. Paper 2: on the relation between a haptic device's position resolution and its stability.
-// Both give means over people, without spreads: paper 1's tables over six, its stiffnesses over twelve.
+// Both papers (title_1, title_2) give means over people, without spreads: paper 1's tables over six, its
+// stiffnesses over twelve.
 
 #include <array>
 #include <cstddef>
@@ -12,6 +11,14 @@
 #include <string_view>
 
 namespace kmax::experiment::paper {
+
+// As far as the copies that these numbers were taken from say it: neither names its authors or its DOI.
+inline constexpr std::string_view title_1 =
+    "A Human Arm's Mechanical Impedance Tuning Method for Improving the Stability of Haptic Rendering, first "
+    "published online on July 21, 2020.";
+inline constexpr std::string_view title_2 =
+    "on the relation between the position resolution of a haptic device and its stability, with experiments "
+    "on a Phantom Desktop.";
 
 // --- Paper 1, section 4: device and setting of its main experiments ---------------------------------------
 inline constexpr double touch_resolution = 0.055e-3;     // m, section 4

@@ -29,6 +29,8 @@ struct RigWall {
   control::WallKind law = control::WallKind::plain;
   double magnetic_coefficient = 0.0;  ///< N, of the magnetic law
   control::AdaptiveMode mode = control::AdaptiveMode::instant;
+  /// On a device: its law, its rate and all else that is not the stiffness or a force stay as they are set.
+  bool as_set = false;
   /// NAME=VALUE, on a device, in place of what is said above or beside it.
   std::vector<std::string> changes{};
 };
@@ -51,6 +53,7 @@ struct TouchPlan {
   std::vector<ForceChange> changes{};  ///< in order of time
   /// Set at each attempt, on a device with its limits; without it the wall that was set stays.
   std::optional<RigWall> wall{};
+  double pause = 0.0;  ///< s before it where nobody is asked: a simulated hand goes back meanwhile
 
   // Of simulated people.
   std::size_t person = 0;

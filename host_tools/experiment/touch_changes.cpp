@@ -24,6 +24,7 @@ constexpr std::string_view parameters_prefix = "parameters.";
 struct ChangeableParameter {
   std::string_view name;
   void (*copy)(Loop& to, const Loop& from);
+  bool of_papers_walls = false;  ///< which are told apart by it
 };
 
 constexpr auto copy_adaptive = [](Loop& to, const Loop& from) {
@@ -73,6 +74,14 @@ constexpr std::array changeable_parameters{
                         [](Loop& to, const Loop& from) { to.position_rounding = from.position_rounding; }},
     ChangeableParameter{"force.slew_limit",
                         [](Loop& to, const Loop& from) { to.force.slew_limit = from.force.slew_limit; }},
+    ChangeableParameter{"wall.law", [](Loop& to, const Loop& from) { to.wall.kind = from.wall.kind; }, true},
+    ChangeableParameter{
+        "wall.magnetic_coefficient",
+        [](Loop& to, const Loop& from) { to.wall.magnetic_coefficient = from.wall.magnetic_coefficient; },
+        true},
+    ChangeableParameter{"wall.adaptive_mode",
+                        [](Loop& to, const Loop& from) { to.wall.adaptive.mode = from.wall.adaptive.mode; },
+                        true},
 };
 
 /// What a name is left alone for, and what changes it instead.
@@ -95,7 +104,7 @@ constexpr std::array reserved{
 
 /// Calls `take(member, name)` for each number of what is simulated that may be changed.
 template <typename Take>
-void for_each_number(Touching touching, const Take& take) {
+void for_each_number(Touching touching, Varied varied, const Take& take) {
   if (touching == Touching::device) return;
   for (const auto& field : simulation::device_fields) {
     if (std::string_view(field.name) != "force_limit")
@@ -116,7 +125,8 @@ void for_each_number(Touching touching, const Take& take) {
         });
   for (const auto& field : simulation::motion_fields) {
     const std::string_view name = field.name;
-    const bool of_one_person = name == "approach_speed" || name == "push_force";
+    const bool of_one_person =
+        (name == "approach_speed" && varied == Varied::papers_walls) || name == "push_force";
     if (name == "start_position" || (of_one_person && touching == Touching::simulated_person))
       take(
           fmt::format("motion.{}", name), [&field](auto& axis) -> auto& {
@@ -127,10 +137,12 @@ void for_each_number(Touching touching, const Take& take) {
       "encoder.counts_per_turn", [](auto& axis) -> auto& { return axis.encoder.counts_per_turn; });
 }
 
-std::vector<std::string> names_of(Touching touching) {
+std::vector<std::string> names_of(Touching touching, Varied varied) {
   std::vector<std::string> names;
-  for (const ChangeableParameter& one : changeable_parameters) names.emplace_back(one.name);
-  for_each_number(touching, [&](const std::string& name, const auto&) { names.push_back(name); });
+  for (const ChangeableParameter& one : changeable_parameters) {
+    if (!one.of_papers_walls || varied != Varied::papers_walls) names.emplace_back(one.name);
+  }
+  for_each_number(touching, varied, [&](const std::string& name, const auto&) { names.push_back(name); });
   return names;
 }
 
@@ -138,17 +150,17 @@ bool is_one_of(const std::string& name, const std::vector<std::string>& names) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-[[noreturn]] void refuse(const std::string& name, bool parameter, Touching touching) {
+[[noreturn]] void refuse(const std::string& name, bool parameter, Touching touching, Varied varied) {
   const auto* known =
       std::find_if(reserved.begin(), reserved.end(), [&](const Reserved& one) { return one.name == name; });
   if (known != reserved.end())
     throw device::ValueError(fmt::format("--set {}: not to be changed here; {}", name, known->why));
-  if (!parameter && is_one_of(name, names_of(Touching::simulated_person)))
+  if (!parameter && is_one_of(name, names_of(Touching::simulated_person, varied)))
     throw device::ValueError(fmt::format(
         "--set {}: it is simulated, and the device that --device names is as it is; leave one of them out",
         name));
   throw device::ValueError(fmt::format("--set {}: no touch of this experiment goes by it; allowed are {}",
-                                       name, fmt::join(names_of(touching), ", ")));
+                                       name, fmt::join(names_of(touching, varied), ", ")));
 }
 
 /// The supplied scene of one person at a wall; with a structure where one is asked for.
@@ -165,8 +177,8 @@ bool of_structure(const simulation::SceneSetting& setting) {
 
 }  // namespace
 
-TouchChanges::TouchChanges(const std::vector<std::string>& texts, Touching touching) {
-  const std::vector<std::string> allowed = names_of(touching);
+TouchChanges::TouchChanges(const std::vector<std::string>& texts, Touching touching, Varied varied) {
+  const std::vector<std::string> allowed = names_of(touching, varied);
   for (simulation::SceneSetting& setting : simulated_board::parse_settings(texts)) {
     const bool parameter = setting.name.starts_with(parameters_prefix);
     if (parameter) setting.name.erase(0, parameters_prefix.size());
@@ -174,7 +186,7 @@ TouchChanges::TouchChanges(const std::vector<std::string>& texts, Touching touch
         std::any_of(changeable_parameters.begin(), changeable_parameters.end(),
                     [&](const ChangeableParameter& one) { return one.name == setting.name; });
     if (!is_one_of(setting.name, allowed) || parameter != of_firmware)
-      refuse(setting.name, parameter, touching);
+      refuse(setting.name, parameter, touching, varied);
     (parameter ? of_parameters_ : of_scene_).push_back(std::move(setting));
   }
   if (!empty()) read();
@@ -235,9 +247,10 @@ void TouchChanges::apply(TouchSetup& setup) const {
   to.person = setup.person;
   to.motion = setup.motion;
   if (from.device.structure && !to.device.structure) to.device.structure = from.device.structure;
-  for_each_number(Touching::simulated_person, [&](const std::string& name, const auto& member) {
-    if (changes(name)) member(to) = member(from);
-  });
+  for_each_number(Touching::simulated_person, Varied::papers_walls,
+                  [&](const std::string& name, const auto& member) {
+                    if (changes(name)) member(to) = member(from);
+                  });
   setup.device = to.device;
   setup.person = *to.person;
   setup.motion = *to.motion;
@@ -249,7 +262,7 @@ simulation::Scene TouchChanges::simulated_device() const {
 }
 
 std::string changeable_names(Touching touching) {
-  return fmt::format("{}", fmt::join(names_of(touching), ", "));
+  return fmt::format("{}", fmt::join(names_of(touching, Varied::papers_walls), ", "));
 }
 
 }  // namespace kmax::experiment

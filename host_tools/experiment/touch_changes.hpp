@@ -21,13 +21,20 @@ enum class Touching : std::uint8_t {
   device,            ///< whoever holds it
 };
 
+/// What the experiment itself varies, and so what is not to be changed.
+enum class Varied : std::uint8_t {
+  papers_walls,          ///< law, coefficient and mode of the papers' walls
+  stiffness_and_speeds,  ///< of a wall that is otherwise anybody's
+};
+
 class TouchChanges {
  public:
   /// None.
   TouchChanges() = default;
   /// "NAME=VALUE" each. Throws device::ValueError or simulation::SceneError: an unknown name or one given
   /// twice, one that is not to be changed here, a value that is not allowed, values that do not go together.
-  TouchChanges(const std::vector<std::string>& texts, Touching touching);
+  TouchChanges(const std::vector<std::string>& texts, Touching touching,
+               Varied varied = Varied::papers_walls);
 
   bool empty() const { return of_parameters_.empty() && of_scene_.empty(); }
   /// "wall.damping=8", as given, the parameters first.

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "host_tools/device/drive.hpp"
 
@@ -16,6 +16,7 @@ using std::chrono::milliseconds;
 
 namespace {
 constexpr auto longest_silence = std::chrono::seconds(2);  // of the trace; each request takes < 1 s
+constexpr double shortest_round = 0.03;                    // s, from one look at the trace to the next
 constexpr double longest_timeout = 1.0;                    // s an axis may push that nobody watches
 
 /// Somebody came to the wall between the look and the arming, which was refused.
@@ -90,19 +91,6 @@ class ArmedAxes {
   bool armed_ = true;
 };
 
-/// Whether contact_measure.hpp has enough to judge: two samples in every quarter of the window.
-bool can_be_judged(const std::vector<simulation::ContactSample>& positions,
-                   const simulation::ContactCriterion& criterion) {
-  std::array<std::size_t, 4> count{};
-  const double length = criterion.window_end - criterion.window_begin;
-  for (const simulation::ContactSample& sample : positions) {
-    if (sample.time < criterion.window_begin || sample.time >= criterion.window_end) continue;
-    const double part = (sample.time - criterion.window_begin) / length * 4.0;
-    ++count[std::min<std::size_t>(3, static_cast<std::size_t>(part))];
-  }
-  return *std::min_element(count.begin(), count.end()) >= 2;
-}
-
 class Watch {
  public:
   Watch(device::Device& device, const TouchWatch& watch, const ReportText& report)
@@ -144,6 +132,10 @@ class Watch {
   bool wall_traced() const { return traced() == wall(); }
   bool touched() const { return touched_ >= 0.0; }
   double now() const { return touch_.samples.empty() ? 0.0 : touch_.samples.back().time; }
+  /// s
+  double link_time() const { return std::chrono::duration<double>(device_.link().now()).count(); }
+  /// Of the trace, as it is on the device: a slow link hands the records over late, but the least lag so far.
+  double device_time() const { return link_time() + ahead_; }
   bool over() const { return touched() && now() >= touched_ + watch_.hold_time + watch_.release; }
 
   /// Of the wall's axis from the surface, m, as the device has it when it refuses to be armed inside.
@@ -165,6 +157,7 @@ class Watch {
     for (int round = 0;; ++round) {
       device_.link().wait(milliseconds(20));
       trace.read(touch_.samples);
+      if (!touch_.samples.empty()) ahead_ = std::max(ahead_, now() - link_time());
       if (looked_at_ < touch_.samples.size()) last_record = device_.link().now();
       late_.looked(now());
       if (!wall_traced()) look_at_wall();
@@ -225,13 +218,20 @@ class Watch {
   }
 
   void make_changes() {
-    while (touch_.change_times.size() < watch_.changes.size()) {
-      const double time = now();
-      const TimedChange& next = watch_.changes[touch_.change_times.size()];
-      if (time < touched_ + next.time) return;
+    double earlier = 0.0;  // s, when the change before was due
+    for (std::size_t first = touch_.change_times.size(), made = first; made < watch_.changes.size(); ++made) {
+      const TimedChange& next = watch_.changes[made];
+      if (made > first && next.time - earlier < shortest_round) {
+        const double left = touched_ + touch_.change_times.back() + next.time - earlier - device_time();
+        if (left > 0.0) device_.link().wait(std::chrono::microseconds(std::llround(left * 1e6)));
+      } else if (device_time() < touched_ + next.time) {
+        return;
+      }
+      earlier = next.time;
+      const double at = device_time();
       device_.apply(device::parse_assignments(next.assignments, wall()));
-      touch_.change_times.push_back(time - touched_);
-      if (next.moves_wall_axis) disturbed_ = time;
+      touch_.change_times.push_back(at - touched_);
+      if (next.moves_wall_axis) disturbed_ = at;
     }
   }
 
@@ -249,6 +249,7 @@ class Watch {
   std::size_t looked_at_ = 0,
               first_ = 0;  ///< of the samples: the next to be looked at, the first of the touch
   double touched_ = -1.0;
+  double ahead_ = -std::numeric_limits<double>::infinity();  ///< s, of the trace's time against the link's
   double disturbed_ = -1.0;         ///< the touch or the last change that moved the wall's axis
   std::vector<TraceSample> looks_;  ///< at the wall's axis, since the touch
   std::size_t touching_ = 0;        ///< of the looks
@@ -324,7 +325,7 @@ simulation::ContactMeasure measure_touch(const WatchedTouch& touch, double hold_
   criterion.threshold = threshold;
   criterion.wall_position = touch.surface;
   criterion.wall_side = touch.side;
-  if (!can_be_judged(positions, criterion)) return {};
+  if (!simulation::can_be_judged(positions, criterion)) return {};
   return simulation::measure_contact(positions, criterion);
 }
 

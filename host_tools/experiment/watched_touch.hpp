@@ -61,7 +61,9 @@ struct TouchWatch {
   /// wall_settling after the touch and after every change that moves that axis on; sooner, while a hand
   /// bounces by millimetres, five times as much does. 0: none does.
   double wall_abort_amplitude = 0.0;
-  std::vector<TimedChange> changes{};  ///< in order of time; each is made at the first round after its time
+  /// In order of time; each is made at the first round after its time. One that is due less than 30 ms after
+  /// the one before follows it in that time, or as soon as the link allows, without a look in between.
+  std::vector<TimedChange> changes{};
 };
 
 struct WatchedTouch {

@@ -58,6 +58,18 @@ struct ContactMeasure {
   std::size_t samples = 0;
 };
 
+// Whether the window has what measure_contact() needs: two samples in every quarter.
+inline bool can_be_judged(std::span<const ContactSample> recording, const ContactCriterion& criterion) {
+  std::array<std::size_t, 4> count{};
+  const double length = criterion.window_end - criterion.window_begin;
+  for (const ContactSample& sample : recording) {
+    if (sample.time < criterion.window_begin || sample.time >= criterion.window_end) continue;
+    const double part = (sample.time - criterion.window_begin) / length * 4.0;
+    ++count[std::min<std::size_t>(3, static_cast<std::size_t>(part))];
+  }
+  return *std::min_element(count.begin(), count.end()) >= 2;
+}
+
 // Samples outside [window_begin, window_end) are ignored, so a whole recording can be given. Samples must be
 // in order of time, with at least two in every quarter. Throws std::invalid_argument. Cost: one pass, no
 // allocation.

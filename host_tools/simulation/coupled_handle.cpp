@@ -61,6 +61,8 @@ CoupledHandle::CoupledHandle(const DeviceModel& device, const OperatorModel* per
       motion_(motion),
       delay_(device.delay),
       has_operator_(person != nullptr),
+      holding_(person != nullptr),
+      lets_go_(person != nullptr && motion.open_time > 0.0),
       tip_(device.structure ? 1 : 0),
       chain_motion_(motion_of(checked_chain(device, person, start), tip_)) {
   force_limit_ = device.force_limit > 0.0 ? device.force_limit : std::numeric_limits<double>::infinity();
@@ -109,7 +111,37 @@ void CoupledHandle::resist_across(double force) {
 void CoupledHandle::begin_motion() {
   if (!has_operator_)
     throw std::logic_error("begin_motion: this scene has no operator who could move the handle");
+  if (!holding_) become(true);
+  in_hold_ = false;
   motion_.begin();
+}
+
+// The chain without the hand, or with it again.
+void CoupledHandle::become(bool holding) {
+  holding_ = holding;
+  if (holding) {
+    chain_.state.position[tip_ + 1] = chain_.state.position[tip_];
+    chain_.state.velocity[tip_ + 1] = chain_.state.velocity[tip_];
+    settled_background_ = -1.0;
+  }
+  chain_motion_ = motion_of(held_chain(device_, holding ? &person_ : nullptr, 1.0), tip_);
+  if (holding && table_) std::visit([this](auto& motion) { motion.share(table_.get()); }, chain_motion_);
+  paces_.fill({});
+  pace_ = next_pace_ = 0;
+}
+
+[[gnu::noinline]] void CoupledHandle::open_or_close_hand(double passed) {
+  if (!holding_) {
+    motion_.advance(passed, target_);
+    open_left_ -= passed;
+    if (open_left_ <= 0.0) become(true);
+    return;
+  }
+  if (in_hold_ && motion_.phase() != MotionPhase::hold) {
+    open_left_ = motion_.config().open_time;
+    become(false);
+  }
+  in_hold_ = holding_ && motion_.phase() == MotionPhase::hold;
 }
 
 const IntendedMotion& CoupledHandle::motion() const {
@@ -118,7 +150,7 @@ const IntendedMotion& CoupledHandle::motion() const {
 }
 
 double CoupledHandle::energy() const {
-  const ChainDynamics chain = held_chain(device_, has_operator_ ? &person_ : nullptr, gain_);
+  const ChainDynamics chain = held_chain(device_, holding_ ? &person_ : nullptr, gain_);
   double twice = 0.0;
   for (std::size_t i = 0; i < chain.masses; ++i) {
     const double next = i + 1 < chain.masses ? chain_.state.position[i + 1] : motion_.position();
@@ -144,7 +176,7 @@ std::size_t CoupledHandle::pace_for(double duration) {
   next_pace_ = (next_pace_ + 1) % paces;
   Pace& pace = paces_[slot];
   pace.duration = duration;
-  if (has_operator_) {
+  if (holding_) {
     pace.half_decay = std::exp(-0.5 * duration / person_.activation_time);
     pace.decay = std::exp(-duration / person_.activation_time);
     pace.push_decay = std::exp(-duration / person_.push_lag);
@@ -165,23 +197,26 @@ void CoupledHandle::advance(double force, double background_force, double durati
   if (device_.delay == 0.0 && duration <= longest_piece) [[likely]] {
     applied_force_ = clipped;
     advance_piece(clipped, background, duration);
-    return;
+  } else if (device_.delay == 0.0) {
+    advance_in_pieces(clipped, background, duration);
+  } else {
+    delay_.command(clipped, duration);
+    for (double left = duration; left > 0.0;) {
+      const double piece = delay_.piece(left);
+      advance_in_pieces(delay_.force(), background, piece);
+      delay_.pass(piece);
+      left = piece == left ? 0.0 : left - piece;
+    }
   }
-  if (device_.delay == 0.0) return advance_in_pieces(clipped, background, duration);
-  delay_.command(clipped, duration);
-  for (double left = duration; left > 0.0;) {
-    const double piece = delay_.piece(left);
-    advance_in_pieces(delay_.force(), background, piece);
-    delay_.pass(piece);
-    left = piece == left ? 0.0 : left - piece;
-  }
+  if (lets_go_) [[unlikely]]
+    open_or_close_hand(duration);
 }
 
 void CoupledHandle::advance(double force, double background_force, double duration, std::uint32_t times) {
   if (times == 0) return;
-  // What is asked of the arguments, and whatever takes more than one piece.
+  // What is asked of the arguments, and whatever takes more than one piece or may change the chain.
   advance(force, background_force, duration);
-  if (device_.delay != 0.0 || duration > longest_piece) {
+  if (device_.delay != 0.0 || duration > longest_piece || lets_go_) {
     for (std::uint32_t n = 1; n < times; ++n) advance(force, background_force, duration);
     return;
   }
@@ -199,7 +234,7 @@ void CoupledHandle::advance(double force, double background_force, double durati
 
 void CoupledHandle::advance_in_pieces(double force, double background, double duration) {
   applied_force_ = force;
-  const int pieces = duration <= longest_piece || !has_operator_
+  const int pieces = duration <= longest_piece || !holding_
                          ? 1
                          : static_cast<int>(std::ceil(duration / longest_piece - 1e-9));
   const double piece = duration / pieces;
@@ -224,7 +259,7 @@ template <std::size_t masses>
   if (paces_[pace_].duration != duration) [[unlikely]]
     pace_ = pace_for(duration);
   IntendedMotion::Segment whole{duration, 0.0, 0.0};
-  if (has_operator_) {
+  if (holding_) {
     if (background != settled_background_) {
       respond_to(background);
       if (rounds_) {
@@ -282,7 +317,7 @@ template <std::size_t masses>
 }
 
 void CoupledHandle::move_by_reference(const ChainInput& input, double duration) {
-  ChainDynamics chain = held_chain(device_, has_operator_ ? &person_ : nullptr, gain_);
+  ChainDynamics chain = held_chain(device_, holding_ ? &person_ : nullptr, gain_);
   if (chain_.blocked) chain.friction = 1e300;
   const double step = longest_piece / integrator_.substeps;
   switch (integrator_.kind) {

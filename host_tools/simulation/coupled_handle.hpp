@@ -22,6 +22,10 @@
 // Two things are constant over pieces of at most 2 ms instead of exact: the activation g (its value in the
 // middle of the piece; its time constant is 200 times longer) and the rate at which the push target moves.
 //
+// A hand that lets go (IntendedMotionConfig::open_time) opens at the end of the interval in which its hold
+// ends: the handle moves on alone, with no mass and no spring of the hand. The person goes back to the start
+// meanwhile; when the time is over, or another trial begins, the hand closes round the handle where that is.
+//
 // Cost per call, -O2, one core of an AMD EPYC at 3.7 GHz, for 2 ms and for 50 us alike: device alone 5 ns
 // sticking, 10 ns sliding; held 9 and 12 ns; held, structure and delay at 50 us 17 and 20 ns. A stiff
 // structure divides an interval of 2 ms into several steps. In a wall that oscillates a call with a reversal
@@ -98,14 +102,19 @@ class CoupledHandle {
   double velocity() const { return chain_.state.velocity[0]; }  // m/s; exactly 0 while sticking
   double tip_position() const { return chain_.state.position[tip_]; }  // m, where the person holds the device
   double tip_velocity() const { return chain_.state.velocity[tip_]; }  // m/s
-  // m; without a person the start position.
+  // m; without a person the start position. An open hand is where the handle is.
   double hand_position() const {
-    return has_operator_ ? chain_.state.position[tip_ + 1] : motion_.position();
+    if (!has_operator_) return motion_.position();
+    return chain_.state.position[holding_ ? tip_ + 1 : tip_];
   }
-  double hand_velocity() const { return has_operator_ ? chain_.state.velocity[tip_ + 1] : 0.0; }  // m/s
+  double hand_velocity() const {  // m/s
+    return has_operator_ ? chain_.state.velocity[holding_ ? tip_ + 1 : tip_] : 0.0;
+  }
   double intended_position() const { return has_operator_ ? motion_.position() : position(); }
   bool sticking() const { return chain_.sticking; }
   bool has_operator() const { return has_operator_; }
+  // A person has let it go for now.
+  bool let_go() const { return has_operator_ && !holding_; }
   // Throws std::logic_error without a person.
   const IntendedMotion& motion() const;
 
@@ -149,6 +158,8 @@ class CoupledHandle {
   void respond_to(double background);
   double driver_of(double background) const;
   std::size_t pace_for(double duration);
+  void open_or_close_hand(double passed);
+  void become(bool holding);
   void move_by_reference(const ChainInput& input, double duration);
 
   DeviceModel device_;
@@ -157,6 +168,10 @@ class CoupledHandle {
   ForceDelay delay_;
   IntegratorConfig integrator_;
   bool has_operator_ = false;
+  bool holding_ = false;    // it, with a closed hand
+  bool lets_go_ = false;    // after a hold
+  bool in_hold_ = false;    // at the end of the last interval; only of a person who lets go
+  double open_left_ = 0.0;  // s
   bool exact_ = true;
   double force_limit_ = 0.0;  // N; infinity: none
   std::size_t tip_ = 0;       // number of the mass that the person holds

@@ -42,6 +42,7 @@ struct IntendedMotionConfig {
   double approach_speed = 0.2;   // m/s
   double push_force = 1.0;       // N, static push at the surface, without the background force
   double hold_time = 3.0;        // s
+  double open_time = 0.0;        // s after the hold for which the hand lets the handle go; 0: it never does
   double wall_position = 0.0;    // m
   double wall_side = 1.0;        // +1 or -1: free space is on this side
 };
@@ -55,6 +56,8 @@ inline constexpr std::array motion_fields{
                                      "static push at the surface, without the background force"},
     ModelField<IntendedMotionConfig>{"hold_time", &IntendedMotionConfig::hold_time, 0.0, 1e5, "s",
                                      "how long the wall is pressed"},
+    ModelField<IntendedMotionConfig>{"open_time", &IntendedMotionConfig::open_time, 0.0, 1e5, "s",
+                                     "how long the hand lets the handle go after that; 0: it never does"},
     ModelField<IntendedMotionConfig>{"wall_position", &IntendedMotionConfig::wall_position, -10.0, 10.0, "m",
                                      "wall that is aimed at; without it the parameter wall.position"},
     ModelField<IntendedMotionConfig>{

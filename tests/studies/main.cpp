@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/report/page.hpp"
 #include "tests/studies/studies.hpp"
 
@@ -36,6 +37,10 @@ int run(int count, char** arguments) {
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--out", input.folder, "Folder for the page and its pictures")->type_name("DIR");
+  experiment::Provenance provenance;
+  app.add_option("--date", provenance.date, "Date that the page names")->type_name("YYYY-MM-DD");
+  app.add_option("--program", provenance.program, "Program, with its commit, that the page names")
+      ->type_name("TEXT");
   app.add_option("--jobs", input.run.threads, "Searches at a time; all processors without it");
   input.run.threads = 0;
   CLI11_PARSE(app, count, arguments);
@@ -44,14 +49,17 @@ int run(int count, char** arguments) {
   input.run.progress = [](std::size_t done, std::size_t all) {
     fmt::print(stderr, "\r{}   ", experiment::progress_words(done, all, std::nullopt));
   };
-  const report::Page page = make_page(input, names);
+  report::Page page = make_page(input, names);
   fmt::print(stderr, "\n");
   for (const report::Section& section : page.sections) {
     fmt::print("{}\n", section.heading);
     for (const std::string& paragraph : section.paragraphs) fmt::print("{}\n", paragraph);
     for (const report::Table& table : section.tables) fmt::print("\n{}", report::terminal_text(table));
   }
-  if (!input.folder.empty()) report::write_page(page, input.folder, "max_stiffness");
+  if (!input.folder.empty()) {
+    if (!provenance.date.empty()) page.sections.push_back(experiment::provenance_section(provenance));
+    report::write_page(page, input.folder, "max_stiffness");
+  }
   return 0;
 }
 

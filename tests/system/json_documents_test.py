@@ -134,6 +134,7 @@ class Documents(unittest.TestCase):
                   ("touch", "--set", "wall.stiffness=1000", "--out", "FOLDER/s.csv")],
         "experiment max-stiffness": [(*SIM, "--conditions", "0,instant")],
         "experiment contact": [(*SIM, "--trials", "1")],
+        "experiment wall-test": [(*SIM, "--repeats", "1", "--stiffness", "1000,6000")],
         "experiment jitter": [(*SIM, "--touches", "1")],
         "experiment deviation": [(*SIM, "--pulses", "1", "--out", "FOLDER/deviation")],
         "experiment resolution": [(*SIM, "--touches", "1", "--speeds", "0.05,0.3")],

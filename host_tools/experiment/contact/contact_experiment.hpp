@@ -8,6 +8,7 @@
 
 #include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/experiment/touch_changes.hpp"
 #include "host_tools/report/page.hpp"
@@ -124,7 +125,7 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
                                                       const std::vector<std::string>& words,
                                                       const std::vector<std::filesystem::path>& pictures,
                                                       const std::filesystem::path& folder,
-                                                      report::Origin origin);
+                                                      report::Origin origin, const Provenance& provenance);
 
 std::string_view to_string(simulation::ContactVerdict verdict);
 

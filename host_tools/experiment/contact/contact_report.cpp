@@ -130,7 +130,7 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
                                                       const std::vector<std::string>& words,
                                                       const std::vector<std::filesystem::path>& pictures,
                                                       const std::filesystem::path& folder,
-                                                      report::Origin origin) {
+                                                      report::Origin origin, const Provenance& provenance) {
   const std::string ours(report::to_string(origin)), theirs(report::to_string(report::Origin::paper));
   report::Table table;
   const bool simulated = origin != report::Origin::measured;
@@ -169,8 +169,9 @@ std::vector<std::filesystem::path> write_contact_page(const std::vector<ContactR
         "between them is unstable without a field (Fig. 9) and stable with 2 N (Fig. 11) is implied by that "
         "fit; only Figs. 10 and 12 are tests. One simulated person proves no method.",
         paper::max_stiffness[0].stiffness / 1e3, paper::max_stiffness[1].stiffness / 1e3));
-  return report::write_page({"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section}}, folder,
-                            "contact");
+  return report::write_page(
+      {"Contact with a stiff wall (paper 1, Figs. 9 to 12)", {section, provenance_section(provenance)}},
+      folder, "contact");
 }
 
 }  // namespace kmax::experiment

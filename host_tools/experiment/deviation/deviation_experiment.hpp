@@ -31,6 +31,7 @@
 #include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/report/page.hpp"
@@ -170,7 +171,7 @@ report::Table deviation_fit_table(const DeviationStudy& study);
 std::vector<std::string> deviation_words(const DeviationStudy& study);
 
 /// As write_jitter().
-std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
+std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study, const Provenance& provenance,
                                                    const std::filesystem::path& folder,
                                                    const std::string& ending);
 

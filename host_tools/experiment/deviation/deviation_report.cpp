@@ -199,7 +199,7 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
   return words;
 }
 
-std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
+std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study, const Provenance& provenance,
                                                    const std::filesystem::path& folder,
                                                    const std::string& ending) {
   std::filesystem::create_directories(folder);
@@ -267,6 +267,7 @@ std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study,
     page.sections.push_back(
         {"One touch, as in Fig. 3", {}, {}, {{"Subject 1 of the simulation.", files.back()}}});
   }
+  page.sections.push_back(provenance_section(provenance));
   for (const auto& file : report::write_page(page, folder, "deviation")) files.push_back(file);
   return files;
 }

@@ -26,6 +26,7 @@
 #include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/report/page.hpp"
@@ -153,7 +154,8 @@ std::vector<std::string> jitter_words(const JitterStudy& study);
 
 /// CSV, pictures and the page, in a folder that is made if need be. `ending`: ".svg" or ".png". Returns the
 /// names written. Throws plot::FigureError, std::runtime_error.
-std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const std::filesystem::path& folder,
+std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const Provenance& provenance,
+                                                const std::filesystem::path& folder,
                                                 const std::string& ending);
 
 }  // namespace kmax::experiment

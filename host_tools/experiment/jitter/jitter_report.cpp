@@ -232,7 +232,8 @@ plot::Series trace(const std::string& label, const std::vector<RigSample>& sampl
 }
 }  // namespace
 
-std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const std::filesystem::path& folder,
+std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const Provenance& provenance,
+                                                const std::filesystem::path& folder,
                                                 const std::string& ending) {
   std::filesystem::create_directories(folder);
   std::vector<std::filesystem::path> files = {folder / "jitter.csv"};
@@ -277,6 +278,7 @@ std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const 
     page.sections.push_back(
         {"One touch, as in Fig. 2", {}, {}, {{"Subject 1 of the simulation.", files.back()}}});
   }
+  page.sections.push_back(provenance_section(provenance));
   for (const auto& file : report::write_page(page, folder, "jitter")) files.push_back(file);
   return files;
 }

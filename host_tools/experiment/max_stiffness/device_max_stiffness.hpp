@@ -130,11 +130,9 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
 
 /// max_stiffness.md, .html, both tables as .csv, and a picture of every touch's oscillation over its
 /// stiffness, if there are touches. Returns the names written. Throws plot::FigureError, std::runtime_error.
-std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
-                                                          const DeviceStiffnessSettings& settings,
-                                                          const TouchLimits& limits,
-                                                          const std::string& device,
-                                                          const std::filesystem::path& folder,
-                                                          const std::string& picture_ending);
+std::vector<std::filesystem::path> write_device_stiffness(
+    const std::vector<DeviceStiffnessResult>& results, const DeviceStiffnessSettings& settings,
+    const TouchLimits& limits, const std::string& device, const Provenance& provenance,
+    const std::filesystem::path& folder, const std::string& picture_ending);
 
 }  // namespace kmax::experiment

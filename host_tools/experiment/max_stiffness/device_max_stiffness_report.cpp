@@ -107,12 +107,10 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
   return words;
 }
 
-std::vector<std::filesystem::path> write_device_stiffness(const std::vector<DeviceStiffnessResult>& results,
-                                                          const DeviceStiffnessSettings& settings,
-                                                          const TouchLimits& limits,
-                                                          const std::string& device,
-                                                          const std::filesystem::path& folder,
-                                                          const std::string& picture_ending) {
+std::vector<std::filesystem::path> write_device_stiffness(
+    const std::vector<DeviceStiffnessResult>& results, const DeviceStiffnessSettings& settings,
+    const TouchLimits& limits, const std::string& device, const Provenance& provenance,
+    const std::filesystem::path& folder, const std::string& picture_ending) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path picture = folder / ("max_stiffness" + picture_ending);
   const std::filesystem::path csv = folder / "max_stiffness.csv",
@@ -128,6 +126,7 @@ std::vector<std::filesystem::path> write_device_stiffness(const std::vector<Devi
   if (touched)
     page.sections.back().pictures.push_back(
         {"Peak-to-peak oscillation of each touch over the stiffness of the wall", picture});
+  page.sections.push_back(provenance_section(provenance));
   std::vector<std::filesystem::path> files = report::write_page(page, folder, "max_stiffness");
   files.insert(files.end(), {csv, touches});
   if (touched) {

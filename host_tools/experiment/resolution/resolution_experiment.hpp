@@ -33,6 +33,7 @@
 #include "host_tools/experiment/device_rig.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/report/page.hpp"
@@ -207,6 +208,7 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study);
 
 /// As write_jitter().
 std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study,
+                                                    const Provenance& provenance,
                                                     const std::filesystem::path& folder,
                                                     const std::string& ending);
 

@@ -224,6 +224,7 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study) {
 }
 
 std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study,
+                                                    const Provenance& provenance,
                                                     const std::filesystem::path& folder,
                                                     const std::string& ending) {
   std::filesystem::create_directories(folder);
@@ -291,6 +292,7 @@ std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study
     page.sections.push_back(
         {"One touch, as in Figures 1 and 2", {}, {}, {{"Subject 1 of the simulation.", files.back()}}});
   }
+  page.sections.push_back(provenance_section(provenance));
   for (const auto& file : report::write_page(page, folder, "resolution")) files.push_back(file);
   return files;
 }

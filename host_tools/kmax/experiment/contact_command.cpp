@@ -5,7 +5,6 @@
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/terminal_text.hpp"
-#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -62,8 +61,7 @@ Json contact_json(const experiment::ContactResult& result) {
 /// The device in use; a simulated one with what is changed of it.
 device::Device connect(Context& context, const experiment::TouchChanges& changes) {
   if (!changes.of_simulation()) return context.connect();
-  return device::Device(std::make_unique<link::SimLink>(changes.simulated_device()),
-                        [&context](const std::string& text) { context.note(text); });
+  return simulated_device(context, changes.simulated_device());
 }
 
 int run_contact_experiment(Context& context, const ContactOptions& options) {
@@ -83,6 +81,8 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
   make_folder(options.files);
   device::Device device = connect(context, settings.changes);
   TouchRun run{options.limits, !options.no_prompt && !context.simulated()};  // who presses by itself
+  experiment::Provenance provenance = provenance_of(options.files);
+  run.provenance = &provenance;
   std::string so_far;
   run.so_far = [&so_far] { return so_far; };
   std::vector<experiment::ContactResult> results;
@@ -104,7 +104,9 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
       pictures.push_back(written.front());
     }
     const auto origin = context.simulated() ? report::Origin::predicted : report::Origin::measured;
-    const auto pages = experiment::write_contact_page(results, words, pictures, options.files.folder, origin);
+    if (context.simulated()) provenance.seed = settings.changes.simulated_device().seed;
+    const auto pages =
+        experiment::write_contact_page(results, words, pictures, options.files.folder, origin, provenance);
     files.insert(files.end(), pages.begin(), pages.end());
   }
   const bool all_agree = std::all_of(results.begin(), results.end(), [](const experiment::ContactResult& r) {

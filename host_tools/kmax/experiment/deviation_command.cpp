@@ -41,7 +41,8 @@ struct DeviationOptions : StudyOptions {
 };
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
-                                    const Interruption& interruption) {
+                                    const Interruption& interruption,
+                                    experiment::Provenance& /*provenance*/) {
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
   return simulate_study(context, interruption, force_pairs_words,
@@ -51,8 +52,8 @@ experiment::DeviationStudy simulate(Context& context, const DeviationOptions& op
 }
 
 experiment::DeviationStudy measure(Context& context, const DeviationOptions& options,
-                                   const Interruption& interruption) {
-  return measure_study(context, interruption, "deviation", options.settings, options,
+                                   const Interruption& interruption, experiment::Provenance& provenance) {
+  return measure_study(context, interruption, "deviation", options.settings, options, provenance,
                        experiment::RigAxes::wall_along,
                        [&](experiment::DeviceRig& rig) { return study_deviation(rig, options.settings); });
 }

@@ -3,17 +3,46 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <ctime>
 #include <map>
+#include <memory>
 
 #include "host_tools/base/print.hpp"
+#include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/quantity_option.hpp"
+#include "host_tools/kmax/supplied_files.hpp"
 
 namespace kmax::cli {
 
+namespace {
+/// "2026-11-26".
+CLI::Validator calendar_date() {
+  return {[](std::string& text) -> std::string {
+            std::tm date{};
+            const char* end = strptime(text.c_str(), "%Y-%m-%d", &date);
+            if (end != nullptr && *end == '\0') return {};
+            return fmt::format("{}: is no date; give year, month and day as in 2026-11-26", text);
+          },
+          ""};
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm date{};
+  localtime_r(&now, &date);
+  return fmt::format("{:04}-{:02}-{:02}", date.tm_year + 1900, date.tm_mon + 1, date.tm_mday);
+}
+}  // namespace
+
 void add_file_options(CLI::App& command, ExperimentFiles& files, const std::string& contents) {
   command.add_option("--out", files.folder, contents)->type_name("DIR");
+  command.add_option("--date", files.date, "Date that the page names; else today")
+      ->check(calendar_date())
+      ->type_name("YYYY-MM-DD");
+  command.add_option("--commit", files.commit, "Commit that the page names; else what --version says")
+      ->type_name("TEXT");
   add_format_option(command, files.ending);
 }
 
@@ -22,6 +51,13 @@ void add_format_option(CLI::App& command, std::string& ending) {
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, std::string>{{"svg", ".svg"}, {"png", ".png"}}))
       ->type_name("svg|png");
+}
+
+experiment::Provenance provenance_of(const ExperimentFiles& files) {
+  experiment::Provenance provenance;
+  provenance.date = files.date.empty() ? today() : files.date;
+  provenance.program = program_text(files.commit);
+  return provenance;
 }
 
 void make_folder(const ExperimentFiles& files) {
@@ -74,6 +110,11 @@ std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
   return people;
 }
 
+device::Device simulated_device(Context& context, const simulation::Scene& scene) {
+  return device::Device(std::make_unique<link::SimLink>(scene),
+                        [&context](const std::string& text) { context.note(text); });
+}
+
 void add_expect_paper_option(CLI::App& command, bool& expect) {
   command.add_flag("--expect-paper", expect, "Exit code 3 where the result differs from the paper's");
 }
@@ -93,9 +134,9 @@ void add_touch_settings_option(CLI::App& command, std::vector<std::string>& sett
 }
 
 experiment::TouchChanges touch_changes(const std::vector<std::string>& settings,
-                                       experiment::Touching touching) {
+                                       experiment::Touching touching, experiment::Varied varied) {
   try {
-    return {settings, touching};
+    return {settings, touching, varied};
   } catch (const simulation::SceneError& error) {
     throw UsageError(error.what());
   }

@@ -11,6 +11,7 @@
 
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/device_rig.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/experiment/touch_changes.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/simulation/device_model.hpp"
@@ -27,12 +28,15 @@ class ExperimentInterrupted : public std::runtime_error {
 struct ExperimentFiles {
   std::string folder;           ///< empty: no files
   std::string ending = ".svg";  ///< of pictures
+  std::string date, commit;     ///< that a page names; empty: today, and what the program came from
 };
 /// `contents`: what the help text of --out says.
 void add_file_options(CLI::App& command, ExperimentFiles& files,
                       const std::string& contents = "Folder for CSV, pictures and a page");
 /// --format alone.
 void add_format_option(CLI::App& command, std::string& ending);
+/// When and with what a page is made, by --date and --commit.
+experiment::Provenance provenance_of(const ExperimentFiles& files);
 /// Makes the folder, if one is wanted: before anybody presses anything.
 void make_folder(const ExperimentFiles& files);
 Json names_json(const std::vector<std::filesystem::path>& written);
@@ -57,6 +61,9 @@ void add_clip_option(CLI::App& command, double& clip);
 std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
                                                  simulation::DeviceModel& device);
 
+/// A device that is simulated here. Its notices go to the context's.
+device::Device simulated_device(Context& context, const simulation::Scene& scene);
+
 /// --expect-paper: a result that differs from the paper's gives exit code 3.
 void add_expect_paper_option(CLI::App& command, bool& expect);
 /// done, or verdict_is_no where the paper's result is expected and is not there.
@@ -66,7 +73,8 @@ int paper_exit_code(bool expect, bool as_paper);
 void add_touch_settings_option(CLI::App& command, std::vector<std::string>& settings);
 /// UsageError for what is not to be changed, or not to that value.
 experiment::TouchChanges touch_changes(const std::vector<std::string>& settings,
-                                       experiment::Touching touching);
+                                       experiment::Touching touching,
+                                       experiment::Varied varied = experiment::Varied::papers_walls);
 /// `rate`: the option that says haptic.rate too; UsageError for both.
 void change_touches(experiment::ContactSettings& touch, const experiment::TouchChanges& changes,
                     const CLI::Option& rate);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "host_tools/base/interruption.hpp"
@@ -73,10 +74,12 @@ Json document_of(const Study& study) {
 /// The parts of one command.
 template <typename Study, typename Options>
 struct StudyCommand {
-  using Make = Study (*)(Context& context, const Options& options, const Interruption& interruption);
+  /// Adds to the provenance what was touched.
+  using Make = Study (*)(Context& context, const Options& options, const Interruption& interruption,
+                         experiment::Provenance& provenance);
   Make simulate, measure;
-  std::vector<std::filesystem::path> (*write)(const Study& study, const std::filesystem::path& folder,
-                                              const std::string& ending);
+  std::vector<std::filesystem::path> (*write)(const Study& study, const experiment::Provenance& provenance,
+                                              const std::filesystem::path& folder, const std::string& ending);
   StudyReport (*report)(const Study& study);
 };
 
@@ -95,10 +98,12 @@ int run_study(Context& context, const Options& options, const StudyCommand<Study
   }
   const Interruption interruption;
   make_folder(options.files);
+  experiment::Provenance provenance = provenance_of(options.files);
   const Study study =
-      (context.simulated() ? command.simulate : command.measure)(context, options, interruption);
+      (context.simulated() ? command.simulate : command.measure)(context, options, interruption, provenance);
   std::vector<std::filesystem::path> files;
-  if (!options.files.folder.empty()) files = command.write(study, options.files.folder, options.files.ending);
+  if (!options.files.folder.empty())
+    files = command.write(study, provenance, options.files.folder, options.files.ending);
   return print_study(context, command.report(study), files, options.expect_paper);
 }
 
@@ -130,7 +135,8 @@ struct TouchRun {
   bool asks = true;
   experiment::RunJournal* journal = nullptr;
   experiment::RigAxes axes = experiment::RigAxes::wall;
-  std::function<std::string()> so_far{};  ///< before each line of progress
+  std::function<std::string()> so_far{};         ///< before each line of progress
+  experiment::Provenance* provenance = nullptr;  ///< gets the device, as it was in the last touch
 };
 
 /// What `make` makes of the touches on `device`. Ctrl-C is an ExperimentInterrupted. Errors: those of the rig
@@ -157,21 +163,40 @@ auto make_touches(Context& context, device::Device& device, const Interruption& 
   };
   experiment::DeviceRig rig(device, limits, {run.asks ? &prompter : nullptr, run.journal, show, notice},
                             run.axes);
-  return make(rig);
+  const auto describe = [&] {
+    if (run.provenance == nullptr) return;
+    run.provenance->device = device.description();
+    try {
+      run.provenance->device = experiment::identity_of(device);
+      run.provenance->parameters = experiment::changed_parameters(device, limits.axis);
+    } catch (const std::exception& error) {
+      // What was measured must not be lost with it.
+      notice(std::string("the page does not name the device and its parameters: ") + error.what());
+    }
+  };
+  if constexpr (std::is_void_v<decltype(make(rig))>) {
+    make(rig);
+    describe();
+  } else {
+    auto made = make(rig);
+    describe();
+    return made;
+  }
 }
 
 /// The study that `make` makes on the device in use, kept in the journal `name` in --out. Errors: those of
 /// open_touch_journal() and of make_touches().
 template <typename Settings, typename Make>
 auto measure_study(Context& context, const Interruption& interruption, const std::string& name,
-                   const Settings& settings, const StudyOptions& options, experiment::RigAxes axes,
-                   const Make& make) {
+                   const Settings& settings, const StudyOptions& options, experiment::Provenance& provenance,
+                   experiment::RigAxes axes, const Make& make) {
   experiment::TouchLimits limits = options.limits;
   limits.axis = context.axis();
   device::Device device = context.connect();
   const auto journal = open_touch_journal(context, options.files.folder, name,
                                           journal_settings(device, limits, settings), options.resume);
-  return make_touches(context, device, interruption, {limits, !options.no_prompt, journal.get(), axes}, make);
+  return make_touches(context, device, interruption,
+                      {limits, !options.no_prompt, journal.get(), axes, {}, &provenance}, make);
 }
 
 }  // namespace kmax::cli

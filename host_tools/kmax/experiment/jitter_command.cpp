@@ -41,7 +41,7 @@ struct JitterOptions : StudyOptions {
 };
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
-                                 const Interruption& interruption) {
+                                 const Interruption& interruption, experiment::Provenance& /*provenance*/) {
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
   return simulate_study(context, interruption, force_pairs_words,
@@ -51,8 +51,9 @@ experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
 }
 
 experiment::JitterStudy measure(Context& context, const JitterOptions& options,
-                                const Interruption& interruption) {
-  return measure_study(context, interruption, "jitter", options.settings, options, experiment::RigAxes::wall,
+                                const Interruption& interruption, experiment::Provenance& provenance) {
+  return measure_study(context, interruption, "jitter", options.settings, options, provenance,
+                       experiment::RigAxes::wall,
                        [&](experiment::DeviceRig& rig) { return study_jitter(rig, options.settings); });
 }
 

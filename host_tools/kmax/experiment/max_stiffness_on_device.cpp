@@ -53,6 +53,8 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
                                           journal_settings(device, limits, settings), options.resume);
   TouchRun run{limits, !options.no_prompt, journal.get()};
   std::vector<DeviceStiffnessResult> results;
+  experiment::Provenance provenance = provenance_of(options.files);
+  run.provenance = &provenance;
   const experiment::RemainingTime remaining(seconds_now());
   run.so_far = [&] {
     const std::size_t all = conditions.size(), made = results.size();
@@ -65,7 +67,7 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
   });
   std::vector<std::filesystem::path> files;
   if (!options.files.folder.empty())
-    files = experiment::write_device_stiffness(results, settings, limits, device.description(),
+    files = experiment::write_device_stiffness(results, settings, limits, device.description(), provenance,
                                                options.files.folder, options.files.ending);
   print_results(context, results, experiment::device_stiffness_words(settings, limits, device.description()),
                 files);

@@ -10,6 +10,7 @@
 #include "host_tools/experiment/max_stiffness/max_stiffness_report.hpp"
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/progress_report.hpp"
+#include "host_tools/experiment/provenance.hpp"
 #include "host_tools/kmax/experiment/experiment_options.hpp"
 #include "host_tools/kmax/experiment/max_stiffness_options.hpp"
 #include "host_tools/report/page.hpp"
@@ -200,7 +201,9 @@ int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options
     }
     files.push_back(folder / "max_stiffness.csv");
     report::write_csv(experiment::max_stiffness_table(studies), files.back());
-    const auto pages = report::write_page(page, folder, "max_stiffness");
+    report::Page written = page;
+    written.sections.push_back(experiment::provenance_section(provenance_of(options.files)));
+    const auto pages = report::write_page(written, folder, "max_stiffness");
     files.insert(files.end(), pages.begin(), pages.end());
   }
   if (context.json) {

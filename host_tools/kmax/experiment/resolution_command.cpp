@@ -73,7 +73,8 @@ experiment::ResolutionSettings settings_of(const ResolutionOptions& options,
 }
 
 experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& options,
-                                     const Interruption& interruption) {
+                                     const Interruption& interruption,
+                                     experiment::Provenance& /*provenance*/) {
   const experiment::ResolutionSettings settings = settings_of(options, {});
   // Of a set the people only: the device is paper 2's.
   simulation::DeviceModel unused;
@@ -85,9 +86,10 @@ experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& 
 }
 
 experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,
-                                    const Interruption& interruption) {
+                                    const Interruption& interruption, experiment::Provenance& provenance) {
   const experiment::ResolutionSettings settings = settings_of(options, experiment::resolution_on_device());
-  return measure_study(context, interruption, "resolution", settings, options, experiment::RigAxes::wall,
+  return measure_study(context, interruption, "resolution", settings, options, provenance,
+                       experiment::RigAxes::wall,
                        [&](experiment::DeviceRig& rig) { return study_resolution(rig, settings); });
 }
 

@@ -133,4 +133,21 @@ TEST(WallAssignments, ChangesTakeThePlaceOfWhatTheWallSays) {
   EXPECT_EQ(std::count(all.begin(), all.end(), "velocity.estimator=difference"), 1);
 }
 
+TEST(TouchChanges, ALawIsChangedOnlyWhereTheExperimentDoesNotVaryIt) {
+  const Texts law = {"wall.law=adaptive", "wall.adaptive_mode=latched"};
+  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { TouchChanges(law, Touching::device); }),
+                  "it is what the experiment compares");
+  const TouchChanges changes(law, Touching::device, Varied::stiffness_and_speeds);
+  EXPECT_EQ(changes.assignments(), law);
+  TouchSetup setup = usual();
+  changes.apply(setup);
+  EXPECT_EQ(setup.wall.wall.kind, control::WallKind::adaptive);
+  EXPECT_EQ(setup.wall.wall.adaptive.mode, control::AdaptiveMode::latched);
+  EXPECT_CONTAINS(thrown_message<device::ValueError>([] {
+                    TouchChanges({"motion.approach_speed=1"}, Touching::simulated_person,
+                                 Varied::stiffness_and_speeds);
+                  }),
+                  "several speeds");
+}
+
 }  // namespace kmax::experiment::touch_changes_test

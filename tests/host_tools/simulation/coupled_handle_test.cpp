@@ -244,6 +244,68 @@ TEST(CoupledHandle, WithoutAPersonThereIsNoMotion) {
   EXPECT_EQ(handle.hand_position(), 0.0);
 }
 
+// --- A hand that lets go.
+
+IntendedMotionConfig letting_go() {
+  IntendedMotionConfig motion;
+  motion.hold_time = 0.1;
+  motion.open_time = 0.2;
+  return motion;
+}
+
+// A wall of 1 N/mm without damping, sampled: it throws out what is let go in it.
+double pushed_back(const CoupledHandle& handle) {
+  return std::max(0.0, -1000.0 * handle.position());
+}
+
+TEST(CoupledHandle, AHandleThatIsLetGoMovesAsIfNobodyWereThere) {
+  CoupledHandle handle = held({}, letting_go());
+  while (!handle.let_go()) handle.advance(pushed_back(handle), 0.0, 50e-6);
+  ASSERT_LT(handle.position(), 0.0) << "in the wall";
+  ASSERT_NEAR(handle.motion().elapsed(), *handle.motion().hold_end(), 51e-6);
+  EXPECT_TRUE(handle.has_operator());
+  CoupledHandle alone(DeviceModel{}, HandleStart{handle.position(), handle.velocity()});
+  for (int n = 0; n < 2000; ++n) {
+    ASSERT_NEAR(handle.position(), alone.position(), 1e-12) << n;
+    ASSERT_EQ(handle.hand_position(), handle.position());
+    handle.advance(pushed_back(handle), 0.0, 50e-6);
+    alone.advance(pushed_back(alone), 0.0, 50e-6);
+  }
+  EXPECT_GT(handle.position(), 0.0) << "thrown out";
+}
+
+TEST(CoupledHandle, TheHandTakesHoldAgainWhereTheHandleIsAndGoesBack) {
+  CoupledHandle handle = held({}, letting_go());
+  while (!handle.let_go()) handle.advance(pushed_back(handle), 0.0, period);
+  int open = 0;
+  double before = handle.position();
+  for (; handle.let_go(); ++open) {
+    before = handle.position();
+    handle.advance(pushed_back(handle), 0.0, period);
+  }
+  EXPECT_EQ(open, 100);
+  EXPECT_LT(std::abs(handle.position() - before), 1e-3) << "without a jump";
+  for (int n = 0; n < 1000; ++n) handle.advance(pushed_back(handle), 0.0, period);
+  EXPECT_NEAR(handle.position(), letting_go().start_position, 2e-3);
+  // Told to begin while it is open, it takes hold at once.
+  handle.begin_motion();
+  while (!handle.let_go()) handle.advance(pushed_back(handle), 0.0, period);
+  handle.begin_motion();
+  EXPECT_FALSE(handle.let_go());
+  handle.advance(0.0, 0.0, period);
+  EXPECT_FALSE(handle.let_go());
+}
+
+TEST(CoupledHandle, LettingGoDoesNotDependOnHowManyIntervalsAreAskedForAtOnce) {
+  CoupledHandle one = held({}, letting_go()), many = one;
+  for (int n = 0; n < 400; ++n) {
+    for (int i = 0; i < 10; ++i) one.advance(0.3, 0.0, 0.2 * period);
+    many.advance(0.3, 0.0, 0.2 * period, 10);
+    ASSERT_EQ(one.position(), many.position()) << n;
+    ASSERT_EQ(one.let_go(), many.let_go());
+  }
+}
+
 // --- Structure.
 
 TEST(CoupledHandle, WithoutAStructureTheTipIsTheHandle) {

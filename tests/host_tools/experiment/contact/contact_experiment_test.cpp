@@ -228,7 +228,7 @@ TEST(ContactReport, SaysWhichVerdictsTheFitImplies) {
   const auto rows_with = [&](const char* text, report::Origin origin) {
     std::vector<std::filesystem::path> here;
     for (const auto& picture : pictures) here.push_back(folder / picture.string());
-    write_contact_page(results, {}, here, folder / "", origin);
+    write_contact_page(results, {}, here, folder / "", origin, {"2026-01-02", "kmax 9", "sim", {}, {}});
     const std::string page = folder.read("contact.md");
     std::size_t count = 0;
     for (std::size_t at = page.find(text); at != std::string::npos; at = page.find(text, at + 1)) ++count;
@@ -236,6 +236,7 @@ TEST(ContactReport, SaysWhichVerdictsTheFitImplies) {
   };
   EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 2u);
   EXPECT_EQ(rows_with("| a test |", report::Origin::predicted), 4u);
+  EXPECT_EQ(rows_with("Made on 2026-01-02 with kmax 9, on sim.", report::Origin::predicted), 1u);
   EXPECT_EQ(rows_with("implied by the fit", report::Origin::measured), 0u);
   for (ContactResult& result : results) result.papers_wall = false;
   EXPECT_EQ(rows_with("| implied by the fit |", report::Origin::predicted), 0u);

@@ -198,7 +198,8 @@ TEST(DeviationReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
   const DeviationStudy study =
       study_deviation(few(), deviation_hands(), std::vector<simulation::OperatorModel>(1));
-  const auto files = write_deviation(study, folder / "new", ".svg");
+  const auto files = write_deviation(study, {"2026-01-02", "kmax 9", "", {}, {}}, folder / "new", ".svg");
+  EXPECT_CONTAINS(folder.read("new/deviation.md"), "Made on 2026-01-02 with kmax 9");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
 }
@@ -211,7 +212,7 @@ TEST(DeviationReport, APageOfADeviceWithoutResults) {
   study.verdict = judge_deviation(study.results);
   study.fits = fit_table_2();
   EXPECT_NO_THROW(report::require_rectangular(deviation_table(study)));
-  EXPECT_EQ(write_deviation(study, folder / "new", ".svg").size(), 5u);
+  EXPECT_EQ(write_deviation(study, {}, folder / "new", ".svg").size(), 5u);
   const std::string words = all_words(study);
   EXPECT_CONTAINS(words, "this is not shown");
   EXPECT_EQ(words.find("does not fall"), std::string::npos) << words;

@@ -261,7 +261,8 @@ TEST(JitterReport, SaysWhatHoldsAndWhatIsNotReproduced) {
 TEST(JitterReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
   const JitterStudy study = study_jitter(few(), jitter_hands(), std::vector<simulation::OperatorModel>(1));
-  const auto files = write_jitter(study, folder / "new", ".svg");
+  const auto files = write_jitter(study, {"2026-01-02", "kmax 9", "", {}, {}}, folder / "new", ".svg");
+  EXPECT_CONTAINS(folder.read("new/jitter.md"), "Made on 2026-01-02 with kmax 9");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
 }
@@ -283,7 +284,7 @@ TEST(JitterReport, APageOfADeviceWithoutResults) {
     EXPECT_EQ(row[3], "-");
     EXPECT_EQ(row.back(), "not shown");
   }
-  EXPECT_EQ(write_jitter(study, folder / "new", ".svg").size(), 4u);
+  EXPECT_EQ(write_jitter(study, {}, folder / "new", ".svg").size(), 4u);
 }
 
 // A device that clips the force takes the trend away, and with it all that could be said of its cause.

@@ -439,14 +439,15 @@ TEST(DeviceStiffnessReport, EveryTouchIsARow) {
 TEST(DeviceStiffnessReport, ThePageAndItsFilesAreWritten) {
   const TemporaryFolder folder;
   const auto files =
-      write_device_stiffness({result_of("a | b", 3500)}, {}, {}, "serial:/dev/x", folder / "out", ".svg");
+      write_device_stiffness({result_of("a | b", 3500)}, {}, {}, "serial:/dev/x", {}, folder / "out", ".svg");
   for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   EXPECT_EQ(files.size(), 5u);
   EXPECT_CONTAINS(folder.read("out/max_stiffness.md"), "| a \\| b | 3.50 |");
   EXPECT_CONTAINS(folder.read("out/max_stiffness.html"), "serial:/dev/x");
   EXPECT_CONTAINS(folder.read("out/max_stiffness.html"), "src=\"max_stiffness.svg\"");
-  EXPECT_NE(thrown_message<plot::FigureError>(
-                [&] { write_device_stiffness({result_of("a", 3500)}, {}, {}, "x", folder / "gif", ".gif"); }),
+  EXPECT_NE(thrown_message<plot::FigureError>([&] {
+              write_device_stiffness({result_of("a", 3500)}, {}, {}, "x", {}, folder / "gif", ".gif");
+            }),
             "");
   // What was measured is there all the same.
   for (const char* name : {"max_stiffness.csv", "max_stiffness_touches.csv", "max_stiffness.html"})
@@ -457,11 +458,12 @@ TEST(DeviceStiffnessReport, WithoutATouchThereIsNoPicture) {
   const TemporaryFolder folder;
   DeviceStiffnessResult untouched = result_of("a", 0);
   untouched.touches.clear();
-  EXPECT_EQ(write_device_stiffness({untouched}, {}, {}, "x", folder / "out", ".svg").size(), 4u);
+  EXPECT_EQ(write_device_stiffness({untouched}, {}, {}, "x", {}, folder / "out", ".svg").size(), 4u);
   EXPECT_FALSE(std::filesystem::exists(folder / "out/max_stiffness.svg"));
   EXPECT_EQ(folder.read("out/max_stiffness.html").find("<img"), std::string::npos);
   EXPECT_EQ(
-      write_device_stiffness({untouched, result_of("b", 1)}, {}, {}, "x", folder / "out", ".svg").size(), 5u);
+      write_device_stiffness({untouched, result_of("b", 1)}, {}, {}, "x", {}, folder / "out", ".svg").size(),
+      5u);
 }
 
 }  // namespace kmax::experiment::device_max_stiffness_test

@@ -217,7 +217,8 @@ TEST(ResolutionReport, NumbersOfTheUsersWereNotChosenToAgree) {
 TEST(ResolutionReport, WritesAPageWithItsPictures) {
   const host_tools_test::TemporaryFolder folder;
   const ResolutionStudy study = study_of(few());
-  const auto files = write_resolution(study, folder / "new", ".svg");
+  const auto files = write_resolution(study, {"2026-01-02", "kmax 9", "", {}, {}}, folder / "new", ".svg");
+  EXPECT_CONTAINS(folder.read("new/resolution.md"), "Made on 2026-01-02 with kmax 9");
   EXPECT_EQ(files.size(), 6u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
 }
@@ -233,7 +234,7 @@ TEST(ResolutionReport, ADevicesTouchesNeedNoSimulation) {
   cell.peak_to_peak = 1e-3;
   study.runs = {{{}, {cell}}};
   EXPECT_EQ(resolution_table(study).rows.size(), 1u);
-  EXPECT_EQ(write_resolution(study, folder / "new", ".svg").size(), 5u);
+  EXPECT_EQ(write_resolution(study, {}, folder / "new", ".svg").size(), 5u);
   EXPECT_CONTAINS(resolution_words(study)[1], "the paper's claims are not all tested");
   EXPECT_CONTAINS(all_words(study), "for want of a touch there: 0.1 mm below 0.1 m/s, 0.1 mm above 0.1 m/s.");
   study.runs[0].cells[0].unstable = study.runs[0].cells[0].people_unstable = 0;
