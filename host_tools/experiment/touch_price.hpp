@@ -16,7 +16,7 @@ struct TouchPrice {
   double rate_hardness = 0.0;
 };
 
-inline constexpr double rate_hardness_time = 0.01;  ///< s; at least one sample
+inline constexpr double rate_hardness_time = 0.004;  ///< s; at least one sample
 
 /// Errors: those of simulate_touch(). The surface is at 0, free space above.
 TouchPrice price_of(const TouchSetup& setup);

@@ -7,6 +7,7 @@
 
 #include "host_tools/device/parameter_file.hpp"
 #include "host_tools/experiment/job_pool.hpp"
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 
 namespace kmax::experiment {
@@ -56,10 +57,10 @@ std::string nothing_found_words(const DesignTask& task, const WallDesign& design
         "--depth, take off a smaller --margin, or leave --depth out.",
         *task.depth * 1e3, design.least_depth * 1e3);
   return fmt::format(
-      "No wall of {:g} N/m or more holds for all {} people: for somebody {} with every one. Allow more with "
+      "No wall of {:g} N/m or more holds for all of {}. Allow more with "
       "--moves or --feels, or look for a faster loop (--rate), a finer encoder (--encoder) or a shorter "
       "delay.",
-      first_rung, task.set.subjects.size(), "is not still");
+      first_rung, people_words(task.set.subjects.size()));
 }
 
 }  // namespace
@@ -70,10 +71,10 @@ std::vector<std::string> wall_design_words(const DesignTask& task, const WallDes
   std::vector<std::string> words{
       fmt::format(
           "{}, damping {:.3g} N s/m, velocity by {}: a margin of {:.3g} % below {}, the stiffest that "
-          "holds for all {} people ({}).",
+          "holds for all of {} ({}).",
           stiffness_words(wall.stiffness), wall.damping, name_of(wall.family),
           100.0 * (1.0 - wall.stiffness / design.largest), stiffness_words(design.largest),
-          task.set.subjects.size(), criteria_words(task)),
+          people_words(task.set.subjects.size()), criteria_words(task)),
       bound_words(task, design),
       fmt::format("Price: field at rest {:.3g} N; deepest {:.3g} mm ({}); rate-hardness {:.3g} N/mm/s per "
                   "mm/s (0.2 m/s, mean of the people).",
@@ -91,10 +92,10 @@ std::vector<std::string> wall_design_words(const DesignTask& task, const WallDes
 std::string wall_design_file(const DesignTask& task, const WallDesign& design) {
   const simulation::DeviceModel& device = task.set.device;
   std::string text = fmt::format(
-      "# A wall by 'kmax design wall', for a simulated device and {} simulated people ({}).\n"
+      "# A wall by 'kmax design wall', for a simulated device and simulated people: {} of the set {}.\n"
       "# Device: {:g} kg, friction {:g} N, damping {:g} N s/m, force {}, delay {:g} s{}.\n"
       "# Loop of {:g} Hz, encoder of {:g} m at the handle. Holds: {}.\n",
-      task.set.subjects.size(), task.set.name, device.mass, device.friction, device.damping,
+      people_words(task.set.subjects.size()), task.set.name, device.mass, device.friction, device.damping,
       device.force_limit > 0.0 ? fmt::format("up to {:g} N", device.force_limit) : "not limited",
       device.delay,
       device.structure ? fmt::format(", structure of {:g} N/m", device.structure->stiffness) : "", task.rate,

@@ -28,7 +28,7 @@ TEST(TouchPrice, AStifferOrDampedWallRisesFasterAndLetsLessDeepIn) {
   EXPECT_GT(stiff.rate_hardness, 1.5 * soft.rate_hardness);
   EXPECT_GT(damped.rate_hardness, soft.rate_hardness);
   EXPECT_LT(stiff.depth, soft.depth);
-  // The spring alone, over a speed that falls within the 10 ms.
+  // The spring alone, over a speed that falls within the time.
   EXPECT_GT(soft.rate_hardness, 0.5 * 500.0);
   EXPECT_LT(soft.rate_hardness, 1.1 * 500.0);
 }

@@ -10,6 +10,8 @@
 
 namespace kmax::experiment::wall_design_test {
 
+using host_tools_test::thrown_message;
+
 /// All that is said of it, and its file: equal only where every number is.
 std::string all_of(const DesignTask& task, const WallDesign& design) {
   std::string text = wall_design_file(task, design);
@@ -107,9 +109,10 @@ TEST(WallDesign, IsTheSameFromShares) {
     shares.push_back(std::make_unique<RunJournal>(folder / std::to_string(part), design_settings(task),
                                                   RunJournal::Begin::fresh));
     known.push_back(shares.back().get());
-    if (part == 3)
+    if (part == 3) {
       EXPECT_CONTAINS(thrown_message<JournalError>([&] { require_whole(task, known); }),
                       "in none of the shares");
+    }
     search_share(task, {part, 3}, *shares.back(), {2});
   }
   require_whole(task, known);
