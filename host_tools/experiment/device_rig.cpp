@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <initializer_list>
 
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"
@@ -54,19 +55,19 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
   const auto choice = [&text](const device::Parameter& parameter, auto value) {
     return text(parameter, static_cast<std::uint32_t>(value));
   };
-  std::vector<std::string> all = {fmt::format("wall.stiffness={}", wall.stiffness),
-                                  choice(device::Parameter::of<"interference.mode">(), wall.interference),
-                                  fmt::format("interference.force={}", wall.force),
-                                  fmt::format("interference.background_force={}", wall.background_force)};
+  std::vector<std::string> all = {fmt::format("wall.stiffness={}", wall.stiffness)};
+  const auto add = [&all](std::initializer_list<std::string> more) { all.insert(all.end(), more); };
+  if (!wall.as_set)
+    add({fmt::format("haptic.rate={}", wall.haptic_rate),
+         fmt::format("position.resolution={}", wall.resolution),
+         choice(device::Parameter::of<"position.rounding">(), wall.rounding)});
+  add({choice(device::Parameter::of<"interference.mode">(), wall.interference),
+       fmt::format("interference.force={}", wall.force),
+       fmt::format("interference.background_force={}", wall.background_force)});
   if (!wall.as_set) {
-    for (const std::string& one : std::initializer_list<std::string>{
-             fmt::format("haptic.rate={}", wall.haptic_rate),
-             fmt::format("position.resolution={}", wall.resolution),
-             choice(device::Parameter::of<"position.rounding">(), wall.rounding),
-             choice(device::Parameter::of<"wall.law">(), wall.law),
-             fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
-             choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)})
-      all.push_back(one);
+    add({choice(device::Parameter::of<"wall.law">(), wall.law),
+         fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
+         choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)});
     for (const char* name : papers_constants) {
       const device::Parameter parameter = device::resolve(name);
       all.push_back(text(parameter, parameter.default_raw()));
