@@ -69,12 +69,12 @@ std::vector<std::string> wall_design_words(const DesignTask& task, const WallDes
   if (!design.found) return {nothing_found_words(task, design)};
   const DesignedWall& wall = design.wall;
   std::vector<std::string> words{
-      fmt::format(
-          "{}, damping {:.3g} N s/m, velocity by {}: a margin of {:.3g} % below {}, the stiffest that "
-          "holds for all of {} ({}).",
-          stiffness_words(wall.stiffness), wall.damping, name_of(wall.family),
-          100.0 * (1.0 - wall.stiffness / design.largest), stiffness_words(design.largest),
-          people_words(task.set.subjects.size()), criteria_words(task)),
+      fmt::format("{}, damping {:.3g} N s/m, {}{}: a margin of {:.3g} % below {}, the stiffest that "
+                  "holds for all of {} ({}).",
+                  stiffness_words(wall.stiffness), wall.damping, wall.family.grows() ? "" : "velocity by ",
+                  name_of(wall.family), 100.0 * (1.0 - wall.stiffness / design.largest),
+                  stiffness_words(design.largest), people_words(task.set.subjects.size()),
+                  criteria_words(task)),
       bound_words(task, design),
       fmt::format("Price: field at rest {:.3g} N; deepest {:.3g} mm ({}); rate-hardness {:.3g} N/mm/s per "
                   "mm/s (0.2 m/s, mean of the people).",
