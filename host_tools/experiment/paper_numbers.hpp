@@ -12,10 +12,11 @@
 
 namespace kmax::experiment::paper {
 
-// As far as the copies that these numbers were taken from say it: neither names its authors or its DOI.
+// As far as the copies that these numbers were taken from say it, which name neither authors nor DOI; the
+// authors of the first are those of the journal's page.
 inline constexpr std::string_view title_1 =
-    "A Human Arm's Mechanical Impedance Tuning Method for Improving the Stability of Haptic Rendering, first "
-    "published online on July 21, 2020.";
+    "Xiong Lu, Beibei Qi, Hao Zhao, Junbin Sun: A Human Arm's Mechanical Impedance Tuning Method for "
+    "Improving the Stability of Haptic Rendering, Robotica, first published online on July 21, 2020.";
 inline constexpr std::string_view title_2 =
     "on the relation between the position resolution of a haptic device and its stability, with experiments "
     "on a Phantom Desktop.";

@@ -78,11 +78,26 @@ class FamilySearch {
   /// Takes a damping that holds up to `rung` for the hard touches as the best, if it is for everybody.
   void improve(double damping, int rung) {
     while (rung > best_.rung) {
-      const auto unstable = trials_.first_unstable(wall_at(damping, rung));
-      if (!unstable) return accept(damping, rung);
-      hard_.insert(hard_.begin(), unstable->number);
-      rung = highest(damping, best_.rung + 1, rung - 1);
+      if (const auto unstable = trials_.first_unstable(wall_at(damping, rung))) {
+        hard_.insert(hard_.begin(), unstable->number);
+        rung = highest(damping, best_.rung + 1, rung - 1);
+      } else if (const int below = highest_below(damping, rung); below < rung) {
+        rung = below;
+      } else {
+        return accept(damping, rung);
+      }
     }
+  }
+
+  /// The highest rung up to `rung` below which, down to a tenth of its stiffness, all hold for the hard
+  /// touches: a wall may be unstable in between, and what holds beyond must not hide a better damping.
+  int highest_below(double damping, int rung) {
+    constexpr int tenth = 231, half = 70;
+    for (int lower = std::max(0, rung - tenth), step = 16; lower < rung; lower += step) {
+      if (!holds(damping, lower)) return lower - 1;
+      if (lower >= rung - half) step = 2;
+    }
+    return rung;
   }
 
   void accept(double damping, int rung) {

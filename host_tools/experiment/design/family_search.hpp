@@ -9,7 +9,8 @@
 // around the best one in steps of half of that, a quarter and an eighth.
 //
 // For one wall of the family the stiffness is found by doubling steps and by halving, which takes for granted
-// that a wall which holds also holds when it is softer; verify_wall() does not.
+// that a wall which holds also holds when it is softer. One that would be the best so far is looked at below
+// as well, by the hard touches; verify_wall() does it by all.
 
 #include <optional>
 #include <vector>

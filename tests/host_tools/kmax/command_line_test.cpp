@@ -258,13 +258,13 @@ TEST_F(CommandLine, ListFiltersAndMarks) {
   EXPECT_EQ(document().size(), 1u);
   EXPECT_EQ(document()["wall.stiffness"]["default"], 1000);
   EXPECT_EQ(kmax({"list", "axis1.wall", "--json"}), done);
-  EXPECT_EQ(document().size(), 18u);
+  EXPECT_EQ(document().size(), 22u);
   EXPECT_TRUE(document().contains("axis1.wall.law"));
   EXPECT_EQ(kmax({"list", "wall", "--axis", "1", "--json"}), done);
   EXPECT_TRUE(document().contains("axis1.wall.law"));
   EXPECT_EQ(kmax({"list", "axis0.wall", "--json"}), done);
   EXPECT_TRUE(document().contains("wall.law"));
-  EXPECT_EQ(document().size(), 18u);
+  EXPECT_EQ(document().size(), 22u);
   EXPECT_EQ(kmax({"list", "--all", "--json"}), done);
   EXPECT_EQ(document().size(), firmware::slot_count);
   EXPECT_EQ(kmax({"list", "wal."}), wrong_usage);

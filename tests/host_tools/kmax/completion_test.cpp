@@ -29,7 +29,7 @@ class Completion : public SimulatedCommandLine {
 TEST_F(Completion, CommandsOptionsParametersChoicesAndScenes) {
   EXPECT_EQ(of({"simu"}), Words{"simulate"});
   EXPECT_EQ(of({"experiment", "jit"}), Words{"jitter"});
-  EXPECT_EQ(of({"get", "wall.damping_"}), Words{"wall.damping_ceiling"});
+  EXPECT_EQ(of({"get", "wall.damping_c"}), Words{"wall.damping_ceiling"});
   EXPECT_EQ(of({"get", "wall.law", "axis1.wall.la"}), Words{"axis1.wall.law"});
   EXPECT_EQ(of({"set", "wall.law"}), Words{"wall.law="});
   EXPECT_EQ(of({"set", "wall.law=pl"}), Words{"wall.law=plain"});
