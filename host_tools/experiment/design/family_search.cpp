@@ -81,10 +81,14 @@ class FamilySearch {
       if (const auto unstable = trials_.first_unstable(wall_at(damping, rung))) {
         hard_.insert(hard_.begin(), unstable->number);
         rung = highest(damping, best_.rung + 1, rung - 1);
+      } else if (!allowed(damping, rung)) {
+        return;  // a softer one is no less deep
       } else if (const int below = highest_below(damping, rung); below < rung) {
         rung = below;
       } else {
-        return accept(damping, rung);
+        found_ = true;
+        best_.rung = rung;
+        best_.damping = damping;
       }
     }
   }
@@ -100,19 +104,15 @@ class FamilySearch {
     return rung;
   }
 
-  void accept(double damping, int rung) {
+  /// Of a wall that everybody has just touched.
+  bool allowed(double damping, int rung) {
     // What nobody gets to is no wall: a field may hold the hand off.
-    if (!trials_.everybody_touched()) return;
-    if (task_.depth) {
-      const double depth = trials_.deepest({family_, damping, stiffness_with_margin(task_, rung)}).depth;
-      if (depth > *task_.depth) {
-        best_.least_depth = best_.least_depth > 0.0 ? std::min(best_.least_depth, depth) : depth;
-        return;
-      }
-    }
-    found_ = true;
-    best_.rung = rung;
-    best_.damping = damping;
+    if (!trials_.everybody_touched()) return false;
+    if (!task_.depth) return true;
+    const double depth = trials_.deepest({family_, damping, stiffness_with_margin(task_, rung)}).depth;
+    if (depth <= *task_.depth) return true;
+    best_.least_depth = best_.least_depth > 0.0 ? std::min(best_.least_depth, depth) : depth;
+    return false;
   }
 
   const DesignTask& task_;

@@ -1,5 +1,7 @@
 #include "host_tools/experiment/design/wall_design.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "firmware/drive/axis_configuration.hpp"
@@ -143,6 +145,12 @@ TEST(WallDesign, VerifiesEverythingBelowTheWall) {
   const int rung = verify_wall(task, design.wall.family, design.wall.damping, top_rung, {2}, counted);
   EXPECT_LT(rung, top_rung);
   EXPECT_GT(counted.touches, 0U);
+}
+
+TEST(WallDesign, SaysThatNoneHolds) {
+  const std::string words = fmt::format("{}", fmt::join(wall_design_words(quick_task(), WallDesign{}), " "));
+  EXPECT_CONTAINS(words, "No wall of 20 N/m or more holds");
+  EXPECT_CONTAINS(words, "--feels");
 }
 
 TEST(WallDesign, ItsFileIsTheWallAndSaysWhereItComesFrom) {

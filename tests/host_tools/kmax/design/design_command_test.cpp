@@ -70,10 +70,6 @@ TEST_F(DesignCommand, TakesTheDeviceFromADump) {
 TEST_F(DesignCommand, ThatNoWallHoldsIsAVerdict) {
   EXPECT_EQ(design({"--depth", "0.001mm"}), verdict_is_no);
   EXPECT_CONTAINS(words(), "Allow more with --depth");
-  EXPECT_EQ(design({"--moves", "0.001um", "--encoder", "1mm", "--rate", "100Hz", "--delay", "50ms",
-                    "--friction", "0N"}),
-            verdict_is_no);
-  EXPECT_CONTAINS(words(), "No wall of 20 N/m or more holds");
 }
 
 TEST_F(DesignCommand, RefusesWhatIsNotAllowedAndSaysWhatIs) {
