@@ -7,7 +7,7 @@ namespace kmax::experiment {
 namespace {
 
 /// A quarter below the bound: the best damping may lie between two that are tried first.
-constexpr int slack = 29;
+constexpr int quarter_below = 29;
 
 class FamilySearch {
  public:
@@ -64,7 +64,7 @@ class FamilySearch {
   /// Every damping against the hard touches, then the best ones against everybody. `centre`: the best of the
   /// first, which need not be above the bound.
   void try_all(double& centre) {
-    const int least = std::max(0, best_.rung - slack);
+    const int least = std::max(0, best_.rung - quarter_below);
     std::vector<TriedDamping> order;
     for (const double damping : dampings_of(task_))
       if (const int rung = highest(damping, least, top_rung); rung >= least) order.push_back({damping, rung});
