@@ -135,7 +135,8 @@ TEST_F(CommandLine, MistypedCommandsGetASuggestion) {
   EXPECT_EQ(kmax({}), wrong_usage);
   EXPECT_CONTAINS(said, "a command is missing");
   EXPECT_EQ(kmax({"experiment"}), wrong_usage);
-  EXPECT_CONTAINS(said, "experiment: name one of max-stiffness, contact, jitter, deviation, resolution, wall-test; ");
+  EXPECT_CONTAINS(
+      said, "experiment: name one of max-stiffness, contact, jitter, deviation, resolution, wall-test; ");
 }
 
 TEST_F(CommandLine, HelpNeedsNoDeviceAndShowsExamplesAndExitCodes) {

@@ -232,8 +232,7 @@ class WallTestOnABoard : public DeviceExperiment {
     std::vector<WallTouch> all;
     with_rig([&](Rig& rig) {
       make_wall_touches(
-          rig, kind, settings, [](std::size_t) {},
-          [&](WallTouch touch) { all.push_back(std::move(touch)); });
+          rig, kind, settings, [](std::size_t) {}, [&](WallTouch touch) { all.push_back(std::move(touch)); });
     });
     return all;
   }
