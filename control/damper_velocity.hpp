@@ -29,7 +29,7 @@ class DamperVelocity {
                                         std::int32_t step) {
     const std::int32_t within = window < 1 ? 1 : window < damper_window_max ? window : damper_window_max;
     const auto samples = static_cast<std::uint32_t>(within);
-    // Steps up to 2^27 are told apart.
+    // Steps up to 2^27 are distinguished.
     return {samples, static_cast<std::uint32_t>(step) << 5 | samples,
             count_length / (period * static_cast<Scalar>(within))};
   }

@@ -24,7 +24,7 @@ constexpr std::string_view parameters_prefix = "parameters.";
 struct ChangeableParameter {
   std::string_view name;
   void (*copy)(Loop& to, const Loop& from);
-  bool of_papers_walls = false;  ///< which are told apart by it
+  bool of_papers_walls = false;  ///< which differ by it
 };
 
 constexpr auto copy_adaptive = [](Loop& to, const Loop& from) {

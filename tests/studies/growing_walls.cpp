@@ -19,10 +19,6 @@ double drawn(std::mt19937& random, double from, double to) {
   return from * std::exp(share * std::log(to / from));
 }
 
-double least(const TwoMeans& found) {
-  return found.least();
-}
-
 }  // namespace
 
 WallChange growing(double touch_stiffness, double growth_time, double damping) {
@@ -93,12 +89,12 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       {}};
   for (const LoopSetting& situation : growing_situations()) table.columns.push_back(situation.name);
   const auto best = std::max_element(walls.begin(), walls.end(), [](const auto& one, const auto& other) {
-    return least(one.situations.front()) < least(other.situations.front());
+    return one.situations.front().least() < other.situations.front().least();
   });
   for (const GrowingResult& wall : walls) {
     table.rows.push_back({wall.wall});
     for (std::size_t n = 0; n < wall.situations.size(); ++n) {
-      const double found = least(wall.situations[n]), plain = least(walls.front().situations[n]);
+      const double found = wall.situations[n].least(), plain = walls.front().situations[n].least();
       table.rows.back().push_back(
           fmt::format("{} ({:.1f})", n_per_mm(found), plain > 0.0 ? found / plain : 0.0));
     }
@@ -110,8 +106,8 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       "is slower than wall.calm_velocity (0.01 m/s). Its damper takes the difference over one sample "
       "(wall.damping_window = 1). No field, so nothing is felt at rest in front of it.",
       fmt::format("Best where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
-                  best->wall, n_per_mm(least(best->situations.front())),
-                  least(best->situations.front()) / least(walls.front().situations.front())),
+                  best->wall, n_per_mm(best->situations.front().least()),
+                  best->situations.front().least() / walls.front().situations.front().least()),
       "It is paid for at the contact: a tap meets the touch stiffness and the damper, and the stiffness "
       "comes "
       "within three growth times. The rate-hardness above says how hard the contact itself is."};

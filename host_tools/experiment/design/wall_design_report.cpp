@@ -17,7 +17,7 @@ std::string stiffness_words(double stiffness) {
   return fmt::format("{:.3g} N/mm", stiffness / 1e3);
 }
 
-std::string words_of(const DesignTask& task, const TouchCase& touch) {
+std::string touch_case_text(const DesignTask& task, const TouchCase& touch) {
   return fmt::format("{} at {:g} m/s with a push of {:g} N", task.set.subjects[touch.person].name,
                      touch.speed, touch.push);
 }
@@ -37,7 +37,7 @@ std::string bound_words(const DesignTask& task, const WallDesign& design) {
     return fmt::format("Bound by nothing: it holds up to {}, the most that is looked at.",
                        stiffness_words(design.largest));
   const DesignBound& bound = *design.bound;
-  return fmt::format("Bound by {}: with {} {}, peak to peak.", words_of(task, bound.touch),
+  return fmt::format("Bound by {}: with {} {}, peak to peak.", touch_case_text(task, bound.touch),
                      stiffness_words(bound.stiffness), swing_words(bound.by_force, bound.peak_to_peak));
 }
 
@@ -78,7 +78,7 @@ std::vector<std::string> wall_design_words(const DesignTask& task, const WallDes
       bound_words(task, design),
       fmt::format("Price: field at rest {:.3g} N; deepest {:.3g} mm ({}); rate-hardness {:.3g} N/mm/s per "
                   "mm/s (0.2 m/s, mean of the people).",
-                  design.price.field_at_rest, design.price.depth * 1e3, words_of(task, design.deepest),
+                  design.price.field_at_rest, design.price.depth * 1e3, touch_case_text(task, design.deepest),
                   design.price.rate_hardness / 1e3)};
   if (!design.changes.empty()) words.push_back(change_words(design));
   words.push_back(

@@ -287,7 +287,7 @@ StableLimit stable_limit(const std::vector<WallCell>& cells, StabilityCriterion 
   return limit;
 }
 
-std::string words_of(const StableLimit& limit) {
+std::string limit_text(const StableLimit& limit) {
   using End = StableLimit::End;
   const double next = limit.next / 1e3;
   if (limit.end == End::unjudged) {

@@ -164,7 +164,7 @@ StableLimit stable_limit(const std::vector<WallCell>& cells, StabilityCriterion 
                          const std::optional<TouchKind>& kind = {});
 
 /// "3 N/mm", "at least 6 N/mm: nothing was unstable", "below 1 N/mm: unstable already there", ...
-std::string words_of(const StableLimit& limit);
+std::string limit_text(const StableLimit& limit);
 
 /// What came of it.
 struct WallTestResult {

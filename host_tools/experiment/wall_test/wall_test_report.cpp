@@ -118,8 +118,7 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
           settings.threshold * 1e3, settings.force_threshold)};
   words.emplace_back(
       "The trace has at most 500 records a second and whole counts of the encoder, and the force has its "
-      "limit: "
-      "rate-hardness is what these let pass of the stiffness.");
+      "limit: rate-hardness is what these let pass of the stiffness.");
   if (!settings.changes.empty()) words.push_back(settings.changes.sentence());
   return words;
 }
@@ -131,7 +130,7 @@ report::Table limit_table(const WallTestResult& result) {
   const auto add = [&](const std::string& name, const std::optional<TouchKind>& kind) {
     std::vector<std::string> row{name};
     for (const StabilityCriterion criterion : stability_criteria)
-      row.push_back(words_of(stable_limit(result.cells, criterion, kind)));
+      row.push_back(limit_text(stable_limit(result.cells, criterion, kind)));
     table.rows.push_back(std::move(row));
   };
   for (const TouchKind kind : touch_kinds) add(std::string(to_string(kind)), kind);
@@ -156,8 +155,7 @@ report::Table verdict_table(const WallTestResult& result) {
 report::Table measure_table(const WallTestResult& result) {
   report::Table table{
       "Speed at contact and rate-hardness (the fastest rise of the force in the first 20 ms over that "
-      "speed): "
-      "median. Depth, force and time to settle: the largest; -: not settled, or nothing to settle",
+      "speed): median. Depth, force and time to settle: the largest; -: not settled, or nothing to settle",
       {"touch", "N/mm", "speed (m/s)", "deepest (mm)", "rate-hardness (N/mm)", "peak force (N)",
        "limited (%)", "settles (s)"},
       {}};
@@ -183,8 +181,7 @@ std::vector<std::filesystem::path> write_wall_test(const WallTestResult& result,
   if (result.origin != report::Origin::measured)
     words.emplace_back(
         "Device and person are simulated. The person touches always in the same way; only the moment within "
-        "a "
-        "sample differs from touch to touch, so that the intervals are those of that moment alone.");
+        "a sample differs from touch to touch, so that the intervals are those of that moment alone.");
   report::Page page{"Wall test", {}};
   page.sections.push_back(
       {"Result",

@@ -82,7 +82,7 @@ Json limit_json(const std::string& touch, const WallTestResult& result,
     row[std::string("by_") + std::string(to_string(criterion))] = {
         {"stiffness_n_per_m", json::optional_json(limit.largest)},
         {"is", found},
-        {"words", experiment::words_of(limit)}};
+        {"words", experiment::limit_text(limit)}};
   }
   return row;
 }
@@ -258,7 +258,7 @@ void add_wall_test_experiment(CLI::App& experiment, Context& context) {
        "wall is pressed, and a handle that is let go in it, each judged by position and by force. Law, rate "
        "and "
        "all else of the wall are the device's own.\n"
-       "On a device you are told before each touch what to do. The axis is disarmed after each touch and on "
+       "On a device each touch is asked for before it is made. The axis is disarmed after each touch and on "
        "Ctrl-C, and its parameters are put back at the end.\n"
        "Every number that is compared needs its interval: 3 stable touches of 3 say no more than that at "
        "least "

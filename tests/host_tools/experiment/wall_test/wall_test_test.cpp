@@ -166,7 +166,7 @@ WallTestSettings three_stiffnesses() {
 
 std::string limit_words(const std::vector<WallTouch>& touches, StabilityCriterion criterion,
                         std::optional<TouchKind> kind = TouchKind::slow) {
-  return words_of(stable_limit(wall_cells(touches, three_stiffnesses()), criterion, kind));
+  return limit_text(stable_limit(wall_cells(touches, three_stiffnesses()), criterion, kind));
 }
 
 TEST(StableLimit, SaysWhereItLiesAndWhatIsNotKnown) {
