@@ -1,7 +1,8 @@
 #include "host_tools/experiment/touch_price.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "host_tools/experiment/rate_hardness.hpp"
 
 namespace kmax::experiment {
 namespace {
@@ -15,14 +16,15 @@ double field_at_rest(const TouchSetup& setup) {
   return static_cast<double>(loop.output().magnetic_force);
 }
 
-double rate_hardness(const std::vector<TouchSample>& touch, double rate) {
-  const auto inside = [](const TouchSample& sample) { return sample.position <= 0.0; };
-  const auto contact = std::find_if(touch.begin(), touch.end(), inside);
-  const auto length = std::max<std::ptrdiff_t>(1, std::lround(rate_hardness_time * rate));
-  if (contact == touch.begin() || touch.end() - contact <= length || !(contact->velocity < 0.0)) return 0.0;
-  if (!std::all_of(contact, contact + length, inside)) return 0.0;
-  const double rise = contact[length - 1].force - contact[-1].force;
-  return rise * rate / static_cast<double>(length) / -contact->velocity;
+double rate_hardness_of(const std::vector<TouchSample>& touch, double rate) {
+  const auto contact = std::ranges::find_if(
+      touch, [](double position) { return position <= 0.0; }, &TouchSample::position);
+  if (contact == touch.end()) return 0.0;
+  std::vector<ContactForce> trace;
+  const auto first = contact - touch.begin();
+  for (std::ptrdiff_t n = 0; n < std::ssize(touch); ++n)
+    trace.push_back({static_cast<double>(n - first) / rate, touch[n].position, touch[n].force});
+  return rate_hardness(trace, -contact->velocity).value_or(0.0);
 }
 
 }  // namespace
@@ -37,7 +39,7 @@ TouchPrice price_of(const TouchSetup& setup) {
     touched = touched || touch[n].position <= 0.0;
     if (!touched && n > 0) price.work += touch[n - 1].force * (touch[n - 1].position - touch[n].position);
   }
-  price.rate_hardness = rate_hardness(touch, setup.wall.tick_rate);
+  price.rate_hardness = rate_hardness_of(touch, setup.wall.tick_rate);
   price.field_at_rest = field_at_rest(setup);
   return price;
 }

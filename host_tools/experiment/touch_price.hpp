@@ -9,14 +9,9 @@ struct TouchPrice {
   double field_at_rest = 0.0;  ///< N, on a handle that rests on the surface
   double work = 0.0;           ///< J, against the field until the surface is met
   double depth = 0.0;          ///< m, deepest in the wall, from the first contact to the end of the hold
-  /// N/m: what the force rises by over the first rate_hardness_time in the wall, over that time and over the
-  /// speed at contact; 0 if the wall was not met, or is left sooner. Lawrence and others (IEEE Trans.
-  /// Robotics and Automation 16(4), 2000) found that people judge hardness by it rather than by the
-  /// stiffness.
+  /// N/m, see rate_hardness.hpp; 0 if the wall was not met, or is left sooner.
   double rate_hardness = 0.0;
 };
-
-inline constexpr double rate_hardness_time = 0.004;  ///< s; at least one sample
 
 /// Errors: those of simulate_touch(). The surface is at 0, free space above.
 TouchPrice price_of(const TouchSetup& setup);

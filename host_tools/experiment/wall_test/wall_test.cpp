@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/experiment/rate_hardness.hpp"
 #include "host_tools/experiment/setting_check.hpp"
 #include "host_tools/experiment/watched_touch.hpp"
 
@@ -24,7 +25,6 @@ std::string_view to_string(StabilityCriterion criterion) {
 
 namespace {
 
-constexpr double first_rise = 0.02;      // s after the touch, within which the force rises fastest
 constexpr double swing_window = 0.25;    // s
 constexpr double simulated_pause = 2.0;  // s, in which a simulated hand is back at its start
 
@@ -52,14 +52,10 @@ Swing swing_of(const std::vector<RigSample>& samples, double RigSample::*value, 
 }
 
 std::optional<double> rate_hardness_of(const RigTouch& touch) {
-  if (!(touch.speed > 0.0)) return std::nullopt;
-  double fastest = 0.0;
-  for (std::size_t i = 1; i < touch.samples.size(); ++i) {
-    const RigSample &before = touch.samples[i - 1], &now = touch.samples[i];
-    if (now.time < 0.0 || now.time > first_rise || !(now.time > before.time)) continue;
-    fastest = std::max(fastest, touch.side * (now.force - before.force) / (now.time - before.time));
-  }
-  return fastest / touch.speed;
+  std::vector<ContactForce> trace;
+  for (const RigSample& sample : touch.samples)
+    trace.push_back({sample.time, sample.outside_distance, touch.side * sample.force});
+  return rate_hardness(trace, touch.speed);
 }
 
 std::optional<double> settling_of(const std::vector<RigSample>& samples, double begin, double end,

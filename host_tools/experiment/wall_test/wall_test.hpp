@@ -84,7 +84,7 @@ struct WallTouch {
   double contact_speed = 0.0;           ///< m/s towards the wall over the 30 ms before it, from the encoder
   double deepest = 0.0;                 ///< m, from the first touch to the end of the hold
   double peak_force = 0.0;              ///< N, asked for, likewise
-  std::optional<double> rate_hardness;  ///< N/m: fastest rise of the force in the first 20 ms over the speed
+  std::optional<double> rate_hardness;  ///< N/m; see rate_hardness.hpp
   /// s from the touch, or from the end of the pulse, after which the handle no longer swings to and fro by
   /// more than the threshold within 0.25 s. Nothing: it does so until the end, or it was let go.
   std::optional<double> settling;

@@ -154,8 +154,9 @@ report::Table verdict_table(const WallTestResult& result) {
 
 report::Table measure_table(const WallTestResult& result) {
   report::Table table{
-      "Speed at contact and rate-hardness (the fastest rise of the force in the first 20 ms over that "
-      "speed): median. Depth, force and time to settle: the largest; -: not settled, or nothing to settle",
+      "Speed at contact and rate-hardness (the rise of the force over the first 4 ms, over their time and "
+      "that speed): median. Depth, force and time to settle: the largest; -: not settled, or nothing to "
+      "settle",
       {"touch", "N/mm", "speed (m/s)", "deepest (mm)", "rate-hardness (N/mm)", "peak force (N)",
        "limited (%)", "settles (s)"},
       {}};
