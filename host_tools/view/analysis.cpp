@@ -6,7 +6,7 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/check/judgement.hpp"
 #include "host_tools/check/stability_map.hpp"
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

@@ -10,7 +10,7 @@
 
 #include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/check/hand_choice.hpp"
-#include "host_tools/view/message.hpp"
+#include "host_tools/view/server/message.hpp"
 
 namespace kmax::view {
 

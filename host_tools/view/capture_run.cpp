@@ -2,7 +2,7 @@
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/view/force_removal.hpp"
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

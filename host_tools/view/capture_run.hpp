@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "host_tools/device/capture_reader.hpp"
-#include "host_tools/view/message.hpp"
+#include "host_tools/view/server/message.hpp"
 
 namespace kmax::view {
 

@@ -10,14 +10,14 @@
 #include "host_tools/record/telemetry_request.hpp"
 #include "host_tools/view/analysis.hpp"
 #include "host_tools/view/capture_run.hpp"
-#include "host_tools/view/command_queue.hpp"
 #include "host_tools/view/force_removal.hpp"
-#include "host_tools/view/messages.hpp"
 #include "host_tools/view/parameter_mirror.hpp"
 #include "host_tools/view/procedure_run.hpp"
 #include "host_tools/view/reach.hpp"
 #include "host_tools/view/row_batch.hpp"
 #include "host_tools/view/row_stream.hpp"
+#include "host_tools/view/server/command_queue.hpp"
+#include "host_tools/view/server/messages.hpp"
 #include "host_tools/view/urgent_link.hpp"
 
 namespace kmax::view {

@@ -33,7 +33,7 @@ else()
   message("The live page shows values in place of its scope. With npm installed, remove ${OUTPUT} and build again.")
 endif()
 
-file(WRITE ${OUTPUT} "#include \"host_tools/view/page_files.hpp\"
+file(WRITE ${OUTPUT} "#include \"host_tools/view/server/page_files.hpp\"
 
 namespace kmax::view {
 

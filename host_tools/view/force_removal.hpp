@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "host_tools/device/device.hpp"
-#include "host_tools/view/command_queue.hpp"
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/command_queue.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

@@ -1,7 +1,7 @@
 #include "host_tools/view/parameter_mirror.hpp"
 
 #include "host_tools/device/store.hpp"
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

@@ -3,41 +3,14 @@
 // `kmax experiment contact`, by the library's same calls. The experiments that take hours are not here: they
 // keep a journal in a folder, with which the command goes on where it was interrupted.
 
-#include <cstddef>
 #include <functional>
-#include <span>
 #include <string>
-#include <string_view>
 
 #include "host_tools/bench/prompter.hpp"
 #include "host_tools/device/device.hpp"
+#include "host_tools/view/server/procedure_text.hpp"
 
 namespace kmax::view {
-
-/// For whoever is about to start it.
-struct ProcedureText {
-  std::string_view name;    ///< in messages
-  std::string_view title;   ///< for people
-  std::string_view before;  ///< that it arms the axis, what it does with the handle, what it needs
-  std::string_view hand;    ///< what the person's hand adds; empty: there is no choice
-  std::size_t trials;       ///< touches of each wall unless others are asked for; 0: it has none
-};
-std::span<const ProcedureText> procedure_texts();
-/// Throws device::ValueError with the names that are allowed.
-const ProcedureText& procedure_named(std::string_view name);
-
-struct ProcedureSettings {
-  std::string name{};  ///< in procedure_texts()
-  std::size_t axis = 0;
-  bool hand = false;  ///< the person takes part: `--hand` of the commands
-  std::size_t trials = 3;
-};
-
-/// A check, a step, a wall.
-struct Finding {
-  std::string name{}, verdict{};  ///< "pass", "fail" or "not judged"
-  std::string words{};            ///< what was found and, if need be, what to do
-};
 
 struct ProcedureResult {
   bool pass = false;

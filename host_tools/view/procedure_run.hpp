@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/view/command_queue.hpp"
 #include "host_tools/view/force_removal.hpp"
-#include "host_tools/view/messages.hpp"
 #include "host_tools/view/procedure.hpp"
+#include "host_tools/view/server/command_queue.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

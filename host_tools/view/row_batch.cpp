@@ -1,6 +1,6 @@
 #include "host_tools/view/row_batch.hpp"
 
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 namespace kmax::view {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "host_tools/record/recording.hpp"
-#include "host_tools/view/message.hpp"
+#include "host_tools/view/server/message.hpp"
 
 namespace kmax::view {
 

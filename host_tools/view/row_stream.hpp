@@ -8,7 +8,7 @@
 
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/record/pdo_plan.hpp"
-#include "host_tools/view/message.hpp"
+#include "host_tools/view/server/message.hpp"
 
 namespace kmax::view {
 

@@ -436,7 +436,7 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
            1e3 * static_cast<double>(defaults.displacement_threshold), defaults.force_threshold,
            defaults.lowest_frequency, 1e3 * static_cast<double>(defaults.settling_time)),
        "Everything here is simulated. Made by "
-       "build/native/tests/studies/kmax-instability-study --out docs."},
+       "build/native/tests/studies/kmax-studies instability --out docs."},
       {},
       {}};
   return {"Instability detector", {what, found, calm, soft}};

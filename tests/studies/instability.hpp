@@ -1,7 +1,7 @@
 #pragma once
 // How well control/instability_detector.hpp finds the unstable walls of simulated people, what it says of
 // stable ones, and whether control/wall_softening.hpp ends what it finds: what docs/instability_detector.md
-// rests on. The program kmax-instability-study (instability_main.cpp) runs it.
+// rests on. `kmax-studies instability` runs it.
 //
 // Detector and softening are run beside the firmware's own haptic loop as they would be within it: the
 // detector sees the counted displacement and the force that the device makes of what is asked for; the

@@ -1,14 +1,18 @@
 // kmax-studies: makes docs/experiments/max_stiffness.md, the study of the largest stiffness (as `kmax
-// experiment max-stiffness`) and behind it the studies that are named.
+// experiment max-stiffness`) and behind it the studies that are named; and what other pages rest on, each by
+// a command of its own.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <memory>
 
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/provenance.hpp"
 #include "host_tools/report/page.hpp"
+#include "tests/studies/instability.hpp"
 #include "tests/studies/studies.hpp"
+#include "tests/studies/wall_design.hpp"
 
 namespace kmax::studies {
 namespace {
@@ -24,6 +28,50 @@ report::Page make_page(const StudyInput& input, const std::vector<std::string>& 
         experiment::draw_max_stiffness(studies, input.folder / "max_stiffness.svg"));
   for (report::Section& section : run_studies(names, input)) page.sections.push_back(std::move(section));
   return page;
+}
+
+void add_instability(CLI::App& studies) {
+  CLI::App* app = studies.add_subcommand(
+      "instability",
+      "How well the instability detector finds unstable walls, and what it says of stable ones.");
+  struct Options {
+    std::size_t jobs = 0, walls = 225;
+    double margin = 0.4;
+    std::filesystem::path folder;
+  };
+  const auto options = std::make_shared<Options>();
+  app->add_option("--jobs", options->jobs, "At a time; all processors without it");
+  app->add_option("--walls", options->walls, "Walls of the stable touches, 50 touches each")
+      ->capture_default_str();
+  app->add_option("--margin", options->margin, "Their stiffness, at most, over the largest stable one")
+      ->capture_default_str();
+  app->add_option("--out", options->folder, "Folder for the page")->type_name("DIR");
+  app->callback([options] {
+    const std::vector<experiment::SubjectSet> sets{experiment::open_subject_set("clipped"),
+                                                   experiment::open_subject_set("unclipped")};
+    const auto ratios = watch_ratios(sets, {0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.5, 2.0, 3.0}, {}, options->jobs);
+    const auto stable = watch_stable(sets, options->walls, 50, options->margin, options->jobs);
+    const report::Page page = instability_page(ratios, stable, options->margin);
+    fmt::print("{}", report::markdown(page));
+    if (!options->folder.empty()) report::write_page(page, options->folder, "instability_detector");
+  });
+}
+
+void add_wall_design(CLI::App& studies) {
+  CLI::App* app = studies.add_subcommand(
+      "wall-design", "Walls of 'kmax design wall' against a fine grid, on random devices, as CSV.");
+  struct Options {
+    std::uint64_t first = 1, devices = 10;
+    experiment::DesignRun run;
+  };
+  const auto options = std::make_shared<Options>();
+  app->add_option("--first", options->first, "Seed of the first device")->capture_default_str();
+  app->add_option("--devices", options->devices, "How many")->capture_default_str();
+  app->add_option("--jobs", options->run.threads, "Searches at a time; all processors without it");
+  app->callback([options] {
+    const auto say = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
+    fmt::print("{}", report::csv(compare_designs(options->first, options->devices, options->run, say)));
+  });
 }
 
 int run(int count, char** arguments) {
@@ -43,7 +91,10 @@ int run(int count, char** arguments) {
       ->type_name("TEXT");
   app.add_option("--jobs", input.run.threads, "Searches at a time; all processors without it");
   input.run.threads = 0;
+  add_instability(app);
+  add_wall_design(app);
   CLI11_PARSE(app, count, arguments);
+  if (!app.get_subcommands().empty()) return 0;
   for (const std::string& set : sets) input.sets.push_back(experiment::open_subject_set(set));
   if (!input.folder.empty()) std::filesystem::create_directories(input.folder);
   input.run.progress = [](std::size_t done, std::size_t all) {

@@ -1,5 +1,7 @@
 #include "tests/studies/wall_design.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -12,6 +14,10 @@ namespace {
 
 using experiment::DesignTask;
 using experiment::WallFamily;
+
+std::string in_n_per_mm(double stiffness) {
+  return fmt::format("{:.2f}", stiffness / 1e3);
+}
 
 GridOptimum optimum_of(const DesignTask& task, const WallGrid& grid, const WallFamily& family, int floor) {
   experiment::WallTrials trials(task);
@@ -88,6 +94,41 @@ DesignTask random_device(std::uint64_t seed) {
   task.rate = share() < 0.5 ? 500.0 : 1000.0;
   task.count_length = between(5e-6, 100e-6);
   return task;
+}
+
+report::Table compare_designs(std::uint64_t first, std::uint64_t devices, const experiment::DesignRun& run,
+                              const std::function<void(const std::string&)>& say) {
+  // How far below the design the grid is looked at.
+  constexpr int below = 5;
+  report::Table table{"",
+                      {"device", "kg", "N", "ms", "structure, N/mm", "Hz", "um", "N limit", "design, N/mm",
+                       "grid, N/mm", "design / grid", "touches", "of the grid's"},
+                      {}};
+  for (std::uint64_t seed = first; seed < first + devices; ++seed) {
+    const experiment::DesignTask task = random_device(seed);
+    const simulation::DeviceModel& device = task.set.device;
+    const experiment::WallDesign design = experiment::design_wall(task, run, false);
+    const int rung = design.found
+                         ? static_cast<int>(std::lround(std::log(design.largest / experiment::first_rung) /
+                                                        std::log(experiment::rung_ratio)))
+                         : -1;
+    const GridOptimum grid = grid_optimum(task, fine_grid(task), rung - below, run);
+    const double best =
+        grid.rung < 0 ? experiment::stiffness_of(rung - below) : experiment::stiffness_of(grid.rung);
+    table.rows.push_back({std::to_string(seed), fmt::format("{:.3f}", device.mass),
+                          fmt::format("{:.2f}", device.friction), fmt::format("{:.2f}", device.delay * 1e3),
+                          device.structure ? in_n_per_mm(device.structure->stiffness) : "-",
+                          fmt::format("{:g}", task.rate), fmt::format("{:.1f}", task.count_length * 1e6),
+                          fmt::format("{:.1f}", device.force_limit), in_n_per_mm(design.largest),
+                          fmt::format("{}{}", grid.rung < 0 ? "<" : "", in_n_per_mm(best)),
+                          fmt::format("{}{:.3f}", grid.rung < 0 ? ">" : "", design.largest / best),
+                          std::to_string(design.touches),
+                          fmt::format("1/{:.0f}", static_cast<double>(grid.points * task.touches()) /
+                                                      static_cast<double>(design.touches))});
+    say(fmt::format("{}: {}, {} N s/m; grid {}, {} N s/m, {} touches", seed, name_of(design.wall.family),
+                    design.wall.damping, name_of(grid.family), grid.damping, grid.touches));
+  }
+  return table;
 }
 
 }  // namespace kmax::studies

@@ -1,11 +1,14 @@
 #pragma once
-// How far `kmax design wall` stays behind a fine grid, on random devices. kmax-wall-design-study
-// (wall_design_main.cpp) makes the table of docs/design_wall.md.
+// How far `kmax design wall` stays behind a fine grid, on random devices. `kmax-studies
+// wall-design` makes the numbers of docs/design_wall.md.
 
 #include <cstdint>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "host_tools/experiment/design/wall_design.hpp"
+#include "host_tools/report/page.hpp"
 
 namespace kmax::studies {
 
@@ -33,5 +36,10 @@ GridOptimum grid_optimum(const experiment::DesignTask& task, const WallGrid& gri
 
 /// The same device and loop on every machine.
 experiment::DesignTask random_device(std::uint64_t seed);
+
+/// A row for each device of the seeds from `first` on: the design beside the grid's best. `say` hears a line
+/// as soon as a device is done.
+report::Table compare_designs(std::uint64_t first, std::uint64_t devices, const experiment::DesignRun& run,
+                              const std::function<void(const std::string&)>& say);
 
 }  // namespace kmax::studies

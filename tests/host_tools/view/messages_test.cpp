@@ -1,4 +1,4 @@
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 #include <gtest/gtest.h>
 

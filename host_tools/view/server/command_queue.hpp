@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/view/command.hpp"
+#include "host_tools/view/server/command.hpp"
 
 namespace kmax::view {
 

@@ -1,4 +1,4 @@
-#include "host_tools/view/command.hpp"
+#include "host_tools/view/server/command.hpp"
 
 #include <fmt/format.h>
 

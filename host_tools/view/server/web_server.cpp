@@ -1,5 +1,5 @@
 // All of Boost.Beast is in this file, which takes long to compile.
-#include "host_tools/view/web_server.hpp"
+#include "host_tools/view/server/web_server.hpp"
 
 #include <fmt/format.h>
 #include <boost/asio/io_context.hpp>
@@ -14,9 +14,9 @@
 #include <thread>
 #include <vector>
 
-#include "host_tools/view/access.hpp"
-#include "host_tools/view/messages.hpp"
-#include "host_tools/view/outbox.hpp"
+#include "host_tools/view/server/access.hpp"
+#include "host_tools/view/server/messages.hpp"
+#include "host_tools/view/server/outbox.hpp"
 
 namespace kmax::view {
 

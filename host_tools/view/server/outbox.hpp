@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "host_tools/view/message.hpp"
+#include "host_tools/view/server/message.hpp"
 
 namespace kmax::view {
 

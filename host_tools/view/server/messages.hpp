@@ -15,8 +15,8 @@
 #include "host_tools/device/drive.hpp"
 #include "host_tools/device/store.hpp"
 #include "host_tools/record/recording.hpp"
-#include "host_tools/view/message.hpp"
-#include "host_tools/view/procedure.hpp"
+#include "host_tools/view/server/message.hpp"
+#include "host_tools/view/server/procedure_text.hpp"
 
 namespace kmax::view {
 

@@ -1,4 +1,4 @@
-#include "host_tools/view/page_files.hpp"
+#include "host_tools/view/server/page_files.hpp"
 
 #include <gtest/gtest.h>
 

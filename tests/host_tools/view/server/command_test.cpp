@@ -1,4 +1,4 @@
-#include "host_tools/view/command.hpp"
+#include "host_tools/view/server/command.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "host_tools/view/messages.hpp"
+#include "host_tools/view/server/messages.hpp"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include "host_tools/json/drive_json.hpp"
 #include "host_tools/json/judgement_json.hpp"
 #include "host_tools/json/value_json.hpp"
-#include "host_tools/view/access.hpp"
+#include "host_tools/view/server/access.hpp"
 #include "host_tools/wall/wall_evaluation.hpp"
 
 namespace kmax::view {

@@ -5,9 +5,9 @@
 #include <span>
 #include <string>
 
-#include "host_tools/view/command_queue.hpp"
-#include "host_tools/view/message.hpp"
-#include "host_tools/view/page_files.hpp"
+#include "host_tools/view/server/command_queue.hpp"
+#include "host_tools/view/server/message.hpp"
+#include "host_tools/view/server/page_files.hpp"
 
 namespace kmax::view {
 

@@ -1,4 +1,4 @@
-#include "host_tools/view/command_queue.hpp"
+#include "host_tools/view/server/command_queue.hpp"
 
 #include <algorithm>
 

@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "host_tools/view/command.hpp"
+#include "host_tools/view/server/command.hpp"
 
 namespace kmax::view {
 

@@ -7,7 +7,7 @@
 
 #include "host_tools/device/capture_reader.hpp"
 #include "host_tools/json/json.hpp"
-#include "host_tools/view/procedure.hpp"
+#include "host_tools/view/server/procedure_text.hpp"
 
 namespace kmax::view {
 

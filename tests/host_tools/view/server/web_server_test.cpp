@@ -1,4 +1,4 @@
-#include "host_tools/view/web_server.hpp"
+#include "host_tools/view/server/web_server.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <array>
 
 #include "tests/host_tools/thrown_message.hpp"
-#include "tests/host_tools/view/web_client.hpp"
+#include "tests/host_tools/view/server/web_client.hpp"
 
 namespace kmax::view::web_server_test {
 

@@ -1,4 +1,4 @@
-#include "host_tools/view/outbox.hpp"
+#include "host_tools/view/server/outbox.hpp"
 
 #include <gtest/gtest.h>
 

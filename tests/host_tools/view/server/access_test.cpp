@@ -1,4 +1,4 @@
-#include "host_tools/view/access.hpp"
+#include "host_tools/view/server/access.hpp"
 
 #include <gtest/gtest.h>
 
