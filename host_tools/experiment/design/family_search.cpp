@@ -8,6 +8,8 @@ namespace {
 
 /// A quarter below the bound: the best damping may lie between two that are tried first.
 constexpr int quarter_below = 29;
+/// Into which a step of damping_ratio is parted: 5.9 %.
+constexpr int fine_steps = 6;
 
 class FamilySearch {
  public:
@@ -24,16 +26,11 @@ class FamilySearch {
     best_.rung = bound;
     double centre = 0.0;
     try_all(centre);
-    // The least above 0, by which a step beside 0 goes.
-    const double least = dampings_of(task_)[1];
-    double ratio = damping_ratio;
-    for (int level = 0; level < 3; ++level) {
-      ratio = std::sqrt(ratio);
-      const bool damped = found_ ? best_.damping > 0.0 : centre > 0.0;
-      const double around = damped ? (found_ ? best_.damping : centre) : least * std::pow(0.5, level);
-      for (const double damping : {around / ratio, around * ratio})
-        if (damping <= most_damping) improve(damping, highest(damping, best_.rung + 1, top_rung));
-    }
+    const double ratio = std::pow(damping_ratio, 1.0 / fine_steps);
+    for (const double damping : finer_dampings(found_ ? best_.damping : centre, ratio)) try_damping(damping);
+    for (const double part : {0.5, 0.25})
+      for (const double factor : {std::pow(ratio, -part), std::pow(ratio, part)})
+        try_damping(best_.damping * factor);
     if (!found_) best_.rung = -1;
     best_.hard = hard_;
     best_.touches = trials_.touches();
@@ -58,6 +55,22 @@ class FamilySearch {
   }
 
  private:
+  /// Over the whole range and a quarter of the least that was tried, the nearest to `centre` first: a better
+  /// one makes those that follow cheaper.
+  std::vector<double> finer_dampings(double centre, double ratio) const {
+    const std::vector<double> coarse = dampings_of(task_);
+    const double least = coarse[1] / 4.0;
+    std::vector<double> dampings;
+    for (double damping = least; damping <= coarse.back(); damping *= ratio) dampings.push_back(damping);
+    const auto distance = [&](double damping) {
+      return std::abs(std::log(damping / std::max(centre, least)));
+    };
+    std::ranges::stable_sort(dampings, {}, distance);
+    return dampings;
+  }
+
+  void try_damping(double damping) { improve(damping, highest(damping, best_.rung + 1, top_rung)); }
+
   DesignedWall wall_at(double damping, int rung) const { return {family_, damping, stiffness_of(rung)}; }
   bool holds(double damping, int rung) { return !trials_.first_unstable(wall_at(damping, rung), hard_); }
 

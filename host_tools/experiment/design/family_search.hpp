@@ -6,7 +6,8 @@
 // ended others before it, hardest first, and is dropped at the first that is unstable at the stiffness which
 // would make it the best so far (branch and bound). Only what survives is touched by everybody; whatever ends
 // it then is one of the hard touches from there on. Damping is tried in ratios of the square root of 2, then
-// around the best one in steps of half of that, a quarter and an eighth.
+// in ratios of 1.044 over the whole range: most of these are dropped at their first touch. A search around
+// the best one alone stayed 4 % behind a grid, since stiffness over damping has several peaks.
 //
 // For one wall of the family the stiffness is found by doubling steps and by halving, which takes for granted
 // that a wall which holds also holds when it is softer. One that would be the best so far is looked at below
