@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "host_tools/experiment/wilson_interval.hpp"
 #include "tests/studies/studies.hpp"
 
 namespace kmax::studies {
@@ -39,6 +40,22 @@ const experiment::paper::ContactVerdict* printed_verdict(const StiffnessConditio
   return nullptr;
 }
 
+std::vector<StiffnessCondition> held_conditions() {
+  std::vector<StiffnessCondition> conditions = experiment::stiffness_conditions();
+  for (StiffnessCondition& rescaled : experiment::rescaled_conditions())
+    conditions.push_back(std::move(rescaled));
+  return conditions;
+}
+
+/// How many of all people, with the 95 % interval that the share leaves for as many others.
+std::string people_with_interval(const HeldWallResult& result) {
+  const std::size_t all = result.people.size();
+  const auto interval = experiment::wilson_interval(result.stable_people(), all);
+  const auto of_all = [&](double share) { return share * static_cast<double>(all); };
+  return fmt::format("{} ({:.1f} to {:.1f})", result.stable_people(), of_all(interval.low),
+                     of_all(interval.high));
+}
+
 }  // namespace
 
 std::size_t HeldWallResult::stable_people() const {
@@ -59,7 +76,7 @@ std::vector<HeldWallResult> hold_walls(const SubjectSet& set, double stiffness, 
   named.activation_gain = set.subjects.front().person.activation_gain;
   std::vector<HeldWallResult> results;
   std::vector<TouchSetup> setups;  // each condition's people, then the named one
-  for (const StiffnessCondition& condition : experiment::stiffness_conditions()) {
+  for (const StiffnessCondition& condition : held_conditions()) {
     const auto* verdict = printed_verdict(condition);
     if (verdict == nullptr) continue;
     results.push_back({condition, std::string(verdict->figure), verdict->stable, {}, {}});
@@ -94,24 +111,45 @@ bool between_targets(const SubjectSet& set, double stiffness) {
 
 }  // namespace
 
+report::Table rescaled_table(const experiment::MaxStiffnessStudy& study) {
+  using experiment::ConditionResult;
+  report::Table table{
+      "Largest stable stiffness, N/mm, mean of the same people with its 95 % interval (Fig. 8: 8.02)",
+      {"adaptive wall", "V in m/s, as printed", "V x 13.3", "more, of each person"},
+      {}};
+  const std::size_t modes = study.conditions.size() / 2;
+  for (std::size_t n = 0; n < modes; ++n) {
+    const ConditionResult &literal = study.conditions[n], &rescaled = study.conditions[modes + n];
+    const auto text = [](const ConditionResult& result) {
+      return fmt::format("{} ± {}", n_per_mm(result.mean()), n_per_mm(result.interval()));
+    };
+    ConditionResult more = literal;
+    for (std::size_t person = 0; person < more.subjects.size(); ++person)
+      more.subjects[person].stiffness =
+          rescaled.subjects[person].stiffness - literal.subjects[person].stiffness;
+    table.rows.push_back({literal.condition.name, text(literal), text(rescaled), text(more)});
+  }
+  return table;
+}
+
 report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results) {
   constexpr double held = experiment::paper::contact_stiffness;
   const bool implied = between_targets(set, held);
   report::Table table{
       fmt::format("Stable when none of {} touches is unstable", results.front().named.touches),
       {"condition", "figure", "paper 1", fmt::format("{}, mm p-p", named_person), std::string(named_person),
-       "agrees", fmt::format("stable of {}", set.subjects.size()), "median worst, mm p-p", "ours is"},
+       "agrees", fmt::format("stable of {} (95 %)", set.subjects.size()), "median worst, mm p-p", "ours is"},
       {}};
   for (const HeldWallResult& result : results) {
-    table.rows.push_back(
-        {result.condition.name, result.figure, result.paper_stable ? "stable" : "unstable",
-         fmt::format("{:.2f}", result.named.worst * 1e3), result.named.stable() ? "stable" : "unstable",
-         result.named.stable() == result.paper_stable ? "yes" : "no",
-         fmt::format("{}", result.stable_people()), fmt::format("{:.2f}", result.median_worst() * 1e3),
-         implied && !result.condition.adaptive() &&
-                 experiment::paper::fitted_to(result.condition.magnetic_coefficient)
-             ? "implied by the fit"
-             : std::string(report::to_string(report::Origin::predicted))});
+    table.rows.push_back({result.condition.name, result.figure, result.paper_stable ? "stable" : "unstable",
+                          fmt::format("{:.2f}", result.named.worst * 1e3),
+                          result.named.stable() ? "stable" : "unstable",
+                          result.named.stable() == result.paper_stable ? "yes" : "no",
+                          people_with_interval(result), fmt::format("{:.2f}", result.median_worst() * 1e3),
+                          implied && !result.condition.adaptive() &&
+                                  experiment::paper::fitted_to(result.condition.magnetic_coefficient)
+                              ? "implied by the fit"
+                              : std::string(report::to_string(report::Origin::predicted))});
   }
   return {
       fmt::format("A wall of {:g} N/mm held (paper 1, Figs. 9 to 12; {})", held / 1e3,
@@ -128,9 +166,14 @@ report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldW
 
 std::vector<report::Section> held_walls(const StudyInput& input) {
   std::vector<report::Section> sections;
-  for (const SubjectSet& set : input.sets)
+  for (const SubjectSet& set : input.sets) {
     sections.push_back(
         held_wall_section(set, hold_walls(set, experiment::paper::contact_stiffness, input.run)));
+    std::vector<StiffnessCondition> adaptive = held_conditions();
+    std::erase_if(adaptive, [](const StiffnessCondition& condition) { return !condition.adaptive(); });
+    sections.back().tables.push_back(
+        rescaled_table(experiment::run_max_stiffness_study(set, adaptive, input.run)));
+  }
   return sections;
 }
 

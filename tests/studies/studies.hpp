@@ -55,7 +55,8 @@ std::vector<report::Section> loop_rates(const StudyInput& input);
 
 /// In the order of the page.
 inline constexpr std::array<Study, 10> all_studies{{
-    {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), predicted", held_walls},
+    {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), V of eq. 7 as printed and rescaled",
+     held_walls},
     {"causes", "the four causes of the gain at 2 N, one by one", causes},
     {"assumptions", "threshold, pushes, approach speeds, device, integrator: what hangs on them",
      assumptions},
@@ -122,6 +123,9 @@ struct HeldWallResult {
 /// Nothing is fitted to it itself, but without a field and with 2 N the fitted means imply it. The paper
 /// shows one person, about whom it says nothing.
 std::vector<HeldWallResult> hold_walls(const SubjectSet& set, double stiffness, const StiffnessRun& run);
+/// Fig. 8's adaptive walls with V as printed and rescaled: the conditions of `study`, in halves. `more` is
+/// the mean of each person's own difference.
+report::Table rescaled_table(const experiment::MaxStiffnessStudy& study);
 report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldWallResult>& results);
 
 // --- Where the gain of F_MC = 2 N comes from (causes.cpp) --------------------------------------------------

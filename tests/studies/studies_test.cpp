@@ -57,12 +57,14 @@ TEST(Studies, ASectionForEachSetOrOneTableForAll) {
 
 TEST(HeldWalls, CountsPeopleAndTouches) {
   const auto results = hold_walls(few_people(3), 5500.0, quick_run());
-  ASSERT_EQ(results.size(), 6U);
+  ASSERT_EQ(results.size(), 9U);
   EXPECT_EQ(results[0].figure, "9");
   EXPECT_FALSE(results[0].paper_stable);
   EXPECT_EQ(results[2].figure, "11");
   EXPECT_TRUE(results[2].paper_stable);
   EXPECT_EQ(results[5].figure, "12");
+  EXPECT_EQ(results[8].figure, "12");
+  EXPECT_EQ(results[8].condition.name, "adaptive, peak_hold, V x 13.3");
   for (const HeldWallResult& result : results) {
     ASSERT_EQ(result.people.size(), 3U);
     EXPECT_EQ(result.named.touches, 2U);
@@ -103,16 +105,36 @@ TEST(HeldWalls, TheTableSaysWhatAgreesWithThePaper) {
   right.named = {15, 4, 1.25e-3};
   const report::Table table = held_wall_section(two_people(), {wrong, right}).tables.at(0);
   EXPECT_CONTAINS(table.caption, "15 touches");
-  EXPECT_EQ(table.rows[0],
-            (Row{"F_MC = 0 N", "9", "unstable", "0.10", "stable", "no", "1", "0.30", "predicted"}));
+  EXPECT_EQ(table.rows[0], (Row{"F_MC = 0 N", "9", "unstable", "0.10", "stable", "no", "1 (0.2 to 1.8)",
+                                "0.30", "predicted"}));
   EXPECT_EQ(table.rows[1][4], "unstable");
   EXPECT_EQ(table.rows[1][5], "yes");
+}
+
+TEST(HeldWalls, RescaledStandsBesideLiteralOfTheSamePeople) {
+  experiment::MaxStiffnessStudy study;
+  for (const double factor : {1.0, 2.0}) {
+    experiment::ConditionResult result;
+    result.condition.name = "adaptive, instant";
+    for (const double stiffness : {3000.0, 5000.0}) {
+      result.subjects.emplace_back();
+      result.subjects.back().stiffness = factor * stiffness;
+    }
+    study.conditions.push_back(result);
+  }
+  const report::Table table = rescaled_table(study);
+  ASSERT_EQ(table.rows.size(), 1U);
+  // Student's 12.706 of one degree of freedom, times the standard deviation, over the root of 2.
+  EXPECT_EQ(table.rows[0], (Row{"adaptive, instant", "4.00 ± 12.71", "8.00 ± 25.41", "4.00 ± 12.71"}));
 }
 
 TEST(HeldWalls, WhatLiesBetweenTheFittedMeansIsNoTest) {
   std::vector<HeldWallResult> results(3);
   const auto conditions = experiment::stiffness_conditions();
-  for (std::size_t n = 0; n < results.size(); ++n) results[n].condition = conditions[2 * n];
+  for (std::size_t n = 0; n < results.size(); ++n) {
+    results[n].condition = conditions[2 * n];
+    results[n].people.resize(1);
+  }
   const auto worth_of = [&](const SubjectSet& set) {
     Row worth;
     const report::Table table = held_wall_section(set, results).tables.at(0);

@@ -12,6 +12,9 @@ void StiffnessCondition::apply(TouchSetup& setup) const {
   wall.kind = fieldless ? control::WallKind::plain : law;
   wall.magnetic_coefficient = static_cast<float>(magnetic_coefficient);
   wall.adaptive.mode = mode;
+  if (velocity_scale != 1.0)
+    wall.adaptive.velocity_max =
+        static_cast<float>(control::AdaptiveCoefficientConfig<double>().velocity_max / velocity_scale);
 }
 
 std::vector<StiffnessCondition> stiffness_conditions() {
@@ -40,6 +43,17 @@ std::vector<StiffnessCondition> stiffness_conditions() {
     condition.mode = mode;
     condition.paper = printed(0.0, true);
     conditions.push_back(condition);
+  }
+  return conditions;
+}
+
+std::vector<StiffnessCondition> rescaled_conditions() {
+  constexpr double half_width = 0.075;  // m, of CHAI3D's model of the Touch
+  std::vector<StiffnessCondition> conditions = stiffness_conditions();
+  std::erase_if(conditions, [](const StiffnessCondition& condition) { return !condition.adaptive(); });
+  for (StiffnessCondition& condition : conditions) {
+    condition.velocity_scale = 1.0 / half_width;
+    condition.name += fmt::format(", V x {:.1f}", condition.velocity_scale);
   }
   return conditions;
 }

@@ -22,4 +22,17 @@ TEST(StiffnessCondition, AreThoseOfThePaper) {
   }
 }
 
+TEST(StiffnessCondition, RescaledCountsTheVelocityInHalfWidthsOfTheWorkspace) {
+  const auto conditions = rescaled_conditions();
+  ASSERT_EQ(conditions.size(), 3U);
+  for (const auto& condition : conditions) {
+    EXPECT_TRUE(condition.adaptive());
+    EXPECT_EQ(condition.paper, 8020.0);
+    TouchSetup setup;
+    condition.apply(setup);
+    EXPECT_FLOAT_EQ(setup.wall.wall.adaptive.velocity_max, 2.4F * 0.075F);
+  }
+  EXPECT_EQ(conditions[1].name, "adaptive, latched, V x 13.3");
+}
+
 }  // namespace kmax::experiment::stiffness_condition_test
