@@ -179,10 +179,9 @@ class Capture {
 
   // Written by the tick. Those without a lock of their own are read after state_, which is stored after them.
   std::atomic<CaptureState> state_{CaptureState::idle};
-  std::atomic<std::uint32_t> taken_{0};
-  std::atomic<std::uint32_t> trigger_sample_{0}, first_tick_{0}, channels_{0};
-  std::atomic<std::uint32_t> begin_{0},
-      ring_words_{0};  ///< where the oldest word is, and where the ring ends
+  // Nothing is in them before the first capture, and nobody asks.
+  std::atomic<std::uint32_t> taken_, trigger_sample_, first_tick_, channels_;
+  std::atomic<std::uint32_t> begin_, ring_words_;  ///< where the oldest word is, and where the ring ends
 
   // Interrupt context only.
   Plan ISR_plan_{};
