@@ -207,4 +207,9 @@ TEST(PhaseWatchConfig, ItsDefaults) {
   EXPECT_EQ(defaults.rate, 20000.0);
 }
 
+TEST(PhaseWatchCoefficients, ItsDefaults) {
+  const PhaseWatch<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.patience, 20u);
+}
+
 }  // namespace kmax::control::phase_watch_test

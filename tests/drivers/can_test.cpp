@@ -345,4 +345,18 @@ TEST(CanErrors, ItsDefaults) {
   EXPECT_FALSE(defaults.bus_off);
 }
 
+TEST(CanReceiveCounters, NothingHasBeenReceivedAtFirst) {
+  const CanReceiveCounters defaults{};
+  EXPECT_EQ(defaults.received, 0u);
+  EXPECT_EQ(defaults.overruns, 0u);
+}
+
+TEST(CanTransmitCounters, NothingHasBeenSentAtFirst) {
+  const CanTransmitCounters defaults{};
+  EXPECT_EQ(defaults.sent, 0u);
+  EXPECT_EQ(defaults.aborted, 0u);
+  EXPECT_EQ(defaults.discarded, 0u);
+  EXPECT_EQ(defaults.arbitration_lost, 0u);
+}
+
 }  // namespace kmax::drivers::stm32f4::can_test

@@ -354,5 +354,25 @@ TEST(ParameterStore, SavesOnABadMemorySayTheTruth) {
   }));
 }
 
+TEST(StoreSurvey, OfNothing) {
+  const StoreSurvey defaults{};
+  EXPECT_FALSE(defaults.newest);
+  EXPECT_EQ(defaults.next_sequence, 1u);
+  EXPECT_EQ(defaults.erases, 0u);
+  EXPECT_EQ(defaults.damaged, 0);
+  EXPECT_EQ(defaults.lock_code, 0u);
+  EXPECT_EQ(defaults.parameters(), 0u);
+}
+
+TEST(LoadReport, OfNothing) {
+  const LoadReport defaults{};
+  EXPECT_FALSE(defaults.found);
+  EXPECT_FALSE(defaults.other_dictionary);
+  EXPECT_EQ(defaults.header.sequence, 0u);
+  EXPECT_EQ(defaults.header.schema, 0u);
+  EXPECT_EQ(defaults.header.erases, 0u);
+  EXPECT_EQ(defaults.header.count, 0u);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::parameter_store_test
