@@ -199,6 +199,18 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
   expect(watch, {{dc(0.0f), dc(1.0f)}}, "after a reset");
 }
 
+TEST(PhaseWatch, ResetGivesTheWholePatienceAgain) {
+  const Stretch starving{dc(0.0f), dc(1.0f), true, c.patience + 1, open};
+  const Stretch leaking{{0.0f, 2.8f, -2.0f}, dc(2.0f), true, c.patience + 1, sum};
+  for (const Stretch& stretch : {starving, leaking}) {
+    Watch watch;
+    for (std::uint32_t i = 0; i < c.patience; ++i)
+      (void)watch.update(c, stretch.measured, stretch.reference, true);
+    watch.reset();
+    expect(watch, {stretch}, "after a reset");
+  }
+}
+
 TEST(PhaseWatchConfig, ItsDefaults) {
   const PhaseWatchConfig<double> defaults;
   EXPECT_EQ(defaults.current_limit, 5.0);
