@@ -141,12 +141,12 @@ class QuadratureIndexWatch {
   }
 
   QuadratureIndexConfig config_;
-  std::uint32_t index_ = 0;                ///< middle of where the line may be high
-  std::int32_t reach_ = 0;                 ///< counts from there in which it may be
-  std::uint32_t low_at_ = 0;               ///< of the last low look
-  std::uint32_t rose_at_ = 0;              ///< of the last low look before the line rose
-  std::int32_t lowest_ = 0, highest_ = 0;  ///< from rose_at_: counts with a high line
-  unsigned doubts_ = 0;                    ///< high looks in a row where no index is
+  std::uint32_t index_{};              ///< middle of where the line may be high
+  std::int32_t reach_{};               ///< counts from there in which it may be
+  std::uint32_t low_at_{};             ///< of the last low look
+  std::uint32_t rose_at_{};            ///< of the last low look before the line rose
+  std::int32_t lowest_{}, highest_{};  ///< from rose_at_: counts with a high line
+  unsigned doubts_ = 0;                ///< high looks in a row where no index is
   bool learned_ = false, failed_ = false, high_ = false;
   bool low_seen_ = false, from_low_ = false, zone_known_ = false;
 };

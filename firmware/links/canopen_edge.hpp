@@ -86,7 +86,7 @@ class CanopenEdge {
   CanReadings readings_;
   EmergencyReports emergencies_;
   RoundClock rounds_;
-  std::uint32_t configured_communication_ = 0;
+  std::uint32_t configured_communication_{};
   bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false;
   CanopenObjects objects_;
   canopen::Node<CanopenObjects> node_;
