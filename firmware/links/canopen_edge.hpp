@@ -26,7 +26,7 @@ class RoundClock {
   std::optional<std::uint32_t> poll(const Axes& axes, std::uint32_t now_us);
 
  private:
-  std::uint32_t round_ = 0, began_us_ = 0, clock_us_ = 0;
+  std::uint32_t round_{}, began_us_{}, clock_us_{};  ///< from wherever: only differences count
 };
 
 /// The CAN link: frames in and out, behind which the device is a CANopen node. What happens on the bus acts
