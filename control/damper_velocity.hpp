@@ -51,7 +51,7 @@ class DamperVelocity {
   static constexpr std::uint32_t ring = 32;   // a power of two above the window
   static constexpr std::uint32_t no_key = 0;  // a window is never 0
   std::array<std::uint32_t, ring> counts_{};  // low words
-  std::uint32_t head_ = 0;
+  std::uint32_t head_{};
   std::uint32_t key_ = no_key;
 };
 

@@ -107,7 +107,7 @@ class FoawVelocity {
   // What push() leaves for estimate().
   struct Pushed {
     const std::uint32_t* positions = nullptr;  // the newest one; older ones behind it
-    std::uint32_t interval = 0;                // the newest one less the second newest
+    std::uint32_t interval{};                  // the newest one less the second newest
   };
 
   // Takes a sample in that lies `steps` from the one before.

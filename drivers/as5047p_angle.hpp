@@ -137,7 +137,7 @@ class As5047pAngle {
 
   struct Movement {
     std::uint32_t count = 0;
-    std::int32_t step = 0;  ///< per frame
+    std::int32_t step{};  ///< per frame
   };
 
   constexpr As5047pSample sample(bool held) const {
@@ -302,7 +302,7 @@ class As5047pAngle {
   std::uint16_t zeros_ = 0;
   bool alive_ = false;  ///< has answered a probe since restart()
   bool believed_before_ = false;
-  std::uint16_t unseen_ = 0;    ///< frames since then
+  std::uint16_t unseen_{};      ///< frames since then
   std::uint32_t believed_ = 0;  ///< the last valid count of a frame
   std::uint32_t reference_generation_ = 0;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace kmax::drivers {
@@ -79,9 +80,6 @@ class QuadratureIndexWatch {
   }
 
  private:
-  static constexpr std::int32_t lesser(std::int32_t a, std::int32_t b) { return a < b ? a : b; }
-  static constexpr std::int32_t greater(std::int32_t a, std::int32_t b) { return a < b ? b : a; }
-
   // Both before the index is known only, and kept out of the tick's one function, of which there is a copy
   // for each axis: inlined they are 1 KiB of the image.
 
@@ -94,8 +92,8 @@ class QuadratureIndexWatch {
       lowest_ = highest_ = static_cast<std::int32_t>(count - rose_at_);
     }
     const auto moved = static_cast<std::int32_t>(count - rose_at_);
-    lowest_ = lesser(lowest_, moved);
-    highest_ = greater(highest_, moved);
+    lowest_ = std::min(lowest_, moved);
+    highest_ = std::max(highest_, moved);
     if (highest_ - lowest_ >= config_.widest) failed_ = true;
   }
 
@@ -103,13 +101,13 @@ class QuadratureIndexWatch {
   [[gnu::noinline, gnu::cold]] constexpr void learn(std::uint32_t count) {
     const auto out = static_cast<std::int32_t>(count - rose_at_);
     if (from_low_ && is_crossing(out)) {
-      const std::int32_t below = lesser(0, out), above = greater(0, out);
+      const std::int32_t below = std::min<std::int32_t>(0, out), above = std::max<std::int32_t>(0, out);
       // To the nearest count; a half goes up, from whichever side it is crossed.
       const std::int32_t middle = (below + lowest_ + highest_ + above + 2) >> 2;
       // All counts that can belong to the index, seen high or not seen at all.
-      const std::int32_t down = middle - lesser(lowest_, below + 1);
-      const std::int32_t up = greater(highest_, above - 1) - middle;
-      take(middle, greater(down, up));
+      const std::int32_t down = middle - std::min(lowest_, below + 1);
+      const std::int32_t up = std::max(highest_, above - 1) - middle;
+      take(middle, std::max(down, up));
       learned_ = true;
     } else if (!zone_known_) {
       take((lowest_ + highest_) >> 1, config_.widest);
@@ -119,7 +117,7 @@ class QuadratureIndexWatch {
   /// An edge may lie within a count, which is then seen low and high. If no other count was high, nothing
   /// tells a crossing from a touch.
   constexpr bool is_crossing(std::int32_t out) const {
-    if (greater(out, -out) > 2 * config_.widest) return false;
+    if (std::max(out, -out) > 2 * config_.widest) return false;
     if (lowest_ > 0 && out > highest_) return true;
     if (highest_ < 0 && out < lowest_) return true;
     if (lowest_ == highest_) return false;
@@ -143,12 +141,12 @@ class QuadratureIndexWatch {
   }
 
   QuadratureIndexConfig config_;
-  std::uint32_t index_ = 0;                ///< middle of where the line may be high
-  std::int32_t reach_ = 0;                 ///< counts from there in which it may be
-  std::uint32_t low_at_ = 0;               ///< of the last low look
-  std::uint32_t rose_at_ = 0;              ///< of the last low look before the line rose
-  std::int32_t lowest_ = 0, highest_ = 0;  ///< from rose_at_: counts with a high line
-  unsigned doubts_ = 0;                    ///< high looks in a row where no index is
+  std::uint32_t index_{};              ///< middle of where the line may be high
+  std::int32_t reach_{};               ///< counts from there in which it may be
+  std::uint32_t low_at_{};             ///< of the last low look
+  std::uint32_t rose_at_{};            ///< of the last low look before the line rose
+  std::int32_t lowest_{}, highest_{};  ///< from rose_at_: counts with a high line
+  unsigned doubts_ = 0;                ///< high looks in a row where no index is
   bool learned_ = false, failed_ = false, high_ = false;
   bool low_seen_ = false, from_low_ = false, zone_known_ = false;
 };

@@ -106,7 +106,7 @@ class CanBusOff {
 
   CanBusOffConfig config_{};
   CanBusState state_ = CanBusState::off;
-  std::uint32_t since_us_ = 0;
+  std::uint32_t since_us_{};
   std::uint32_t wait_us_{}, this_wait_us_{};  ///< of the next bus-off, and of this one
   CanBusOffCounters counters_{};
 };

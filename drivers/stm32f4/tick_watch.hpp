@@ -72,7 +72,7 @@ class TickWatch {
   Timer& follower_;
   Dma& dma_;
   // What DMA carries.
-  std::uint32_t middle_ = 0, disarmed_ = 0;
+  std::uint32_t middle_{}, disarmed_{};
   std::uint32_t event_ = timer_egr::Break::mask | timer_egr::CaptureCompare<4>::mask;
 };
 

@@ -146,7 +146,7 @@ class Usart {
 
   Registers& registers_;
   const std::uint8_t* next_ = nullptr;
-  std::size_t remaining_ = 0;
+  std::size_t remaining_{};
   std::atomic<bool> transmitting_{false};
 };
 

@@ -185,11 +185,11 @@ class Emergency {
   std::array<std::uint32_t, error_history_length> history_{};
   std::uint32_t overflows_ = 0;
   std::size_t present_ = 0;
-  std::size_t first_ = 0, queued_ = 0;
-  std::size_t newest_ = 0;
-  std::uint32_t identifier_ = 0;
-  std::uint32_t inhibit_us_ = 0;
-  std::uint32_t sent_us_ = 0;
+  std::size_t queued_ = 0;
+  std::size_t first_{}, newest_{};  // a ring begins anywhere
+  std::uint32_t identifier_{};
+  std::uint32_t inhibit_us_{};
+  std::uint32_t sent_us_{};
   std::uint8_t remembered_ = 0;
   bool valid_ = false;         // until configure()
   bool inhibiting_ = false;    // sent_us_ counts

@@ -113,8 +113,8 @@ class HeartbeatConsumer {
 
  private:
   struct Entry {
-    std::uint32_t time_us = 0;
-    std::uint32_t last_us = 0;
+    std::uint32_t time_us{};
+    std::uint32_t last_us{};
     std::uint8_t node_id = 0;  // 0: unused
     HeartbeatWatch watch = HeartbeatWatch::unused;
     bool booted = false;  // no heartbeat since its boot-up message

@@ -116,8 +116,8 @@ class Nmt {
         .identifier = cob_id::heartbeat + node_id_, .length = 1, .data = {static_cast<std::uint8_t>(state)}};
   }
 
-  std::uint32_t heartbeat_us_ = 0;
-  std::uint32_t last_us_ = 0;  // when the latest heartbeat was due
+  std::uint32_t heartbeat_us_{};
+  std::uint32_t last_us_{};  // when the latest heartbeat was due
   NmtState state_ = NmtState::initialising;
   std::uint8_t node_id_ = unconfigured_node_id;
   bool boot_up_waits_ = false;

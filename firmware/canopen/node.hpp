@@ -410,11 +410,11 @@ class Node {
   CanSettings settings_;
   // As last taken over.
   Identity identity_;
-  std::uint16_t heartbeat_ms_ = 0;
+  std::uint16_t heartbeat_ms_{};
   std::array<std::uint32_t, watched_node_count> watched_{};  ///< object 0x1016
-  std::uint32_t error_behaviour_ = 0;                        ///< object 0x1029
+  std::uint32_t error_behaviour_{};                          ///< object 0x1029
   std::uint32_t identity_conflicts_ = 0;
-  bool sdo_silent_ = false;
+  bool sdo_silent_{};
 };
 
 }  // namespace kmax::firmware::canopen

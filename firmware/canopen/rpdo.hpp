@@ -98,7 +98,7 @@ class Rpdos {
     PdoSettings settings{};
     std::array<std::uint8_t, 8> data{};
     bool kept = false;
-    std::uint32_t kept_us = 0;
+    std::uint32_t kept_us{};
   };
 
   RpdoResult length_of(const drivers::CanFrame& frame, const Pdo& pdo) {

@@ -102,10 +102,10 @@ class SdoBlockDownload {
   }
 
   Phase phase_ = Phase::segments;
-  bool with_crc_ = false;
+  bool with_crc_{};
   bool begun_ = false;       // a segment of this block has come
   bool last_taken_ = false;  // the value's last segment is in `previous_`
-  std::uint8_t block_size_ = 0;
+  std::uint8_t block_size_{};
   std::uint8_t good_ = 0;  // number of the last one in sequence
   std::uint16_t crc_ = sdo_crc_start;
   Abort failed_ = Abort::none;

@@ -88,9 +88,9 @@ class SdoBlockUpload {
   enum class Phase : std::uint8_t { initiated, segments, end };
 
   Phase phase_ = Phase::initiated;
-  bool with_crc_ = false;
+  bool with_crc_{};
   bool last_sent_ = false;
-  std::uint8_t block_size_ = 0;
+  std::uint8_t block_size_{};
   std::uint8_t unused_ = 0;  // bytes of the last segment that are padding
   std::uint16_t crc_ = sdo_crc_start;
   std::uint32_t sent_ = 0;     // segments of this block

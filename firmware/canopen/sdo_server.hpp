@@ -315,7 +315,7 @@ class SdoServer {
 
   void block_download_segment(const SdoBytes& bytes) {
     using Step = typename SdoBlockDownload<Objects>::Step;
-    bool complete = false;
+    bool complete{};
     const Step step = block_download_.segment(bytes, sink_, complete);
     if (step == Step::lost) ++counters_.segments_lost;
     if (step == Step::repeated) ++counters_.segments_repeated;
@@ -355,12 +355,12 @@ class SdoServer {
   SdoChannel channel_;
   Transfer transfer_ = Transfer::none;
   bool answer_waits_ = false;
-  bool cut_ = false;         // the silence under way has been answered with an acknowledgement
-  std::uint8_t toggle_ = 0;  // of the segment expected next
+  bool cut_{};             // the silence under way has been answered with an acknowledgement
+  std::uint8_t toggle_{};  // of the segment expected next
   ObjectAddress address_{};
   SdoBytes answer_{};
-  std::uint32_t last_us_ = 0;  // the last frame in either direction
-  std::uint32_t uploaded_ = 0;
+  std::uint32_t last_us_{};  // the last frame in either direction
+  std::uint32_t uploaded_{};
   std::array<std::uint8_t, buffer_size> buffer_{};  // of a download; the window of an upload
   SdoSource<Objects> source_;
   SdoSink<Objects> sink_;

@@ -61,9 +61,9 @@ class SdoSource {
   Objects* objects_;
   std::span<std::uint8_t> window_;
   ObjectAddress address_{};
-  std::uint32_t size_ = 0;
-  std::uint32_t begins_ = 0;  // offset of the window's first byte in the value
-  std::uint32_t filled_ = 0;  // bytes in the window
+  std::uint32_t size_{};
+  std::uint32_t begins_{};  // offset of the window's first byte in the value
+  std::uint32_t filled_{};  // bytes in the window
 };
 
 }  // namespace kmax::firmware::canopen

@@ -151,8 +151,8 @@ class Tpdos {
   struct Pdo {
     PdoSettings settings{};
     std::uint32_t period_us = 0;
-    std::uint32_t due_us = 0;   // the next time on the grid
-    std::uint32_t sent_us = 0;  // the latest frame, if inhibited
+    std::uint32_t due_us{};   // the next time on the grid
+    std::uint32_t sent_us{};  // the latest frame, if inhibited
     std::array<std::uint8_t, 8> data{};
     std::array<std::uint8_t, 8> sent_data{};
     State state = State::idle;

@@ -150,14 +150,13 @@ class Capture {
 
   struct Plan {
     bool arm = false;  ///< false: stop the capture `number`
-    std::uint32_t number = 0;
+    std::uint32_t number{};
     std::array<std::uint8_t, capture_channels_max> channel{};
     std::uint32_t channels = 0;
-    std::uint32_t interval = 1;
-    std::uint32_t samples = 0;
-    std::uint32_t pre_trigger = 0;
+    // Set in every plan that arms.
+    std::uint32_t interval{}, samples{}, pre_trigger{};
     CaptureTrigger trigger = CaptureTrigger::now;
-    float level = 0.0f;
+    float level{};
   };
 
   void ISR_begin(const Plan& plan);
@@ -172,24 +171,25 @@ class Capture {
   std::span<std::uint32_t> storage_;
 
   // Main loop only, or written by it.
-  std::uint32_t number_ = 0;
-  bool arming_ = false;  ///< what the plan on its way asks for
+  std::uint32_t number_{};
+  bool arming_{};  ///< what the plan on its way asks for
   std::atomic<std::uint8_t> watched_axis_{no_axis};
   DoubleBuffer<Plan> plan_;
 
   // Written by the tick. Those without a lock of their own are read after state_, which is stored after them.
   std::atomic<CaptureState> state_{CaptureState::idle};
-  std::atomic<std::uint32_t> taken_{0};
-  std::atomic<std::uint32_t> trigger_sample_{0}, first_tick_{0}, channels_{0};
-  std::atomic<std::uint32_t> begin_{0},
-      ring_words_{0};  ///< where the oldest word is, and where the ring ends
+  // Nothing is in them before the first capture, and nobody asks.
+  std::atomic<std::uint32_t> taken_, trigger_sample_, first_tick_, channels_;
+  std::atomic<std::uint32_t> begin_, ring_words_;  ///< where the oldest word is, and where the ring ends
 
   // Interrupt context only.
   Plan ISR_plan_{};
-  bool ISR_active_ = false, ISR_waiting_ = false, ISR_before_ = false;
-  std::uint32_t ISR_countdown_ = 0;
-  std::uint32_t ISR_at_ = 0;         ///< word to write next
-  std::uint32_t ISR_remaining_ = 0;  ///< samples until the end; once triggered
+  bool ISR_active_ = false;
+  // Set where a capture begins.
+  bool ISR_waiting_{}, ISR_before_{};
+  std::uint32_t ISR_countdown_{};
+  std::uint32_t ISR_at_{};         ///< word to write next
+  std::uint32_t ISR_remaining_{};  ///< samples until the end; once triggered
 };
 
 inline bool Capture::arm(const CaptureConfig& config) {

@@ -52,7 +52,7 @@ class WriteLock {
   StoreCommands& store_;
   RetainedCount since_start_{};
   RetainedCount& attempts_;
-  std::uint32_t wait_us_, polled_us_ = 0;
+  std::uint32_t wait_us_, polled_us_{};
   bool polled_ = false, open_ = false, setting_ = false;
 };
 

@@ -134,7 +134,7 @@ class Supervisor {
   Link commander_ = Link::serial;
   std::uint16_t number_ = 0;  ///< of the commander
   std::array<std::uint16_t, link_count> next_number_{};
-  std::uint32_t signed_us_ = 0;
+  std::uint32_t signed_us_{};
   bool claimed_ = false;  ///< somebody has armed it, or tried to: the next one's number is another
   bool halted_ = false;   ///< who does not command, or no longer, may begin a halt and not end it
 };

@@ -91,7 +91,7 @@ class ThermalSupervisor {
   Winding model_{};
   float winding_ = 25.0f, power_stage_ = 25.0f, resistance_temperature_ = 25.0f;
   int allowed_steps_ = steps;
-  std::uint32_t last_us_ = 0;
+  std::uint32_t last_us_{};
   bool started_ = false;
 };
 

@@ -26,7 +26,7 @@ class RoundClock {
   std::optional<std::uint32_t> poll(const Axes& axes, std::uint32_t now_us);
 
  private:
-  std::uint32_t round_ = 0, began_us_ = 0, clock_us_ = 0;
+  std::uint32_t round_{}, began_us_{}, clock_us_{};  ///< from wherever: only differences count
 };
 
 /// The CAN link: frames in and out, behind which the device is a CANopen node. What happens on the bus acts
@@ -86,7 +86,7 @@ class CanopenEdge {
   CanReadings readings_;
   EmergencyReports emergencies_;
   RoundClock rounds_;
-  std::uint32_t configured_communication_ = 0;
+  std::uint32_t configured_communication_{};
   bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false;
   CanopenObjects objects_;
   canopen::Node<CanopenObjects> node_;

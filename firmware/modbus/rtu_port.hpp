@@ -256,10 +256,10 @@ class RtuPort {
   RtuPortCounters counters_;
   std::optional<std::uint32_t> last_valid_request_us_;
   std::uint32_t reply_end_us_ = 0;
-  std::size_t reply_size_ = 0;
+  std::size_t reply_size_{};
   std::size_t answered_size_ = 0;  // of the request that `reply_` answers; 0: of none
-  std::uint32_t answered_ = 0;     // its hash
-  bool broadcast_ = false;         // what is being executed
+  std::uint32_t answered_{};       // its hash
+  bool broadcast_{};               // what is being executed
   State state_ = State::listening;
   std::array<std::uint8_t, adu_size_max> reply_{};
 };

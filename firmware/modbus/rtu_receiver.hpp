@@ -145,8 +145,8 @@ class RtuReceiver {
 
   RtuTiming timing_;
   RtuReceiverCounters counters_;
-  std::uint32_t last_us_ = 0;  // end of the latest character; meaningless while idle
-  std::size_t size_ = 0;
+  std::uint32_t last_us_{};  // end of the latest character; meaningless while idle
+  std::size_t size_{};
   std::uint16_t crc_ = crc_start;
   State state_ = State::idle;
   std::array<std::uint8_t, adu_size_max> buffer_{};

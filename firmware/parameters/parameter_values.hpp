@@ -33,7 +33,7 @@ constexpr Refusal check_value(const SlotDescriptor& entry, std::uint32_t raw) {
     const auto found = std::find(choices.begin(), choices.end(), static_cast<std::int32_t>(raw));
     return found != choices.end() ? Refusal::none : Refusal::not_a_choice;
   }
-  bool inside = false;
+  bool inside{};
   if (entry.type == Type::float32) {
     const auto value = std::bit_cast<float>(raw);
     if (!(value - value == 0.0f)) return Refusal::not_finite;

@@ -21,6 +21,7 @@ inline unsigned long counted(unsigned long to) {
   return all;
 }
 inline constexpr int room[2] = {3, 4};
+inline int lesser(int a, int b) { return a < b ? a : b; }
 """
 TEST = """#include "control/made_up.hpp"
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ TEST(MadeUp, IsRight) {
 # Line, change: verdict. What hangs is killed by its time-out.
 EXPECTED = {("3", "< -> <="): "killed", ("3", "10 -> 11"): "killed", ("4", "- -> +"): "survived", ("4", "1 -> 2"): "survived",
             ("6", "0 -> 1"): "survived", ("7", "!= -> =="): "killed", ("7", "++ -> --"): "killed",
-            ("10", "2 -> 3"): "survived", ("10", "3 -> 4"): "killed", ("10", "4 -> 5"): "survived"}
+            ("11", "< -> <="): "equivalent", ("10", "2 -> 3"): "survived", ("10", "3 -> 4"): "killed", ("10", "4 -> 5"): "survived"}
 
 
 class Mutate(unittest.TestCase):

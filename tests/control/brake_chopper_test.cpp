@@ -44,4 +44,10 @@ TEST(BrakeChopperConfig, ItsDefaults) {
   EXPECT_EQ(defaults.hysteresis, 0.5f);
 }
 
+TEST(BrakeChopperCoefficients, ItsDefaults) {
+  const BrakeChopper::Coefficients defaults{};
+  EXPECT_EQ(defaults.on_voltage, 0.0f);
+  EXPECT_EQ(defaults.off_voltage, 0.0f);
+}
+
 }  // namespace kmax::control::brake_chopper_test

@@ -323,4 +323,9 @@ TEST(ForceCompensationConfig, ItsDefaults) {
   EXPECT_EQ(defaults.limit, 0.0);
 }
 
+TEST(ForceCompensationCoefficients, ItsDefaults) {
+  const ForceCompensation<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.cogging_periods, 0u);
+}
+
 }  // namespace kmax::control::force_compensation_test

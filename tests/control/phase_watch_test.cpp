@@ -199,12 +199,29 @@ TEST(PhaseWatch, ResetForgetsTheSampleBefore) {
   expect(watch, {{dc(0.0f), dc(1.0f)}}, "after a reset");
 }
 
+TEST(PhaseWatch, ResetGivesTheWholePatienceAgain) {
+  const Stretch starving{dc(0.0f), dc(1.0f), true, c.patience + 1, open};
+  const Stretch leaking{{0.0f, 2.8f, -2.0f}, dc(2.0f), true, c.patience + 1, sum};
+  for (const Stretch& stretch : {starving, leaking}) {
+    Watch watch;
+    for (std::uint32_t i = 0; i < c.patience; ++i)
+      (void)watch.update(c, stretch.measured, stretch.reference, true);
+    watch.reset();
+    expect(watch, {stretch}, "after a reset");
+  }
+}
+
 TEST(PhaseWatchConfig, ItsDefaults) {
   const PhaseWatchConfig<double> defaults;
   EXPECT_EQ(defaults.current_limit, 5.0);
   EXPECT_EQ(defaults.over_current_factor, 1.5);
   EXPECT_EQ(defaults.bandwidth, 3000.0);
   EXPECT_EQ(defaults.rate, 20000.0);
+}
+
+TEST(PhaseWatchCoefficients, ItsDefaults) {
+  const PhaseWatch<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.patience, 20u);
 }
 
 }  // namespace kmax::control::phase_watch_test

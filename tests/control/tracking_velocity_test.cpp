@@ -87,4 +87,12 @@ TEST(TrackingVelocity, FloatDoesNotDriftOnALongRamp) {
   EXPECT_LT(std::fabs(velocity.update(coefficients, 864'000'370'000)), 1e-12F);
 }
 
+TEST(TrackingVelocityCoefficients, ItsDefaults) {
+  const TrackingVelocity<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.kept, 0.0);
+  EXPECT_EQ(defaults.beta, 0.0);
+  EXPECT_EQ(defaults.scale, 0.0);
+  EXPECT_EQ(defaults.per_sample, 0.0);
+}
+
 }  // namespace kmax::control::tracking_velocity_test

@@ -261,4 +261,10 @@ TEST(VelocityEstimatorConfig, ItsDefaults) {
   EXPECT_EQ(defaults.bandwidth, 100.0);
 }
 
+TEST(VelocityEstimatorCoefficients, ItsDefaults) {
+  const VelocityEstimator<double>::Coefficients defaults{};
+  EXPECT_EQ(defaults.kind, VelocityEstimatorKind::foaw);
+  EXPECT_EQ(defaults.key, 0u);
+}
+
 }  // namespace kmax::control::velocity_estimator_test

@@ -423,4 +423,13 @@ TEST(As5047pSample, ItsDefaults) {
   EXPECT_EQ(defaults.reference_generation, 0u);
 }
 
+TEST(As5047pDiagnostics, ItsDefaults) {
+  const As5047pDiagnostics defaults{};
+  EXPECT_EQ(defaults.gain, 0);
+  EXPECT_FALSE(defaults.ready);
+  EXPECT_FALSE(defaults.overflow);
+  EXPECT_FALSE(defaults.field_too_strong);
+  EXPECT_FALSE(defaults.field_too_weak);
+}
+
 }  // namespace kmax::drivers::as5047p_angle_test

@@ -154,4 +154,11 @@ TEST(CanBitTiming, ItsDefaults) {
   EXPECT_EQ(defaults.jump_width, 0u);
 }
 
+TEST(CanBitTimingSolution, ItsDefaults) {
+  const CanBitTimingSolution defaults{};
+  EXPECT_EQ(defaults.rate_error_ppm, 0u);
+  EXPECT_EQ(defaults.sample_error_permille, 0u);
+  EXPECT_FALSE(defaults.usable);
+}
+
 }  // namespace kmax::drivers::stm32f4::can_bit_timing_test

@@ -93,4 +93,9 @@ TEST(CanBusOffConfig, ItsDefaults) {
   EXPECT_EQ(defaults.stable_us, 1'000'000u);
 }
 
+TEST(CanBusOffCounters, ItsDefaults) {
+  const CanBusOffCounters defaults{};
+  EXPECT_EQ(defaults.bus_offs, 0u);
+}
+
 }  // namespace kmax::drivers::stm32f4::can_bus_off_test

@@ -29,4 +29,12 @@ TEST(CanFilter, AcceptWhatTheySay) {
   EXPECT_EQ(CanFilter{}.fifo, 0);
 }
 
+TEST(CanFilter, TakesEverythingIntoTheFirstFifo) {
+  const CanFilter defaults{};
+  EXPECT_EQ(defaults.first, 0u);
+  EXPECT_EQ(defaults.second, 0u);
+  EXPECT_FALSE(defaults.list);
+  EXPECT_EQ(defaults.fifo, 0);
+}
+
 }  // namespace kmax::drivers::stm32f4::can_filter_test

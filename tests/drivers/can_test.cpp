@@ -225,6 +225,45 @@ TEST(Can, AFullQueueRefusesAndNothingIsOverwritten) {
   }
 }
 
+// Off the bus: what waits goes at once, what is in a mailbox when the hardware gives it back, each one once.
+TEST(Can, BusOffDiscardsEveryFrameOnce) {
+  OnTheBus bench;
+  for (const std::uint32_t identifier : {0x500U, 0x600U, 0x700U, 0x750U, 0x760U}) bench.send(identifier);
+  bench.can.esr.value = 1U << 2;
+  EXPECT_EQ(bench.driver.poll(1), CanBusState::waiting);
+  EXPECT_EQ(bench.aborts, 0x0080'8080U);
+  bench.driver.ISR_serve_transmit();
+  EXPECT_EQ(bench.driver.transmit_counters().discarded, 2U);
+  for (unsigned mailbox = 0; mailbox < 2; ++mailbox) bench.complete(mailbox, false);
+  bench.complete(2, true);
+  EXPECT_EQ(bench.driver.transmit_counters().discarded, 4U);
+  EXPECT_EQ(bench.driver.transmit_counters().sent, 1U);
+  EXPECT_EQ(bench.driver.transmit_counters().aborted, 0U);
+  EXPECT_EQ(bench.status, Bench::empty) << "nothing went into a mailbox meanwhile";
+}
+
+TEST(Can, ComesBackFromBusOffAndSendsAgain) {
+  OnTheBus bench;
+  bench.can.mcr.writes.clear();
+  bench.can.esr.value = 1U << 2;
+  EXPECT_EQ(bench.driver.poll(1), CanBusState::waiting);
+  EXPECT_EQ(bench.pended, 1U);
+  EXPECT_FALSE(bench.driver.has_room());
+  EXPECT_EQ(bench.driver.send({}), CanSendResult::not_on_the_bus);
+  EXPECT_TRUE(bench.can.mcr.writes.empty());
+  EXPECT_EQ(bench.driver.poll(100'001), CanBusState::entering);
+  EXPECT_EQ(bench.can.mcr.writes, (std::vector<std::uint32_t>{0x0001'0001})) << "INRQ";
+  EXPECT_EQ(bench.driver.poll(100'002), CanBusState::recovering);
+  EXPECT_EQ(bench.can.mcr.writes, (std::vector<std::uint32_t>{0x0001'0001, 0x0001'0000}));
+  EXPECT_EQ(bench.driver.poll(100'003), CanBusState::recovering) << "still off";
+  bench.can.esr.value = 0;
+  EXPECT_EQ(bench.driver.poll(100'004), CanBusState::on_bus);
+  EXPECT_TRUE(bench.driver.has_room());
+  bench.send(0x123);
+  EXPECT_EQ(bench.identifier_in(0), 0x123U);
+  EXPECT_EQ(bench.driver.bus_off_counters().bus_offs, 1U);
+}
+
 TEST(Can, ReceiveIsBoundedWhenTheFifoNeverEmpties) {
   Bench bench;
   bench.can.rfr[0].on_read = [](std::uint32_t) { return 3U; };
@@ -304,6 +343,20 @@ TEST(CanErrors, ItsDefaults) {
   EXPECT_FALSE(defaults.warning);
   EXPECT_FALSE(defaults.passive);
   EXPECT_FALSE(defaults.bus_off);
+}
+
+TEST(CanReceiveCounters, NothingHasBeenReceivedAtFirst) {
+  const CanReceiveCounters defaults{};
+  EXPECT_EQ(defaults.received, 0u);
+  EXPECT_EQ(defaults.overruns, 0u);
+}
+
+TEST(CanTransmitCounters, NothingHasBeenSentAtFirst) {
+  const CanTransmitCounters defaults{};
+  EXPECT_EQ(defaults.sent, 0u);
+  EXPECT_EQ(defaults.aborted, 0u);
+  EXPECT_EQ(defaults.discarded, 0u);
+  EXPECT_EQ(defaults.arbitration_lost, 0u);
 }
 
 }  // namespace kmax::drivers::stm32f4::can_test

@@ -275,4 +275,10 @@ TEST(CurrentSamplingCounters, ItsDefaults) {
   EXPECT_EQ(defaults.spurious, 0u);
 }
 
+TEST(ZeroCurrentCodes, ItsDefaults) {
+  const ZeroCurrentCodes defaults{};
+  EXPECT_EQ(defaults.phase_b, 0u);
+  EXPECT_EQ(defaults.phase_c, 0u);
+}
+
 }  // namespace kmax::drivers::stm32f4::current_sampling_test

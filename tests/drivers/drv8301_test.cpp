@@ -200,4 +200,9 @@ TEST(Drv8301, AChipThatIsNoneHasNoFaultsToTell) {
   for (Bench* bench : {&high, &low, &other, &dead}) EXPECT_FALSE(bench->driver.faults());
 }
 
+TEST(Drv8301Config, ThreeInputsAreAskedFor) {
+  const Drv8301Config defaults{};
+  EXPECT_FALSE(defaults.three_inputs);
+}
+
 }  // namespace kmax::drivers::drv8301_test

@@ -91,4 +91,13 @@ TEST(NtcThermistor, OtherPartsAndResistors) {
   }
 }
 
+TEST(NtcThermistorConfig, ItsDefaults) {
+  const NtcThermistorConfig defaults{};
+  EXPECT_EQ(defaults.resistance_25_ohm, 10'000.0);
+  EXPECT_EQ(defaults.beta_kelvin, 3434.0);
+  EXPECT_EQ(defaults.ground_resistor_ohm, 3'300.0);
+  EXPECT_EQ(defaults.open_below, 48);
+  EXPECT_EQ(defaults.shorted_above, 3936);
+}
+
 }  // namespace kmax::drivers::ntc_thermistor_test

@@ -171,4 +171,12 @@ TEST(UsartConfig, ItsDefaults) {
   EXPECT_EQ(defaults.parity, UsartParity::even);
 }
 
+TEST(UsartEvent, ItsDefaults) {
+  const UsartEvent defaults{};
+  EXPECT_FALSE(defaults.received);
+  EXPECT_EQ(defaults.byte, 0);
+  EXPECT_FALSE(defaults.line_error);
+  EXPECT_FALSE(defaults.transmission_complete);
+}
+
 }  // namespace kmax::drivers::stm32f4::usart_test

@@ -200,5 +200,16 @@ TEST_F(Arming, StatuswordTellsTheStateAndTheLimit) {
   EXPECT_GE(bench.get("measured.armed_samples"), bench.get("measured.limited_samples"));
 }
 
+TEST_F(Arming, TheSoftStartShowsInTheFlagsWhileItLasts) {
+  const auto flags = [&] { return static_cast<unsigned>(bench.get("measured.flags")); };
+  bench.set("force.ramp_time", 0.1);
+  bench.device.stand_at(1000);
+  EXPECT_EQ(flags(), 0u);
+  ASSERT_TRUE(bench.arm());
+  EXPECT_EQ(flags(), 8u | 16u);
+  bench.run_ms(100);
+  EXPECT_EQ(flags(), 16u);
+}
+
 }  // namespace
 }  // namespace kmax::board::application_arming_test

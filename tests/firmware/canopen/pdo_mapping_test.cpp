@@ -108,6 +108,23 @@ TEST(PdoMapping, AddsTheLengthsUpTo64Bits) {
   EXPECT_EQ(compile_mapping(transmit, 3, full.values, 0xFFFFFFFF, mapping), Abort::pdo_length);
 }
 
+TEST(PdoMapping, HoldsNothingBeyondItsCount) {
+  const Entries full(transmit, 0, {mapping_of(0x6041, 0, 16), mapping_of(0x6041, 0, 16)});
+  for (const std::uint32_t count : {0U, 1U, 2U}) {
+    PdoMapping mapping;
+    mapping.objects.fill({0, 16});
+    ASSERT_EQ(compile_mapping(transmit, 0, full.values, count, mapping), Abort::none);
+    for (std::size_t i = count; i < mapped_max; ++i) {
+      EXPECT_EQ(mapping.objects[i].slot, dummy_slot);
+      EXPECT_EQ(mapping.objects[i].bits, 0);
+    }
+  }
+  PdoMapping refused{.count = 1, .bits = 16};
+  EXPECT_EQ(compile_mapping(transmit, 0, full.values, 9, refused), Abort::pdo_length);
+  EXPECT_EQ(refused.count, 0);
+  EXPECT_EQ(refused.bits, 0);
+}
+
 TEST(PdoMapping, AnEmptyEntryWithinTheCountIsNoObject) {
   const Entries gap(transmit, 0, {mapping_of(0x6041, 0, 16), 0, mapping_of(0x6041, 0, 16)});
   PdoMapping mapping;

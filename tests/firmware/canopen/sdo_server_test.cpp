@@ -315,5 +315,11 @@ TEST(SdoCounters, ItsDefaults) {
   EXPECT_EQ(defaults.segments_repeated, 0u);
 }
 
+TEST(SdoChannel, IsNoneByDefault) {
+  const SdoChannel defaults{};
+  EXPECT_EQ(defaults.request, 0);
+  EXPECT_EQ(defaults.response, 0);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::canopen::sdo_server_test

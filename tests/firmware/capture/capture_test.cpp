@@ -411,5 +411,12 @@ TEST(CaptureReadings, ItsDefaults) {
   EXPECT_EQ(defaults.channels, 0u);
 }
 
+TEST(CaptureEvent, ItsDefaults) {
+  const CaptureEvent defaults{};
+  EXPECT_EQ(defaults.flags, 0u);
+  EXPECT_EQ(defaults.force, 0.0f);
+  EXPECT_EQ(defaults.velocity, 0.0f);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::capture_test

@@ -311,5 +311,13 @@ TEST(AxisDemand, ItsDefaults) {
   EXPECT_EQ(defaults.share, 1.0f);
 }
 
+TEST(AxisInput, ItsDefaults) {
+  const Axis::Input defaults{};
+  EXPECT_EQ(defaults.condition, Fault::none);
+  EXPECT_FALSE(defaults.motor.present);
+  EXPECT_EQ(defaults.reference_generation, 0u);
+  EXPECT_FALSE(defaults.referenced);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::axis_test

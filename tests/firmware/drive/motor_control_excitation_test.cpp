@@ -98,6 +98,8 @@ TEST(MotorControlExcitation, DcVoltageMakesTheCurrentOfItsResistance) {
     ASSERT_TRUE(bench.run(asked(ExcitationKind::voltage, volts), 1000));
     EXPECT_NEAR(bench.out.current, volts / 0.8f, 1e-4f);
     EXPECT_FLOAT_EQ(bench.out.voltage, volts);
+    EXPECT_EQ(bench.out.current_d, 0.0f);
+    EXPECT_EQ(bench.out.voltage_d, 0.0f);
     EXPECT_EQ(bench.out.current_reference, 0.0f);
     EXPECT_EQ(bench.out.duty_a, 0.5f);
     EXPECT_NEAR(bench.out.force_made, volts / 0.8f * 3.0f, 1e-3f);

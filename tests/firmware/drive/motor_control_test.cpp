@@ -351,5 +351,34 @@ TEST(MotorControlReport, ItsDefaults) {
   EXPECT_FALSE(defaults.excitation_finished);
 }
 
+TEST(MotorControlCoefficients, ItsDefaults) {
+  const MotorControl::Coefficients defaults{};
+  EXPECT_EQ(defaults.angle_per_count, 0u);
+  EXPECT_EQ(defaults.angle_offset, 0u);
+  EXPECT_EQ(defaults.shaft_angle_per_count, 0u);
+  EXPECT_EQ(defaults.electrical_speed_per_velocity, 0.0f);
+  EXPECT_EQ(defaults.slow_velocity, 0.0f);
+  EXPECT_EQ(defaults.current_square_step, 0.0f);
+}
+
+TEST(MotorControlOutput, ItsDefaults) {
+  const MotorControl::Output defaults{};
+  EXPECT_EQ(defaults.current_reference, 0.0f);
+  EXPECT_EQ(defaults.current, 0.0f);
+  EXPECT_EQ(defaults.force_made, 0.0f);
+  EXPECT_EQ(defaults.current_square, 0.0f);
+  EXPECT_EQ(defaults.current_d, 0.0f);
+  EXPECT_EQ(defaults.voltage, 0.0f);
+  EXPECT_EQ(defaults.voltage_d, 0.0f);
+  EXPECT_EQ(defaults.fault_value, 0.0f);
+  EXPECT_FALSE(defaults.saturated);
+  EXPECT_FALSE(defaults.excitation_started);
+  EXPECT_FALSE(defaults.excitation_finished);
+  EXPECT_EQ(defaults.duty_a, 0.5f);
+  EXPECT_EQ(defaults.duty_b, 0.5f);
+  EXPECT_EQ(defaults.duty_c, 0.5f);
+  EXPECT_EQ(defaults.electrical_angle, 0u);
+}
+
 }  // namespace
 }  // namespace kmax::firmware::motor_control_test

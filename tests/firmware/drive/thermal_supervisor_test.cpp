@@ -136,6 +136,25 @@ TEST(ThermalSupervisor, NoiseDoesNotMakeTheAllowanceFlutter) {
   EXPECT_LE(changes, 2);
 }
 
+// 20 K below the limit in 32 steps: all of these temperatures are exact.
+TEST(ThermalSupervisor, TheAllowanceFallsAtAWholeStepAndRisesHalfAStepLater) {
+  const auto at = [](float steps) { return 100.0f - steps * 20.0f / 32.0f; };
+  for (int step = 1; step < ThermalSupervisor::steps; ++step) {
+    Clock clock;
+    clock.supervisor.configure(small_motor());
+    const auto steps_at = [&](float temperature) {
+      clock.pass(0.01f, 0.0f, temperature);
+      return clock.supervisor.allowance() * 32.0f;
+    };
+    const auto whole = static_cast<float>(step);
+    EXPECT_EQ(steps_at(at(whole)), whole);
+    EXPECT_EQ(steps_at(at(whole + 0.5f)), whole);
+    EXPECT_EQ(steps_at(std::nextafter(at(whole + 0.5f), 0.0f)), whole + 1.0f);
+    EXPECT_EQ(steps_at(std::nextafter(at(whole), 0.0f)), whole + 1.0f);
+    EXPECT_EQ(steps_at(at(whole)), whole);
+  }
+}
+
 TEST(ThermalSupervisor, SomeCurrentIsLeftBelowTheLimit) {
   Clock clock;
   clock.supervisor.configure(small_motor());

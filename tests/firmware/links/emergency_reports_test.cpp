@@ -63,6 +63,17 @@ TEST_F(Reports, AFaultIsReportedWithItsGroupItsAxisAndItsNumber) {
   }
 }
 
+TEST_F(Reports, NothingHasHappenedAtFirst) {
+  EXPECT_EQ(causes.identity_conflicts, 0U);
+  EXPECT_EQ(causes.frames_lost, 0U);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    EXPECT_EQ(causes.faults[axis], Fault::none);
+    EXPECT_EQ(causes.fault_values[axis], 0.0f);
+  }
+  EXPECT_EQ(emergency.present(), 0U);
+  EXPECT_FALSE(next());
+}
+
 TEST_F(Reports, AnotherFaultTakesThePlaceOfTheOneBeforeAndAxesHaveTheirOwn) {
   causes.faults[0] = Fault::over_speed;
   poll();

@@ -123,6 +123,23 @@ void put_record(FakeFlash& flash, std::size_t sector, std::size_t word, record::
   flash.words[sector][word + 1] = record::commit;
 }
 
+// What lies in the flash of a device outlives the firmware that wrote it.
+TEST(ParameterStore, TheWordsOfARecordAreWhatItsFormatSays) {
+  FakeFlash flash;
+  Store store(flash);
+  const ParameterValues values = some_values(7);
+  ASSERT_EQ(save(store, values), SaveProgress::done);
+  const auto& words = flash.words[0];
+  std::vector<std::uint32_t> expected{0x4B4D'5032 /* KMP2 */, 1, dictionary_checksum, 0, persistent_count};
+  for (std::size_t i = 0; i < persistent_count; ++i)
+    expected.insert(expected.end(), {persistent_identity(i), persistent_part(values)[i]});
+  Crc32 crc;
+  for (const std::uint32_t word : expected) crc.add(word);
+  expected.insert(expected.end(), {crc.value(), 0, 0xFFFF'FFFF});
+  ASSERT_LE(expected.size(), words.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(words[i], expected[i]) << "word " << i;
+}
+
 TEST(ParameterStore, SequenceWraps) {
   FakeFlash flash;
   put_record(flash, 1, 0, {0xFFFF'FFFDU, dictionary_checksum, 7, 0}, persistent_part(some_values(99)));
@@ -335,6 +352,26 @@ TEST(ParameterStore, SavesOnABadMemorySayTheTruth) {
       RC_ASSERT(loaded(flash) == kept);
     }
   }));
+}
+
+TEST(StoreSurvey, OfNothing) {
+  const StoreSurvey defaults{};
+  EXPECT_FALSE(defaults.newest);
+  EXPECT_EQ(defaults.next_sequence, 1u);
+  EXPECT_EQ(defaults.erases, 0u);
+  EXPECT_EQ(defaults.damaged, 0);
+  EXPECT_EQ(defaults.lock_code, 0u);
+  EXPECT_EQ(defaults.parameters(), 0u);
+}
+
+TEST(LoadReport, OfNothing) {
+  const LoadReport defaults{};
+  EXPECT_FALSE(defaults.found);
+  EXPECT_FALSE(defaults.other_dictionary);
+  EXPECT_EQ(defaults.header.sequence, 0u);
+  EXPECT_EQ(defaults.header.schema, 0u);
+  EXPECT_EQ(defaults.header.erases, 0u);
+  EXPECT_EQ(defaults.header.count, 0u);
 }
 
 }  // namespace
