@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <chrono>
 #include <cstdio>
 #include <memory>
 
@@ -22,6 +23,7 @@ report::Page make_page(const StudyInput& input, const std::vector<std::string>& 
   for (const SubjectSet& set : input.sets)
     studies.push_back(
         experiment::run_max_stiffness_study(set, experiment::stiffness_conditions(), input.run));
+  if (input.done) input.done("largest stiffness");
   report::Page page{"Largest stable stiffness", {experiment::max_stiffness_section(studies)}};
   if (!input.folder.empty())
     page.sections.front().pictures.push_back(
@@ -99,6 +101,12 @@ int run(int count, char** arguments) {
   if (!input.folder.empty()) std::filesystem::create_directories(input.folder);
   input.run.progress = [](std::size_t done, std::size_t all) {
     fmt::print(stderr, "\r{}   ", experiment::progress_words(done, all, std::nullopt));
+  };
+  auto begun = std::chrono::steady_clock::now();
+  input.done = [&](std::string_view study) {
+    const auto now = std::chrono::steady_clock::now();
+    fmt::print(stderr, "\r{}: {:.0f} s\n", study, std::chrono::duration<double>(now - begun).count());
+    begun = now;
   };
   report::Page page = make_page(input, names);
   fmt::print(stderr, "\n");

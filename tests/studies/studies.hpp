@@ -34,7 +34,8 @@ using experiment::TouchSetup;
 struct StudyInput {
   std::vector<SubjectSet> sets;  ///< calibrated, at least one
   StiffnessRun run;
-  std::filesystem::path folder;  ///< of pictures; empty: none are drawn
+  std::filesystem::path folder;                        ///< of pictures; empty: none are drawn
+  std::function<void(std::string_view study)> done{};  ///< hears of each study when it has been made
 };
 
 struct Study {

@@ -40,6 +40,7 @@ std::vector<report::Section> run_studies(const std::vector<std::string>& names, 
       if (name != "all" && name != study.name) continue;
       known = true;
       for (report::Section& section : study.run(input)) sections.push_back(std::move(section));
+      if (input.done) input.done(study.name);
     }
     if (known) continue;
     std::string allowed;

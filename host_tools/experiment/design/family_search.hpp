@@ -10,8 +10,8 @@
 // the best one alone stayed 4 % behind a grid, since stiffness over damping has several peaks.
 //
 // For one wall of the family the stiffness is found by doubling steps and by halving, which takes for granted
-// that a wall which holds also holds when it is softer. One that would be the best so far is looked at below
-// as well, by the hard touches; verify_wall() does it by all.
+// that a wall which holds also holds when it is softer. One that would be the best so far is therefore
+// touched by everybody at rungs_below() as well.
 
 #include <optional>
 #include <vector>
@@ -19,6 +19,10 @@
 #include "host_tools/experiment/design/wall_trials.hpp"
 
 namespace kmax::experiment {
+
+/// At which a wall of this rung has to hold too: each second one down to half of its stiffness, each
+/// sixteenth from there to a tenth.
+std::vector<int> rungs_below(int rung);
 
 struct FamilyResult {
   int rung = -1;                  ///< highest one that holds for everybody; -1: none above the bound

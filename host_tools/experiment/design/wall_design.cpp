@@ -186,7 +186,7 @@ void tell_bound(const DesignTask& task, int rung, WallDesign& design) {
   if (rung >= top_rung) return;
   WallTrials trials(task);
   DesignedWall next = design.wall;
-  // The verified one may be some rungs below the next that was tried.
+  // By everybody only each second rung was tried.
   for (int above = rung + 1; above <= std::min(rung + 16, top_rung); ++above) {
     next.stiffness = stiffness_of(above);
     if (const auto unstable = trials.first_unstable(next)) {
@@ -256,24 +256,6 @@ void require_whole(const DesignTask& task, std::span<const RunJournal* const> kn
   }
 }
 
-int verify_wall(const DesignTask& task, const WallFamily& family, double damping, int rung,
-                const DesignRun& run, WallDesign& design) {
-  constexpr int half = 70, tenth = 231;  // rungs that a half and a tenth are below
-  std::vector<int> rungs;
-  for (int n = std::max(0, rung - tenth); n < rung - half; n += 16) rungs.push_back(n);
-  for (int n = std::max(rung % 2, rung - half); n <= rung; n += 2) rungs.push_back(n);
-  const auto held =
-      by_each_person<std::size_t>(task, run, design, [&](WallTrials& trials, std::size_t person) {
-        std::vector<std::size_t> numbers = touches_by(task, person);
-        std::size_t n = 0;
-        while (n < rungs.size() && !trials.first_unstable({family, damping, stiffness_of(rungs[n])}, numbers))
-          ++n;
-        return n;
-      });
-  const std::size_t least = *std::min_element(held.begin(), held.end());
-  return least == 0 ? -1 : rungs[least - 1];
-}
-
 WallDesign design_wall(const DesignTask& task, const DesignRun& run, bool with_changes,
                        std::span<const RunJournal* const> known) {
   validate(task);
@@ -285,17 +267,12 @@ WallDesign design_wall(const DesignTask& task, const DesignRun& run, bool with_c
 
   WallDesign design;
   const std::vector<Candidate> candidates = candidates_of(variants.front(), searches, design);
-  int best = -1;
-  for (const Candidate& one : candidates) {
-    if (one.result.rung <= best) break;
-    const int held = verify_wall(task, one.family, one.result.damping, one.result.rung, run, design);
-    if (held <= best) continue;
-    best = held;
-    design.wall = {one.family, one.result.damping, 0.0};
-    design.hard = one.result.hard;
-  }
-  design.found = best >= 0;
+  design.found = !candidates.empty();
   if (!design.found) return design;
+  const auto& [family, result] = candidates.front();
+  design.wall = {family, result.damping, 0.0};
+  design.hard = result.hard;
+  const int best = result.rung;
   design.largest = stiffness_of(best);
   tell_bound(task, best, design);
   int lowered = best;
@@ -311,9 +288,7 @@ WallDesign design_wall(const DesignTask& task, const DesignRun& run, bool with_c
     design.changes_touches += counted.touches;
     design.event_limit_hits += counted.event_limit_hits;
     const double stiffness = found.empty() ? 0.0 : stiffness_of(found.front().result.rung);
-    // Search against search: neither is verified.
-    design.changes.push_back(
-        {variants[n].name, stiffness / stiffness_of(candidates.front().result.rung) - 1.0});
+    design.changes.push_back({variants[n].name, stiffness / design.largest - 1.0});
   }
   if (with_changes && task.set.device.delay == 0.0) design.changes.push_back({"no delay", std::nullopt});
   return design;

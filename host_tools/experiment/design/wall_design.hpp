@@ -73,11 +73,6 @@ WallDesign design_wall(const DesignTask& task, const DesignRun& run, bool with_c
 /// JournalError naming the first search that none of the journals has.
 void require_whole(const DesignTask& task, std::span<const RunJournal* const> known);
 
-/// The highest rung that holds for everybody from a tenth of `rung` on, in steps of two rungs from the half
-/// on and of sixteen below; -1: not even the first. Counts its touches into `design`.
-int verify_wall(const DesignTask& task, const WallFamily& family, double damping, int rung,
-                const DesignRun& run, WallDesign& design);
-
 /// The wall as the firmware's parameters of axis 0.
 std::vector<device::Assignment> parameters_of(const DesignTask& task, const DesignedWall& wall);
 

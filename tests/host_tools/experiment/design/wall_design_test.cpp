@@ -136,15 +136,26 @@ TEST(WallDesign, LetsNobodyDeeperInThanAllowed) {
   EXPECT_CONTAINS(wall_design_words(task, none).front(), "deeper in than 0.001 mm: the least found is");
 }
 
-TEST(WallDesign, VerifiesEverythingBelowTheWall) {
+TEST(WallDesign, HoldsForEverybodyWhenItIsSofter) {
   const DesignTask task = quick_task();
-  const WallDesign design = design_wall(task, {2}, false);
-  ASSERT_TRUE(design.bound);
-  WallDesign counted;
-  // From a rung that does not hold it comes down to one that does.
-  const int rung = verify_wall(task, design.wall.family, design.wall.damping, top_rung, {2}, counted);
-  EXPECT_LT(rung, top_rung);
-  EXPECT_GT(counted.touches, 0U);
+  const FamilyResult found = search_family(task, families_of(task).front(), -1, {});
+  ASSERT_GE(found.rung, 0);
+  const std::vector<int> rungs = rungs_below(found.rung);
+  ASSERT_GT(rungs.size(), 30U);
+  WallTrials trials(task);
+  for (const int rung : rungs)
+    EXPECT_FALSE(trials.first_unstable({families_of(task).front(), found.damping, stiffness_of(rung)}))
+        << rung;
+}
+
+TEST(WallDesign, LooksAtRungsDownToATenth) {
+  const std::vector<int> rungs = rungs_below(301);
+  EXPECT_EQ(rungs.front(), 70);
+  EXPECT_LE(stiffness_of(rungs.front()), 0.101 * stiffness_of(301));
+  EXPECT_EQ(rungs.back(), 299);
+  EXPECT_TRUE(std::is_sorted(rungs.begin(), rungs.end()));
+  EXPECT_TRUE(rungs_below(0).empty());
+  EXPECT_EQ(rungs_below(5), (std::vector<int>{1, 3}));
 }
 
 TEST(WallDesign, SaysThatNoneHolds) {
