@@ -115,7 +115,7 @@ struct Times {
   }
   void print(const char* what) const {
     std::printf(
-        "%-16s %4d times: gates off after %.1f us at most, brake after %.1f us; %d times not within %.0f "
+        "%-19s %4d times: gates off after %.1f us at most, brake after %.1f us; %d times not within %.0f "
         "us\n",
         what, cases, gates * 1e6, brake * 1e6, never, longest * 1e6);
   }
@@ -203,13 +203,17 @@ struct Hang {
   std::function<void(Bench&)> make;
   bool core_goes_on;  ///< and says tick_missed, before the watchdog ends it
   double limit;       ///< s, to the end of the force
-  double settles;     ///< s, until the brake is off for good
+  double settles;     ///< s, until the brake, which is pulsed, is off for good
   int few = 6;
 };
 
 void hang_the_tick(Bench& bench) {
-  bench.run_until([&] { return bench.board->core().exceptions.active(conversions); });
-  bench.board->run_until(bench.board->now() + 1);
+  const auto in_tick = [&] { return bench.board->core().exceptions.active(conversions); };
+  // Behind its first block, but not behind its last one: that would be the main loop.
+  do {
+    bench.run_until(in_tick);
+    bench.board->run_until(bench.board->now() + 1);
+  } while (!in_tick());
   bench.hang();
 }
 void lock_the_core_up(Bench& bench) {
@@ -224,9 +228,19 @@ void stop_the_converters(Bench& bench) {
   bench.board->bus().write(adc_base + adc_stride + offsetof(AdcRegisters, cr2), 4, 0, bench.board->now());
 }
 
-void hang_the_main_loop(Bench& bench) {
-  bench.run_until([&] { return bench.board->core().exceptions.active_count() == 0; });
+void hang_the_main_loop(Bench& bench, bool masked) {
+  bench.run_until([&] {
+    return bench.board->core().exceptions.active_count() == 0 &&
+           bench.board->processor().masks().primask == masked;
+  });
   bench.hang();
+}
+void hang_the_main_loop_under_ticks(Bench& bench) {
+  hang_the_main_loop(bench, false);
+}
+/// As it is while it sleeps: no tick comes through.
+void hang_the_masked_main_loop(Bench& bench) {
+  hang_the_main_loop(bench, true);
 }
 
 class HangTest : public testing::TestWithParam<Hang> {};
@@ -240,21 +254,26 @@ TEST_P(HangTest, LeavesNoForceAndSaysWhatItWas) {
     ASSERT_NO_FATAL_FAILURE(bench->drive());
     bench->run_to_any_moment(random);
     hang.make(*bench);
-    const auto off = bench->time_to_off(std::max(longest, 2.0 * hang.limit));
-    times.add(off);
+    const BoardTime hung = bench->board->now();
+    auto off = bench->time_to_off(std::max(longest, 2.0 * hang.limit));
     EXPECT_LE(off.gates, hang.limit) << i;
     EXPECT_LE(off.brake, hang.limit) << i;
+    for (double time = 0.0; time < hang.settles; time = seconds(bench->board->now() - hung)) {
+      bench->board->run_for(0.313e-3);  // no multiple of the PWM's period
+      if (bench->board->brake().on()) off.brake = seconds(bench->board->now() - hung);
+      EXPECT_TRUE(bench->gates_off()) << i;
+    }
+    times.add(off);
     if (testing::Test::HasFailure()) {
       // Enough is known.
       bench = std::make_unique<Bench>();
       continue;
     }
-    bench->board->run_for(hang.settles);
     for (std::size_t axis = 0; hang.core_goes_on && axis < axes; ++axis)
       EXPECT_EQ(firmware::text_of(bench->fault(axis)).name, std::string("tick_missed")) << i;
     const auto resets = bench->board->resets();
-    for (int hundredths = 0; hundredths < 300 && bench->board->resets() == resets; ++hundredths) {
-      bench->board->run_for(0.01);
+    for (int steps = 0; steps < 300 && bench->board->resets() == resets; ++steps) {
+      bench->board->run_for(10.013e-3);
       ASSERT_TRUE(bench->gates_off()) << i;
       ASSERT_FALSE(bench->board->brake().on()) << i;
     }
@@ -270,11 +289,13 @@ TEST_P(HangTest, LeavesNoForceAndSaysWhatItWas) {
 constexpr double two_ticks = 2 * tick_s;
 // With the ticks the brake goes on for 0.2 s after driving, and the ticks themselves miss the main loop after
 // 0.1 s.
-INSTANTIATE_TEST_SUITE_P(Image, HangTest,
-                         testing::Values(Hang{"TickHung", hang_the_tick, false, two_ticks, 5e-3},
-                                         Hang{"CoreLockedUp", lock_the_core_up, false, two_ticks, 5e-3},
-                                         Hang{"TicksStopped", stop_the_converters, true, two_ticks, 5e-3},
-                                         Hang{"MainLoopStuck", hang_the_main_loop, false, 0.106, 0.25, 3}),
-                         [](const auto& tested) { return tested.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Image, HangTest,
+    testing::Values(Hang{"TickHung", hang_the_tick, false, two_ticks, 5e-3},
+                    Hang{"CoreLockedUp", lock_the_core_up, false, two_ticks, 5e-3},
+                    Hang{"TicksStopped", stop_the_converters, true, two_ticks, 5e-3},
+                    Hang{"MainLoopStuck", hang_the_main_loop_under_ticks, false, 0.106, 0.31, 3},
+                    Hang{"MainLoopStuckMasked", hang_the_masked_main_loop, false, two_ticks, 5e-3, 3}),
+    [](const auto& tested) { return tested.param.name; });
 
 }  // namespace kmax::tests::halt_and_hang_test

@@ -6,10 +6,17 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <deque>
+#include <fstream>
+#include <functional>
 #include <iterator>
+#include <map>
+#include <optional>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "host_tools/calibration/procedure.hpp"
@@ -269,60 +276,145 @@ ForceError run_image(Scene scene, double contact, double hottest) {
   return error;
 }
 
+/// Of one board, natively or on the image; N.
 struct Result {
+  bool on_image;
   unsigned number;
-  ForceError error;
+  std::string motor;
+  double mean, worst;
+
+  std::string line() const {
+    return fmt::format("{}{:4} {:14} {:.4f} N mean, {:.4f} N worst", on_image ? "image " : "", number, motor,
+                       mean, worst);
+  }
+  /// Nothing for any other line, such as a failure's.
+  static std::optional<Result> of(const std::string& line) {
+    Result result{line.starts_with("image "), 0, std::string(32, '\0'), 0.0, 0.0};
+    const char* text = line.c_str() + (result.on_image ? 6 : 0);
+    if (std::sscanf(text, "%u %31s %lf N mean, %lf N worst", &result.number, result.motor.data(),
+                    &result.mean, &result.worst) != 4)
+      return std::nullopt;
+    result.motor.resize(std::strlen(result.motor.c_str()));
+    return result;
+  }
 };
 
-int run(unsigned boards, unsigned first, unsigned seed, double contact, unsigned on_image) {
-  const double image_contact = std::min(contact, 20.0);
-  std::vector<Result> results;
+struct Options {
+  unsigned boards = 200, first = 0, seed = 1, on_image = 0;
+  double contact = 600.0;
+  std::string results;
+};
+
+/// What has been measured; in a file too, if there is one, for a run that goes on or is shared.
+class Results {
+ public:
+  /// std::runtime_error: the file is of another run, or cannot be written.
+  explicit Results(const Options& options) {
+    if (options.results.empty()) return;
+    const std::string heading = fmt::format("seed {}, {} s of contact", options.seed, options.contact);
+    std::ifstream in(options.results);
+    bool begun = false;
+    for (std::string line; std::getline(in, line);) {
+      if (!begun && line != heading)
+        throw std::runtime_error(
+            fmt::format("{} begins with '{}', and this run's would with '{}': name another", options.results,
+                        line, heading));
+      begun = true;
+      if (const auto result = Result::of(line)) all_.push_back(*result);
+    }
+    file_.open(options.results, std::ios::app);
+    if (!begun) file_ << heading << std::endl;
+    if (!file_) throw std::runtime_error(options.results + " cannot be written");
+  }
+  const Result* find(bool on_image, unsigned number) const {
+    const auto found = std::ranges::find_if(
+        all_, [&](const Result& r) { return r.on_image == on_image && r.number == number; });
+    return found == all_.end() ? nullptr : &*found;
+  }
+  /// The line and its end in one piece: others may write too.
+  const Result* add(const Result& result) {
+    if (file_.is_open()) file_ << result.line() + "\n" << std::flush;
+    return &all_.emplace_back(result);
+  }
+
+ private:
+  std::deque<Result> all_;
+  std::ofstream file_;
+};
+
+/// A line of the table in docs/random_boards.md.
+struct Row {
+  unsigned boards = 0;
+  double sum = 0.0, worst = 0.0;
+
+  void add(const Result& result) {
+    ++boards;
+    sum += result.mean;
+    worst = std::max(worst, result.worst);
+  }
+  void print(const std::string& what) const {
+    if (boards > 0) fmt::print("| {} | {} | {:.3f} N | {:.3f} N |\n", what, boards, sum / boards, worst);
+  }
+};
+
+int run(const Options& options) {
+  Results results(options);
   unsigned failures = 0;
-  ForceError all;
-  for (unsigned number = first; number < first + boards; ++number) {
-    Draw draw(seed, number);
+  // What is in the file has not failed.
+  const auto measured = [&](bool on_image, unsigned number) -> const Result* {
+    if (const Result* known = results.find(on_image, number)) return known;
+    Draw draw(options.seed, number);
     const Scene scene = draw.board();
     // It warms up by a degree in a second at most.
-    const double hottest = std::min(draw.between(35.0, 70.0), 25.0 + contact);
+    const double hottest = std::min(draw.between(35.0, 70.0), 25.0 + options.contact);
+    const Result* result = nullptr;
     try {
-      NativeRun native(scene, contact, hottest);
-      native.run();
-      judge(native.error(), allowed_natively);
-      fmt::print("{:4} {:14} {:.4f} N mean, {:.4f} N worst\n", number, scene.name, native.error().mean(),
-                 native.error().worst);
-      all.sum += native.error().mean();
-      all.worst = std::max(all.worst, native.error().worst);
-      results.push_back({number, native.error()});
+      ForceError error;
+      if (on_image) {
+        error = run_image(scene, std::min(options.contact, 20.0), 45.0);
+      } else {
+        NativeRun native(scene, options.contact, hottest);
+        native.run();
+        error = native.error();
+      }
+      judge(error, on_image ? allowed_on_image : allowed_natively);
+      result = results.add({on_image, number, scene.name, error.mean(), error.worst});
+      fmt::print("{}\n", result->line());
     } catch (const std::exception& error) {
       ++failures;
-      fmt::print("{:4} {:14} FAILED {}\n", number, scene.name, error.what());
+      fmt::print("{}{:4} {:14} FAILED {}\n", on_image ? "image " : "", number, scene.name, error.what());
     }
     std::fflush(stdout);
+    return result;
+  };
+  std::vector<Result> natively;
+  for (unsigned number = options.first; number < options.first + options.boards; ++number)
+    if (const Result* result = measured(false, number)) natively.push_back(*result);
+  std::ranges::stable_sort(natively, std::greater{}, &Result::worst);
+  Row all, image;
+  std::map<std::string, Row> motors;
+  for (const Result& result : natively) {
+    all.add(result);
+    motors[result.motor].add(result);
   }
-  std::ranges::sort(results, [](const Result& a, const Result& b) { return a.error.worst > b.error.worst; });
-  for (std::size_t i = 0; i < std::min<std::size_t>(on_image, results.size()); ++i) {
-    Draw draw(seed, results[i].number);
-    const Scene scene = draw.board();
-    try {
-      const ForceError error = run_image(scene, image_contact, 45.0);
-      judge(error, allowed_on_image);
-      fmt::print("image {:4} {:14} {:.4f} N mean, {:.4f} N worst\n", results[i].number, scene.name,
-                 error.mean(), error.worst);
-    } catch (const std::exception& error) {
-      ++failures;
-      fmt::print("image {:4} {:14} FAILED {}\n", results[i].number, scene.name, error.what());
-    }
-    std::fflush(stdout);
-  }
-  fmt::print("{} boards, {} failures; force error at the handle {:.4f} N mean, {:.4f} N worst\n", boards,
-             failures, results.empty() ? 0.0 : all.sum / static_cast<double>(results.size()), all.worst);
-  return failures == 0 && !results.empty() ? 0 : 1;
+  const std::size_t most = std::min<std::size_t>(options.on_image, natively.size());
+  for (std::size_t i = 0; i < most; ++i)
+    if (const Result* result = measured(true, natively[i].number)) image.add(*result);
+  fmt::print("\n| motor | boards | force error, mean | worst |\n|---|---|---|---|\n");
+  for (const auto& [motor, row] : motors) row.print(motor);
+  all.print("all");
+  image.print(fmt::format("the worst {}, on the image, cogging counted", most));
+  fmt::print("\n{} boards, {} failures\n", options.boards, failures);
+  return failures == 0 && !natively.empty() ? 0 : 1;
 }
 
 constexpr const char* usage =
     "usage: random_boards [--boards N] [--first B] [--seed S] [--contact SECONDS] [--image N]\n"
+    "                     [--results FILE]\n"
     "  --boards N  200 by default, from board B on; --contact 600 s each, half of it at each of two walls\n"
     "  --image N   the N worst of them, 20 s each at most, by the image on the virtual board; 0 by default\n"
+    "  --results FILE  keeps what is measured, and measures only what it does not have: a run that was\n"
+    "      broken off goes on, and several that began with other boards end as one\n"
     "Exit code 0: no false trip and none missed, and forces within their bounds; 1: else, which the same "
     "seed\n"
     "does again; 2: wrong usage.\n";
@@ -339,21 +431,26 @@ bool parse(const char* text, Number& number) {
 
 int main(int count, char** arguments) {
   using namespace kmax::soak;
-  unsigned boards = 200, first = 0, seed = 1, on_image = 0;
-  double contact = 600.0;
+  Options options;
   for (int i = 1; i < count; i += 2) {
     const std::string name = arguments[i];
     const char* value = i + 1 < count ? arguments[i + 1] : "";
-    const bool taken = name == "--boards"    ? parse(value, boards)
-                       : name == "--first"   ? parse(value, first)
-                       : name == "--seed"    ? parse(value, seed)
-                       : name == "--contact" ? parse(value, contact)
-                       : name == "--image"   ? parse(value, on_image)
+    const bool taken = name == "--boards"    ? parse(value, options.boards)
+                       : name == "--first"   ? parse(value, options.first)
+                       : name == "--seed"    ? parse(value, options.seed)
+                       : name == "--contact" ? parse(value, options.contact)
+                       : name == "--image"   ? parse(value, options.on_image)
+                       : name == "--results" ? !(options.results = value).empty()
                                              : false;
     if (!taken) {
       fmt::print(stderr, "random_boards: '{}' '{}' is not understood\n{}", name, value, usage);
       return 2;
     }
   }
-  return run(boards, first, seed, contact, on_image);
+  try {
+    return run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "random_boards: {}\n", error.what());
+    return 2;
+  }
 }

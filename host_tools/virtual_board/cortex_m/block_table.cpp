@@ -47,6 +47,7 @@ const Block& BlockTable::add(std::uint32_t address, std::span<const std::uint8_t
     at += instruction.bytes;
   }
   block->ends_inside_if_then = governed != 0;
+  block->endless = block->size == 2 && half_word(0) == 0xE7FE;
   const Block& added = *block;
   blocks_[key(address, added.size)] = std::move(block);
   slots_[address / 2 % slot_count] = &added;

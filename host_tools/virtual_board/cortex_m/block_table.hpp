@@ -35,6 +35,7 @@ struct Block {
   std::uint32_t first_floating_point = 0;  ///< address
   /// Cut by the end of a page (1 KiB) between an IT instruction and the last one that it governs.
   bool ends_inside_if_then = false;
+  bool endless = false;  ///< a branch to itself, and nothing else
   std::vector<MemoryInstruction> memory;
 };
 

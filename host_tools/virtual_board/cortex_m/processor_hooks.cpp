@@ -165,16 +165,17 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   if (on_block_) on_block_(address, size);
   block_ = block;
   locator_.begin_block(*block);
-  instructions_ += block->instructions;
-  if (config_.units_per_instruction != 0) {
-    block_period_ = config_.units_per_instruction;
-    cycles_ += block->instructions;
-    now_ += block->instructions * block_period_;
-  } else {
-    block_period_ = clocks_.core;
-    cycles_ += block->cycles;
-    now_ += block->cycles * block_period_;
-  }
+  const bool by_instruction = config_.units_per_instruction != 0;
+  block_period_ = by_instruction ? config_.units_per_instruction : clocks_.core;
+  std::uint64_t cycles = by_instruction ? block->instructions : block->cycles;
+  std::uint64_t rounds = 1;
+  // Until the next event nothing can end an endless loop but stop(), which is looked for now and then.
+  if (block->endless && !inside_if_then && !on_block_ && limit_ > now_)
+    rounds = std::min<std::uint64_t>((limit_ - now_ - 1) / (cycles * block_period_) + 1, 10'000);
+  cycles *= rounds;
+  instructions_ += rounds * block->instructions;
+  cycles_ += cycles;
+  now_ += cycles * block_period_;
 }
 
 /// Something is up: find out what. Also takes the limit again when registers were accessed.

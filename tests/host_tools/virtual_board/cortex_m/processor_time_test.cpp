@@ -115,6 +115,40 @@ TEST(ProcessorTime, OvershootsByLessThanABlock) {
   }
 }
 
+// Whoever listens to blocks gets each of them: that is the reference.
+TEST(ProcessorTime, GoesThroughAnEndlessLoopAsIfRoundByRound) {
+  for (const auto first :
+       {std::uint16_t{0xBF00}, std::uint16_t{0xB672}}) {  // nop; cpsid i: what is asked for waits
+    for (const ProcessorConfig& config : {ProcessorConfig{}, ProcessorConfig{.units_per_instruction = 7}}) {
+      ProgramOnCore quick({first, 0xE7FE}, config), slow({first, 0xE7FE}, config);
+      std::uint64_t rounds = 0;
+      slow.processor.on_block([&](std::uint32_t, std::uint32_t) { ++rounds; });
+      for (ProgramOnCore* board : {&quick, &slow}) {
+        board->handler(tim2, {0x3601, 0x4770});  // adds r6, #1; bx lr
+        board->core.exceptions.set_enabled(tim2, true);
+        board->core.exceptions.set_priority(tim2, 0x10);
+        // An event at odd times, each of which asks for the interrupt.
+        board->block.next_after = [board](BoardTime now) {
+          board->core.exceptions.pend(tim2);
+          return now + 12'347;
+        };
+        board->block.event = 1001;
+        board->set(6, 0);
+      }
+      for (BoardTime limit = 1; limit < 600'000; limit += limit < 3000 ? 1 : 33'331) {
+        ASSERT_EQ(quick.run(limit), RunEnd::time_reached);
+        ASSERT_EQ(slow.run(limit), RunEnd::time_reached);
+        ASSERT_EQ(quick.processor.now(), slow.processor.now()) << limit;
+        ASSERT_EQ(quick.processor.cycles(), slow.processor.cycles()) << limit;
+        ASSERT_EQ(quick.processor.instructions(), slow.processor.instructions()) << limit;
+        ASSERT_EQ(quick.get(6), slow.get(6)) << limit;
+      }
+      EXPECT_EQ(quick.block.advanced, slow.block.advanced);
+      EXPECT_GT(rounds, 10'000U);
+    }
+  }
+}
+
 TEST(ProcessorTime, ChargesEntryReturnAndTailChaining) {
   const Program idle{0xBF30, 0xBE01};  // wfi
   const auto cycles_of = [&](unsigned interrupts) {
