@@ -96,26 +96,35 @@ Baseline adaptive_as_printed() {
 
 std::vector<Baseline> law_baselines() {
   constexpr auto difference = VelocityEstimatorKind::difference;
-  std::vector<Baseline> laws{
-      plain_wall(),
-      field_of_two(),
-      {"field of 2 N, x_0 = 5 mm", field(2.0, 5e-3)},
-      adaptive_as_printed(),
-      {"adaptive, V_max = 0.24 m/s, difference", Eq7{.velocity_max = 0.24, .estimator = difference}}};
+  std::vector<Baseline> laws;
+  const auto add = [&](std::string family, std::vector<Baseline> walls) {
+    for (Baseline& wall : walls) {
+      wall.family = family;
+      laws.push_back(std::move(wall));
+    }
+  };
+  add("plain", {plain_wall()});
+  add("field of 2 N", {field_of_two(), {"field of 2 N, x_0 = 5 mm", field(2.0, 5e-3)}});
+  add("adaptive",
+      {adaptive_as_printed(),
+       {"adaptive, V_max = 0.24 m/s, difference", Eq7{.velocity_max = 0.24, .estimator = difference}}});
   for (const double damping : {4.0, 8.0, 12.0, 16.0})
-    laws.push_back({fmt::format("damping {:g} N s/m, difference", damping), damped(damping, difference)});
+    add("damping, difference",
+        {{fmt::format("damping {:g} N s/m, difference", damping), damped(damping, difference)}});
   for (const auto estimator : {VelocityEstimatorKind::low_pass, VelocityEstimatorKind::foaw,
                                VelocityEstimatorKind::foaw_end_fit, VelocityEstimatorKind::tracking})
-    laws.push_back({fmt::format("damping 8 N s/m, {}", estimator_name(estimator)), damped(8.0, estimator)});
-  laws.push_back({"field of 2 N, damping 8 N s/m, difference", both(field(2.0), damped(8.0, difference))});
-  laws.push_back({"grows from 2 N/mm in 0.2 s", growing(2000.0, 0.2, 0.0)});
-  laws.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m", growing(3000.0, 0.2, 6.0)});
-  laws.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m, field of 2 N",
-                  both(growing(3000.0, 0.2, 6.0), field(2.0))});
-  laws.push_back({"passivity controller, alpha <= 15 N s/m", passivity_controlled(15.0, false)});
-  laws.push_back({"the same against the spring's energy", passivity_controlled(15.0, true)});
-  laws.push_back(
-      {"field of 2 N, against the spring's energy", both(field(2.0), passivity_controlled(15.0, true))});
+    add("damping, other estimators",
+        {{fmt::format("damping 8 N s/m, {}", estimator_name(estimator)), damped(8.0, estimator)}});
+  add("field and damping",
+      {{"field of 2 N, damping 8 N s/m, difference", both(field(2.0), damped(8.0, difference))}});
+  add("growing", {{"grows from 2 N/mm in 0.2 s", growing(2000.0, 0.2, 0.0)},
+                  {"grows from 3 N/mm in 0.2 s, damping 6 N s/m", growing(3000.0, 0.2, 6.0)}});
+  add("growing, field", {{"grows from 3 N/mm in 0.2 s, damping 6 N s/m, field of 2 N",
+                          both(growing(3000.0, 0.2, 6.0), field(2.0))}});
+  add("passivity",
+      {{"passivity controller, alpha <= 15 N s/m", passivity_controlled(15.0, false)},
+       {"the same against the spring's energy", passivity_controlled(15.0, true)},
+       {"field of 2 N, against the spring's energy", both(field(2.0), passivity_controlled(15.0, true))}});
   return laws;
 }
 
@@ -304,10 +313,49 @@ report::Section relation_section(const SubjectSet& set, const std::vector<Baseli
   return section;
 }
 
+plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult>& results) {
+  struct Price {
+    const char* label;
+    double WallPrice::*value;
+    double scale;
+  };
+  plot::Figure figure{fmt::format("What a stiff wall costs ({})", experiment::clip_words(set.device)),
+                      "largest stiffness, stable by both criteria (N/mm)",
+                      {}};
+  figure.legend_beside = true;
+  for (const Price& price : {Price{"deepest (mm)", &WallPrice::depth, 1e3},
+                             Price{"rate-hardness (N/mm)", &WallPrice::rate_hardness, 1e-3},
+                             Price{"field at rest (N)", &WallPrice::field_at_rest, 1.0}}) {
+    plot::Panel panel{price.label, {}, {}};
+    std::string_view family;
+    for (const BaselineResult& result : results) {
+      if (result.law.family != family || panel.series.empty())
+        panel.series.push_back({figure.panels.empty() ? result.law.family : "", {}, {}, false, true});
+      family = result.law.family;
+      panel.series.back().x.push_back(std::min(result.moves.mean, result.feels.mean) / 1e3);
+      panel.series.back().y.push_back(result.price.*price.value * price.scale);
+    }
+    figure.panels.push_back(std::move(panel));
+  }
+  return figure;
+}
+
 std::vector<report::Section> baselines(const StudyInput& input) {
   std::vector<report::Section> sections;
   for (const SubjectSet& set : input.sets) {
-    sections.push_back(baseline_section(set, run_baselines(set, law_baselines(), input.run)));
+    const std::vector<BaselineResult> results = run_baselines(set, law_baselines(), input.run);
+    sections.push_back(baseline_section(set, results));
+    if (!input.folder.empty()) {
+      const std::filesystem::path file =
+          input.folder /
+          fmt::format("price_of_stiffness_{}.svg", set.device.force_limit > 0.0 ? "clipped" : "unclipped");
+      const plot::Figure figure = price_front(set, results);
+      plot::write_figure(figure, file);
+      sections.back().pictures = {{figure.title +
+                                       ": the further right, the stiffer; shallow, hard and without a "
+                                       "field is better.",
+                                   file}};
+    }
     sections.push_back(relation_section(set, run_baselines(set, relation_baselines(), input.run)));
   }
   return sections;

@@ -135,6 +135,25 @@ TEST(BaselineSection, TheFrontAndTheRatingsFollowTheNumbers) {
   EXPECT_CONTAINS(paragraphs_of(baseline_section(two_people(), results)), "field at rest rises: no");
 }
 
+TEST(PriceFront, HasEveryWallOnceInEachPanel) {
+  std::vector<BaselineResult> results = made_up(law_baselines(), {1.0, 1e-3, 2e-3, 3000.0});
+  results[0].feels.mean = 3000.0;
+  const plot::Figure figure = price_front(two_people(), results);
+  ASSERT_EQ(figure.panels.size(), 3U);
+  const std::array<double, 3> prices{2.0, 3.0, 1.0};
+  for (std::size_t panel = 0; panel < prices.size(); ++panel) {
+    std::size_t walls = 0;
+    for (const plot::Series& series : figure.panels[panel].series) {
+      walls += series.x.size();
+      EXPECT_EQ(series.label.empty(), panel > 0);
+      for (const double price : series.y) EXPECT_DOUBLE_EQ(price, prices[panel]);
+    }
+    EXPECT_EQ(walls, results.size());
+    EXPECT_EQ(figure.panels[panel].series.size(), 9U) << "a curve a family";
+    EXPECT_DOUBLE_EQ(figure.panels[panel].series[0].x[0], 3.0) << "the lesser of both criteria";
+  }
+}
+
 TEST(RelationSection, SaysWhatIsBetterThanThePapersChoice) {
   std::vector<BaselineResult> results = made_up(relation_baselines(), {0.8, 1e-3, 1e-3});
   EXPECT_CONTAINS(paragraphs_of(relation_section(two_people(), results)), "at no higher cost: none of these");

@@ -21,6 +21,7 @@
 #include "host_tools/experiment/paper_numbers.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/experiment/touch_price.hpp"
+#include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
 
 namespace kmax::studies {
@@ -265,6 +266,7 @@ struct Baseline {
   std::string name;
   WallChange wall;
   const experiment::paper::MaxStiffness* paper = nullptr;  ///< of the same wall
+  std::string family{};                                    ///< one curve of the front
 };
 /// Those of paper 1.
 Baseline plain_wall();
@@ -285,6 +287,8 @@ struct BaselineResult {
 };
 std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vector<Baseline>& laws,
                                           const StiffnessRun& run);
+/// Largest stiffness by both criteria against what each wall costs, a curve a family.
+plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult>& results);
 report::Section baseline_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
 report::Section relation_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
 
