@@ -11,9 +11,9 @@
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/supplied_files.hpp"
-#include "host_tools/view/server/access.hpp"
 #include "host_tools/view/analysis.hpp"
 #include "host_tools/view/device_session.hpp"
+#include "host_tools/view/server/access.hpp"
 #include "host_tools/view/server/web_server.hpp"
 
 namespace kmax::cli {
