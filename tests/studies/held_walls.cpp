@@ -113,11 +113,14 @@ bool between_targets(const SubjectSet& set, double stiffness) {
 
 report::Table rescaled_table(const experiment::MaxStiffnessStudy& study) {
   using experiment::ConditionResult;
-  report::Table table{
-      "Largest stable stiffness, N/mm, mean of the same people with its 95 % interval (Fig. 8: 8.02)",
-      {"adaptive wall", "V in m/s, as printed", "V x 13.3", "more, of each person"},
-      {}};
   const std::size_t modes = study.conditions.size() / 2;
+  report::Table table{
+      fmt::format(
+          "Largest stable stiffness, N/mm, mean of the same people with its 95 % interval (Fig. 8: {})",
+          n_per_mm(experiment::paper::max_stiffness.back().stiffness)),
+      {"adaptive wall", "V in m/s, as printed",
+       fmt::format("V x {:.1f}", study.conditions.back().condition.velocity_scale), "more, of each person"},
+      {}};
   for (std::size_t n = 0; n < modes; ++n) {
     const ConditionResult &literal = study.conditions[n], &rescaled = study.conditions[modes + n];
     const auto text = [](const ConditionResult& result) {
