@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/experiment/design/family_search.hpp"
 #include "tests/host_tools/experiment/design/design_case.hpp"
 
 namespace kmax::studies::wall_design_test {
@@ -54,6 +55,20 @@ TEST(WallGrid, ADesignIsHardlyBehindIt) {
   ASSERT_GE(best.rung, 0);
   EXPECT_GT(design.largest, 0.9 * experiment::stiffness_of(best.rung));
   EXPECT_LT(design.touches, best.points * task.touches());
+}
+
+// By the touches that ended other walls alone, some of these would be unstable when softer.
+TEST(WallDesign, HoldsForEverybodyOnRandomDevicesWhenItIsSofter) {
+  for (const std::uint64_t seed : {3, 7}) {
+    const DesignTask task = quick_device(seed);
+    for (const experiment::WallFamily& family : experiment::families_of(task)) {
+      const experiment::FamilyResult found = experiment::search_family(task, family, -1, {});
+      experiment::WallTrials trials(task);
+      for (const int rung : experiment::rungs_below(found.rung))
+        EXPECT_FALSE(trials.first_unstable({family, found.damping, experiment::stiffness_of(rung)}))
+            << seed << ' ' << name_of(family) << ' ' << rung;
+    }
+  }
 }
 
 }  // namespace kmax::studies::wall_design_test
