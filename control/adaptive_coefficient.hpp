@@ -86,16 +86,19 @@ class AdaptiveCoefficient {
 
   /// The same where the caller has already asked on which side of the surface the handle is.
   Scalar update_inside(const Coefficients& c, Scalar outward_velocity) {
+    if (c.mode == AdaptiveMode::instant) [[likely]]
+      return without_memory(c, outward_velocity);
     const Scalar present = follow(c, outward_velocity);
     if (!was_inside_) {
       was_inside_ = true;
       latched_ = present;
       return c.mode == AdaptiveMode::peak_hold ? held(c) : present;
     }
-    if (c.mode == AdaptiveMode::instant) return present;
     return c.mode == AdaptiveMode::latched ? bounded(c, latched_) : held(c);
   }
   Scalar update_outside(const Coefficients& c, Scalar outward_velocity) {
+    if (c.mode == AdaptiveMode::instant) [[likely]]
+      return without_memory(c, outward_velocity);
     const Scalar present = follow(c, outward_velocity);
     was_inside_ = false;
     return c.mode == AdaptiveMode::peak_hold ? held(c) : present;
@@ -104,17 +107,14 @@ class AdaptiveCoefficient {
   /// Eq. 7 without memory.
   static Scalar at_velocity(const Coefficients& c, Scalar outward_velocity) {
     Scalar speed = -outward_velocity;
-    if (c.velocity == AdaptiveVelocity::speed) {
+    if (c.velocity == AdaptiveVelocity::speed) [[unlikely]] {
       speed = magnitude(speed);
     } else if (speed < Scalar(0)) {
       speed = Scalar(0);
     }
     Scalar normalised = speed * c.inverse_velocity_max;
-    if (c.relation == AdaptiveRelation::square) {
-      normalised = normalised * normalised;
-    } else if (c.relation == AdaptiveRelation::square_root) {
-      normalised = square_root(normalised);
-    }
+    if (c.relation != AdaptiveRelation::linear) [[unlikely]]
+      normalised = c.relation == AdaptiveRelation::square ? normalised * normalised : square_root(normalised);
     // V_k is not bounded to 1 before: all three relations rise with it, and `most` is what they give at 1.
     const Scalar force = c.gain * normalised + c.offset;
     if (force > c.most) return c.most;
@@ -123,6 +123,13 @@ class AdaptiveCoefficient {
   }
 
  private:
+  // A mode with a memory that is changed to under way begins with this sample.
+  Scalar without_memory(const Coefficients& c, Scalar outward_velocity) {
+    was_inside_ = false;
+    excess_ = Scalar(0);
+    return at_velocity(c, outward_velocity);
+  }
+
   // The coefficient at this velocity; the excess follows it.
   Scalar follow(const Coefficients& c, Scalar outward_velocity) {
     const Scalar present = at_velocity(c, outward_velocity);

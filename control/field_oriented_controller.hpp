@@ -6,6 +6,7 @@
 #include "control/current_loop_gains.hpp"
 #include "control/dead_time_compensation.hpp"
 #include "control/finite.hpp"
+#include "control/phase_currents.hpp"
 #include "control/sine_cosine.hpp"
 
 namespace kmax::control {
@@ -94,13 +95,10 @@ class FieldOrientedController {
     Scalar duty_a = Scalar(0.5);  ///< share of the period with the high side on
     Scalar duty_b = Scalar(0.5);
     Scalar duty_c = Scalar(0.5);
-    Scalar current_d{};    ///< A, measured
-    Scalar current_q{};    ///< A, measured
-    Scalar voltage_d{};    ///< V, after the circle, in the rotor's frame when it is active
-    Scalar voltage_q{};    ///< V, after the circle
-    Scalar reference_a{};  ///< A, the phases' references at the sample; 0 for an open-loop voltage and
-    Scalar reference_b{};  ///< together with `not_finite`
-    Scalar reference_c{};
+    Scalar current_d{};  ///< A, measured
+    Scalar current_q{};  ///< A, measured
+    Scalar voltage_d{};  ///< V, after the circle, in the rotor's frame when it is active
+    Scalar voltage_q{};  ///< V, after the circle
   };
 
   /// Outside the interrupt path. `period`: s per call of update().
@@ -143,14 +141,13 @@ class FieldOrientedController {
       drop_d_ += c.gains_d.tracking * added_d;
       drop_q_ += c.gains_q.tracking * added_q;
       Phases duty = modulated(c, in.electrical_speed, share, sine, cosine);
-      const Phases reference = referred(in, sine, cosine);
       if (c.dead_time.active) [[likely]] {
+        const PhaseCurrents<Scalar> reference = referred(in, sine, cosine);
         duty.a += c.dead_time.of(reference.a);
         duty.b += c.dead_time.of(reference.b);
         duty.c += c.dead_time.of(reference.c);
       }
-      return {{false, false}, duty.a,   duty.b,      duty.c,      current.d,  current.q,
-              wanted.d,       wanted.q, reference.a, reference.b, reference.c};
+      return {{false, false}, duty.a, duty.b, duty.c, current.d, current.q, wanted.d, wanted.q};
     }
     if (!(square <= std::numeric_limits<Scalar>::max())) {
       reset();
@@ -162,9 +159,13 @@ class FieldOrientedController {
     drop_d_ += c.gains_d.tracking * ((left.d + forward_d) - drop_d_);
     drop_q_ += c.gains_q.tracking * ((left.q - forward_q) - drop_q_);
     const Phases duty = modulated(c, in.electrical_speed, bounded, sine, cosine);
-    const Phases reference = referred(in, sine, cosine);
-    return {{true, false}, duty.a, duty.b,      duty.c,      current.d,  current.q,
-            left.d,        left.q, reference.a, reference.b, reference.c};
+    return {{true, false}, duty.a, duty.b, duty.c, current.d, current.q, left.d, left.q};
+  }
+
+  /// A, the phases' references at the sample.
+  [[gnu::always_inline]] static PhaseCurrents<Scalar> phase_references(const Input& in) {
+    const auto [sine, cosine] = rotation(in.angle);
+    return referred(in, sine, cosine);
   }
 
   /// An open-loop voltage (V, turning with in.electrical_speed, at in.angle when the currents are sampled)
@@ -183,13 +184,12 @@ class FieldOrientedController {
     }
     if (square <= c.circle_square) {
       const Phases duty = modulated(c, in.electrical_speed, share, sine, cosine);
-      return {{}, duty.a, duty.b, duty.c, current.d, current.q, voltage_d, voltage_q, {}, {}, {}};
+      return {{}, duty.a, duty.b, duty.c, current.d, current.q, voltage_d, voltage_q};
     }
     const Vector bounded = on_the_circle(c, share);
     const Scalar back = in.supply * static_cast<Scalar>(4.0 / 3.0);
     const Phases duty = modulated(c, in.electrical_speed, bounded, sine, cosine);
-    return {{true, false},    duty.a,           duty.b, duty.c, current.d, current.q,
-            bounded.d * back, bounded.q * back, {},     {},     {}};
+    return {{true, false}, duty.a, duty.b, duty.c, current.d, current.q, bounded.d * back, bounded.q * back};
   }
 
  private:
@@ -227,7 +227,7 @@ class FieldOrientedController {
 
   [[gnu::always_inline]] static Output without_voltage(const Vector& current) {
     constexpr auto half = Scalar(0.5);
-    return {fault(), half, half, half, current.d, current.q, Scalar(0), Scalar(0), {}, {}, {}};
+    return {fault(), half, half, half, current.d, current.q, Scalar(0), Scalar(0)};
   }
 
   // What lies beyond the circle onto it, the d axis first.
@@ -259,7 +259,7 @@ class FieldOrientedController {
     return {centre + alpha, others + whole, others - whole};
   }
 
-  [[gnu::always_inline]] static Phases referred(const Input& in, Scalar sine, Scalar cosine) {
+  [[gnu::always_inline]] static PhaseCurrents<Scalar> referred(const Input& in, Scalar sine, Scalar cosine) {
     constexpr auto half_root_three = static_cast<Scalar>(0.866025403784438646763723170753);
     const Scalar a = in.reference_d * cosine - in.reference_q * sine;
     const Scalar beta = (in.reference_d * sine + in.reference_q * cosine) * half_root_three;

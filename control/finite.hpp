@@ -12,6 +12,12 @@ constexpr bool is_finite(Scalar value) {
   return value - value == Scalar(0);
 }
 
+/// Both are, with one comparison.
+template <typename Scalar>
+constexpr bool are_finite(Scalar one, Scalar other) {
+  return one - one == other - other;
+}
+
 /// |value|, one instruction; the magnitude of a NaN is a NaN.
 constexpr float magnitude(float value) {
   return __builtin_fabsf(value);

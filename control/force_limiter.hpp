@@ -55,20 +55,26 @@ class ForceLimiter {
   }
 
   Output update(const Coefficients& c, Scalar requested) {
+    if (is_finite(requested)) return update_finite(c, requested);
+    reset();
     Output out;
-    if (!is_finite(requested)) {
-      reset();
-      out.not_finite = true;
-      return out;
-    }
+    out.not_finite = true;
+    return out;
+  }
+  /// For a caller that knows it to be finite.
+  Output update_finite(const Coefficients& c, Scalar requested) {
+    Output out;
     if (ramp_ < Scalar(1)) {
       ramp_ += c.ramp_increment;
       if (ramp_ > Scalar(1)) ramp_ = Scalar(1);
       out.ramping = ramp_ < Scalar(1);
       requested = requested * ramp_;
     }
-    const Scalar limited = clamp_magnitude(requested, c.limit);
-    out.limited = limited != requested;
+    Scalar limited = requested;
+    if (magnitude(requested) > c.limit) [[unlikely]] {
+      limited = clamp_magnitude(requested, c.limit);
+      out.limited = true;
+    }
     if (magnitude(limited - force_) <= c.step_limit) [[likely]] {
       // Adding the step back to the old force would round; the target itself is exact.
       force_ = limited;

@@ -70,8 +70,10 @@ struct HapticLoopConfig {
 ///
 /// The detector sees the encoder's own counts from where the loop was enabled, since a coarser resolution is
 /// the wall's and not the handle's motion, and a wall that is moved moves no handle; and the force after all
-/// limits. It looks on in tick() only, while enabled. What has been softened stays so until the loop is not
-/// enabled, or reset; alarms are counted until they are forgotten.
+/// limits. It looks at every sample up to 10 kHz; beyond that at every fourth, where no wall makes what a
+/// hand holds oscillate so fast that it would miss a turn. It looks on in tick() only, while enabled. What
+/// has been softened stays so until the loop is not enabled, or reset; alarms are counted until they are
+/// forgotten.
 ///
 /// No heap, no libm, no virtual call, no loop beyond the velocity estimator's window.
 template <typename Scalar>
@@ -94,6 +96,7 @@ class HapticLoop {
     typename Interference<Scalar>::Coefficients interference{};
     typename ForceLimiter<Scalar>::Coefficients force{};
     InstabilityAction instability_action = InstabilityAction::off;
+    std::uint32_t watch_mask = 0;  ///< the detector looks at samples whose number has none of these bits
     typename InstabilityDetector<Scalar>::Coefficients instability{};
     typename WallSoftening<Scalar>::Coefficients softening{};
   };
@@ -106,12 +109,12 @@ class HapticLoop {
     Scalar velocity{};          ///< m/s along +x
     Scalar magnetic_force{};    ///< N, outwards, before softening
     Scalar magnetic_coefficient{};  ///< N
-    bool inside = false;
-    bool limited = false;  ///< force.limit took something away
+    bool limited = false;           ///< force.limit took something away
     bool slew_limited = false;
-    bool ramping = false;   ///< soft start under way
-    bool unstable = false;  ///< the wall oscillates under the hand
+    bool ramping = false;  ///< soft start under way
     HapticFault fault = HapticFault::none;
+    bool inside = false;
+    bool unstable = false;    ///< the wall oscillates under the hand
     bool new_sample = false;  ///< this tick computed; false: the previous sample is held
   };
 
@@ -119,8 +122,8 @@ class HapticLoop {
   static Coefficients prepare(const HapticLoopConfig<Scalar>& config, std::int64_t count_near);
 
   /// Start afresh, as after power-up: no velocity, no held force, soft start wound back. Needed when the
-  /// scale or the origin of the counts has changed.
-  void reset() {
+  /// scale or the origin of the counts has changed. `samples`: what samples() goes on from.
+  void reset(std::uint32_t samples = 0) {
     resampler_.reset();
     damper_.forget();
     settled_ = false;
@@ -130,16 +133,15 @@ class HapticLoop {
     detector_.reset();
     softening_.reset();
     ticks_until_sample_ = 0;
+    samples_ = samples;
     held_ = Output{};
   }
 
   /// One tick of a rendered wall. `added`: N along +x that comes from elsewhere, limited with the wall's
   /// force.
   ///
-  /// A function of its own even where its caller is flattened, with all of its steps in it: the velocity
-  /// estimator needs all registers.
-  [[gnu::noinline, gnu::flatten]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
-                                                     Scalar added = Scalar(0)) {
+  [[gnu::flatten]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
+                                      Scalar added = Scalar(0)) {
     if (!sample_is_due(c)) return hold(enabled);
     counted_ = static_cast<std::uint32_t>(count);
     const Motion motion = observe(c, count);
@@ -148,8 +150,17 @@ class HapticLoop {
     const auto disturbance = interference_.update(c.interference, wall.inside);
     show(wall, disturbance);
     const Scalar outward = softening_.factor() * (wall.force + disturbance.normal);
-    const bool forced = limit(c, motion, along_axis(c, outward, added), enabled);
-    return forced && c.instability_action != InstabilityAction::off ? watch(c) : held_;
+    Scalar requested = c.side * outward + added;
+    if (!is_sound(c, requested)) [[unlikely]]
+      requested = without_overflow(c, outward, added);
+    if (!limit(c, requested, enabled)) [[unlikely]]
+      return held_;
+    if (c.instability_action == InstabilityAction::off) [[unlikely]] {
+      held_.unstable = false;
+    } else if (watch_is_due(c)) {
+      watch(c);
+    }
+    return held_;
   }
 
   /// One tick without a wall: `force` (N along +x) is what is asked for.
@@ -159,7 +170,9 @@ class HapticLoop {
     const Motion motion = observe(c, count);
     show({.inside = !(motion.outside_distance > Scalar(0))}, {});
     detector_.reset();
-    limit(c, motion, force, enabled);
+    if (!is_sound(c, force)) [[unlikely]]
+      name_fault(force);
+    limit(c, force, enabled);
     return held_;
   }
 
@@ -179,6 +192,9 @@ class HapticLoop {
   const InstabilityDetector<Scalar>& detector() const { return detector_; }
   void forget_alarms() { detector_.forget_alarms(); }
 
+  /// Haptic samples so far; wraps at 2^32.
+  std::uint32_t samples() const { return samples_; }
+
   /// What the last tick() or follow() gave.
   const Output& output() const { return held_; }
 
@@ -193,14 +209,18 @@ class HapticLoop {
 
   /// Distance of a count from the surface, m, > 0 in free space.
   static Scalar outside_distance(const Coefficients& c, std::int64_t position) {
-    std::int64_t difference = position - c.wall_count;
-    if (difference > INT32_MAX) difference = INT32_MAX;
-    if (difference < INT32_MIN) difference = INT32_MIN;
-    const Scalar counts = static_cast<Scalar>(static_cast<std::int32_t>(difference)) - c.wall_fraction;
+    const std::int64_t difference = position - c.wall_count;
+    auto whole = static_cast<std::int32_t>(difference);
+    if (whole != difference) [[unlikely]]
+      whole = difference < 0 ? INT32_MIN : INT32_MAX;
+    const Scalar counts = static_cast<Scalar>(whole) - c.wall_fraction;
     return c.side * (counts * c.count_length);
   }
 
  private:
+  /// s; where samples come faster, the detector looks at every fourth.
+  static constexpr Scalar shortest_look = Scalar(0.0001);
+
   struct Motion {
     Scalar velocity{};          ///< m/s along +x
     Scalar outside_distance{};  ///< m, > 0 in free space
@@ -212,6 +232,7 @@ class HapticLoop {
       return false;
     }
     ticks_until_sample_ = c.divider - 1;
+    ++samples_;
     return true;
   }
 
@@ -230,6 +251,7 @@ class HapticLoop {
       settled_ = true;
     }
     held_.new_sample = true;
+    held_.fault = HapticFault::none;
     held_.position = sample.count;
     held_.velocity = velocity_.update(c.velocity, sample);
     held_.outside_distance = outside_distance(c, sample.count);
@@ -238,10 +260,12 @@ class HapticLoop {
 
   /// m/s outwards.
   Scalar damper_velocity(const Coefficients& c, Scalar outwards) {
-    if (c.damper_has_its_own) [[unlikely]]
-      return c.side * damper_.update(c.damper, held_.position);
-    damper_.forget();
-    return outwards;
+    if (!c.damper_has_its_own) [[likely]]
+      return outwards;
+    // What it saw before it was switched off is not its window.
+    if (damper_saw_ + 1 != samples_) damper_.forget();
+    damper_saw_ = samples_;
+    return c.side * damper_.update(c.damper, held_.position);
   }
 
   void show(const typename WallLaw<Scalar>::Output& wall,
@@ -252,29 +276,26 @@ class HapticLoop {
     held_.tangential_force = disturbance.tangential;
   }
 
-  /// An outward force and one along +x as one along +x. What overflows is brought back to the largest number.
-  static Scalar along_axis(const Coefficients& c, Scalar outward, Scalar added) {
-    const Scalar sum = c.side * outward + added;
-    if (is_finite(sum)) [[likely]]
-      return sum;
-    return saturate(c.side * saturate(outward) + added);
+  /// Nothing keeps the force from being given. A velocity within the limit is finite, since the limit is.
+  bool is_sound(const Coefficients& c, Scalar requested) const {
+    return magnitude(held_.velocity) <= c.velocity_limit && are_finite(requested, held_.outside_distance);
   }
 
-  /// From what is asked for to what the device gets, with what must keep it from getting anything. False: it
-  /// gets nothing.
-  bool limit(const Coefficients& c, const Motion& motion, Scalar requested, bool enabled) {
-    // A velocity within the limit is finite, since the limit is.
-    const bool sound = magnitude(motion.velocity) <= c.velocity_limit && is_finite(motion.outside_distance) &&
-                       is_finite(requested);
-    held_.unstable = false;
-    held_.fault = HapticFault::none;
-    if (!sound) [[unlikely]]
-      name_fault(requested);
-    if (!enabled || !sound) [[unlikely]] {
+  /// The sum of an outward force and one along +x where something is not sound: what overflows is brought
+  /// back to the largest number, and anything else is a fault.
+  [[gnu::noinline, gnu::cold]] Scalar without_overflow(const Coefficients& c, Scalar outward, Scalar added) {
+    const Scalar requested = saturate(c.side * saturate(outward) + added);
+    if (!is_sound(c, requested)) name_fault(requested);
+    return requested;
+  }
+
+  /// From what is asked for to what the device gets. False: it gets nothing.
+  bool limit(const Coefficients& c, Scalar requested, bool enabled) {
+    if (!enabled || held_.fault != HapticFault::none) [[unlikely]] {
       release();
       return false;
     }
-    const auto limited = limiter_.update(c.force, requested);
+    const auto limited = limiter_.update_finite(c.force, requested);
     held_.force = limited.force;
     held_.limited = limited.limited;
     held_.slew_limited = limited.slew_limited;
@@ -288,23 +309,25 @@ class HapticLoop {
     held_.fault = finite ? HapticFault::over_speed : HapticFault::not_finite;
   }
 
+  bool watch_is_due(const Coefficients& c) const { return (samples_ & c.watch_mask) == 0; }
+
   /// Whether the wall oscillates under the hand, with what is to be done about it. A function of its own: it
   /// would take registers from the velocity estimator.
-  [[gnu::noinline]] const Output& watch(const Coefficients& c) {
+  [[gnu::noinline]] void watch(const Coefficients& c) {
     const auto moved = static_cast<std::int32_t>(counted_ - watched_from_);
-    if (detector_.update(c.instability, static_cast<Scalar>(moved) * c.count_length, held_.force))
-        [[unlikely]]
+    held_.unstable =
+        detector_.update(c.instability, static_cast<Scalar>(moved) * c.count_length, held_.force);
+    if (held_.unstable) [[unlikely]]
       act_on_instability(c);
-    return held_;
   }
 
   [[gnu::noinline, gnu::cold]] void act_on_instability(const Coefficients& c) {
     if (c.instability_action == InstabilityAction::soften) softening_.update(c.softening, true);
     if (c.instability_action == InstabilityAction::trip) {
       release();
+      held_.unstable = true;
       held_.fault = HapticFault::unstable;
     }
-    held_.unstable = true;
   }
 
   /// No force, and the soft start is wound back.
@@ -319,9 +342,9 @@ class HapticLoop {
     held_.limited = held_.slew_limited = held_.ramping = false;
   }
 
+  // The estimators' long windows come last: the core's shortest loads of floats reach 1 KiB.
+  Output held_;
   Resampler resampler_;
-  VelocityEstimator<Scalar> velocity_;
-  DamperVelocity<Scalar> damper_;
   WallLaw<Scalar> wall_;
   Interference<Scalar> interference_;
   ForceLimiter<Scalar> limiter_;
@@ -330,8 +353,11 @@ class HapticLoop {
   // Low words of counts: the last one, kept here so that it takes no registers, and the detector's origin.
   std::uint32_t counted_ = 0, watched_from_ = 0;
   std::uint32_t ticks_until_sample_ = 0;
+  std::uint32_t samples_ = 0;
   bool settled_ = false;  // the velocity estimator has seen a position
-  Output held_;
+  VelocityEstimator<Scalar> velocity_;
+  DamperVelocity<Scalar> damper_;
+  std::uint32_t damper_saw_ = 0;  // the number of its last sample
 };
 
 template <typename Scalar>
@@ -360,9 +386,14 @@ typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const Hapt
   c.force = ForceLimiter<Scalar>::prepare(config.force, period);
   c.instability_action = config.instability_action;
   auto instability = config.instability;
-  instability.rate = Scalar(1) / period;
+  // Four is a power of two: one comparison of bits.
+  constexpr std::uint32_t samples_a_look = 4;
+  const bool at_each = period >= shortest_look;
+  c.watch_mask = at_each ? 0 : samples_a_look - 1;
+  const Scalar look = at_each ? period : Scalar(samples_a_look) * period;
+  instability.rate = Scalar(1) / look;
   c.instability = InstabilityDetector<Scalar>::prepare(instability);
-  c.softening = WallSoftening<Scalar>::prepare(config.softening, period);
+  c.softening = WallSoftening<Scalar>::prepare(config.softening, look);
   return c;
 }
 

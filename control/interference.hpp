@@ -64,9 +64,11 @@ class Interference {
     const std::uint32_t elapsed = samples_inside_;
     if (!inside) {
       samples_inside_ = 0;
-    } else if (samples_inside_ != UINT32_MAX) {
-      ++samples_inside_;
+    } else if (elapsed != UINT32_MAX) {
+      samples_inside_ = elapsed + 1;
     }
+    if (c.mode == InterferenceMode::none) [[likely]]
+      return out;
     if (c.mode == InterferenceMode::perpendicular) {
       out.normal = inside ? saturate(c.background_force + c.force) : c.background_force;
     } else if (c.mode == InterferenceMode::parallel && inside) {

@@ -117,20 +117,30 @@ class WallLaw {
     } else if (c.kind == WallKind::none) {
       return {Scalar(0), Scalar(0), Scalar(0), true};
     }
-    // Overflow is brought back where it would show: not in the damper, whose infinity ends as 0 or as the
-    // largest number just as the largest number itself would, and not in the reaction before the field is
-    // added.
-    constexpr Scalar largest = std::numeric_limits<Scalar>::max();
-    Scalar spring = stiffness_.inside(c.stiffness, outward_velocity) * -outside_distance;
-    if (spring > largest) spring = largest;
-    Scalar reaction = spring - c.damping * damper_velocity;
-    if (reaction < Scalar(0)) reaction = Scalar(0);
-    Scalar force = reaction + coefficient;
-    if (force > largest) force = largest;
+    const Scalar spring = stiffness_.inside(c.stiffness, outward_velocity) * -outside_distance;
+    const Scalar damper = c.damping * damper_velocity;
+    Scalar force = together(spring, damper, coefficient);
+    // An overflow anywhere ends in an infinity here, or in a NaN.
+    if (!(force <= largest)) [[unlikely]]
+      force = saturated(spring, damper, coefficient);
     return {force, coefficient, coefficient, true};
   }
 
  private:
+  static constexpr Scalar largest = std::numeric_limits<Scalar>::max();
+
+  /// The wall does not pull; the field is added to what is left.
+  static Scalar together(Scalar spring, Scalar damper, Scalar field) {
+    const Scalar reaction = spring - damper;
+    return (reaction < Scalar(0) ? Scalar(0) : reaction) + field;
+  }
+  /// The same with the largest number in place of an overflow, where that would show: not in the damper,
+  /// whose infinity ends as 0 or as the largest number just as the largest number itself would.
+  [[gnu::noinline, gnu::cold]] static Scalar saturated(Scalar spring, Scalar damper, Scalar field) {
+    const Scalar force = together(spring > largest ? largest : spring, damper, field);
+    return force > largest ? largest : force;
+  }
+
   AdaptiveCoefficient<Scalar> adaptive_;
   GrowingStiffness<Scalar> stiffness_;
 };

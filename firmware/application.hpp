@@ -64,9 +64,11 @@ class Application {
   Application& operator=(const Application&) = delete;
 
   /// The result is valid until the axis' next tick.
-  const AxisOutput& ISR_tick(std::size_t axis, const Tick::SlotInput& input);
+  const AxisOutput& ISR_tick(std::size_t axis, const Tick::SlotInput& input) {
+    return axes_.tick().ISR_tick(axis, input);
+  }
   /// In place of it, for an axis that the board does not have.
-  [[gnu::cold]] void ISR_pass(std::size_t axis);
+  [[gnu::cold]] void ISR_pass(std::size_t axis) { axes_.tick().ISR_pass(axis); }
   /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
     TickOutput output;

@@ -12,4 +12,8 @@ namespace kmax::board::odrive_v3 {
   }
 }
 
+void tick_without_power(firmware::Application& application) {
+  static_cast<void>(application.ISR_tick(firmware::TickInput{}));
+}
+
 }  // namespace kmax::board::odrive_v3

@@ -198,8 +198,7 @@ void poll_power(std::uint32_t now_us) {
 /// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on
 /// a slow clock a tick takes longer than the characters of the serial line, and they would be lost.
 void tick_without_power() {
-  constexpr firmware::TickInput input{{{{0, false}, {0, false}}}};
-  static_cast<void>(application->ISR_tick(input));
+  odrive_v3::tick_without_power(*application);
 }
 
 [[noreturn]] void run() {

@@ -61,7 +61,7 @@ class PowerHardware {
   static_assert(firmware::axis_count == 2, "the board has two bridges");
   static constexpr bool has(std::size_t) { return true; }
   auto& bridge(std::size_t axis) { return axis == 0 ? bridge0_ : bridge1_; }
-  const drivers::stm32f4::CurrentSample& ISR_sample(std::size_t axis) {
+  drivers::stm32f4::CurrentSample ISR_sample(std::size_t axis) {
     return sampling_.ISR_read(static_cast<unsigned>(axis));
   }
   drivers::stm32f4::ZeroCurrentCodes zero_current(std::size_t axis) const {
@@ -80,7 +80,7 @@ class PowerHardware {
   /// For the length of a pulse.
   void set_brake(bool on) { on ? brake_.start() : brake_.stop(); }
 
-  std::uint16_t supply_code() const { return sampling_.latest().supply; }
+  std::uint16_t supply_code() const { return sampling_.supply(); }
   std::uint16_t temperature_code(std::size_t axis) const {
     return sampling_.temperature(static_cast<unsigned>(axis));
   }
@@ -129,5 +129,7 @@ class PowerHardware {
 
 /// The conversions' interrupt. In a file of its own, compiled for speed.
 void ISR_tick(Power<PowerHardware>& power, firmware::Application& application);
+/// A tick of all axes without encoders and power stage.
+void tick_without_power(firmware::Application& application);
 
 }  // namespace kmax::board::odrive_v3

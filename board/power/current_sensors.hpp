@@ -21,11 +21,10 @@ class CurrentSensors {
   float ISR_amperes_b(std::uint16_t code) const { return sense_b_.ISR_amperes(code); }
   float ISR_amperes_c(std::uint16_t code) const { return sense_c_.ISR_amperes(code); }
   /// A sample that is valid counts in the calibration.
-  template <typename Sample>
-  void ISR_calibrate(const Sample& sample) {
-    if (!sample.valid) return;
-    offset_b_.ISR_add(sample.phase_b);
-    offset_c_.ISR_add(sample.phase_c);
+  void ISR_calibrate(bool valid, std::uint16_t code_b, std::uint16_t code_c) {
+    if (!valid) return;
+    offset_b_.ISR_add(code_b);
+    offset_c_.ISR_add(code_c);
   }
 
   void restart_calibration(drivers::CurrentSenseGain gain) {

@@ -66,7 +66,7 @@ class Drives {
                                               const Stage& stage) {
     if (!in_service(axis)) [[unlikely]]
       return ISR_pass(axis, application);
-    const firmware::AxisInput input = ISR_measure(axis, stage);
+    const firmware::AxisInput& input = ISR_measure(axis, stage);
     if constexpr (Application::needs_all_positions) {
       const auto inputs = ISR_beside_others(axis, input);
       ISR_drive(axis, application.ISR_tick(axis, inputs), input.motor.supply_voltage, stage);
@@ -92,7 +92,7 @@ class Drives {
   /// The two parts of ISR_tick(), before and after the application's, for a board in which all axes are
   /// sampled together.
   template <typename Stage>
-  [[gnu::always_inline]] inline firmware::AxisInput ISR_measure(std::size_t axis, const Stage& stage);
+  [[gnu::always_inline]] inline const firmware::AxisInput& ISR_measure(std::size_t axis, const Stage& stage);
   template <typename Stage>
   [[gnu::always_inline]] inline void ISR_drive(std::size_t axis, const firmware::AxisOutput& output,
                                                float supply_voltage, const Stage& stage);
@@ -172,13 +172,14 @@ class Drives {
     bool has_brake = false;
   };
 
+  enum class Bridge : std::uint8_t { off, driving, would_not_rise };
+
   struct Axis {
+    firmware::AxisInput input{.motor = {.present = true}};  ///< of its last tick
+    std::uint32_t encoder_generation = 0;                   ///< of the settings that have been taken over
+    Bridge bridge = Bridge::off;
     CurrentSensors sensors{};
     Counter counter{};
-    std::uint32_t encoder_generation = 0;      ///< of the settings that have been taken over
-    float current_b = 0.0f, current_c = 0.0f;  ///< A, of its last tick
-    bool driving = false, arm_failed = false;
-    Count count{};  ///< of its last tick; kept where a law needs all positions
   };
   using Inputs = std::array<firmware::AxisInput, firmware::axis_count>;
 
@@ -196,12 +197,11 @@ class Drives {
   }
   [[gnu::always_inline]] inline void ISR_end_tick(std::size_t axis, float supply_voltage);
   Inputs ISR_beside_others(std::size_t axis, const firmware::AxisInput& input);
-  [[gnu::always_inline]] inline Count ISR_read_count(std::size_t axis, const Settings& settings,
-                                                     bool driving);
+  [[gnu::always_inline]] inline void ISR_read_count(std::size_t axis, const Settings& settings, bool driving);
   [[gnu::noinline]] void ISR_brake(const control::BrakeChopper::Coefficients& coefficients,
                                    float supply_voltage) {
     bool driving = false;
-    for (const Axis& axis : axes_) driving = driving || axis.driving;
+    for (const Axis& axis : axes_) driving = driving || axis.bridge == Bridge::driving;
     hardware_.set_brake(brake_.ISR_update(coefficients, supply_voltage, driving));
   }
   std::array<bool, firmware::axis_count> has() const {
@@ -221,14 +221,18 @@ class Drives {
   [[gnu::noinline, gnu::cold]] firmware::Fault ISR_why_fallen(std::size_t axis) {
     return ISR_ticks_stayed_away(axis) ? firmware::Fault::tick_missed : firmware::Fault::power_stage;
   }
-  template <typename Sample>
-  [[gnu::noinline, gnu::cold]] bool ISR_holds(std::size_t axis, const Sample& sample) {
+  [[gnu::noinline, gnu::cold]] bool ISR_holds(std::size_t axis, bool valid, std::uint16_t phase_b,
+                                              std::uint16_t phase_c) {
     const SampleHold::Action action = samples_.ISR_take(axis);
-    if (action.calibrate) axes_[axis].sensors.ISR_calibrate(sample);
+    if (action.calibrate) axes_[axis].sensors.ISR_calibrate(valid, phase_b, phase_c);
     return action.hold;
   }
   [[gnu::noinline, gnu::cold]] void ISR_configure_encoder(std::size_t axis, const Settings& settings);
-  [[gnu::noinline]] Count ISR_take_serial();
+  [[gnu::noinline]] void ISR_take_serial(firmware::AxisInput& input);
+  static void ISR_without_count(firmware::AxisInput& input) {
+    input.count = input.reference_generation = 0;
+    input.count_valid = input.referenced = false;
+  }
   [[gnu::noinline]] void ISR_select_serial() { serial_encoder().ISR_select(); }
   [[gnu::noinline]] void ISR_begin_serial() { serial_encoder().ISR_begin(); }
 
@@ -247,65 +251,56 @@ class Drives {
 
 template <typename Hardware>
 template <typename Stage>
-inline firmware::AxisInput Drives<Hardware>::ISR_measure(std::size_t index, const Stage& stage) {
+inline const firmware::AxisInput& Drives<Hardware>::ISR_measure(std::size_t index, const Stage& stage) {
   Axis& axis = axes_[index];
   const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
-  const auto& sample = hardware_.ISR_sample(index);
-  // Before anything is stored that may lie where the compiler takes the sample to be: they stay in registers.
-  const std::uint16_t phase_b = sample.phase_b, phase_c = sample.phase_c, supply = sample.supply;
-  const bool driving = axis.driving;
+  const auto sample = hardware_.ISR_sample(index);
+  firmware::AxisInput& input = axis.input;
+  const bool driving = axis.bridge == Bridge::driving;
   firmware::Fault condition = firmware::Fault::none;
   // 2 triggers are 50 us: the converter of supply and temperatures stands still.
   if (!sample.valid || sample.slow_age > 2) [[unlikely]] {
     condition = firmware::Fault::tick_missed;
-  } else if (supply_.saturated(supply)) [[unlikely]] {
+  } else if (supply_.saturated(sample.supply)) [[unlikely]] {
     condition = firmware::Fault::over_voltage;
-  } else if (axis.sensors.ISR_saturated(phase_b, phase_c)) [[unlikely]] {
+  } else if (axis.sensors.ISR_saturated(sample.phase_b, sample.phase_c)) [[unlikely]] {
     // Also of a bridge that is off: its amplifiers read zero, and until they are awake the stage says so
     // below.
     condition = firmware::Fault::current_sense;
   }
-  float current_b = axis.sensors.ISR_amperes_b(phase_b), current_c = axis.sensors.ISR_amperes_c(phase_c);
-  if (samples_.ISR_has_action()) [[unlikely]] {
-    if (ISR_holds(index, sample)) {
-      current_b = axis.current_b;
-      current_c = axis.current_c;
-    }
+  if (!samples_.ISR_has_action() || !ISR_holds(index, sample.valid, sample.phase_b, sample.phase_c))
+      [[likely]] {
+    input.motor.current_b = axis.sensors.ISR_amperes_b(sample.phase_b);
+    input.motor.current_c = axis.sensors.ISR_amperes_c(sample.phase_c);
   }
-  axis.current_b = current_b;
-  axis.current_c = current_c;
-  const Count count = ISR_read_count(index, settings, driving);
+  input.motor.supply_voltage = supply_.volts(sample.supply);
+  ISR_read_count(index, settings, driving);
   // Before the condition: a line interrupt in between must be found as what it is.
-  const bool bridge_fell = axis.arm_failed || (driving && !hardware_.bridge(index).armed());
+  const bool bridge_fell = axis.bridge != Bridge::off && !(driving && hardware_.bridge(index).armed());
   if (const firmware::Fault cause = stage.condition(); cause != firmware::Fault::none) condition = cause;
   // The bridge fell, or would not rise, without anybody saying why.
   if (bridge_fell && condition == firmware::Fault::none) [[unlikely]]
     condition = ISR_why_fallen(index);
-  // Named in full: what is filled with zeros first is filled by a function of the library.
-  return {.count = count.count,
-          .count_valid = count.valid,
-          .condition = condition,
-          .motor = {.present = true,
-                    .supply_voltage = supply_.volts(supply),
-                    .current_b = current_b,
-                    .current_c = current_c},
-          .reference_generation = count.reference_generation,
-          .referenced = count.referenced};
+  input.condition = condition;
+  return input;
 }
 
 template <typename Hardware>
-inline typename Drives<Hardware>::Count Drives<Hardware>::ISR_read_count(std::size_t axis,
-                                                                         const Settings& settings,
-                                                                         bool driving) {
+inline void Drives<Hardware>::ISR_read_count(std::size_t axis, const Settings& settings, bool driving) {
+  firmware::AxisInput& input = axes_[axis].input;
   if (axes_[axis].encoder_generation != settings.encoders.generation[axis]) [[unlikely]]
     ISR_configure_encoder(axis, settings);
   if (settings.encoders.role[axis] != EncoderRole::lines) [[unlikely]] {
-    if (settings.encoders.role[axis] == EncoderRole::chip) return ISR_take_serial();
+    if (settings.encoders.role[axis] == EncoderRole::chip) return ISR_take_serial(input);
     ISR_select_serial();
-    if (settings.encoders.role[axis] == EncoderRole::missing) return {};
+    if (settings.encoders.role[axis] == EncoderRole::missing) return ISR_without_count(input);
   }
   const auto index_line = [this, axis] { return hardware_.ISR_index_line(axis); };
-  return axes_[axis].counter.ISR_read(hardware_.ISR_counter(axis), index_line, driving);
+  const Count count = axes_[axis].counter.ISR_read(hardware_.ISR_counter(axis), index_line, driving);
+  input.count = count.count;
+  input.count_valid = count.valid;
+  input.referenced = count.referenced;
+  input.reference_generation = count.reference_generation;
 }
 
 /// The input of the axis whose slot it is, and where the others' counters stand in it. What is valid and what
@@ -314,31 +309,27 @@ inline typename Drives<Hardware>::Count Drives<Hardware>::ISR_read_count(std::si
 template <typename Hardware>
 typename Drives<Hardware>::Inputs Drives<Hardware>::ISR_beside_others(std::size_t axis,
                                                                       const firmware::AxisInput& input) {
-  axes_[axis].count = {.count = input.count,
-                       .valid = input.count_valid,
-                       .referenced = input.referenced,
-                       .reference_generation = input.reference_generation};
   Inputs inputs{};
   for (std::size_t other = 0; other < firmware::axis_count; ++other) {
     if (!hardware_.has(other)) continue;
     const Axis& of = axes_[other];
     const EncoderRole role = double_buffer_.ISR_current().encoders.role[other];
     const bool on_lines = role == EncoderRole::lines || role == EncoderRole::lines_beside_chip;
-    inputs[other].count = on_lines ? of.counter.ISR_peek(hardware_.ISR_counter(other)) : of.count.count;
-    inputs[other].count_valid = of.count.valid;
-    inputs[other].reference_generation = of.count.reference_generation;
+    inputs[other].count = on_lines ? of.counter.ISR_peek(hardware_.ISR_counter(other)) : of.input.count;
+    inputs[other].count_valid = of.input.count_valid;
+    inputs[other].reference_generation = of.input.reference_generation;
   }
   inputs[axis] = input;
   return inputs;
 }
 
 template <typename Hardware>
-typename Drives<Hardware>::Count Drives<Hardware>::ISR_take_serial() {
+void Drives<Hardware>::ISR_take_serial(firmware::AxisInput& input) {
   const auto angle = serial_encoder().ISR_take();
-  return {.count = angle.count,
-          .valid = angle.valid,
-          .referenced = false,
-          .reference_generation = serial_generations | angle.reference_generation};
+  input.count = angle.count;
+  input.count_valid = angle.valid;
+  input.referenced = false;
+  input.reference_generation = serial_generations | angle.reference_generation;
 }
 
 template <typename Hardware>
@@ -360,12 +351,11 @@ inline void Drives<Hardware>::ISR_drive(std::size_t index, const firmware::AxisO
       output.enabled && bridge.ISR_set_duty({output.motor.duty_a, output.motor.duty_b, output.motor.duty_c});
   if (!has_duty) {
     bridge.disarm();
-    axis.driving = axis.arm_failed = false;
+    axis.bridge = Bridge::off;
     // The next arming begins without voltage.
     bridge.ISR_set_no_voltage();
-  } else if (!axis.driving) {
-    axis.driving = bridge.arm();
-    axis.arm_failed = !axis.driving;
+  } else if (axis.bridge != Bridge::driving) [[unlikely]] {
+    axis.bridge = bridge.arm() ? Bridge::driving : Bridge::would_not_rise;
     if (stage.condition() != firmware::Fault::none) bridge.disarm();
   }
   ISR_end_tick(index, supply_voltage);
@@ -376,8 +366,8 @@ void Drives<Hardware>::ISR_begin_pass(std::size_t index) {
   const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
   if (settings.encoders.role[index] == EncoderRole::lines_beside_chip) ISR_select_serial();
   hardware_.bridge(index).disarm();
-  axes_[index].driving = axes_[index].arm_failed = false;
-  axes_[index].count = {};  // for the other axes
+  axes_[index].bridge = Bridge::off;
+  ISR_without_count(axes_[index].input);  // for the other axes
 }
 
 template <typename Hardware>

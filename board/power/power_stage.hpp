@@ -85,35 +85,38 @@ class PowerStage {
     });
   }
   void ISR_take(Line line) {
-    (line == Line::fault ? fault_edge_ : stop_edge_).store(true, std::memory_order_relaxed);
+    signs_.fetch_or(line == Line::fault ? fault_edge : stop_edge, std::memory_order_relaxed);
   }
 
   /// Why no axis may be driven now; none: it may.
   firmware::Fault condition() const {
-    if (stop_edge_.load(std::memory_order_relaxed)) return firmware::Fault::emergency_stop;
-    if (fault_edge_.load(std::memory_order_relaxed)) return firmware::Fault::gate_driver;
-    return condition_.load(std::memory_order_relaxed);
+    const std::uint32_t signs = signs_.load(std::memory_order_relaxed);
+    if (signs == 0) [[likely]]
+      return firmware::Fault::none;
+    if ((signs & stop_edge) != 0) return firmware::Fault::emergency_stop;
+    if ((signs & fault_edge) != 0) return firmware::Fault::gate_driver;
+    return static_cast<firmware::Fault>(signs);
   }
 
   /// Main loop, at least every few milliseconds.
   void poll(std::uint32_t now_us, bool any_armed) {
     if (hardware_.emergency_stop_open() && ISR_is_meant(Line::emergency_stop)) {
-      stop_edge_.store(true, std::memory_order_relaxed);
+      ISR_take(Line::emergency_stop);
     } else if (!any_armed) {
-      stop_edge_.store(false, std::memory_order_relaxed);
+      signs_.fetch_and(~stop_edge, std::memory_order_relaxed);
       // It may have been pressed after it was looked at; that edge has just been wiped out.
-      if (hardware_.emergency_stop_open()) stop_edge_.store(true, std::memory_order_relaxed);
+      if (hardware_.emergency_stop_open()) ISR_take(Line::emergency_stop);
     }
     if (!started_) {
       started_ = true;
       begin_reset(now_us, firmware::Fault::power_stage);
     }
-    const bool fault = fault_edge_.load(std::memory_order_relaxed) ||
+    const bool fault = (signs_.load(std::memory_order_relaxed) & fault_edge) != 0 ||
                        (hardware_.fault_line_low() && ISR_is_meant(Line::fault));
     if (state_ == State::ready && fault) {
       // Once: a look at the faults takes those back whose cause is over.
-      const bool is_new = condition_.load(std::memory_order_relaxed) != firmware::Fault::gate_driver;
-      condition_.store(firmware::Fault::gate_driver, std::memory_order_relaxed);
+      const bool is_new = lasting() != firmware::Fault::gate_driver;
+      set_lasting(firmware::Fault::gate_driver);
       if (is_new) note_gate_driver_faults();
       if (!any_armed) begin_reset(now_us, firmware::Fault::gate_driver);
       return;
@@ -131,8 +134,19 @@ class PowerStage {
 
   void begin_reset(std::uint32_t now_us, firmware::Fault reason) {
     hardware_.set_gate_enable(false);
-    condition_.store(reason, std::memory_order_relaxed);
+    set_lasting(reason);
     enter(State::resetting, now_us);
+  }
+
+  firmware::Fault lasting() const {
+    return static_cast<firmware::Fault>(signs_.load(std::memory_order_relaxed) & 0xFFU);
+  }
+  /// In one step: in between the tick must never see that all is well. An edge that comes meanwhile stays.
+  void set_lasting(firmware::Fault fault) {
+    std::uint32_t signs = signs_.load(std::memory_order_relaxed);
+    while (!signs_.compare_exchange_weak(signs, (signs & ~0xFFU) | static_cast<std::uint32_t>(fault),
+                                         std::memory_order_relaxed)) {
+    }
   }
 
   void enter(State state, std::uint32_t now_us) {
@@ -184,21 +198,21 @@ class PowerStage {
       case State::waking:
         if (elapsed < wake_us) return;
         // The drivers pull nFAULT while they start; an edge from then says nothing.
-        fault_edge_.store(false, std::memory_order_relaxed);
+        signs_.fetch_and(~fault_edge, std::memory_order_relaxed);
         return leave_waking(now_us);
       case State::measuring:
         switch (hardware_.offset_progress()) {
           case OffsetProgress::running:
             return;
           case OffsetProgress::accepted:
-            condition_.store(firmware::Fault::none, std::memory_order_relaxed);
+            set_lasting(firmware::Fault::none);
             return enter(State::ready, now_us);
           case OffsetProgress::refused:
             return refuse_offsets(now_us);
         }
         return;
       case State::waiting:
-        if (elapsed >= retry_us) begin_reset(now_us, condition_.load(std::memory_order_relaxed));
+        if (elapsed >= retry_us) begin_reset(now_us, lasting());
         return;
       case State::ready:
         if (elapsed < track_us) return;
@@ -215,12 +229,11 @@ class PowerStage {
       return enter(State::measuring, now_us);
     }
     const bool named = low && note_gate_driver_faults();
-    condition_.store(configured || named ? firmware::Fault::gate_driver : firmware::Fault::power_stage,
-                     std::memory_order_relaxed);
+    set_lasting(configured || named ? firmware::Fault::gate_driver : firmware::Fault::power_stage);
     enter(State::waiting, now_us);
   }
   void refuse_offsets(std::uint32_t now_us) {
-    condition_.store(firmware::Fault::current_sense, std::memory_order_relaxed);
+    set_lasting(firmware::Fault::current_sense);
     enter(State::waiting, now_us);
   }
 
@@ -230,9 +243,10 @@ class PowerStage {
   bool started_ = false;
   std::array<bool, firmware::axis_count> has_answered_{};
   std::array<std::uint8_t, firmware::axis_count> silent_rounds_{};
-  // Each flag is set by its interrupt and taken back by the main loop; the condition is the main loop's.
-  std::atomic<bool> fault_edge_{false}, stop_edge_{false};
-  std::atomic<firmware::Fault> condition_{firmware::Fault::power_stage};
+  // One word, so that a tick in which all is well looks once. An edge is set by its interrupt and taken back
+  // by the main loop; the low byte is a condition that lasts, the main loop's.
+  static constexpr std::uint32_t fault_edge = 1U << 8, stop_edge = 1U << 9;
+  std::atomic<std::uint32_t> signs_{static_cast<std::uint32_t>(firmware::Fault::power_stage)};
 };
 
 }  // namespace kmax::board

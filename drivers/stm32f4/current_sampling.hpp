@@ -123,7 +123,8 @@ class CurrentSampling {
   void start(unsigned first_axis) {
     arm_lists(first_axis & 1U);
     last_axis_ = none;
-    latest_ = CurrentSample{};
+    supply_ = 0;
+    slow_age_ = 0;
     for (Adc* each : {&adc1_, &adc3_, &adc2_}) {
       each->sr = flags_cleared;
       each->cr2 = adc_cr2::On::mask | adc_cr2::InjectedTrigger::bits(adc_cr2::timer1_trgo) |
@@ -139,21 +140,23 @@ class CurrentSampling {
   }
 
   /// The body of the ADC interrupt. `axis` (0 or 1) is the one whose sampling point the latest trigger was,
-  /// by the timer's own direction bit and not by counting interrupts. The result is valid until the next
-  /// call.
-  const CurrentSample& ISR_read(unsigned axis) {
+  /// by the timer's own direction bit and not by counting interrupts. By value: a tick takes it from
+  /// registers.
+  [[gnu::always_inline]] CurrentSample ISR_read(unsigned axis) {
     axis &= 1U;
+    CurrentSample sample;
     if (!finished(adc2_)) [[unlikely]] {
       ++counters_.spurious;
-      latest_.valid = false;
-      return latest_;
+      sample.supply = supply_;
+      sample.slow_age = slow_age_;
+      return sample;
     }
     const bool phase_c_finished = finished(adc3_);
     // Before the data is read: a conversion that ends from here on shows in the flags again.
     adc2_.sr = flags_cleared;
     adc3_.sr = flags_cleared;
-    latest_.phase_b = code(adc2_.jdr[0]);
-    latest_.phase_c = code(adc3_.jdr[0]);
+    sample.phase_b = code(adc2_.jdr[0]);
+    sample.phase_c = code(adc3_.jdr[0]);
     // Also of a trigger out of step, whose codes a current may have made: who follows them must be slow.
     zero_current_[axis ^ 1U] = {static_cast<std::uint32_t>(adc2_.jdr[1]),
                                 static_cast<std::uint32_t>(adc3_.jdr[1])};
@@ -172,14 +175,14 @@ class CurrentSampling {
     if (!phase_c_finished) [[unlikely]]
       ++counters_.missing_phase_c;
     last_axis_ = axis;
-    latest_.valid = !disturbed && converted_axis == axis && phase_c_finished;
-    read_slow();
-    return latest_;
+    sample.valid = !disturbed && converted_axis == axis && phase_c_finished;
+    sample.slow_age = read_slow();
+    sample.supply = supply_;
+    return sample;
   }
 
-  /// Written by the interrupt; each is a half-word that another context may read, of different triggers.
-  /// Zeros before the first.
-  const CurrentSample& latest() const { return latest_; }
+  /// Of the last trigger, 0 before the first; written by the interrupt, for other contexts.
+  std::uint16_t supply() const { return supply_; }
   /// Of an axis' power stage, converted last. Any context; not the interrupt's business.
   std::uint16_t temperature(unsigned axis) const { return code(adc1_.jdr[1 + axis]); }
   /// Written by the interrupt. Zeros before the other axis' first read.
@@ -248,14 +251,16 @@ class CurrentSampling {
     axis_in_force_ = axis;
   }
 
-  void read_slow() {
+  /// Their age.
+  std::uint8_t read_slow() {
     if (!finished(adc1_)) [[unlikely]] {
-      if (latest_.slow_age != 0xFF) ++latest_.slow_age;
-      return;
+      if (slow_age_ != 0xFF) ++slow_age_;
+      return slow_age_;
     }
     adc1_.sr = flags_cleared;
-    latest_.supply = code(adc1_.jdr[0]);
-    latest_.slow_age = 0;
+    supply_ = code(adc1_.jdr[0]);
+    slow_age_ = 0;
+    return 0;
   }
 
   Adc& adc1_;
@@ -266,7 +271,8 @@ class CurrentSampling {
   std::array<Lists, 2> lists_{};
   unsigned axis_in_force_ = none;
   unsigned last_axis_ = none;
-  CurrentSample latest_{};
+  std::uint16_t supply_ = 0;
+  std::uint8_t slow_age_ = 0;
   std::array<ZeroCurrentCodes, 2> zero_current_{};
   CurrentSamplingCounters counters_{};
 };

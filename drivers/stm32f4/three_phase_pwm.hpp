@@ -140,11 +140,20 @@ class ThreePhasePwm {
     const float sum = magnitude(duty.a) + magnitude(duty.b) + magnitude(duty.c);
     if (!(sum < convertible)) [[unlikely]]
       return set_far_duty(duty.a, duty.b, duty.c);
-    // Taken here: the compiler would load it again after each store to a register.
-    const std::int32_t fewest = fewest_compare_;
-    registers_.ccr[0] = compare_of(duty.a, fewest);
-    registers_.ccr[1] = compare_of(duty.b, fewest);
-    registers_.ccr[2] = compare_of(duty.c, fewest);
+    // Taken here: the compiler would load them again after each store to a register.
+    const std::int32_t whole = config_.half_period_ticks, fewest = fewest_compare_;
+    const std::int32_t a = whole - high_ticks(duty.a), b = whole - high_ticks(duty.b),
+                       c = whole - high_ticks(duty.c);
+    // Below the fewest is far above everything without a sign: one comparison for both ends.
+    const auto range = static_cast<std::uint32_t>(whole - fewest);
+    const auto is_beyond = [fewest, range](std::int32_t compare) {
+      return static_cast<std::uint32_t>(compare - fewest) > range;
+    };
+    if (is_beyond(a) || is_beyond(b) || is_beyond(c)) [[unlikely]]
+      return set_far_duty(duty.a, duty.b, duty.c);
+    registers_.ccr[0] = static_cast<std::uint32_t>(a);
+    registers_.ccr[1] = static_cast<std::uint32_t>(b);
+    registers_.ccr[2] = static_cast<std::uint32_t>(c);
     return true;
   }
 
@@ -233,11 +242,8 @@ class ThreePhasePwm {
   /// One instruction, where the comparison with 0 takes four.
   static constexpr float magnitude(float value) { return __builtin_fabsf(value); }
 
-  std::uint32_t compare_of(float duty, std::int32_t fewest) const {
-    const auto high = static_cast<std::int32_t>(duty * ticks_per_duty_ + 0.5F);
-    const std::int32_t whole = config_.half_period_ticks;
-    const std::int32_t low = std::max(whole - high, fewest);
-    return static_cast<std::uint32_t>(std::min(low, whole));
+  std::int32_t high_ticks(float duty) const {
+    return static_cast<std::int32_t>(duty * ticks_per_duty_ + 0.5F);
   }
 
   [[gnu::noinline]] bool set_far_duty(float a, float b, float c) {

@@ -27,13 +27,13 @@ void AxesSettings::make(const ParameterValues& values, std::uint32_t restarts, c
     setting.compensation =
         control::ForceCompensation<float>::prepare(compensation_configuration(values, axis));
     setting.plausibility = control::MotionPlausibility<float>::prepare(
-        plausibility_configuration(values, axis), 1.0f / static_cast<float>(tick_rate_hz));
+        plausibility_configuration(values, axis),
+        static_cast<float>(Axis::motion_look) / static_cast<float>(tick_rate_hz));
     setting.watch_motion = values.real<"device.hand_force">(axis) > 0.0f;
     setting.excitation = Excitation::prepare(excitation_configuration(values, axis));
     setting.mode = values.choice<DriveMode, "drive.mode">(axis);
     setting.commutated = now[axis].commutated;
-    setting.supply_voltage_min = values.real<"supply.voltage_min">();
-    setting.supply_voltage_max = highest_supply(values);
+    setting.supply = SupplyWindow(values.real<"supply.voltage_min">(), highest_supply(values));
   }
 }
 

@@ -52,9 +52,7 @@ class AxesTick {
 
   /// `capture_memory`: for captures, up to capture_words; it outlives this object.
   explicit AxesTick(const Settings& initial, std::span<std::uint32_t> capture_memory = {}, Law law = {})
-      : settings_(initial), capture_(capture_memory), law_(law) {
-    for (std::size_t axis = 0; axis < axes; ++axis) leave_share(axis, 1.0f);
-  }
+      : settings_(initial), capture_(capture_memory), law_(law) {}
   AxesTick(const AxesTick&) = delete;
   AxesTick& operator=(const AxesTick&) = delete;
 
@@ -63,26 +61,25 @@ class AxesTick {
   /// For all axes at once, from axis 0's next tick on.
   void offer(const Settings& settings) { settings_.offer(settings); }
   bool settings_taken() const { return settings_.taken(); }
-  void enable(std::size_t axis, bool enabled) { enabled_[axis].store(enabled, std::memory_order_relaxed); }
-  bool enabled(std::size_t axis) const { return enabled_[axis].load(std::memory_order_relaxed); }
+  void enable(std::size_t axis, bool enabled) { command(commands_[axis].enable, enabled); }
+  bool enabled(std::size_t axis) const { return commands_[axis].enable; }
   /// N at the handle, along +x, finite: what mode torque makes.
-  void command_force(std::size_t axis, float force) {
-    commanded_force_[axis].store(force, std::memory_order_relaxed);
-  }
-  /// What is left of an enabled axis' force, see Axis::Demand::share.
-  void leave_share(std::size_t axis, float share) {
-    force_share_[axis].store(share, std::memory_order_relaxed);
-  }
+  void command_force(std::size_t axis, float force) { command(commands_[axis].from_host, force); }
+  /// What is left of an enabled axis' force, see Axis::Command::share.
+  void leave_share(std::size_t axis, float share) { command(commands_[axis].share, share); }
   /// The main loop runs.
-  void keep_alive() {
-    rounds_alive_.store(rounds_alive_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  }
+  void keep_alive() { ticks_alive_.store(most_ticks_without_round, std::memory_order_relaxed); }
   AxisReport report(std::size_t axis) const { return reports_[axis].read(); }
   void report(std::size_t axis, AxisReport& report) const { reports_[axis].read(report); }
   /// A record of `axis` at every `interval`-th haptic sample; 0: none.
   void trace_axis(std::size_t axis, std::uint32_t interval) {
-    trace_axis_.store(static_cast<std::uint8_t>(axis), std::memory_order_relaxed);
+    const std::uint8_t traced = interval == 0 ? no_axis : static_cast<std::uint8_t>(axis);
+    if (traced == trace_axis_.load(std::memory_order_relaxed) &&
+        interval == trace_interval_.load(std::memory_order_relaxed))
+      return;
+    trace_axis_.store(traced, std::memory_order_relaxed);
     trace_interval_.store(interval, std::memory_order_relaxed);
+    trace_starts_.store(trace_starts_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
   const Trace& trace() const { return trace_; }
   Capture& capture() { return capture_; }
@@ -137,7 +134,8 @@ class AxesTick {
   }
 
  private:
-  const Axis::Output& ISR_tick_at(std::size_t axis, const Axis::Input& input, const AxesPositions<axes>& at);
+  [[gnu::always_inline]] inline const Axis::Output& ISR_tick_at(std::size_t axis, const Axis::Input& input,
+                                                                const AxesPositions<axes>& at);
   AxesPositions<axes> ISR_positions(const Inputs& inputs) const;
   [[gnu::always_inline]] inline const Settings& ISR_begin(std::size_t axis) {
     if (axis != 0) return settings_.ISR_current();
@@ -146,47 +144,55 @@ class AxesTick {
     ISR_supervise_main_loop();
     return settings;
   }
-  void ISR_supervise_main_loop();
-  void ISR_trace(const control::HapticLoop<float>::Output& traced);
+  /// One tick less until the main loop counts as standing. It cannot come in between.
+  void ISR_supervise_main_loop() {
+    if (const std::uint32_t left = ticks_alive_.load(std::memory_order_relaxed); left != 0) [[likely]]
+      ticks_alive_.store(left - 1, std::memory_order_relaxed);
+  }
+  bool ISR_main_loop_stands() const { return ticks_alive_.load(std::memory_order_relaxed) == 0; }
+  /// A part of a command, written by the main loop. The tick, which it cannot interrupt, reads it plainly.
+  template <typename Part>
+  static void command(Part& part, Part value) {
+    std::atomic_ref<Part>(part).store(value, std::memory_order_relaxed);
+  }
   // Rare, and kept out of the tick's one function, whose registers it would take.
+  [[gnu::noinline]] void ISR_trace(const control::HapticLoop<float>::Output& traced);
   [[gnu::noinline]] void ISR_capture(std::size_t axis, const Axis::Input& input, const Axis::Output& output);
 
   DoubleBuffer<Settings> settings_;
   std::array<Seqlock<AxisReport>, axes> reports_;
   Trace trace_;
   Capture capture_;
-  std::array<std::atomic<bool>, axes> enabled_{};
-  std::array<std::atomic<float>, axes> commanded_force_{};
-  std::array<std::atomic<float>, axes> force_share_{};
-  std::atomic<std::uint32_t> rounds_alive_{0};
-  std::atomic<std::uint8_t> trace_axis_{0};
-  std::atomic<std::uint32_t> trace_interval_{0};
+  std::array<Axis::Command, axes> commands_{};  ///< `from_axes` is the interrupt's, the rest the main loop's
+  static constexpr std::uint32_t most_ticks_without_round = tick_rate_hz / 10 + 2;
+  std::atomic<std::uint32_t> ticks_alive_{most_ticks_without_round};
+  static constexpr std::uint8_t no_axis = 0xFF;
+  std::atomic<std::uint8_t> trace_axis_{no_axis};
+  std::atomic<std::uint32_t> trace_interval_{0}, trace_starts_{0};
 
   // Interrupt context only.
   std::array<Axis, axes> axes_;
   Law law_;
   std::uint32_t ticks_ = 0;
-  bool main_loop_stands_ = false;
-  std::uint32_t rounds_seen_ = 0, ticks_without_round_ = 0;
-  std::uint32_t trace_countdown_ = 0;
+  std::uint32_t trace_countdown_ = 0, trace_start_ = 0;
 };
 
 template <std::size_t axes, typename Law>
 requires AxesLaw<Law, axes>
-const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axis::Input& input,
-                                                     const AxesPositions<axes>& at) {
+inline const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axis::Input& input,
+                                                            const AxesPositions<axes>& at) {
   const Settings& settings = ISR_begin(axis);
   Axis& ticked = axes_[axis];
-  const bool enable = enabled_[axis].load(std::memory_order_relaxed);
-  if (main_loop_stands_ && enable) ticked.ISR_trip(Fault::main_loop);
-  const Axis::Demand demand{law_.ISR_force(settings.law, axis, at),
-                            commanded_force_[axis].load(std::memory_order_relaxed),
-                            force_share_[axis].load(std::memory_order_relaxed)};
-  const Axis::Output& output = ticked.ISR_tick(settings.axis[axis], input, enable, demand, ticks_);
+  Axis::Command& command = commands_[axis];
+  if (ISR_main_loop_stands() && command.enable) [[unlikely]]
+    ticked.ISR_trip(Fault::main_loop, input);
+  command.from_axes = law_.ISR_force(settings.law, axis, at);
+  const Axis::Output& output = ticked.ISR_tick(settings.axis[axis], input, command, ticks_);
   law_.ISR_rendered(settings.law, axis, ticked.ISR_haptic(), output.enabled);
   if (ticked.ISR_changed() || ISR_round_begins())
     reports_[axis].ISR_publish([&ticked](AxisReport& report) { ticked.ISR_fill(report); });
-  if (axis == trace_axis_.load(std::memory_order_relaxed)) ISR_trace(ticked.ISR_haptic());
+  if (axis == trace_axis_.load(std::memory_order_relaxed)) [[unlikely]]
+    ISR_trace(ticked.ISR_haptic());
   if (capture_.ISR_wants(axis)) [[unlikely]]
     ISR_capture(axis, input, output);
   return output;
@@ -195,14 +201,14 @@ const Axis::Output& AxesTick<axes, Law>::ISR_tick_at(std::size_t axis, const Axi
 template <std::size_t axes, typename Law>
 requires AxesLaw<Law, axes> std::uint32_t AxesTick<axes, Law>::ISR_held_ticks(std::size_t present)
 const {
-  if (!settings_.taken() || main_loop_stands_) return 0;
+  if (!settings_.taken() || ISR_main_loop_stands()) return 0;
   std::uint32_t least = UINT32_MAX;
   for (std::size_t axis = 0; axis < axes; ++axis) {
     if (capture_.ISR_wants(axis)) return 0;
     if (axis >= present) continue;
-    if (force_share_[axis].load(std::memory_order_relaxed) != 1.0f) return 0;
-    const bool enable = enabled_[axis].load(std::memory_order_relaxed);
-    const std::uint32_t held = axes_[axis].ISR_held_ticks(settings_.ISR_current().axis[axis], enable);
+    const Axis::Command& command = commands_[axis];
+    if (command.share != 1.0f) return 0;
+    const std::uint32_t held = axes_[axis].ISR_held_ticks(settings_.ISR_current().axis[axis], command.enable);
     least = held < least ? held : least;
   }
   return present == 0 ? 0 : least;
@@ -223,23 +229,13 @@ const {
 
 template <std::size_t axes, typename Law>
 requires AxesLaw<Law, axes>
-void AxesTick<axes, Law>::ISR_supervise_main_loop() {
-  constexpr std::uint32_t most_ticks_without_round = tick_rate_hz / 10;
-  const std::uint32_t rounds = rounds_alive_.load(std::memory_order_relaxed);
-  ticks_without_round_ = rounds == rounds_seen_ ? ticks_without_round_ + 1 : 0;
-  rounds_seen_ = rounds;
-  main_loop_stands_ = ticks_without_round_ > most_ticks_without_round;
-}
-
-template <std::size_t axes, typename Law>
-requires AxesLaw<Law, axes>
 void AxesTick<axes, Law>::ISR_trace(const control::HapticLoop<float>::Output& traced) {
   const std::uint32_t interval = trace_interval_.load(std::memory_order_relaxed);
-  if (interval == 0) {
+  if (const std::uint32_t start = trace_starts_.load(std::memory_order_relaxed); start != trace_start_) {
+    trace_start_ = start;
     trace_countdown_ = 0;
-    return;
   }
-  if (!traced.new_sample) return;
+  if (!traced.new_sample || interval == 0) return;
   // A countdown as long as the interval is left over from a longer one.
   if (trace_countdown_ == 0 || trace_countdown_ >= interval) {
     trace_countdown_ = interval;

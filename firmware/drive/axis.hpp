@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "control/count_extender.hpp"
@@ -19,22 +20,43 @@ enum class DriveMode : std::uint8_t {
   torque = 2,      ///< makes the force that the host asks for, without a wall
 };
 
+/// Between which voltages a supply must be. From 0 up, numbers are ordered as their bits are, and what is
+/// negative or no number lies above all of them; so one comparison of whole numbers does, and is shorter.
+class SupplyWindow {
+ public:
+  constexpr SupplyWindow() : SupplyWindow(0.0f, 0.0f) {}
+  /// V, 0 <= low <= high.
+  constexpr SupplyWindow(float low, float high)
+      : low_(std::bit_cast<std::uint32_t>(low)), width_(std::bit_cast<std::uint32_t>(high) - low_) {}
+  constexpr bool contains(float voltage) const {
+    return std::bit_cast<std::uint32_t>(voltage) - low_ <= width_;
+  }
+  /// All of it is below that; not below what is no number.
+  constexpr bool is_below(float voltage) const { return voltage > high(); }
+  constexpr float high() const { return std::bit_cast<float>(low_ + width_); }
+
+ private:
+  std::uint32_t low_, width_;
+};
+
 /// What the tick of one axis works by; made in the main loop, handed over whole.
+///
+/// What each tick reads comes first: the core's shortest loads of floats reach 1 KiB.
 struct AxisSetting {
-  control::HapticLoop<float>::Coefficients haptic{};
-  MotorControl::Coefficients motor{};
-  control::ForceCompensation<float>::Coefficients compensation{};  ///< by the shaft's angle
-  control::MotionPlausibility<float>::Coefficients plausibility{};
-  Excitation::Coefficients excitation{};
-  float supply_voltage_min = 0.0f, supply_voltage_max = 0.0f;  ///< V, >= 0
-  std::int32_t encoder_offset = 0;                             ///< counts
-  std::int32_t encoder_direction = 1;                          ///< +1 or -1
   std::uint32_t generation = 0;  ///< differs from the last one: estimators start afresh
   DriveMode mode = DriveMode::haptic;
   bool watch_motion = false;  ///< `plausibility` trips, except in mode excitation
   /// False: nobody knows the rotor's angle yet. Excitations of a synchronous motor that need it then ask for
   /// nothing; mode haptic is the main loop's to refuse.
   bool commutated = true;
+  std::int32_t encoder_offset = 0;     ///< counts
+  std::int32_t encoder_direction = 1;  ///< +1 or -1
+  SupplyWindow supply{};
+  control::HapticLoop<float>::Coefficients haptic{};
+  MotorControl::Coefficients motor{};
+  control::MotionPlausibility<float>::Coefficients plausibility{};  ///< for Axis::motion_look ticks a call
+  control::ForceCompensation<float>::Coefficients compensation{};   ///< by the shaft's angle
+  Excitation::Coefficients excitation{};
 };
 
 /// What was when a trip happened. Before the motor was commanded in that tick (any fault but those of motor
@@ -82,14 +104,15 @@ struct AxisReport {
 class Axis {
  public:
   struct Input {
-    std::uint32_t count;  ///< free-running, wraps at 2^32
-    bool count_valid;
+    std::uint32_t count = 0;  ///< free-running, wraps at 2^32
+    bool count_valid = false;
     Fault condition = Fault::none;  ///< what the board has found wrong with power stage or lines
+    bool referenced = false;        ///< the counts are those from the encoder's index
+    std::uint8_t reserved = 0;      ///< 0; these four bytes are read as one word
     MotorControl::Measured motor{};
     /// Another number: the counts are referred to another origin from this tick on, as when the index was
     /// passed first. Never while the axis is driven: that trips.
     std::uint32_t reference_generation = 0;
-    bool referenced = false;  ///< the counts are those from the encoder's index
   };
   struct Output {
     /// N along +x, with compensation; 0 unless enabled. Within force.limit, except in mode excitation.
@@ -98,8 +121,9 @@ class Axis {
     MotorControl::Output motor{};
   };
 
-  /// Forces from outside the axis, N along +x.
-  struct Demand {
+  /// What is wanted of the axis from outside it; forces are N along +x.
+  struct Command {
+    bool enable = false;
     float from_axes = 0.0f;  ///< mode haptic: what a law over several axes adds to the wall
     float from_host = 0.0f;  ///< mode torque: all of the force
     /// What is left of the force, 0 to 1, while it fades after its commander was lost; less than 0: none, and
@@ -110,15 +134,18 @@ class Axis {
 
   /// Defined apart, so that it is one function in the image whose arguments and result a test can follow.
   /// The result is valid until the next call.
-  const Output& ISR_tick(const AxisSetting& setting, const Input& input, bool enable, Demand demand,
+  const Output& ISR_tick(const AxisSetting& setting, const Input& input, const Command& command,
                          std::uint32_t tick);
+
+  /// Ticks between two looks at the motion's plausibility, a power of two.
+  static constexpr std::uint32_t motion_look = 8;
 
   /// In place of ISR_tick(), for an axis that the board does not have: no valid count, nothing driven.
   void ISR_pass(const AxisSetting& setting, std::uint32_t tick) {
     tick_ = tick;
     generation_ = setting.generation;
     state_ = changes_ = 0;
-    started_ = false;
+    reference_generation_ = no_reference;
   }
 
   /// Where another axis' slot finds this one, which does not tick in it: counts, by this axis' last setting.
@@ -127,12 +154,13 @@ class Axis {
     return position_of(extender_.peek(count), setting);
   }
   bool ISR_follows(const Input& input) const {
-    return input.count_valid && started_ && reference_generation_ == input.reference_generation;
+    return input.count_valid && reference_generation_ == input.reference_generation;
   }
 
-  /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled.
-  void ISR_trip(Fault fault) {
-    if (trip_ == Fault::none) trip(fault, 0.0f, loop_.output().position);
+  /// A fault found outside: no force from the next ISR_tick() on, until the axis has been disabled. `input`:
+  /// of the present tick.
+  void ISR_trip(Fault fault, const Input& input) {
+    if (trip_ == Fault::none) trip(fault, 0.0f, loop_.output().position, input);
   }
 
   /// Where an encoder count is on the handle's axis, counts.
@@ -176,47 +204,61 @@ class Axis {
   }
 
  private:
-  static constexpr std::uint32_t enabled_bit = 1U << 16, count_valid_bit = 1U << 17,
-                                 referenced_bit = 1U << 18, unreported_bit = 1U << 31;
+  // All that the main loop must hear of at once, in one word: one comparison finds any change. Four bytes:
+  // the first three of the input as they are, the trip in the last.
+  static constexpr unsigned condition_shift = 8, trip_shift = 24;
+  static constexpr std::uint32_t count_valid_bit = 1, referenced_bit = 1U << 16, enabled_bit = 1U << 17,
+                                 unreported_bit = 1U << 31;
+  /// No board counts so many references.
+  static constexpr std::uint32_t no_reference = 0x7FFFFFFFU;
+  static constexpr bool looks_at_motion(std::uint32_t tick) { return tick % motion_look == 3; }
 
-  /// All that the main loop must hear of at once, in one word: one comparison finds any change.
-  static constexpr std::uint32_t state_word(Fault trip, Fault condition, bool enabled, const Input& input) {
-    return static_cast<std::uint32_t>(trip) | static_cast<std::uint32_t>(condition) << 8 |
-           (enabled ? enabled_bit : 0U) | (input.count_valid ? count_valid_bit : 0U) |
-           (input.referenced ? referenced_bit : 0U);
+  static constexpr std::uint32_t trip_bits(Fault trip) {
+    return static_cast<std::uint32_t>(trip) << trip_shift;
   }
-  static constexpr Fault condition_in(std::uint32_t state) { return static_cast<Fault>(state >> 8 & 0xFFU); }
+  static constexpr Fault condition_in(std::uint32_t state) {
+    return static_cast<Fault>(state >> condition_shift & 0xFFU);
+  }
 
   // What is rare, or for identification, is kept out of the tick's one function, whose registers it would
   // take.
   [[gnu::noinline, gnu::cold]] void start_afresh();
   [[gnu::noinline, gnu::cold]] void take_reference(const Input& input, bool enable);
-  [[gnu::noinline, gnu::cold]] void trip(Fault fault, float value, std::int64_t position);
-  [[gnu::noinline, gnu::cold]] bool trip_in_drive(Fault fault, float value, const AxisSetting& setting);
+  [[gnu::noinline, gnu::cold]] void trip(Fault fault, float value, std::int64_t position, const Input& input);
+  [[gnu::noinline, gnu::cold]] bool trip_in_drive(Fault fault, float value, const AxisSetting& setting,
+                                                  const Input& input);
   [[gnu::noinline]] bool excite_or_release(const AxisSetting& setting, const Input& input,
-                                           std::uint32_t state, std::int32_t moved, bool brakes);
+                                           std::uint32_t state, bool brakes);
+  [[gnu::noinline, gnu::cold]] void take_change(std::uint32_t state);
   void find_trips(const AxisSetting& setting, const Input& input, Fault condition);
   [[gnu::cold]] float excite(const AxisSetting& setting, const Input& input);
   [[gnu::noinline]] float compensated(const AxisSetting& setting, std::uint32_t position) const;
-  static Fault condition_of(const AxisSetting& setting, const Input& input);
+  [[gnu::noinline, gnu::cold]] static std::uint32_t with_supply_fault(std::uint32_t status,
+                                                                      const AxisSetting& setting,
+                                                                      const Input& input);
   [[gnu::always_inline]] inline bool drive(const AxisSetting& setting, const Input& input,
-                                           std::uint32_t position, std::int32_t moved, float share);
+                                           std::uint32_t position, float share);
+  /// m/s along +x since the last look; takes this place for the next one.
+  float velocity_since_look(const AxisSetting& setting);
 
-  control::CountExtender<std::uint32_t> extender_;
-  control::HapticLoop<float> loop_;
-  control::MotionPlausibility<float> plausibility_;
-  Excitation excitation_;
-  MotorControl motor_;
+  // What each tick needs comes first, as in AxisSetting.
   Output output_{};
-  std::int64_t armed_at_ = 0;  ///< extended count where the axis was armed
-  TripRecord record_{};
-  std::uint32_t tick_ = 0, generation_ = 0, reference_generation_ = 0;
-  std::uint32_t armed_samples_ = 0, limited_samples_ = 0;
-  float supply_ = 0.0f;  ///< V, of the last tick
+  std::uint32_t tick_ = 0, generation_ = 0;
+  std::uint32_t reference_generation_ = no_reference;
   Fault trip_ = Fault::none;
   std::uint32_t state_ = 0;    ///< of the last tick, see state_word
   std::uint32_t changes_ = 0;  ///< its bits that the last tick has changed
-  bool started_ = false;
+  control::CountExtender<std::uint32_t> extender_;
+  float forces_made_ = 0.0f;       ///< N, the sum since the last look at the motion
+  std::uint32_t looked_from_ = 0;  ///< low word of the extended count at that look
+  control::MotionPlausibility<float> plausibility_;
+  MotorControl motor_;
+  control::HapticLoop<float> loop_;
+  std::uint32_t armed_from_ = 0;                           ///< the loop's samples when the axis was armed
+  std::uint32_t armed_samples_ = 0, limited_samples_ = 0;  ///< of the last time it was armed
+  std::int64_t armed_at_ = 0;                              ///< extended count where the axis was armed
+  TripRecord record_{};
+  Excitation excitation_;
 };
 
 }  // namespace kmax::firmware

@@ -64,14 +64,15 @@ MotorControl::Coefficients MotorControl::prepare(const MotorControlConfig& confi
   watch.current_limit = config.current_limit;
   watch.over_current_factor = over_current_factor;
   watch.bandwidth = config.bandwidth;
-  watch.rate = config.tick_rate;
+  watch.rate = config.tick_rate / static_cast<float>(phase_look);
   c.watch = control::PhaseWatch<float>::prepare(watch);
   c.angle_per_count = turn_fraction_per_count(config.pole_pairs, config.counts_per_turn);
   c.angle_offset = turn_fraction(config.electrical_offset);
   c.shaft_angle_per_count = turn_fraction_per_count(1, config.counts_per_turn);
   c.electrical_speed_per_velocity = static_cast<float>(config.pole_pairs) / config.transmission;
   c.slow_velocity = control::magnitude(4.0f / config.torque_constant * config.transmission);
-  c.current_square_step = control::one_minus_exponential(period / current_square_time);
+  c.current_square_step =
+      control::one_minus_exponential(static_cast<float>(square_look) * period / current_square_time);
   return c;
 }
 

@@ -71,7 +71,7 @@ class MotorControl {
     std::uint32_t shaft_angle_per_count = 0;     ///< 2^32 per turn of the shaft
     float electrical_speed_per_velocity = 0.0f;  ///< rad/m
     float slow_velocity = 0.0f;        ///< m/s of the handle: with 8 V the back-EMF is then below half of it
-    float current_square_step = 0.0f;  ///< per tick
+    float current_square_step = 0.0f;  ///< per look
     MotorKind kind = MotorKind::dc;
   };
 
@@ -111,8 +111,12 @@ class MotorControl {
 
   /// `force`: N at the handle. `position`: counts, low 32 bits, direction and offset applied. `velocity`: m/s
   /// of the handle. Not driving: no reference, controllers wound back, the measured current still reported.
+  /// `tick`: its number, by which what is slow takes turns: phases that are open or leak are looked for in
+  /// every phase_look-th tick, and the square of the current is taken in every square_look-th on average, so
+  /// that no tick pays for both.
   void update(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
-              float velocity, bool driving, Output& out);
+              float velocity, bool driving, std::uint32_t tick, Output& out);
+  static constexpr std::uint32_t phase_look = 4, square_look = 8;  ///< powers of two
 
   /// Instead of update(), in a tick in which an excited axis is driven. Gives the force asked for, N at the
   /// handle, as far as it is known: 0 for a voltage, and for a current in the stator's frame.
@@ -121,19 +125,21 @@ class MotorControl {
   /// whatever the encoder says, and without a joule from or to the supply. What the winding makes of that is
   /// watched for over-current as ever. Gives 0: no force is asked for. Without measured currents nothing
   /// brakes.
-  [[gnu::cold]] float brake(const Coefficients& c, const Measured& measured, Output& out) {
+  [[gnu::cold]] float brake(const Coefficients& c, const Measured& measured, std::uint32_t tick,
+                            Output& out) {
     Excitation::Output shorted{};
     shorted.kind = ExcitationKind::voltage;
-    return excite(c, measured, shorted, 0, 0.0f, out);
+    return excite(c, measured, shorted, 0, 0.0f, tick, out);
   }
 
   [[gnu::cold]] float excite(const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
-                             std::uint32_t position, float velocity, Output& out);
+                             std::uint32_t position, float velocity, std::uint32_t tick, Output& out);
 
  private:
   using FieldOriented = control::FieldOrientedController<float>;
   using Dc = control::DcCurrentController<float>;
   using Phases = control::PhaseCurrents<float>;
+  using Watch = control::PhaseWatch<float>;
 
   static Phases of_dc(const Measured& measured) { return {0.0f, measured.current_b, measured.current_c}; }
   static Phases of_pmsm(const Measured& measured) {
@@ -145,31 +151,39 @@ class MotorControl {
   enum class By : std::uint8_t { tick, identification };
   template <By by>
   void follow_force(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
-                    float velocity, Output& out);
+                    float velocity, std::uint32_t tick, Output& out);
   control::PhaseCondition drive_dc(const Coefficients& c, const Measured& measured, float velocity,
-                                   bool steady, Output& out);
+                                   bool steady, std::uint32_t tick, Output& out);
   template <By by>
   control::PhaseCondition drive_pmsm(const Coefficients& c, const Measured& measured, std::uint32_t angle,
-                                     float velocity, bool steady, Output& out);
+                                     float velocity, bool steady, std::uint32_t tick, Output& out);
   control::PhaseCondition excite_dc(const Coefficients& c, const Measured& measured,
-                                    const Excitation::Output& asked, float velocity, Output& out);
+                                    const Excitation::Output& asked, float velocity, std::uint32_t tick,
+                                    Output& out);
   [[gnu::cold, gnu::noinline]] FieldOriented::Output identify_pmsm(const Coefficients& c,
                                                                    const FieldOriented::Input& in);
   // For identification only: small code rather than fast code.
-  [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(const Coefficients& c,
-                                                                     const Measured& measured,
-                                                                     const Excitation::Output& asked,
-                                                                     std::uint32_t rotor_angle,
-                                                                     float velocity, Output& out);
+  [[gnu::cold, gnu::noinline]] control::PhaseCondition excite_stator(
+      const Coefficients& c, const Measured& measured, const Excitation::Output& asked,
+      std::uint32_t rotor_angle, float velocity, std::uint32_t tick, Output& out);
   static void take(const Dc::Output& made, Output& out);
   static void take(const FieldOriented::Output& made, Output& out);
   [[gnu::noinline, gnu::cold]] void report_fault(control::PhaseCondition condition, const Coefficients& c,
                                                  const Measured& measured, Output& out);
-  void settle(const Coefficients& c, float torque_current, float square, Output& out);
+  static constexpr bool looks_at_phases(std::uint32_t tick) { return tick % phase_look == 2; }
+  /// Not always the same tick of eight: a current that alternates from tick to tick would be seen at one of
+  /// its values alone. Over 64 ticks each of the eight has its turn.
+  static constexpr bool looks_at_square(std::uint32_t tick) {
+    return (tick ^ tick / square_look) % square_look == 0;
+  }
+  /// `squares`: gives A^2 of both components, asked for where it is taken.
+  template <typename Squares>
+  void settle(const Coefficients& c, float torque_current, std::uint32_t tick, Squares&& squares,
+              Output& out);
 
   control::DcCurrentController<float> dc_;
   control::FieldOrientedController<float> pmsm_;
-  control::PhaseWatch<float> watch_;
+  Watch watch_;
   float current_square_ = 0.0f;
   ExcitationKind excited_ = ExcitationKind::off;
 };
@@ -177,24 +191,27 @@ class MotorControl {
 // Here and not in a file of its own, so that the tick becomes one function without calls.
 
 inline void MotorControl::update(const Coefficients& c, const Measured& measured, float force,
-                                 std::uint32_t position, float velocity, bool driving, Output& out) {
+                                 std::uint32_t position, float velocity, bool driving, std::uint32_t tick,
+                                 Output& out) {
   if (!driving) {
     out = {};
     dc_.reset();
     pmsm_.reset();
     watch_.reset();
     excited_ = ExcitationKind::off;
-    settle(c, 0.0f, 0.0f, out);
+    settle(
+        c, 0.0f, tick, [] { return 0.0f; }, out);
     if (measured.present && c.kind == MotorKind::dc)
       out.current = 0.5f * (measured.current_b - measured.current_c);
     return;
   }
-  follow_force<By::tick>(c, measured, force, position, velocity, out);
+  follow_force<By::tick>(c, measured, force, position, velocity, tick, out);
 }
 
 template <MotorControl::By by>
 inline void MotorControl::follow_force(const Coefficients& c, const Measured& measured, float force,
-                                       std::uint32_t position, float velocity, Output& out) {
+                                       std::uint32_t position, float velocity, std::uint32_t tick,
+                                       Output& out) {
   const auto wanted = control::MotorTransmission<float>::update(c.transmission, force);
   out.current_reference = wanted.current;
   out.saturated = wanted.limited;
@@ -203,30 +220,36 @@ inline void MotorControl::follow_force(const Coefficients& c, const Measured& me
     out.force_made = wanted.force;
     return;
   }
-  const auto condition =
-      c.kind == MotorKind::dc
-          ? drive_dc(c, measured, velocity, true, out)
-          : drive_pmsm<by>(c, measured, position * c.angle_per_count + c.angle_offset, velocity, true, out);
+  const auto condition = c.kind == MotorKind::dc
+                             ? drive_dc(c, measured, velocity, true, tick, out)
+                             : drive_pmsm<by>(c, measured, position * c.angle_per_count + c.angle_offset,
+                                              velocity, true, tick, out);
   if (condition != control::PhaseCondition::good) [[unlikely]]
     report_fault(condition, c, measured, out);
 }
 
 /// `steady`: the reference is one that the current can follow.
 inline control::PhaseCondition MotorControl::drive_dc(const Coefficients& c, const Measured& measured,
-                                                      float velocity, bool steady, Output& out) {
+                                                      float velocity, bool steady, std::uint32_t tick,
+                                                      Output& out) {
   out.current = 0.5f * (measured.current_b - measured.current_c);
   const float speed = control::MotorTransmission<float>::motor_speed(c.transmission, velocity);
   take(dc_.update(c.dc, out.current_reference, out.current, speed, measured.supply_voltage), out);
+  settle(
+      c, out.current, tick, [&out] { return out.current * out.current; }, out);
+  const Phases phases = of_dc(measured);
+  if (Watch::over_current(c.watch, phases)) [[unlikely]]
+    return control::PhaseCondition::over_current;
+  if (!looks_at_phases(tick)) return control::PhaseCondition::good;
   const float expected = steady ? out.current_reference : 0.0f;
-  settle(c, out.current, out.current * out.current, out);
-  return watch_.update(c.watch, of_dc(measured), {0.0f, expected, -expected},
+  return watch_.update(c.watch, phases, {0.0f, expected, -expected},
                        control::magnitude(velocity) < c.slow_velocity);
 }
 
 template <MotorControl::By by>
 inline control::PhaseCondition MotorControl::drive_pmsm(const Coefficients& c, const Measured& measured,
                                                         std::uint32_t angle, float velocity, bool steady,
-                                                        Output& out) {
+                                                        std::uint32_t tick, Output& out) {
   FieldOriented::Input in;
   in.angle = angle;
   in.current_b = measured.current_b;
@@ -241,9 +264,14 @@ inline control::PhaseCondition MotorControl::drive_pmsm(const Coefficients& c, c
   out.voltage = made.voltage_q;
   out.voltage_d = made.voltage_d;
   out.electrical_angle = angle;
-  settle(c, made.current_q, made.current_q * made.current_q + made.current_d * made.current_d, out);
-  return watch_.update<control::PhaseSum::implied>(c.watch, of_pmsm(measured),
-                                                   {made.reference_a, made.reference_b, made.reference_c},
+  settle(
+      c, made.current_q, tick,
+      [&made] { return made.current_q * made.current_q + made.current_d * made.current_d; }, out);
+  const Phases phases = of_pmsm(measured);
+  if (Watch::over_current(c.watch, phases)) [[unlikely]]
+    return control::PhaseCondition::over_current;
+  if (!looks_at_phases(tick)) return control::PhaseCondition::good;
+  return watch_.update<control::PhaseSum::implied>(c.watch, phases, FieldOriented::phase_references(in),
                                                    steady && control::magnitude(velocity) < c.slow_velocity);
 }
 
@@ -263,8 +291,10 @@ inline void MotorControl::take(const FieldOriented::Output& made, Output& out) {
   if (made.not_finite) out.fault = Fault::not_finite;
 }
 
-inline void MotorControl::settle(const Coefficients& c, float torque_current, float square, Output& out) {
-  current_square_ += c.current_square_step * (square - current_square_);
+template <typename Squares>
+inline void MotorControl::settle(const Coefficients& c, float torque_current, std::uint32_t tick,
+                                 Squares&& squares, Output& out) {
+  if (looks_at_square(tick)) current_square_ += c.current_square_step * (squares() - current_square_);
   out.current_square = current_square_;
   out.force_made = control::MotorTransmission<float>::force(c.transmission, torque_current);
 }

@@ -22,7 +22,7 @@ bool bound(float limit, float& along, float& across) {
 // Kept out of the tick's one function: it is for identification, and would take its registers.
 [[gnu::noinline]] float MotorControl::excite(const Coefficients& c, const Measured& measured,
                                              const Excitation::Output& asked, std::uint32_t position,
-                                             float velocity, Output& out) {
+                                             float velocity, std::uint32_t tick, Output& out) {
   using Transmission = control::MotorTransmission<float>;
   if (excited_ != asked.kind) {
     // What the integrators hold belongs to another frame, or to nothing.
@@ -35,7 +35,7 @@ bool bound(float limit, float& along, float& across) {
   out.excitation_finished = asked.finished;
   out.current_d = out.voltage_d = 0.0f;
   if (asked.kind == ExcitationKind::position) {
-    follow_force<By::identification>(c, measured, asked.force, position, velocity, out);
+    follow_force<By::identification>(c, measured, asked.force, position, velocity, tick, out);
     return Transmission::force(c.transmission, out.current_reference);
   }
   const bool by_voltage = asked.kind == ExcitationKind::voltage;
@@ -52,24 +52,27 @@ bool bound(float limit, float& along, float& across) {
     return force;
   }
   const std::uint32_t rotor_angle = position * c.angle_per_count + c.angle_offset;
-  const auto condition =
-      c.kind == MotorKind::dc ? excite_dc(c, measured, asked, velocity, out)
-      : of_rotor ? drive_pmsm<By::identification>(c, measured, rotor_angle, velocity, !asked.alternating, out)
-                 : excite_stator(c, measured, asked, rotor_angle, velocity, out);
+  const auto condition = c.kind == MotorKind::dc ? excite_dc(c, measured, asked, velocity, tick, out)
+                         : of_rotor ? drive_pmsm<By::identification>(c, measured, rotor_angle, velocity,
+                                                                     !asked.alternating, tick, out)
+                                    : excite_stator(c, measured, asked, rotor_angle, velocity, tick, out);
   if (condition != control::PhaseCondition::good) report_fault(condition, c, measured, out);
   return force;
 }
 
 control::PhaseCondition MotorControl::excite_dc(const Coefficients& c, const Measured& measured,
                                                 const Excitation::Output& asked, float velocity,
-                                                Output& out) {
+                                                std::uint32_t tick, Output& out) {
   if (asked.kind != ExcitationKind::voltage) {
-    return drive_dc(c, measured, velocity, !asked.alternating, out);
+    return drive_dc(c, measured, velocity, !asked.alternating, tick, out);
   }
   out.current = 0.5f * (measured.current_b - measured.current_c);
   take(Dc::voltage(c.dc, asked.along, measured.supply_voltage), out);
-  settle(c, out.current, out.current * out.current, out);
-  return watch_.update(c.watch, of_dc(measured), {}, false);
+  settle(
+      c, out.current, tick, [&out] { return out.current * out.current; }, out);
+  const Phases phases = of_dc(measured);
+  if (Watch::over_current(c.watch, phases)) return control::PhaseCondition::over_current;
+  return looks_at_phases(tick) ? watch_.update(c.watch, phases, {}, false) : control::PhaseCondition::good;
 }
 
 MotorControl::FieldOriented::Output MotorControl::identify_pmsm(const Coefficients& c,
@@ -79,7 +82,8 @@ MotorControl::FieldOriented::Output MotorControl::identify_pmsm(const Coefficien
 
 control::PhaseCondition MotorControl::excite_stator(const Coefficients& c, const Measured& measured,
                                                     const Excitation::Output& asked,
-                                                    std::uint32_t rotor_angle, float velocity, Output& out) {
+                                                    std::uint32_t rotor_angle, float velocity,
+                                                    std::uint32_t tick, Output& out) {
   const bool by_voltage = asked.kind == ExcitationKind::voltage;
   FieldOriented::Input in;
   in.angle = asked.angle;
@@ -103,10 +107,13 @@ control::PhaseCondition MotorControl::excite_stator(const Coefficients& c, const
   const bool steady = !by_voltage && !asked.alternating;
   // What the vector makes along the rotor's q axis, as far as the rotor's angle is known.
   const auto [sine, cosine] = control::sine_cosine<float>(asked.angle - rotor_angle);
-  settle(c, made.current_d * sine + made.current_q * cosine,
-         made.current_d * made.current_d + made.current_q * made.current_q, out);
-  return watch_.update<control::PhaseSum::implied>(c.watch, of_pmsm(measured),
-                                                   {made.reference_a, made.reference_b, made.reference_c},
+  settle(
+      c, made.current_d * sine + made.current_q * cosine, tick,
+      [&made] { return made.current_d * made.current_d + made.current_q * made.current_q; }, out);
+  const Phases phases = of_pmsm(measured);
+  if (Watch::over_current(c.watch, phases)) return control::PhaseCondition::over_current;
+  if (!looks_at_phases(tick)) return control::PhaseCondition::good;
+  return watch_.update<control::PhaseSum::implied>(c.watch, phases, FieldOriented::phase_references(in),
                                                    steady && control::magnitude(velocity) < c.slow_velocity);
 }
 

@@ -35,7 +35,7 @@ float bound_of(Fault fault, const Supervisor::Situation& now, std::size_t axis) 
     case Fault::under_voltage:
       return values.real<"supply.voltage_min">();
     case Fault::over_voltage:
-      return now.setting.supply_voltage_max;
+      return now.setting.supply.high();
     case Fault::over_current:
       return over_current_factor * values.real<"current.limit">(axis);
     case Fault::current_sum:
@@ -129,7 +129,7 @@ void Supervisor::go_on_with_reaction(const Situation& now) {
     const float velocity = now.report.haptic.velocity;
     if (!(velocity < standstill && velocity > -standstill)) reaction.moved_last = now_tick;
     over = over || now_tick - reaction.moved_last > standing;
-    reaction.share = Axis::Demand::brakes;
+    reaction.share = Axis::Command::brakes;
   }
   if (over) reaction_.reset();
 }

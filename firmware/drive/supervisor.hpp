@@ -104,7 +104,7 @@ class Supervisor {
   bool armed() const { return machine_.armed(); }
   /// Armed, or its force is fading.
   bool makes_force() const { return armed() || reaction_.has_value(); }
-  /// See Axis::Demand::share.
+  /// See Axis::Command::share.
   float force_share() const { return reaction_ ? reaction_->share : 1.0f; }
   const Trip& last_trip() const { return trip_; }
   /// Halt, as the last controlword that was obeyed says.

@@ -29,7 +29,7 @@ class Seqlock {
     std::atomic_signal_fence(std::memory_order_seq_cst);
     fill(value_);
     std::atomic_signal_fence(std::memory_order_seq_cst);
-    sequence_.store(sequence + 2, std::memory_order_release);
+    sequence_.store(sequence + 2, std::memory_order_relaxed);
   }
 
   Value read() const {

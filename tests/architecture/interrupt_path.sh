@@ -70,9 +70,5 @@ check "firmware/drive/axis.cpp" "$source_dir/firmware/drive/axis.cpp" || failed=
 # Those of axis.cpp, likewise.
 axis='^_ZNK?4kmax8firmware4Axis(8ISR_(tick|fill)E|4tripE)'
 allowed="$allowed|$axis"
-check "firmware/application_tick.cpp" "$source_dir/firmware/application_tick.cpp" || failed=1
-# Those of application_tick.cpp.
-application='^_ZN4kmax8firmware11Application8ISR_(tick|pass)E'
-allowed="$allowed|$application"
 check "board/odrive_v3/drives_tick.cpp" "$source_dir/board/odrive_v3/drives_tick.cpp" || failed=1
 exit $failed

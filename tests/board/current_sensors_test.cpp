@@ -22,7 +22,7 @@ class CurrentSensorsTest : public testing::Test {
  protected:
   Amperes read(const Sample& sample) {
     const SampleHold::Action action = samples.ISR_take(0);
-    if (action.calibrate) sensors.ISR_calibrate(sample);
+    if (action.calibrate) sensors.ISR_calibrate(sample.valid, sample.phase_b, sample.phase_c);
     return {sensors.ISR_amperes_b(sample.phase_b), sensors.ISR_amperes_c(sample.phase_c)};
   }
   OffsetProgress calibrate(const Sample& sample, int count = 1024) {

@@ -19,7 +19,7 @@ class AxisTickCalls {
     const std::uint32_t entry =
         image()
             .required_symbol(
-                "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputEbNS1_6DemandEm")
+                "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputERKNS1_7CommandEm")
             .address;
     board.processor().on_block([this, entry](std::uint32_t address, std::uint32_t /*size*/) {
       if (address == entry) {

@@ -255,7 +255,8 @@ TEST(ClosedLoopOfEachPhase, AnOpenPhaseOfTheSynchronousMotorIsNamed) {
       if (std::abs(bench.world.drive(1).currents()[terminal]) < 0.35) continue;
       tried = true;
       bench.world.drive(1).open_terminal(terminal, true);
-      bench.board->run_until(bench.board->now() + ticks(one_tick_and_handling));
+      // The patience, 1.7 ms, and a look before and behind it.
+      bench.board->run_until(bench.board->now() + ticks(42));
       EXPECT_FALSE(bench.board->bridge_armed(1)) << terminal;
       EXPECT_EQ(bench.fault(1), Fault::phase_open) << terminal;
     }

@@ -105,6 +105,8 @@ struct Cause {
 };
 
 constexpr double line = 0.1, no_tick = 0.8, tick = 1.3, supply_tick = 1.8, slow_tick = 100;
+// The patience of PhaseWatch at the default bandwidth, two looks and what is left of a tick.
+constexpr double wire = 42;
 
 void plant(Bench& bench, std::size_t axis, Defect defect) {
   bench.world.drives().plant(axis, defect);
@@ -230,8 +232,8 @@ std::vector<Cause> causes() {
           },
           Hits::both, Fault::gate_driver, line),
       converters,
-      defect("motor's wire B broken", Defect::phase_b_open, Fault::phase_open, tick, Refusal::none),
-      defect("motor's wire C broken", Defect::phase_c_open, Fault::phase_open, tick, Refusal::none),
+      defect("motor's wire B broken", Defect::phase_b_open, Fault::phase_open, wire, Refusal::none),
+      defect("motor's wire C broken", Defect::phase_c_open, Fault::phase_open, wire, Refusal::none),
       thermistor("thermistor's wire broken", TemperatureSensor::Wiring::open),
       thermistor("thermistor shorted", TemperatureSensor::Wiring::shorted),
       {"power stage at 130 degC",

@@ -29,10 +29,9 @@ class Companion {
     const auto setting = calls_.value_at<firmware::AxisSetting>(calls_.argument(1));
     mode_ = setting.mode;
     const auto input = calls_.value_at<Axis::Input>(calls_.argument(2));
-    const bool enable = (calls_.argument(3) & 0xFFU) != 0;
-    const Axis::Demand demand{board_.processor().fp_register(0), board_.processor().fp_register(1)};
+    const auto command = calls_.value_at<Axis::Command>(calls_.argument(3));
     const auto tick = calls_.value_at<std::uint32_t>(calls_.argument(13));
-    expected_ = axes_[calls_.axis()].ISR_tick(setting, input, enable, demand, tick);
+    expected_ = axes_[calls_.axis()].ISR_tick(setting, input, command, tick);
   }
 
   void leave() {

@@ -33,7 +33,6 @@ KMAX_OPENED(ParametersKey, firmware::Application::parameters_);
 KMAX_OPENED(ChangesKey, firmware::ParameterAccess::changes_);
 KMAX_OPENED(TicksKey, firmware::AxesTick<firmware::axis_count>::ticks_);
 KMAX_OPENED(ReportsKey, firmware::AxesTick<firmware::axis_count>::reports_);
-KMAX_OPENED(RoundsKey, firmware::AxesTick<firmware::axis_count>::rounds_alive_);
 KMAX_OPENED(SequenceKey, firmware::Seqlock<firmware::AxisReport>::sequence_);
 KMAX_OPENED(QueueKey, firmware::CanopenEdge::queue_);
 KMAX_OPENED(HeadKey, FrameQueue::head_);
@@ -146,7 +145,6 @@ class NativeRig final : public Rig {
     const std::uint32_t near_wrap = 0U - 2'000 - 2 * static_cast<std::uint32_t>(random_() % 200'000);
     auto& tick = (application.*opened(AxesKey{})).tick();
     tick.*opened(TicksKey{}) = near_wrap;
-    tick.*opened(RoundsKey{}) = near_wrap;
     for (auto& report : tick.*opened(ReportsKey{})) report.*opened(SequenceKey{}) = near_wrap;
     (application.*opened(ParametersKey{})).*opened(ChangesKey{}) = 0U - 200;
     auto& queue = application.can().*opened(QueueKey{});

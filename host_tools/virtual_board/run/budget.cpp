@@ -91,6 +91,7 @@ std::uint16_t half_word_at(Bus& bus, std::uint32_t address) {
 }
 
 struct Tick {
+  std::uint32_t object = UINT32_MAX;  ///< where the axis lies in the image's memory
   std::size_t axis = 0;
   std::vector<std::uint32_t> addresses;
   std::uint64_t register_waits = 0;
@@ -102,13 +103,22 @@ class Recorder {
   Recorder(const ElfImage& image, VirtualBoard& board)
       : board_(board),
         handler_(image.required_symbol("ISR_adc").address),
-        application_(
-            image.required_symbol("_ZN4kmax8firmware11Application8ISR_tickEjRKNS0_4Axis5InputE").address) {
+        axis_tick_(
+            image
+                .required_symbol("_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputERKNS1_"
+                                 "7CommandEm")
+                .address) {
     board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
   }
 
   void start() { recording_ = true; }
-  std::vector<Tick> take() { return std::move(ticks_); }
+  std::vector<Tick> take() {
+    // The axes are an array: axis 0 lies lowest.
+    std::uint32_t lowest = UINT32_MAX;
+    for (const Tick& tick : ticks_) lowest = std::min(lowest, tick.object);
+    for (Tick& tick : ticks_) tick.axis = tick.object == lowest ? 0 : 1;
+    return std::move(ticks_);
+  }
 
  private:
   void note(std::uint32_t address, std::uint32_t size) {
@@ -128,7 +138,7 @@ class Recorder {
         exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
       return;
     Tick& tick = ticks_.back();
-    if (address == application_) tick.axis = board_.processor().core_register(1);
+    if (address == axis_tick_) tick.object = board_.processor().core_register(0);
     for (std::uint32_t at = address; at < address + size;) {
       tick.addresses.push_back(at);
       at += is_wide(half_word_at(board_.bus(), at)) ? 4 : 2;
@@ -136,7 +146,7 @@ class Recorder {
   }
 
   VirtualBoard& board_;
-  std::uint32_t handler_, application_;
+  std::uint32_t handler_, axis_tick_;
   bool recording_ = false, open_ = false;
   std::uint64_t waits_before_ = 0;
   std::vector<Tick> ticks_;

@@ -17,7 +17,7 @@ TEST(AxesSettings, AreMadeByTheParametersOfEachAxis) {
   EXPECT_EQ(settings.of(0).encoder_direction, 1);
   EXPECT_EQ(settings.of(1).encoder_direction, -1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    EXPECT_EQ(settings.of(axis).supply_voltage_max, 31.0f);
+    EXPECT_EQ(settings.of(axis).supply.high(), 31.0f);
     EXPECT_EQ(settings.of(axis).motor.dc.share_limit, 0.25f) << "what the board's bridge can give";
   }
 }
@@ -38,11 +38,12 @@ TEST(AxesSettings, WhatTheTickLooksAtItselfIsOfEachAxis) {
   values.set_real<"device.hand_force">(0.5f, 1);
   settings.make(values, 6, {}, {});
   EXPECT_TRUE(settings.of(1).watch_motion);
-  EXPECT_EQ(settings.of(1).supply_voltage_min, 9.0f);
+  EXPECT_TRUE(settings.of(1).supply.contains(9.0f));
+  EXPECT_FALSE(settings.of(1).supply.contains(8.999f));
   EXPECT_EQ(settings.generation(), 7u);
   EXPECT_EQ(&settings.all().axis[1], &settings.of(1));
-  // Per tick of 50 us: m/s for 1 N.
-  EXPECT_FLOAT_EQ(settings.of(0).plausibility.acceleration, 5e-5f / values.real<"device.mass">(0));
+  // In eight ticks of 50 us: m/s for 1 N.
+  EXPECT_FLOAT_EQ(settings.of(0).plausibility.acceleration, 8 * 5e-5f / values.real<"device.mass">(0));
 }
 
 TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
@@ -50,7 +51,7 @@ TEST(AxesSettings, NoParameterLetsTheSupplyRiseAboveTheBoardsCeiling) {
     ParameterValues values;
     values.set_real<"supply.voltage_max">(31.0f);
     values.set_real<"supply.ceiling">(ceiling);
-    EXPECT_EQ(AxesSettings(values).of(1).supply_voltage_max, trips_above);
+    EXPECT_EQ(AxesSettings(values).of(1).supply.high(), trips_above);
   }
 }
 

@@ -28,7 +28,7 @@ class AxisBackground : public testing::Test {
     setting.generation = 1;
   }
   Axis::Output tick(std::uint32_t count, bool enable = true) {
-    return axis.ISR_tick(setting, {count, true}, enable, {}, ++ticks);
+    return axis.ISR_tick(setting, {count, true}, {.enable = enable}, ++ticks);
   }
   float background(std::uint32_t count, bool enable = true) {
     tick(count, enable);
@@ -98,7 +98,7 @@ TEST_F(AxisBackground, IsThereOnlyWhileTheAxisIsDriven) {
   take_over();
   EXPECT_EQ(background(outside, false), 0.0f);
   EXPECT_EQ(background(outside), 3.0f);
-  axis.ISR_tick(setting, {outside, false}, true, {}, ++ticks);
+  axis.ISR_tick(setting, {outside, false}, {.enable = true}, ++ticks);
   EXPECT_EQ(axis.ISR_background_force(setting), 0.0f) << "it has tripped";
   EXPECT_EQ(background(outside), 0.0f);
 }

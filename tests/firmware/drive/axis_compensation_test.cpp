@@ -22,7 +22,7 @@ class AxisCompensation : public testing::Test {
     setting.haptic = control::HapticLoop<float>::prepare(haptic, 0);
     setting.motor = MotorControl::prepare(motor);
     setting.compensation = control::ForceCompensation<float>::prepare(added);
-    setting.supply_voltage_max = 60.0f;
+    setting.supply = SupplyWindow(0.0f, 60.0f);
     setting.generation = 1;
     setting.mode = mode;
   }
@@ -30,7 +30,7 @@ class AxisCompensation : public testing::Test {
     Axis::Input in{};
     in.count = static_cast<std::uint32_t>(count);
     in.count_valid = true;
-    return axis.ISR_tick(setting, in, enable, {}, ++ticks);
+    return axis.ISR_tick(setting, in, {.enable = enable}, ++ticks);
   }
 
   Axis axis;

@@ -95,9 +95,10 @@ AxisSetting setting_of(MotorKind kind, DriveMode mode, double electrical_offset 
   AxisSetting setting;
   setting.haptic = control::HapticLoop<float>::prepare(haptic, 0);
   setting.motor = MotorControl::prepare(motor);
-  setting.plausibility = control::MotionPlausibility<float>::prepare(motion, static_cast<float>(tick));
+  setting.plausibility =
+      control::MotionPlausibility<float>::prepare(motion, static_cast<float>(Axis::motion_look * tick));
   setting.watch_motion = true;
-  setting.supply_voltage_max = 60.0f;
+  setting.supply = SupplyWindow(0.0f, 60.0f);
   setting.generation = 1;
   setting.mode = mode;
   return setting;
@@ -117,7 +118,7 @@ class AxisMotion : public testing::Test {
   /// False: a fault.
   bool run(MovingHandle& handle, const AxisSetting& setting, double seconds, bool enable = true) {
     for (double time = 0.0; time < seconds; time += tick) {
-      const auto out = axis.ISR_tick(setting, handle.input(), enable, {}, ++ticks);
+      const auto out = axis.ISR_tick(setting, handle.input(), {.enable = enable}, ++ticks);
       handle.run(out.motor, out.enabled);
       made = out.motor;
       if (axis.ISR_report().fault != Fault::none) return false;
@@ -261,8 +262,8 @@ TEST_F(AxisMotion, NeitherTheHapticRateNorTheEstimatorLooksLikeASpinOut) {
           setting.haptic = control::HapticLoop<float>::prepare(haptic, 0);
           control::MotionPlausibilityConfig<float> motion;
           motion.hand_force = 5.0f;
-          setting.plausibility =
-              control::MotionPlausibility<float>::prepare(motion, static_cast<float>(tick));
+          setting.plausibility = control::MotionPlausibility<float>::prepare(
+              motion, static_cast<float>(Axis::motion_look * tick));
           ASSERT_TRUE(run(handle, setting, 0.01, false));
           handle.hand = hand;
           EXPECT_TRUE(run(handle, setting, 1.0))
@@ -287,7 +288,8 @@ TEST_F(AxisMotion, AReversedEncoderWithItsDirectionSetIsNoSpinOut) {
       setting.encoder_direction = set ? direction : -direction;
       control::MotionPlausibilityConfig<float> motion;
       motion.hand_force = 0.5f;
-      setting.plausibility = control::MotionPlausibility<float>::prepare(motion, static_cast<float>(tick));
+      setting.plausibility =
+          control::MotionPlausibility<float>::prepare(motion, static_cast<float>(Axis::motion_look * tick));
       ASSERT_TRUE(run(handle, setting, 0.01, false));
       handle.velocity = -0.1;
       EXPECT_EQ(run(handle, setting, 0.5), set) << direction;

@@ -31,7 +31,7 @@ ParameterValues plain_wall() {
 class AxisTest : public testing::Test {
  protected:
   Axis::Output tick(std::uint32_t count, bool enable, bool valid = true, float external = 0.0f) {
-    return axis.ISR_tick(setting, {count, valid}, enable, {.from_axes = external}, ++ticks);
+    return axis.ISR_tick(setting, {count, valid}, {.enable = enable, .from_axes = external}, ++ticks);
   }
   Axis axis;
   AxisSetting setting = setting_from(plain_wall());
@@ -143,8 +143,7 @@ TEST_F(AxisTest, TripsOnTheBoardsConditionAtOnce) {
   for (const Fault condition : {Fault::emergency_stop, Fault::gate_driver, Fault::power_stage}) {
     (void)tick(at(-1000), false);
     ASSERT_TRUE(tick(at(-1000), true).enabled);
-    const auto out =
-        axis.ISR_tick(setting, {at(-1000), true, condition, {false, 24.0f, 0.0f, 0.0f}}, true, {}, ++ticks);
+    const auto out = axis.ISR_tick(setting, {at(-1000), true, condition}, {.enable = true}, ++ticks);
     EXPECT_FALSE(out.enabled);
     EXPECT_EQ(out.force, 0.0f);
     EXPECT_EQ(axis.ISR_report().fault, condition);
@@ -154,12 +153,12 @@ TEST_F(AxisTest, TripsOnTheBoardsConditionAtOnce) {
 }
 
 TEST_F(AxisTest, SupplyOutsideItsBoundsTripsWithTheVoltage) {
-  setting.supply_voltage_min = 8.0f;
-  setting.supply_voltage_max = 26.0f;
+  setting.supply = SupplyWindow(8.0f, 26.0f);
   setting.motor = MotorControl::prepare({});
   const auto with_supply = [&](float voltage) {
-    return axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, voltage, 0.0f, 0.0f}}, true, {},
-                         ++ticks);
+    return axis.ISR_tick(setting,
+                         {.count = at(-1000), .count_valid = true, .motor = {true, voltage, 0.0f, 0.0f}},
+                         {.enable = true}, ++ticks);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::pair<float, Fault> cases[] = {
@@ -177,10 +176,11 @@ TEST_F(AxisTest, SupplyOutsideItsBoundsTripsWithTheVoltage) {
 
 // The duty of a tick in which the axis trips must never reach the bridge.
 TEST_F(AxisTest, ATripOfTheMotorLeavesNoDuty) {
-  setting.supply_voltage_max = 26.0f;
+  setting.supply = SupplyWindow(0.0f, 26.0f);
   setting.motor = MotorControl::prepare({});
   const auto out =
-      axis.ISR_tick(setting, {at(-1000), true, Fault::none, {true, 24.0f, 9.0f, -9.0f}}, true, {}, ++ticks);
+      axis.ISR_tick(setting, {.count = at(-1000), .count_valid = true, .motor = {true, 24.0f, 9.0f, -9.0f}},
+                    {.enable = true}, ++ticks);
   EXPECT_FALSE(out.enabled);
   EXPECT_EQ(out.motor.duty_b, 0.5f);
   EXPECT_EQ(axis.ISR_report().fault, Fault::over_current);
@@ -219,9 +219,9 @@ TEST_F(AxisTest, TellsItsCountItsFaultAndWhereAnotherSlotFindsIt) {
   input.reference_generation = 1;
   EXPECT_FALSE(axis.ISR_follows(input)) << "of another origin";
   EXPECT_FALSE(axis.ISR_follows({at(-290), false}));
-  axis.ISR_trip(Fault::main_loop);
+  axis.ISR_trip(Fault::main_loop, {});
   EXPECT_EQ(axis.ISR_fault(), Fault::main_loop);
-  axis.ISR_trip(Fault::tick_missed);
+  axis.ISR_trip(Fault::tick_missed, {});
   EXPECT_EQ(axis.ISR_fault(), Fault::main_loop) << "the first is kept";
 }
 
@@ -294,8 +294,8 @@ TEST(AxisReport, ItsDefaults) {
 
 TEST(AxisSetting, ItsDefaults) {
   const AxisSetting defaults;
-  EXPECT_EQ(defaults.supply_voltage_min, 0.0f);
-  EXPECT_EQ(defaults.supply_voltage_max, 0.0f);
+  EXPECT_TRUE(defaults.supply.contains(0.0f));
+  EXPECT_FALSE(defaults.supply.contains(1e-30f));
   EXPECT_EQ(defaults.encoder_offset, 0);
   EXPECT_EQ(defaults.encoder_direction, 1);
   EXPECT_EQ(defaults.generation, 0u);
@@ -304,8 +304,9 @@ TEST(AxisSetting, ItsDefaults) {
   EXPECT_TRUE(defaults.commutated);
 }
 
-TEST(AxisDemand, ItsDefaults) {
-  const Axis::Demand defaults{};
+TEST(AxisCommand, ItsDefaults) {
+  const Axis::Command defaults{};
+  EXPECT_FALSE(defaults.enable);
   EXPECT_EQ(defaults.from_axes, 0.0f);
   EXPECT_EQ(defaults.from_host, 0.0f);
   EXPECT_EQ(defaults.share, 1.0f);

@@ -162,7 +162,7 @@ RC_GTEST_PROP(CyclicTorque, NewtonsArriveAsTheCurrentThatMakesThem, ()) {
   const Axis::Input input{.count = 0, .count_valid = true, .condition = Fault::none, .motor = {}};
   const Axis::Output* output = nullptr;
   for (std::uint32_t tick = 1; tick <= 100; ++tick)
-    output = &axis.ISR_tick(setting, input, true, {0.0f, share_of(values)}, tick);
+    output = &axis.ISR_tick(setting, input, {true, 0.0f, share_of(values)}, tick);
   const double limit = double(values.real<"force.limit">());
   const double force = std::clamp(double(values.real<"profile.target_force">()), -limit, limit);
   const double per_newton =

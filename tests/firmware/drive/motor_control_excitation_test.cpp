@@ -19,6 +19,7 @@ using control::test::DcMotor;
 using control::test::SynchronousMotor;
 
 constexpr double turn = 6.283185307179586;
+std::uint32_t tick_number = 0;
 constexpr float supply = 24.0f;
 
 control::TurnFraction fraction(double radians) {
@@ -66,7 +67,7 @@ struct Bench {
   }
 
   void tick(const Excitation::Output& wanted, std::uint32_t position = 0) {
-    force = motor.excite(c, measured(), wanted, position, 0.0f, out);
+    force = motor.excite(c, measured(), wanted, position, 0.0f, ++tick_number, out);
     if (c.kind == MotorKind::dc) {
       dc.run(static_cast<double>(out.duty_b - out.duty_c) * static_cast<double>(supply));
     } else {
@@ -178,12 +179,12 @@ TEST(MotorControlExcitation, TorqueAndPositionAreTheUsualWay) {
     for (std::uint32_t i = 0; i < 50; ++i) {
       const auto shake = static_cast<float>(i % 7) * 0.1f;
       const MotorControl::Measured now{true, supply, 0.5f - shake, shake - 0.4f};
-      by_force.update(c, now, 3.0f, 100 * i, 0.1f, true, a);
+      by_force.update(c, now, 3.0f, 100 * i, 0.1f, true, i, a);
       Excitation::Output wanted = asked(ExcitationKind::torque, a.current_reference);
-      EXPECT_FLOAT_EQ(by_torque.excite(c, now, wanted, 100 * i, 0.1f, b), 3.0f);
+      EXPECT_FLOAT_EQ(by_torque.excite(c, now, wanted, 100 * i, 0.1f, i, b), 3.0f);
       wanted = asked(ExcitationKind::position, 0.0f);
       wanted.force = 3.0f;
-      EXPECT_FLOAT_EQ(by_position.excite(c, now, wanted, 100 * i, 0.1f, p), 3.0f);
+      EXPECT_FLOAT_EQ(by_position.excite(c, now, wanted, 100 * i, 0.1f, i, p), 3.0f);
       for (const auto* out : {&b, &p}) {
         ASSERT_EQ(a.duty_a, out->duty_a);
         ASSERT_EQ(a.duty_b, out->duty_b);
@@ -211,7 +212,7 @@ TEST(MotorControlExcitation, NoOpenPhaseIsToldWhereTheCurrentIsNotKnown) {
       for (int i = 0; i < 5000; ++i) {
         // Flows and vanishes within a sample as well.
         const auto sample = i % 100 < 50 ? now : MotorControl::Measured{true, supply, 0.0f, 0.0f};
-        motor.excite(c, sample, asked(ExcitationKind::voltage, 5.0f, 0.0f, 0.3), 0, 0.0f, out);
+        motor.excite(c, sample, asked(ExcitationKind::voltage, 5.0f, 0.0f, 0.3), 0, 0.0f, ++tick_number, out);
         ASSERT_EQ(out.fault, Fault::none) << i;
       }
     }
@@ -234,13 +235,14 @@ TEST(MotorControlExcitation, AnOpenPhaseIsToldWhereASteadyCurrentIsAsked) {
       const auto wanted = asked(steady, 2.0f, 0.0f, 0.3);
       ASSERT_TRUE(bench.run(wanted, 300, 100));
       const MotorControl::Measured cut{true, supply, 0.0f, 0.0f};
-      bench.motor.excite(bench.c, cut, wanted, 100, 0.0f, bench.out);
+      for (int i = 0; i < 37 && bench.out.fault == Fault::none; ++i)
+        bench.motor.excite(bench.c, cut, wanted, 100, 0.0f, ++tick_number, bench.out);
       EXPECT_EQ(bench.out.fault, Fault::phase_open);
       // And where it never came.
       MotorControl motor;
       MotorControl::Output out;
       for (int i = 0; i < 100 && out.fault == Fault::none; ++i)
-        motor.excite(bench.c, cut, wanted, 100, 0.0f, out);
+        motor.excite(bench.c, cut, wanted, 100, 0.0f, ++tick_number, out);
       EXPECT_EQ(out.fault, Fault::phase_open);
     }
   }
@@ -257,7 +259,8 @@ TEST(MotorControlExcitation, OverCurrentAndLeakageAreWatchedWithAVoltageToo) {
   MotorControl motor;
   MotorControl::Output out;
   for (int i = 0; i < 200 && out.fault == Fault::none; ++i)
-    motor.excite(c, {true, supply, 2.0f, -0.5f}, asked(ExcitationKind::voltage, 1.0f), 0, 0.0f, out);
+    motor.excite(c, {true, supply, 2.0f, -0.5f}, asked(ExcitationKind::voltage, 1.0f), 0, 0.0f, ++tick_number,
+                 out);
   EXPECT_EQ(out.fault, Fault::current_sum);
 }
 
@@ -320,7 +323,8 @@ TEST(MotorControlExcitation, ForceMadeByAVectorInTheStatorIsItsPartAcrossTheRoto
     const double alpha = 2.0 * std::cos(angle), beta = 2.0 * std::sin(angle);
     const MotorControl::Measured now{true, supply, static_cast<float>(-alpha / 2 + std::sqrt(3.0) / 2 * beta),
                                      static_cast<float>(-alpha / 2 - std::sqrt(3.0) / 2 * beta)};
-    EXPECT_EQ(motor.excite(c, now, asked(ExcitationKind::voltage, 1.6f, 0.0f, angle), position, 0.0f, out),
+    EXPECT_EQ(motor.excite(c, now, asked(ExcitationKind::voltage, 1.6f, 0.0f, angle), position, 0.0f,
+                           ++tick_number, out),
               0.0f);
     EXPECT_NEAR(static_cast<double>(out.current), 2.0, 1e-3);
     EXPECT_NEAR(static_cast<double>(out.force_made), 6.0 * std::sin(ahead), 5e-3) << ahead;
@@ -331,9 +335,10 @@ TEST(MotorControlExcitation, WithoutMeasuredCurrentsOnlyWhatNeedsNoneIsMade) {
   const auto c = MotorControl::prepare(configuration(MotorKind::pmsm));
   MotorControl motor;
   MotorControl::Output out;
-  EXPECT_FLOAT_EQ(motor.excite(c, {}, asked(ExcitationKind::torque, 1.0f), 0, 0.0f, out), 3.0f);
+  EXPECT_FLOAT_EQ(motor.excite(c, {}, asked(ExcitationKind::torque, 1.0f), 0, 0.0f, ++tick_number, out),
+                  3.0f);
   EXPECT_FLOAT_EQ(out.force_made, 3.0f);
-  EXPECT_EQ(motor.excite(c, {}, asked(ExcitationKind::voltage, 1.0f), 0, 0.0f, out), 0.0f);
+  EXPECT_EQ(motor.excite(c, {}, asked(ExcitationKind::voltage, 1.0f), 0, 0.0f, ++tick_number, out), 0.0f);
   EXPECT_EQ(out.force_made, 0.0f);
   EXPECT_EQ(out.duty_b, 0.5f);
   EXPECT_EQ(out.current_reference, 0.0f);
@@ -348,18 +353,18 @@ TEST(MotorControlExcitation, WhatIsNotANumberIsAFaultAndNoVoltage) {
       for (const float bad : {nan, 0.0f}) {
         MotorControl motor;
         MotorControl::Output out;
-        motor.excite(c, {true, bad, 0.1f, 0.1f}, asked(kind, 1.0f), 0, 0.0f, out);
+        motor.excite(c, {true, bad, 0.1f, 0.1f}, asked(kind, 1.0f), 0, 0.0f, ++tick_number, out);
         EXPECT_EQ(out.fault, Fault::not_finite) << static_cast<int>(kind) << " supply " << bad;
         EXPECT_EQ(out.duty_b, 0.5f);
       }
       MotorControl motor;
       MotorControl::Output out;
-      motor.excite(c, {true, supply, nan, 0.1f}, asked(kind, 1.0f), 0, 0.0f, out);
+      motor.excite(c, {true, supply, nan, 0.1f}, asked(kind, 1.0f), 0, 0.0f, ++tick_number, out);
       EXPECT_NE(out.fault, Fault::none);
       auto wanted = asked(kind, 0.0f);
       wanted.force = nan;
       MotorControl other;
-      other.excite(c, {true, supply, 0.0f, 0.0f}, wanted, 0, 0.0f, out);
+      other.excite(c, {true, supply, 0.0f, 0.0f}, wanted, 0, 0.0f, ++tick_number, out);
       EXPECT_EQ(out.fault, kind == ExcitationKind::position ? Fault::not_finite : Fault::none);
     }
   }
@@ -377,7 +382,7 @@ TEST(MotorControlExcitation, ItsFlagsGoWhenTheAxisIsNotDriven) {
   wanted.finished = true;
   bench.tick(wanted);
   EXPECT_TRUE(bench.out.excitation_finished);
-  bench.motor.update(bench.c, bench.measured(), 0.0f, 0, 0.0f, false, bench.out);
+  bench.motor.update(bench.c, bench.measured(), 0.0f, 0, 0.0f, false, ++tick_number, bench.out);
   EXPECT_FALSE(bench.out.excitation_finished);
 }
 

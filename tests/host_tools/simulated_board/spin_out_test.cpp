@@ -42,10 +42,10 @@ class SpinOut {
     setting_.motor = firmware::MotorControl::prepare(motor);
     control::MotionPlausibilityConfig<float> plausibility{.mass = static_cast<float>(axis.device.mass),
                                                           .hand_force = hand_force};
-    setting_.plausibility =
-        control::MotionPlausibility<float>::prepare(plausibility, static_cast<float>(tick));
+    setting_.plausibility = control::MotionPlausibility<float>::prepare(
+        plausibility, static_cast<float>(firmware::Axis::motion_look * tick));
     setting_.watch_motion = true;
-    setting_.supply_voltage_max = 100.0f;
+    setting_.supply = firmware::SupplyWindow(0.0f, 100.0f);
     setting_.encoder_direction = wrong.reversed ? -1 : 1;
     setting_.generation = 1;
   }
@@ -98,7 +98,8 @@ class SpinOut {
       in.motor = {true, static_cast<float>(supply.voltage()),
                   static_cast<float>((pin(Channel::b) - zero_b) * per_volt),
                   static_cast<float>((pin(Channel::c) - zero_c) * per_volt)};
-      const auto& out = axis.ISR_tick(setting_, in, true, {.from_axes = static_cast<float>(force)}, n);
+      const auto& out =
+          axis.ISR_tick(setting_, in, {.enable = true, .from_axes = static_cast<float>(force)}, n);
       if (axis.ISR_fault() != Fault::none) return {axis.ISR_fault(), n * tick, drive.handle().position()};
       const auto leg = [&](float duty) { return simulation::LegCommand{true, static_cast<double>(duty)}; };
       simulation::InverterCommand next = command;

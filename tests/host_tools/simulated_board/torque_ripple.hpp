@@ -192,7 +192,7 @@ class Rig {
     config.velocity.bandwidth = 30.0f;
     config.force.ramp_time = 0.0f;
     setting_.haptic = control::HapticLoop<float>::prepare(config, 0);
-    setting_.supply_voltage_max = 100.0f;
+    setting_.supply = firmware::SupplyWindow(0.0f, 100.0f);
     setting_.generation = 1;
   }
 
@@ -258,8 +258,8 @@ class Rig {
     in.count = static_cast<std::uint32_t>(count());
     in.count_valid = true;
     in.motor = {true, static_cast<float>(supply_.voltage()), amperes(0), amperes(1)};
-    const auto& out =
-        controlled_.ISR_tick(setting_, in, true, {.from_axes = static_cast<float>(asked_force)}, ticks_++);
+    const auto& out = controlled_.ISR_tick(
+        setting_, in, {.enable = true, .from_axes = static_cast<float>(asked_force)}, ticks_++);
     if (controlled_.ISR_fault() != firmware::Fault::none) {
       throw std::runtime_error("the axis has tripped: fault " +
                                std::to_string(static_cast<int>(controlled_.ISR_fault())));
