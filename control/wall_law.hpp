@@ -59,8 +59,9 @@ struct WallLawConfig {
 /// to the largest number (the force limiter downstream is what bounds it to something sensible). A NaN
 /// passes through as a NaN: HapticLoop turns it into zero force and a fault.
 ///
-/// Cost on a Cortex-M4F, executed instructions: adaptive at most 95 (85 as configured by default), where K
-/// grows 118; one division outside (tests/benchmarks/instruction_budget counts them).
+/// Cost on a Cortex-M4F, executed instructions: adaptive 69 as configured by default, at most 120, where the
+/// force overflows, and 143 where K grows as well; one division outside (tests/benchmarks/instruction_budget
+/// counts them).
 template <typename Scalar>
 class WallLaw {
  public:

@@ -16,6 +16,7 @@
 
 #include "board/odrive_v3/description.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
+#include "firmware/application.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
@@ -112,6 +113,8 @@ class Recorder {
   }
 
   void start() { recording_ = true; }
+  /// Instructions outside all interrupts.
+  std::uint64_t main_loop() const { return main_loop_; }
   std::vector<Tick> take() {
     // The axes are an array: axis 0 lies lowest.
     std::uint32_t lowest = UINT32_MAX;
@@ -133,22 +136,34 @@ class Recorder {
     // The first block behind the tick closes it.
     if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
     open_ = open_ && exceptions.active(conversions);
-    if (ticks_.empty() || !exceptions.active(conversions)) return;
+    if (ticks_.empty()) return;
+    if (!exceptions.any_active()) main_loop_ += instructions_in(address, size);
+    if (!exceptions.active(conversions)) return;
     if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
         exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
       return;
     Tick& tick = ticks_.back();
     if (address == axis_tick_) tick.object = board_.processor().core_register(0);
-    for (std::uint32_t at = address; at < address + size;) {
-      tick.addresses.push_back(at);
-      at += is_wide(half_word_at(board_.bus(), at)) ? 4 : 2;
-    }
+    each_instruction(address, size, [&tick](std::uint32_t at) { tick.addresses.push_back(at); });
+  }
+
+  template <typename Use>
+  void each_instruction(std::uint32_t address, std::uint32_t size, Use use) {
+    for (std::uint32_t at = address; at < address + size;
+         at += is_wide(half_word_at(board_.bus(), at)) ? 4 : 2)
+      use(at);
+  }
+  std::uint64_t instructions_in(std::uint32_t address, std::uint32_t size) {
+    std::uint64_t& known = lengths_[address];
+    if (known == 0) each_instruction(address, size, [&known](std::uint32_t) { ++known; });
+    return known;
   }
 
   VirtualBoard& board_;
   std::uint32_t handler_, axis_tick_;
   bool recording_ = false, open_ = false;
-  std::uint64_t waits_before_ = 0;
+  std::uint64_t waits_before_ = 0, main_loop_ = 0;
+  std::map<std::uint32_t, std::uint64_t> lengths_;  ///< of the main loop's blocks, instructions
   std::vector<Tick> ticks_;
 };
 
@@ -156,8 +171,14 @@ class Recorder {
 constexpr std::uint32_t exception_cycles = 12 + 12 + 2 * 17;
 
 struct StepSum {
-  std::uint64_t ticks = 0, instructions = 0, cycles = 0;
+  std::uint64_t ticks = 0, instructions = 0, cycles = 0, waits = 0;
   std::uint32_t worst = 0, worst_cycles = 0;
+};
+
+/// Of a step in one tick; waits are those for flash.
+struct StepInTick {
+  std::uint32_t instructions = 0, cycles = 0;
+  std::uint64_t waits = 0;
 };
 
 /// A file that goes away with its name.
@@ -220,6 +241,19 @@ std::map<std::uint32_t, std::vector<std::string>> inline_frames(const std::strin
   return frames;
 }
 
+/// What was not measured keeps every bound. Throws std::runtime_error when an axis has ticked less often than
+/// in `seconds` it must.
+void require_all_ticks(const std::vector<Tick>& ticks, double seconds) {
+  const double due = seconds * board::odrive_v3::description.pwm_hz();
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+    const auto made =
+        std::count_if(ticks.begin(), ticks.end(), [axis](const Tick& tick) { return tick.axis == axis; });
+    if (static_cast<double>(made) < due - 2.0)
+      throw std::runtime_error(
+          fmt::format("axis {} has ticked {} times in {} s instead of {:.0f}", axis, made, seconds, due));
+  }
+}
+
 }  // namespace
 
 bool BudgetReport::kept() const {
@@ -247,13 +281,15 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) link.arm(axis);
   recorder.start();
   // The approach, the contact and some of the hold.
-  board.run_for(0.3);
+  constexpr double measured = 0.3;  // s
+  board.run_for(measured);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (!board.bridge_armed(axis))
       throw std::runtime_error(fmt::format("axis {} has tripped during the measurement", axis));
   }
   std::vector<Tick> ticks = recorder.take();
   if (!ticks.empty()) ticks.pop_back();  // not over
+  require_all_ticks(ticks, measured);
 
   std::set<std::uint32_t> unique;
   for (const Tick& tick : ticks) unique.insert(tick.addresses.begin(), tick.addresses.end());
@@ -276,37 +312,41 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   std::array<Waits, 2> waits{};
   std::array<std::uint32_t, 2> estimate_worst{};
   for (const Tick& tick : ticks) {
-    std::map<std::string, std::pair<std::uint32_t, std::uint32_t>> in_tick;
+    std::map<std::string, StepInTick> in_tick;
     FlashAccelerator flash;
     std::uint64_t flash_waits = 0, cycles_so_far = 0;
     for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
       const Place& place = places.at(tick.addresses[i]);
       const bool taken = i + 1 < tick.addresses.size() &&
                          tick.addresses[i + 1] != tick.addresses[i] + place.instruction.bytes;
-      auto& [instructions, cycles] = in_tick[place.step];
-      ++instructions;
+      StepInTick& step = in_tick[place.step];
+      ++step.instructions;
       const std::uint32_t its_cycles =
           place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
-      cycles += its_cycles;
+      step.cycles += its_cycles;
+      const std::uint64_t waits_before = flash_waits;
       flash_waits += flash.fetch(tick.addresses[i], place.instruction.bytes, cycles_so_far + flash_waits);
       const auto& memory = place.instruction.memory;
       if (memory && memory->base == MemoryOperand::no_register && memory_map::flash.contains(memory->offset))
         flash_waits += flash.load(memory->offset, cycles_so_far + flash_waits);
+      step.waits += flash_waits - waits_before;
       cycles_so_far += its_cycles;
     }
     std::uint32_t cycles_of_tick = exception_cycles;
     for (const auto& [step, cost] : in_tick) {
-      cycles_of_tick += cost.second;
+      cycles_of_tick += cost.cycles;
       StepSum& sum = sums[step];
       ++sum.ticks;
-      sum.instructions += cost.first;
-      sum.cycles += cost.second;
-      sum.worst = std::max(sum.worst, cost.first);
-      sum.worst_cycles = std::max(sum.worst_cycles, cost.second);
+      sum.instructions += cost.instructions;
+      sum.cycles += cost.cycles;
+      sum.waits += cost.waits;
+      sum.worst = std::max(sum.worst, cost.instructions);
+      sum.worst_cycles = std::max(sum.worst_cycles, cost.cycles);
     }
     std::uint32_t estimate = 0;
     for (const char* step : {"position", "re-sampling", "velocity (FOAW)"}) {
-      if (const auto found = in_tick.find(step); found != in_tick.end()) estimate += found->second.first;
+      if (const auto found = in_tick.find(step); found != in_tick.end())
+        estimate += found->second.instructions;
     }
     const std::size_t axis = tick.axis & 1U;
     estimate_worst[axis] = std::max(estimate_worst[axis], estimate);
@@ -317,6 +357,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     ++total.ticks;
     total.instructions += tick.addresses.size();
     total.cycles += cycles_of_tick;
+    total.waits += flash_waits + tick.register_waits;
     total.worst = std::max(total.worst, static_cast<std::uint32_t>(tick.addresses.size()));
     total.worst_cycles = std::max(total.worst_cycles, cycles_of_tick);
   }
@@ -326,7 +367,8 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   const auto add = [&report](const std::string& name, const StepSum& sum) {
     const auto count = static_cast<double>(std::max<std::uint64_t>(1, sum.ticks));
     report.steps.push_back({name, sum.ticks, sum.worst, static_cast<double>(sum.instructions) / count,
-                            static_cast<double>(sum.cycles) / count, sum.worst_cycles});
+                            static_cast<double>(sum.cycles) / count, sum.worst_cycles,
+                            static_cast<double>(sum.waits) / count});
   };
   std::set<std::string> shown;
   for (const StepPattern& pattern : patterns) {
@@ -339,6 +381,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
 
   const auto worst = [&sums](const char* step) { return static_cast<double>(sums[step].worst); };
   constexpr const board::BoardDescription& of_board = board::odrive_v3::description;
+  const double round_s = firmware::Application::Tick::round_ticks / of_board.pwm_hz();
   const double tick_cycles = of_board.core_clock_hz / of_board.pwm_hz();
   report.lines = {
       {"adaptive wall", worst("adaptive wall"), 90, "instructions", ""},
@@ -351,6 +394,8 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
        100.0 * static_cast<double>(totals[0].worst_cycles + totals[1].worst_cycles) / tick_cycles, 25,
        fmt::format("% of {:.0f} MHz", of_board.core_clock_hz * 1e-6),
        "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
+      {fmt::format("main loop without traffic, {:.0f} us", round_s * 1e6),
+       static_cast<double>(recorder.main_loop()) * round_s / measured, 1200, "instructions", ""},
   };
   for (std::size_t axis = 0; axis < totals.size(); ++axis) {
     const auto share = [&](std::uint64_t of_all) {
@@ -366,12 +411,12 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
 }
 
 std::string budget_table(const BudgetReport& report) {
-  std::string text = fmt::format("{:<34} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "step of the tick", "ticks",
-                                 "worst", "mean", "cycles", "worst");
-  text += fmt::format("{:<34} {:>8} {:>17} {:>17}\n", "", "", "instructions", "modelled");
+  std::string text = fmt::format("{:<31} {:>6} {:>6} {:>7} {:>7} {:>6} {:>8}\n", "step of the tick", "ticks",
+                                 "worst", "mean", "cycles", "worst", "waits");
+  text += fmt::format("{:<31} {:>6} {:>14} {:>14} {:>8}\n", "", "", "instructions", "without waits", "mean");
   for (const StepCost& step : report.steps) {
-    text += fmt::format("{:<34} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>8}\n", step.name, step.ticks, step.worst,
-                        step.mean, step.mean_cycles, step.worst_cycles);
+    text += fmt::format("{:<31} {:>6} {:>6} {:>7.1f} {:>7.1f} {:>6} {:>8.1f}\n", step.name, step.ticks,
+                        step.worst, step.mean, step.mean_cycles, step.worst_cycles, step.mean_waits);
   }
   text += "\nbudget\n";
   for (const BudgetLine& line : report.lines) {
@@ -405,7 +450,8 @@ std::string budget_json(const BudgetReport& report) {
                                  {"worst_instructions", step.worst},
                                  {"mean_instructions", step.mean},
                                  {"mean_cycles", step.mean_cycles},
-                                 {"worst_cycles", step.worst_cycles}});
+                                 {"worst_cycles", step.worst_cycles},
+                                 {"mean_waits", step.mean_waits}});
   }
   for (const BudgetLine& line : report.lines) {
     document["budget"].push_back({{"name", line.name},

@@ -17,6 +17,7 @@ struct StepCost {
   double mean = 0.0;               ///< instructions
   double mean_cycles = 0.0;        ///< modelled; see instruction.hpp
   std::uint32_t worst_cycles = 0;  ///< likewise
+  double mean_waits = 0.0;         ///< cycles for flash; of a whole tick for the buses as well
 };
 
 /// A bound, and what is held against it.
@@ -51,7 +52,7 @@ struct BudgetReport {
 /// An instruction belongs to the innermost function that names a step, by the debug information of the image:
 /// what the compiler has inlined is told apart too, and what it has moved between two functions goes where it
 /// says it came from. Needs arm-none-eabi-addr2line. Throws std::runtime_error when that is missing, when the
-/// axes cannot be armed, or when an axis trips.
+/// axes cannot be armed, when an axis trips, or when one does not tick as often as it must.
 BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene,
                             const VirtualBoardConfig& config);
 

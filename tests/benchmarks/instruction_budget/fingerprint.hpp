@@ -119,7 +119,8 @@ class Fingerprint {
       for (const float number :
            {b.duty_a, b.duty_b, b.duty_c, b.current_d, b.current_q, b.voltage_d, b.voltage_q})
         add(number);
-      const auto phases = b.not_finite ? control::PhaseCurrents<float>{} : FieldOriented::phase_references(in);
+      const auto phases =
+          b.not_finite ? control::PhaseCurrents<float>{} : FieldOriented::phase_references(in);
       for (const float number : {phases.a, phases.b, phases.c}) add(number);
       const auto open =
           FieldOriented::voltage(FieldOriented::prepare(config, 5e-5F), in, in.reference_d, in.reference_q);
