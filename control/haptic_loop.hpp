@@ -170,6 +170,7 @@ class HapticLoop {
     const Motion motion = observe(c, count);
     show({.inside = !(motion.outside_distance > Scalar(0))}, {});
     detector_.reset();
+    held_.unstable = false;
     if (!is_sound(c, force)) [[unlikely]]
       name_fault(force);
     limit(c, force, enabled);

@@ -52,17 +52,20 @@ struct MotionPlausibilityConfig {
 /// force that is only asked for would be missed as energy. Where the axis is not driven call follow()
 /// instead, and reset() when the counts get another origin.
 ///
+/// An axis calls it at every eighth tick: the coarser a call, the finer the difference of counts, 0.14 m/s a
+/// count above, and the later a trip, by 0.35 ms at most.
+///
 /// A NaN trips. Cost, executed on a Cortex-M4F: 47 instructions.
 template <typename Scalar>
 class MotionPlausibility {
  public:
   /// Energies are kept as 2 / mass times themselves, m2/s2, impulses as 1 / mass: fewer instructions.
   struct Coefficients {
-    Scalar smoothing{};     ///< share of the difference, per tick
-    Scalar acceleration{};  ///< m/s for 1 N in a tick: period / mass
-    Scalar hand{};          ///< m/s for hand_force in a tick
+    Scalar smoothing{};     ///< share of the difference, per call
+    Scalar acceleration{};  ///< m/s for 1 N between calls: period / mass
+    Scalar hand{};          ///< m/s for hand_force between calls
     Scalar returned{};      ///< of the kinetic energy, in E
-    Scalar kept{};          ///< of E, per tick
+    Scalar kept{};          ///< of E, per call
     Scalar floor{};         ///< m2/s2, E's least above the present energy: no denormal numbers
     Scalar lowest{};        ///< m2/s2, < 0: trips below
     Scalar half_mass{};     ///< kg
@@ -85,7 +88,7 @@ class MotionPlausibility {
   /// As if at rest.
   void reset() { *this = {}; }
 
-  /// One tick in which the axis is not driven: follows the velocity and judges nothing, so that arming a
+  /// A call in which the axis is not driven: follows the velocity and judges nothing, so that arming a
   /// handle on the move is no surprise. Takes a velocity that is not finite as 0.
   void follow(const Coefficients& c, Scalar velocity) {
     velocity_ += c.smoothing * (velocity - velocity_);
@@ -95,8 +98,8 @@ class MotionPlausibility {
     reserve_ = energy_;
   }
 
-  /// One tick. `force`: N along +x that acts. `velocity`: m/s. True: implausible. To latch that is the
-  /// caller's business.
+  /// `force`: N along +x that acts, `velocity`: m/s, both means since the last call. True: implausible. To
+  /// latch that is the caller's business.
   bool update(const Coefficients& c, Scalar force, Scalar velocity) {
     const Scalar before = velocity_;
     const Scalar step = c.smoothing * (velocity - before);
@@ -117,7 +120,7 @@ class MotionPlausibility {
 
  private:
   Scalar velocity_{};  // m/s, smoothed
-  Scalar gain_{};      // m/s that the force gives in a tick, smoothed
+  Scalar gain_{};      // m/s that the force gives between calls, smoothed
   Scalar energy_{};    // E
   Scalar reserve_{};   // R
 };

@@ -36,10 +36,10 @@ enum class PhaseSum : std::uint8_t {
 /// Over-current is asked of every sample, over_current(); the rest of some, at regular intervals, update():
 ///
 /// Open phase: the reference asks a phase for more than `present`, and less than `absent` is measured in it,
-/// for more than `patience` looks: five time constants of the current loop, at least 1 ms. It is not judged
-/// while `slow` is false: a fast motor's back-EMF may hold the current down, and a glitch of the encoder,
-/// which looks like speed, makes the feed-forward throw the current about. present = max(0.25 A, 5 % of
-/// current_limit), absent = present / 3: below that a phase can open unnoticed.
+/// for more than `patience` looks: five time constants of the current loop in whole looks, at least 1 ms. It
+/// is not judged while `slow` is false: a fast motor's back-EMF may hold the current down, and a glitch of
+/// the encoder, which looks like speed, makes the feed-forward throw the current about. present = max(0.25 A,
+/// 5 % of current_limit), absent = present / 3: below that a phase can open unnoticed.
 ///
 /// Sum: |a + b + c| above 10 % of current_limit plus 0.25 A in more than `patience` looks in a row, at any
 /// speed. Current then leaks to ground or the supply, or a sensor shows what does not flow. The 10 % leave

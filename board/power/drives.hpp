@@ -261,6 +261,8 @@ inline const firmware::AxisInput& Drives<Hardware>::ISR_measure(std::size_t inde
   // 2 triggers are 50 us: the converter of supply and temperatures stands still.
   if (!sample.valid || sample.slow_age > 2) [[unlikely]] {
     condition = firmware::Fault::tick_missed;
+    // What is read then is of nobody.
+    if (!sample.valid) samples_.ISR_invalidate(index);
   } else if (supply_.saturated(sample.supply)) [[unlikely]] {
     condition = firmware::Fault::over_voltage;
   } else if (axis.sensors.ISR_saturated(sample.phase_b, sample.phase_c)) [[unlikely]] {

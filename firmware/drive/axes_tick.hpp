@@ -77,9 +77,13 @@ class AxesTick {
     if (traced == trace_axis_.load(std::memory_order_relaxed) &&
         interval == trace_interval_.load(std::memory_order_relaxed))
       return;
-    trace_axis_.store(traced, std::memory_order_relaxed);
+    // The axis last: no record of the new one by the old interval.
+    trace_axis_.store(no_axis, std::memory_order_relaxed);
+    std::atomic_signal_fence(std::memory_order_seq_cst);
     trace_interval_.store(interval, std::memory_order_relaxed);
     trace_starts_.store(trace_starts_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    trace_axis_.store(traced, std::memory_order_relaxed);
   }
   const Trace& trace() const { return trace_; }
   Capture& capture() { return capture_; }

@@ -105,8 +105,10 @@ void Axis::take_change(std::uint32_t state) {
 
 /// As after power-up, for the estimators and for what the main loop has heard.
 void Axis::start_afresh() {
-  // In step with the ticks, so that the detector of a fast loop looks when no other slow watch does.
+  // In step with the ticks, so that the detector of a fast loop looks in every fourth of them.
+  const std::uint32_t counted = loop_.samples();
   loop_.reset(tick_ - 1);
+  armed_from_ += loop_.samples() - counted;
   plausibility_.reset();
   looked_from_ = low_word(extender_.count());
   state_ |= unreported_bit;

@@ -25,9 +25,10 @@ enum class DriveMode : std::uint8_t {
 class SupplyWindow {
  public:
   constexpr SupplyWindow() : SupplyWindow(0.0f, 0.0f) {}
-  /// V, 0 <= low <= high.
+  /// V, 0 <= low <= high; of anything else no voltage is within.
   constexpr SupplyWindow(float low, float high)
-      : low_(std::bit_cast<std::uint32_t>(low)), width_(std::bit_cast<std::uint32_t>(high) - low_) {}
+      : low_(low >= 0.0f && low <= high ? std::bit_cast<std::uint32_t>(low + 0.0f) : beyond_all),
+        width_(low_ == beyond_all ? 0 : std::bit_cast<std::uint32_t>(high) - low_) {}
   constexpr bool contains(float voltage) const {
     return std::bit_cast<std::uint32_t>(voltage) - low_ <= width_;
   }
@@ -36,6 +37,8 @@ class SupplyWindow {
   constexpr float high() const { return std::bit_cast<float>(low_ + width_); }
 
  private:
+  static constexpr std::uint32_t beyond_all = 0xFFFFFFFFU;  // no number
+
   std::uint32_t low_, width_;
 };
 
@@ -246,7 +249,7 @@ class Axis {
   std::uint32_t tick_ = 0, generation_ = 0;
   std::uint32_t reference_generation_ = no_reference;
   Fault trip_ = Fault::none;
-  std::uint32_t state_ = 0;    ///< of the last tick, see state_word
+  std::uint32_t state_ = 0;    ///< of the last tick, laid out as above
   std::uint32_t changes_ = 0;  ///< its bits that the last tick has changed
   control::CountExtender<std::uint32_t> extender_;
   float forces_made_ = 0.0f;       ///< N, the sum since the last look at the motion

@@ -112,8 +112,7 @@ class MotorControl {
   /// `force`: N at the handle. `position`: counts, low 32 bits, direction and offset applied. `velocity`: m/s
   /// of the handle. Not driving: no reference, controllers wound back, the measured current still reported.
   /// `tick`: its number, by which what is slow takes turns: phases that are open or leak are looked for in
-  /// every phase_look-th tick, and the square of the current is taken in every square_look-th on average, so
-  /// that no tick pays for both.
+  /// one of phase_look ticks, and the square of the current is taken in one of square_look.
   void update(const Coefficients& c, const Measured& measured, float force, std::uint32_t position,
               float velocity, bool driving, std::uint32_t tick, Output& out);
   static constexpr std::uint32_t phase_look = 4, square_look = 8;  ///< powers of two
@@ -170,7 +169,9 @@ class MotorControl {
   static void take(const FieldOriented::Output& made, Output& out);
   [[gnu::noinline, gnu::cold]] void report_fault(control::PhaseCondition condition, const Coefficients& c,
                                                  const Measured& measured, Output& out);
-  static constexpr bool looks_at_phases(std::uint32_t tick) { return tick % phase_look == 2; }
+  /// Ticks 2 and 7 of eight, in which no other watch looks. Not a whole number of quarters of eight apart: of
+  /// a current that alternates in step with the looks, both would find the zero on its way to the other side.
+  static constexpr bool looks_at_phases(std::uint32_t tick) { return tick % 8 == 2 || tick % 8 == 7; }
   /// Not always the same tick of eight: a current that alternates from tick to tick would be seen at one of
   /// its values alone. Over 64 ticks each of the eight has its turn.
   static constexpr bool looks_at_square(std::uint32_t tick) {

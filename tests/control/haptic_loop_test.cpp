@@ -451,6 +451,14 @@ TEST(HapticLoop, NoWallIsWatchedWhereItFollows) {
   }
 }
 
+TEST(HapticLoop, WhatWasUnstableIsNoLongerWhereItFollows) {
+  const auto c = HapticLoop<float>::prepare(watched_wall(InstabilityAction::warn), 0);
+  HapticLoop<float> loop;
+  for (int tick = 0; tick < in_time; ++tick) loop.tick(c, swinging(tick), true);
+  ASSERT_TRUE(loop.output().unstable);
+  EXPECT_FALSE(loop.follow(c, 0, true, 0.0f).unstable);
+}
+
 TEST(HapticLoop, AResetForgetsTheOscillationAndTheSoftening) {
   Loop<float> loop(watched_wall(InstabilityAction::soften));
   for (int tick = 0; tick < 2 * in_time; ++tick) loop.at(swinging(tick));

@@ -129,6 +129,24 @@ TEST_F(AxisTest, SamplesAreCountedFromArmingAndKeptAfterwards) {
   EXPECT_EQ(axis.ISR_report().limited_samples, 0u);
 }
 
+// A new start of the estimators numbers the loop's samples anew; those since arming stay what they are.
+TEST_F(AxisTest, ANewStartLosesNoSamplesOfTheArming) {
+  setting.haptic.divider = 2;
+  for (int i = 0; i < 1001; ++i) tick(at(1000), false);
+  for (int i = 0; i < 20; ++i) tick(at(1000), true);
+  ASSERT_EQ(axis.ISR_report().armed_samples, 10u);
+  // Another origin while armed: it trips, and starts afresh, with a sample at once.
+  Axis::Input moved{at(1000), true};
+  moved.reference_generation = 1;
+  axis.ISR_tick(setting, moved, {.enable = true}, ++ticks);
+  ASSERT_EQ(axis.ISR_report().fault, Fault::encoder);
+  EXPECT_EQ(axis.ISR_report().armed_samples, 11u);
+  // And with new settings in the tick that disarms it.
+  setting.generation = 2;
+  axis.ISR_tick(setting, moved, {}, ++ticks);
+  EXPECT_EQ(axis.ISR_report().armed_samples, 11u);
+}
+
 TEST(AxisPosition, OffsetAndDirectionWithoutOverflow) {
   AxisSetting setting;
   setting.encoder_offset = std::numeric_limits<std::int32_t>::min();
@@ -302,6 +320,27 @@ TEST(AxisSetting, ItsDefaults) {
   EXPECT_EQ(defaults.mode, DriveMode::haptic);
   EXPECT_FALSE(defaults.watch_motion);
   EXPECT_TRUE(defaults.commutated);
+}
+
+TEST(SupplyWindow, HasWhatIsBetweenItsEndsAndNothingIfTheyAreTheWrongWayRound) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const SupplyWindow window(8.0f, 26.0f);
+  for (const float inside : {8.0f, 12.0f, 26.0f}) EXPECT_TRUE(window.contains(inside)) << inside;
+  for (const float outside : {7.999f, 26.001f, 0.0f, -0.0f, -12.0f, nan, -nan, 1e30f})
+    EXPECT_FALSE(window.contains(outside)) << outside;
+  EXPECT_TRUE(window.is_below(26.001f));
+  EXPECT_FALSE(window.is_below(7.0f));
+  EXPECT_FALSE(window.is_below(nan));
+  const SupplyWindow from_zero(-0.0f, 26.0f);
+  EXPECT_TRUE(from_zero.contains(0.0f));
+  EXPECT_FALSE(from_zero.contains(-1.0f));
+  for (const SupplyWindow& none : {SupplyWindow(26.0f, 8.0f), SupplyWindow(-1.0f, 8.0f),
+                                   SupplyWindow(nan, 8.0f), SupplyWindow(8.0f, nan)}) {
+    for (const float voltage : {-1.0f, 0.0f, 8.0f, 12.0f, 26.0f, 1e30f, nan}) {
+      EXPECT_FALSE(none.contains(voltage)) << voltage;
+      EXPECT_FALSE(none.is_below(voltage)) << voltage;
+    }
+  }
 }
 
 TEST(AxisCommand, ItsDefaults) {
