@@ -74,26 +74,25 @@ template <typename Scalar, typename Number>
 control::StabilityCase<Scalar> stability_case(const ParameterValues& values, std::size_t axis,
                                               Number number) {
   control::StabilityCase<Scalar> judged;
-  const auto has_wall = [&](float largest_coefficient) {
-    judged.stiffness = number(values.real<"wall.stiffness">(axis));
-    judged.wall_damping = number(values.real<"wall.damping">(axis));
-    judged.magnetic_coefficient = number(largest_coefficient);
-  };
   const auto wall = wall_configuration<float>(values, axis);
   // All of them, and no default: a law that nobody has thought of here does not compile.
+  float largest_coefficient = 0.0f;
   switch (wall.kind) {
     case control::WallKind::none:
-      break;
     case control::WallKind::plain:
-      has_wall(0.0f);
       break;
     case control::WallKind::magnetic:
-      has_wall(wall.magnetic_coefficient);
+      largest_coefficient = wall.magnetic_coefficient;
       break;
     case control::WallKind::adaptive:
       // The period matters for the decay only.
-      has_wall(control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most);
+      largest_coefficient = control::AdaptiveCoefficient<float>::prepare(wall.adaptive, 1.0f).most;
       break;
+  }
+  if (wall.kind != control::WallKind::none) {
+    judged.stiffness = number(values.real<"wall.stiffness">(axis));
+    judged.wall_damping = number(values.real<"wall.damping">(axis));
+    judged.magnetic_coefficient = number(largest_coefficient);
   }
   const double count = count_length(values, axis);
   judged.magnetic_length = number(wall.magnetic_length);

@@ -71,8 +71,6 @@ class ExceptionTable {
 
   bool pending(unsigned exception) const { return get(pending_, exception); }
   bool active(unsigned exception) const { return get(active_, exception); }
-  /// False: thread mode.
-  bool any_active() const { return active_count_ != 0; }
   bool enabled(unsigned exception) const { return get(enabled_, exception); }
   std::uint8_t priority(unsigned exception) const { return priority_[exception]; }
   unsigned priority_group() const { return group_; }

@@ -137,7 +137,8 @@ class Recorder {
     if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
     open_ = open_ && exceptions.active(conversions);
     if (ticks_.empty()) return;
-    if (!exceptions.any_active()) main_loop_ += instructions_in(address, size);
+    if (exceptions.execution_level({}) == ExceptionTable::base_level)
+      main_loop_ += instructions_in(address, size);
     if (!exceptions.active(conversions)) return;
     if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
         exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
