@@ -13,6 +13,9 @@ std::uint32_t low_word(std::int64_t count) {
   return static_cast<std::uint32_t>(count);
 }
 
+/// What was summed between two looks at the motion, times this, is the mean of a tick.
+constexpr float per_look_tick = 1.0f / static_cast<float>(Axis::motion_look);
+
 /// An assignment would go around the padding byte by byte; this copies whole words.
 [[gnu::always_inline]] inline void copy_words(void* to, const void* from, std::size_t size) {
   std::memcpy(__builtin_assume_aligned(to, alignof(std::uint32_t)),
@@ -180,8 +183,7 @@ bool Axis::drive(const AxisSetting& setting, const Input& input, std::uint32_t p
   forces_made_ = 0.0f;
   // A force source without a power stage commutates nothing that could run away.
   if (!setting.watch_motion || !input.motor.present) return true;
-  constexpr float per_tick = 1.0f / static_cast<float>(motion_look);
-  if (plausibility_.update(setting.plausibility, per_tick * forces, velocity)) [[unlikely]]
+  if (plausibility_.update(setting.plausibility, per_look_tick * forces, velocity)) [[unlikely]]
     return trip_in_drive(Fault::spin_out, -plausibility_.reserve(setting.plausibility), setting, input);
   return true;
 }
@@ -192,9 +194,8 @@ float Axis::velocity_since_look(const AxisSetting& setting) {
   const std::uint32_t here = low_word(extender_.count());
   const std::uint32_t moved = (here - looked_from_) * static_cast<std::uint32_t>(setting.encoder_direction);
   looked_from_ = here;
-  constexpr float per_tick = 1.0f / static_cast<float>(motion_look);
   return static_cast<float>(static_cast<std::int32_t>(moved)) *
-         (per_tick * setting.haptic.velocity_per_count);
+         (per_look_tick * setting.haptic.velocity_per_count);
 }
 
 /// Excitation, braking, a trip, or nothing at all. True: the axis is driven.

@@ -72,16 +72,17 @@ TEST(PhaseWatch, CurrentThatVanishesIsFoundAfterThePatienceInEachOfThreePhases) 
     expect({}, {{flowing, flowing}, {left, flowing, true, c.patience + 1, open}}, "three phases");
 }
 
-// A force that is gone for two samples and is back, with the fastest loop that can be set: whatever the look
-// falls on, nothing is open.
+// A small force that is gone for three samples and is back, with the fastest loop that can be set: whatever
+// the looks fall on, nothing is open. A verdict by the look before alone says it is.
 TEST(PhaseWatch, AForceThatBlinksIsNoOpenPhase) {
-  for (int phase = 0; phase < 5; ++phase) {
+  for (int period = 4; period <= 13; ++period) {
     Watch watch;
-    float current = 2.0f;
-    for (int i = 0; i < 2000; ++i) {
-      const float reference = i % 5 < 2 ? 0.0f : 2.0f;
-      if (i % 5 == phase) {
-        ASSERT_EQ(watch.update(c, dc(current), dc(reference), true), PhaseCondition::good) << i;
+    float current = 0.3f;
+    for (int tick = 0; tick < 2000; ++tick) {
+      const float reference = tick % period < 3 ? 0.0f : 0.3f;
+      if (tick % 8 == 2 || tick % 8 == 7) {
+        ASSERT_EQ(watch.update(c, dc(current), dc(reference), true), PhaseCondition::good)
+            << period << " " << tick;
       }
       current += 0.54f * (reference - current);
     }

@@ -129,7 +129,8 @@ TEST_F(AxisTest, SamplesAreCountedFromArmingAndKeptAfterwards) {
   EXPECT_EQ(axis.ISR_report().limited_samples, 0u);
 }
 
-// A new start of the estimators numbers the loop's samples anew; those since arming stay what they are.
+// A new start of the estimators gives the loop's samples other numbers; those since arming stay what they
+// are.
 TEST_F(AxisTest, ANewStartLosesNoSamplesOfTheArming) {
   setting.haptic.divider = 2;
   for (int i = 0; i < 1001; ++i) tick(at(1000), false);

@@ -135,6 +135,22 @@ TEST(MotorControl, AnOpenPhaseOfEitherMotorIsNamedAfterThePatience) {
   }
 }
 
+// A force that changes sides in step with the looks: its current goes through zero while all of it is asked
+// for.
+TEST(MotorControl, ACurrentThatAlternatesIsNoOpenPhaseWhereverItsZerosFall) {
+  const auto c = MotorControl::prepare(dc());
+  for (std::uint32_t zero = 0; zero < 4; ++zero) {
+    MotorControl motor;
+    MotorControl::Output out;
+    for (std::uint32_t tick = 0; tick < 400; ++tick) {
+      const float side = (tick - zero) / 4 % 2 == 0 ? 1.0f : -1.0f;
+      const float current = tick % 4 == zero ? 0.0f : 2.0f * side;
+      motor.update(c, measured(current, -current), 6.0f * side, 0, 0.0f, true, tick, out);
+      ASSERT_EQ(out.fault, Fault::none) << zero << " " << tick;
+    }
+  }
+}
+
 TEST(MotorControl, OverCurrentCarriesItsNumber) {
   MotorControl motor;
   const auto out = update(motor, MotorControl::prepare(dc()), measured(-9.0f, 2.0f), 0.0f, 0, 0.0f, true);
