@@ -32,14 +32,20 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
 
 void Application::poll(std::uint32_t now_us) {
   axes_.begin_poll(now_us);
-  log_.count_time(now_us);
-  parameters_.poll(now_us);
-  lock_.poll(now_us);
+  if (now_us - kept_house_us_ >= housekeeping_us) keep_house(now_us);
   serial_.poll(now_us);
   can_.poll();
   axes_.act();
   store_.poll();
   can_.finish_saves();
+}
+
+/// What goes by milliseconds and seconds.
+void Application::keep_house(std::uint32_t now_us) {
+  kept_house_us_ = now_us;
+  log_.count_time(now_us);
+  parameters_.poll(now_us);
+  lock_.poll(now_us);
 }
 
 const LoadReport& Application::attach_store(AnyFlashSectors flash) {

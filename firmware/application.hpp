@@ -9,10 +9,10 @@
 #include "firmware/command/axes.hpp"
 #include "firmware/command/fault_log.hpp"
 #include "firmware/command/host_writes.hpp"
-#include "firmware/command/link_states.hpp"
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/command/store_commands.hpp"
 #include "firmware/command/write_lock.hpp"
+#include "firmware/drive/link_states.hpp"
 #include "firmware/links/canopen_edge.hpp"
 #include "firmware/links/modbus_edge.hpp"
 #include "firmware/links/readings.hpp"
@@ -122,6 +122,9 @@ class Application {
   float ISR_background_force(std::size_t axis) const { return axes_.tick().ISR_background_force(axis); }
 
  private:
+  static constexpr std::uint32_t housekeeping_us = 1'000;
+  [[gnu::cold]] void keep_house(std::uint32_t now_us);
+
   BoardIdentity board_;
   ParameterAccess parameters_;
   StoreCommands store_{parameters_};
@@ -133,6 +136,7 @@ class Application {
   Readings readings_;
   ModbusEdge serial_;
   CanopenEdge can_;
+  std::uint32_t kept_house_us_ = 0;
 };
 
 }  // namespace kmax::firmware

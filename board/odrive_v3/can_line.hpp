@@ -1,8 +1,8 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "drivers/cortex_m/interrupt_controller.hpp"
@@ -34,43 +34,37 @@ class CanLine {
       readings_.transmit_errors = errors.transmit;
       readings_.receive_errors = errors.receive;
       readings_.state = state_of(errors);
+      readings_.received = can_.receive_counters().received;
+      readings_.overruns = can_.receive_counters().overruns;
+      readings_.sent = can_.transmit_counters().sent;
+      readings_.discarded = can_.transmit_counters().discarded;
+      readings_.bus_offs = can_.bus_off_counters().bus_offs;
+      link.set_readings(readings_);
     }
-    readings_.received = can_.receive_counters().received;
-    readings_.overruns = can_.receive_counters().overruns;
-    readings_.sent = can_.transmit_counters().sent;
-    readings_.discarded = can_.transmit_counters().discarded;
-    readings_.bus_offs = can_.bus_off_counters().bus_offs;
-    link.set_readings(readings_);
   }
 
   /// Main loop, after the link's poll().
   void send(firmware::CanopenEdge& link) {
-    const firmware::CanSettings wanted = link.settings();
     const bool again = !configured_ && looked_us_ - tried_us_ >= retry_interval_us;
-    if (!(wanted == settings_) || again) {
-      tried_us_ = looked_us_;
-      configure(wanted);
+    if (again || followed_changes_ != link.settings_changes()) {
+      followed_changes_ = link.settings_changes();
+      const firmware::CanSettings& wanted = link.settings();
+      if (again || !(wanted == settings_)) {
+        tried_us_ = looked_us_;
+        configure(wanted);
+      }
     }
     if (!configured_) return;
     // As many as there is room for; a frame that is taken out of the link is on its way.
-    drivers::CanFrame frame;
-    while (can_.has_room() && link.next_frame(frame)) static_cast<void>(can_.send(frame));
+    while (can_.has_room() && link.next_frame(frame_)) static_cast<void>(can_.send(frame_));
   }
 
-  void ISR_serve_transmit() {
-    can_.ISR_serve_transmit();
-    poll_due_.store(true, std::memory_order_relaxed);
-  }
+  /// These two leave something for the main loop.
+  void ISR_serve_transmit() { can_.ISR_serve_transmit(); }
   void ISR_receive(unsigned fifo, firmware::CanopenEdge& link) {
-    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) {
-      link.ISR_frame(frame);
-      poll_due_.store(true, std::memory_order_relaxed);
-    });
+    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) { link.ISR_frame(frame); });
   }
   void ISR_serve_status() { static_cast<void>(can_.ISR_serve_status()); }
-
-  /// An interrupt has left something for the main loop since the last call.
-  bool poll_due() { return poll_due_.exchange(false, std::memory_order_relaxed); }
 
  private:
   struct PendTransmit {
@@ -146,9 +140,10 @@ class CanLine {
   drivers::stm32f4::Can<PendTransmit> can_;
   firmware::CanSettings settings_{.bit_rate = 0};
   firmware::CanReadings readings_{};
+  drivers::CanFrame frame_;  ///< the one being sent: kept, since to make an empty one takes 38 instructions
+  std::optional<std::uint32_t> followed_changes_;  ///< of the link's settings
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
   bool configured_ = false, absent_ = false;
-  std::atomic<bool> poll_due_{false};
 };
 
 }  // namespace kmax::board::odrive_v3

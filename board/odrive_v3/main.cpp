@@ -1,7 +1,6 @@
 // Composition root of the ODrive v3.6: names the peripherals, gives them their pins and priorities, and hands
 // time, bytes, counts and currents to the application.
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -29,6 +28,7 @@
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/system_memory.hpp"
 #include "drivers/stm32f4/reset_cause.hpp"
+#include "firmware/exchange/interrupt_signal.hpp"
 
 extern "C" {
 extern volatile std::uint32_t kmax_parameters_begin[];
@@ -70,6 +70,8 @@ ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, p
 [[gnu::section(".noinit")]] firmware::RetainedCount lock_attempts;
 
 std::optional<firmware::Application> application;
+/// Raised by the lines' interrupts: they have left something for the main loop.
+firmware::InterruptSignal lines_due;
 std::optional<SerialLine> serial;
 std::optional<CanLine> can_line;
 ChipBus chip_bus{stm32::spi3()};
@@ -161,9 +163,15 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
 /// core back: the longest tick, as it really is, without an instruction of its own for it.
 std::uint32_t longest_tick = 0;
 
-/// What the main loop does for the power stage. What has been read is for the next round: an answer on the
-/// bus does not wait for it.
+std::uint32_t power_polled_us = 0;
+
+/// What the main loop does for the power stage, once a millisecond, and at once when there is something to
+/// take over: nothing in it changes faster, and the lines have interrupts of their own. What has been read is
+/// for the next round: an answer on the bus does not wait for it.
 void poll_power(std::uint32_t now_us) {
+  constexpr std::uint32_t interval_us = 1'000;
+  if (now_us - power_polled_us < interval_us && !power->has_to_take_over(*application)) return;
+  power_polled_us = now_us;
   power->poll(*application, now_us);
   firmware::BoardReadings readings = power->readings();
   readings.longest_tick = longest_tick;
@@ -192,7 +200,9 @@ void poll_power(std::uint32_t now_us) {
   cortex::wait_for_interrupt();
   const std::uint32_t awake = cycles();
   cortex::unmask_interrupts();
-  longest_tick = std::max(longest_tick, cycles() - awake);
+  const std::uint32_t taken = cycles() - awake;
+  if (taken > longest_tick) [[unlikely]]
+    longest_tick = taken;
 }
 
 /// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on
@@ -201,7 +211,8 @@ void tick_without_power() {
   odrive_v3::tick_without_power(*application);
 }
 
-[[noreturn]] void run() {
+/// All that comes before the loop.
+[[gnu::cold]] void start() {
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
@@ -229,23 +240,35 @@ void tick_without_power() {
     power.emplace(supply_divider_ratio(variant), chip_bus);
     if (!start_power(clocks) || !watchdog.start(watchdog_ms)) cortex::stop_on_unexpected_interrupt();
   }
+}
+
+void poll() {
+  const std::uint32_t now = system_tick.now_us();
+  can_line->poll(application->can(), now);
+  application->poll(now);
+  can_line->send(application->can());
+  serial->poll(application->serial(), now);
+  if (application->can().restart_wanted()) restart();
+  if (power_runs) poll_power(now);
+}
+
+/// Hot, for what runs once, and what never returns, is made small instead of fast.
+[[noreturn, gnu::noinline, gnu::hot]] void run() {
+  while (!power_runs) {
+    tick_without_power();
+    poll();
+    if (!lines_due.take()) sleep();
+  }
   for (;;) {
-    bool due = serial->poll_due();
-    due = can_line->poll_due() || due;
-    due = (power_runs && power->drives().main_loop_due()) || due;
-    if (due || !power_runs) {
-      const std::uint32_t now = system_tick.now_us();
-      if (!power_runs) tick_without_power();
-      can_line->poll(application->can(), now);
-      application->poll(now);
-      can_line->send(application->can());
-      serial->poll(application->serial(), now);
-      if (application->can().restart_wanted()) restart();
-      if (power_runs) poll_power(now);
+    bool due = lines_due.take();
+    due = power->drives().main_loop_due() || due;
+    // What has come meanwhile does not wait; what comes between the look above and the sleep does, for the
+    // next interrupt, at most half a tick.
+    if (due) {
+      poll();
+    } else {
+      sleep();
     }
-    // What has come meanwhile does not wait; what comes between the look above and here does, for the next
-    // interrupt, at most half a tick.
-    if (!due) sleep();
   }
 }
 
@@ -292,11 +315,13 @@ void ISR_system_tick() {
 
 void ISR_can1_tx() {
   kmax::board::can_line->ISR_serve_transmit();
+  kmax::board::lines_due.ISR_raise();
 }
 
 void ISR_can1_rx0() {
   using namespace kmax::board;
   can_line->ISR_receive(0, application->can());
+  lines_due.ISR_raise();
 }
 
 void ISR_can1_sce() {
@@ -305,9 +330,10 @@ void ISR_can1_sce() {
 
 void ISR_usart2() {
   using namespace kmax::board;
-  serial->ISR_serve(application->serial(), system_tick);
+  if (serial->ISR_serve(application->serial(), system_tick)) lines_due.ISR_raise();
 }
 
 int main() {
+  kmax::board::start();
   kmax::board::run();
 }

@@ -9,6 +9,7 @@
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/usart.hpp"
+#include "firmware/exchange/interrupt_signal.hpp"
 #include "firmware/links/modbus_edge.hpp"
 
 namespace kmax::board::odrive_v3 {
@@ -33,7 +34,7 @@ class SerialLine {
 
   /// Main loop, after the link's poll().
   void poll(firmware::ModbusEdge& link, std::uint32_t now_us) {
-    if (reply_sent_.exchange(false)) link.reply_sent(reply_sent_us_);
+    if (reply_sent_.take()) link.reply_sent(reply_sent_us_);
     if (usart_.transmitting()) return;
     const std::span<const std::uint8_t> reply = link.reply_due(now_us);
     if (usart_.transmit(reply)) return;
@@ -43,25 +44,22 @@ class SerialLine {
     static_cast<void>(configure());
   }
 
-  /// The USART's interrupt.
+  /// The USART's interrupt. True: it has left something for the main loop.
   template <typename Clock>
-  void ISR_serve(firmware::ModbusEdge& link, const Clock& clock) {
+  bool ISR_serve(firmware::ModbusEdge& link, const Clock& clock) {
     const drivers::stm32f4::UsartEvent event = usart_.ISR_serve();
-    if (!event.received && !event.line_error && !event.transmission_complete) return;
+    if (!event.received && !event.line_error && !event.transmission_complete) return false;
     const std::uint32_t now = clock.now_us();
     if (event.received || event.line_error) link.ISR_byte(event.byte, event.line_error, now);
     if (event.transmission_complete) {
       reply_sent_us_ = now;
-      reply_sent_.store(true);
+      reply_sent_.ISR_raise();
     }
-    poll_due_.store(true, std::memory_order_relaxed);
+    return true;
   }
 
   /// A reply is under way.
   bool transmitting() const { return usart_.transmitting(); }
-
-  /// The interrupt has left something for the main loop since the last call.
-  bool poll_due() { return poll_due_.exchange(false, std::memory_order_relaxed); }
 
  private:
   bool configure() {
@@ -78,7 +76,7 @@ class SerialLine {
   drivers::stm32f4::Usart<> usart_{drivers::stm32f4::usart2()};
   firmware::SerialSettings settings_{};
   std::atomic<std::uint32_t> reply_sent_us_{0};  ///< written before the flag
-  std::atomic<bool> reply_sent_{false}, poll_due_{false};
+  firmware::InterruptSignal reply_sent_;
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -19,6 +19,7 @@
 #include "drivers/supply_divider.hpp"
 #include "firmware/application.hpp"
 #include "firmware/exchange/double_buffer.hpp"
+#include "firmware/exchange/interrupt_signal.hpp"
 
 namespace kmax::board {
 
@@ -156,7 +157,7 @@ class Drives {
   bool all_have_ticked() { return ticks_.all_have_ticked(has()); }
 
   /// Once a round of the application, when all axes have reported: the main loop need not look more often.
-  bool main_loop_due() { return main_loop_due_.exchange(false, std::memory_order_relaxed); }
+  bool main_loop_due() { return main_loop_due_.take(); }
 
  private:
   using Counter = drivers::ReferencedQuadratureCounter<decltype(std::declval<Hardware>().ISR_counter(0))>;
@@ -193,7 +194,7 @@ class Drives {
   template <typename Application>
   [[gnu::always_inline]] inline void ISR_end_round(std::size_t axis, const Application& application) {
     if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
-      main_loop_due_.store(true, std::memory_order_relaxed);
+      main_loop_due_.ISR_raise();
   }
   [[gnu::always_inline]] inline void ISR_end_tick(std::size_t axis, float supply_voltage);
   Inputs ISR_beside_others(std::size_t axis, const firmware::AxisInput& input);
@@ -243,7 +244,7 @@ class Drives {
   BrakeResistor brake_;
   Settings settings_{};
   firmware::DoubleBuffer<Settings> double_buffer_{Settings{}};
-  std::atomic<bool> main_loop_due_{false};
+  firmware::InterruptSignal main_loop_due_;
   SampleHold samples_;
   std::array<std::atomic<bool>, firmware::axis_count> absent_{};
   TickMonitor ticks_;
@@ -393,7 +394,7 @@ bool Drives<Hardware>::ISR_ticks_have_stopped() {
   if (!ticks_.ISR_have_stopped(has())) return false;
   static_cast<void>(ISR_disarm());
   hardware_.set_brake(false);
-  main_loop_due_.store(true, std::memory_order_relaxed);
+  main_loop_due_.ISR_raise();
   return true;
 }
 

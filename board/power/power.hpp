@@ -74,6 +74,10 @@ class Power {
       absent[axis] = absent[axis] || application.values().template whole<"drive.declared_absent">(axis) != 0;
     drives_.apply(application.values(), absent);
   }
+  /// Main loop: what the application has been given since the last poll() does not wait for the next one.
+  bool has_to_take_over(const firmware::Application& application) const {
+    return application.parameter_changes() != taken_changes_ || application.store_busy();
+  }
   /// Main loop: for the application.
   firmware::BoardReadings readings() const {
     firmware::BoardReadings readings = drives_.readings();

@@ -31,6 +31,12 @@ struct BoardReadings {
   std::array<std::uint16_t, axis_count> gate_driver_faults{};
   bool has_power_stage = false;     ///< false: forces are ideal, and nothing is commutated
   bool ticks_have_stopped = false;  ///< no tick for a while: nobody else could say so
+
+  /// `declared_absent`: by parameter drive.declared_absent.
+  AxisPresence presence(std::size_t axis, bool declared_absent) const {
+    if (declared_absent) return AxisPresence::declared_absent;
+    return gate_driver_missing[axis] ? AxisPresence::no_answer : AxisPresence::present;
+  }
 };
 
 }  // namespace kmax::firmware

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -29,6 +30,9 @@ struct NodeEvents {
   bool heartbeat = false;            ///< of a watched node
   bool heartbeat_lost = false;       ///< of a watched node
   bool pdos_ended = false;           ///< operational was left: what PDOs asked for is no longer wanted
+  /// In almost every poll there is none: looked for in two words.
+  constexpr bool any() const { return std::bit_cast<std::array<std::uint32_t, 2>>(*this) != nothing; }
+  static constexpr std::array<std::uint32_t, 2> nothing{};
 };
 
 /// A CANopen node (CiA 301): all services of one device on one bus, behind one function for frames in and one
@@ -154,10 +158,12 @@ class Node {
   /// The next frame to send, if there is one; it counts as sent.
   [[nodiscard]] bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
     if (lss_.quiet()) return false;
-    return nmt_.next_frame(out, now_us) || (speaks() && sync_.next_frame(out)) ||
-           emergency_.next_frame(out, nmt_.state(), now_us) ||
-           (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
-           (speaks() && next_answer(out, now_us)) || lss_.next_frame(out);
+    if (nmt_.next_frame(out, now_us)) return true;
+    const bool said =
+        speaks() && (sync_.next_frame(out) || emergency_.next_frame(out, nmt_.state(), now_us) ||
+                     (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
+                     next_answer(out, now_us));
+    return said || lss_.next_frame(out);
   }
 
   /// The controller has gone off the bus.
@@ -175,6 +181,8 @@ class Node {
   /// 1 to 127, or 255 while there is none.
   std::uint8_t node_id() const { return nmt_.node_id(); }
   const CanSettings& settings() const { return settings_; }
+  /// Rises when they may have changed.
+  std::uint32_t settings_changes() const { return settings_changes_; }
   bool any_heartbeat_lost() const { return heartbeats_.any_lost(); }
 
   /// Of the server at `number`, 0 or 1.
@@ -209,7 +217,7 @@ class Node {
     return static_cast<std::uint8_t>(watched_source + other_node);
   }
 
-  bool speaks() const {
+  [[gnu::always_inline]] bool speaks() const {
     return nmt_.state() == NmtState::pre_operational || nmt_.state() == NmtState::operational;
   }
 
@@ -319,6 +327,7 @@ class Node {
     return nullptr;
   }
   bool next_answer(drivers::CanFrame& out, std::uint32_t now_us) {
+    if (!sdo_[0].busy() && !sdo_[1].busy()) return false;
     const std::size_t other = 1 - answered_last_;
     if (sdo_[other].next_frame(out, now_us)) {
       answered_last_ = other;
@@ -344,6 +353,7 @@ class Node {
   void act_on(LssAction action, const ParameterValues& values, NodeEvents& events) {
     if (action == LssAction::switch_bit_rate) {
       settings_.bit_rate = lss_.active_bit_rate();
+      ++settings_changes_;
       configure_sync(values);
       // What went often enough at the rate before may fill the bus at this one.
       if (nmt_.state() == NmtState::operational) configure_tpdos(values);
@@ -391,6 +401,7 @@ class Node {
       }
     }
     settings_ = settings;
+    ++settings_changes_;
   }
 
   Objects& objects_;
@@ -408,6 +419,7 @@ class Node {
   Tpdos tpdos_;
   Rpdos rpdos_;
   CanSettings settings_;
+  std::uint32_t settings_changes_ = 0;
   // As last taken over.
   Identity identity_;
   std::uint16_t heartbeat_ms_{};

@@ -4,7 +4,6 @@
 
 #include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/cyclic_torque.hpp"
-#include "firmware/modbus/rtu_timing.hpp"
 
 namespace kmax::firmware {
 
@@ -15,7 +14,8 @@ Axes::Axes(ParameterAccess& parameters, const StoreCommands& store, const LinkSt
       links_(links),
       log_(log),
       settings_(parameters.values()),
-      tick_(settings_.all(), capture_memory) {
+      tick_(settings_.all(), capture_memory),
+      situations_(situations(std::make_index_sequence<axis_count>{})) {
   configure_thermal();
 }
 
@@ -77,6 +77,7 @@ void Axes::configure_thermal() {
 }
 
 void Axes::poll_temperatures() {
+  temperatures_us_ = now_us_;
   for (std::size_t axis = 0; axis < axis_count; ++axis)
     thermal_[axis].poll(now_us_, report_[axis].motor.current_square, readings_.power_stage_temperature[axis]);
 }
@@ -87,29 +88,25 @@ bool Axes::commutation_known(std::size_t axis) const {
 }
 
 Supervisor::Situation Axes::situation(std::size_t axis) {
-  const Supervisor& supervisor = supervisors_[axis];
-  const auto signed_us = supervisor.signed_us();
-  const auto heard_us = signed_us ? signed_us : links_[supervisor.commander()].heard_us;
-  const LinkState& can = links_[Link::can];
   return {.values = parameters_.values(),
           .commutation = commutation_[axis],
           .thermal = thermal_[axis],
           .report = report_[axis],
           .setting = settings_.of(axis),
-          .silent_us = heard_us ? std::optional(modbus::elapsed_us(now_us_, *heard_us)) : std::nullopt,
-          .power_stage_temperature = readings_.power_stage_temperature[axis],
-          .supply_voltage = readings_.supply_voltage,
-          .enabled = tick_.enabled(axis),
-          .settled = settled(axis),
-          .ticks_have_stopped = readings_.ticks_have_stopped,
+          .readings = readings_,
+          .links = links_,
+          .now_us = now_us_};
+}
+
+Supervisor::Readiness Axes::readiness(std::size_t axis) const {
+  return {.settled = settled(axis),
           .commutation_known = commutation_known(axis),
           .guard_failed = guard_[axis].verdict == GuardFinding::Verdict::fail,
           .store_busy = store_.keeper().busy(),
-          .restarting = can.restart_asked,
-          .absent = presence(axis) != AxisPresence::present,
-          .pushes_anothers_axis = pushes_anothers_axis(axis),
-          .off_the_bus = can.is_off,
-          .heartbeat_lost = can.heartbeat_lost};
+          .restarting = links_[Link::can].restart_asked,
+          .absent = readings_.presence(axis, parameters_.values().whole<"drive.declared_absent">(axis) !=
+                                                 0) != AxisPresence::present,
+          .pushes_anothers_axis = pushes_anothers_axis(axis)};
 }
 
 void Axes::begin_poll(std::uint32_t now_us) {
@@ -117,11 +114,13 @@ void Axes::begin_poll(std::uint32_t now_us) {
   tick_.keep_alive();
   // The last axis' first: that it is of a round says that those of the others are of the same.
   for (std::size_t axis = axis_count; axis-- > 0;) tick_.report(axis, report_[axis]);
-  poll_temperatures();
+  constexpr std::uint32_t temperatures_interval_us = 1'000;
+  if (now_us - temperatures_us_ >= temperatures_interval_us) poll_temperatures();
 }
 
 void Axes::log_trip(std::size_t axis) {
   const Fault fault = logged_[axis] = supervisors_[axis].machine().fault();
+  ++fault_changes_;
   if (fault == Fault::none) return;
   const Supervisor::Trip& trip = supervisors_[axis].last_trip();
   const TripRecord& record = trip.record;
@@ -133,16 +132,40 @@ void Axes::log_trip(std::size_t axis) {
        record.current_reference, record.supply, trip.power_stage_temperature, trip.winding_temperature});
 }
 
-void Axes::act() {
-  for (std::size_t axis = 0; axis < axis_count; ++axis)
-    commutation_[axis].follow(parameters_.values(), axis, report_[axis].reference_generation);
+bool Axes::circumstances_have_changed() const {
+  bool changed = parameters_.changes() != seen_.parameters || fault_changes_ != seen_.faults ||
+                 readings_changes_ != seen_.readings;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const SeenOfAxis& seen = seen_.axis[axis];
+    changed = changed || thermal_[axis].changes() != seen.temperatures ||
+              report_[axis].reference_generation != seen.reference_generation ||
+              report_[axis].referenced != seen.referenced;
+  }
+  return changed;
+}
+
+void Axes::follow_circumstances() {
+  seen_ = {.parameters = parameters_.changes(),
+           .faults = fault_changes_,
+           .readings = readings_changes_,
+           .axis = {}};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const AxisReport& report = report_[axis];
+    seen_.axis[axis] = {thermal_[axis].changes(), report.reference_generation, report.referenced};
+    commutation_[axis].follow(parameters_.values(), axis, report.reference_generation);
+  }
   offer_settings_if_changed();
   judge_if_changed();
+}
+
+void Axes::act() {
+  if (circumstances_have_changed()) [[unlikely]]
+    follow_circumstances();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     Supervisor& supervisor = supervisors_[axis];
     if (const auto controlword = parameters_.fetch_controlword(axis))
       supervisor.request(*controlword, now_us_);
-    supervisor.poll(situation(axis), axis);
+    supervisor.poll(situations_[axis], axis, [this, axis] { return readiness(axis); });
     tick_.leave_share(axis, supervisor.force_share());
     tick_.enable(axis, supervisor.makes_force());
     supervisor.finish_reaction();
@@ -173,7 +196,7 @@ void Axes::disarm(std::size_t axis) {
 void Axes::trip_all_of(Link link, Fault fault) {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (supervisors_[axis].armed() && supervisors_[axis].commander() == link)
-      supervisors_[axis].trip(situation(axis), axis, fault, 0.0f, 0.0f);
+      supervisors_[axis].trip(situations_[axis], axis, fault, 0.0f, 0.0f);
   }
 }
 

@@ -19,7 +19,7 @@ namespace kmax::firmware {
 /// It is tied to the parameters that are set when motor.commutation_known becomes yes.
 class Commutation {
  public:
-  /// Whenever parameters may have changed. `counts`: AxisReport::reference_generation.
+  /// Whenever parameters or `counts` (AxisReport::reference_generation) may have changed.
   void follow(ParameterValues& values, std::size_t axis, std::uint32_t counts) {
     const bool found = values.whole<"motor.commutation_known">(axis) == 1;
     const Basis basis = basis_of(values, axis, counts);

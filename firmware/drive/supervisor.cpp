@@ -2,6 +2,7 @@
 
 #include "firmware/drive/axis_configuration.hpp"
 #include "firmware/drive/stability_guard.hpp"
+#include "firmware/modbus/rtu_timing.hpp"
 
 namespace kmax::firmware {
 
@@ -62,20 +63,21 @@ constexpr float standstill = 1e-3f;  // m/s
 constexpr std::uint32_t standing = tick_rate_hz / 20;
 }  // namespace
 
-Refusal Supervisor::obstacle_to_arming(const Situation& now, std::size_t axis) const {
-  if (now.store_busy) return Refusal::store_busy;  // an erase stops the tick
-  if (now.restarting) return Refusal::restarting;
-  if (now.absent) return Refusal::axis_absent;
-  if (now.pushes_anothers_axis) return Refusal::other_commander;
-  if (is_can(commander_) && now.heartbeat_lost) return Refusal::heartbeat_missing;
+Refusal Supervisor::obstacle_to_arming(const Situation& now, const Readiness& readiness,
+                                       std::size_t axis) const {
+  if (readiness.store_busy) return Refusal::store_busy;  // an erase stops the tick
+  if (readiness.restarting) return Refusal::restarting;
+  if (readiness.absent) return Refusal::axis_absent;
+  if (readiness.pushes_anothers_axis) return Refusal::other_commander;
+  if (is_can(commander_) && now.links[Link::can].heartbeat_lost) return Refusal::heartbeat_missing;
   if (now.report.condition != Fault::none) return refusal_for(now.report.condition);
   if (now.thermal.power_stage_too_hot()) return Refusal::too_hot;
   if (now.thermal.motor_too_hot()) return Refusal::motor_too_hot;
   if (!now.report.count_valid) return Refusal::encoder_invalid;
   // Excitation begins without knowing anything of the rotor; what needs its angle is bounded in travel.
   if (mode_of(now.values, axis) == DriveMode::excitation) return Refusal::none;
-  if (!now.commutation_known) return Refusal::commutation_unknown;
-  if (now.guard_failed && now.values.choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
+  if (!readiness.commutation_known) return Refusal::commutation_unknown;
+  if (readiness.guard_failed && now.values.choice<GuardMode, "guard.mode">(axis) == GuardMode::refuse)
     return Refusal::guard_refused;
   const auto& haptic = now.setting.haptic;
   const bool makes_force = mode_of(now.values, axis) == DriveMode::haptic &&
@@ -94,7 +96,7 @@ void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float
   trip_ = {.record = report.trip,
            .value = value,
            .bound = bound,
-           .power_stage_temperature = now.power_stage_temperature,
+           .power_stage_temperature = now.readings.power_stage_temperature[axis],
            .winding_temperature = now.thermal.winding_temperature()};
   if (report.trip.fault == fault && report.fault == fault) return;
   // Found here and not in the tick: as the last report says.
@@ -104,7 +106,7 @@ void Supervisor::trip(const Situation& now, std::size_t axis, Fault fault, float
                   .force = report.force,
                   .current = report.motor.current,
                   .current_reference = report.motor.current_reference,
-                  .supply = now.supply_voltage,
+                  .supply = now.readings.supply_voltage,
                   .value = value,
                   .fault = fault};
 }
@@ -120,7 +122,8 @@ void Supervisor::begin_reaction(const Situation& now, std::size_t axis) {
 void Supervisor::go_on_with_reaction(const Situation& now) {
   Reaction& reaction = *reaction_;
   const std::uint32_t now_tick = now.report.tick, elapsed = now_tick - reaction.began;
-  bool over = now.report.fault != Fault::none || now.ticks_have_stopped || elapsed > longest_reaction;
+  bool over =
+      now.report.fault != Fault::none || now.readings.ticks_have_stopped || elapsed > longest_reaction;
   if (reaction.kind == LinkLoss::ramp) {
     const auto gone = static_cast<float>(elapsed);
     over = over || !(gone < reaction.ramp);
@@ -137,21 +140,22 @@ void Supervisor::go_on_with_reaction(const Situation& now) {
 void Supervisor::watch(const Situation& now, std::size_t axis) {
   const ParameterValues& values = now.values;
   const AxisReport& report = now.report;
-  if (report.fault != Fault::none && now.enabled)
+  if (report.fault != Fault::none)
     trip(now, axis, report.fault, report.fault_value, bound_of(report.fault, now, axis));
   if (now.thermal.power_stage_too_hot())
-    trip(now, axis, Fault::over_temperature, now.power_stage_temperature,
+    trip(now, axis, Fault::over_temperature, now.readings.power_stage_temperature[axis],
          values.real<"temperature.limit">(axis));
   if (now.thermal.motor_too_hot())
     trip(now, axis, Fault::motor_too_hot, now.thermal.winding_temperature(),
          values.real<"temperature.motor_limit">(axis));
-  if (now.ticks_have_stopped) trip(now, axis, Fault::tick_missed, 0.0f, 0.0f);
+  if (now.readings.ticks_have_stopped) trip(now, axis, Fault::tick_missed, 0.0f, 0.0f);
   const float timeout = values.real<"link.timeout">();
-  if (timeout > 0.0f && now.silent_us) {
-    const auto silent_us = static_cast<float>(*now.silent_us);
+  const auto heard_us = number_ != 0 ? std::optional(signed_us_) : now.links[commander_].heard_us;
+  if (timeout > 0.0f && heard_us) {
+    const auto silent_us = static_cast<float>(modbus::elapsed_us(now.now_us, *heard_us));
     if (silent_us > timeout * 1e6f) trip(now, axis, Fault::link_silent, silent_us * 1e-6f, timeout);
   }
-  if (is_can(commander_) && now.off_the_bus) trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
+  if (is_can(commander_) && now.links[Link::can].is_off) trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
 }
 
 bool Supervisor::cause_remains(const Situation& now) const {
@@ -165,13 +169,13 @@ bool Supervisor::cause_remains(const Situation& now) const {
       if (now.thermal.power_stage_too_hot()) return true;
       break;
     case Fault::tick_missed:
-      if (now.ticks_have_stopped) return true;
+      if (now.readings.ticks_have_stopped) return true;
       break;
     case Fault::motor_too_hot:
       if (now.thermal.motor_too_hot()) return true;
       break;
     case Fault::heartbeat_lost:
-      if (now.heartbeat_lost) return true;
+      if (now.links[Link::can].heartbeat_lost) return true;
       break;
     default:
       break;
@@ -179,32 +183,25 @@ bool Supervisor::cause_remains(const Situation& now) const {
   return machine_.fault() == now.report.condition;
 }
 
-void Supervisor::obey(const Situation& now, std::size_t axis) {
+void Supervisor::obey(const Situation& now, const Readiness& readiness, std::size_t axis) {
   const auto [word, by] = *waiting_;
   if (!asks_for_operation(word)) reaction_.reset();
   const bool arms = machine_.asks_to_enable(word, by);
-  if (arms && !now.settled) return;
+  if (arms && !readiness.settled) return;
   const bool stays = now.values.whole<"profile.quick_stop_option">(axis) == 6;
   halted_ = halted(word) || (halted_ && makes_force() && (by != commander_ || reaction_));
-  machine_.command(word, by, obstacle_to_arming(now, axis), cause_remains(now),
+  machine_.command(word, by, obstacle_to_arming(now, readiness, axis), cause_remains(now),
                    {.stay_in_quick_stop = stays});
   waiting_.reset();
   if (arms) claimed_ = true;
 }
 
-void Supervisor::poll(const Situation& now, std::size_t axis) {
-  // Before the commands: a fault is reported even if the host disarms in the same moment.
-  if (armed())
-    watch(now, axis);
-  else if (reaction_)
-    go_on_with_reaction(now);
-  if (waiting_) obey(now, axis);
-  if (claimed_ && !makes_force()) {
-    claimed_ = false;
-    number_ = 0;
-    set_next_number(commander_, 0);
-    now.values.set_whole<"drive.commander">(0, axis);
-  }
+/// The next commander's number is another.
+void Supervisor::give_back(ParameterValues& values, std::size_t axis) {
+  claimed_ = false;
+  number_ = 0;
+  set_next_number(commander_, 0);
+  values.set_whole<"drive.commander">(0, axis);
 }
 
 }  // namespace kmax::firmware

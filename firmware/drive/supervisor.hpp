@@ -1,13 +1,16 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <optional>
 
+#include "firmware/board_interface/board_readings.hpp"
 #include "firmware/drive/armed_axes.hpp"
 #include "firmware/drive/axis.hpp"
 #include "firmware/drive/axis_state_machine.hpp"
 #include "firmware/drive/commutation.hpp"
+#include "firmware/drive/link_states.hpp"
 #include "firmware/drive/thermal_supervisor.hpp"
 
 namespace kmax::firmware {
@@ -33,22 +36,24 @@ enum class LinkLoss : std::uint8_t {
 /// reset, and two seconds end it at once. Mode excitation always loses its force at once.
 class Supervisor {
  public:
-  /// All that it judges by, of one moment.
+  /// All that an axis which makes force is judged by. It refers to what its owner brings up to date before
+  /// each poll().
   struct Situation {
     ParameterValues& values;
     Commutation& commutation;
     const ThermalSupervisor& thermal;
-    const AxisReport& report;                ///< the tick's
-    const AxisSetting& setting;              ///< in force
-    std::optional<std::uint32_t> silent_us;  ///< since the commander was heard; nothing: never
-    float power_stage_temperature;           ///< degC
-    float supply_voltage;                    ///< V
-    bool enabled;                            ///< for the tick
+    const AxisReport& report;    ///< the tick's
+    const AxisSetting& setting;  ///< in force
+    const BoardReadings& readings;
+    const LinkStates& links;
+    const std::uint32_t& now_us;
+  };
+  /// What arming is judged by beside it.
+  struct Readiness {
     bool settled;  ///< the tick works by the present settings, and knows of the axis' last disarming
-    bool ticks_have_stopped, commutation_known, guard_failed, store_busy, restarting;
-    bool absent;                       ///< the board does not have this axis
-    bool pushes_anothers_axis;         ///< if it were armed: of one that another link has armed
-    bool off_the_bus, heartbeat_lost;  ///< of CAN, whoever commands
+    bool commutation_known, guard_failed, store_busy, restarting;
+    bool absent;                ///< the board does not have this axis
+    bool pushes_anothers_axis;  ///< if it were armed: of one that another link has armed
   };
   /// The last trip, and the temperatures then.
   struct Trip {
@@ -80,14 +85,19 @@ class Supervisor {
   void take_sign_of_life(Link link, std::uint16_t number, std::uint32_t now_us) {
     if (link == commander_ && number == number_) signed_us_ = now_us;
   }
-  /// When a commander with a number gave its last sign of life; nothing: it has none, and any of its link's
-  /// counts.
-  std::optional<std::uint32_t> signed_us() const {
-    return number_ != 0 ? std::optional(signed_us_) : std::nullopt;
+  /// In every poll, and after every controlword. `readiness()` is asked for while a controlword waits.
+  template <std::invocable Ask>
+  void poll(const Situation& now, std::size_t axis, Ask readiness) {
+    // Before the commands: a fault is reported even if the host disarms in the same moment.
+    if (armed())
+      watch(now, axis);
+    else if (reaction_)
+      go_on_with_reaction(now);
+    if (waiting_) [[unlikely]]
+      obey(now, readiness(), axis);
+    if (claimed_ && !makes_force()) [[unlikely]]
+      give_back(now.values, axis);
   }
-
-  /// In every poll, and after every controlword.
-  void poll(const Situation& now, std::size_t axis);
   [[gnu::cold]] void trip(const Situation& now, std::size_t axis, Fault fault, float value, float bound);
   /// After poll(), when the tick knows whether the axis makes force.
   void finish_reaction() {
@@ -112,11 +122,13 @@ class Supervisor {
 
  private:
   void watch(const Situation& now, std::size_t axis);
-  void obey(const Situation& now, std::size_t axis);
+  [[gnu::cold]] void obey(const Situation& now, const Readiness& readiness, std::size_t axis);
+  [[gnu::cold]] void give_back(ParameterValues& values, std::size_t axis);
   [[gnu::cold]] void begin_reaction(const Situation& now, std::size_t axis);
   [[gnu::cold]] void go_on_with_reaction(const Situation& now);
   // Rare: small code rather than fast code.
-  [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, std::size_t axis) const;
+  [[gnu::cold]] Refusal obstacle_to_arming(const Situation& now, const Readiness& readiness,
+                                           std::size_t axis) const;
   [[gnu::cold]] bool cause_remains(const Situation& now) const;
 
   /// The way from a lost commander to no force. Times are the tick's.
@@ -134,9 +146,9 @@ class Supervisor {
   Link commander_ = Link::serial;
   std::uint16_t number_ = 0;  ///< of the commander
   std::array<std::uint16_t, link_count> next_number_{};
-  std::uint32_t signed_us_{};
-  bool claimed_ = false;  ///< somebody has armed it, or tried to: the next one's number is another
-  bool halted_ = false;   ///< who does not command, or no longer, may begin a halt and not end it
+  std::uint32_t signed_us_{};  ///< when a commander with a number gave its last sign of life
+  bool claimed_ = false;       ///< somebody has armed it, or tried to: the next one's number is another
+  bool halted_ = false;        ///< who does not command, or no longer, may begin a halt and not end it
 };
 
 }  // namespace kmax::firmware

@@ -31,9 +31,11 @@ class ThermalSupervisor {
   void configure(const ThermalSupervisorConfig& config) {
     config_ = config;
     coefficients_ = Winding::prepare(config.winding);
-    if (started_) return;
-    model_.reset(config.winding.ambient_temperature);
-    winding_ = resistance_temperature_ = config.winding.ambient_temperature;
+    if (!started_) {
+      model_.reset(config.winding.ambient_temperature);
+      winding_ = resistance_temperature_ = config.winding.ambient_temperature;
+    }
+    compare();
   }
 
   /// `now_us`: a microsecond clock that wraps. `mean_square_current`: A^2, low-passed over about 10 ms.
@@ -41,6 +43,7 @@ class ThermalSupervisor {
   void poll(std::uint32_t now_us, float mean_square_current, float power_stage_temperature) {
     constexpr std::uint32_t step_us = 10'000;
     power_stage_ = power_stage_temperature;
+    compare();
     if (!started_) {
       started_ = true;
       last_us_ = now_us - step_us;
@@ -49,10 +52,14 @@ class ThermalSupervisor {
     if (elapsed_us < step_us) return;
     last_us_ = now_us;
     winding_ = model_.update(coefficients_, static_cast<float>(elapsed_us) * 1e-6f, mean_square_current);
+    compare();
     allow(share() * static_cast<float>(steps));
     constexpr float worth = 5.0f;  // K, 2 % of the resistance
     const float warmer = winding_ - resistance_temperature_;
-    if (warmer > worth || warmer < -worth) resistance_temperature_ = winding_;
+    if (warmer > worth || warmer < -worth) {
+      resistance_temperature_ = winding_;
+      ++changes_;
+    }
   }
 
   /// degC; NaN: could not be computed.
@@ -61,11 +68,17 @@ class ThermalSupervisor {
   float resistance_temperature() const { return resistance_temperature_; }
   /// Share of current.limit that may flow, a whole number of 1/steps, rounded up.
   float allowance() const { return static_cast<float>(allowed_steps_) / static_cast<float>(steps); }
-  bool motor_too_hot() const { return config_.motor_limit > 0.0f && !(winding_ < config_.motor_limit); }
+  /// Rises when one of these two changes by itself.
+  std::uint32_t changes() const { return changes_; }
+  bool motor_too_hot() const { return motor_too_hot_; }
   /// Also with a broken sensor.
-  bool power_stage_too_hot() const { return !(power_stage_ <= config_.power_stage_limit); }
+  bool power_stage_too_hot() const { return power_stage_too_hot_; }
 
  private:
+  void compare() {
+    motor_too_hot_ = config_.motor_limit > 0.0f && !(winding_ < config_.motor_limit);
+    power_stage_too_hot_ = !(power_stage_ <= config_.power_stage_limit);
+  }
   /// Falls at once, and rises half a step later than it fell, so that noise does not make it flutter.
   void allow(float wanted) {
     const auto below = static_cast<float>(allowed_steps_ - 1);
@@ -73,6 +86,7 @@ class ThermalSupervisor {
     auto whole = static_cast<int>(wanted);
     if (static_cast<float>(whole) < wanted) ++whole;
     allowed_steps_ = whole;
+    ++changes_;
   }
 
   using Winding = control::WindingTemperature<float>;
@@ -91,8 +105,8 @@ class ThermalSupervisor {
   Winding model_{};
   float winding_ = 25.0f, power_stage_ = 25.0f, resistance_temperature_ = 25.0f;
   int allowed_steps_ = steps;
-  std::uint32_t last_us_{};
-  bool started_ = false;
+  std::uint32_t last_us_{}, changes_{};
+  bool started_ = false, motor_too_hot_ = false, power_stage_too_hot_ = false;
 };
 
 }  // namespace kmax::firmware

@@ -24,6 +24,9 @@ class InterruptQueue {
     head_.store(head + 1, std::memory_order_release);
   }
 
+  bool empty() const {
+    return tail_.load(std::memory_order_relaxed) == head_.load(std::memory_order_acquire);
+  }
   /// False if there is nothing.
   bool pop(Item& item) {
     const std::uint32_t tail = tail_.load(std::memory_order_relaxed);

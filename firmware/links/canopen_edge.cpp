@@ -55,6 +55,24 @@ void CanopenEdge::set_readings(const CanReadings& readings) {
 
 void CanopenEdge::poll() {
   const std::uint32_t now_us = axes_.now_us();
+  bool serve = now_us - served_us_ >= service_us || fault_changes_ != axes_.fault_changes();
+  if (!queue_.empty()) {
+    receive(now_us);
+    serve = true;
+  }
+  if (parameters_.communication_changes() != configured_communication_) {
+    configured_communication_ = parameters_.communication_changes();
+    node_.configure(parameters_.values(), now_us);
+  }
+  if (serve) {
+    served_us_ = now_us;
+    fault_changes_ = axes_.fault_changes();
+    serve_bus(now_us);
+  }
+  if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us, now_us);
+}
+
+void CanopenEdge::receive(std::uint32_t now_us) {
   constexpr int frames_per_poll = 16;
   // A flood of frames must not keep the main loop from all else that it watches.
   drivers::CanFrame frame;
@@ -62,13 +80,13 @@ void CanopenEdge::poll() {
     node_.lss().hold(axes_.any_armed(), parameters_.locked());
     act_on(node_.receive(frame, parameters_.values(), now_us));
   }
+}
+
+/// After frames, after a fault has come or gone, and else once a millisecond: the times that it watches are
+/// much longer.
+void CanopenEdge::serve_bus(std::uint32_t now_us) {
   node_.lss().hold(axes_.any_armed(), parameters_.locked());
-  if (parameters_.communication_changes() != configured_communication_) {
-    configured_communication_ = parameters_.communication_changes();
-    node_.configure(parameters_.values(), now_us);
-  }
   act_on(node_.poll(parameters_.values(), now_us));
-  if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us, now_us);
   const bool bus_off = readings_.state == CanState::bus_off;
   if (bus_off && !was_bus_off_) act_on(node_.bus_off());
   was_bus_off_ = bus_off;
@@ -78,6 +96,8 @@ void CanopenEdge::poll() {
 
 void CanopenEdge::act_on(const canopen::NodeEvents& events) {
   state_.heartbeat_lost = node_.any_heartbeat_lost();
+  if (!events.any()) [[likely]]
+    return;
   for (const Link link : can_links) {
     if (events.heartbeat) links_[link].heard_us = axes_.now_us();
     if (events.heartbeat_lost) axes_.trip_all_of(link, Fault::heartbeat_lost);

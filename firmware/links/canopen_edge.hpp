@@ -9,7 +9,7 @@
 #include "firmware/canopen/node.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"
-#include "firmware/command/link_states.hpp"
+#include "firmware/drive/link_states.hpp"
 #include "firmware/command/store_commands.hpp"
 #include "firmware/exchange/interrupt_queue.hpp"
 #include "firmware/links/canopen_objects.hpp"
@@ -63,7 +63,9 @@ class CanopenEdge {
   /// sent.
   bool next_frame(drivers::CanFrame& frame);
   /// What the controller must be set to; a bit rate changes only when the communication is reset.
-  CanSettings settings() const { return node_.settings(); }
+  const CanSettings& settings() const { return node_.settings(); }
+  /// Rises when they may have changed.
+  std::uint32_t settings_changes() const { return node_.settings_changes(); }
   /// A host has asked for a restart (NMT reset node), and no axis is driven any more.
   bool restart_wanted() const { return restart_wanted_; }
 
@@ -71,6 +73,9 @@ class CanopenEdge {
   void publish(ParameterValues& values) const;
 
  private:
+  static constexpr std::uint32_t service_us = 1'000;
+  void receive(std::uint32_t now_us);
+  void serve_bus(std::uint32_t now_us);
   void act_on(const canopen::NodeEvents& events);
   void start_node();
   void reset_communication();
@@ -86,7 +91,7 @@ class CanopenEdge {
   CanReadings readings_;
   EmergencyReports emergencies_;
   RoundClock rounds_;
-  std::uint32_t configured_communication_{};
+  std::uint32_t configured_communication_{}, served_us_{}, fault_changes_{};
   bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false;
   CanopenObjects objects_;
   canopen::Node<CanopenObjects> node_;

@@ -61,7 +61,9 @@ void Readings::refresh_axis(std::size_t axis) {
   v.set_whole<"drive.statusword">(statusword_of(status), axis);
   v.set_whole<"drive.error_code">(error_code_of(machine.fault()), axis);
   v.set_whole<"drive.refusal">(static_cast<std::uint32_t>(machine.refusal()), axis);
-  v.set_whole<"drive.presence">(static_cast<std::uint32_t>(of_.axes.presence(axis)), axis);
+  const AxisPresence presence =
+      of_.axes.readings().presence(axis, v.whole<"drive.declared_absent">(axis) != 0);
+  v.set_whole<"drive.presence">(static_cast<std::uint32_t>(presence), axis);
   v.set_whole<"drive.gate_driver_faults">(of_.axes.readings().gate_driver_faults[axis], axis);
   const bool faulty = machine.fault() != Fault::none;
 

@@ -101,6 +101,7 @@ class RtuPort {
 
   // At least once a second.
   void poll(std::uint32_t now_us) {
+    if (state_ == State::listening && receiver_.is_idle()) return;
     if (state_ == State::after_reply &&
         elapsed_us(now_us, reply_end_us_) >= receiver_.timing().character_us) {
       state_ = State::listening;

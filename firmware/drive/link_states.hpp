@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "firmware/command/parameter_access.hpp"
+#include "firmware/drive/armed_axes.hpp"
 
 namespace kmax::firmware {
 
