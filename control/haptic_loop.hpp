@@ -139,7 +139,6 @@ class HapticLoop {
 
   /// One tick of a rendered wall. `added`: N along +x that comes from elsewhere, limited with the wall's
   /// force.
-  ///
   [[gnu::flatten]] const Output& tick(const Coefficients& c, std::int64_t count, bool enabled,
                                       Scalar added = Scalar(0)) {
     if (!sample_is_due(c)) return hold(enabled);

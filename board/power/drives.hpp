@@ -193,8 +193,7 @@ class Drives {
 
   template <typename Application>
   [[gnu::always_inline]] inline void ISR_end_round(std::size_t axis, const Application& application) {
-    if (axis + 1 == firmware::axis_count && application.ISR_round_begins())
-      main_loop_due_.ISR_raise();
+    if (axis + 1 == firmware::axis_count && application.ISR_round_begins()) main_loop_due_.ISR_raise();
   }
   [[gnu::always_inline]] inline void ISR_end_tick(std::size_t axis, float supply_voltage);
   Inputs ISR_beside_others(std::size_t axis, const firmware::AxisInput& input);

@@ -56,7 +56,7 @@ inline constexpr std::uint16_t follows_command_value = 1u << 12;  // in mode tor
 constexpr std::uint16_t base_of(DriveState state) {
   switch (state) {
     case DriveState::not_ready_to_switch_on:
-      return 0x00;
+      break;
     case DriveState::switch_on_disabled:
       return 0x40;
     case DriveState::ready_to_switch_on:

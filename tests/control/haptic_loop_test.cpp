@@ -469,6 +469,15 @@ TEST(HapticLoop, AResetForgetsTheOscillationAndTheSoftening) {
   EXPECT_FLOAT_EQ(loop.at(-500).force, 2.5f);
 }
 
+TEST(HapticLoop, AfterAResetTheFirstPositionIsNoMovement) {
+  Loop<float> loop(plain_wall<float>());
+  for (int count = 0; count < 100; ++count) loop.at(count);
+  ASSERT_GT(loop.loop().output().velocity, 0.0f);
+  loop.loop().reset();
+  EXPECT_EQ(loop.at(100'000).velocity, 0.0f) << "the counts may have got another origin";
+  EXPECT_EQ(loop.at(100'000).velocity, 0.0f);
+}
+
 TEST(HapticLoop, ParallelInterferenceIsReportedForTheOtherAxis) {
   auto config = plain_wall<float>();
   config.interference = {InterferenceMode::parallel, 5.0f, 0.0f, 0.0f};

@@ -40,6 +40,43 @@ TEST(ThermalSupervisor, BeginsAtAmbientWithTheWholeCurrent) {
   EXPECT_FALSE(run.supervisor.motor_too_hot());
 }
 
+TEST(ThermalSupervisor, TheModelIsSteppedEveryTenMilliseconds) {
+  ThermalSupervisor supervisor;
+  supervisor.configure(small_motor());
+  constexpr std::uint32_t start = 0xFFFF'F000u, step_us = 10'000;
+  supervisor.poll(start, 100.0f, 25.0f);
+  for (std::uint32_t step = 0; step < 3; ++step) {
+    const float before = supervisor.winding_temperature();
+    supervisor.poll(start + (step + 1) * step_us - 1, 100.0f, 25.0f);
+    EXPECT_EQ(supervisor.winding_temperature(), before);
+    supervisor.poll(start + (step + 1) * step_us, 100.0f, 25.0f);
+    EXPECT_GT(supervisor.winding_temperature(), before);
+  }
+}
+
+// What follows them is made anew only then.
+TEST(ThermalSupervisor, CountsTheChangesOfAllowanceAndResistance) {
+  Clock run;
+  run.supervisor.configure(small_motor());
+  run.pass(0.1f, 0.0f);
+  std::uint32_t counted = run.supervisor.changes();
+  float allowance = run.supervisor.allowance(), resistance = run.supervisor.resistance_temperature();
+  int of_allowance = 0, of_resistance = 0;
+  for (int i = 0; i < 20'000 && !run.supervisor.motor_too_hot(); ++i) {
+    run.pass(0.01f, 25.0f);
+    const bool less = run.supervisor.allowance() != allowance;
+    const bool warmer = run.supervisor.resistance_temperature() != resistance;
+    ASSERT_EQ(run.supervisor.changes() != counted, less || warmer);
+    counted = run.supervisor.changes();
+    allowance = run.supervisor.allowance();
+    resistance = run.supervisor.resistance_temperature();
+    of_allowance += less ? 1 : 0;
+    of_resistance += warmer ? 1 : 0;
+  }
+  EXPECT_EQ(of_allowance, ThermalSupervisor::steps);
+  EXPECT_GT(of_resistance, 10);
+}
+
 TEST(ThermalSupervisor, TheAllowanceFallsBeforeTheTripAndComesBack) {
   Clock run;
   run.supervisor.configure(small_motor());

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstdint>
 #include <functional>
+#include <numeric>
+#include <utility>
 
 namespace kmax::firmware::seqlock_test {
 namespace {
@@ -40,6 +43,32 @@ TEST(Seqlock, BeforeTheFirstPublicationTheValueIsEmpty) {
   snapshot.ISR_publish(5);
   EXPECT_EQ(snapshot.read(), 5);
   EXPECT_EQ(snapshot.read(), 5);
+}
+
+template <std::size_t words>
+void expect_to_be_read_whole() {
+  using Value = std::array<std::uint32_t, words>;
+  struct {
+    std::uint32_t before = 0xBEF0;
+    Value value{};
+    std::uint32_t behind = 0xBE41;
+  } read;
+  Value published;
+  std::iota(published.begin(), published.end(), 1000U);
+  Seqlock<Value> lock;
+  lock.ISR_publish(published);
+  lock.read(read.value);
+  EXPECT_EQ(read.value, published) << words;
+  EXPECT_EQ(lock.read(), published) << words;
+  EXPECT_EQ(read.before, 0xBEF0U) << words;
+  EXPECT_EQ(read.behind, 0xBE41U) << words;
+}
+
+TEST(Seqlock, ValuesOfAnySizeAreReadToTheirLastWordAndNoFurther) {
+  [&]<std::size_t... more>(std::index_sequence<more...>) {
+    (expect_to_be_read_whole<1 + more>(), ...);
+  }
+  (std::make_index_sequence<66>{});
 }
 
 TEST(Seqlock, InterruptAtEveryPointOfTheCopyGivesTheNewestWholeValue) {

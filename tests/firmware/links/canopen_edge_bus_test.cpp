@@ -272,6 +272,27 @@ TEST(CanopenEdge, TheFaultOfEachAxisIsToldWithItsNumber) {
   }
 }
 
+// The bus' own times are looked at once a millisecond; what has happened to an axis does not wait for that.
+TEST(CanopenEdge, AFaultIsSentInTheRoundThatFindsItWheneverItComes) {
+  constexpr double round_ms = 0.2;
+  for (int offset = 0; offset < 10; ++offset) {
+    CanOpenHost host;
+    host.bench.set_up_plain_wall();
+    host.bench.preset("velocity.limit", 0.01, 0);
+    host.bench.device.stand_at(1000, 0);
+    host.run_ms(5);
+    ASSERT_TRUE(host.bench.arm());
+    host.run_ms(1 + 0.1 * offset);
+    host.heard.clear();
+    host.bench.device.stand_at(100'000, 0);
+    for (int i = 0; i < 100 && host.bench.application().fault(0) == Fault::none; ++i) host.run_ms(0.05);
+    ASSERT_EQ(host.bench.application().fault(0), Fault::over_speed);
+    host.run_ms(round_ms);
+    EXPECT_TRUE(std::ranges::any_of(host.heard, [](const auto& frame) { return frame.identifier == 0x081; }))
+        << offset;
+  }
+}
+
 TEST_F(OnCan, AWatchedNodeThatIsLostDoesNotTripWhatSerialHasArmed) {
   EXPECT_EQ(write(0x1016, 1, 5U << 16 | 100, 4), 0U);
   heartbeat_of(5);
