@@ -52,6 +52,10 @@ void memory_protection(double duration_s) {
 
 int main(int argc, char** argv) {
   const double duration_s = argc > 1 ? std::atof(argv[1]) : 2.0;
+  if (!(duration_s > 0.0)) {
+    fmt::print(stderr, "virtual_board_benchmark: '{}' is no duration; give seconds above 0\n", argv[1]);
+    return 2;
+  }
   row("both axes armed", 2, duration_s);
   row("one axis armed", 1, duration_s);
   row("none armed", 0, duration_s);

@@ -26,11 +26,7 @@ class FamilySearch {
     best_.rung = bound;
     double centre = 0.0;
     try_all(centre);
-    const double ratio = std::pow(damping_ratio, 1.0 / fine_steps);
-    for (const double damping : finer_dampings(found_ ? best_.damping : centre, ratio)) try_damping(damping);
-    for (const double part : {0.5, 0.25})
-      for (const double factor : {std::pow(ratio, -part), std::pow(ratio, part)})
-        try_damping(best_.damping * factor);
+    if (found_ || may_be_less_deep()) try_finer(found_ ? best_.damping : centre);
     if (!found_) best_.rung = -1;
     best_.hard = hard_;
     best_.touches = trials_.touches();
@@ -55,6 +51,18 @@ class FamilySearch {
   }
 
  private:
+  /// A damping between two that were tried may let nobody too deep in, where neither does; not where both let
+  /// somebody in to twice the depth: they are a factor of damping_ratio apart.
+  bool may_be_less_deep() const { return !task_.depth || !(best_.least_depth > 2.0 * *task_.depth); }
+
+  void try_finer(double centre) {
+    const double ratio = std::pow(damping_ratio, 1.0 / fine_steps);
+    for (const double damping : finer_dampings(centre, ratio)) try_damping(damping);
+    for (const double part : {0.5, 0.25})
+      for (const double factor : {std::pow(ratio, -part), std::pow(ratio, part)})
+        try_damping(best_.damping * factor);
+  }
+
   /// Over the whole range and a quarter of the least that was tried, the nearest to `centre` first: a better
   /// one makes those that follow cheaper.
   std::vector<double> finer_dampings(double centre, double ratio) const {
