@@ -31,21 +31,25 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
 }
 
 void Application::poll(std::uint32_t now_us) {
+  const bool millisecond = millisecond_.due(now_us);
   axes_.begin_poll(now_us);
-  if (now_us - kept_house_us_ >= housekeeping_us) keep_house(now_us);
+  if (millisecond) count_time(now_us);
   serial_.poll(now_us);
   can_.poll();
   axes_.act();
-  store_.poll();
-  can_.finish_saves();
+  if (millisecond || store_.keeper().busy()) go_on_saving(now_us);
 }
 
-/// What goes by milliseconds and seconds.
-void Application::keep_house(std::uint32_t now_us) {
-  kept_house_us_ = now_us;
+void Application::count_time(std::uint32_t now_us) {
   log_.count_time(now_us);
   parameters_.poll(now_us);
+}
+
+void Application::go_on_saving(std::uint32_t now_us) {
+  store_.poll();
+  // A code is in force as soon as it is in the flash.
   lock_.poll(now_us);
+  can_.finish_saves();
 }
 
 const LoadReport& Application::attach_store(AnyFlashSectors flash) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "drivers/periodic_timer.hpp"
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/board_interface/board_readings.hpp"
 #include "firmware/command/axes.hpp"
@@ -122,8 +123,9 @@ class Application {
   float ISR_background_force(std::size_t axis) const { return axes_.tick().ISR_background_force(axis); }
 
  private:
-  static constexpr std::uint32_t housekeeping_us = 1'000;
-  [[gnu::cold]] void keep_house(std::uint32_t now_us);
+  // Rare: small code rather than fast code.
+  [[gnu::cold]] void count_time(std::uint32_t now_us);
+  [[gnu::cold]] void go_on_saving(std::uint32_t now_us);
 
   BoardIdentity board_;
   ParameterAccess parameters_;
@@ -136,7 +138,7 @@ class Application {
   Readings readings_;
   ModbusEdge serial_;
   CanopenEdge can_;
-  std::uint32_t kept_house_us_ = 0;
+  drivers::PeriodicTimer millisecond_{1'000};
 };
 
 }  // namespace kmax::firmware

@@ -21,6 +21,7 @@
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
+#include "drivers/periodic_timer.hpp"
 #include "drivers/stm32f4/external_interrupt.hpp"
 #include "drivers/stm32f4/flash_sectors.hpp"
 #include "drivers/stm32f4/independent_watchdog.hpp"
@@ -163,15 +164,14 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
 /// core back: the longest tick, as it really is, without an instruction of its own for it.
 std::uint32_t longest_tick = 0;
 
-std::uint32_t power_polled_us = 0;
+drivers::PeriodicTimer power_timer{1'000};
 
 /// What the main loop does for the power stage, once a millisecond, and at once when there is something to
 /// take over: nothing in it changes faster, and the lines have interrupts of their own. What has been read is
 /// for the next round: an answer on the bus does not wait for it.
 void poll_power(std::uint32_t now_us) {
-  constexpr std::uint32_t interval_us = 1'000;
-  if (now_us - power_polled_us < interval_us && !power->has_to_take_over(*application)) return;
-  power_polled_us = now_us;
+  const bool due = power_timer.due(now_us);
+  if (!due && !power->has_to_take_over(*application)) return;
   power->poll(*application, now_us);
   firmware::BoardReadings readings = power->readings();
   readings.longest_tick = longest_tick;
@@ -263,7 +263,7 @@ void poll() {
     bool due = lines_due.take();
     due = power->drives().main_loop_due() || due;
     // What has come meanwhile does not wait; what comes between the look above and the sleep does, for the
-    // next interrupt, at most half a tick.
+    // next interrupt, at most half a tick, and in the loop without ticks a millisecond.
     if (due) {
       poll();
     } else {

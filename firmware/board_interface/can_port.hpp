@@ -15,7 +15,7 @@ enum class CanState : std::uint8_t {
   bus_off = 5,        ///< off the bus for its errors, or on the way back
 };
 
-/// What a board says of its CAN controller, before each poll().
+/// What a board says of its CAN controller, once a millisecond.
 struct CanReadings {
   CanState state = CanState::absent;
   std::uint8_t transmit_errors = 0, receive_errors = 0;

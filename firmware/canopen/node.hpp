@@ -114,6 +114,7 @@ class Node {
                                    std::uint32_t now_us) {
     NodeEvents events;
     if (frame.extended || frame.remote) return events;
+    follow_second_channel();
     const std::uint32_t id = frame.identifier;
     if (id == cob_id::nmt) {
       follow(nmt_.receive(frame), values, events);
@@ -138,8 +139,7 @@ class Node {
     if (events.heartbeat_lost) communication_error(events);
     act_on(lss_.poll(now_us), values, events);
     for (auto& server : sdo_) server.poll(now_us);
-    if (!sdo_silent_ && sdo_[1].channel() != second_channel_ && !sdo_[1].busy())
-      sdo_[1].start(second_channel_);
+    follow_second_channel();
     return events;
   }
 
@@ -159,11 +159,12 @@ class Node {
   [[nodiscard]] bool next_frame(drivers::CanFrame& out, std::uint32_t now_us) {
     if (lss_.quiet()) return false;
     if (nmt_.next_frame(out, now_us)) return true;
-    const bool said =
-        speaks() && (sync_.next_frame(out) || emergency_.next_frame(out, nmt_.state(), now_us) ||
-                     (nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
-                     next_answer(out, now_us));
-    return said || lss_.next_frame(out);
+    const bool speaking = speaks();
+    return (speaking && sync_.next_frame(out)) || emergency_.next_frame(out, nmt_.state(), now_us) ||
+           (speaking &&
+            ((nmt_.state() == NmtState::operational && tpdos_.next_frame(out, objects_, pdo_us_)) ||
+             next_answer(out, now_us))) ||
+           lss_.next_frame(out);
   }
 
   /// The controller has gone off the bus.
@@ -325,6 +326,11 @@ class Node {
       if (request == server.channel().request) return &server;
     }
     return nullptr;
+  }
+  /// As soon as the second server has ended what it had under way on the channel before.
+  void follow_second_channel() {
+    if (!sdo_silent_ && sdo_[1].channel() != second_channel_ && !sdo_[1].busy())
+      sdo_[1].start(second_channel_);
   }
   bool next_answer(drivers::CanFrame& out, std::uint32_t now_us) {
     if (!sdo_[0].busy() && !sdo_[1].busy()) return false;

@@ -77,7 +77,6 @@ void Axes::configure_thermal() {
 }
 
 void Axes::poll_temperatures() {
-  temperatures_us_ = now_us_;
   for (std::size_t axis = 0; axis < axis_count; ++axis)
     thermal_[axis].poll(now_us_, report_[axis].motor.current_square, readings_.power_stage_temperature[axis]);
 }
@@ -114,8 +113,7 @@ void Axes::begin_poll(std::uint32_t now_us) {
   tick_.keep_alive();
   // The last axis' first: that it is of a round says that those of the others are of the same.
   for (std::size_t axis = axis_count; axis-- > 0;) tick_.report(axis, report_[axis]);
-  constexpr std::uint32_t temperatures_interval_us = 1'000;
-  if (now_us - temperatures_us_ >= temperatures_interval_us) poll_temperatures();
+  if (temperatures_timer_.due(now_us)) poll_temperatures();
 }
 
 void Axes::log_trip(std::size_t axis) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "drivers/periodic_timer.hpp"
 #include "firmware/board_interface/board_readings.hpp"
 #include "firmware/command/fault_log.hpp"
 #include "firmware/command/store_commands.hpp"
@@ -117,7 +118,8 @@ class Axes {
   const LinkStates& links_;
   FaultLog& log_;
   BoardReadings readings_;
-  std::uint32_t now_us_ = 0, temperatures_us_ = 0;
+  std::uint32_t now_us_ = 0;
+  drivers::PeriodicTimer temperatures_timer_{1'000};
   std::array<Supervisor, axis_count> supervisors_;
   std::array<Fault, axis_count> logged_{};  ///< the faults that there were when it was last looked
   std::uint32_t fault_changes_ = 0;

@@ -110,7 +110,7 @@ class FaultLogIn {
     add_start(cause, crash, last);
   }
 
-  /// In every poll, for the time since the start.
+  /// Several times a second, for the time since the start.
   void count_time(std::uint32_t now_us) {
     if (!started_) second_us_ = now_us;
     started_ = true;

@@ -34,6 +34,7 @@ class ThermalSupervisor {
     if (!started_) {
       model_.reset(config.winding.ambient_temperature);
       winding_ = resistance_temperature_ = config.winding.ambient_temperature;
+      ++changes_;
     }
     compare();
   }
@@ -68,7 +69,7 @@ class ThermalSupervisor {
   float resistance_temperature() const { return resistance_temperature_; }
   /// Share of current.limit that may flow, a whole number of 1/steps, rounded up.
   float allowance() const { return static_cast<float>(allowed_steps_) / static_cast<float>(steps); }
-  /// Rises when one of these two changes by itself.
+  /// Rises when one of these two changes.
   std::uint32_t changes() const { return changes_; }
   bool motor_too_hot() const { return motor_too_hot_; }
   /// Also with a broken sensor.

@@ -55,7 +55,8 @@ void CanopenEdge::set_readings(const CanReadings& readings) {
 
 void CanopenEdge::poll() {
   const std::uint32_t now_us = axes_.now_us();
-  bool serve = now_us - served_us_ >= service_us || fault_changes_ != axes_.fault_changes();
+  // What goes by time is looked at once a millisecond: the times are much longer.
+  bool serve = service_.due(now_us) || fault_changes_ != axes_.fault_changes();
   if (!queue_.empty()) {
     receive(now_us);
     serve = true;
@@ -63,13 +64,15 @@ void CanopenEdge::poll() {
   if (parameters_.communication_changes() != configured_communication_) {
     configured_communication_ = parameters_.communication_changes();
     node_.configure(parameters_.values(), now_us);
+    serve = true;
   }
   if (serve) {
-    served_us_ = now_us;
     fault_changes_ = axes_.fault_changes();
-    serve_bus(now_us);
+    node_.lss().hold(axes_.any_armed(), parameters_.locked());
+    act_on(node_.poll(parameters_.values(), now_us));
   }
   if (const auto round_us = rounds_.poll(axes_, now_us)) node_.poll_pdos(*round_us, now_us);
+  if (serve) watch_bus();
 }
 
 void CanopenEdge::receive(std::uint32_t now_us) {
@@ -82,11 +85,7 @@ void CanopenEdge::receive(std::uint32_t now_us) {
   }
 }
 
-/// After frames, after a fault has come or gone, and else once a millisecond: the times that it watches are
-/// much longer.
-void CanopenEdge::serve_bus(std::uint32_t now_us) {
-  node_.lss().hold(axes_.any_armed(), parameters_.locked());
-  act_on(node_.poll(parameters_.values(), now_us));
+void CanopenEdge::watch_bus() {
   const bool bus_off = readings_.state == CanState::bus_off;
   if (bus_off && !was_bus_off_) act_on(node_.bus_off());
   was_bus_off_ = bus_off;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "drivers/can_frame.hpp"
+#include "drivers/periodic_timer.hpp"
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/board_interface/can_port.hpp"
 #include "firmware/canopen/node.hpp"
@@ -73,9 +74,8 @@ class CanopenEdge {
   void publish(ParameterValues& values) const;
 
  private:
-  static constexpr std::uint32_t service_us = 1'000;
   void receive(std::uint32_t now_us);
-  void serve_bus(std::uint32_t now_us);
+  void watch_bus();
   void act_on(const canopen::NodeEvents& events);
   void start_node();
   void reset_communication();
@@ -91,7 +91,8 @@ class CanopenEdge {
   CanReadings readings_;
   EmergencyReports emergencies_;
   RoundClock rounds_;
-  std::uint32_t configured_communication_{}, served_us_{}, fault_changes_{};
+  std::uint32_t configured_communication_{}, fault_changes_{};
+  drivers::PeriodicTimer service_{1'000};
   bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false;
   CanopenObjects objects_;
   canopen::Node<CanopenObjects> node_;

@@ -122,6 +122,26 @@ TEST_F(TwoServers, ABlockOfTheOneDoesNotKeepTheOtherWaiting) {
   EXPECT_GT(answers_by(first), 5U);
 }
 
+// A transfer under way is ended on the channel before; the first request on the other one comes right behind
+// it.
+TEST_F(TwoServers, OneThatChangesItsChannelHearsTheFirstRequestOnTheOther) {
+  SdoChannel now = second;
+  for (int turn = 0; turn < 10; ++turn) {
+    const SdoChannel other{now == second ? std::uint16_t{0x6A2} : second.request, now.response};
+    const Eight begun = ask(now, {0x40, 0x08, 0x10, 0});
+    ASSERT_EQ(begun[0], 0x41) << "segmented";
+    for (const std::uint32_t request : {0x8000'0000U, std::uint32_t{other.request}})
+      EXPECT_EQ(write_by(first, 0x1201, 1, request, 4), 0U);
+    Eight segment{};
+    for (int i = 0; i < 10 && (segment[0] & 1U) == 0; ++i)
+      segment = ask(now, {static_cast<std::uint8_t>(i % 2 == 0 ? 0x60 : 0x70)});
+    ASSERT_EQ(segment[0] & 0xE1U, 1U) << "the last";
+    EXPECT_EQ(ask(other, {0x40, 0x18, 0x10, 1})[0], 0x43) << turn;
+    now = other;
+    run_ms(0.1);
+  }
+}
+
 TEST_F(TwoServers, ATransactionBelongsToTheOneThatBeganIt) {
   EXPECT_EQ(write_by(second, 0x5810, 1, 1, 2), 0U);
   EXPECT_EQ(stiffness_by(second, 700), 0U);

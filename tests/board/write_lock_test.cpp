@@ -4,6 +4,7 @@
 
 #include <rapidcheck.h>
 
+#include <bit>
 #include <map>
 #include <optional>
 
@@ -142,6 +143,18 @@ class WriteLockWalk : public testing::TestWithParam<State> {};
 INSTANTIATE_TEST_SUITE_P(, WriteLockWalk,
                          testing::Values(State::disarmed, State::operational, State::armed_over_serial,
                                          State::armed_over_can, State::fault));
+
+TEST(WriteLock, ACodeIsInForceAsSoonAsItIsSaved) {
+  for (int offset = 0; offset < 10; ++offset) {
+    Node node;
+    node.run_ms(0.1 * offset);
+    ASSERT_EQ(node.bench.set("lock.code", code), 0);
+    while (node.bench.application().store_busy()) node.run_ms(0.05);
+    EXPECT_EQ(node.write(Way::can, entry_of<"wall.stiffness">(), 0, std::bit_cast<std::uint32_t>(900.0f)),
+              abort_locked)
+        << offset;
+  }
+}
 
 TEST_P(WriteLockWalk, EverySettingIsRefusedWithItsOwnErrorAndStaysAsItIs) {
   Node node;

@@ -77,6 +77,17 @@ TEST(ThermalSupervisor, CountsTheChangesOfAllowanceAndResistance) {
   EXPECT_GT(of_resistance, 10);
 }
 
+TEST(ThermalSupervisor, AnotherAmbientTemperatureBeforeTheFirstStepIsAChange) {
+  ThermalSupervisor supervisor;
+  supervisor.configure(small_motor());
+  const std::uint32_t before = supervisor.changes();
+  ThermalSupervisorConfig warmer = small_motor();
+  warmer.winding.ambient_temperature = 60.0f;
+  supervisor.configure(warmer);
+  EXPECT_EQ(supervisor.resistance_temperature(), 60.0f);
+  EXPECT_NE(supervisor.changes(), before);
+}
+
 TEST(ThermalSupervisor, TheAllowanceFallsBeforeTheTripAndComesBack) {
   Clock run;
   run.supervisor.configure(small_motor());
