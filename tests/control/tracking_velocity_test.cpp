@@ -87,6 +87,11 @@ TEST(TrackingVelocity, FloatDoesNotDriftOnALongRamp) {
   EXPECT_LT(std::fabs(velocity.update(coefficients, 864'000'370'000)), 1e-12F);
 }
 
+TEST(TrackingVelocity, OneThatWasNeverResetStandsAtTheOrigin) {
+  TrackingVelocity<double> velocity;
+  EXPECT_EQ(velocity.update(TrackingVelocity<double>::prepare(50.0, 0.002, 1e-6), 0), 0.0);
+}
+
 TEST(TrackingVelocityCoefficients, ItsDefaults) {
   const TrackingVelocity<double>::Coefficients defaults{};
   EXPECT_EQ(defaults.kept, 0.0);

@@ -87,6 +87,7 @@ struct OnTheBus : Bench {
 TEST(Can, ConfigureInOrder) {
   Bench bench;
   std::vector<CanFilter> filters{CanFilter{}, can_filter_standard_list(0, 0x80, 1)};
+  bench.can.bank[0].fr1.value = bench.can.bank[0].fr2.value = 0x1234'5678;  // left by an earlier life
   ASSERT_EQ(bench.driver.configure({.timing = can_bit_timing<42'000'000, 1'000'000>()}, filters),
             CanConfigureResult::ok);
   EXPECT_EQ(bench.can.mcr.writes, (std::vector<std::uint32_t>{0x0001'0001, 0x0001'0000}))

@@ -46,6 +46,8 @@ TEST(DeadTime, NanosecondsRoundUp) {
   EXPECT_EQ(ticks_not_shorter_than(168'000'000, 120), 21U);
   EXPECT_EQ(ticks_not_shorter_than(168'000'000, 1'000), 168U);
   EXPECT_EQ(ticks_not_shorter_than(168'000'000, 0), 0U);
+  EXPECT_EQ(ticks_not_shorter_than(0xFFFF'FFFF, 1'000'000'000), 0xFFFF'FFFFU);
+  EXPECT_EQ(ticks_not_shorter_than(0x8000'0000, 2'000'000'000), 0xFFFF'FFFFU) << "one tick more does not fit";
   EXPECT_EQ(ticks_not_shorter_than(0xFFFF'FFFF, 0xFFFF'FFFF), 0xFFFF'FFFFU) << "saturates";
 }
 

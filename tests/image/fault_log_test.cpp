@@ -157,8 +157,9 @@ TEST(ImageFaultLog, AResetInTheMiddleOfAnEntryLeavesItWholeOrOut) {
   Bench bench;
   std::size_t entries = 0, with = 0, without = 0;
   const auto memory = bench.board->bus().ccm();
-  // Half a microsecond later each time, from its first store on.
-  for (int i = 0; i < 24; ++i) {
+  // Later each time, from its first store on to behind the ticks of both axes, which may come in between.
+  constexpr double step = 0.7e-6;
+  for (int i = 0; i < 40; ++i) {
     for (const unsigned word : {0x00, 0x80, 0x00, 0x06, 0x0F}) bench.command(word);
     ASSERT_TRUE(bench.board->bridge_armed(0));
     const std::vector<std::uint8_t> before(memory.begin(), memory.end());
@@ -166,7 +167,7 @@ TEST(ImageFaultLog, AResetInTheMiddleOfAnEntryLeavesItWholeOrOut) {
     for (int waited = 0; waited < 4000 && std::ranges::equal(before, memory); ++waited)
       bench.board->run_for(0.5e-6);
     ASSERT_FALSE(std::ranges::equal(before, memory));
-    bench.board->run_for(0.5e-6 * i);
+    bench.board->run_for(step * i);
     bench.board->pull_reset();
     bench.board->open_emergency_stop(false);
     bench.start();

@@ -320,6 +320,22 @@ TEST_F(OnCan, AHeldResetBitIsNoEdgeAfterNmtStop) {
   EXPECT_EQ(fault(), Fault::heartbeat_lost);
 }
 
+TEST(CanopenEdge, NmtStopAndResetTakeTheForceOfEveryAxisAway) {
+  for (const std::uint8_t nmt_command : {std::uint8_t{0x02}, std::uint8_t{0x82}}) {
+    CanOpenHost host;
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      host.bench.set_up_plain_wall(axis);
+      host.bench.device.stand_at(1000, axis);
+    }
+    host.run_ms(5);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) ASSERT_TRUE(host.bench.arm(axis)) << axis;
+    host.nmt(nmt_command);
+    host.run_ms(1);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      EXPECT_NE(host.bench.state(axis), DriveState::operation_enabled) << axis;
+  }
+}
+
 TEST_F(OnCan, ResetCommunicationBringsBackWhatWasSaved) {
   EXPECT_EQ(write(0x1017, 0, 50, 2), 0U);
   EXPECT_EQ(write(0x1010, 1, firmware::signature_save, 4), 0U);

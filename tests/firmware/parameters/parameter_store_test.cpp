@@ -13,6 +13,15 @@ namespace {
 constexpr std::size_t stride = record::aligned_up(Store::length);
 constexpr std::size_t saves_per_sector = (FakeFlash::words_per_sector + stride - Store::length) / stride;
 
+// What is in a device's flash was written by an earlier firmware.
+TEST(ParameterRecord, BeginsWhereEarlierFirmwareBeganIt) {
+  EXPECT_EQ(record::aligned_up(0), 0U);
+  EXPECT_EQ(record::aligned_up(1), 16U);
+  EXPECT_EQ(record::aligned_up(16), 16U);
+  EXPECT_EQ(record::aligned_up(17), 32U);
+  EXPECT_EQ(record::length_of(3), 13U);
+}
+
 TEST(ParameterStore, AnErasedMemoryHoldsNothing) {
   FakeFlash flash;
   Store store(flash);
