@@ -8,7 +8,7 @@ namespace kmax::drivers {
 ///
 /// Due at the first call, unless the clock is within an interval of its wrap, and then once in each interval,
 /// counted from the call that was due before: a loop that comes by a little less often than the interval
-/// leaves none out. One that comes late by a whole interval begins to count anew.
+/// leaves none out. One that comes late by a whole interval counts from then on.
 ///
 /// `now_us`: microseconds, wraps at 2^32; call it at least once an hour. Cost: a load, a subtraction and a
 /// compare. Main loop only.

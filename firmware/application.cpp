@@ -33,16 +33,14 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
 void Application::poll(std::uint32_t now_us) {
   const bool millisecond = millisecond_.due(now_us);
   axes_.begin_poll(now_us);
-  if (millisecond) count_time(now_us);
+  if (millisecond) {
+    log_.count_time(now_us);
+    parameters_.poll(now_us);
+  }
   serial_.poll(now_us);
   can_.poll();
   axes_.act();
   if (millisecond || store_.keeper().busy()) go_on_saving(now_us);
-}
-
-void Application::count_time(std::uint32_t now_us) {
-  log_.count_time(now_us);
-  parameters_.poll(now_us);
 }
 
 void Application::go_on_saving(std::uint32_t now_us) {

@@ -124,7 +124,6 @@ class Application {
 
  private:
   // Rare: small code rather than fast code.
-  [[gnu::cold]] void count_time(std::uint32_t now_us);
   [[gnu::cold]] void go_on_saving(std::uint32_t now_us);
 
   BoardIdentity board_;

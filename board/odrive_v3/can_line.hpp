@@ -6,6 +6,7 @@
 #include <span>
 
 #include "drivers/cortex_m/interrupt_controller.hpp"
+#include "drivers/periodic_timer.hpp"
 #include "drivers/stm32f4/can.hpp"
 #include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
@@ -27,7 +28,7 @@ class CanLine {
 
   /// Main loop, before the link's poll().
   void poll(firmware::CanopenEdge& link, std::uint32_t now_us) {
-    if (now_us - looked_us_ >= status_interval_us) {
+    if (status_timer_.due(now_us)) {
       looked_us_ = now_us;
       static_cast<void>(can_.poll(now_us));
       const drivers::stm32f4::CanErrors errors = can_.errors();
@@ -74,7 +75,6 @@ class CanLine {
   static constexpr std::array all_interrupts = {
       drivers::stm32f4::Interrupt::can1_tx, drivers::stm32f4::Interrupt::can1_rx0,
       drivers::stm32f4::Interrupt::can1_rx1, drivers::stm32f4::Interrupt::can1_sce};
-  static constexpr std::uint32_t status_interval_us = 1'000;
   /// Initialization waits for the end of the frame that is on the bus, 1.2 ms at 125 kbit/s.
   static constexpr std::uint32_t initialization_polls = 100'000;
   static constexpr std::uint32_t retry_interval_us = 100'000;
@@ -142,6 +142,7 @@ class CanLine {
   firmware::CanReadings readings_{};
   drivers::CanFrame frame_;  ///< the one being sent: kept, since to make an empty one takes 38 instructions
   std::optional<std::uint32_t> followed_changes_;  ///< of the link's settings
+  drivers::PeriodicTimer status_timer_{1'000};
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
   bool configured_ = false, absent_ = false;
 };

@@ -31,8 +31,7 @@ struct NodeEvents {
   bool heartbeat_lost = false;       ///< of a watched node
   bool pdos_ended = false;           ///< operational was left: what PDOs asked for is no longer wanted
   /// In almost every poll there is none: looked for in two words.
-  constexpr bool any() const { return std::bit_cast<std::array<std::uint32_t, 2>>(*this) != nothing; }
-  static constexpr std::array<std::uint32_t, 2> nothing{};
+  constexpr bool any() const { return std::bit_cast<std::uint64_t>(*this) != 0; }
 };
 
 /// A CANopen node (CiA 301): all services of one device on one bus, behind one function for frames in and one

@@ -130,6 +130,8 @@ void Axes::log_trip(std::size_t axis) {
        record.current_reference, record.supply, trip.power_stage_temperature, trip.winding_temperature});
 }
 
+/// Against what follow_circumstances() keeps, field by field: a whole one to compare with would take 30
+/// instructions more in every poll.
 bool Axes::circumstances_have_changed() const {
   bool changed = parameters_.changes() != seen_.parameters || fault_changes_ != seen_.faults ||
                  readings_changes_ != seen_.readings;

@@ -44,23 +44,16 @@ class ThermalSupervisor {
   void poll(std::uint32_t now_us, float mean_square_current, float power_stage_temperature) {
     constexpr std::uint32_t step_us = 10'000;
     power_stage_ = power_stage_temperature;
-    compare();
     if (!started_) {
       started_ = true;
       last_us_ = now_us - step_us;
     }
     const std::uint32_t elapsed_us = now_us - last_us_;
-    if (elapsed_us < step_us) return;
-    last_us_ = now_us;
-    winding_ = model_.update(coefficients_, static_cast<float>(elapsed_us) * 1e-6f, mean_square_current);
-    compare();
-    allow(share() * static_cast<float>(steps));
-    constexpr float worth = 5.0f;  // K, 2 % of the resistance
-    const float warmer = winding_ - resistance_temperature_;
-    if (warmer > worth || warmer < -worth) {
-      resistance_temperature_ = winding_;
-      ++changes_;
+    if (elapsed_us >= step_us) {
+      last_us_ = now_us;
+      step(static_cast<float>(elapsed_us) * 1e-6f, mean_square_current);
     }
+    compare();
   }
 
   /// degC; NaN: could not be computed.
@@ -76,10 +69,22 @@ class ThermalSupervisor {
   bool power_stage_too_hot() const { return power_stage_too_hot_; }
 
  private:
+  void step(float seconds, float mean_square_current) {
+    winding_ = model_.update(coefficients_, seconds, mean_square_current);
+    allow(share() * static_cast<float>(steps));
+    constexpr float worth = 5.0f;  // K, 2 % of the resistance
+    const float warmer = winding_ - resistance_temperature_;
+    if (warmer > worth || warmer < -worth) {
+      resistance_temperature_ = winding_;
+      ++changes_;
+    }
+  }
+
   void compare() {
     motor_too_hot_ = config_.motor_limit > 0.0f && !(winding_ < config_.motor_limit);
     power_stage_too_hot_ = !(power_stage_ <= config_.power_stage_limit);
   }
+
   /// Falls at once, and rises half a step later than it fell, so that noise does not make it flutter.
   void allow(float wanted) {
     const auto below = static_cast<float>(allowed_steps_ - 1);

@@ -46,7 +46,7 @@ class Seqlock {
     do {
       before = sequence_.load(std::memory_order_acquire);
       std::atomic_signal_fence(std::memory_order_seq_cst);
-      copy_in_blocks(copy);
+      copy_to(copy);
       std::atomic_signal_fence(std::memory_order_seq_cst);
     } while ((before & 1u) != 0 || sequence_.load(std::memory_order_acquire) != before);
   }
@@ -54,21 +54,17 @@ class Seqlock {
  private:
   /// For large values compilers call memcpy, which takes two instructions a word; blocks that are known to be
   /// short and aligned take one for two words.
-  void copy_in_blocks(Value& copy) const {
+  void copy_to(Value& copy) const {
     if constexpr (!std::is_trivially_copyable_v<Value>) {
       copy = value_;
     } else {
-      copy_bytes_in_blocks(copy);
+      constexpr std::size_t block = 64;
+      const auto* from = static_cast<const char*>(__builtin_assume_aligned(&value_, alignof(Value)));
+      auto* to = static_cast<char*>(__builtin_assume_aligned(&copy, alignof(Value)));
+      std::size_t at = 0;
+      for (; at + block <= sizeof(Value); at += block) __builtin_memcpy(to + at, from + at, block);
+      __builtin_memcpy(to + at, from + at, sizeof(Value) % block);
     }
-  }
-  void copy_bytes_in_blocks(Value& copy) const {
-    constexpr std::size_t block = 64;
-    constexpr std::size_t alignment = alignof(Value);
-    const auto* from = static_cast<const char*>(__builtin_assume_aligned(&value_, alignment));
-    auto* to = static_cast<char*>(__builtin_assume_aligned(&copy, alignment));
-    std::size_t at = 0;
-    for (; at + block <= sizeof(Value); at += block) __builtin_memcpy(to + at, from + at, block);
-    __builtin_memcpy(to + at, from + at, sizeof(Value) % block);
   }
 
   Value value_{};

@@ -9,9 +9,9 @@
 #include "firmware/canopen/object_places.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"
-#include "firmware/drive/link_states.hpp"
 #include "firmware/command/parameter_access.hpp"
 #include "firmware/command/store_commands.hpp"
+#include "firmware/drive/link_states.hpp"
 #include "firmware/links/readings.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 

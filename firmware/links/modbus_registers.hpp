@@ -8,8 +8,8 @@
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/command/axes.hpp"
 #include "firmware/command/host_writes.hpp"
-#include "firmware/drive/link_states.hpp"
 #include "firmware/command/parameter_access.hpp"
+#include "firmware/drive/link_states.hpp"
 #include "firmware/links/readings.hpp"
 #include "firmware/modbus/register_bank.hpp"
 

@@ -93,7 +93,7 @@ struct Regularity {
 void run_with_host(tests::CanBench& bench, double duration_s) {
   constexpr double between_requests_s = 0.250'037;
   for (double done = 0.0; done < duration_s; done += between_requests_s) {
-    bench.board->run_for(between_requests_s);
+    bench.board->run_for(std::min(between_requests_s, duration_s - done));
     bench.port.send(tests::upload_request({0x1000, 0}));
     bench.port.forget();
   }

@@ -54,7 +54,7 @@ TEST(ThermalSupervisor, TheModelIsSteppedEveryTenMilliseconds) {
   }
 }
 
-// What follows them is made anew only then.
+// Who follows them looks at them only then.
 TEST(ThermalSupervisor, CountsTheChangesOfAllowanceAndResistance) {
   Clock run;
   run.supervisor.configure(small_motor());
