@@ -9,6 +9,7 @@
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "drivers/stm32f4/registers/can.hpp"
+#include "drivers/stm32f4/registers/otg_fs.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/spi.hpp"
 #include "drivers/stm32f4/registers/syscfg.hpp"
@@ -88,6 +89,8 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
   attach(with_events, chip::rcc_base, RccModel::size, "RCC", rcc_, always, 0);
   attach(with_events, chip::iwdg_base, IwdgModel::size, "IWDG", iwdg_, always, 0);
   attach(with_events, chip::can1_base, 0x400, "CAN1", can1_, apb1, chip::rcc_apb1enr::Can1::mask);
+  attach(with_events, chip::otg_fs_base, OtgFsModel::size, "OTG_FS", otg_fs_,
+         offsetof(chip::RccRegisters, ahb2enr), chip::rcc_ahb2enr::OtgFs::mask);
   attach(without_events, chip::tim3_base, timer_size, "TIM3", encoders_[0], apb1,
          chip::rcc_apb1enr::Timer3::mask);
   attach(without_events, chip::tim4_base, timer_size, "TIM4", encoders_[1], apb1,
@@ -150,6 +153,7 @@ void VirtualBoard::wire() {
     if ((bits & chip::rcc_apb2enr::Timer1::mask) != 0) pwm_[0].reset(now);
     if ((bits & chip::rcc_apb2enr::Timer8::mask) != 0) pwm_[1].reset(now);
   });
+  rcc_.on_usb_reset([this](BoardTime now) { otg_fs_.reset(now); });
   rcc_.on_clock_security_interrupt([this](bool level, BoardTime /*now*/) {
     if (level) core_.exceptions.pend(exception_number::non_maskable);
   });

@@ -31,9 +31,11 @@
 #include "host_tools/virtual_board/stm32f4/gpio_port.hpp"
 #include "host_tools/virtual_board/stm32f4/iwdg.hpp"
 #include "host_tools/virtual_board/stm32f4/one_pulse_timer.hpp"
+#include "host_tools/virtual_board/stm32f4/otg_fs.hpp"
 #include "host_tools/virtual_board/stm32f4/rcc.hpp"
 #include "host_tools/virtual_board/stm32f4/spi.hpp"
 #include "host_tools/virtual_board/stm32f4/usart.hpp"
+#include "host_tools/virtual_board/stm32f4/usb_host_port.hpp"
 
 namespace kmax::virtual_board {
 
@@ -171,6 +173,8 @@ class VirtualBoard {
   /// GPIO1 and GPIO2 of J3; the image of today does not use it.
   UsartModel& uart4() { return uart4_; }
   CanBus& can_bus() { return can_bus_; }
+  /// The host at the other end of the USB cable; the cable is unplugged when the board is made.
+  UsbHostPort& usb() { return usb_port_; }
   const CanBusNode& can_node() const { return *can1_.node(); }
   AdvancedTimerModel& pwm(std::size_t axis) { return pwm_[axis]; }
   GeneralTimerModel& encoder_timer(std::size_t axis) { return encoders_[axis]; }
@@ -235,6 +239,9 @@ class VirtualBoard {
   UsartModel uart4_{clocks_, core_.nvic, drivers::stm32f4::Interrupt::uart4};
   CanBus can_bus_;
   CanController can1_{clocks_, core_.nvic, can_bus_};
+  UsbHostPort usb_port_;
+  OtgFsModel otg_fs_{clocks_, core_.nvic, usb_port_, [this](BoardTime at) { return rcc_.usb_clock(at); },
+                     [this] { return has_usb_pins(ports_[0]); }};
   SpiModel spi3_{clocks_};
   std::vector<std::unique_ptr<Peripheral>> others_;  ///< on the bus, and of no concern to the board's wiring
   std::array<Drv8301Chip, 2> gate_drivers_;

@@ -54,6 +54,8 @@ class GpioPortModel final : public RegisterBlock<GpioPortModel> {
   bool floats(unsigned pin) const { return (floating_ >> pin & 1U) != 0; }
   PinOutput output(unsigned pin) const { return outputs_[pin]; }
   drivers::stm32f4::GpioMode mode(unsigned pin) const;
+  /// The alternate function that is chosen, whether or not the mode lets it out.
+  unsigned alternate_function(unsigned pin) const { return afr_[pin / 8] >> (4 * (pin % 8)) & 0xFU; }
 
   /// Called when the part begins or ceases to drive a pin or changes the level that it drives, and at once
   /// (with time 0) for those that it drives already.

@@ -15,6 +15,7 @@ namespace rcc_cfgr = stm32::rcc_cfgr;
 namespace rcc_cir = stm32::rcc_cir;
 namespace rcc_csr = stm32::rcc_csr;
 namespace rcc_ahb1enr = stm32::rcc_ahb1enr;
+namespace rcc_ahb2enr = stm32::rcc_ahb2enr;
 namespace rcc_apb1enr = stm32::rcc_apb1enr;
 namespace rcc_apb2enr = stm32::rcc_apb2enr;
 using stm32::RccRegisters;
@@ -163,7 +164,7 @@ void RccModel::restore_reset_values() {
   pllcfgr_ = rcc_pllcfgr::reset_value;
   cfgr_ = cir_ = 0;
   ahb1enr_ = rcc_ahb1enr::Ccm::mask;
-  apb1enr_ = apb2enr_ = apb2rstr_ = 0;
+  ahb2enr_ = apb1enr_ = apb2enr_ = apb2rstr_ = ahb2rstr_ = 0;
   internal_ready_ = 0;
   crystal_ready_ = pll_ready_ = never;
   core_clock_lost_ = false;
@@ -232,11 +233,14 @@ const RegisterTable<RccModel>& RccModel::registers() {
        rcc_cir::ClockSecurityFlag::mask | rcc_cir::ClockSecurityClear::mask,
        Row::takes<&Model::write_interrupts>},
       Row::reserved(offsetof(Layout, ahb1rstr), "AHB1RSTR"),
+      {offsetof(Layout, ahb2rstr), "AHB2RSTR", Row::shows<&Model::ahb2rstr_>, rcc_ahb2enr::OtgFs::mask,
+       Row::takes<&Model::write_usb_reset>},
       Row::reserved(offsetof(Layout, apb1rstr), "APB1RSTR"),
       {offsetof(Layout, apb2rstr), "APB2RSTR", Row::shows<&Model::apb2rstr_>,
        rcc_apb2enr::Timer1::mask | rcc_apb2enr::Timer8::mask, Row::takes<&Model::write_peripheral_reset>},
       Row::word<&Model::ahb1enr_>(offsetof(Layout, ahb1enr), "AHB1ENR",
                                   ports | rcc_ahb1enr::Ccm::mask | rcc_ahb1enr::Dma2::mask),
+      Row::word<&Model::ahb2enr_>(offsetof(Layout, ahb2enr), "AHB2ENR", rcc_ahb2enr::OtgFs::mask),
       Row::word<&Model::apb1enr_>(offsetof(Layout, apb1enr), "APB1ENR", apb1_bits),
       Row::word<&Model::apb2enr_>(offsetof(Layout, apb2enr), "APB2ENR", apb2_bits),
       {offsetof(Layout, csr), "CSR", Row::shows<&Model::read_status>,
@@ -312,6 +316,19 @@ void RccModel::write_peripheral_reset(const Access& access, std::uint32_t value)
   const std::uint32_t rising = value & ~apb2rstr_;
   apb2rstr_ = value;
   if (rising != 0 && peripheral_reset_) peripheral_reset_(rising, access.now);
+}
+
+void RccModel::write_usb_reset(const Access& access, std::uint32_t value) {
+  const bool rises = (value & ~ahb2rstr_) != 0;
+  ahb2rstr_ = value;
+  if (rises && usb_reset_) usb_reset_(access.now);
+}
+
+bool RccModel::usb_clock(BoardTime now) const {
+  const std::uint64_t product = crystal_hz * rcc_pllcfgr::Multiplier::of(pllcfgr_);
+  const std::uint64_t divider =
+      std::uint64_t{rcc_pllcfgr::InputDivider::of(pllcfgr_)} * rcc_pllcfgr::UsbDivider::of(pllcfgr_);
+  return now >= pll_ready_ && rcc_pllcfgr::FromCrystal::of(pllcfgr_) != 0 && product == 48 * mhz * divider;
 }
 
 void RccModel::write_interrupts(const Access& access, std::uint32_t value) {

@@ -49,8 +49,8 @@ class PwrModel final : public RegisterBlock<PwrModel> {
 /// a ready source; changes of a PLL that is on; stopping what the core runs on (silicon ignores that); HCLK
 /// above 168, PCLK1 above 42, PCLK2 above 84 MHz; HCLK above what the flash wait states and the voltage scale
 /// allow; frequencies of which 336 MHz is no multiple, which BoardTime cannot express; clock outputs, I2S
-/// PLL, backup domain, LSION, ready interrupts, low-power enables; peripheral resets but those of TIM1 and
-/// TIM8; enable bits of peripherals that the board does not have.
+/// PLL, backup domain, LSION, ready interrupts, low-power enables; peripheral resets but those of TIM1, TIM8
+/// and OTG_FS; enable bits of peripherals that the board does not have.
 class RccModel final : public RegisterBlock<RccModel> {
  public:
   static constexpr std::uint32_t size = 0x90;
@@ -80,6 +80,8 @@ class RccModel final : public RegisterBlock<RccModel> {
   }
   /// Called when the clock security system finds the crystal dead: also a break for TIM1 and TIM8.
   void on_clock_failure(std::function<void(BoardTime)> callback) { clock_failure_ = std::move(callback); }
+  /// Called when the bit of OTG_FS in AHB2RSTR rises.
+  void on_usb_reset(std::function<void(BoardTime)> callback) { usb_reset_ = std::move(callback); }
   /// Called when bits of APB2RSTR rise: those of TIM1 and TIM8 alone are modelled.
   void on_peripheral_reset(std::function<void(std::uint32_t bits, BoardTime)> callback) {
     peripheral_reset_ = std::move(callback);
@@ -92,6 +94,9 @@ class RccModel final : public RegisterBlock<RccModel> {
   /// without, and if it ran from the crystal, it stops (core_clock_lost).
   void fail_crystal(BoardTime now);
   bool core_clock_lost() const { return core_clock_lost_; }
+  /// The PLL gives exactly 48 MHz, from the crystal: what USB needs (RM0090, section Clocks). The internal
+  /// oscillator is off by more than the 0.25 % that a host accepts.
+  bool usb_clock(BoardTime now) const;
 
  private:
   static const RegisterTable<RccModel>& registers();
@@ -100,6 +105,7 @@ class RccModel final : public RegisterBlock<RccModel> {
   void write_control(const Access& access, std::uint32_t value);
   void write_pll(const Access& access, std::uint32_t value);
   void write_configuration(const Access& access, std::uint32_t value);
+  void write_usb_reset(const Access& access, std::uint32_t value);
   void write_peripheral_reset(const Access& access, std::uint32_t value);
   void write_interrupts(const Access& access, std::uint32_t value);
   void write_status(std::uint32_t value);
@@ -117,7 +123,7 @@ class RccModel final : public RegisterBlock<RccModel> {
   const FlashInterface& flash_;
   const PwrModel& power_;
   std::uint32_t cr_ = 0, pllcfgr_ = 0, cfgr_ = 0, cir_ = 0;  // CR without the ready flags
-  std::uint32_t ahb1enr_ = 0, apb1enr_ = 0, apb2enr_ = 0, apb2rstr_ = 0;
+  std::uint32_t ahb1enr_ = 0, ahb2enr_ = 0, apb1enr_ = 0, apb2enr_ = 0, apb2rstr_ = 0, ahb2rstr_ = 0;
   std::uint32_t csr_ = 0;
   BoardTime internal_ready_ = 0;
   BoardTime crystal_ready_ = never;
@@ -130,6 +136,7 @@ class RccModel final : public RegisterBlock<RccModel> {
   std::function<void(bool, BoardTime)> clock_security_interrupt_;
   std::function<void(BoardTime)> clock_failure_;
   std::function<void(std::uint32_t, BoardTime)> peripheral_reset_;
+  std::function<void(BoardTime)> usb_reset_;
 };
 
 }  // namespace kmax::virtual_board
