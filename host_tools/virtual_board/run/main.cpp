@@ -17,6 +17,7 @@
 #include "host_tools/virtual_board/run/budget.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
 #include "host_tools/virtual_board/run/real_time_run.hpp"
+#include "host_tools/virtual_board/run/usbip_server.hpp"
 
 namespace {
 
@@ -26,6 +27,7 @@ struct Options {
   std::string elf, serial, can, gpio, bench, scene = "motor_axes", store;
   double duration = 0.0;
   int volts = 24;
+  std::optional<std::uint16_t> usbip{};
   bool free_running = false, budget = false, json = false;
 };
 
@@ -97,6 +99,14 @@ int run(const Options& options) {
   }
   if (!options.gpio.empty())
     gpio.emplace(board, options.gpio, [](const std::string& text) { fmt::print(stderr, "{}\n", text); });
+  std::optional<virtual_board::UsbipServer> usb;
+  if (options.usbip) {
+    usb.emplace(board, *options.usbip,
+                [](const std::string& text) { fmt::print(stderr, "kmax-board: {}\n", text); });
+    fmt::print("USB at 127.0.0.1:{}: usbip --tcp-port {} attach -r 127.0.0.1 -b {}\n", usb->port(),
+               usb->port(), virtual_board::UsbipSession::bus_id);
+    std::cout.flush();
+  }
   std::optional<virtual_board::BenchPipe> bench;
   if (!options.bench.empty()) bench.emplace(options.bench, board, world);
   if (!addresses.empty()) {
@@ -107,8 +117,8 @@ int run(const Options& options) {
   serve::Pace pace([](const std::string& words) { fmt::print(stderr, "kmax-board: {}\n", words); });
   const double simulated_s = virtual_board::run_board(
       board, {line ? &*line : nullptr, can ? &*can : nullptr}, gpio ? &*gpio : nullptr,
-      bench ? &*bench : nullptr, options.duration, options.free_running ? nullptr : &pace,
-      [&] { return interruption.requested(); });
+      bench ? &*bench : nullptr, usb ? &*usb : nullptr, options.duration,
+      options.free_running ? nullptr : &pace, [&] { return interruption.requested(); });
   fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", simulated_s,
              board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
   if (pace.behind_s() > 0.0)
@@ -151,6 +161,13 @@ int main(int argc, char** argv) {
          "AXIS NEWTON, release AXIS, unplug AXIS, plug AXIS, plant AXIS DEFECT, mend AXIS DEFECT, stop "
          "open, stop closed; made if missing")
       ->type_name("PIPE");
+  app.add_option("--usbip", options.usbip,
+                 "TCP port of this machine at which the board's USB connector is offered to USB/IP clients, "
+                 "as device "
+                 "1-1; 3240 is usual, 0 takes one that is free and says which. The cable is plugged in while "
+                 "a client "
+                 "is there")
+      ->type_name("PORT");
   app.add_option("--scene", options.scene,
                  "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
                  "connector, its position stays 0")

@@ -51,7 +51,7 @@ class CanBridge {
 }  // namespace
 
 double run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* gpio, BenchPipe* bench,
-                 double duration_s, serve::Pace* pace, const std::function<bool()>& stop) {
+                 UsbipServer* usb, double duration_s, serve::Pace* pace, const std::function<bool()>& stop) {
   std::optional<CanBridge> can;
   if (host.can != nullptr) can.emplace(board, *host.can);
   const BoardTime begin = board.now();
@@ -66,6 +66,7 @@ double run_board(VirtualBoard& board, const serve::HostSide& host, GpioBridge* g
     }
     if (can) can->exchange();
     if (bench != nullptr) bench->exchange();
+    if (usb != nullptr) usb->exchange();
     const bool runs = gpio == nullptr || gpio->exchange();
     if (pace != nullptr) {
       const auto now = Clock::now();
