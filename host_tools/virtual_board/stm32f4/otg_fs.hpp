@@ -43,7 +43,8 @@ namespace kmax::virtual_board {
 /// A new DAD counts after the status stage when it is written within a control transfer, as the manual has it
 /// done, else at once.
 ///
-/// Where the manual is silent: NAKSTS stays as it is when an IN transfer ends; a fourth SETUP back to back
+/// Where the manual is silent: an endpoint that a bus reset has deactivated loses EPENA with the next store
+/// into its control register; NAKSTS stays as it is when an IN transfer ends; a fourth SETUP back to back
 /// sets B2BSTUP and leaves STUPCNT 0.
 ///
 /// Refused: host mode, OTG (SRP, HNP), isochronous endpoints, low power (PCGCCTL), remote wake-up, DMA, test
@@ -51,10 +52,11 @@ namespace kmax::virtual_board {
 /// a connection with TRDT below what HCLK needs; FIFO sizes outside of 16 to 256 words, beyond the 320,
 /// overlapping at the first use, changed while full; TXFNUM other than the endpoint's number; EPENA without
 /// USBAEP, without packets, with PKTCNT that does not fit XFRSIZ, with a FIFO too small for a packet or with
-/// old words in it; DIEPTSIZ and DOEPTSIZ written while enabled; EPDIS without the NAK that the manual asks
-/// for before it (SNAK and INEPNE; SGONAK and GONAKEFF), or of OUT endpoint 0; a word into a transmit FIFO
-/// that is full, that no transfer waits for, or beyond XFRSIZ; taking from an empty receive FIFO, and the
-/// next status before the last byte of a packet; a flush of a FIFO that may be on the wire.
+/// old words in it; DIEPTSIZ and DOEPTSIZ written while enabled (DOEPTSIZ0: and NAKSTS is 0); EPDIS without
+/// the NAK that the manual asks for before it (SNAK and INEPNE; SGONAK and GONAKEFF), or of OUT endpoint 0; a
+/// word into a transmit FIFO that is full, that no transfer waits for, or beyond XFRSIZ; taking from an empty
+/// receive FIFO, and the next status before the last byte of a packet; a flush of a FIFO that may be on the
+/// wire.
 class OtgFsModel final : public RegisterBlock<OtgFsModel>, private UsbDeviceSide {
  public:
   static constexpr std::uint32_t size = drivers::stm32f4::otg_fs_size;

@@ -308,7 +308,7 @@ void OtgFsModel::connection_changed(const Access& access) {
   refuse_if(turnaround < least_turnaround(hclk), access,
             "connected with GUSBCFG.TRDT = {}; with HCLK at {} Hz it must be {} or more", turnaround, hclk,
             least_turnaround(hclk));
-  if (suspend_at_ == never && !enumerated_ && !suspended_)
+  if (suspend_at_ == never && !enumerated_ && !suspended_ && !bus_reset_)
     suspend_at_ = std::max(access.now, forced_at_) + usb_time::idle_until_suspend;
 }
 

@@ -121,8 +121,12 @@ void UsbHostPort::step(BoardTime now) {
       return watch_device(now);
     case State::resetting:
       if (device_ != nullptr) device_->on_reset(false, now);
-      return enter(State::recovering, now + recovery_time, now);
-    case State::recovering:
+      recovered_at_ = now + recovery_time;
+      return enter(State::recovering, now, now);
+    case State::recovering:  // with frames, lest the device falls asleep
+      state_until_ = now + usb_time::frame;
+      if (begin_frame(now) && now >= recovered_at_) enter(State::ready, never, now);
+      return;
     case State::resuming:
       if (begin_frame(now)) enter(State::ready, never, now);
       return;

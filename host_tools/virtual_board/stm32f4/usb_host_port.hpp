@@ -157,6 +157,7 @@ class UsbHostPort {
   std::function<void(State, BoardTime)> listener_;
   BoardTime state_until_ = never;  ///< when the state ends, or the device is looked at again
   BoardTime seen_since_ = never;
+  BoardTime recovered_at_ = 0;
   BoardTime frame_end_ = 0;
   BoardTime look_at_ = never;  ///< when a transaction may begin
   unsigned frame_ = 0;

@@ -50,7 +50,7 @@ inline constexpr std::uint32_t enable = 1U << 31, disable = 1U << 30, set_nak = 
 }  // namespace usb_registers
 
 /// The core with a host at its port and, on the other side, a program of a few lines that drives its
-/// registers by hand: a device that answers GET_DESCRIPTOR with 18 bytes, takes SET_ADDRESS and
+/// registers by hand: a device that answers GET_DESCRIPTOR, takes SET_ADDRESS and
 /// SET_CONFIGURATION, stalls all other requests, and sends back on bulk IN 1 what arrives at bulk OUT 1.
 struct UsbBench : ModelBench {
   UsbBench() : ModelBench({&core}, 100'000) { clocks.core = units_per_period(168'000'000); }
@@ -122,6 +122,10 @@ struct UsbBench : ModelBench {
   static constexpr std::uint8_t address = 7;
   static constexpr std::array<std::uint8_t, 18> descriptor{18,   1,    0,    2, 2, 0, 0, 64, 0x09,
                                                            0x12, 0x34, 0x12, 0, 1, 0, 0, 0,  1};
+  /// Bulk endpoints 1 in both directions of one interface of the vendor's own class.
+  static constexpr std::array<std::uint8_t, 32> configuration{9,  2, 32, 0,    1, 1,    0, 0x80, 50, 9,    4,
+                                                              0,  0, 2,  0xFF, 1, 2,    0, 7,    5,  0x81, 2,
+                                                              64, 0, 0,  7,    5, 0x01, 2, 64,   0,  0};
   UsbHostPort port;
   bool clocked = true, pins = true;
   OtgFsModel core{clocks, interrupts, port, [this](BoardTime) { return clocked; }, [this] { return pins; }};
@@ -170,8 +174,9 @@ inline void UsbBench::answer_setup() {
   using namespace usb_registers;
   const std::uint8_t request = setup[1];
   if (setup[0] == 0x80 && request == 6) {
-    const std::size_t length = std::min<std::size_t>(setup[6], descriptor.size());
-    queue_in(0, std::span(descriptor).first(length));
+    const std::span<const std::uint8_t> whole = setup[3] == 2 ? std::span<const std::uint8_t>(configuration)
+                                                              : std::span<const std::uint8_t>(descriptor);
+    queue_in(0, whole.first(std::min<std::size_t>(setup[6], whole.size())));
     arm_out(0);
   } else if (setup[0] == 0 && (request == 5 || request == 9)) {
     if (request == 5) write(dcfg, 3U | static_cast<std::uint32_t>(setup[2]) << 4);
