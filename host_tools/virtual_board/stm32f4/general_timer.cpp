@@ -27,7 +27,7 @@ constexpr std::array<Unit, 4> units{Unit{"TIM2", 0xFFFF'FFFF}, Unit{"TIM3", 0xFF
                                     Unit{"TIM5", 0xFFFF'FFFF}};
 
 constexpr std::uint32_t cr1_settings = timer_cr1::UpdateRequestSource::mask;
-constexpr std::uint32_t cr1_of_counter = timer_cr1::Enable::mask | timer_cr1::CountingDown::mask;
+constexpr std::uint32_t cr1_from_counter = timer_cr1::Enable::mask | timer_cr1::CountingDown::mask;
 constexpr std::uint32_t input_fields = timer_ccmr::Selection<1>::mask | timer_ccmr::InputFilter<1>::mask;
 constexpr std::uint32_t both_inputs = timer_ccmr::Selection<1>::bits(timer_ccmr::input_of_own_pin) |
                                       timer_ccmr::Selection<2>::bits(timer_ccmr::input_of_own_pin);
@@ -95,7 +95,7 @@ const RegisterTable<GeneralTimerModel>& GeneralTimerModel::registers() {
   using Row = Register<Model>;
   using Layout = TimerRegisters;
   static const RegisterTable<Model> table{
-      {offsetof(Layout, cr1), "CR1", Row::shows<&Model::read_cr1>, cr1_settings | cr1_of_counter,
+      {offsetof(Layout, cr1), "CR1", Row::shows<&Model::read_cr1>, cr1_settings | cr1_from_counter,
        Row::takes<&Model::write_cr1>},
       Row::reserved(offsetof(Layout, cr2), "CR2"),
       {offsetof(Layout, smcr), "SMCR", Row::shows<&Model::smcr_>, timer_smcr::SlaveMode::mask,

@@ -28,10 +28,10 @@ namespace diepint = stm32::otg_fs_diepint;
 namespace doepint = stm32::otg_fs_doepint;
 namespace eptsiz = stm32::otg_fs_eptsiz;
 
-constexpr std::uint32_t flag_bits = gint::StartOfFrame::mask | gint::EarlySuspend::mask |
-                                    gint::Suspend::mask | gint::Reset::mask | gint::EnumerationDone::mask |
-                                    gint::SessionRequest::mask | gint::WakeUp::mask;
-constexpr std::uint32_t gintmsk_bits = flag_bits | gint::ModeMismatch::mask | gint::Otg::mask |
+constexpr std::uint32_t gintsts_flags =
+    gint::StartOfFrame::mask | gint::EarlySuspend::mask | gint::Suspend::mask | gint::Reset::mask |
+    gint::EnumerationDone::mask | gint::SessionRequest::mask | gint::WakeUp::mask;
+constexpr std::uint32_t gintmsk_bits = gintsts_flags | gint::ModeMismatch::mask | gint::Otg::mask |
                                        gint::ReceiveNotEmpty::mask | gint::GlobalInNakEffective::mask |
                                        gint::GlobalOutNakEffective::mask | gint::InEndpoint::mask |
                                        gint::OutEndpoint::mask;
