@@ -17,6 +17,7 @@
 #include "drivers/stm32f4/registers/flash.hpp"
 #include "drivers/stm32f4/registers/gpio.hpp"
 #include "drivers/stm32f4/registers/iwdg.hpp"
+#include "drivers/stm32f4/registers/otg_fs.hpp"
 #include "drivers/stm32f4/registers/pwr.hpp"
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/registers/spi.hpp"
@@ -159,6 +160,49 @@ TEST(Registers, FieldsOfTheChipAreThoseOfTheManual) {
   {
     using namespace usart_cr3;
     EXPECT_EQ((bits_of<ReceiveDma, TransmitDma>()), 0x0000'00C0U);
+  }
+  {
+    using namespace otg_fs_gahbcfg;
+    EXPECT_EQ((bits_of<InterruptEnable, EmptyLevel>()), 0x0000'0081U);
+  }
+  {
+    using namespace otg_fs_gusbcfg;
+    EXPECT_EQ((bits_of<TimeoutCalibration, FullSpeedPhy, SessionRequestCapable, HostNegotiation, Turnaround,
+                       ForceHost, ForceDevice, CorruptPacket>()),
+              0xE000'3F47U);
+  }
+  {
+    using namespace otg_fs_grstctl;
+    EXPECT_EQ((bits_of<CoreReset, ReceiveFlush, TransmitFlush, TransmitFifoNumber, AhbIdle>()), 0x8000'07F1U);
+  }
+  {
+    using namespace otg_fs_grxsts;
+    EXPECT_EQ((bits_of<Endpoint, ByteCount, DataPid, PacketStatus, FrameNumber>()), 0x01FF'FFFFU);
+  }
+  {
+    using namespace otg_fs_gccfg;
+    EXPECT_EQ((bits_of<PowerUp, VbusSensingA, VbusSensingB, StartOfFrameOutput, NoVbusSensing>()),
+              0x003D'0000U);
+  }
+  {
+    using namespace otg_fs_diepctl;
+    EXPECT_EQ((bits_of<MaximumPacket, Active, DataPid, Nak, Type, Stall, TransmitFifoNumber, ClearNak, SetNak,
+                       SetData0, SetData1, Disable, Enable>()),
+              0xFFEF'87FFU);
+  }
+  {
+    using namespace otg_fs_diepint;
+    EXPECT_EQ((bits_of<TransferComplete, Disabled, Timeout, TokenWhileEmpty, NakEffective, FifoEmpty>()),
+              0x0000'00DBU);
+  }
+  {
+    using namespace otg_fs_doepint;
+    EXPECT_EQ((bits_of<TransferComplete, Disabled, SetupDone, TokenWhileDisabled, BackToBackSetups>()),
+              0x0000'005BU);
+  }
+  {
+    using namespace otg_fs_eptsiz;
+    EXPECT_EQ((bits_of<TransferSize, PacketCount, SetupCount>()), 0x7FFF'FFFFU);
   }
   {
     using namespace pwr_cr;
@@ -443,6 +487,8 @@ TEST(Registers, BlocksAreWhereTheMemoryMapHasThem) {
   EXPECT_EQ(address(tim5()), 0x4000'0C00U);
   EXPECT_EQ(address(iwdg()), 0x4000'3000U);
   EXPECT_EQ(address(spi3()), 0x4000'3C00U);
+  EXPECT_EQ(address(otg_fs_global()), 0x5000'0000U);
+  EXPECT_EQ(address(otg_fs_device()), 0x5000'0800U);
   EXPECT_EQ(address(usart2()), 0x4000'4400U);
   EXPECT_EQ(address(uart4()), 0x4000'4C00U);
   EXPECT_EQ(address(can1()), 0x4000'6400U);
