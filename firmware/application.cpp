@@ -26,7 +26,13 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
             .writes = writes_,
             .readings = readings_,
             .axes = axes_,
-            .links = links_}) {
+            .links = links_}),
+      usb_({.board = board_,
+            .parameters = parameters_,
+            .writes = writes_,
+            .readings = readings_,
+            .axes = axes_,
+            .state = links_[Link::usb]}) {
   readings_.refresh();
 }
 
@@ -41,6 +47,11 @@ void Application::poll(std::uint32_t now_us) {
   can_.poll();
   axes_.act();
   if (millisecond || store_.keeper().busy()) go_on_saving(now_us);
+}
+
+void Application::poll_usb() {
+  usb_.poll();
+  axes_.act();
 }
 
 void Application::go_on_saving(std::uint32_t now_us) {
