@@ -14,7 +14,7 @@ namespace {
 enum class State { unaddressed, addressed, configured, halted };
 
 struct Bench : DeviceAtHost<> {
-  Bench() : DeviceAtHost<>{.link = fake_link} { host.reset(); }
+  Bench() : DeviceAtHost<>(fake_link) { host.reset(); }
   void be(State state) {
     host.reset();
     if (state == State::unaddressed) return;
@@ -253,10 +253,10 @@ TEST(UsbDevice, OffersTheBootLoaderOnlyWhileNoAxisMakesForce) {
 
 /// After whatever has happened, a reset and an enumeration, the device works as new.
 void expect_works(Bench& bench) {
+  bench.fake_link.has_room = true;
   bench.host.enumerate();
   EXPECT_EQ(bench.host.read({0x80, 8, 0, 0, 1}), Bytes{1});
   bench.fake_link.packets.clear();
-  bench.fake_link.has_room = true;
   EXPECT_TRUE(bench.host.put(3, Bytes{1, 2}));
   EXPECT_EQ(bench.fake_link.packets, std::vector<Bytes>{(Bytes{1, 2})});
   static_cast<void>(bench.functions.serial().reply_sent());

@@ -26,13 +26,13 @@ struct FakeController {
     std::uint16_t size = full_packet;
   };
 
-  Side& side(std::uint8_t address) { return sides[address]; }
+  Side& side(std::uint8_t of) { return sides[of]; }
 
   void ISR_open(const Endpoint& endpoint) {
     EXPECT_NE(number_of(endpoint.address), 0);
     side(endpoint.address) = {.open = true, .size = endpoint.packet_bytes};
   }
-  void ISR_close(std::uint8_t address) { side(address) = {}; }
+  void ISR_close(std::uint8_t of) { side(of) = {}; }
   void ISR_take_address(std::uint8_t wanted) { next_address = wanted; }
   void ISR_send(std::uint8_t number, std::span<const std::uint8_t> data) {
     Side& to_host = side(static_cast<std::uint8_t>(number | direction_in));
@@ -44,14 +44,14 @@ struct FakeController {
     broken_promises += number != 0 && (!side(number).open || side(number).receiving);
     side(number).receiving = true;
   }
-  void ISR_stall(std::uint8_t address) {
-    side(address).stalled = true;
-    side(address).packet.reset();
-    side(address).receiving = false;
+  void ISR_stall(std::uint8_t of) {
+    side(of).stalled = true;
+    side(of).packet.reset();
+    side(of).receiving = false;
   }
-  void ISR_clear_stall(std::uint8_t address) {
-    side(address).stalled = side(address).second_data = side(address).receiving = false;
-    side(address).packet.reset();
+  void ISR_clear_stall(std::uint8_t of) {
+    side(of).stalled = side(of).second_data = side(of).receiving = false;
+    side(of).packet.reset();
   }
   void ISR_stall_control() { control_stalled = true; }
 
@@ -194,6 +194,8 @@ struct FakeClock {
 template <typename Link = FakeLink>
 struct DeviceAtHost {
   using Behaviour = Functions<FakeController, Link, FakeClock>;
+
+  explicit DeviceAtHost(Link& behind) : link(behind) {}
 
   Link& link;
   FakeController wire;
