@@ -28,11 +28,13 @@ enum class Interrupt : std::uint8_t {
   tim4 = 30,
   usart2 = 38,
   exti15_10 = 40,
+  otg_fs_wakeup = 42,
   tim8_brk_tim12 = 43,
   tim8_up_tim13 = 44,
   tim5 = 50,
   spi3 = 51,
   uart4 = 52,
+  otg_fs = 67,
 };
 
 }  // namespace kmax::drivers::stm32f4

@@ -37,6 +37,7 @@ static_assert(offsetof(RccRegisters, pllcfgr) == 0x04);
 static_assert(offsetof(RccRegisters, cfgr) == 0x08);
 static_assert(offsetof(RccRegisters, cir) == 0x0C);
 static_assert(offsetof(RccRegisters, ahb1rstr) == 0x10);
+static_assert(offsetof(RccRegisters, ahb2rstr) == 0x14);
 static_assert(offsetof(RccRegisters, apb1rstr) == 0x20);
 static_assert(offsetof(RccRegisters, apb2rstr) == 0x24);
 static_assert(offsetof(RccRegisters, ahb1enr) == 0x30);
@@ -97,6 +98,10 @@ using GpioD = Field<3>;
 using Ccm = Field<20>;  // CCMDATARAMEN; the only one that is on after reset
 using Dma2 = Field<22>;
 }  // namespace rcc_ahb1enr
+
+namespace rcc_ahb2enr {
+using OtgFs = Field<7>;  // OTGFSEN
+}  // namespace rcc_ahb2enr
 
 namespace rcc_apb1enr {
 using Timer2 = Field<0>;
