@@ -49,9 +49,10 @@ void Application::poll(std::uint32_t now_us) {
   if (millisecond || store_.keeper().busy()) go_on_saving(now_us);
 }
 
-void Application::poll_usb() {
-  usb_.poll();
+bool Application::poll_usb() {
+  const bool some = usb_.poll();
   axes_.act();
+  return some;
 }
 
 void Application::go_on_saving(std::uint32_t now_us) {

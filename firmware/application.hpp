@@ -90,8 +90,8 @@ class Application {
 
   void poll(std::uint32_t now_us);
   /// Behind poll(), when something has come over USB, and only then: without a host USB costs nothing. What
-  /// came over USB as CAN frames (CanopenEdge::take()) comes before it.
-  [[gnu::cold]] void poll_usb();
+  /// came over USB as CAN frames (CanopenEdge::take()) comes before it. True: packets were taken.
+  [[gnu::cold]] bool poll_usb();
   /// Before poll(), as often as they change.
   void set_readings(const BoardReadings& readings) { axes_.set_readings(readings); }
   ModbusEdge& serial() { return serial_; }

@@ -20,14 +20,17 @@ UsbModbusEdge::UsbModbusEdge(const Sources& sources)
                   .link = Link::usb}),
       port_(registers_, unit_in(parameters_.values())) {}
 
-void UsbModbusEdge::poll() {
+bool UsbModbusEdge::poll() {
+  bool some = false;
   Packet packet;
   for (std::size_t i = 0; i < packets && queue_.pop(packet); ++i) {
+    some = true;
     if (packet.begins_anew) port_.restart();
     port_.set_unit(unit_in(parameters_.values()));
     port_.receive(std::span(packet.bytes).first(packet.length), packet.time_us);
     state_.heard_us = port_.last_valid_request_time();
   }
+  return some;
 }
 
 }  // namespace kmax::firmware

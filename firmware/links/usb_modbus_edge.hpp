@@ -46,8 +46,9 @@ class UsbModbusEdge {
   /// no request that comes from now on, and no reply is under way.
   void ISR_restart() { begins_anew_ = true; }
 
-  /// What has come; at most as many packets as one request has. Before it: Application::poll().
-  void poll();
+  /// What has come; at most as many packets as one request has. True if there was any: then there is room for
+  /// more. Before it: Application::poll().
+  bool poll();
   /// A reply to send now, once; the bytes stay valid until reply_sent().
   std::span<const std::uint8_t> reply_due() { return port_.take_reply(); }
   void reply_sent() { port_.reply_sent(); }

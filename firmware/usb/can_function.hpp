@@ -44,7 +44,12 @@ class CanFunction {
   /// one, in their order.
   bool next_from_host(gs::HostFrame& frame) { return to_host_.room() != 0 && from_host_.pop(frame); }
   void done(const gs::HostFrame& frame) {
-    if (frame.session == session_.load(std::memory_order_relaxed)) static_cast<void>(to_host_.push(frame));
+    if (is_current(frame)) static_cast<void>(to_host_.push(frame));
+  }
+  /// Main loop: the channel that it came by is still open, and has been since.
+  bool is_current(const gs::HostFrame& frame) const {
+    return frame.session == session_.load(std::memory_order_relaxed) &&
+           is_open(static_cast<CanChannel>(frame.channel));
   }
   /// Main loop: what the host sees on an open channel. As many as `kept_for_echoes` more must fit.
   void show(CanChannel channel, const drivers::CanFrame& frame) {

@@ -30,7 +30,9 @@ struct FakeController {
 
   void ISR_open(const Endpoint& endpoint) {
     EXPECT_NE(number_of(endpoint.address), 0);
-    side(endpoint.address) = {.open = true, .size = endpoint.packet_bytes};
+    side(endpoint.address) = {};
+    side(endpoint.address).open = true;
+    side(endpoint.address).size = endpoint.packet_bytes;
   }
   void ISR_close(std::uint8_t of) { side(of) = {}; }
   void ISR_take_address(std::uint8_t wanted) { next_address = wanted; }
