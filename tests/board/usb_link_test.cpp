@@ -74,14 +74,18 @@ TEST_F(UsbLink, ItsTransactionEndsWithItsSilence) {
 
 TEST_F(UsbLink, CommandsTheAxisThatItArmed) {
   ASSERT_TRUE(arm());
-  EXPECT_NE(bench.set("force.limit", 10), 0) << "another's axis, which others may only restrain";
+  EXPECT_NE(bench.set("wall.stiffness", 123), 0) << "another's axis";
+  EXPECT_EQ(set("wall.stiffness", 900), 0);
   bench.command(0x06);
   bench.run_ticks(3);
   EXPECT_NE(bench.state(), DriveState::operation_enabled) << "anybody may disarm it";
 }
 
 TEST_F(UsbLink, PulledOutWhileArmedTheForceIsGoneWithinTheTimeOut) {
+  bench.preset("device.hand_force", 0);  // scripted handles jump
   bench.preset("link.timeout", 0.3);
+  bench.preset("link.loss", 0);
+  bench.run_ms(5);
   ASSERT_TRUE(arm());
   bench.device.stand_at(-1000);
   for (int i = 0; i < 20; ++i) {
@@ -119,9 +123,9 @@ TEST_F(UsbLink, ARequestThatFloodsWaitsForRoomAndIsAnsweredInTheEnd) {
 
 TEST_F(UsbLink, ANodeThatIsReachedOverUsbNeedsNoBus) {
   auto& can = bench.application().can();
-  can.take({.identifier = 0, .length = 2, .data = {0x01, 0x01}});  // NMT: operational
-  bench.run_ms(5);
   drivers::CanFrame frame;
+  for (int i = 0; i < 20 && can.next_frame(frame); ++i) {
+  }  // boot-up
   bool answered = false;
   can.take({.identifier = 0x601, .length = 8, .data = {0x40, 0x00, 0x10, 0, 0, 0, 0, 0}});
   for (int i = 0; i < 20 && can.next_frame(frame); ++i) answered = answered || frame.identifier == 0x581;
