@@ -49,12 +49,6 @@ void Application::poll(std::uint32_t now_us) {
   if (millisecond || store_.keeper().busy()) go_on_saving(now_us);
 }
 
-bool Application::poll_usb() {
-  const bool some = usb_.poll();
-  axes_.act();
-  return some;
-}
-
 void Application::go_on_saving(std::uint32_t now_us) {
   store_.poll();
   // A code is in force as soon as it is in the flash.

@@ -71,7 +71,7 @@ class Application {
     return axes_.tick().ISR_tick(axis, input);
   }
   /// In place of it, for an axis that the board does not have.
-  [[gnu::cold]] void ISR_pass(std::size_t axis) { axes_.tick().ISR_pass(axis); }
+  [[gnu::cold]] void ISR_tick(std::size_t axis) { axes_.tick().ISR_pass(axis); }
   /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
     TickOutput output;
@@ -89,15 +89,13 @@ class Application {
   void ISR_pass_held(std::uint32_t ticks) { axes_.tick().ISR_pass_held(ticks); }
 
   void poll(std::uint32_t now_us);
-  /// Behind poll(), when something has come over USB, and only then: without a host USB costs nothing. What
-  /// came over USB as CAN frames (CanopenEdge::take()) comes before it. True: packets were taken.
-  [[gnu::cold]] bool poll_usb();
   /// Before poll(), as often as they change.
   void set_readings(const BoardReadings& readings) { axes_.set_readings(readings); }
   ModbusEdge& serial() { return serial_; }
   const ModbusEdge& serial() const { return serial_; }
   CanopenEdge& can() { return can_; }
   const CanopenEdge& can() const { return can_; }
+  /// Polled by the board behind poll(), and only when something has come: without a host USB costs nothing.
   UsbModbusEdge& usb() { return usb_; }
 
   /// Parameters a board or a scene starts with, before the first tick. Refused like a host's write, and

@@ -231,7 +231,7 @@ class NativeBoard {
       link.ISR_packet(usb_incoming_.front(), static_cast<std::uint32_t>(now_us_));
       usb_incoming_.pop_front();
     }
-    application_->poll_usb();
+    static_cast<void>(link.poll());
     const auto reply = link.reply_due();
     usb_outgoing_.insert(usb_outgoing_.end(), reply.begin(), reply.end());
     link.reply_sent();

@@ -60,7 +60,7 @@ class UsbLine {
     functions_.allow_restart(!application.any_armed() && !application.store_busy());
     bool moved = exchange_frames(application.can(), line);
     if (functions_.serial().reply_sent()) application.usb().reply_sent();
-    moved = application.poll_usb() || moved;
+    moved = application.usb().poll() || moved;
     if (const auto reply = application.usb().reply_due(); !reply.empty()) {
       functions_.serial().send(reply);
       moved = true;

@@ -89,11 +89,8 @@ class UsbDevice {
       handler.ISR_reset();
       return true;
     }
-    if (otg_fs_gint::EnumerationDone::of(flags) != 0) {
-      // There is no speed but one, and endpoint 0 has packets of 64 bytes after reset.
-      global_.gintsts = otg_fs_gint::EnumerationDone::mask;
-      device_.dctl = static_cast<std::uint32_t>(device_.dctl) | otg_fs_dctl::ClearGlobalInNak::mask;
-    }
+    // There is no speed but one, and endpoint 0 has packets of 64 bytes after reset.
+    if (otg_fs_gint::EnumerationDone::of(flags) != 0) global_.gintsts = otg_fs_gint::EnumerationDone::mask;
     // What was sent came before what was received behind it: see Device.
     if (otg_fs_gint::InEndpoint::of(flags) != 0) ISR_serve_in(handler);
     if (otg_fs_gint::OutEndpoint::of(flags) != 0) ISR_serve_out(handler);

@@ -10,6 +10,7 @@ std::uint8_t unit_in(const ParameterValues& values) {
 
 UsbModbusEdge::UsbModbusEdge(const Sources& sources)
     : parameters_(sources.parameters),
+      axes_(sources.axes),
       state_(sources.state),
       registers_({.board = sources.board,
                   .parameters = sources.parameters,
@@ -30,6 +31,7 @@ bool UsbModbusEdge::poll() {
     port_.receive(std::span(packet.bytes).first(packet.length), packet.time_us);
     state_.heard_us = port_.last_valid_request_time();
   }
+  axes_.act();
   return some;
 }
 

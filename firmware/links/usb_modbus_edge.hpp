@@ -47,7 +47,8 @@ class UsbModbusEdge {
   void ISR_restart() { begins_anew_ = true; }
 
   /// What has come; at most as many packets as one request has. True if there was any: then there is room for
-  /// more. Before it: Application::poll().
+  /// more. Behind Application::poll(), and behind what came over USB as CAN frames (CanopenEdge::take()): what
+  /// either of them set acts at its end.
   bool poll();
   /// A reply to send now, once; the bytes stay valid until reply_sent().
   std::span<const std::uint8_t> reply_due() { return port_.take_reply(); }
@@ -63,6 +64,7 @@ class UsbModbusEdge {
   static constexpr std::size_t packets = modbus::adu_size_max / modbus::TransferReceiver::packet_bytes;
 
   const ParameterAccess& parameters_;
+  Axes& axes_;
   LinkState& state_;
   ModbusRegisters registers_;
   modbus::TransferPort<ModbusRegisters> port_;

@@ -180,12 +180,12 @@ class CanFunction {
     constexpr std::uint32_t reset = 0, start = 1;
     const std::uint8_t before = open_.load(std::memory_order_relaxed);
     if (mode == reset) {
-      open_.store(before & static_cast<std::uint8_t>(~bit_of(channel)), std::memory_order_relaxed);
+      open_.store(static_cast<std::uint8_t>(before & ~bit_of(channel)), std::memory_order_relaxed);
       return true;
     }
     if (mode != start || (flags & ~gs::features) != 0) return false;
     if (before == 0) ISR_begin_session();
-    open_.store(before | bit_of(channel), std::memory_order_relaxed);
+    open_.store(static_cast<std::uint8_t>(before | bit_of(channel)), std::memory_order_relaxed);
     return true;
   }
 
