@@ -71,7 +71,7 @@ class Application {
     return axes_.tick().ISR_tick(axis, input);
   }
   /// In place of it, for an axis that the board does not have.
-  [[gnu::cold]] void ISR_tick(std::size_t axis) { axes_.tick().ISR_pass(axis); }
+  [[gnu::cold]] void ISR_tick(std::size_t axis) { axes_.tick().ISR_tick(axis); }
   /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
     TickOutput output;
