@@ -12,12 +12,8 @@ namespace kmax::board {
 /// (AN2606).
 inline constexpr std::uint32_t asks_for_boot_loader = 0xB007'10AD;
 
-/// First of all that main does, while clocks and peripherals are as a reset leaves them, which the boot
-/// loader counts on. Returns if nobody has asked for it; another reset, or the boot loader's own "leave",
-/// comes back here and starts the firmware.
-inline void enter_boot_loader_if_asked(firmware::RetainedCount& asked) {
-  if (asked.value() != asks_for_boot_loader) return;
-  asked.set(0);
+/// Leaves the firmware for good: what runs then has the stack for itself.
+[[noreturn, gnu::noinline, gnu::cold]] inline void start_boot_loader() {
 #if defined(__arm__)
   // System memory begins with a vector table (RM0090, boot configuration): stack pointer, start.
   constexpr std::uint32_t system_memory = 0x1FFF'0000;
@@ -27,8 +23,17 @@ inline void enter_boot_loader_if_asked(firmware::RetainedCount& asked) {
   drivers::cortex_m::scb().vtor = system_memory;
   drivers::cortex_m::data_synchronization_barrier();
   asm volatile("msr msp, %0\n\tbx %1" : : "r"(stack), "r"(program) : "memory");
-  __builtin_unreachable();
 #endif
+  __builtin_unreachable();
+}
+
+/// First of all that main does, while clocks and peripherals are as a reset leaves them, which the boot
+/// loader counts on. Returns if nobody has asked for it; another reset, or the boot loader's own "leave",
+/// comes back here and starts the firmware.
+inline void enter_boot_loader_if_asked(firmware::RetainedCount& asked) {
+  if (asked.value() != asks_for_boot_loader) return;
+  asked.set(0);
+  start_boot_loader();
 }
 
 }  // namespace kmax::board
