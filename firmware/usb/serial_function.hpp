@@ -30,7 +30,7 @@ class SerialFunction {
   /// Main loop: a reply, whose bytes stay as they are until reply_sent(). One at a time. The caller pends the
   /// interrupt.
   void send(std::span<const std::uint8_t> reply) { static_cast<void>(replies_.push(reply)); }
-  /// Main loop, once for each: the reply has left, or nobody is there to take it.
+  /// Main loop, once for each: the host has the whole reply, or nobody is there to take it.
   bool reply_sent() { return reply_sent_.take(); }
 
   void ISR_start() {
@@ -45,13 +45,10 @@ class SerialFunction {
   }
   /// What the main loop has left: a reply, or room for the next packet.
   void ISR_serve() {
-    if (!reply_) {
-      std::span<const std::uint8_t> next;
-      if (replies_.ISR_pop(next)) reply_ = Reply{next, next.size() % full_packet == 0};
-    }
-    if (reply_ && !running_) ISR_end_reply();
+    if (std::span<const std::uint8_t> next; !left_ && replies_.ISR_pop(next)) left_ = next;
+    if (left_ && !running_) ISR_end_reply();
     if (!running_) return;
-    if (reply_ && !in_flight_) ISR_send_packet();
+    if (!in_flight_ && (left_ || owes_empty_)) ISR_send_packet();
     if (!receiving_ && link_.ISR_has_room()) {
       receiving_ = true;
       controller_.ISR_receive(number_of(serial_from_host.address));
@@ -88,14 +85,14 @@ class SerialFunction {
   }
   void ISR_sent() {
     in_flight_ = false;
-    if (reply_ && reply_->left.empty() && !reply_->ends_empty) ISR_end_reply();
+    if (left_ && left_->empty()) ISR_end_reply();
     ISR_serve();
   }
   /// A packet that was lost with the halt is not sent again: its reply is cut, and the client asks again.
   void ISR_reopened(std::uint8_t address) {
     if (address == serial_to_host.address) {
-      in_flight_ = false;
-      if (reply_) ISR_end_reply();
+      in_flight_ = owes_empty_ = false;
+      if (left_) ISR_end_reply();
     }
     if (address == serial_from_host.address) receiving_ = false;
     ISR_serve();
@@ -107,25 +104,28 @@ class SerialFunction {
                                 send_break = 0x23;
   static constexpr std::uint16_t terminal_ready_bit = 1;
 
-  struct Reply {
-    std::span<const std::uint8_t> left;
-    bool ends_empty;
-  };
-
+  /// The empty one that the reply before ends with comes first; it is no part of that any more: the client
+  /// has all of it, and may ask again before the empty one is fetched.
   void ISR_send_packet() {
-    const auto packet = reply_->left.first(std::min(reply_->left.size(), full_packet));
-    reply_->left = reply_->left.subspan(packet.size());
-    if (packet.empty()) reply_->ends_empty = false;
     in_flight_ = true;
+    std::span<const std::uint8_t> packet;
+    if (owes_empty_) {
+      owes_empty_ = false;
+    } else {
+      packet = left_->first(std::min(left_->size(), full_packet));
+      left_ = left_->subspan(packet.size());
+      owes_empty_ = left_->empty() && packet.size() == full_packet;
+    }
     controller_.ISR_send(number_of(serial_to_host.address), packet);
   }
   void ISR_end_reply() {
-    reply_.reset();
+    left_.reset();
     reply_sent_.ISR_raise();
   }
   void ISR_begin_anew() {
     link_.ISR_restart();
-    if (reply_) ISR_end_reply();
+    owes_empty_ = false;
+    if (left_) ISR_end_reply();
   }
   void ISR_follow_terminal(bool ready) {
     if (ready == terminal_ready_) return;
@@ -138,10 +138,10 @@ class SerialFunction {
   const Clock& clock_;
   QueueToInterrupt<std::span<const std::uint8_t>, 1> replies_;
   InterruptSignal reply_sent_;
-  std::optional<Reply> reply_;
+  std::optional<std::span<const std::uint8_t>> left_;  ///< of the reply under way, not yet sent
   /// 115200 baud, one stop bit, even parity, eight bits: what the serial line has.
   std::array<std::uint8_t, 7> line_coding_{0x00, 0xC2, 0x01, 0x00, 0, 2, 8};
-  bool running_ = false, in_flight_ = false, receiving_ = false, terminal_ready_ = false;
+  bool running_ = false, in_flight_ = false, receiving_ = false, terminal_ready_ = false, owes_empty_ = false;
 };
 
 }  // namespace kmax::firmware::usb
