@@ -26,7 +26,13 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
             .writes = writes_,
             .readings = readings_,
             .axes = axes_,
-            .links = links_}) {
+            .links = links_}),
+      usb_({.board = board_,
+            .parameters = parameters_,
+            .writes = writes_,
+            .readings = readings_,
+            .axes = axes_,
+            .state = links_[Link::usb]}) {
   readings_.refresh();
 }
 

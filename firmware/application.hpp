@@ -17,6 +17,7 @@
 #include "firmware/links/canopen_edge.hpp"
 #include "firmware/links/modbus_edge.hpp"
 #include "firmware/links/readings.hpp"
+#include "firmware/links/usb_modbus_edge.hpp"
 
 namespace kmax::firmware {
 
@@ -35,22 +36,23 @@ struct TickOutput {
 ///   serial() ModbusEdge  --+                       +--> axes() Axes: supervisors, AxesTick
 ///                          +--> HostWrites --------+--> ParameterAccess
 ///   can()    CanopenEdge --+--> Readings           +--> StoreCommands, WriteLock
+///   usb()  UsbModbusEdge --+
 ///
 /// A board owns one, calls ISR_tick() for each axis at 20 kHz from the interrupt that follows the axis'
-/// current sample, serial().ISR_byte() and can().ISR_frame() from its receive interrupts, and everything else
-/// from its main loop.
+/// current sample, serial().ISR_byte(), can().ISR_frame() and usb().ISR_packet() from its receive interrupts,
+/// and everything else from its main loop.
 ///
 /// Contexts. The tick is the highest; the receive interrupts may be preempted by it; the main loop by both.
 /// What crosses: settings, enables and forces from the main loop to the tick (DoubleBuffer, atomics), reports
-/// and the trace back (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes and CAN
-/// frames to the main loop (InterruptQueue). Nothing else is shared.
+/// and the trace back (Seqlock, Trace), a capture's plan and its samples (Capture), serial bytes, CAN frames
+/// and USB packets to the main loop (InterruptQueue). Nothing else is shared.
 ///
-/// Two hosts, one device. Serial and CAN reach the same parameters and the same state machines; see
+/// Several hosts, one device. Serial, CAN and USB reach the same parameters and the same state machines; see
 /// ParameterAccess for whose settings are taken and Supervisor for who commands an axis.
 ///
 /// Time: `now_us` is a microsecond clock that wraps at 2^32; poll() at least once a second, in practice
 /// every tick. Errors: none of these calls can fail; what goes wrong becomes a fault of an axis, a refusal,
-/// or a counter, all of which a host can read. Memory: about 37 KiB on the target, no heap.
+/// or a counter, all of which a host can read. Memory: about 42 KiB on the target, no heap.
 class Application {
  public:
   using Tick = AxesTick<axis_count>;
@@ -69,7 +71,7 @@ class Application {
     return axes_.tick().ISR_tick(axis, input);
   }
   /// In place of it, for an axis that the board does not have.
-  [[gnu::cold]] void ISR_pass(std::size_t axis) { axes_.tick().ISR_pass(axis); }
+  [[gnu::cold]] void ISR_tick(std::size_t axis) { axes_.tick().ISR_tick(axis); }
   /// All axes, for a board that samples them at the same time.
   TickOutput ISR_tick(const TickInput& input) {
     TickOutput output;
@@ -93,6 +95,8 @@ class Application {
   const ModbusEdge& serial() const { return serial_; }
   CanopenEdge& can() { return can_; }
   const CanopenEdge& can() const { return can_; }
+  /// Polled by the board behind poll(), and only when something has come: without a host USB costs nothing.
+  UsbModbusEdge& usb() { return usb_; }
 
   /// Parameters a board or a scene starts with, before the first tick. Refused like a host's write, and
   /// then nothing changes.
@@ -137,6 +141,7 @@ class Application {
   Readings readings_;
   ModbusEdge serial_;
   CanopenEdge can_;
+  UsbModbusEdge usb_;
   drivers::PeriodicTimer millisecond_{1'000};
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -107,6 +108,22 @@ class NativeBoard {
     }
   }
 
+  /// A transfer from a host over USB, which takes no time: in the next tick it is there, as far as there is
+  /// room for its packets, and the rest in the ticks after.
+  void receive_usb(std::span<const std::uint8_t> bytes) {
+    constexpr std::size_t full = firmware::modbus::TransferReceiver::packet_bytes;
+    for (std::size_t at = 0; at <= bytes.size(); at += full) {
+      const auto packet = bytes.subspan(at, std::min(full, bytes.size() - at));
+      usb_incoming_.emplace_back(packet.begin(), packet.end());
+    }
+  }
+  /// Bytes for that host since the last call.
+  std::vector<std::uint8_t> transmitted_usb() {
+    std::vector<std::uint8_t> out;
+    out.swap(usb_outgoing_);
+    return out;
+  }
+
   /// Bytes for the host that have left the line since the last call.
   std::vector<std::uint8_t> transmitted() {
     std::vector<std::uint8_t> out;
@@ -154,7 +171,7 @@ class NativeBoard {
   }
 
   bool somebody_speaks() const {
-    return !incoming_.empty() || sending_until_us_ != 0 || !can_incoming_.empty() ||
+    return !incoming_.empty() || !usb_incoming_.empty() || sending_until_us_ != 0 || !can_incoming_.empty() ||
            can_.state == firmware::CanState::active;
   }
 
@@ -207,6 +224,19 @@ class NativeBoard {
     }
   }
 
+  void exchange_usb() {
+    if (usb_incoming_.empty()) return;
+    firmware::UsbModbusEdge& link = application_->usb();
+    while (!usb_incoming_.empty() && link.ISR_has_room()) {
+      link.ISR_packet(usb_incoming_.front(), static_cast<std::uint32_t>(now_us_));
+      usb_incoming_.pop_front();
+    }
+    static_cast<void>(link.poll());
+    const auto reply = link.reply_due();
+    usb_outgoing_.insert(usb_outgoing_.end(), reply.begin(), reply.end());
+    link.reply_sent();
+  }
+
   void tick() {
     firmware::TickInput input;
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) input.axis[axis] = sample(axis);
@@ -228,6 +258,7 @@ class NativeBoard {
     if constexpr (PoweredDevice<Device>) application_->set_readings(device_.readings());
     exchange_can();
     application_->poll(now);
+    exchange_usb();
     send_can();
     if (application_->can().restart_wanted()) {
       sending_until_us_ = 0;
@@ -254,7 +285,8 @@ class NativeBoard {
   firmware::TickOutput output_{};
   std::uint64_t now_us_, line_free_us_ = 0, sending_until_us_ = 0;
   std::deque<TimedByte> incoming_;
-  std::vector<std::uint8_t> reply_, outgoing_;
+  std::vector<std::uint8_t> reply_, outgoing_, usb_outgoing_;
+  std::deque<std::vector<std::uint8_t>> usb_incoming_;
   firmware::CanReadings can_;
   std::vector<drivers::CanFrame> can_incoming_, can_outgoing_;
   std::uint64_t can_free_us_ = 0;

@@ -60,10 +60,29 @@ class CanLine {
     while (can_.has_room() && link.next_frame(frame_)) static_cast<void>(can_.send(frame_));
   }
 
-  /// These two leave something for the main loop.
+  /// Main loop, for who shares the bus with the node over USB: the bus takes what is sent at its own pace.
+  bool keeps_pace() const { return configured_ && readings_.state == firmware::CanState::active; }
+  bool has_room() const { return configured_ && can_.has_room(); }
+  /// Half of the room is the node's.
+  bool has_room_for_guests() const { return configured_ && can_.room() > frames_of_node; }
+  void put(const drivers::CanFrame& frame) {
+    if (has_room()) static_cast<void>(can_.send(frame));
+  }
+  /// Whether all frames of the bus are received, and not the node's alone.
+  void set_listening_to_all(bool all) {
+    if (all == listens_to_all_) return;
+    listens_to_all_ = all;
+    if (configured_) can_.set_filters(filters_of(settings_).span());
+  }
+
+  /// These two leave something for the main loop. `tap` sees every frame.
   void ISR_serve_transmit() { can_.ISR_serve_transmit(); }
-  void ISR_receive(unsigned fifo, firmware::CanopenEdge& link) {
-    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) { link.ISR_frame(frame); });
+  template <typename Tap>
+  void ISR_receive(unsigned fifo, firmware::CanopenEdge& link, Tap tap) {
+    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t filter) {
+      if (filter < node_filters) link.ISR_frame(frame);
+      tap(frame);
+    });
   }
   void ISR_serve_status() { static_cast<void>(can_.ISR_serve_status()); }
 
@@ -78,6 +97,9 @@ class CanLine {
   /// Initialization waits for the end of the frame that is on the bus, 1.2 ms at 125 kbit/s.
   static constexpr std::uint32_t initialization_polls = 100'000;
   static constexpr std::uint32_t retry_interval_us = 100'000;
+  static constexpr std::size_t frames_of_node = 8;
+  /// Each list of two has two numbers (RM0090, filter match index).
+  static constexpr std::uint8_t node_filters = firmware::CanSettings::identifiers_max;
 
   firmware::CanState state_of(const drivers::stm32f4::CanErrors& errors) const {
     using drivers::stm32f4::CanBusState;
@@ -95,16 +117,22 @@ class CanLine {
   }
 
   struct Filters {
-    std::array<drivers::stm32f4::CanFilter, firmware::CanSettings::identifiers_max / 2> bank{};
+    std::array<drivers::stm32f4::CanFilter, firmware::CanSettings::identifiers_max / 2 + 1> bank{};
     std::size_t count = 0;
     std::span<const drivers::stm32f4::CanFilter> span() const { return std::span(bank).first(count); }
   };
-  static Filters filters_of(const firmware::CanSettings& wanted) {
+  Filters filters_of(const firmware::CanSettings& wanted) const {
     Filters filters;
     for (std::size_t i = 0; i < wanted.identifier_count; i += 2) {
       const std::size_t second = i + 1 < wanted.identifier_count ? i + 1 : i;
       filters.bank[filters.count++] =
           drivers::stm32f4::can_filter_standard_list(wanted.identifiers[i], wanted.identifiers[second]);
+    }
+    // A list comes before a mask: what the node wants is still told apart, by the number of the filter.
+    if (listens_to_all_) {
+      while (filters.count < filters.bank.size() - 1)
+        filters.bank[filters.count++] = drivers::stm32f4::can_filter_standard_list(0, 0);
+      filters.bank[filters.count++] = drivers::stm32f4::CanFilter{};
     }
     return filters;
   }
@@ -144,7 +172,7 @@ class CanLine {
   std::optional<std::uint32_t> followed_changes_;  ///< of the link's settings
   drivers::PeriodicTimer status_timer_{1'000};
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
-  bool configured_ = false, absent_ = false;
+  bool configured_ = false, absent_ = false, listens_to_all_ = false;
 };
 
 }  // namespace kmax::board::odrive_v3

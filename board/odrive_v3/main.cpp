@@ -13,7 +13,9 @@
 #include "board/odrive_v3/power_hardware.hpp"
 #include "board/odrive_v3/priorities.hpp"
 #include "board/odrive_v3/serial_line.hpp"
+#include "board/odrive_v3/usb_line.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
+#include "board/stm32f405/boot_loader.hpp"
 #include "board/stm32f405/crash_record.hpp"
 #include "board/stm32f405/memory_rights.hpp"
 #include "board/stm32f405/unique_id.hpp"
@@ -30,6 +32,7 @@
 #include "drivers/stm32f4/registers/system_memory.hpp"
 #include "drivers/stm32f4/reset_cause.hpp"
 #include "firmware/exchange/interrupt_signal.hpp"
+#include "firmware/object_dictionary/firmware_version.hpp"
 
 extern "C" {
 extern volatile std::uint32_t kmax_parameters_begin[];
@@ -69,12 +72,14 @@ ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, p
 [[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
 [[gnu::section(".noinit")]] firmware::RetainedCount lock_attempts;
+[[gnu::section(".noinit")]] firmware::RetainedCount boot_loader_asked;
 
 std::optional<firmware::Application> application;
 /// Raised by the lines' interrupts: they have left something for the main loop.
 firmware::InterruptSignal lines_due;
 std::optional<SerialLine> serial;
 std::optional<CanLine> can_line;
+std::optional<UsbLine> usb_line;
 ChipBus chip_bus{stm32::spi3()};
 /// Made in main, once the clocks are known; no interrupt is enabled before.
 std::optional<Power<PowerHardware>> power;
@@ -98,6 +103,13 @@ VoltageVariant voltage_variant() {
   // NOLINTNEXTLINE(performance-no-int-to-ptr)
   const auto* otp = reinterpret_cast<const volatile std::uint8_t*>(stm32::otp_base);
   return voltage_variant_from_otp([otp](std::size_t i) { return otp[i]; }).value_or(variant_of_blank_board);
+}
+
+/// Major, minor and patch are a byte each, and stay below ten.
+firmware::usb::DeviceIdentity usb_identity(std::uint32_t serial_number) {
+  constexpr std::uint32_t version = firmware::firmware_version;
+  return {serial_number, static_cast<std::uint16_t>((version >> 16 & 0xF) << 8 | (version >> 8 & 0xF) << 4 |
+                                                    (version & 0xF))};
 }
 
 firmware::BoardIdentity identity(const stm32::ClockFrequencies& clocks, VoltageVariant variant) {
@@ -213,6 +225,7 @@ void tick_without_power() {
 
 /// All that comes before the loop.
 [[gnu::cold]] void start() {
+  enter_boot_loader_if_asked(boot_loader_asked);
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();
@@ -233,6 +246,11 @@ void tick_without_power() {
   // rate can be made.
   const bool good_clock = clocks.source == stm32::ClockSource::crystal_pll;
   can_line.emplace(interrupts, good_clock ? clocks.apb1_hz : 0);
+  // Nor 48 MHz as USB wants them.
+  stm32::enable_peripheral_clock(stm32::rcc().ahb2enr, stm32::rcc_ahb2enr::OtgFs::mask);
+  apply(usb_pins);
+  usb_line.emplace(interrupts, application->usb(), system_tick, usb_identity(serial_number_from_unique_id()));
+  if (good_clock) usb_line->start();
 
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
   // say that they have no encoder.
@@ -242,10 +260,21 @@ void tick_without_power() {
   }
 }
 
+/// A host is at the USB connector, or just has been.
+[[gnu::cold, gnu::noinline]] void poll_usb() {
+  usb_line->poll(*application, *can_line);
+  if (!usb_line->boot_loader_wanted(*application)) return;
+  usb_line->disconnect();
+  boot_loader_asked.set(asks_for_boot_loader);
+  restart();
+}
+
 void poll() {
   const std::uint32_t now = system_tick.now_us();
   can_line->poll(application->can(), now);
   application->poll(now);
+  if (usb_line->due()) [[unlikely]]
+    poll_usb();
   can_line->send(application->can());
   serial->poll(application->serial(), now);
   if (application->can().restart_wanted()) restart();
@@ -320,12 +349,18 @@ void ISR_can1_tx() {
 
 void ISR_can1_rx0() {
   using namespace kmax::board;
-  can_line->ISR_receive(0, application->can());
+  can_line->ISR_receive(0, application->can(),
+                        [](const kmax::drivers::CanFrame& frame) { usb_line->ISR_bus_frame(frame); });
   lines_due.ISR_raise();
 }
 
 void ISR_can1_sce() {
   kmax::board::can_line->ISR_serve_status();
+}
+
+void ISR_otg_fs() {
+  using namespace kmax::board;
+  if (usb_line->ISR_serve()) lines_due.ISR_raise();
 }
 
 void ISR_usart2() {

@@ -58,6 +58,9 @@ inline constexpr PinLocation can_transmit{GpioPort::b, 9};
 /// GPIO3 and GPIO4 of connector J3.
 inline constexpr PinLocation serial_transmit{GpioPort::a, 2};
 inline constexpr PinLocation serial_receive{GpioPort::a, 3};
+/// USB, connector J1; its VBUS goes nowhere.
+inline constexpr PinLocation usb_minus{GpioPort::a, 11};
+inline constexpr PinLocation usb_plus{GpioPort::a, 12};
 }  // namespace pins
 
 inline constexpr GpioConfig output_low{.mode = GpioMode::output};
@@ -102,6 +105,14 @@ inline constexpr auto can_pins = std::to_array<PinState>({
     PinState{pins::can_receive, {.mode = GpioMode::alternate, .pull = GpioPull::up, .alternate_function = 9}},
     PinState{pins::can_transmit,
              {.mode = GpioMode::alternate, .speed = GpioSpeed::medium, .alternate_function = 9}},
+});
+
+/// OTG_FS, alternate function 10; its transceiver has the pull-ups.
+inline constexpr auto usb_pins = std::to_array<PinState>({
+    PinState{pins::usb_minus,
+             {.mode = GpioMode::alternate, .speed = GpioSpeed::very_high, .alternate_function = 10}},
+    PinState{pins::usb_plus,
+             {.mode = GpioMode::alternate, .speed = GpioSpeed::very_high, .alternate_function = 10}},
 });
 
 /// TIM1 (alternate function 1) and TIM8 (3): high sides, then low sides; TIM2 (1): the brake. The pull-downs
@@ -189,6 +200,7 @@ constexpr bool names_no_pin_twice(const std::array<PinState, count>& table) {
 static_assert(detail::names_no_pin_twice(power_stage_off));
 static_assert(detail::names_no_pin_twice(serial_pins));
 static_assert(detail::names_no_pin_twice(can_pins));
+static_assert(detail::names_no_pin_twice(usb_pins));
 static_assert(detail::names_no_pin_twice(gate_pins));
 static_assert(detail::names_no_pin_twice(encoder_pins));
 static_assert(detail::names_no_pin_twice(analog_pins));

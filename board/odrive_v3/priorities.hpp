@@ -13,7 +13,7 @@
 //                flag and clears MOE again
 //   1  tick      the conversions' end: the control of one axis, 40,000 times a second
 //   4  clock     SysTick at 1 kHz, the microsecond clock and the main loop's heartbeat
-//   8  serial    one byte in, one byte out; CAN: one frame in, the next ones out
+//   8  serial    one byte in, one byte out; CAN: one frame in, the next ones out; USB: packets either way
 //
 // The microsecond clock is exact only in contexts that do not outrank it: the lines and the tick never ask
 // for the time.
@@ -34,10 +34,10 @@ struct OfInterrupt {
 using drivers::stm32f4::Interrupt;
 /// All that the board enables, SysTick aside. Read by tests/architecture/stack_depth.py as well, which adds
 /// up what the interrupts need of the stack when each interrupts the next.
-inline constexpr OfInterrupt all[] = {{Interrupt::exti2, lines},     {Interrupt::exti4, lines},
-                                      {Interrupt::adc, tick},        {Interrupt::usart2, serial},
-                                      {Interrupt::can1_tx, serial},  {Interrupt::can1_rx0, serial},
-                                      {Interrupt::can1_rx1, serial}, {Interrupt::can1_sce, serial}};
+inline constexpr OfInterrupt all[] = {
+    {Interrupt::exti2, lines},     {Interrupt::exti4, lines},     {Interrupt::adc, tick},
+    {Interrupt::usart2, serial},   {Interrupt::can1_tx, serial},  {Interrupt::can1_rx0, serial},
+    {Interrupt::can1_rx1, serial}, {Interrupt::can1_sce, serial}, {Interrupt::otg_fs, serial}};
 
 /// Once, before any of them is enabled.
 inline void set_all(drivers::cortex_m::InterruptController<>& interrupts) {

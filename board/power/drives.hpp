@@ -82,7 +82,7 @@ class Drives {
   template <typename Application>
   [[gnu::noinline, gnu::cold]] void ISR_pass(std::size_t axis, Application& application) {
     ISR_begin_pass(axis);
-    application.ISR_pass(axis);
+    application.ISR_tick(axis);
     ISR_end_pass(axis);
     ISR_end_round(axis, application);
   }

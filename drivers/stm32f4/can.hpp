@@ -140,6 +140,9 @@ class Can {
   /// Main loop: send() would find a free slot.
   bool has_room() const { return !transmitter_.halted() && bus_off_.may_send() && transmitter_.has_room(); }
 
+  /// Main loop: so many frames would find a free slot.
+  std::size_t room() const { return transmitter_.halted() || !bus_off_.may_send() ? 0 : transmitter_.room(); }
+
   /// Main loop.
   [[nodiscard]] CanSendResult send(const CanFrame& frame) {
     if (!frame.valid()) return CanSendResult::bad_frame;

@@ -60,6 +60,12 @@ class CanTransmitter {
     return false;
   }
 
+  std::size_t room() const {
+    std::size_t free = 0;
+    for (const Slot& slot : slots_) free += slot.state.load(std::memory_order_acquire) == State::free ? 1 : 0;
+    return free;
+  }
+
   /// False: all slots are taken, or the frame is not valid. The caller pends the interrupt afterwards.
   [[nodiscard]] bool send(const CanFrame& frame) {
     if (!frame.valid()) return false;

@@ -8,11 +8,12 @@
 namespace kmax::firmware {
 
 /// From where a host reaches the parameters; `local`: the board or the scene that holds the application;
-/// `can_2`: the second SDO server. Clients behind one link cannot be told apart: the device has one Modbus
-/// unit, and two SDO servers. Nor does a PDO say who sends it: while CAN commands its axis it is the
-/// commander's, else that of `can`.
-enum class Link : std::uint8_t { serial, can, local, can_2 };
-inline constexpr std::size_t link_count = 4;
+/// `can_2`: the second SDO server; `usb`: the Modbus server behind the serial port over USB, while what comes
+/// over USB as CAN frames is CAN's. Clients behind one link cannot be told apart: the device has one Modbus
+/// unit on each line, and two SDO servers. Nor does a PDO say who sends it: while CAN commands its axis it is
+/// the commander's, else that of `can`.
+enum class Link : std::uint8_t { serial, can, local, can_2, usb };
+inline constexpr std::size_t link_count = static_cast<std::size_t>(Link::usb) + 1;
 inline constexpr std::array can_links{Link::can, Link::can_2};
 constexpr bool is_can(Link link) {
   return link == Link::can || link == Link::can_2;

@@ -99,7 +99,7 @@ class AxesTick {
     }
   }
   /// In place of ISR_tick(), for an axis that the board does not have: settings and rounds go on.
-  void ISR_pass(std::size_t axis) {
+  void ISR_tick(std::size_t axis) {
     const Settings& settings = ISR_begin(axis);
     axes_[axis].ISR_pass(settings.axis[axis], ticks_);
     if (ISR_round_begins())

@@ -24,6 +24,11 @@ class InterruptQueue {
     head_.store(head + 1, std::memory_order_release);
   }
 
+  /// The interrupt's question before it lets more come.
+  bool ISR_has_room() const {
+    return head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire) < capacity;
+  }
+
   bool empty() const {
     return tail_.load(std::memory_order_relaxed) == head_.load(std::memory_order_acquire);
   }

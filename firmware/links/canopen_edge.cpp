@@ -49,8 +49,19 @@ void CanopenEdge::start_node() {
 
 void CanopenEdge::set_readings(const CanReadings& readings) {
   readings_ = readings;
-  state_.is_off = readings.state == CanState::bus_off || readings.state == CanState::stopped ||
-                  readings.state == CanState::absent;
+  judge_bus();
+}
+
+void CanopenEdge::set_reached_otherwise(bool reached) {
+  if (reached == reached_otherwise_) return;
+  reached_otherwise_ = reached;
+  judge_bus();
+}
+
+void CanopenEdge::judge_bus() {
+  const bool bus_is_off = readings_.state == CanState::bus_off || readings_.state == CanState::stopped ||
+                          readings_.state == CanState::absent;
+  state_.is_off = bus_is_off && !reached_otherwise_;
 }
 
 void CanopenEdge::poll() {
@@ -83,6 +94,11 @@ void CanopenEdge::receive(std::uint32_t now_us) {
     node_.lss().hold(axes_.any_armed(), parameters_.locked());
     act_on(node_.receive(frame, parameters_.values(), now_us));
   }
+}
+
+void CanopenEdge::take(const drivers::CanFrame& frame) {
+  node_.lss().hold(axes_.any_armed(), parameters_.locked());
+  act_on(node_.receive(frame, parameters_.values(), axes_.now_us()));
 }
 
 void CanopenEdge::watch_bus() {

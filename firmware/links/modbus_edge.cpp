@@ -21,7 +21,7 @@ ModbusEdge::ModbusEdge(const Sources& sources)
                   .readings = sources.readings,
                   .axes = sources.axes,
                   .state = sources.state,
-                  .edge = *this}),
+                  .link = Link::serial}),
       port_(registers_, port_configuration(parameters_.values())) {}
 
 void ModbusEdge::poll(std::uint32_t now_us) {

@@ -49,8 +49,6 @@ class ModbusEdge {
 
   /// When the latest frame for this unit or for all had come; nothing: none has.
   std::optional<std::uint32_t> heard_us() const { return port_.last_valid_request_time(); }
-  /// While a request is carried out: it went to every unit.
-  bool is_broadcast() const { return port_.is_broadcast(); }
 
   /// Writes the readings counters.* of this link into `values`.
   void publish(ParameterValues& values) const;

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "firmware/board_interface/board_identity.hpp"
-#include "firmware/links/modbus_edge.hpp"
 #include "firmware/object_dictionary/firmware_version.hpp"
 
 namespace kmax::firmware::modbus {
@@ -167,13 +166,12 @@ Exception ModbusRegisters::read_input(std::uint16_t address, std::span<std::uint
 }
 
 Exception ModbusRegisters::write_holding(std::uint16_t address, std::span<const std::uint16_t> in) {
-  of_.state.heard_us = of_.edge.heard_us();
   const modbus::WantedValues wanted = modbus::wanted_values(address, in);
   if (wanted.refusal != Refusal::none) {
     of_.parameters.refuse(wanted.refusal, wanted.address);
     return modbus::exception_for(wanted.refusal);
   }
-  if (of_.edge.is_broadcast()) {
+  if (broadcast_) {
     for (const SlotValue& one : wanted.values()) {
       if (owner_of(one.slot).entry == entry_of<"drive.controlword">() &&
           asks_for_operation(one.raw & 0xFFFFU)) {
@@ -182,7 +180,7 @@ Exception ModbusRegisters::write_holding(std::uint16_t address, std::span<const 
       }
     }
   }
-  return modbus::exception_for(of_.writes.write(wanted.values(), Link::serial).refusal);
+  return modbus::exception_for(of_.writes.write(wanted.values(), of_.link).refusal);
 }
 
 std::string_view ModbusRegisters::identification(std::uint8_t object_id) const {

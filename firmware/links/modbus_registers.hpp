@@ -44,24 +44,27 @@ Exception exception_for(Refusal refusal);
 
 namespace kmax::firmware {
 
-class ModbusEdge;
-
 /// The device as Modbus sees it (modbus::RegisterBank): parameters and readings, the windows of the trace,
 /// the capture and the fault log, and the texts of the device identification. Main loop only.
 class ModbusRegisters {
  public:
-  /// What the registers stand for. The edge is used from the first request on, not before.
+  /// What the registers stand for, and the link by which requests come.
   struct Sources {
     const BoardIdentity& board;
     ParameterAccess& parameters;
     HostWrites& writes;
     Readings& readings;
-    Axes& axes;  ///< their trace, captures and fault log
-    LinkState& state;
-    const ModbusEdge& edge;
+    Axes& axes;        ///< their trace, captures and fault log
+    LinkState& state;  ///< of `link`
+    Link link;
   };
   explicit ModbusRegisters(const Sources& sources) : of_(sources) {}
 
+  /// Before what a request asks for: its host lives, and the command to arm needs to know.
+  void begin_request(std::uint32_t end_us, bool broadcast) {
+    of_.state.heard_us = end_us;
+    broadcast_ = broadcast;
+  }
   modbus::Exception read_holding(std::uint16_t address, std::span<std::uint16_t> out);
   modbus::Exception read_input(std::uint16_t address, std::span<std::uint16_t> out);
   modbus::Exception write_holding(std::uint16_t address, std::span<const std::uint16_t> in);
@@ -70,6 +73,7 @@ class ModbusRegisters {
 
  private:
   Sources of_;
+  bool broadcast_ = false;  ///< the request went to every unit
 };
 
 }  // namespace kmax::firmware

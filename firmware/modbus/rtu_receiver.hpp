@@ -37,32 +37,11 @@
 #include <optional>
 #include <span>
 
+#include "firmware/modbus/adu.hpp"
 #include "firmware/modbus/crc.hpp"
 #include "firmware/modbus/rtu_timing.hpp"
 
 namespace kmax::firmware::modbus {
-
-inline constexpr std::size_t adu_size_max = 256;  // unit, PDU, CRC
-inline constexpr std::size_t adu_size_min = 4;    // unit, function, CRC
-inline constexpr std::size_t crc_size = 2;
-
-// A frame with a good CRC. `pdu` (1..253 bytes) points into the receiver: valid up to the next receive().
-struct RtuFrame {
-  std::uint8_t unit;
-  std::span<const std::uint8_t> pdu;
-  std::uint32_t end_us;  // end of the last stop bit
-};
-
-// Each burst of characters between two silences raises one of these by one. They wrap.
-struct RtuReceiverCounters {
-  std::uint32_t frames_received = 0;  // good CRC, whatever the unit
-  std::uint32_t crc_errors = 0;
-  std::uint32_t line_errors = 0;  // parity, framing or overrun
-  std::uint32_t gap_errors = 0;   // silence between t1.5 and t3.5
-  std::uint32_t oversize = 0;     // more than 256 bytes
-  std::uint32_t undersize = 0;    // fewer than 4 bytes
-  std::uint32_t abandoned = 0;    // under way when the timing was changed
-};
 
 class RtuReceiver {
  public:

@@ -33,7 +33,7 @@ FOLDERS = {
         ["exchange", "object_dictionary"],
         ["board_interface"],
         ["parameters", "capture"],
-        ["canopen", "modbus"],
+        ["canopen", "modbus", "usb"],
         ["drive"],
         ["command"],
         ["links"],

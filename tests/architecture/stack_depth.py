@@ -49,6 +49,8 @@ OF_THE_IMAGE = Stated(
         "firmware::AnyFlashSectors::read": FLASH,
         "firmware::ParameterStore::write": FLASH,
         "firmware::ParameterKeeper::poll": FLASH,
+        # Never to come back: the stack is the boot loader's then.
+        "board::start_boot_loader": [],
         # What a link says of itself.
         "firmware::Readings::refresh_device": ["firmware::LinkReadings::LinkReadings"],
         # What std::any_of() and its like are given.

@@ -350,13 +350,13 @@ TEST_F(TwoWalls, AnAxisThatIsNotThereTakesSettingsAndReportsInItsRounds) {
   settings.axis[0].generation = settings.axis[1].generation = 9;
   tick.offer(settings);
   EXPECT_FALSE(tick.settings_taken());
-  tick.ISR_pass(0);
+  tick.ISR_tick(0);
   EXPECT_TRUE(tick.settings_taken());
-  tick.ISR_pass(1);
+  tick.ISR_tick(1);
   for (int number = 3; number <= 5; ++number) {
     EXPECT_NE(tick.report(1).generation, 9u) << "not before its round";
-    tick.ISR_pass(0);
-    tick.ISR_pass(1);
+    tick.ISR_tick(0);
+    tick.ISR_tick(1);
   }
   EXPECT_EQ(tick.report(1).generation, 9u);
   EXPECT_EQ(tick.report(1).tick, 5u);

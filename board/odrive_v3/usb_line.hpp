@@ -1,0 +1,155 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "board/odrive_v3/can_line.hpp"
+#include "drivers/can_frame.hpp"
+#include "drivers/cortex_m/interrupt_controller.hpp"
+#include "drivers/cortex_m/system_tick.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
+#include "drivers/stm32f4/registers/rcc.hpp"
+#include "drivers/stm32f4/usb_device.hpp"
+#include "firmware/application.hpp"
+#include "firmware/exchange/interrupt_queue.hpp"
+#include "firmware/exchange/interrupt_signal.hpp"
+#include "firmware/usb/device.hpp"
+#include "firmware/usb/functions.hpp"
+
+namespace kmax::board::odrive_v3 {
+
+/// USB on connector J1, between its interrupt and the links behind it: the serial port's Modbus server, and
+/// the CAN adapter.
+///
+/// Channel 0 of the adapter joins the board's node alone. A host on it is to the node what one on the bus is:
+/// it hears all that the node sends, and sends to it. Channel 1 joins the bus as well: what a host sends
+/// there goes to the node and, as long as half of the transmit slots are left to the node, to the bus; what
+/// the bus brings, and what the node sends there, it hears. Without such a host the bus hears and sends
+/// nothing more.
+///
+/// While a bus takes what is sent, it sets the pace at which the node sends; a bus that is off, or where
+/// nobody acknowledges, does not: then the adapter does, and the bus gets what it has room for. A host that
+/// does not take its frames loses them, and is told so, and holds up nobody.
+///
+/// Without a host none of this is called but the interrupt, now and then, and due(), one look at a flag.
+class UsbLine {
+ public:
+  UsbLine(drivers::cortex_m::InterruptController<>& interrupts, firmware::UsbModbusEdge& link,
+          const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity)
+      : interrupts_(interrupts),
+        functions_(controller_, link, clock),
+        device_(controller_, functions_, identity) {}
+
+  /// Clock and pins are on, the interrupt has its priority, 48 MHz come from the crystal. Without a core that
+  /// answers there is no USB.
+  void start() {
+    // A boot loader may have left the core in use.
+    using drivers::stm32f4::rcc;
+    drivers::stm32f4::rcc_ahb2enr::OtgFs::set(rcc().ahb2rstr);
+    drivers::stm32f4::rcc_ahb2enr::OtgFs::clear(rcc().ahb2rstr);
+    if (controller_.start(device_mode_polls)) interrupts_.enable(drivers::stm32f4::Interrupt::otg_fs);
+  }
+
+  /// Main loop: there is something for poll().
+  [[gnu::always_inline]] bool due() { return due_.take(); }
+  /// Main loop, behind the application's and before the CAN line sends. As long as a host is there it is due
+  /// in every turn.
+  void poll(firmware::Application& application, CanLine& line) {
+    const bool attended = attended_.load(std::memory_order_relaxed);
+    functions_.allow_restart(!application.any_armed() && !application.store_busy());
+    bool moved = exchange_frames(application.can(), line);
+    if (functions_.serial().reply_sent()) application.usb().reply_sent();
+    moved = application.usb().poll() || moved;
+    if (const auto reply = application.usb().reply_due(); !reply.empty()) {
+      functions_.serial().send(reply);
+      moved = true;
+    }
+    if (moved) interrupts_.pend(drivers::stm32f4::Interrupt::otg_fs);
+    if (attended) due_.ISR_raise();
+  }
+  /// Main loop, behind poll(): a host asks for a restart into the boot loader, and no axis makes force.
+  bool boot_loader_wanted(const firmware::Application& application) {
+    return functions_.boot_loader_wanted() && !application.any_armed();
+  }
+  /// The host sees the device leave.
+  void disconnect() { controller_.disconnect(); }
+
+  /// OTG_FS. True: it has left something for the main loop.
+  bool ISR_serve() {
+    const bool some = controller_.ISR_serve(device_);
+    functions_.ISR_serve();
+    attended_.store(device_.ISR_attended(), std::memory_order_relaxed);
+    if (some) due_.ISR_raise();
+    return some;
+  }
+  /// Of the bus, from the CAN interrupt, which has the same priority.
+  void ISR_bus_frame(const drivers::CanFrame& frame) {
+    if (functions_.can().is_open(firmware::usb::CanChannel::bus)) from_bus_.ISR_push(frame);
+  }
+
+ private:
+  using Controller = drivers::stm32f4::UsbDevice<>;
+  using Functions =
+      firmware::usb::Functions<Controller, firmware::UsbModbusEdge, drivers::cortex_m::SystemTick<>>;
+  using Channel = firmware::usb::CanChannel;
+  /// Reads, for 25 ms at 168 MHz and more.
+  static constexpr std::uint32_t device_mode_polls = 600'000;
+  static constexpr std::size_t frames_per_poll = 8;
+
+  /// True if frames have moved either way.
+  bool exchange_frames(firmware::CanopenEdge& node, CanLine& line) {
+    auto& can = functions_.can();
+    const bool there = attended_.load(std::memory_order_relaxed);
+    const bool with_node = there && can.is_open(Channel::node), with_bus = there && can.is_open(Channel::bus);
+    node.set_reached_otherwise(with_node || with_bus);
+    line.set_listening_to_all(with_bus);
+    bool moved = false;
+    drivers::CanFrame frame;
+    for (std::size_t i = 0; i < frames_per_poll && from_bus_.pop(frame); ++i) {
+      can.show(Channel::bus, frame);
+      moved = true;
+    }
+    if (!with_node && !with_bus) return moved;
+    moved = take_from_host(node, line) || moved;
+    // At most as many as there is room for on one of the two.
+    while ((line.keeps_pace() ? line.has_room() : can.has_room()) && node.next_frame(frame)) {
+      line.put(frame);
+      can.show(Channel::node, frame);
+      can.show(Channel::bus, frame);
+      moved = true;
+    }
+    return moved;
+  }
+
+  bool take_from_host(firmware::CanopenEdge& node, CanLine& line) {
+    auto& can = functions_.can();
+    bool moved = false;
+    for (std::size_t i = 0; i < frames_per_poll; ++i) {
+      if (!waiting_ && !can.next_from_host(from_host_)) return moved;
+      waiting_ = false;
+      if (!can.is_current(from_host_)) continue;
+      const bool for_bus = from_host_.channel == static_cast<std::uint8_t>(Channel::bus);
+      // A bus that takes what is sent is waited for, and with it the frames behind.
+      waiting_ = for_bus && line.keeps_pace() && !line.has_room_for_guests();
+      if (waiting_) return moved;
+      if (for_bus && line.has_room_for_guests()) line.put(from_host_.frame);
+      node.take(from_host_.frame);
+      can.done(from_host_);
+      moved = true;
+    }
+    return moved;
+  }
+
+  drivers::cortex_m::InterruptController<>& interrupts_;
+  Controller controller_{drivers::stm32f4::otg_fs_global(), drivers::stm32f4::otg_fs_device()};
+  Functions functions_;
+  firmware::usb::Device<Controller, Functions> device_;
+  firmware::InterruptSignal due_;
+  std::atomic<bool> attended_{false};  ///< the interrupt writes it
+  firmware::InterruptQueue<drivers::CanFrame, 16> from_bus_;
+  firmware::usb::gs::HostFrame from_host_;
+  bool waiting_ = false;  ///< it waits for the bus
+};
+
+}  // namespace kmax::board::odrive_v3

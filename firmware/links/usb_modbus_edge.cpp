@@ -1,0 +1,38 @@
+#include "firmware/links/usb_modbus_edge.hpp"
+
+namespace kmax::firmware {
+
+namespace {
+std::uint8_t unit_in(const ParameterValues& values) {
+  return static_cast<std::uint8_t>(values.whole<"modbus.unit">());
+}
+}  // namespace
+
+UsbModbusEdge::UsbModbusEdge(const Sources& sources)
+    : parameters_(sources.parameters),
+      axes_(sources.axes),
+      state_(sources.state),
+      registers_({.board = sources.board,
+                  .parameters = sources.parameters,
+                  .writes = sources.writes,
+                  .readings = sources.readings,
+                  .axes = sources.axes,
+                  .state = sources.state,
+                  .link = Link::usb}),
+      port_(registers_, unit_in(parameters_.values())) {}
+
+bool UsbModbusEdge::poll() {
+  bool some = false;
+  Packet packet;
+  for (std::size_t i = 0; i < packets && queue_.pop(packet); ++i) {
+    some = true;
+    if (packet.begins_anew) port_.restart();
+    port_.set_unit(unit_in(parameters_.values()));
+    port_.receive(std::span(packet.bytes).first(packet.length), packet.time_us);
+    state_.heard_us = port_.last_valid_request_time();
+  }
+  axes_.act();
+  return some;
+}
+
+}  // namespace kmax::firmware
