@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "drivers/cortex_m/interrupt_controller.hpp"
@@ -169,7 +168,7 @@ class CanLine {
   firmware::CanSettings settings_{.bit_rate = 0};
   firmware::CanReadings readings_{};
   drivers::CanFrame frame_;  ///< the one being sent: kept, since to make an empty one takes 38 instructions
-  std::optional<std::uint32_t> followed_changes_;  ///< of the link's settings
+  std::uint32_t followed_changes_ = ~0U;  ///< of the link's settings; none so far, and compared in every turn
   drivers::PeriodicTimer status_timer_{1'000};
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
   bool configured_ = false, absent_ = false, listens_to_all_ = false;
