@@ -101,9 +101,9 @@ class OnACable(unittest.TestCase):
         device = f"serial:{TERMINAL}"
         kmax("set", "link.timeout=0.5", device=device)
         with Holding(device) as holding:
-            self.assertEqual(kmax_json("state", device=self.board.device)["axes"][0]["state"], "Operation enabled")
+            self.assertEqual(kmax_json("state", device=self.board.device)["axes"][0]["state"], "operation_enabled")
             self.pull_out()
-            wait_until(lambda: kmax_json("state", device=self.board.device)["axes"][0]["state"] != "Operation enabled",
+            wait_until(lambda: kmax_json("state", device=self.board.device)["axes"][0]["state"] != "operation_enabled",
                        "it is still armed")
             self.assertNotEqual(holding.ended()[1], 0)
         self.plug_in()
