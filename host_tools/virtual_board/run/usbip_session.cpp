@@ -209,8 +209,9 @@ void UsbipSession::submit(std::uint32_t sequence, BoardTime now) {
   std::copy_n(input_.begin() + 40, transfer.setup.size(), transfer.setup.begin());
   if (!in) transfer.data.assign(input_.begin() + command_size, input_.begin() + command_size + length);
   if (endpoint == 0) {
-    constexpr std::uint8_t set_address = 5;
-    if (transfer.setup[0] == 0 && transfer.setup[1] == set_address) return answer_submit(sequence, 0, 0, {});
+    constexpr std::uint8_t address_request = 5;
+    if (transfer.setup[0] == 0 && transfer.setup[1] == address_request)
+      return answer_submit(sequence, 0, 0, {});
     const std::uint32_t promised =
         number_at(std::vector<std::uint8_t>{transfer.setup[7], transfer.setup[6]}, 0, 2);
     if (!in && promised != length)
