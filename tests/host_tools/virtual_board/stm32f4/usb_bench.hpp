@@ -103,8 +103,8 @@ struct UsbBench : ModelBench {
     if (!result) port.cancel(number, now);
     return *result;
   }
-  UsbTransferResult control(std::array<std::uint8_t, 8> setup, std::size_t length) {
-    return transfer({.kind = UsbTransferKind::control, .setup = setup, .length = length});
+  UsbTransferResult control(std::array<std::uint8_t, 8> request, std::size_t length) {
+    return transfer({.kind = UsbTransferKind::control, .setup = request, .length = length});
   }
   UsbTransferResult send(const std::vector<std::uint8_t>& bytes) {
     return transfer({.kind = UsbTransferKind::bulk, .endpoint = 1, .data = bytes});
