@@ -3,7 +3,7 @@ import { spawn, spawnSync } from "node:child_process";
 import { existsSync } from "node:fs";
 
 export const KMAX = process.env.KMAX ?? "build/native/kmax";
-export const PATIENCE = 60_000;  // ms, for what comes in a moment unless the machine is slow; success does not wait for it
+export const PATIENCE = 240_000;  // ms, for what comes in a moment unless the machine is slow; success does not wait for it
 
 /** Until `look` gives something true, which is returned. */
 export async function until(what, look) {
