@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "host_tools/bench/least_squares.hpp"
 
 namespace kmax::experiment {
 
@@ -19,7 +20,7 @@ double quasi_static_deviation(const HandResistance& hand, double background, dou
 namespace {
 constexpr std::array members{&HandResistance::stiffness, &HandResistance::threshold,
                              &HandResistance::stiffening, &HandResistance::threshold_rise};
-// Steps and scales that make the four numbers comparable.
+// What each may sensibly change by.
 constexpr std::array scales{100.0, 1.0, 0.3, 0.3};
 
 class Problem {
@@ -30,76 +31,33 @@ class Problem {
   }
   std::size_t size() const { return fitted_.size(); }
 
-  HandResistance hand(const Eigen::VectorXd& at) const {
-    HandResistance hand;
+  HandResistance hand(const Eigen::VectorXd& numbers) const {
+    HandResistance hand{0.0, 0.0, 0.0, 0.0};
     for (std::size_t i = 0; i < fitted_.size(); ++i)
-      hand.*members[fitted_[i]] = at(static_cast<Eigen::Index>(i)) * scales[fitted_[i]];
+      hand.*members[fitted_[i]] = numbers(static_cast<Eigen::Index>(i));
     return hand;
   }
-  Eigen::VectorXd point(const HandResistance& hand) const {
-    Eigen::VectorXd at(static_cast<Eigen::Index>(fitted_.size()));
-    for (std::size_t i = 0; i < fitted_.size(); ++i)
-      at(static_cast<Eigen::Index>(i)) = hand.*members[fitted_[i]] / scales[fitted_[i]];
-    return at;
+  Eigen::VectorXd numbers_of(const auto& all) const {
+    Eigen::VectorXd numbers(static_cast<Eigen::Index>(fitted_.size()));
+    for (std::size_t i = 0; i < fitted_.size(); ++i) numbers(static_cast<Eigen::Index>(i)) = all(fitted_[i]);
+    return numbers;
   }
-  bool allowed(const Eigen::VectorXd& at) const {
-    const HandResistance found = hand(at);
-    return found.stiffness > 1.0 && found.threshold >= 0.0 && found.stiffening >= -0.2 &&
-           found.threshold_rise > -10.0;
-  }
-  /// mm
-  Eigen::VectorXd residuals(const Eigen::VectorXd& at) const {
-    const HandResistance found = hand(at);
-    Eigen::VectorXd result(static_cast<Eigen::Index>(cells_.size()));
-    for (std::size_t i = 0; i < cells_.size(); ++i)
+  /// mm; infinite for a hand that there cannot be
+  void residuals(const Eigen::VectorXd& numbers, Eigen::VectorXd& result) const {
+    const HandResistance found = hand(numbers);
+    const bool possible = found.stiffness > 1.0 && found.threshold >= 0.0 && found.stiffening >= -0.2 &&
+                          found.threshold_rise > -10.0;
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const double deviation = quasi_static_deviation(found, cells_[i].background, cells_[i].interference);
       result(static_cast<Eigen::Index>(i)) =
-          1e3 *
-          (quasi_static_deviation(found, cells_[i].background, cells_[i].interference) - cells_[i].deviation);
-    return result;
-  }
-  Eigen::MatrixXd slopes(const Eigen::VectorXd& at) const {
-    Eigen::MatrixXd result(static_cast<Eigen::Index>(cells_.size()), at.size());
-    constexpr double step = 1e-6;
-    for (Eigen::Index i = 0; i < at.size(); ++i) {
-      Eigen::VectorXd up = at, down = at;
-      up(i) += step;
-      down(i) -= step;
-      result.col(i) = (residuals(up) - residuals(down)) / (2.0 * step);
+          possible ? 1e3 * (deviation - cells_[i].deviation) : std::numeric_limits<double>::infinity();
     }
-    return result;
   }
 
  private:
   std::span<const paper::DeviationCell> cells_;
   std::vector<std::size_t> fitted_{0, 1};
 };
-
-Eigen::VectorXd descend(const Problem& problem, Eigen::VectorXd at) {
-  double damping = 1e-3;
-  double cost = problem.residuals(at).squaredNorm();
-  for (int round = 0; round < 500 && damping < 1e12; ++round) {
-    const Eigen::MatrixXd slopes = problem.slopes(at);
-    const Eigen::MatrixXd normal = slopes.transpose() * slopes;
-    const Eigen::VectorXd gradient = slopes.transpose() * problem.residuals(at);
-    const Eigen::MatrixXd damped =
-        normal + damping * (Eigen::MatrixXd(normal.diagonal().asDiagonal()) +
-                            1e-9 * Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
-    const Eigen::VectorXd next = at - damped.ldlt().solve(gradient);
-    const double next_cost = next.allFinite() && problem.allowed(next)
-                                 ? problem.residuals(next).squaredNorm()
-                                 : std::numeric_limits<double>::infinity();
-    if (next_cost < cost) {
-      const bool done = cost - next_cost < 1e-14 * cost;
-      at = next;
-      cost = next_cost;
-      damping *= 0.3;
-      if (done) break;
-    } else {
-      damping *= 5.0;
-    }
-  }
-  return at;
-}
 }  // namespace
 
 DeviationFit fit_deviation(std::span<const paper::DeviationCell> cells, const FitKind& kind) {
@@ -107,31 +65,30 @@ DeviationFit fit_deviation(std::span<const paper::DeviationCell> cells, const Fi
   if (cells.size() < problem.size())
     throw std::invalid_argument(fmt::format("{} cells for {} fitted numbers: give at least as many cells",
                                             cells.size(), problem.size()));
-  Eigen::VectorXd best;
+  const auto count = static_cast<Eigen::Index>(cells.size());
+  const Eigen::VectorXd scale = problem.numbers_of([](std::size_t i) { return scales[i]; });
+  const auto residuals = [&](const Eigen::VectorXd& numbers, Eigen::VectorXd& result) {
+    problem.residuals(numbers, result);
+  };
+  bench::NonlinearFit best;
+  Eigen::VectorXd left(count);
   double least = std::numeric_limits<double>::infinity();
   for (const double stiffness : {150.0, 300.0, 600.0}) {
     for (const double threshold : {0.5, 2.0, 2.9}) {
       for (const double rise : {0.05, 0.4}) {
-        const Eigen::VectorXd found = descend(problem, problem.point({stiffness, threshold, rise, rise}));
-        const double cost = problem.residuals(found).squaredNorm();
-        if (cost >= least) continue;
-        least = cost;
+        const HandResistance start{stiffness, threshold, rise, rise};
+        const bench::NonlinearFit found = bench::minimise(
+            residuals, problem.numbers_of([&](std::size_t i) { return start.*members[i]; }), scale, count);
+        problem.residuals(found.value, left);
+        if (left.squaredNorm() >= least) continue;
+        least = left.squaredNorm();
         best = found;
       }
     }
   }
-  DeviationFit fit{kind, problem.hand(best), {0, 0, 0, 0}, 0.0, cells.size()};
+  DeviationFit fit{kind, problem.hand(best.value), {0, 0, 0, 0}, 0.0, cells.size()};
   fit.rms = 1e-3 * std::sqrt(least / static_cast<double>(cells.size()));
-  if (cells.size() > problem.size()) {
-    const Eigen::MatrixXd slopes = problem.slopes(best);
-    const double variance = least / static_cast<double>(cells.size() - problem.size());
-    const Eigen::MatrixXd covariance =
-        variance * (slopes.transpose() * slopes).completeOrthogonalDecomposition().pseudoInverse();
-    const HandResistance none = fit.error;
-    fit.error = problem.hand(covariance.diagonal().cwiseMax(0.0).cwiseSqrt());
-    if (!kind.stiffening) fit.error.stiffening = none.stiffening;
-    if (!kind.threshold_rise) fit.error.threshold_rise = none.threshold_rise;
-  }
+  if (cells.size() > problem.size()) fit.error = problem.hand(best.standard_error);
   return fit;
 }
 
