@@ -2,7 +2,6 @@
 // simulated motors; and the self-test with what only this board has.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/host_tools/calibration/procedure_accuracy.hpp"
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests::calibration_test {
 
@@ -59,10 +59,10 @@ TEST_P(ImageCalibration, FindsTheMotorWithinItsBounds) {
     EXPECT_TRUE(one.good()) << one.name << ": " << one.found << ", truth " << one.truth;
 }
 
-// A minute or more each: a soak (KMAX_SOAK) takes all. Natively all run each time, and a calibration is in
+// A minute or more each: a soak takes all. Natively all run each time, and a calibration is in
 // bring_up_test.cpp.
 std::vector<const char*> scenes() {
-  if (std::getenv("KMAX_SOAK") == nullptr) return {};
+  if (!in_a_soak()) return {};
   return {std::begin(kmax::calibration_test::motor_scenes), std::end(kmax::calibration_test::motor_scenes)};
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, ImageCalibration, testing::ValuesIn(scenes()));

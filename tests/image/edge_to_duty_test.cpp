@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <random>
 
 #include "firmware/modbus/crc.hpp"
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests::edge_to_duty_test {
 
@@ -83,7 +83,7 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
   };
   const auto request = busy_request();
   // Each of the thousand phases four times over.
-  const BoardTime end = board.now() + ticks(std::getenv("KMAX_SOAK") != nullptr ? 1e6 : 2.5e5);
+  const BoardTime end = board.now() + ticks(in_a_soak() ? 1e6 : 2.5e5);
   while (board.now() < end) {
     const double phase = static_cast<double>(random() % 1000) / 1000.0;
     board.run_until(board.now() + ticks(60.0 + phase));

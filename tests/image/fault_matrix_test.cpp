@@ -17,6 +17,7 @@
 #include "firmware/parameters/refusal.hpp"
 #include "host_tools/device/crash_words.hpp"
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests::fault_matrix_test {
 
@@ -489,7 +490,7 @@ class FaultMatrix : public testing::TestWithParam<std::size_t> {};
 
 /// All states on both axes; else one axis, in turn, is tried in all of them and the other one armed.
 bool is_thorough() {
-  return std::getenv("KMAX_SOAK") != nullptr || std::getenv("KMAX_WRITE_DOCS") != nullptr;
+  return in_a_soak() || std::getenv("KMAX_WRITE_DOCS") != nullptr;
 }
 
 TEST_P(FaultMatrix, IsWhatThePageSays) {

@@ -2,13 +2,13 @@
 // the gates are off in time, they do not come back by themselves, and the board says what it was.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <functional>
 #include <random>
 
 #include "drivers/stm32f4/registers/adc.hpp"
 #include "drivers/stm32f4/registers/dbgmcu.hpp"
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests::halt_and_hang_test {
 
@@ -99,7 +99,7 @@ class Bench : public ImageBench {
 };
 
 int count(int few, int many) {
-  return std::getenv("KMAX_SOAK") != nullptr ? many : few;
+  return in_a_soak() ? many : few;
 }
 
 /// s for which an end is waited for.

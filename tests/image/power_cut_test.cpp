@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <bit>
-#include <cstdlib>
 
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests::power_cut_test {
 
@@ -110,10 +110,9 @@ std::vector<std::uint8_t> prepared(bool sector_full) {
 // Each cut boots a board twice, so not every word: the first and the last ones, where a record and its sector
 // begin and end, and some between, an odd number apart so that both words of a value are met. The store
 // itself is cut at every word in tests/firmware/parameters/parameter_store_power_cut_test.cpp; this shows
-// that the image erases, writes and starts as it does there. KMAX_SOAK=1 in the environment tries five times
-// as many.
+// that the image erases, writes and starts as it does there. A soak tries five times as many.
 bool is_tried(std::uint64_t cut, std::uint64_t operations) {
-  static const bool soak = std::getenv("KMAX_SOAK") != nullptr;
+  static const bool soak = in_a_soak();
   const std::uint64_t at_the_ends = soak ? 24 : 4, between = soak ? 7 : 47;
   return cut <= at_the_ends || cut + at_the_ends > operations || cut % between == 0;
 }

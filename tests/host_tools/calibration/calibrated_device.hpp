@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <functional>
 #include <iterator>
 #include <map>
@@ -18,15 +17,16 @@
 #include "host_tools/device/store.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "tests/host_tools/disturbed_link.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::calibration_test {
 
 using host_tools_test::all_settings;
 using host_tools_test::motor_scenes;
 
-/// One of each kind of motor; a soak (KMAX_SOAK) takes all.
+/// One of each kind of motor; a soak takes all.
 inline std::vector<const char*> representative_scenes() {
-  if (std::getenv("KMAX_SOAK") != nullptr) return {std::begin(motor_scenes), std::end(motor_scenes)};
+  if (in_a_soak()) return {std::begin(motor_scenes), std::end(motor_scenes)};
   return {"dc_coreless_a", "gimbal_b"};
 }
 
