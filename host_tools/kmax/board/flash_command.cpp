@@ -20,6 +20,7 @@
 #include "host_tools/kmax/board/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/supplied_files.hpp"
+#include "host_tools/usb/usb_devices.hpp"
 
 namespace kmax::cli {
 
@@ -160,7 +161,7 @@ void refuse_while_armed(Context& context) {
 void wait_for_dfu(const BoardServices& services) {
   constexpr std::chrono::milliseconds longest{5'000}, pause{100};
   for (std::chrono::milliseconds waited{0}; waited < longest; waited += pause) {
-    const auto usb = flash::list_usb_devices(services.usb_devices);
+    const auto usb = usb::list_usb_devices(services.usb_devices);
     if (std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); })) return;
     services.sleep(pause);
   }
@@ -237,7 +238,7 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const BoardProfile& board = chosen_board(options.board, config);
   std::optional<flash::FlashImage> image;
   if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board), *board.memory);
-  const auto usb = flash::list_usb_devices(services.usb_devices);
+  const auto usb = usb::list_usb_devices(services.usb_devices);
   const auto verdicts = flash::judge_methods(board, config, usb);
   const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);
   for (const auto& verdict : verdicts) {
