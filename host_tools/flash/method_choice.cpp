@@ -34,7 +34,10 @@ Need needs_of(Method method, const BoardProfile& board, const lines::LinesConfig
       if (std::ranges::any_of(devices, &UsbDevice::is_dfu)) return {true, "a board in DFU mode is on USB"};
       if (!board.boot0_is_switch && has(LineRole::boot0) && has(LineRole::reset))
         return {true, "[lines.boot0] and [lines.reset] start the ROM bootloader; connect USB"};
-      return {false, fmt::format("no board in DFU mode (0483:df11) is on USB: {}", board.to_bootloader)};
+      if (std::ranges::any_of(devices, &UsbDevice::is_kmax))
+        return {true, "the firmware on USB can restart into its ROM bootloader"};
+      return {false, fmt::format("neither Kmax nor a board in DFU mode (0483:df11) is on USB: {}",
+                                 board.to_bootloader)};
     case Method::serial:
       break;
   }

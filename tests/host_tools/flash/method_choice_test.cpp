@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/usb/descriptors.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
@@ -17,6 +18,8 @@ constexpr const char* boot =
 const UsbDevice st_link{0x0483, 0x3748, ""};
 const UsbDevice dfu_board{0x0483, 0xDF11, ""};
 const UsbDevice mouse{0x046D, 0xC077, ""};
+const UsbDevice kmax_on_usb{firmware::usb::identity.vendor, firmware::usb::identity.product, "1F2E3D4C",
+                            "Kmax"};
 
 class MethodChoice : public testing::Test {
  protected:
@@ -93,6 +96,16 @@ TEST_F(MethodChoice, AnotherBoardCanDoSerialWithPortAndLines) {
 TEST_F(MethodChoice, TheODriveNeedsItsSwitchForDfu) {
   text = boot;
   EXPECT_CONTAINS(refusal<MethodError>("dfu"), "set the DIP switch SW1 to DFU");
+}
+
+TEST_F(MethodChoice, FirmwareOnUsbNeedsNoSwitchAndAnAdapterIsPreferred) {
+  devices = {mouse, kmax_on_usb};
+  EXPECT_EQ(choose("auto"), Method::dfu);
+  EXPECT_EQ(choose("dfu"), Method::dfu);
+  devices.push_back(st_link);
+  EXPECT_EQ(choose("auto"), Method::openocd_stlink);
+  devices = {{kmax_on_usb.vendor, kmax_on_usb.product, "1F2E3D4C", "candleLight"}};
+  EXPECT_CONTAINS(refusal<MethodError>("dfu"), "set the DIP switch SW1 to DFU") << "any other CAN adapter";
 }
 
 TEST_F(MethodChoice, EveryBoardSaysWhyForEveryMethod) {

@@ -29,6 +29,7 @@ class BoardCommandLine : public CommandLineFixture {
       if (at_sleep) at_sleep();
     };
     services.usb_devices = usb_tree.devices();
+    services.usb_nodes = usb_tree.nodes();
     services.dev = usb_tree.dev();
     services.net = usb_tree.net();
     image = board.folder.write("image.elf", flash::made_elf(flash::made_image())).string();
