@@ -180,6 +180,18 @@ TEST_F(FlashOverUsb, ABoardThatDoesNotComeBackIsWrittenAllTheSame) {
   EXPECT_CONTAINS(said, "to start it: switch the DC supply off and on");
 }
 
+TEST_F(FlashOverUsb, ABoardThatVanishesUnderDfuUtilHasLeftAllTheSame) {
+  board.misbehave("fail_at_leave");
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], true);
+  EXPECT_EQ(said.find("failed with exit code"), std::string::npos) << "it has worked";
+  comes_back = false;
+  plug_in_kmax();
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], false);
+  EXPECT_CONTAINS(said, "dfu-util failed with exit code 74; the image is written and verified");
+}
+
 TEST_F(FlashOverUsb, OfTwoBoardsOneMustBeNamed) {
   usb_tree.plug_in_kmax("1-2", "5A6B7C8D");
   EXPECT_EQ(kmax({"flash", image}), failed);
