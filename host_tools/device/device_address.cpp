@@ -14,7 +14,8 @@ using firmware::Entry;
 using firmware::entry_at;
 using firmware::entry_of;
 
-constexpr std::string_view forms = "allowed are sim, serial:PATH[?unit=1&baud=115200] and can:IFACE[?node=1]";
+constexpr std::string_view forms =
+    "allowed are sim, usb[:SERIAL], serial:PATH[?unit=1&baud=115200] and can:IFACE[?node=1]";
 
 struct Option {
   std::string_view key;
@@ -22,6 +23,7 @@ struct Option {
 };
 constexpr Option serial_options[] = {{"unit", entry_of<"modbus.unit">()},
                                      {"baud", entry_of<"modbus.baud_rate">()}};
+constexpr Option usb_options[] = {{"unit", entry_of<"modbus.unit">()}};
 constexpr Option can_options[] = {{"node", entry_of<"node.id">()}};
 
 [[noreturn]] void fail(std::string_view address, const std::string& what) {
@@ -78,32 +80,51 @@ void parse_options(std::string_view address, std::string_view query, std::span<c
     query.remove_prefix(end + 1);
   }
 }
+
+struct Scheme {
+  std::string_view name;
+  DeviceAddress::Kind kind;
+  std::span<const Option> options;
+  std::string_view missing;  ///< what is said where nothing stands behind the colon
+};
+constexpr Scheme schemes[] = {
+    {"serial", DeviceAddress::Kind::serial, serial_options, "the port is missing, as in serial:/dev/ttyUSB0"},
+    {"can", DeviceAddress::Kind::can, can_options, "the interface is missing, as in can:can0"},
+    {"usb", DeviceAddress::Kind::usb, usb_options,
+     "the serial number is missing, as in usb:1F2E3D4C; write usb for the only device"},
+};
+
+const Scheme* scheme_of(DeviceAddress::Kind kind) {
+  const auto* const found = std::ranges::find(schemes, kind, &Scheme::kind);
+  return found == std::end(schemes) ? nullptr : found;
+}
 }  // namespace
 
 DeviceAddress parse_device_address(std::string_view text) {
   DeviceAddress address;
   if (text == "sim") return address;
 
-  const auto colon = text.find(':');
-  const std::string_view scheme = text.substr(0, colon);
-  if (colon == std::string_view::npos || (scheme != "serial" && scheme != "can")) {
+  const auto question = text.find('?');
+  const auto colon = std::min(text.find(':'), question);
+  const std::string_view name = text.substr(0, colon);
+  const bool colon_there = colon < text.size() && text[colon] == ':';
+  const auto* const scheme = std::ranges::find(schemes, name, &Scheme::name);
+  // Only a device on USB can be the only one.
+  if (scheme == std::end(schemes) || (!colon_there && scheme->kind != DeviceAddress::Kind::usb)) {
     if (text.starts_with("/dev/")) fail(text, fmt::format("write serial:{}", text));
     if (text.empty()) fail(text, fmt::format("it is empty; {}", forms));
-    if (scheme == "sim") fail(text, "the simulated device takes no options; write sim");
+    if (name == "sim") fail(text, "the simulated device takes no options; write sim");
     fail(text, fmt::format("{}", forms));
   }
-  const bool serial = scheme == "serial";
-  const std::string_view rest = text.substr(colon + 1);
-  const auto question = rest.find('?');
-  address.kind = serial ? DeviceAddress::Kind::serial : DeviceAddress::Kind::can;
-  address.path = rest.substr(0, question);
-  if (address.path.empty())
-    fail(text, serial ? "the port is missing, as in serial:/dev/ttyUSB0"
-                      : "the interface is missing, as in can:can0");
+  address.kind = scheme->kind;
+  if (colon_there) {
+    address.path =
+        text.substr(colon + 1, question == std::string_view::npos ? question : question - colon - 1);
+    if (address.path.empty()) fail(text, std::string(scheme->missing));
+  }
   if (question == std::string_view::npos) return address;
 
-  const std::span<const Option> options = serial ? std::span<const Option>(serial_options) : can_options;
-  parse_options(text, rest.substr(question + 1), options,
+  parse_options(text, text.substr(question + 1), scheme->options,
                 [&address](std::size_t entry, std::uint32_t number) {
                   if (entry == entry_of<"modbus.unit">()) address.unit = static_cast<std::uint8_t>(number);
                   if (entry == entry_of<"modbus.baud_rate">()) address.baud_rate = number;
@@ -114,21 +135,15 @@ DeviceAddress parse_device_address(std::string_view text) {
 
 std::string text_of(const DeviceAddress& address) {
   const DeviceAddress defaults;
+  const Scheme* const scheme = scheme_of(address.kind);
+  if (scheme == nullptr) return "sim";
   std::vector<std::string> options;
-  switch (address.kind) {
-    case DeviceAddress::Kind::sim:
-      return "sim";
-    case DeviceAddress::Kind::serial:
-      if (address.unit != defaults.unit) options.push_back(fmt::format("unit={}", address.unit));
-      if (address.baud_rate != defaults.baud_rate)
-        options.push_back(fmt::format("baud={}", address.baud_rate));
-      break;
-    case DeviceAddress::Kind::can:
-      if (address.node != defaults.node) options.push_back(fmt::format("node={}", address.node));
-      break;
-  }
-  return fmt::format("{}:{}{}{}", address.kind == DeviceAddress::Kind::serial ? "serial" : "can",
-                     address.path, options.empty() ? "" : "?", fmt::join(options, "&"));
+  // Of a kind that has no such option it is the default.
+  if (address.unit != defaults.unit) options.push_back(fmt::format("unit={}", address.unit));
+  if (address.baud_rate != defaults.baud_rate) options.push_back(fmt::format("baud={}", address.baud_rate));
+  if (address.node != defaults.node) options.push_back(fmt::format("node={}", address.node));
+  return fmt::format("{}{}{}{}{}", scheme->name, address.path.empty() ? "" : ":", address.path,
+                     options.empty() ? "" : "?", fmt::join(options, "&"));
 }
 
 std::optional<std::string> device_address_of_environment() {

@@ -40,8 +40,8 @@ std::optional<std::string> default_device_address() {
   for (const auto& [key, value] : table) {
     if (key.str() != keys[0])
       throw AddressError(
-          fmt::format("{}: there is no setting '{}'{}; what may stand here is device = \"serial:PATH\" or "
-                      "\"can:IFACE\"",
+          fmt::format("{}: there is no setting '{}'{}; what may stand here is device = \"usb\", "
+                      "\"serial:PATH\" or \"can:IFACE\"",
                       file.string(), key.str(), device::did_you_mean(key.str(), keys)));
   }
   if (!table.contains(keys[0])) return std::nullopt;

@@ -17,7 +17,7 @@ constexpr std::array<BoardProfile, 2> boards = {{
      {{
          {true, "connector J2 has SWCLK, SWDIO, nRST and GND; needs GPIO lines wired to them"},
          {true, "connector J2 has SWCLK, SWDIO, nRST and GND; needs an ST-Link on USB"},
-         {true, "USB is a port of the ROM bootloader, which the DIP switch SW1 starts"},
+         {true, "USB is a port of the ROM bootloader, which the DIP switch SW1 or this firmware starts"},
          {false,
           "its serial ports on connector J3 (UART4 on GPIO1 and 2, USART2 on GPIO3 and 4) are not ports of "
           "the ROM bootloader, and those that are drive the gates of motor 0 and of the brake"},

@@ -93,17 +93,27 @@ FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget
           {}};
 }
 
-Arguments dfu_call(const FlashTarget& target, const std::string& place, const char* way,
-                   const std::string& file) {
+Arguments dfu_call(const FlashTarget& target, const std::string& place, const Arguments& what) {
   Arguments arguments = {target.program, "-d", "0483:df11", "-a", "0"};
-  if (!target.usb_serial.empty()) arguments.insert(arguments.end(), {"-S", target.usb_serial});
-  arguments.insert(arguments.end(), {"-s", place, way, file});
+  if (!target.usb_port.empty()) {
+    arguments.insert(arguments.end(), {"-p", target.usb_port});
+  } else if (!target.usb_serial.empty()) {
+    arguments.insert(arguments.end(), {"-S", target.usb_serial});
+  }
+  arguments.insert(arguments.end(), {"-s", place});
+  std::ranges::copy(what, std::back_inserter(arguments));
   return arguments;
+}
+
+std::vector<Step> dfu_start(const FlashTarget& target) {
+  if (target.usb_port.empty()) return {};
+  const std::string place = fmt::format("0x{:08x}:leave", target.memory->flash_begin());
+  return {{"start the application", dfu_call(target, place, {}), false}};
 }
 
 FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
   const auto dfu = [&target](const std::string& place, const char* way, const std::string& file) {
-    return dfu_call(target, place, way, file);
+    return dfu_call(target, place, {way, file});
   };
   const auto read = [&](std::uint32_t address, std::size_t size, const std::string& file) {
     return dfu(fmt::format("0x{:08x}:{}", address, size), "-U", file);
@@ -125,6 +135,7 @@ FlashPlan dfu_plan(const FlashImage& image, const FlashTarget& target) {
       {"read the parameters again",
        read(target.memory->parameters_begin(), target.memory->parameters_size(), parameters_after_file),
        false});
+  plan.start = dfu_start(target);
   return plan;
 }
 
@@ -193,11 +204,12 @@ FlashPlan plan_factory_reset(Method method, const FlashTarget& target) {
     case Method::dfu:
       for (const Sector& sector : target.memory->parameter_sectors())
         plan.steps.push_back(
-            {erases, dfu_call(target, fmt::format("0x{:08x}", sector.begin), "-D", blank_file), true});
+            {erases, dfu_call(target, fmt::format("0x{:08x}", sector.begin), {"-D", blank_file}), true});
       plan.steps.push_back({reads,
                             dfu_call(target, fmt::format("{}:{}", area, target.memory->parameters_size()),
-                                     "-U", parameters_after_file),
+                                     {"-U", parameters_after_file}),
                             false});
+      plan.start = dfu_start(target);
       return plan;
     case Method::serial:
       plan.steps.push_back(

@@ -55,6 +55,9 @@ struct FlashTarget {
   std::optional<AdapterLine> reset{};  ///< NRST on a line
   unsigned adapter_kilohertz = 1000;
   std::string usb_serial{};  ///< of the ST-Link or of the board in DFU mode; empty: the only one
+  /// Of a board in DFU mode that its firmware has put there: "1-1.2". Other than one whose BOOT0 is set, it
+  /// is started by leaving DFU mode. Empty: whichever port it is on, and a reset or a person starts it.
+  std::string usb_port{};
   std::string serial_port{};
   unsigned baud_rate = 115200;
 };

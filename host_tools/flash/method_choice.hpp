@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -9,25 +8,11 @@
 
 #include "host_tools/flash/board_profile.hpp"
 #include "host_tools/lines/lines_config.hpp"
+#include "host_tools/usb/usb_devices.hpp"
 
 // Which way of flashing to take: those that the board has, and of them those that are there right now.
 
 namespace kmax::flash {
-
-/// What is plugged in, from the kernel's list of USB devices; opens none of them.
-struct UsbDevice {
-  std::uint16_t vendor, product;
-  std::string serial;  ///< empty if it has none
-
-  bool is_st_link() const;
-  /// The ROM bootloader of an STM32 in DFU mode.
-  bool is_dfu() const { return vendor == 0x0483 && product == 0xDF11; }
-};
-
-inline const std::filesystem::path kernel_usb_devices = "/sys/bus/usb/devices";
-
-/// Empty where the kernel has no USB.
-std::vector<UsbDevice> list_usb_devices(const std::filesystem::path& folder = kernel_usb_devices);
 
 struct MethodVerdict {
   Method method;
@@ -38,7 +23,7 @@ struct MethodVerdict {
 
 /// In the order of preference: all_methods.
 std::vector<MethodVerdict> judge_methods(const BoardProfile& board, const lines::LinesConfig& config,
-                                         std::span<const UsbDevice> usb);
+                                         std::span<const usb::UsbDevice> devices);
 
 /// No method can be used, or not the one asked for. The message lists all of them with their reasons.
 class MethodError : public std::runtime_error {

@@ -83,8 +83,8 @@ CLI::Validator within(double least, double most) {
 void add_device_option(CLI::App& command, Context& context) {
   command
       .add_option("--device", context.device_option,
-                  "sim, serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; else KMAX_DEVICE, the "
-                  "settings file, or sim")
+                  "sim, usb[:SERIAL], serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; else "
+                  "KMAX_DEVICE, the settings file, or sim")
       ->type_name("ADDRESS");
 }
 

@@ -13,6 +13,7 @@
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/help_text.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
+#include "host_tools/usb/usb_devices.hpp"
 
 namespace kmax::cli {
 
@@ -57,7 +58,10 @@ Words settings(const std::string& begun) {
 }
 
 Words addresses() {
-  Words found{"sim", "serial:", "can:"};
+  Words found{"sim", "serial:", "can:", "usb"};
+  for (const usb::UsbDevice& device : usb::list_usb_devices()) {
+    if (device.is_kmax()) found.push_back(device.address());
+  }
   std::error_code missing;
   for (const auto& entry : std::filesystem::directory_iterator("/dev", missing)) {
     const std::string name = entry.path().filename();

@@ -28,7 +28,7 @@ link::DeviceAddress address_of(const std::string& text) {
   const auto named = link::default_device_address();
   if (!named)
     throw device::ValueError(
-        "no device is named: give its address, serial:PATH, can:IFACE or sim, or set KMAX_DEVICE; 'kmax "
+        "no device is named: give its address, usb, serial:PATH, can:IFACE or sim, or set KMAX_DEVICE; 'kmax "
         "devices' shows what can be reached");
   return link::parse_device_address(*named);
 }

@@ -41,7 +41,7 @@ FOLDERS = {
     ],
     "host_tools": [
         ["base"],
-        ["plot", "report", "lines", "simulation"],
+        ["plot", "report", "lines", "simulation", "usb"],
         ["flash", "wall", "device"],
         ["description", "record", "check", "bench", "simulated_board"],
         ["device/sim", "serve", "calibration", "selftest", "json"],

@@ -5,6 +5,7 @@
 #include "host_tools/device/can/can_link.hpp"
 #include "host_tools/device/serial/serial_link.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
+#include "host_tools/device/usb_address.hpp"
 
 namespace kmax::link {
 
@@ -16,6 +17,8 @@ std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& noti
       return std::make_unique<SerialLink>(address, notice);
     case DeviceAddress::Kind::can:
       return std::make_unique<CanLink>(address, notice);
+    case DeviceAddress::Kind::usb:
+      return std::make_unique<SerialLink>(serial_address_of(address, usb::list_usb_devices()), notice);
   }
   throw AddressError(fmt::format("{}: no such kind of device", text_of(address)));
 }

@@ -8,20 +8,27 @@
 #include <string>
 
 #include "host_tools/flash/board_profile.hpp"
-#include "host_tools/flash/method_choice.hpp"
 #include "host_tools/kmax/context.hpp"
 #include "host_tools/lines/board_reset.hpp"
 #include "host_tools/lines/gpio_lines.hpp"
 #include "host_tools/lines/lines_config.hpp"
+#include "host_tools/usb/boot_loader_request.hpp"
+#include "host_tools/usb/usb_devices.hpp"
 
-// What the commands for GPIO lines and flashing reach of this computer; tests put their own in.
+// What the commands for GPIO lines, flashing and discovery reach of this computer; tests put their own in.
 
 namespace kmax::cli {
 
 struct BoardServices {
   std::function<std::unique_ptr<lines::GpioLines>()> open_gpio = lines::kernel_gpio_lines;
   lines::Sleep sleep = lines::sleep_for;
-  std::filesystem::path usb_devices = flash::kernel_usb_devices;
+  std::filesystem::path usb_devices = usb::kernel_usb_devices;
+  std::filesystem::path usb_nodes = usb::kernel_usb_nodes;
+  std::filesystem::path dev = "/dev";
+  std::filesystem::path net = "/sys/class/net";
+  std::function<bool(const std::filesystem::path&)> may_open = usb::may_open;
+  std::function<void(const usb::UsbDevice&, const std::filesystem::path& nodes)> restart_into_boot_loader =
+      usb::restart_into_boot_loader;
 };
 
 /// Those of the context, or else this computer's own.

@@ -8,11 +8,14 @@
 #include <cstdlib>
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/interruption.hpp"
 #include "host_tools/base/print.hpp"
+#include "host_tools/device/device_address.hpp"
 #include "host_tools/device/drive.hpp"
+#include "host_tools/device/usb_address.hpp"
 #include "host_tools/flash/flash_image.hpp"
 #include "host_tools/flash/flash_plan.hpp"
 #include "host_tools/flash/flash_run.hpp"
@@ -20,6 +23,7 @@
 #include "host_tools/kmax/board/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/supplied_files.hpp"
+#include "host_tools/usb/usb_devices.hpp"
 
 namespace kmax::cli {
 
@@ -53,7 +57,8 @@ struct FlashOptions {
     add_lines_option(command, lines);
     command
         .add_option("--usb-serial", usb_serial,
-                    "Serial number of the ST-Link or of the board in DFU mode, if there are several")
+                    "Serial number of the ST-Link, of the board in DFU mode or of the one to be restarted "
+                    "into it, if there are several")
         ->type_name("TEXT")
         ->check([](const std::string& text) {
           // It becomes part of an OpenOCD command.
@@ -130,13 +135,56 @@ flash::FlashTarget target_of(Method method, const BoardProfile& board, const Fla
   return target;
 }
 
+/// How the board comes to be in the state that the method needs.
+struct WayIn {
+  bool by_lines = false;
+  std::optional<usb::UsbDevice> restarted{};  ///< the firmware on USB does it
+};
+
+/// What --usb-serial or --device says of which board on USB is meant; nothing where they say nothing.
+std::optional<link::DeviceAddress> meant_board(const Context& context, const FlashOptions& options) {
+  if (!options.usb_serial.empty()) {
+    link::DeviceAddress address;
+    address.kind = link::DeviceAddress::Kind::usb;
+    address.path = options.usb_serial;
+    return address;
+  }
+  const auto named = context.named_device();
+  return named ? std::optional(link::parse_device_address(*named)) : std::nullopt;
+}
+
+WayIn way_in(const Context& context, const FlashOptions& options, const BoardProfile& board,
+             const lines::LinesConfig& config, Method method, std::span<const usb::UsbDevice> devices) {
+  using Kind = link::DeviceAddress::Kind;
+  const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
+  if (method == Method::serial) return {.by_lines = has_lines};
+  if (method != Method::dfu) return {};
+  const auto meant = meant_board(context, options);
+  const usb::UsbDevice* running = meant ? link::usb_device_of(*meant, devices) : nullptr;
+  if (running != nullptr) return {.restarted = *running};
+  if (std::ranges::any_of(devices, &usb::UsbDevice::is_dfu)) return {};
+  if (has_lines && !board.boot0_is_switch) return {.by_lines = true};
+  if (std::ranges::none_of(devices, &usb::UsbDevice::is_kmax)) return {};
+  // A device of another link may be the same board; one that USB does not have is another one.
+  link::DeviceAddress only;
+  only.kind = Kind::usb;
+  if (!meant || meant->kind != Kind::usb) running = link::usb_device_of(only, devices);
+  if (running == nullptr)
+    throw flash::MethodError(
+        fmt::format("which board? On USB there is {}; name one by --device or --usb-serial",
+                    link::usb_addresses(devices)));
+  return {.restarted = *running};
+}
+
 /// An armed axis makes force with whatever half of a program is there: ask first, if there is somebody to
-/// ask.
-void refuse_while_armed(Context& context) {
+/// ask. A board that is to be restarted over USB refuses that itself; that it is the one of --device is
+/// asked.
+void refuse_while_armed(Context& context, const WayIn& way) {
   const char* variable = std::getenv("KMAX_DEVICE");
   const bool named = !context.device_option.empty() || (variable != nullptr && *variable != '\0');
   if (!named || context.simulated()) {
-    context.note("no --device is given, so the board was not asked whether an axis is armed");
+    if (!way.restarted)
+      context.note("no --device is given, so the board was not asked whether an axis is armed");
     return;
   }
   try {
@@ -148,6 +196,13 @@ void refuse_while_armed(Context& context) {
             "first. Nothing was changed",
             axis));
     }
+    if (!way.restarted) return;
+    const auto number = device.read(device::Parameter::of<"info.serial_number">());
+    if (fmt::format("{:08X}", number) != way.restarted->serial)
+      throw flash::FlashError(fmt::format(
+          "the board of --device has the serial number {:08X}, and the one on USB {}: name the one that is "
+          "meant. Nothing was changed",
+          number, way.restarted->serial));
   } catch (const link::LinkError& error) {
     context.note(fmt::format("the board does not answer, so it was not asked whether an axis is armed: {}",
                              error.what()));
@@ -156,14 +211,38 @@ void refuse_while_armed(Context& context) {
   }
 }
 
-/// A board that has just entered DFU mode takes a while to appear on USB.
-void wait_for_dfu(const BoardServices& services) {
-  constexpr std::chrono::milliseconds longest{5'000}, pause{100};
+/// Looks for what `is_there` finds among the USB devices, which takes a while to appear. False: it did not.
+template <typename IsThere>
+bool wait_for_usb(const BoardServices& services, std::chrono::milliseconds longest, IsThere is_there) {
+  constexpr std::chrono::milliseconds pause{100};
   for (std::chrono::milliseconds waited{0}; waited < longest; waited += pause) {
-    const auto usb = flash::list_usb_devices(services.usb_devices);
-    if (std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); })) return;
+    if (std::ranges::any_of(usb::list_usb_devices(services.usb_devices), is_there)) return true;
     services.sleep(pause);
   }
+  return false;
+}
+
+/// A board that has just entered DFU mode, at `port` unless that is empty, and that udev has set the rights
+/// of.
+void wait_for_dfu(const BoardServices& services, const WayIn& way) {
+  constexpr std::chrono::milliseconds longest{5'000};
+  std::filesystem::path forbidden;
+  const bool ready = wait_for_usb(services, longest, [&](const usb::UsbDevice& device) {
+    if (!device.is_dfu() || (way.restarted && device.port != way.restarted->port)) return false;
+    forbidden = services.usb_nodes / device.node();
+    return services.may_open(forbidden);
+  });
+  if (ready) return;
+  if (!forbidden.empty())
+    throw flash::FlashError(fmt::format(
+        "the board is in DFU mode, but {} may not be opened: {}. Nothing on the board was changed",
+        forbidden.string(), usb::permission_advice));
+  if (way.restarted)
+    throw flash::FlashError(
+        fmt::format("{} has restarted, but no board in DFU mode (0483:df11) appeared at its USB port {} "
+                    "within 5 s; nothing on the board was changed. Switch its supply off and on and try "
+                    "again, or flash it another way",
+                    way.restarted->address(), way.restarted->port));
   throw flash::FlashError(
       "BOOT0 and reset were moved, but no board in DFU mode (0483:df11) appeared on USB within 5 s; nothing "
       "on the board was changed. Is USB connected, and PB2 (BOOT1) low?");
@@ -183,7 +262,7 @@ Json pieces_json(const flash::FlashImage& image) {
 }
 
 int show_plan(Context& context, const BoardProfile& board, Method method, const Json& pieces,
-              const flash::FlashPlan& plan, bool by_lines) {
+              const flash::FlashPlan& plan, const WayIn& way) {
   std::vector<flash::Step> steps = plan.steps;
   steps.insert(steps.end(), plan.start.begin(), plan.start.end());
   if (context.json) {
@@ -198,37 +277,63 @@ int show_plan(Context& context, const BoardProfile& board, Method method, const 
   }
   print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
         flash::facts_of(method).name);
-  if (by_lines) print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  if (way.by_lines) print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  if (way.restarted)
+    print(context.out, "# start the ROM bootloader: {} restarts\n", way.restarted->address());
   for (const flash::Step& step : steps)
     print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
-  if (by_lines) print(context.out, "# start the application: [lines.reset]\n");
+  if (way.by_lines) print(context.out, "# start the application: [lines.reset]\n");
   return done;
+}
+
+/// The start step of a plan that leaves DFU mode. The board vanishes under dfu-util, which may call that an
+/// error: it has worked when the firmware is back at its port.
+bool leave_dfu_mode(Context& context, const BoardServices& services, const WayIn& way,
+                    const flash::FlashPlan& plan, flash::WorkFolder& folder, const flash::FlashHooks& hooks) {
+  constexpr std::chrono::milliseconds longest{10'000};
+  std::string failure = "the firmware did not come back on USB within 10 s";
+  try {
+    flash::start_application(plan, folder, hooks);
+  } catch (const flash::FlashError& error) {
+    failure = error.what();
+  }
+  const bool back = wait_for_usb(services, longest, [&way](const usb::UsbDevice& device) {
+    return device.is_kmax() && device.port == way.restarted->port;
+  });
+  if (!back) context.note(failure);
+  return back;
 }
 
 /// Runs the plan with the board in the state that it needs, `work` doing the steps. Whether the application
 /// has been started.
 bool carry_out(Context& context, const BoardServices& services, const lines::LinesConfig& config,
-               Method method, const flash::FlashPlan& plan, bool by_lines, double at_most,
+               Method method, const flash::FlashPlan& plan, const WayIn& way, double at_most,
                const std::function<void(flash::WorkFolder&, const flash::FlashHooks&)>& work) {
   const Interruption interruption;
-  refuse_while_armed(context);
+  refuse_while_armed(context, way);
   flash::WorkFolder folder;
   flash::FlashHooks hooks;
   hooks.say = [&context](const std::string& text) { context.note(text); };
   hooks.stop = [&interruption] { return interruption.requested(); };
   hooks.limits.at_most = std::chrono::milliseconds(static_cast<std::int64_t>(at_most * 1000));
   std::unique_ptr<lines::GpioLines> gpio;
-  if (by_lines) {
+  if (way.by_lines) {
     gpio = services.open_gpio();
     context.note("start the ROM bootloader");
     lines::enter_bootloader(*gpio, config, services.sleep);
-    if (method == Method::dfu) wait_for_dfu(services);
+    if (method == Method::dfu) wait_for_dfu(services, way);
+  }
+  if (way.restarted) {
+    context.note(fmt::format("start the ROM bootloader: {} restarts", way.restarted->address()));
+    services.restart_into_boot_loader(*way.restarted, services.usb_nodes);
+    wait_for_dfu(services, way);
   }
   // After a failure the ROM bootloader goes on running: all its pins are inputs.
   work(folder, hooks);
+  if (way.restarted) return leave_dfu_mode(context, services, way, plan, folder, hooks);
   flash::start_application(plan, folder, hooks);
-  if (by_lines) lines::pulse_reset(*gpio, config, services.sleep);
-  return by_lines || !plan.start.empty();
+  if (way.by_lines) lines::pulse_reset(*gpio, config, services.sleep);
+  return way.by_lines || !plan.start.empty();
 }
 
 int run_flash(Context& context, const FlashOptions& options) try {
@@ -237,8 +342,8 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const BoardProfile& board = chosen_board(options.board, config);
   std::optional<flash::FlashImage> image;
   if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board), *board.memory);
-  const auto usb = flash::list_usb_devices(services.usb_devices);
-  const auto verdicts = flash::judge_methods(board, config, usb);
+  const auto devices = usb::list_usb_devices(services.usb_devices);
+  const auto verdicts = flash::judge_methods(board, config, devices);
   const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);
   for (const auto& verdict : verdicts) {
     if (verdict.method == method)
@@ -246,16 +351,15 @@ int run_flash(Context& context, const FlashOptions& options) try {
           fmt::format("{}: {} because {}", board.title, flash::facts_of(method).name,
                       verdict.ready ? verdict.text : "you asked for it; not ready: " + verdict.text));
   }
-  const bool dfu_is_there = std::any_of(usb.begin(), usb.end(), [](const auto& one) { return one.is_dfu(); });
-  const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
-  const bool by_lines = has_lines && (method == Method::serial || (method == Method::dfu && !dfu_is_there));
-  const flash::FlashTarget target = target_of(method, board, options, config, services);
+  const WayIn way = way_in(context, options, board, config, method, devices);
+  flash::FlashTarget target = target_of(method, board, options, config, services);
+  if (way.restarted) target.usb_port = way.restarted->port;
   const flash::FlashPlan plan =
       image ? flash::plan_flash(method, *image, target) : flash::plan_factory_reset(method, target);
   const Json pieces = image ? pieces_json(*image) : Json::array();
-  if (options.dry_run) return show_plan(context, board, method, pieces, plan, by_lines);
+  if (options.dry_run) return show_plan(context, board, method, pieces, plan, way);
   flash::FlashReport report{};
-  const bool started = carry_out(context, services, config, method, plan, by_lines, options.at_most,
+  const bool started = carry_out(context, services, config, method, plan, way, options.at_most,
                                  [&](flash::WorkFolder& folder, const flash::FlashHooks& hooks) {
                                    if (image) {
                                      report = flash::write_and_verify(plan, *image, folder, hooks);
@@ -285,7 +389,9 @@ int run_flash(Context& context, const FlashOptions& options) try {
         "the stored parameters and the write lock's code are erased, read back blank; the device starts with "
         "its defaults and open");
   }
-  if (!started) context.note(fmt::format("to start it: {}", board.to_application));
+  if (!started)
+    context.note(fmt::format("to start it: {}",
+                             way.restarted ? "switch the DC supply off and on" : board.to_application));
   return done;
 } catch (const flash::ImageError& error) {
   throw UsageError(error.what());
@@ -301,11 +407,13 @@ void add_flash_command(CLI::App& app, Context& context) {
       app, context,
       {"flash", "Writes a firmware image into the board, keeps its parameters, and checks what is there.",
        "  kmax flash                                   the built image, the first way that is ready\n"
+       "  kmax flash --device usb                      over the USB cable\n"
        "  kmax flash --method dfu --dry-run            the exact command lines\n"
        "  kmax flash image.elf --method openocd-gpio --device serial:/dev/ttyACM0\n"
        "  kmax flash --factory-reset                   all parameters at their defaults, no write lock\n\n"
        "Ways: openocd-gpio (SWD over GPIO lines), openocd-stlink, dfu (USB), serial (ROM bootloader).\n"
-       "ODrive v3: SWD on connector J2, or USB with the DIP switch on DFU; serial is not possible.\n"
+       "ODrive v3: SWD on connector J2, or USB; serial is not possible. Over USB a board that runs this\n"
+       "firmware restarts into its ROM bootloader and back; any other one needs its DIP switch on DFU.\n"
        "Only the image's sectors are written. All is read back and compared, the parameter sectors, too.\n"
        "Refused while an axis of --device is armed. Afterwards 'kmax info' shows what runs."},
       Takes::device, run_flash);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host_tools/base/print.hpp"
+#include "host_tools/kmax/board/board_services.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/device/reachable_devices.hpp"
 
@@ -29,8 +30,11 @@ int run_devices(Context& context, const DevicesOptions& options) {
   if (std::find(buses.begin(), buses.end(), "") != buses.end())
     throw UsageError("--can: the name of a CAN interface is needed, as in --can can0");
   std::vector<ReachableDevice> devices{{"sim", "a simulated device in this program"}};
-  append(devices, serial_ports("/dev"));
-  append(devices, can_interfaces("/sys/class/net"));
+  const BoardServices& services = board_services(context);
+  const auto on_usb = usb::list_usb_devices(services.usb_devices);
+  append(devices, usb_devices(on_usb, services.dev, services.may_open));
+  append(devices, serial_ports(services.dev, on_usb));
+  append(devices, can_interfaces(services.net, on_usb));
   int code = done;
   for (const std::string& bus : buses) {
     std::vector<ReachableDevice> nodes;
@@ -70,9 +74,11 @@ int run_devices(Context& context, const DevicesOptions& options) {
 void add_devices_command(CLI::App& app, Context& context) {
   add_command<DevicesOptions>(
       app, context,
-      {"devices", "Lists what can be reached: simulated, serial ports, CAN interfaces and the nodes on them.",
+      {"devices",
+       "Lists what can be reached: simulated, on USB, serial ports, CAN interfaces and the nodes on them.",
        "  kmax devices\n  kmax devices --can can0     with the nodes on can0\n\n"
-       "The first column is what --device takes. Serial ports are listed, not opened. Nodes are asked for\n"
+       "The first column is what --device takes. A device on USB comes with what to do where its port or\n"
+       "its CAN interfaces cannot be used yet. Serial ports are listed, not opened. Nodes are asked for\n"
        "their identity over SDO, which takes a second for each bus."},
       Takes::nothing, run_devices);
 }

@@ -45,42 +45,87 @@ std::string state_words(std::uint8_t state) {
   return fmt::format("state {}", state);
 }
 
+/// The Kmax device whose driver has made this terminal or interface; nullptr: none.
+const usb::UsbDevice* owner_of(std::span<const usb::UsbDevice> devices,
+                               std::vector<std::string> usb::UsbDevice::*names, const std::string& name) {
+  const auto found = std::ranges::find_if(devices, [&](const usb::UsbDevice& device) {
+    return device.is_kmax() && std::ranges::find(device.*names, name) != (device.*names).end();
+  });
+  return found == devices.end() ? nullptr : &*found;
+}
+
 bool is_kmax(const link::FoundNode& node) {
   return node.device_type == firmware::device_type_of_several_axes && node.identity &&
          (*node.identity)[1] == firmware::product_code;
 }
 }  // namespace
 
-std::vector<ReachableDevice> serial_ports(const fs::path& dev) {
+std::vector<ReachableDevice> usb_devices(std::span<const usb::UsbDevice> devices, const fs::path& dev,
+                                         const std::function<bool(const fs::path&)>& may_open) {
+  std::vector<ReachableDevice> found, in_dfu_mode;
+  for (const usb::UsbDevice& device : devices) {
+    if (device.is_dfu())
+      in_dfu_mode.push_back(
+          {"", fmt::format("an STM32 in DFU mode at USB port {}; 'kmax flash' writes firmware into it",
+                           device.port)});
+    if (!device.is_kmax()) continue;
+    const std::string port = device.terminals.empty() ? "" : (dev / device.terminals.front()).string();
+    std::string text = fmt::format("Kmax at USB port {}: ", device.port);
+    if (port.empty()) {
+      text += "no serial port: plug it in again, or 'sudo modprobe cdc_acm'";
+    } else if (may_open(port)) {
+      text += fmt::format("serial port {}", port);
+    } else {
+      text += fmt::format("serial port {}, which you may not open: {}", port, usb::permission_advice);
+    }
+    if (device.can.empty()) {
+      text += "; no CAN interfaces: 'sudo modprobe gs_usb'";
+    } else {
+      text += fmt::format("; CAN {}", fmt::join(device.can, ", "));
+    }
+    found.push_back({device.address(), text});
+  }
+  found.insert(found.end(), in_dfu_mode.begin(), in_dfu_mode.end());
+  return found;
+}
+
+std::vector<ReachableDevice> serial_ports(const fs::path& dev, std::span<const usb::UsbDevice> devices) {
   std::vector<ReachableDevice> ports;
   std::map<fs::path, bool> listed;
+  const auto owner = [devices](const fs::path& port) -> std::string {
+    const auto* const device = owner_of(devices, &usb::UsbDevice::terminals, port.filename());
+    return device == nullptr ? "" : ", of " + device->address();
+  };
   for (const fs::path& link : entries_of(dev / "serial" / "by-id")) {
     std::error_code dangling;
     const fs::path target = fs::canonical(link, dangling);
     if (dangling) continue;
     listed[target] = true;
-    ports.push_back({"serial:" + link.string(), target.string()});
+    ports.push_back({"serial:" + link.string(), target.string() + owner(target)});
   }
   for (const fs::path& port : entries_of(dev)) {
     const std::string name = port.filename().string();
     if (!name.starts_with("ttyACM") && !name.starts_with("ttyUSB")) continue;
-    if (!listed.contains(port)) ports.push_back({"serial:" + port.string(), "serial port"});
+    if (!listed.contains(port)) ports.push_back({"serial:" + port.string(), "serial port" + owner(port)});
   }
   return ports;
 }
 
-std::vector<ReachableDevice> can_interfaces(const fs::path& net) {
+std::vector<ReachableDevice> can_interfaces(const fs::path& net, std::span<const usb::UsbDevice> devices) {
   std::vector<ReachableDevice> interfaces;
   for (const fs::path& interface : entries_of(net)) {
     if (first_word(interface / "type") != "280") continue;
     const std::string name = interface.filename().string();
     const std::string flags = first_word(interface / "flags");
     const bool up = !flags.empty() && (std::strtoul(flags.c_str(), nullptr, 16) & 1U) != 0;
-    interfaces.push_back(
-        {"can:" + name,
-         up ? fmt::format("CAN interface, up; 'kmax devices --can {}' looks for nodes on it", name)
-            : fmt::format("CAN interface, down: sudo ip link set {} up type can bitrate {}", name,
-                          link::factory_default<std::uint32_t, "can.bit_rate">())});
+    std::string text = "CAN interface";
+    if (const auto* const device = owner_of(devices, &usb::UsbDevice::can, name))
+      text += fmt::format(" of {}, {}", device->address(),
+                          device->can.front() == name ? "the board alone" : "with the bus at its connector");
+    text += up ? fmt::format(", up; 'kmax devices --can {}' looks for nodes on it", name)
+               : fmt::format(", down: sudo ip link set {} up type can bitrate {}", name,
+                             link::factory_default<std::uint32_t, "can.bit_rate">());
+    interfaces.push_back({"can:" + name, text});
   }
   return interfaces;
 }

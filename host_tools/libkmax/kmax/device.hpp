@@ -66,8 +66,9 @@ struct ForceLoopOptions {
 /// for a closed device.
 class KMAX_API Device {
  public:
-  /// "can:IFACE[?node=1]", "can:/PATH/OF/A/BUS", "serial:PATH[?unit=1&baud=115200]", or "sim", a simulated
-  /// device in this process, whose time passes in calls only. Empty: KMAX_DEVICE, which must then be set.
+  /// "usb[:SERIAL]", "can:IFACE[?node=1]", "can:/PATH/OF/A/BUS", "serial:PATH[?unit=1&baud=115200]", or
+  /// "sim", a simulated device in this process, whose time passes in calls only. Empty: KMAX_DEVICE, which
+  /// must then be set.
   explicit Device(const std::string& address = {}, DeviceOptions options = {});
   /// close(); errors go to the notice.
   ~Device();

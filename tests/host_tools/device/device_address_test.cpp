@@ -16,7 +16,7 @@ std::string complaint(const std::string& text) {
   return thrown_message<AddressError>([&] { parse_device_address(text); });
 }
 
-TEST(DeviceAddress, TheThreeForms) {
+TEST(DeviceAddress, ItsForms) {
   EXPECT_EQ(parse_device_address("sim").kind, Kind::sim);
   const auto serial = parse_device_address("serial:/dev/ttyUSB0?unit=17&baud=9600");
   EXPECT_EQ(serial.kind, Kind::serial);
@@ -27,6 +27,29 @@ TEST(DeviceAddress, TheThreeForms) {
   EXPECT_EQ(can.kind, Kind::can);
   EXPECT_EQ(can.path, "can0");
   EXPECT_EQ(can.node, 5);
+  const auto usb = parse_device_address("usb:1F2E3D4C?unit=17");
+  EXPECT_EQ(usb.kind, Kind::usb);
+  EXPECT_EQ(usb.path, "1F2E3D4C");
+  EXPECT_EQ(usb.unit, 17);
+}
+
+TEST(DeviceAddress, TheOnlyDeviceOnUsbNeedsNoName) {
+  for (const std::string text : {"usb", "usb?unit=17"}) {
+    const auto address = parse_device_address(text);
+    EXPECT_EQ(address.kind, Kind::usb);
+    EXPECT_EQ(address.path, "");
+    EXPECT_EQ(text_of(address), text);
+  }
+  EXPECT_CONTAINS(complaint("usb:"),
+                  "the serial number is missing, as in usb:1F2E3D4C; write usb for the only");
+  EXPECT_CONTAINS(complaint("usb:?unit=1"), "the serial number is missing");
+  EXPECT_CONTAINS(complaint("usb?"), "no option ''");
+  EXPECT_CONTAINS(complaint("usb?baud=9600"), "options are unit");
+  EXPECT_CONTAINS(complaint("usb?unit=0"), "1 .. 247");
+  EXPECT_CONTAINS(complaint("usbx"), "allowed are");
+  EXPECT_CONTAINS(complaint("serial"), "allowed are");
+  EXPECT_CONTAINS(complaint("can?node=1"), "allowed are");
+  EXPECT_CONTAINS(complaint("sim?x:y"), "no options");
 }
 
 TEST(DeviceAddress, ABusMayBeAPath) {
@@ -48,7 +71,7 @@ TEST(DeviceAddress, LeftOutOptionsAreTheFactorys) {
 
 TEST(DeviceAddress, ErrorsSayWhatIsAllowed) {
   EXPECT_CONTAINS(complaint("/dev/ttyUSB0"), "write serial:/dev/ttyUSB0");
-  EXPECT_CONTAINS(complaint("tcp:host"), "allowed are sim, serial:PATH");
+  EXPECT_CONTAINS(complaint("tcp:host"), "allowed are sim, usb[:SERIAL], serial:PATH");
   EXPECT_CONTAINS(complaint(""), "empty");
   EXPECT_CONTAINS(complaint("Sim"), "allowed are");
   EXPECT_CONTAINS(complaint("sim:x"), "no options");
@@ -73,15 +96,12 @@ TEST(DeviceAddress, ErrorsSayWhatIsAllowed) {
 }
 
 RC_GTEST_PROP(DeviceAddress, ItsTextGivesItBack, ()) {
-  DeviceAddress address{.kind = *rc::gen::element(Kind::serial, Kind::can)};
-  address.path = *rc::gen::nonEmpty(
-      rc::gen::container<std::string>(rc::gen::element('a', '/', ':', '.', '-', '=', '&')));
-  if (address.kind == Kind::serial) {
-    address.unit = *rc::gen::inRange<std::uint8_t>(1, 248);
-    address.baud_rate = *rc::gen::element(9600u, 115200u, 921600u);
-  } else {
-    address.node = *rc::gen::inRange<std::uint8_t>(1, 128);
-  }
+  DeviceAddress address{.kind = *rc::gen::element(Kind::serial, Kind::can, Kind::usb)};
+  address.path = *rc::gen::container<std::string>(rc::gen::element('a', '/', ':', '.', '-', '=', '&'));
+  if (address.kind != Kind::usb && address.path.empty()) address.path = "a";
+  if (address.kind != Kind::can) address.unit = *rc::gen::inRange<std::uint8_t>(1, 248);
+  if (address.kind == Kind::serial) address.baud_rate = *rc::gen::element(9600u, 115200u, 921600u);
+  if (address.kind == Kind::can) address.node = *rc::gen::inRange<std::uint8_t>(1, 128);
   RC_ASSERT(parse_device_address(text_of(address)) == address);
 }
 

@@ -49,7 +49,7 @@ class BoardWithTools {
 
   /// "", "fail" (at the first write), "fail_early", "flip" (a bit of what is written last), "flip_quietly"
   /// (which the tool's own check does not see), "wipe" (a parameter), "hang" (at the first write),
-  /// "hang_hard" (and ignores SIGINT and SIGTERM), "short_read", "no_erase"
+  /// "hang_hard" (and ignores SIGINT and SIGTERM), "short_read", "no_erase", "fail_at_leave"
   void misbehave(const std::string& how) const { folder.write("mode", how); }
 
   std::string flash() const { return folder.read("flash"); }
@@ -126,7 +126,9 @@ if tool == "openocd":
         if words[0] == "verify_image": verify(int(words[2], 0), words[1])
 elif tool == "dfu-util":
     place = arguments[arguments.index("-s") + 1].split(":")
-    if "-U" in arguments: read(int(place[0], 0), int(place[1]), arguments[-1])
+    if place[1:] == ["leave"]:
+        if mode == "fail_at_leave": quit(74, "Error: the device has gone")
+    elif "-U" in arguments: read(int(place[0], 0), int(place[1]), arguments[-1])
     else: write(int(place[0], 0), arguments[-1])
 else:
     place = arguments[arguments.index("-S") + 1].split(":")

@@ -86,6 +86,20 @@ TEST_F(FlashPlanText, DfuUtil) {
                 tool + "0x08004000:32768 -U parameters_after.bin"}));
 }
 
+// It is known by its port, since the ROM bootloader has a serial number of its own, and left by itself.
+TEST_F(FlashPlanText, DfuUtilWithABoardThatItsFirmwareHasRestarted) {
+  target.usb_serial = "1F2E3D4C";
+  target.usb_port = "1-1.2";
+  const auto texts = steps(Method::dfu);
+  ASSERT_EQ(texts.size(), 8u);
+  for (std::size_t i = 0; i < 7; ++i)
+    EXPECT_TRUE(texts[i].starts_with("tool -d 0483:df11 -a 0 -p 1-1.2 -s 0x0800")) << texts[i];
+  EXPECT_EQ(texts.back(), "start: tool -d 0483:df11 -a 0 -p 1-1.2 -s 0x08000000:leave");
+  const FlashPlan reset = plan_factory_reset(Method::dfu, target);
+  ASSERT_EQ(reset.start.size(), 1u);
+  EXPECT_CONTAINS(command_text(reset.start.front().arguments), ":leave");
+}
+
 TEST_F(FlashPlanText, Stm32Flash) {
   const auto texts = steps(Method::serial);
   const std::string tool = "tool -b 115200 -m 8e1 ";

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/usb/descriptors.hpp"
 #include "tests/host_tools/flash/board_with_tools.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::flash::method_choice_test {
+
+using usb::UsbDevice;
 
 constexpr const char* swd =
     "lines.swdio = {chip = \"g\", line = 1}\nlines.swclk = {chip = \"g\", line = 2}\n";
@@ -15,6 +18,8 @@ constexpr const char* boot =
 const UsbDevice st_link{0x0483, 0x3748, ""};
 const UsbDevice dfu_board{0x0483, 0xDF11, ""};
 const UsbDevice mouse{0x046D, 0xC077, ""};
+const UsbDevice kmax_on_usb{firmware::usb::identity.vendor, firmware::usb::identity.product, "1F2E3D4C",
+                            "Kmax"};
 
 class MethodChoice : public testing::Test {
  protected:
@@ -22,7 +27,7 @@ class MethodChoice : public testing::Test {
 
   Method choose(const std::string& wanted, bool dry = false) {
     const auto config = lines::parse_lines_config(text, "lines.toml");
-    return choose_method(wanted, *board, judge_methods(*board, config, usb), dry);
+    return choose_method(wanted, *board, judge_methods(*board, config, devices), dry);
   }
   template <typename Error>
   std::string refusal(const std::string& wanted, bool dry = false) {
@@ -32,13 +37,13 @@ class MethodChoice : public testing::Test {
   BoardWithTools tools;
   const BoardProfile* board = board_of_kind("odrive_v3");
   std::string text;
-  std::vector<UsbDevice> usb;
+  std::vector<UsbDevice> devices;
 };
 
 TEST_F(MethodChoice, AutomaticTakesWhatIsThere) {
-  usb = {mouse, dfu_board};
+  devices = {mouse, dfu_board};
   EXPECT_EQ(choose("auto"), Method::dfu);
-  usb.push_back(st_link);
+  devices.push_back(st_link);
   EXPECT_EQ(choose("auto"), Method::openocd_stlink);
   text = swd;
   EXPECT_EQ(choose("auto"), Method::openocd_gpio);
@@ -46,7 +51,7 @@ TEST_F(MethodChoice, AutomaticTakesWhatIsThere) {
 }
 
 TEST_F(MethodChoice, WithNothingThereEveryWayIsExplained) {
-  usb = {mouse};
+  devices = {mouse};
   const std::string message = refusal<MethodError>("auto");
   EXPECT_CONTAINS(message, "ODrive v3.5 or v3.6 cannot be flashed right now");
   EXPECT_CONTAINS(message, "openocd-gpio    possible: connector J2 has SWCLK");
@@ -68,7 +73,7 @@ TEST_F(MethodChoice, OneAskedForMustBeReadyUnlessItIsOnlyShown) {
 }
 
 TEST_F(MethodChoice, AMissingProgramIsNamedWithItsPackage) {
-  usb = {dfu_board};
+  devices = {dfu_board};
   tools.remove("dfu-util");
   EXPECT_CONTAINS(refusal<MethodError>("dfu"),
                   "the program dfu-util is not installed: apt-get install dfu-util");
@@ -83,7 +88,7 @@ TEST_F(MethodChoice, AnotherBoardCanDoSerialWithPortAndLines) {
   text += boot;
   EXPECT_EQ(choose("serial"), Method::serial);
   EXPECT_EQ(choose("auto"), Method::dfu) << "the lines start the bootloader, USB is faster";
-  usb = {st_link};
+  devices = {st_link};
   EXPECT_EQ(choose("auto"), Method::openocd_stlink);
 }
 
@@ -93,6 +98,16 @@ TEST_F(MethodChoice, TheODriveNeedsItsSwitchForDfu) {
   EXPECT_CONTAINS(refusal<MethodError>("dfu"), "set the DIP switch SW1 to DFU");
 }
 
+TEST_F(MethodChoice, FirmwareOnUsbNeedsNoSwitchAndAnAdapterIsPreferred) {
+  devices = {mouse, kmax_on_usb};
+  EXPECT_EQ(choose("auto"), Method::dfu);
+  EXPECT_EQ(choose("dfu"), Method::dfu);
+  devices.push_back(st_link);
+  EXPECT_EQ(choose("auto"), Method::openocd_stlink);
+  devices = {{kmax_on_usb.vendor, kmax_on_usb.product, "1F2E3D4C", "candleLight"}};
+  EXPECT_CONTAINS(refusal<MethodError>("dfu"), "set the DIP switch SW1 to DFU") << "any other CAN adapter";
+}
+
 TEST_F(MethodChoice, EveryBoardSaysWhyForEveryMethod) {
   for (const BoardProfile& one : all_boards()) {
     EXPECT_EQ(board_of_kind(one.kind), &one);
@@ -100,38 +115,6 @@ TEST_F(MethodChoice, EveryBoardSaysWhyForEveryMethod) {
   }
   EXPECT_EQ(board_of_kind("toaster"), nullptr);
   EXPECT_EQ(board_kinds(), "odrive_v3, generic_stm32f405");
-}
-
-TEST(UsbDevices, AreReadFromTheKernelsFiles) {
-  host_tools_test::TemporaryFolder folder;
-  for (const char* name : {"usb1", "1-1", "1-1:1.0", "1-2"}) std::filesystem::create_directory(folder / name);
-  folder.write("usb1/idVendor", "1d6b\n");
-  folder.write("usb1/idProduct", "0002\n");
-  folder.write("1-1/idVendor", "0483\n");
-  folder.write("1-1/idProduct", "df11\n");
-  folder.write("1-1/serial", "357236713033\n");
-  folder.write("1-2/idVendor", "0483x\n");
-  folder.write("1-2/idProduct", "374b\n");
-  const auto found = list_usb_devices(folder.path());
-  ASSERT_EQ(found.size(), 2u);
-  for (const UsbDevice& device : found) {
-    EXPECT_FALSE(device.is_st_link());
-    EXPECT_EQ(device.is_dfu(), device.vendor == 0x0483);
-    if (device.is_dfu()) {
-      EXPECT_EQ(device.serial, "357236713033");
-    }
-  }
-}
-
-TEST(UsbDevices, WithoutUsbThereAreNone) {
-  EXPECT_TRUE(list_usb_devices("/no/such/folder").empty());
-}
-
-TEST(UsbDevices, StLinksAreKnownByVendorAndProduct) {
-  EXPECT_TRUE((UsbDevice{0x0483, 0x3748, ""}.is_st_link()));
-  EXPECT_TRUE((UsbDevice{0x0483, 0x3754, ""}.is_st_link()));
-  EXPECT_FALSE((UsbDevice{0x0483, 0xDF11, ""}.is_st_link()));
-  EXPECT_FALSE((UsbDevice{0x0484, 0x3748, ""}.is_st_link()));
 }
 
 }  // namespace kmax::flash::method_choice_test

@@ -54,7 +54,8 @@ TEST(LibraryDevice, SaysWhatIsWrongWithAValue) {
   EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.get("wall.stifness"); }), "wall.stiffness");
   EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.set("measured.force", "1"); }), "can only be read");
   EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.status(7); }), "axis 7");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { Device("usb:0"); }), "allowed are sim, serial:PATH");
+  EXPECT_CONTAINS(thrown_message<ValueError>([] { Device("tcp:0"); }),
+                  "allowed are sim, usb[:SERIAL], serial:PATH");
   EXPECT_CONTAINS(thrown_message<LinkError>([] { Device("serial:/nowhere/tty"); }), "/nowhere/tty");
 }
 

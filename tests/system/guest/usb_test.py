@@ -1,14 +1,16 @@
 """The image on a USB cable: Linux' own drivers, cdc_acm and gs_usb, find it, and kmax speaks to it through both."""
 
+import fcntl
 import os
 import socket
 import struct
 import subprocess
+import tempfile
 import time
 import unittest
 from pathlib import Path
 
-from kmax_under_test import PATIENCE, Holding, VirtualBoard, kmax, kmax_json, wait_for
+from kmax_under_test import ELF, PATIENCE, Holding, VirtualBoard, kmax, kmax_json, wait_for
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTROLLER = Path("/sys/devices/platform/vhci_hcd.0")
@@ -29,6 +31,15 @@ def interfaces():
     made = [path for path in Path("/sys/class/net").iterdir() if (path / "device" / "driver").exists()
             and (path / "device" / "driver").resolve().name == "gs_usb"]
     return [path.name for path in sorted(made, key=lambda path: int((path / "dev_id").read_text(), 16))]
+
+
+def ask_for_boot_loader():
+    """The vendor request, as any program may send it: usbdevice_fs.h, USBDEVFS_CONTROL."""
+    device = next(path.parent for path in Path("/sys/bus/usb/devices").glob("*/idVendor") if path.read_text().strip() == "1209")
+    bus, number = (int((device / name).read_text()) for name in ("busnum", "devnum"))
+    request = struct.pack("@BBHHHI4xP", 0x40, 0xDF, 0x4446, 0, 0, 1000, 0)
+    with open(f"/dev/bus/usb/{bus:03}/{number:03}", "r+b", buffering=0) as node:
+        fcntl.ioctl(node, 3 << 30 | len(request) << 16 | ord("U") << 8, request)
 
 
 @unittest.skipUnless(CONTROLLER.exists(), "this kernel has no virtual USB host controller")
@@ -80,6 +91,74 @@ class OnACable(unittest.TestCase):
         kmax("set", "wall.stiffness=2345", device=device)
         self.assertEqual(kmax_json("get", "wall.stiffness", device=device)["wall.stiffness"]["value"], 2345)
 
+    def listed(self):
+        """What kmax devices says of each address that it has."""
+        return {one["address"]: one["description"] for one in kmax_json("devices")["devices"]}
+
+    @property
+    def address(self):
+        number = kmax_json("get", "info.serial_number", device=self.board.device)["info.serial_number"]["value"]
+        return f"usb:{number:08X}"
+
+    def test_kmax_finds_it_by_its_serial_number(self):
+        first, second = interfaces()
+        devices = self.listed()
+        self.assertIn(f"serial port {TERMINAL}; CAN {first}, {second}", devices[self.address])
+        self.assertIn(f"of {self.address}", devices[f"serial:{TERMINAL}"])
+        self.assertIn(f"CAN interface of {self.address}, the board alone, down: sudo ip link set {first} up",
+                      devices[f"can:{first}"])
+        self.assertIn("with the bus at its connector, down", devices[f"can:{second}"])
+        # As a user does what it says.
+        command = devices[f"can:{first}"].split(": sudo ")[1]
+        subprocess.run(command.split(), check=True)
+        self.addCleanup(subprocess.run, ["ip", "link", "set", first, "down"], check=False)
+        self.assertIn("the board alone, up", self.listed()[f"can:{first}"])
+        found = kmax_json("devices", "--can", first)["devices"]
+        self.assertTrue(any(one["address"] == f"can:{first}" and one["description"].startswith("Kmax ") for one in found), found)
+
+    def test_kmax_speaks_to_it_by_its_serial_number(self):
+        for device in "usb", self.address, self.address.lower():
+            kmax("set", "wall.stiffness=3456", device=device)
+            self.assertEqual(kmax_json("get", "wall.stiffness", device=self.board.device)["wall.stiffness"]["value"], 3456)
+            kmax("set", "wall.stiffness=1000", device=device)
+        self.assertIn(f"there is {self.address}", kmax("info", device="usb:00000000", check=False).stderr)
+
+    def test_without_its_driver_kmax_says_which_is_missing(self):
+        driver = Path("/sys/bus/usb/drivers/cdc_acm")
+        interface = next(path.name for path in driver.iterdir() if path.name.endswith(":1.1"))
+        (driver / "unbind").write_text(interface)
+        self.addCleanup(wait_for, TERMINAL)
+        self.addCleanup((driver / "bind").write_text, interface)
+        wait_until(lambda: not TERMINAL.exists(), "the port stays")
+        self.assertIn("no serial port: plug it in again, or 'sudo modprobe cdc_acm'", self.listed()[self.address])
+        done = kmax("info", device="usb", check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("sudo modprobe cdc_acm", done.stderr)
+
+    def flash_with_a_dfu_util_that_finds_nothing(self):
+        """The way to it is what is tried: no ROM is there that would answer dfu-util."""
+        with tempfile.TemporaryDirectory() as folder:
+            program = Path(folder) / "dfu-util"
+            program.write_text("#!/bin/sh\nexit 74\n")
+            program.chmod(0o755)
+            path = os.environ["PATH"]
+            os.environ["PATH"] = f"{folder}:{path}"
+            try:
+                return kmax("flash", ELF, "--method", "dfu", "--device", "usb", check=False)
+            finally:
+                os.environ["PATH"] = path
+
+    def test_flashing_is_refused_while_armed_by_the_program_and_by_the_firmware(self):
+        with Holding("usb") as holding:
+            done = self.flash_with_a_dfu_util_that_finds_nothing()
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("axis 0 is armed", done.stderr)
+            # Without the program's question the firmware answers the request itself.
+            with self.assertRaises(BrokenPipeError):
+                ask_for_boot_loader()
+            self.assertEqual(kmax_json("state", device=self.board.device)["axes"][0]["state"], "operation_enabled")
+            holding.interrupt()
+
     def test_frames_come_back_as_sent_and_none_is_lost(self):
         first = interfaces()[0]
         self.bring_up(first)
@@ -110,6 +189,15 @@ class OnACable(unittest.TestCase):
         self.assertGreater(kmax_json("get", "info.tick", device=device)["info.tick"]["value"], 0)
         self.assertEqual(kmax_json("get", "counters.missed_ticks", device=device)["counters.missed_ticks"]["value"], 0)
         self.assertEqual(kmax_json("get", "info.crash_count", device=device)["info.crash_count"]["value"], 0)
+
+    def test_zz_disarmed_it_restarts_for_the_boot_loader(self):
+        # The last one: what the image jumps to then is in no model.
+        address = self.address
+        done = self.flash_with_a_dfu_util_that_finds_nothing()
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn(f"start the ROM bootloader: {address} restarts", done.stderr)
+        self.assertIn("has restarted, but no board in DFU mode (0483:df11) appeared at its USB port", done.stderr)
+        wait_until(lambda: not TERMINAL.exists(), "it has not left the bus")
 
 
 if __name__ == "__main__":

@@ -210,8 +210,8 @@ class Scene:
 
 
 class Device:
-    """A haptic device with its controller, by its address: "can:IFACE[?node=1]", "can:/PATH/OF/A/BUS",
-    "serial:PATH[?unit=1&baud=115200]", or "sim", a simulated one in this process, whose time passes in calls only. Without
+    """A haptic device with its controller, by its address: "usb[:SERIAL]", "can:IFACE[?node=1]",
+    "can:/PATH/OF/A/BUS", "serial:PATH[?unit=1&baud=115200]", or "sim", a simulated one in this process, whose time passes in calls only. Without
     an address that of KMAX_DEVICE.
 
     Safe to use from several threads, which take turns. In a fork's child it raises Error.

@@ -13,6 +13,7 @@
 #include "tests/host_tools/flash/made_elf.hpp"
 #include "tests/host_tools/kmax/command_line_fixture.hpp"
 #include "tests/host_tools/lines/fake_gpio_lines.hpp"
+#include "tests/host_tools/usb/made_usb_tree.hpp"
 
 namespace kmax::cli {
 
@@ -23,12 +24,14 @@ class BoardCommandLine : public CommandLineFixture {
     unsetenv("KMAX_DEVICE");
     unsetenv("KMAX_LINES");
     setenv("XDG_CONFIG_HOME", board.folder.path().c_str(), 1);
-    std::filesystem::create_directory(board.folder / "usb");
     services.open_gpio = [this] { return gpio.open(); };
     services.sleep = [this](std::chrono::milliseconds) {
       if (at_sleep) at_sleep();
     };
-    services.usb_devices = board.folder / "usb";
+    services.usb_devices = usb_tree.devices();
+    services.usb_nodes = usb_tree.nodes();
+    services.dev = usb_tree.dev();
+    services.net = usb_tree.net();
     image = board.folder.write("image.elf", flash::made_elf(flash::made_image())).string();
   }
   ~BoardCommandLine() override { unsetenv("XDG_CONFIG_HOME"); }
@@ -45,12 +48,11 @@ class BoardCommandLine : public CommandLineFixture {
     setenv("KMAX_LINES", lines_file.c_str(), 1);
   }
   void plug_in(const std::string& vendor, const std::string& product) {
-    std::filesystem::create_directory(board.folder / "usb" / "1-1");
-    board.folder.write("usb/1-1/idVendor", vendor + "\n");
-    board.folder.write("usb/1-1/idProduct", product + "\n");
+    usb_tree.plug_in("1-1", vendor, product);
   }
 
   flash::BoardWithTools board;
+  usb::MadeUsbTree usb_tree{board.folder};
   lines::FakeGpio gpio;
   BoardServices services;
   std::function<void()> at_sleep;

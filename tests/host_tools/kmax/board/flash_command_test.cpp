@@ -1,6 +1,8 @@
 // kmax flash, with tools that write into a file instead of a board.
 #include <gtest/gtest.h>
 
+#include <cerrno>
+
 #include "tests/host_tools/kmax/board/board_command_line.hpp"
 
 namespace kmax::cli::flash_command_test {
@@ -71,6 +73,188 @@ TEST_F(FlashCommand, OverUsbSaysWhatThePersonDoes) {
   EXPECT_EQ(document()["method"], "dfu");
   EXPECT_EQ(document()["started"], false);
   EXPECT_CONTAINS(said, "to start it: set the DIP switch SW1 back to RUN");
+}
+
+/// A board that runs the firmware, at USB port 1-1: it restarts when asked, and appears in DFU mode after
+/// some pauses; dfu-util's "leave" brings it back.
+class FlashOverUsb : public FlashCommand {
+ protected:
+  FlashOverUsb() {
+    plug_in_kmax();
+    services.restart_into_boot_loader = [this](const usb::UsbDevice& asked,
+                                               const std::filesystem::path& nodes) {
+      EXPECT_EQ(nodes, usb_tree.nodes());
+      restarted.push_back(asked.address());
+      if (armed) throw usb::RequestError(usb::request_failure(asked, "node", EPIPE));
+      usb_tree.pull_out(asked.port);
+      pauses = 0;
+      calls_before = board.calls().size();
+    };
+    at_sleep = [this] {
+      ++pauses;
+      const auto calls = board.calls();
+      const bool left = calls.size() > calls_before && calls.back().ends_with(":leave");
+      if (pauses == 8 && appears && !restarted.empty() && !left) usb_tree.plug_in("1-1", "0483", "df11");
+      if (left && comes_back) plug_in_kmax();
+    };
+  }
+  void plug_in_kmax() {
+    usb_tree.pull_out("1-1");
+    usb_tree.plug_in_kmax("1-1", "1F2E3D4C");
+    usb_tree.bind_serial("1-1", "ttyACM0");
+  }
+
+  bool armed = false, appears = true, comes_back = true;
+  int pauses = 0;
+  std::size_t calls_before = 0;
+  Words restarted;
+};
+
+TEST_F(FlashOverUsb, TheFirmwareRestartsIntoTheBootloaderAndBack) {
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(restarted, Words{"usb:1F2E3D4C"});
+  EXPECT_EQ(document()["method"], "dfu");
+  EXPECT_EQ(document()["started"], true);
+  EXPECT_EQ(document()["verified"], true);
+  EXPECT_CONTAINS(said, "dfu because the firmware on USB can restart into its ROM bootloader");
+  EXPECT_CONTAINS(said, "start the ROM bootloader: usb:1F2E3D4C restarts");
+  EXPECT_EQ(said.find("to start it"), std::string::npos);
+  for (const std::string& call : board.calls()) EXPECT_CONTAINS(call, " -p 1-1 ");
+  EXPECT_TRUE(gpio.history.empty());
+  EXPECT_TRUE(touched());
+}
+
+TEST_F(FlashOverUsb, RefusedByTheFirmwareNothingIsChanged) {
+  armed = true;
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said, "it refuses, because an axis is armed");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashOverUsb, WithoutPermissionForTheRequestItSaysWhatToInstall) {
+  services.restart_into_boot_loader = [](const usb::UsbDevice& asked, const std::filesystem::path&) {
+    throw usb::RequestError(usb::request_failure(asked, "/dev/bus/usb/003/001", EACCES));
+  };
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said, "/dev/bus/usb/003/001 may not be opened: install the udev rules");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashOverUsb, WithoutPermissionForTheBootloaderItWaitsForUdevAndSaysWhatToInstall) {
+  int asked = 0;
+  services.may_open = [&asked](const std::filesystem::path& node) {
+    EXPECT_EQ(node.filename(), "002");
+    return ++asked == 3;
+  };
+  ASSERT_EQ(kmax({"flash", image}), done) << said;
+  EXPECT_EQ(asked, 3);
+  plug_in_kmax();
+  services.may_open = [](const std::filesystem::path&) { return false; };
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said, "the board is in DFU mode, but ");
+  EXPECT_CONTAINS(said, "may not be opened: install the udev rules");
+}
+
+TEST_F(FlashOverUsb, ABootloaderThatDoesNotAppearIsNotWaitedForLong) {
+  appears = false;
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said,
+                  "no board in DFU mode (0483:df11) appeared at its USB port 1-1 within 5 s; nothing on");
+  EXPECT_EQ(pauses, 50);
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashOverUsb, ABootloaderAtAnotherPortIsAnotherBoard) {
+  appears = false;
+  usb_tree.plug_in("1-9", "0483", "df11");
+  EXPECT_EQ(kmax({"flash", image, "--device", "usb:1F2E3D4C"}), failed);
+  EXPECT_CONTAINS(said, "appeared at its USB port 1-1");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashOverUsb, ABoardThatDoesNotComeBackIsWrittenAllTheSame) {
+  comes_back = false;
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], false);
+  EXPECT_CONTAINS(said, "the firmware did not come back on USB within 10 s");
+  EXPECT_CONTAINS(said, "to start it: switch the DC supply off and on");
+}
+
+TEST_F(FlashOverUsb, ABoardThatVanishesUnderDfuUtilHasLeftAllTheSame) {
+  board.misbehave("fail_at_leave");
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], true);
+  EXPECT_EQ(said.find("failed with exit code"), std::string::npos) << "it has worked";
+  comes_back = false;
+  plug_in_kmax();
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], false);
+  EXPECT_CONTAINS(said, "dfu-util failed with exit code 74; the image is written and verified");
+}
+
+TEST_F(FlashOverUsb, OfTwoBoardsOneMustBeNamed) {
+  usb_tree.plug_in_kmax("1-2", "5A6B7C8D");
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said, "which board? On USB there is usb:1F2E3D4C, usb:5A6B7C8D; name one");
+  EXPECT_EQ(kmax({"flash", image, "--usb-serial", "0000"}), failed);
+  EXPECT_CONTAINS(said, "which board?");
+  EXPECT_EQ(kmax({"flash", image, "--device", "usb:0000"}), failed);
+  EXPECT_CONTAINS(said, "which board?");
+  EXPECT_TRUE(restarted.empty());
+  for (const Words& naming : {Words{"--usb-serial", "1f2e3d4c"}, Words{"--device", "usb:1F2E3D4C"},
+                              Words{"--device", "serial:/dev/ttyACM0"}}) {
+    ASSERT_EQ(kmax({"flash", image, naming[0], naming[1]}), done) << said;
+    EXPECT_EQ(restarted.back(), "usb:1F2E3D4C");
+  }
+}
+
+TEST_F(FlashOverUsb, ABoardThatIsInDfuModeAlreadyIsTakenUnlessAnotherIsNamed) {
+  usb_tree.plug_in("1-9", "0483", "df11");
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], false);
+  EXPECT_TRUE(restarted.empty());
+  ASSERT_EQ(kmax({"flash", image, "--device", "usb"}), done) << said;
+  EXPECT_EQ(restarted, Words{"usb:1F2E3D4C"});
+}
+
+TEST_F(FlashOverUsb, TheBoardOfAnotherLinkMustBeTheSame) {
+  device = std::make_shared<host_tools_test::FakeDevice>();
+  device->registers.values().set_whole<"info.serial_number">(0x5A6B7C8D);
+  EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/ttyUSB0"}), failed);
+  EXPECT_CONTAINS(said, "the board of --device has the serial number 5A6B7C8D, and the one on USB 1F2E3D4C");
+  EXPECT_TRUE(restarted.empty());
+  device->registers.values().set_whole<"info.serial_number">(0x1F2E3D4C);
+  ASSERT_EQ(kmax({"flash", image, "--device", "serial:/dev/ttyUSB0"}), done) << said;
+  EXPECT_EQ(restarted.size(), 1u);
+}
+
+TEST_F(FlashOverUsb, WithoutDfuUtilItIsNotRestarted) {
+  board.remove("dfu-util");
+  board.hide_all_but_the_fakes();
+  EXPECT_EQ(kmax({"flash", image, "--method", "dfu"}), failed);
+  EXPECT_CONTAINS(said, "the program dfu-util is not installed: apt-get install dfu-util");
+  EXPECT_TRUE(restarted.empty());
+}
+
+TEST_F(FlashOverUsb, ADryRunRestartsNothing) {
+  ASSERT_EQ(kmax({"flash", image, "--dry-run"}), done) << said;
+  EXPECT_CONTAINS(output, "# start the ROM bootloader: usb:1F2E3D4C restarts\n");
+  EXPECT_CONTAINS(output, " -p 1-1 -s 0x08000000:leave\n");
+  EXPECT_TRUE(restarted.empty());
+}
+
+TEST_F(FlashOverUsb, AFactoryResetGoesTheSameWay) {
+  ASSERT_EQ(kmax({"flash", "--factory-reset", "--json"}), done) << said;
+  EXPECT_EQ(document()["started"], true);
+  EXPECT_EQ(board.parameters(), std::string(0x8000, '\xFF'));
+  EXPECT_FALSE(touched());
+}
+
+TEST_F(FlashOverUsb, TheODrivesSwitchIsNoLineAndOtherBoardsHaveOne) {
+  configure(serial_board + std::string());
+  ASSERT_EQ(kmax({"flash", image, "--board", "odrive_v3"}), done) << said;
+  EXPECT_EQ(restarted.size(), 1u);
+  EXPECT_TRUE(gpio.history.empty());
 }
 
 TEST_F(FlashCommand, OverSerialTheLinesEnterAndLeaveTheBootloader) {
