@@ -13,7 +13,7 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
                  .store = store_,
                  .lock = lock_,
                  .axes = axes_,
-                 .links = {LinkReadings(serial_), LinkReadings(can_)}}),
+                 .links = {LinkReadings(serial_), LinkReadings(can_), LinkReadings(usb_)}}),
       serial_({.board = board_,
                .parameters = parameters_,
                .writes = writes_,

@@ -59,8 +59,17 @@ class CanLine {
     while (can_.has_room() && link.next_frame(frame_)) static_cast<void>(can_.send(frame_));
   }
 
-  /// Main loop, for who shares the bus with the node over USB: the bus takes what is sent at its own pace.
-  bool keeps_pace() const { return configured_ && readings_.state == firmware::CanState::active; }
+  /// Main loop, for who shares the bus with the node over USB, in each turn: the bus takes what is sent at
+  /// its own pace. Not one that is off, or where nobody acknowledges, or that others fill with what is more
+  /// urgent.
+  bool keeps_pace(std::uint32_t now_us) {
+    const std::uint32_t sent = can_.transmit_counters().sent;
+    if (sent != paced_sent_ || can_.room() == slots) {
+      paced_sent_ = sent;
+      paced_us_ = now_us;
+    }
+    return configured_ && readings_.state == firmware::CanState::active && now_us - paced_us_ < patience_us;
+  }
   bool has_room() const { return configured_ && can_.has_room(); }
   /// Half of the room is the node's.
   bool has_room_for_guests() const { return configured_ && can_.room() > frames_of_node; }
@@ -96,7 +105,8 @@ class CanLine {
   /// Initialization waits for the end of the frame that is on the bus, 1.2 ms at 125 kbit/s.
   static constexpr std::uint32_t initialization_polls = 100'000;
   static constexpr std::uint32_t retry_interval_us = 100'000;
-  static constexpr std::size_t frames_of_node = 8;
+  static constexpr std::size_t slots = 16, frames_of_node = slots / 2;
+  static constexpr std::uint32_t patience_us = 10'000;  ///< a frame takes 1 ms at 125 kbit/s
   /// Each list of two has two numbers (RM0090, filter match index).
   static constexpr std::uint8_t node_filters = firmware::CanSettings::identifiers_max;
 
@@ -164,13 +174,15 @@ class CanLine {
 
   drivers::cortex_m::InterruptController<>& interrupts_;
   std::uint32_t peripheral_clock_hz_;
-  drivers::stm32f4::Can<PendTransmit> can_;
+  drivers::stm32f4::Can<PendTransmit, slots> can_;
   firmware::CanSettings settings_{.bit_rate = 0};
   firmware::CanReadings readings_{};
   drivers::CanFrame frame_;  ///< the one being sent: kept, since to make an empty one takes 38 instructions
   std::uint32_t followed_changes_ = ~0U;  ///< of the link's settings; none so far, and compared in every turn
   drivers::PeriodicTimer status_timer_{1'000};
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
+  std::uint32_t paced_us_ = 0,
+                paced_sent_ = 0;  ///< when the bus took something last, or was asked for nothing
   bool configured_ = false, absent_ = false, listens_to_all_ = false;
 };
 

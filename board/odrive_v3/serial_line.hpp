@@ -34,10 +34,16 @@ class SerialLine {
 
   /// Main loop, after the link's poll().
   void poll(firmware::ModbusEdge& link, std::uint32_t now_us) {
-    if (reply_sent_.take()) link.reply_sent(reply_sent_us_);
-    if (usart_.transmitting()) return;
+    if (reply_sent_.take()) {
+      link.reply_sent(reply_sent_us_);
+      replying_ = false;
+    }
+    if (replying_) return;
     const std::span<const std::uint8_t> reply = link.reply_due(now_us);
-    if (usart_.transmit(reply)) return;
+    if (!reply.empty()) {
+      replying_ = usart_.transmit(reply);
+      if (replying_) return;
+    }
     const firmware::SerialSettings wanted = link.settings();
     if (wanted == settings_) return;
     settings_ = wanted;
@@ -77,6 +83,7 @@ class SerialLine {
   firmware::SerialSettings settings_{};
   std::atomic<std::uint32_t> reply_sent_us_{0};  ///< written before the flag
   firmware::InterruptSignal reply_sent_;
+  bool replying_ = false;  ///< the main loop's: until reply_sent_, which it looks at in every turn
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -12,6 +12,7 @@
 #include "drivers/stm32f4/registers/rcc.hpp"
 #include "drivers/stm32f4/usb_device.hpp"
 #include "firmware/application.hpp"
+#include "firmware/board_interface/usb_port.hpp"
 #include "firmware/exchange/interrupt_queue.hpp"
 #include "firmware/exchange/interrupt_signal.hpp"
 #include "firmware/usb/device.hpp"
@@ -29,8 +30,9 @@ namespace kmax::board::odrive_v3 {
 /// nothing more.
 ///
 /// While a bus takes what is sent, it sets the pace at which the node sends; a bus that is off, or where
-/// nobody acknowledges, does not: then the adapter does, and the bus gets what it has room for. A host that
-/// does not take its frames loses them, and is told so, and holds up nobody.
+/// nobody acknowledges, or that is full of what is more urgent, does not: then the adapter does, and the bus
+/// gets what it has room for. What a host has for the bus waits apart, so that what it has for the node alone
+/// goes on. A host that does not take its frames loses them, and is told so, and holds up nobody.
 ///
 /// Without a host none of this is called but the interrupt, now and then, and due(), one look at a flag.
 class UsbLine {
@@ -38,6 +40,7 @@ class UsbLine {
   UsbLine(drivers::cortex_m::InterruptController<>& interrupts, firmware::UsbModbusEdge& link,
           const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity)
       : interrupts_(interrupts),
+        clock_(clock),
         functions_(controller_, link, clock),
         device_(controller_, functions_, identity) {}
 
@@ -58,6 +61,7 @@ class UsbLine {
   void poll(firmware::Application& application, CanLine& line) {
     const bool attended = attended_.load(std::memory_order_relaxed);
     functions_.allow_restart(!application.any_armed() && !application.store_busy());
+    application.usb().set_readings(readings());
     bool moved = exchange_frames(application.can(), line);
     if (functions_.serial().reply_sent()) application.usb().reply_sent();
     moved = application.usb().poll() || moved;
@@ -85,7 +89,8 @@ class UsbLine {
   }
   /// Of the bus, from the CAN interrupt, which has the same priority.
   void ISR_bus_frame(const drivers::CanFrame& frame) {
-    if (functions_.can().is_open(firmware::usb::CanChannel::bus)) from_bus_.ISR_push(frame);
+    const auto& can = functions_.can();
+    if (can.is_open(Channel::bus)) from_bus_.ISR_push(can.to_host(Channel::bus, frame));
   }
 
  private:
@@ -97,6 +102,35 @@ class UsbLine {
   static constexpr std::uint32_t device_mode_polls = 600'000;
   static constexpr std::size_t frames_per_poll = 8;
 
+  firmware::UsbReadings readings() {
+    const auto device = device_.counters();
+    const auto adapter = functions_.can().counters();
+    return {.resets = device.resets,
+            .suspensions = device.suspensions,
+            .refused_requests = device.refused_requests,
+            .frames_lost = adapter.lost + from_bus_.overflows(),
+            .frames_not_sent = frames_not_sent_,
+            .frames_refused = adapter.refused};
+  }
+
+  /// Frames of the host that wait for the bus: more than Linux sends before it has their echoes, which is 10.
+  class Guests {
+   public:
+    bool empty() const { return waiting_ == 0; }
+    bool full() const { return waiting_ == frames_.size(); }
+    firmware::usb::gs::HostFrame& next_place() { return frames_[(first_ + waiting_) % frames_.size()]; }
+    void take_in() { ++waiting_; }
+    const firmware::usb::gs::HostFrame& first() const { return frames_[first_]; }
+    void drop_first() {
+      first_ = (first_ + 1) % frames_.size();
+      --waiting_;
+    }
+
+   private:
+    std::array<firmware::usb::gs::HostFrame, 16> frames_{};
+    std::size_t first_ = 0, waiting_ = 0;
+  };
+
   /// True if frames have moved either way.
   bool exchange_frames(firmware::CanopenEdge& node, CanLine& line) {
     auto& can = functions_.can();
@@ -105,15 +139,18 @@ class UsbLine {
     node.set_reached_otherwise(with_node || with_bus);
     line.set_listening_to_all(with_bus);
     bool moved = false;
-    drivers::CanFrame frame;
-    for (std::size_t i = 0; i < frames_per_poll && from_bus_.pop(frame); ++i) {
-      can.show(Channel::bus, frame);
+    firmware::usb::gs::HostFrame of_bus;
+    for (std::size_t i = 0; i < frames_per_poll && from_bus_.pop(of_bus); ++i) {
+      can.show(of_bus);
       moved = true;
     }
     if (!with_node && !with_bus) return moved;
-    moved = take_from_host(node, line) || moved;
+    const bool bus_sets_pace = line.keeps_pace(clock_.now_us());
+    moved = take_from_host(node) || moved;
+    moved = pass_guests(node, line, bus_sets_pace) || moved;
+    drivers::CanFrame frame;
     // At most as many as there is room for on one of the two.
-    while ((line.keeps_pace() ? line.has_room() : can.has_room()) && node.next_frame(frame)) {
+    while ((bus_sets_pace ? line.has_room() : can.has_room()) && node.next_frame(frame)) {
       line.put(frame);
       can.show(Channel::node, frame);
       can.show(Channel::bus, frame);
@@ -122,34 +159,56 @@ class UsbLine {
     return moved;
   }
 
-  bool take_from_host(firmware::CanopenEdge& node, CanLine& line) {
+  bool take_from_host(firmware::CanopenEdge& node) {
     auto& can = functions_.can();
     bool moved = false;
-    for (std::size_t i = 0; i < frames_per_poll; ++i) {
-      if (!waiting_ && !can.next_from_host(from_host_)) return moved;
-      waiting_ = false;
-      if (!can.is_current(from_host_)) continue;
-      const bool for_bus = from_host_.channel == static_cast<std::uint8_t>(Channel::bus);
-      // A bus that takes what is sent is waited for, and with it the frames behind.
-      waiting_ = for_bus && line.keeps_pace() && !line.has_room_for_guests();
-      if (waiting_) return moved;
-      if (for_bus && line.has_room_for_guests()) line.put(from_host_.frame);
-      node.take(from_host_.frame);
-      can.done(from_host_);
+    for (std::size_t i = 0; i < frames_per_poll && !guests_.full(); ++i) {
+      firmware::usb::gs::HostFrame& frame = guests_.next_place();
+      if (!can.next_from_host(frame)) break;
+      moved = true;
+      if (!can.is_current(frame)) continue;
+      if (frame.channel == static_cast<std::uint8_t>(Channel::bus)) {
+        guests_.take_in();
+      } else {
+        node.take(frame.frame);
+        can.done(frame);
+      }
+    }
+    return moved;
+  }
+
+  /// To the bus and to the node, when the bus has room for them or is not waited for.
+  bool pass_guests(firmware::CanopenEdge& node, CanLine& line, bool bus_sets_pace) {
+    auto& can = functions_.can();
+    bool moved = false;
+    for (std::size_t i = 0; i < frames_per_poll && !guests_.empty(); ++i) {
+      const firmware::usb::gs::HostFrame& frame = guests_.first();
+      if (can.is_current(frame)) {
+        const bool fits = line.has_room_for_guests();
+        if ((bus_sets_pace && !fits) || !can.has_room_for_echo()) break;
+        if (fits)
+          line.put(frame.frame);
+        else
+          ++frames_not_sent_;
+        node.take(frame.frame);
+        can.done(frame);
+      }
+      guests_.drop_first();
       moved = true;
     }
     return moved;
   }
 
   drivers::cortex_m::InterruptController<>& interrupts_;
+  const drivers::cortex_m::SystemTick<>& clock_;
   Controller controller_{drivers::stm32f4::otg_fs_global(), drivers::stm32f4::otg_fs_device()};
   Functions functions_;
   firmware::usb::Device<Controller, Functions> device_;
   firmware::InterruptSignal due_;
   std::atomic<bool> attended_{false};  ///< the interrupt writes it
-  firmware::InterruptQueue<drivers::CanFrame, 16> from_bus_;
-  firmware::usb::gs::HostFrame from_host_;
-  bool waiting_ = false;  ///< it waits for the bus
+  firmware::InterruptQueue<firmware::usb::gs::HostFrame, 16> from_bus_;
+  Guests guests_;
+  std::uint32_t frames_not_sent_ = 0;
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -148,6 +148,8 @@ class UsbDevice {
     }
   }
 
+  void ISR_take_back(std::uint8_t number) { ISR_stop_sending(number); }
+
   void ISR_receive(std::uint8_t number) {
     auto& out = device_.out[number];
     const bool armed = otg_fs_doepctl::Enable::read(out.doepctl) != 0;
@@ -236,7 +238,11 @@ class UsbDevice {
   /// What waits in the endpoint is thrown away, and is not reported as sent.
   void ISR_stop_sending(unsigned number) {
     auto& in = device_.in[number];
-    if (otg_fs_diepctl::Enable::read(in.diepctl) == 0) return;
+    if (otg_fs_diepctl::Enable::read(in.diepctl) == 0) {
+      // It has left since ISR_serve_in() looked, and what is sent next must not be taken for it.
+      in.diepint = otg_fs_diepint::TransferComplete::mask;
+      return;
+    }
     in.diepctl = kept(in.diepctl) | otg_fs_diepctl::SetNak::mask;
     constexpr std::uint32_t nak = otg_fs_diepint::NakEffective::mask,
                             disabled = otg_fs_diepint::Disabled::mask;

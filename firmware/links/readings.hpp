@@ -38,7 +38,7 @@ class Readings {
     const StoreCommands& store;
     const WriteLock& lock;
     Axes& axes;
-    std::array<LinkReadings, 2> links;
+    std::array<LinkReadings, 3> links;
   };
   explicit Readings(const Sources& sources) : of_(sources) {}
 

@@ -35,4 +35,18 @@ bool UsbModbusEdge::poll() {
   return some;
 }
 
+void UsbModbusEdge::publish(ParameterValues& values) const {
+  const modbus::RtuPortCounters& port = port_.counters();
+  const modbus::RtuReceiverCounters& line = port_.receiver_counters();
+  values.set_whole<"counters.usb_resets">(readings_.resets);
+  values.set_whole<"counters.usb_suspensions">(readings_.suspensions);
+  values.set_whole<"counters.usb_refused_requests">(readings_.refused_requests);
+  values.set_whole<"counters.usb_modbus_requests">(port.requests);
+  values.set_whole<"counters.usb_modbus_errors">(line.crc_errors + line.undersize + line.oversize +
+                                                 line.abandoned + port.other_units);
+  values.set_whole<"counters.usb_frames_lost">(readings_.frames_lost);
+  values.set_whole<"counters.usb_frames_not_sent">(readings_.frames_not_sent);
+  values.set_whole<"counters.usb_frames_refused">(readings_.frames_refused);
+}
+
 }  // namespace kmax::firmware

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "firmware/board_interface/usb_port.hpp"
 #include "firmware/exchange/interrupt_queue.hpp"
 #include "firmware/links/modbus_registers.hpp"
 #include "firmware/modbus/transfer_port.hpp"
@@ -47,12 +48,17 @@ class UsbModbusEdge {
   void ISR_restart() { begins_anew_ = true; }
 
   /// What has come; at most as many packets as one request has. True if there was any: then there is room for
-  /// more. Behind Application::poll(), and behind what came over USB as CAN frames (CanopenEdge::take()): what
-  /// either of them set acts at its end.
+  /// more. Behind Application::poll(), and behind what came over USB as CAN frames (CanopenEdge::take()):
+  /// what either of them set acts at its end.
   bool poll();
   /// A reply to send now, once; the bytes stay valid until reply_sent().
   std::span<const std::uint8_t> reply_due() { return port_.take_reply(); }
   void reply_sent() { port_.reply_sent(); }
+
+  /// Main loop, as often as they change.
+  void set_readings(const UsbReadings& readings) { readings_ = readings; }
+  /// Writes the readings counters.usb_* into `values`.
+  void publish(ParameterValues& values) const;
 
  private:
   struct Packet {
@@ -68,6 +74,7 @@ class UsbModbusEdge {
   LinkState& state_;
   ModbusRegisters registers_;
   modbus::TransferPort<ModbusRegisters> port_;
+  UsbReadings readings_;
   InterruptQueue<Packet, packets> queue_;
   bool begins_anew_ = false;  ///< the interrupt's alone
 };

@@ -184,6 +184,28 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
             "Disturbances of the emergency stop's line and of the gate drivers' fault line that were over "
             "within microseconds, and after which force went on. Up to 5 a millisecond go on for ever; a "
             "number that rises asks for shielded cables."),
+    reading(
+        "counters.usb_resets", group::counters, 13, Type::unsigned32, "",
+        "Resets by a USB host: a few each time that it finds the board; more without a hand at the plug are "
+        "a bad cable, or disturbances."),
+    reading("counters.usb_suspensions", group::counters, 14, Type::unsigned32, "",
+            "Times that a USB host fell silent: it sleeps, or the cable was pulled."),
+    reading(
+        "counters.usb_refused_requests", group::counters, 15, Type::unsigned32, "",
+        "Requests about the USB device itself that it refused, malformed ones among them. A PC asks for some "
+        "that this one does not have each time that it finds it."),
+    reading("counters.usb_modbus_requests", group::counters, 16, Type::unsigned32, "",
+            "Modbus requests received over USB."),
+    reading(
+        "counters.usb_modbus_errors", group::counters, 17, Type::unsigned32, "",
+        "What came over USB's serial port and was none: checksum, length, another unit, or the port closed "
+        "in the middle."),
+    reading("counters.usb_frames_lost", group::counters, 18, Type::unsigned32, "",
+            "CAN frames that the PC at the USB CAN adapter was too slow for."),
+    reading("counters.usb_frames_not_sent", group::counters, 19, Type::unsigned32, "",
+            "CAN frames of that PC that a bus which is off, or where nobody acknowledges, had no room for."),
+    reading("counters.usb_frames_refused", group::counters, 20, Type::unsigned32, "",
+            "What that PC sent and was no CAN frame, or for a channel that was not open."),
 
     reading("refusal.reason", group::refusal, 1, Type::unsigned16, "",
             "Why the last write was refused; 0: it was not."),

@@ -28,6 +28,10 @@ inline constexpr std::size_t can_channels = 2;
 /// While the main loop has many of them, or the host does not take what it has, the endpoint answers NAK, and
 /// the host waits. Frames to the host beyond those that are kept are lost, and the next one says so.
 ///
+/// Opening a channel begins a session of it, and so does closing it. What is under way for the session
+/// before, either way, is nobody's any more: its frames do not reach the node, and whoever opens the channel
+/// next sees none of them, not even the one that the host had not fetched yet.
+///
 /// Bit timings are looked at, so that a host hears of one that cannot be, and have no effect: the bit rate of
 /// the bus is the device's setting can.bit_rate, which every node there depends on, and there is no bit rate
 /// between the host and the node. Time stamps, identification and modes of the controller are refused.
@@ -40,26 +44,45 @@ class CanFunction {
   bool is_open(CanChannel channel) const {
     return (open_.load(std::memory_order_relaxed) & bit_of(channel)) != 0;
   }
+  /// Main loop: what did not go through, since the start.
+  struct Counters {
+    std::uint32_t lost = 0;     ///< frames to the host that it was too slow for
+    std::uint32_t refused = 0;  ///< packets from it that were no frame, or one for a channel that is closed
+  };
+  Counters counters() const { return {frames_lost_, refused_.load(std::memory_order_relaxed)}; }
+
   /// Main loop: the next frame from the host, if there is room for its echo. The caller calls done() for each
-  /// one, in their order.
-  bool next_from_host(gs::HostFrame& frame) { return to_host_.room() != 0 && from_host_.pop(frame); }
+  /// one, in the order of its channel; not before has_room_for_echo(), where others have been done meanwhile.
+  bool next_from_host(gs::HostFrame& frame) { return has_room_for_echo() && from_host_.pop(frame); }
+  bool has_room_for_echo() const { return to_host_.room() != 0; }
   void done(const gs::HostFrame& frame) {
     if (is_current(frame)) static_cast<void>(to_host_.push(frame));
   }
-  /// Main loop: the channel that it came by is still open, and has been since.
+  /// Main loop: the channel that it came by, or is for, is still open, and has been since.
   bool is_current(const gs::HostFrame& frame) const {
-    return frame.session == session_.load(std::memory_order_relaxed) &&
-           is_open(static_cast<CanChannel>(frame.channel));
+    const auto channel = static_cast<CanChannel>(frame.channel);
+    return frame.session == session(channel) && is_open(channel);
+  }
+  /// A frame for the host, of the channel's session as it is now.
+  gs::HostFrame to_host(CanChannel channel, const drivers::CanFrame& frame) const {
+    gs::HostFrame out;
+    out.channel = static_cast<std::uint8_t>(channel);
+    out.session = session(channel);
+    out.frame = frame;
+    return out;
   }
   /// Main loop: what the host sees on an open channel. As many as `kept_for_echoes` more must fit.
   void show(CanChannel channel, const drivers::CanFrame& frame) {
-    if (!is_open(channel)) return;
-    gs::HostFrame out;
-    out.channel = static_cast<std::uint8_t>(channel);
-    out.flags = lost_ ? gs::flag_overflow : std::uint8_t{0};
-    out.session = session_.load(std::memory_order_relaxed);
-    out.frame = frame;
-    lost_ = to_host_.room() <= kept_for_echoes || !to_host_.push(out);
+    if (is_open(channel)) show(to_host(channel, frame));
+  }
+  /// One that has waited since to_host().
+  void show(gs::HostFrame frame) {
+    if (!is_current(frame)) return;
+    // The loss of a session is not the next one's.
+    Loss& loss = loss_[frame.channel];
+    frame.flags = loss.some && loss.session == frame.session ? gs::flag_overflow : std::uint8_t{0};
+    loss = {to_host_.room() <= kept_for_echoes || !to_host_.push(frame), frame.session};
+    if (loss.some) ++frames_lost_;
   }
   /// Main loop: show() would take it.
   bool has_room() const { return to_host_.room() > kept_for_echoes; }
@@ -77,8 +100,8 @@ class CanFunction {
   void ISR_serve() {
     if (!running_) return;
     gs::HostFrame next;
-    if (!in_flight_ && ISR_next_to_host(next)) {
-      in_flight_ = true;
+    if (in_flight_ == nothing && ISR_next_to_host(next)) {
+      in_flight_ = next.channel;
       controller_.ISR_send(number_of(can_to_host.address), gs::encoded(next));
     }
     if (!receiving_ && from_host_.ISR_has_room()) {
@@ -139,21 +162,26 @@ class CanFunction {
   /// What is no frame, or is for a channel that is not open, is nothing.
   void ISR_received(std::span<const std::uint8_t> data) {
     receiving_ = false;
+    bool taken = false;
     if (data.size() >= gs::frame_bytes) {
       gs::HostFrame frame = gs::decoded(data);
-      frame.session = session_.load(std::memory_order_relaxed);
       frame.flags = 0;
       const bool open = frame.channel < can_channels && is_open(static_cast<CanChannel>(frame.channel));
-      if (open && frame.frame.valid()) from_host_.ISR_push(frame);
+      taken = open && frame.frame.valid();
+      if (taken) {
+        frame.session = session(static_cast<CanChannel>(frame.channel));
+        from_host_.ISR_push(frame);
+      }
     }
+    if (!taken) refused_.store(refused_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     ISR_serve();
   }
   void ISR_sent() {
-    in_flight_ = false;
+    in_flight_ = nothing;
     ISR_serve();
   }
   void ISR_reopened(std::uint8_t address) {
-    if (address == can_to_host.address) in_flight_ = false;
+    if (address == can_to_host.address) in_flight_ = nothing;
     if (address == can_from_host.address) receiving_ = false;
     ISR_serve();
   }
@@ -162,53 +190,71 @@ class CanFunction {
   static constexpr std::uint32_t software_version = 2, hardware_version = 1;  ///< as candleLight's
   static constexpr std::size_t frames_from_host = 8, frames_to_host = 32;
   static constexpr std::size_t kept_for_echoes = frames_from_host;
+  static constexpr std::uint8_t nothing = 0xFF;
+
+  struct Loss {
+    bool some = false;
+    std::uint8_t session = 0;
+  };
 
   static constexpr std::uint8_t bit_of(CanChannel channel) {
     return static_cast<std::uint8_t>(1U << static_cast<unsigned>(channel));
   }
 
+  /// Its number rises with each opening and closing; the interrupt writes it.
+  std::uint8_t session(CanChannel channel) const {
+    return session_[static_cast<std::size_t>(channel)].load(std::memory_order_relaxed);
+  }
+
   /// Those of a session that has ended are passed over.
   bool ISR_next_to_host(gs::HostFrame& next) {
     for (std::size_t i = 0; i < frames_to_host && to_host_.ISR_pop(next); ++i) {
-      const bool open = is_open(static_cast<CanChannel>(next.channel));
-      if (open && next.session == session_.load(std::memory_order_relaxed)) return true;
+      if (is_current(next)) return true;
     }
     return false;
   }
 
   bool ISR_set_mode(CanChannel channel, std::uint32_t mode, std::uint32_t flags) {
     constexpr std::uint32_t reset = 0, start = 1;
-    const std::uint8_t before = open_.load(std::memory_order_relaxed);
-    if (mode == reset) {
-      open_.store(static_cast<std::uint8_t>(before & ~bit_of(channel)), std::memory_order_relaxed);
-      return true;
+    if (mode != reset && (mode != start || (flags & ~gs::features) != 0)) return false;
+    ISR_begin_session(channel);
+    const std::uint8_t before = open_.load(std::memory_order_relaxed), bit = bit_of(channel);
+    open_.store(static_cast<std::uint8_t>(mode == start ? before | bit : before & ~bit),
+                std::memory_order_relaxed);
+    if (in_flight_ == static_cast<std::uint8_t>(channel)) {
+      controller_.ISR_take_back(number_of(can_to_host.address));
+      in_flight_ = nothing;
     }
-    if (mode != start || (flags & ~gs::features) != 0) return false;
-    if (before == 0) ISR_begin_session();
-    open_.store(static_cast<std::uint8_t>(before | bit_of(channel)), std::memory_order_relaxed);
+    ISR_serve();
     return true;
   }
 
   /// What waits from before belongs to nobody any more.
-  void ISR_begin_session() {
-    session_.store(static_cast<std::uint8_t>(session_.load(std::memory_order_relaxed) + 1),
-                   std::memory_order_relaxed);
+  void ISR_begin_session(CanChannel channel) {
+    auto& session = session_[static_cast<std::size_t>(channel)];
+    session.store(static_cast<std::uint8_t>(session.load(std::memory_order_relaxed) + 1),
+                  std::memory_order_relaxed);
   }
 
   void ISR_forget() {
-    in_flight_ = receiving_ = false;
+    in_flight_ = nothing;
+    receiving_ = false;
     open_.store(0, std::memory_order_relaxed);
-    ISR_begin_session();
+    ISR_begin_session(CanChannel::node);
+    ISR_begin_session(CanChannel::bus);
     to_host_.ISR_clear();
   }
 
   Controller& controller_;
   InterruptQueue<gs::HostFrame, frames_from_host> from_host_;
   QueueToInterrupt<gs::HostFrame, frames_to_host> to_host_;
-  std::atomic<std::uint8_t> open_{0};     ///< a bit for each channel; the interrupt writes it
-  std::atomic<std::uint8_t> session_{0};  ///< rises when all channels were closed; the interrupt writes it
-  bool lost_ = false;                     ///< the main loop's alone
-  bool running_ = false, in_flight_ = false, receiving_ = false;
+  std::atomic<std::uint8_t> open_{0};  ///< a bit for each channel; the interrupt writes it
+  std::array<std::atomic<std::uint8_t>, can_channels> session_{};
+  std::array<Loss, can_channels> loss_{};  ///< the main loop's alone, with the next
+  std::uint32_t frames_lost_ = 0;
+  std::atomic<std::uint32_t> refused_{0};  ///< the interrupt writes it
+  std::uint8_t in_flight_ = nothing;       ///< of which channel a frame waits for the host
+  bool running_ = false, receiving_ = false;
 };
 
 }  // namespace kmax::firmware::usb

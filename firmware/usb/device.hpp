@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <concepts>
 #include <cstdint>
 #include <initializer_list>
@@ -65,14 +66,26 @@ class Device {
         descriptor_(device_descriptor(of.release)),
         serial_number_(serial_number_text(of.serial_number)) {}
 
+  /// Main loop: since the start.
+  struct Counters {
+    std::uint32_t resets = 0, suspensions = 0;
+    std::uint32_t refused_requests = 0;  ///< that were answered with STALL
+  };
+  Counters counters() const {
+    return {resets_.load(std::memory_order_relaxed), suspensions_.load(std::memory_order_relaxed),
+            refused_.load(std::memory_order_relaxed)};
+  }
+
   void ISR_reset() {
+    ISR_count(resets_);
     ISR_leave_configuration();
     stage_ = Stage::idle;
-    address_ = 0;
+    address_ = next_address_ = 0;
     suspended_ = false;
   }
 
   void ISR_set_up(std::span<const std::uint8_t, setup_bytes> bytes) {
+    ISR_give_up_address();
     setup_ = setup_packet(bytes);
     left_ = {};
     received_ = 0;
@@ -107,12 +120,16 @@ class Device {
       ISR_send_next();
     } else if (stage_ == Stage::status_to_host) {
       stage_ = Stage::idle;
+      address_ = next_address_;
       if (setup_.kind() != RequestKind::standard) functions_.ISR_finished(setup_);
     }
   }
 
   /// Silence and its end change nothing in a device: what waits goes on behind it.
-  void ISR_suspend() { suspended_ = true; }
+  void ISR_suspend() {
+    ISR_count(suspensions_);
+    suspended_ = true;
+  }
   void ISR_resume() { suspended_ = false; }
   /// The host is there, and has chosen the configuration.
   bool ISR_attended() const { return configured_ && !suspended_; }
@@ -130,7 +147,12 @@ class Device {
   };
   using Answer = std::optional<std::span<const std::uint8_t>>;
 
+  static void ISR_count(std::atomic<std::uint32_t>& counter) {
+    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  }
+
   void ISR_refuse() {
+    ISR_count(refused_);
     stage_ = Stage::idle;
     controller_.ISR_stall_control();
   }
@@ -271,9 +293,15 @@ class Device {
     constexpr std::uint16_t highest = 127;
     if (!setup_.is_for(Recipient::device) || setup_.value > highest || setup_.index != 0 || configured_)
       return false;
-    address_ = static_cast<std::uint8_t>(setup_.value);
-    controller_.ISR_take_address(address_);
+    next_address_ = static_cast<std::uint8_t>(setup_.value);
+    controller_.ISR_take_address(next_address_);
     return true;
+  }
+  /// A host that gives SET_ADDRESS up before its status stage still knows the device by the old one (9.4.6).
+  void ISR_give_up_address() {
+    if (next_address_ == address_) return;
+    next_address_ = address_;
+    controller_.ISR_take_address(address_);
   }
 
   bool ISR_set_configuration() {
@@ -348,8 +376,9 @@ class Device {
   std::size_t received_ = 0;            ///< of what is being written
   std::array<std::uint8_t, full_packet> room_{};
   std::array<bool, endpoints.size()> halted_{};
+  std::atomic<std::uint32_t> resets_{0}, suspensions_{0}, refused_{0};  ///< the interrupt writes them
   Stage stage_ = Stage::idle;
-  std::uint8_t address_ = 0;
+  std::uint8_t address_ = 0, next_address_ = 0;  ///< the next one counts behind the status stage
   bool ends_empty_ = false, configured_ = false, suspended_ = false;
 };
 

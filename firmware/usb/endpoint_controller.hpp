@@ -13,9 +13,13 @@ namespace kmax::firmware::usb {
 /// The device calls
 ///   ISR_open(endpoint)      the endpoint answers NAK from now on; its next data packet is DATA0
 ///   ISR_close(address)      it does not answer any more; a packet that waits in it is thrown away
-///   ISR_take_address(a)     called before the status stage of SET_ADDRESS, in force behind it (9.4.6)
+///   ISR_take_address(a)     called before the status stage of SET_ADDRESS, in force behind it (9.4.6); the
+///   one
+///                           in force again where that stage does not come
 ///   ISR_send(number, data)  one packet, up to the endpoint's size, 0 bytes too; the controller has a copy
 ///                           when it returns. Not again before ISR_sent()
+///   ISR_take_back(number)   a packet that waits in it is thrown away, and is not reported as sent; its data
+///                           toggle stays. Without one nothing happens
 ///   ISR_receive(number)     one packet may come; until then, and behind it, the endpoint answers NAK
 ///   ISR_stall(address)      it answers STALL; a packet that waits in it is thrown away
 ///   ISR_clear_stall(address)   it answers NAK again, and its next data packet is DATA0; a packet that waits
@@ -37,6 +41,7 @@ concept EndpointController = requires(Controller& controller, const Endpoint& en
   controller.ISR_close(number);
   controller.ISR_take_address(number);
   controller.ISR_send(number, data);
+  controller.ISR_take_back(number);
   controller.ISR_receive(number);
   controller.ISR_stall(number);
   controller.ISR_clear_stall(number);

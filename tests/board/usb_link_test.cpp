@@ -121,6 +121,29 @@ TEST_F(UsbLink, ARequestThatFloodsWaitsForRoomAndIsAnsweredInTheEnd) {
   EXPECT_EQ(set("wall.stiffness", 500), 0);
 }
 
+TEST_F(UsbLink, CountsWhatComesOverItApartFromTheSerialLine) {
+  const double serial_errors = bench.get("counters.crc_errors");
+  ASSERT_FALSE(request({3, 0, 0, 0, 1}).empty());
+  EXPECT_EQ(bench.get("counters.usb_modbus_requests"), 1);
+  EXPECT_EQ(bench.get("counters.usb_modbus_errors"), 0);
+  bench.board().receive_usb(Bytes(20, 0xEE));
+  bench.run_ticks(4);
+  EXPECT_EQ(bench.get("counters.usb_modbus_errors"), 1);
+  EXPECT_EQ(bench.get("counters.crc_errors"), serial_errors);
+  bench.application().usb().set_readings({.resets = 1,
+                                          .suspensions = 2,
+                                          .refused_requests = 3,
+                                          .frames_lost = 4,
+                                          .frames_not_sent = 5,
+                                          .frames_refused = 6});
+  EXPECT_EQ(bench.get("counters.usb_resets"), 1);
+  EXPECT_EQ(bench.get("counters.usb_suspensions"), 2);
+  EXPECT_EQ(bench.get("counters.usb_refused_requests"), 3);
+  EXPECT_EQ(bench.get("counters.usb_frames_lost"), 4);
+  EXPECT_EQ(bench.get("counters.usb_frames_not_sent"), 5);
+  EXPECT_EQ(bench.get("counters.usb_frames_refused"), 6);
+}
+
 TEST_F(UsbLink, ANodeThatIsReachedOverUsbNeedsNoBus) {
   auto& can = bench.application().can();
   drivers::CanFrame frame;

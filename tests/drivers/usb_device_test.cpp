@@ -198,6 +198,21 @@ TEST(UsbDeviceController, ABusResetStopsWhatIsUnderWayAndForgetsTheAddress) {
   EXPECT_EQ(core.device.daintmsk.value, otg_fs_daint::In::bits(1) | otg_fs_daint::Out::bits(1));
 }
 
+TEST(UsbDeviceController, APacketThatIsTakenBackIsThrownAwayAndNotReportedAsSent) {
+  Core core;
+  core.usb.ISR_open(Endpoint{0x81, 2, 64});
+  core.usb.ISR_send(1, Bytes(20));
+  core.usb.ISR_take_back(1);
+  EXPECT_EQ(otg_fs_diepctl::Enable::read(core.device.in[1].diepctl), 0U);
+  EXPECT_EQ(core.global.grstctl.writes.back(),
+            otg_fs_grstctl::TransmitFlush::mask | otg_fs_grstctl::TransmitFifoNumber::bits(1));
+  // One that has left meanwhile, too.
+  core.device.in[1].diepint.writes.clear();
+  core.usb.ISR_take_back(1);
+  EXPECT_EQ(core.device.in[1].diepint.writes,
+            std::vector<std::uint32_t>{otg_fs_diepint::TransferComplete::mask});
+}
+
 TEST(UsbDeviceController, AnEndpointThatIsArmedAlreadyIsOnlyLetReceive) {
   Core core;
   core.usb.ISR_receive(2);

@@ -171,6 +171,63 @@ TEST(UsbCan, WhatIsNoFrameOrForAClosedChannelIsNothing) {
   EXPECT_EQ(bench.take_all(), 1);
 }
 
+TEST(UsbCan, AClosedChannelKeepsNothingForWhoOpensItNext) {
+  for (const bool other_open : {true, false}) {
+    for (const bool closes : {true, false}) {
+      Bench bench;
+      ASSERT_TRUE(bench.set_mode(1, 1));
+      if (other_open) {
+        ASSERT_TRUE(bench.set_mode(0, 1));
+      }
+      const gs::HostFrame waits = bench.functions.can().to_host(CanChannel::bus, some_frame);
+      for (int i = 0; i < 100; ++i) bench.show(some_frame, CanChannel::bus);
+      EXPECT_TRUE(bench.send(1, some_frame, 1));
+      if (closes) {
+        EXPECT_TRUE(bench.set_mode(1, 0));
+      }
+      EXPECT_TRUE(bench.set_mode(1, 1));
+      bench.functions.can().show(waits);
+      EXPECT_EQ(bench.take_all(), 1);
+      EXPECT_FALSE(bench.receive()) << "neither frames nor the echo, and not the one in the endpoint";
+      bench.show(some_frame, CanChannel::bus);
+      EXPECT_EQ(bench.receive()->flags, 0) << "nor the loss";
+      EXPECT_EQ(bench.wire.broken_promises, 0);
+    }
+  }
+}
+
+TEST(UsbCan, ClosingAChannelLeavesTheOtherAsItWas) {
+  Bench bench;
+  ASSERT_TRUE(bench.set_mode(0, 1));
+  ASSERT_TRUE(bench.set_mode(1, 1));
+  for (int i = 0; i < 3; ++i) {
+    bench.show(some_frame);
+    bench.show(some_frame, CanChannel::bus);
+  }
+  EXPECT_TRUE(bench.send(4, some_frame));
+  EXPECT_TRUE(bench.set_mode(1, 0));
+  bench.take_all();
+  int seen = 0, echoes = 0;
+  while (const auto frame = bench.receive()) {
+    EXPECT_EQ(frame->channel, 0);
+    (frame->echo == gs::no_echo ? seen : echoes) += 1;
+  }
+  EXPECT_EQ(seen, 3);
+  EXPECT_EQ(echoes, 1);
+}
+
+TEST(UsbCan, CountsWhatDidNotGoThrough) {
+  Bench bench;
+  ASSERT_TRUE(bench.set_mode(0, 1));
+  EXPECT_TRUE(bench.host.put(2, Bytes(19)));
+  EXPECT_TRUE(bench.send(1, some_frame, 1)) << "closed";
+  EXPECT_TRUE(bench.send(1, {.identifier = 0x800, .length = 1}));
+  EXPECT_EQ(bench.functions.can().counters().refused, 3U);
+  EXPECT_EQ(bench.functions.can().counters().lost, 0U);
+  for (int i = 0; i < 100; ++i) bench.show(some_frame);
+  EXPECT_EQ(bench.functions.can().counters().lost, 75U) << "25 fit: one is in the endpoint";
+}
+
 TEST(UsbCan, WhatWaitsFromBeforeAResetIsNobodys) {
   Bench bench;
   ASSERT_TRUE(bench.set_mode(0, 1));

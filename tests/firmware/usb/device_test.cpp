@@ -192,6 +192,31 @@ TEST(UsbDevice, ItsConfigurationIsAListOfWholeDescriptorsOfTheEndpointsThatItOpe
   EXPECT_EQ(addresses, (Bytes{0x81, 0x02, 0x83, 0x82, 0x03}));
 }
 
+TEST(UsbDevice, AnAddressThatIsGivenUpBeforeItsStatusStageIsNone) {
+  Bench bench;
+  ASSERT_TRUE(bench.host.write({0x00, 5, 3, 0, 0}));
+  bench.host.set_up({0x00, 5, 17, 0, 0});
+  EXPECT_EQ(bench.wire.next_address, 17);
+  EXPECT_EQ(bench.device.ISR_address(), 3);
+  EXPECT_TRUE(bench.host.read({0x80, 6, 0x0100, 0, 18}));
+  EXPECT_EQ(bench.wire.next_address, 3) << "the controller has the old one again";
+  EXPECT_EQ(bench.device.ISR_address(), 3);
+}
+
+TEST(UsbDevice, CountsResetsSilencesAndWhatItRefuses) {
+  Bench bench;
+  const auto before = bench.device.counters();
+  bench.host.reset();
+  bench.device.ISR_suspend();
+  bench.device.ISR_resume();
+  EXPECT_FALSE(bench.host.write({0x00, 9, 2, 0, 0}));
+  EXPECT_FALSE(bench.host.read({0x80, 6, 0x0600, 0, 10}));
+  const auto after = bench.device.counters();
+  EXPECT_EQ(after.resets, before.resets + 1);
+  EXPECT_EQ(after.suspensions, before.suspensions + 1);
+  EXPECT_EQ(after.refused_requests, before.refused_requests + 2);
+}
+
 TEST(UsbDevice, AReplyThatFillsItsLastPacketEndsWithAnEmptyOneOnlyIfMoreWasAskedFor) {
   Bench bench;
   constexpr std::size_t size = configuration_descriptor.size();

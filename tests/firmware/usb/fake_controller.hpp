@@ -39,6 +39,10 @@ struct FakeController {
         to_host.packet.has_value() || data.size() > to_host.size || (number != 0 && !to_host.open);
     to_host.packet = Bytes(data.begin(), data.end());
   }
+  void ISR_take_back(std::uint8_t number) {
+    broken_promises += number == 0;
+    side(static_cast<std::uint8_t>(number | direction_in)).packet.reset();
+  }
   void ISR_receive(std::uint8_t number) {
     broken_promises += number != 0 && (!side(number).open || side(number).receiving);
     side(number).receiving = true;
