@@ -31,8 +31,10 @@ namespace kmax::board::odrive_v3 {
 ///
 /// While a bus takes what is sent, it sets the pace at which the node sends; a bus that is off, or where
 /// nobody acknowledges, or that is full of what is more urgent, does not: then the adapter does, and the bus
-/// gets what it has room for. What a host has for the bus waits apart, so that what it has for the node alone
-/// goes on. A host that does not take its frames loses them, and is told so, and holds up nobody.
+/// gets what it has room for. A host that fetches its frames sets it too; one that does not for 10 ms loses
+/// them, hears so with the next one, and holds up nobody. What a host has for the bus waits apart, so that
+/// what it has for the node alone goes on; and what others say on the bus, it hears as long as there is room
+/// left for the node.
 ///
 /// Without a host none of this is called but the interrupt, now and then, and due(), one look at a flag.
 class UsbLine {
@@ -101,6 +103,7 @@ class UsbLine {
   /// Reads, for 25 ms at 168 MHz and more.
   static constexpr std::uint32_t device_mode_polls = 600'000;
   static constexpr std::size_t frames_per_poll = 8;
+  static constexpr std::uint32_t host_patience_us = 10'000;
 
   firmware::UsbReadings readings() {
     const auto device = device_.counters();
@@ -141,22 +144,34 @@ class UsbLine {
     bool moved = false;
     firmware::usb::gs::HostFrame of_bus;
     for (std::size_t i = 0; i < frames_per_poll && from_bus_.pop(of_bus); ++i) {
-      can.show(of_bus);
+      can.show_of_others(of_bus);
       moved = true;
     }
     if (!with_node && !with_bus) return moved;
-    const bool bus_sets_pace = line.keeps_pace(clock_.now_us());
+    const std::uint32_t now_us = clock_.now_us();
+    const bool bus_sets_pace = line.keeps_pace(now_us), host_sets_pace = host_keeps_pace(now_us);
     moved = take_from_host(node) || moved;
     moved = pass_guests(node, line, bus_sets_pace) || moved;
     drivers::CanFrame frame;
-    // At most as many as there is room for on one of the two.
-    while ((bus_sets_pace ? line.has_room() : can.has_room()) && node.next_frame(frame)) {
+    for (std::size_t i = 0; i < frames_per_poll; ++i) {
+      const bool waits = (bus_sets_pace && !line.has_room()) || (host_sets_pace && !can.has_room());
+      if (waits || !node.next_frame(frame)) break;
       line.put(frame);
       can.show(Channel::node, frame);
       can.show(Channel::bus, frame);
       moved = true;
     }
     return moved;
+  }
+
+  /// It fetches what there is for it, or nothing is.
+  bool host_keeps_pace(std::uint32_t now_us) {
+    const std::uint32_t fetched = functions_.can().fetched();
+    if (fetched != paced_fetched_ || functions_.can().nothing_waits()) {
+      paced_fetched_ = fetched;
+      paced_us_ = now_us;
+    }
+    return now_us - paced_us_ < host_patience_us;
   }
 
   bool take_from_host(firmware::CanopenEdge& node) {
@@ -209,6 +224,7 @@ class UsbLine {
   firmware::InterruptQueue<firmware::usb::gs::HostFrame, 16> from_bus_;
   Guests guests_;
   std::uint32_t frames_not_sent_ = 0;
+  std::uint32_t paced_us_ = 0, paced_fetched_ = 0;  ///< when the host fetched something last
 };
 
 }  // namespace kmax::board::odrive_v3

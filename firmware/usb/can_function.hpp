@@ -71,21 +71,18 @@ class CanFunction {
     out.frame = frame;
     return out;
   }
-  /// Main loop: what the host sees on an open channel. As many as `kept_for_echoes` more must fit.
+  /// Main loop: what the node sends, as the host sees it on an open channel. As many as `kept_for_echoes`
+  /// more must fit.
   void show(CanChannel channel, const drivers::CanFrame& frame) {
-    if (is_open(channel)) show(to_host(channel, frame));
+    if (is_open(channel)) show(to_host(channel, frame), kept_for_echoes);
   }
-  /// One that has waited since to_host().
-  void show(gs::HostFrame frame) {
-    if (!is_current(frame)) return;
-    // The loss of a session is not the next one's.
-    Loss& loss = loss_[frame.channel];
-    frame.flags = loss.some && loss.session == frame.session ? gs::flag_overflow : std::uint8_t{0};
-    loss = {to_host_.room() <= kept_for_echoes || !to_host_.push(frame), frame.session};
-    if (loss.some) ++frames_lost_;
-  }
-  /// Main loop: show() would take it.
-  bool has_room() const { return to_host_.room() > kept_for_echoes; }
+  /// What others say on the bus, which has waited since to_host(): it does not keep out what the node says.
+  void show_of_others(const gs::HostFrame& frame) { show(frame, kept_for_echoes + kept_for_node); }
+  /// Main loop: show() would take one of the node's, on both channels.
+  bool has_room() const { return to_host_.room() > kept_for_echoes + 1; }
+  /// Main loop: rises with what the host fetches; and nothing waits for it.
+  std::uint32_t fetched() const { return fetched_.load(std::memory_order_relaxed); }
+  bool nothing_waits() const { return to_host_.room() == frames_to_host; }
 
   void ISR_start() {
     ISR_forget();
@@ -177,6 +174,7 @@ class CanFunction {
     ISR_serve();
   }
   void ISR_sent() {
+    fetched_.store(fetched_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     in_flight_ = nothing;
     ISR_serve();
   }
@@ -188,8 +186,8 @@ class CanFunction {
 
  private:
   static constexpr std::uint32_t software_version = 2, hardware_version = 1;  ///< as candleLight's
-  static constexpr std::size_t frames_from_host = 8, frames_to_host = 32;
-  static constexpr std::size_t kept_for_echoes = frames_from_host;
+  static constexpr std::size_t frames_from_host = 8, frames_to_host = 64;
+  static constexpr std::size_t kept_for_echoes = frames_from_host, kept_for_node = 16;
   static constexpr std::uint8_t nothing = 0xFF;
 
   struct Loss {
@@ -204,6 +202,15 @@ class CanFunction {
   /// Its number rises with each opening and closing; the interrupt writes it.
   std::uint8_t session(CanChannel channel) const {
     return session_[static_cast<std::size_t>(channel)].load(std::memory_order_relaxed);
+  }
+
+  void show(gs::HostFrame frame, std::size_t kept) {
+    if (!is_current(frame)) return;
+    // The loss of a session is not the next one's.
+    Loss& loss = loss_[frame.channel];
+    frame.flags = loss.some && loss.session == frame.session ? gs::flag_overflow : std::uint8_t{0};
+    loss = {to_host_.room() <= kept || !to_host_.push(frame), frame.session};
+    if (loss.some) ++frames_lost_;
   }
 
   /// Those of a session that has ended are passed over.
@@ -252,8 +259,8 @@ class CanFunction {
   std::array<std::atomic<std::uint8_t>, can_channels> session_{};
   std::array<Loss, can_channels> loss_{};  ///< the main loop's alone, with the next
   std::uint32_t frames_lost_ = 0;
-  std::atomic<std::uint32_t> refused_{0};  ///< the interrupt writes it
-  std::uint8_t in_flight_ = nothing;       ///< of which channel a frame waits for the host
+  std::atomic<std::uint32_t> refused_{0}, fetched_{0};  ///< the interrupt writes them
+  std::uint8_t in_flight_ = nothing;                    ///< of which channel a frame waits for the host
   bool running_ = false, receiving_ = false;
 };
 
