@@ -324,7 +324,8 @@ bool carry_out(Context& context, const BoardServices& services, const lines::Lin
     if (method == Method::dfu) wait_for_dfu(services, way);
   }
   if (way.restarted) {
-    context.note(fmt::format("start the ROM bootloader: {} restarts", way.restarted->address()));
+    context.note(fmt::format("start the ROM bootloader: {} restarts; keep the handles still",
+                             way.restarted->address()));
     services.restart_into_boot_loader(*way.restarted, services.usb_nodes);
     wait_for_dfu(services, way);
   }
