@@ -68,7 +68,9 @@ class CanLine {
       paced_sent_ = sent;
       paced_us_ = now_us;
     }
-    return configured_ && readings_.state == firmware::CanState::active && now_us - paced_us_ < patience_us;
+    return configured_ && now_us - paced_us_ < patience_us &&
+           (readings_.state == firmware::CanState::active ||
+            readings_.state == firmware::CanState::error_passive);
   }
   bool has_room() const { return configured_ && can_.has_room(); }
   /// Half of the room is the node's.

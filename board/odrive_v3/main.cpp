@@ -99,10 +99,14 @@ void switch_power_stage_off() {
   apply(power_stage_off);
 }
 
-VoltageVariant voltage_variant() {
+/// Of the maker's one-time-programmable area.
+std::uint8_t otp_byte(std::size_t i) {
   // NOLINTNEXTLINE(performance-no-int-to-ptr)
-  const auto* otp = reinterpret_cast<const volatile std::uint8_t*>(stm32::otp_base);
-  return voltage_variant_from_otp([otp](std::size_t i) { return otp[i]; }).value_or(variant_of_blank_board);
+  return reinterpret_cast<const volatile std::uint8_t*>(stm32::otp_base)[i];
+}
+
+VoltageVariant voltage_variant() {
+  return voltage_variant_from_otp(otp_byte).value_or(variant_of_blank_board);
 }
 
 /// Major, minor and patch are a byte each, and stay below ten.
@@ -175,6 +179,7 @@ bool start_power(const stm32::ClockFrequencies& clocks) {
 /// Cycles that the longest interrupt has taken which ended a sleep, with those behind it that did not let the
 /// core back: the longest tick, as it really is, without an instruction of its own for it.
 std::uint32_t longest_tick = 0;
+volatile bool usb_interrupted = false;  ///< since longest_tick was looked at; the interrupt sets it
 
 drivers::PeriodicTimer power_timer{1'000};
 
@@ -213,8 +218,11 @@ void poll_power(std::uint32_t now_us) {
   const std::uint32_t awake = cycles();
   cortex::unmask_interrupts();
   const std::uint32_t taken = cycles() - awake;
-  if (taken > longest_tick) [[unlikely]]
-    longest_tick = taken;
+  if (taken > longest_tick) [[unlikely]] {
+    // With a USB interrupt in it, it was not the tick alone: the next one as long counts.
+    if (!usb_interrupted) longest_tick = taken;
+    usb_interrupted = false;
+  }
 }
 
 /// No encoder is read here, and none is claimed: the axes tick, and refuse to be armed. In the main loop: on
@@ -249,7 +257,8 @@ void tick_without_power() {
   // Nor 48 MHz as USB wants them.
   stm32::enable_peripheral_clock(stm32::rcc().ahb2enr, stm32::rcc_ahb2enr::OtgFs::mask);
   apply(usb_pins);
-  usb_line.emplace(interrupts, application->usb(), system_tick, usb_identity(serial_number_from_unique_id()));
+  usb_line.emplace(interrupts, application->usb(), system_tick, usb_identity(serial_number_from_unique_id()),
+                   boot_loader_is_safe(otp_byte));
   if (good_clock) usb_line->start();
 
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
@@ -360,6 +369,7 @@ void ISR_can1_sce() {
 
 void ISR_otg_fs() {
   using namespace kmax::board;
+  usb_interrupted = true;
   if (usb_line->ISR_serve()) lines_due.ISR_raise();
 }
 

@@ -40,9 +40,11 @@ namespace kmax::board::odrive_v3 {
 class UsbLine {
  public:
   UsbLine(drivers::cortex_m::InterruptController<>& interrupts, firmware::UsbModbusEdge& link,
-          const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity)
+          const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity,
+          bool boot_loader_is_safe)
       : interrupts_(interrupts),
         clock_(clock),
+        boot_loader_is_safe_(boot_loader_is_safe),
         functions_(controller_, link, clock),
         device_(controller_, functions_, identity) {}
 
@@ -62,11 +64,13 @@ class UsbLine {
   /// in every turn.
   void poll(firmware::Application& application, CanLine& line) {
     const bool attended = attended_.load(std::memory_order_relaxed);
-    functions_.allow_restart(!application.any_armed() && !application.store_busy());
+    functions_.allow_restart(may_restart(application));
     application.usb().set_readings(readings());
     bool moved = exchange_frames(application.can(), line);
     if (functions_.serial().reply_sent()) application.usb().reply_sent();
     moved = application.usb().poll() || moved;
+    // What that request began, a save for one, keeps the boot loader away at once.
+    functions_.allow_restart(may_restart(application));
     if (const auto reply = application.usb().reply_due(); !reply.empty()) {
       functions_.serial().send(reply);
       moved = true;
@@ -74,9 +78,9 @@ class UsbLine {
     if (moved) interrupts_.pend(drivers::stm32f4::Interrupt::otg_fs);
     if (attended) due_.ISR_raise();
   }
-  /// Main loop, behind poll(): a host asks for a restart into the boot loader, and no axis makes force.
-  bool boot_loader_wanted(const firmware::Application& application) {
-    return functions_.boot_loader_wanted() && !application.any_armed();
+  /// Main loop, behind poll(): a host asks for a restart into the boot loader, and nothing stands against it.
+  bool boot_loader_wanted(firmware::Application& application) {
+    return functions_.boot_loader_wanted() && may_restart(application);
   }
   /// The host sees the device leave.
   void disconnect() { controller_.disconnect(); }
@@ -104,6 +108,10 @@ class UsbLine {
   static constexpr std::uint32_t device_mode_polls = 600'000;
   static constexpr std::size_t frames_per_poll = 8;
   static constexpr std::uint32_t host_patience_us = 10'000;
+
+  bool may_restart(firmware::Application& application) const {
+    return boot_loader_is_safe_ && !application.store_busy() && application.usb().may_leave_firmware();
+  }
 
   firmware::UsbReadings readings() {
     const auto device = device_.counters();
@@ -139,7 +147,7 @@ class UsbLine {
     auto& can = functions_.can();
     const bool there = attended_.load(std::memory_order_relaxed);
     const bool with_node = there && can.is_open(Channel::node), with_bus = there && can.is_open(Channel::bus);
-    node.set_reached_otherwise(with_node || with_bus);
+    node.set_reached_over_usb(with_node);
     line.set_listening_to_all(with_bus);
     bool moved = false;
     firmware::usb::gs::HostFrame of_bus;
@@ -216,6 +224,7 @@ class UsbLine {
 
   drivers::cortex_m::InterruptController<>& interrupts_;
   const drivers::cortex_m::SystemTick<>& clock_;
+  const bool boot_loader_is_safe_;
   Controller controller_{drivers::stm32f4::otg_fs_global(), drivers::stm32f4::otg_fs_device()};
   Functions functions_;
   firmware::usb::Device<Controller, Functions> device_;

@@ -14,27 +14,45 @@ namespace kmax::board::odrive_v3 {
 
 enum class VoltageVariant : std::uint8_t { v24, v56 };
 
-/// Reads the maker's record (its layout: registers/system_memory.hpp). Nothing for a blank, damaged or
-/// unknown record: the caller then takes what the build says. (The maker's firmware reads the first
-/// record only, its tools skip void ones.) `byte_at(i)`: byte i of the area.
+/// Where the maker's record of a v3 begins (its layout: registers/system_memory.hpp). Nothing for a blank,
+/// damaged or unknown one. (The maker's firmware reads the first record only, its tools skip void ones.)
+/// `byte_at(i)`: byte i of the area.
 template <typename ByteAt>
-constexpr std::optional<VoltageVariant> voltage_variant_from_otp(ByteAt byte_at) {
+constexpr std::optional<std::size_t> maker_record(ByteAt byte_at) {
   namespace otp = drivers::stm32f4::odrive_otp;
   for (std::size_t record = 0; record < drivers::stm32f4::otp_bytes; record += otp::record_bytes) {
     const std::uint8_t magic = byte_at(record + otp::magic_offset);
     if (magic == 0x00) continue;
     if (magic != otp::magic || byte_at(record + otp::version_major_offset) != 3) return std::nullopt;
-    switch (byte_at(record + otp::voltage_offset)) {
-      case 24:
-        return VoltageVariant::v24;
-      case 48:
-      case 56:
-        return VoltageVariant::v56;
-      default:
-        return std::nullopt;
-    }
+    return record;
   }
   return std::nullopt;
+}
+
+/// As the maker's record says; nothing: the caller takes what the build says.
+template <typename ByteAt>
+constexpr std::optional<VoltageVariant> voltage_variant_from_otp(ByteAt byte_at) {
+  const auto record = maker_record(byte_at);
+  if (!record) return std::nullopt;
+  switch (byte_at(*record + drivers::stm32f4::odrive_otp::voltage_offset)) {
+    case 24:
+      return VoltageVariant::v24;
+    case 48:
+    case 56:
+      return VoltageVariant::v56;
+    default:
+      return std::nullopt;
+  }
+}
+
+/// Boards before v3.5 have no resistors that hold the brake chopper's gates down (PB10, PB11), which the
+/// boot loader in ROM pulls up for its serial port: the maker's firmware never enters it there. A board
+/// without a record is the v3.6 of the build.
+template <typename ByteAt>
+constexpr bool boot_loader_is_safe(ByteAt byte_at) {
+  constexpr std::uint8_t first_safe_minor = 5;
+  const auto record = maker_record(byte_at);
+  return !record || byte_at(*record + drivers::stm32f4::odrive_otp::version_minor_offset) >= first_safe_minor;
 }
 
 /// For a board whose area is blank: set with -DKMAX_ODRIVE_VOLTAGE=24 or 56 when configuring. 56 is the safe

@@ -79,10 +79,6 @@ class UsbDevice {
     // Behind the packets: they came before it.
     const auto flags =
         static_cast<std::uint32_t>(global_.gintsts) & static_cast<std::uint32_t>(global_.gintmsk);
-    if (otg_fs_gint::WakeUp::of(flags) != 0) {
-      global_.gintsts = otg_fs_gint::WakeUp::mask;
-      handler.ISR_resume();
-    }
     if (otg_fs_gint::Reset::of(flags) != 0) {
       global_.gintsts = otg_fs_gint::Reset::mask;
       ISR_reset_bus();
@@ -94,9 +90,14 @@ class UsbDevice {
     // What was sent came before what was received behind it: see Device.
     if (otg_fs_gint::InEndpoint::of(flags) != 0) ISR_serve_in(handler);
     if (otg_fs_gint::OutEndpoint::of(flags) != 0) ISR_serve_out(handler);
-    if (otg_fs_gint::Suspend::of(flags) != 0) {
-      global_.gintsts = otg_fs_gint::Suspend::mask;
-      handler.ISR_suspend();
+    constexpr std::uint32_t activity = otg_fs_gint::Suspend::mask | otg_fs_gint::WakeUp::mask;
+    if ((flags & activity) != 0) {
+      global_.gintsts = flags & activity;
+      // Both may have come since the last interrupt, in either order.
+      if (otg_fs_dsts::Suspended::read(device_.dsts) != 0)
+        handler.ISR_suspend();
+      else
+        handler.ISR_resume();
     }
     return flags != 0;
   }
@@ -194,6 +195,9 @@ class UsbDevice {
   static constexpr std::uint32_t control_interrupts = otg_fs_daint::In::bits(1) | otg_fs_daint::Out::bits(1);
   /// Reads that a hand-shake of the core is waited for: the time of a packet, and more.
   static constexpr std::uint32_t handshake_polls = 2'000;
+  /// In a bus reset nothing is on the wire, and 10 clocks of the PHY are enough. No section says that
+  /// endpoints which the reset has deactivated shake hands at all, and other interrupts wait behind this one.
+  static constexpr std::uint32_t handshake_polls_in_reset = 64;
   /// Status words that the receive FIFO can hold.
   static constexpr unsigned receive_entries = receive_words;
 
@@ -235,8 +239,9 @@ class UsbDevice {
     return wait_until(global_.grstctl, otg_fs_grstctl::TransmitFlush::mask, 0, handshake_polls);
   }
 
-  /// What waits in the endpoint is thrown away, and is not reported as sent.
-  void ISR_stop_sending(unsigned number) {
+  /// What waits in the endpoint is thrown away, and is not reported as sent. `polls`: of each of two
+  /// hand-shakes.
+  void ISR_stop_sending(unsigned number, std::uint32_t polls = handshake_polls) {
     auto& in = device_.in[number];
     if (otg_fs_diepctl::Enable::read(in.diepctl) == 0) {
       // It has left since ISR_serve_in() looked, and what is sent next must not be taken for it.
@@ -246,11 +251,11 @@ class UsbDevice {
     in.diepctl = kept(in.diepctl) | otg_fs_diepctl::SetNak::mask;
     constexpr std::uint32_t nak = otg_fs_diepint::NakEffective::mask,
                             disabled = otg_fs_diepint::Disabled::mask;
-    static_cast<void>(wait_until(in.diepint, nak, nak, handshake_polls));
+    static_cast<void>(wait_until(in.diepint, nak, nak, polls));
     // It may have left meanwhile.
     if (otg_fs_diepctl::Enable::read(in.diepctl) != 0) {
       in.diepctl = kept(in.diepctl) | otg_fs_diepctl::Disable::mask;
-      static_cast<void>(wait_until(in.diepint, disabled, disabled, handshake_polls));
+      static_cast<void>(wait_until(in.diepint, disabled, disabled, polls));
     }
     in.diepint = nak | disabled | otg_fs_diepint::TransferComplete::mask;
     static_cast<void>(ISR_flush(number));
@@ -259,7 +264,7 @@ class UsbDevice {
   void ISR_reset_bus() {
     for (unsigned i = 0; i < otg_fs_endpoints; ++i) {
       device_.out[i].doepctl = kept(device_.out[i].doepctl) | otg_fs_doepctl::SetNak::mask;
-      ISR_stop_sending(i);
+      ISR_stop_sending(i, handshake_polls_in_reset);
       device_.in[i].diepint = 0xFFFF'FFFF;
       device_.out[i].doepint = 0xFFFF'FFFF;
     }
@@ -312,7 +317,8 @@ class UsbDevice {
   template <typename Handler>
   void ISR_serve_out(Handler& handler) {
     const std::uint32_t asking = otg_fs_daint::Out::of(ISR_asking());
-    for (std::uint8_t number = 0; number < otg_fs_endpoints; ++number) {
+    // Endpoint 0 last: what came on the others came before a request that ends it.
+    for (std::uint8_t number = otg_fs_endpoints; number-- > 0;) {
       if ((asking >> number & 1U) == 0) continue;
       auto& out = device_.out[number];
       const auto flags = static_cast<std::uint32_t>(out.doepint);

@@ -15,6 +15,7 @@ struct LinkState {
   /// heartbeat. Nothing: never.
   std::optional<std::uint32_t> heard_us;
   bool is_off = false;          ///< off the bus, or never on it again after a bit rate that failed
+  bool heard_over_usb = false;  ///< of CAN: its commander's last command came by the board's CAN adapter
   bool heartbeat_lost = false;  ///< of a watched node
   bool restart_asked = false;   ///< of the whole device; nothing may be armed any more
 };

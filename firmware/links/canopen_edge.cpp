@@ -49,19 +49,15 @@ void CanopenEdge::start_node() {
 
 void CanopenEdge::set_readings(const CanReadings& readings) {
   readings_ = readings;
-  judge_bus();
+  state_.is_off = readings.state == CanState::bus_off || readings.state == CanState::stopped ||
+                  readings.state == CanState::absent;
 }
 
-void CanopenEdge::set_reached_otherwise(bool reached) {
-  if (reached == reached_otherwise_) return;
-  reached_otherwise_ = reached;
-  judge_bus();
-}
-
-void CanopenEdge::judge_bus() {
-  const bool bus_is_off = readings_.state == CanState::bus_off || readings_.state == CanState::stopped ||
-                          readings_.state == CanState::absent;
-  state_.is_off = bus_is_off && !reached_otherwise_;
+void CanopenEdge::set_reached_over_usb(bool reached) {
+  if (reached == reached_over_usb_) return;
+  reached_over_usb_ = reached;
+  if (reached) return;
+  for (const Link link : can_links) links_[link].heard_over_usb = false;
 }
 
 void CanopenEdge::poll() {
@@ -98,11 +94,13 @@ void CanopenEdge::receive(std::uint32_t now_us) {
 
 void CanopenEdge::take(const drivers::CanFrame& frame) {
   node_.lss().hold(axes_.any_armed(), parameters_.locked());
+  objects_.set_over_usb(reached_over_usb_);
   act_on(node_.receive(frame, parameters_.values(), axes_.now_us()));
+  objects_.set_over_usb(false);
 }
 
 void CanopenEdge::watch_bus() {
-  const bool bus_off = readings_.state == CanState::bus_off;
+  const bool bus_off = readings_.state == CanState::bus_off && !reached_over_usb_;
   if (bus_off && !was_bus_off_) act_on(node_.bus_off());
   was_bus_off_ = bus_off;
   report_emergencies();

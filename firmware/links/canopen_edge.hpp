@@ -58,10 +58,11 @@ class CanopenEdge {
   void power_on();
   /// After Axes::begin_poll().
   void poll();
-  /// Main loop, after poll(): a frame that has come by another way than the bus, as if it had come from it.
+  /// Main loop, after poll(): a frame that has come over USB, as if it had come from the bus.
   [[gnu::cold]] void take(const drivers::CanFrame& frame);
-  /// Hosts reach the node by another way than the bus: it is not off while they do, whatever the bus is at.
-  void set_reached_otherwise(bool reached);
+  /// Whether a host has the node for itself over USB. While it has, a bus that goes off neither stops the
+  /// node nor trips an axis whose last command came that way; it trips all others that were armed over CAN.
+  void set_reached_over_usb(bool reached);
   /// After the store's step: what waits for the end of a save.
   void finish_saves();
   /// The next frame to send; called while there is room for it, after poll(). A frame that is taken counts as
@@ -78,7 +79,6 @@ class CanopenEdge {
   void publish(ParameterValues& values) const;
 
  private:
-  void judge_bus();
   void receive(std::uint32_t now_us);
   void watch_bus();
   void act_on(const canopen::NodeEvents& events);
@@ -98,7 +98,7 @@ class CanopenEdge {
   RoundClock rounds_;
   std::uint32_t configured_communication_{}, fault_changes_{};
   drivers::PeriodicTimer service_{1'000};
-  bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false, reached_otherwise_ = false;
+  bool was_bus_off_ = false, identity_saving_ = false, restart_wanted_ = false, reached_over_usb_ = false;
   CanopenObjects objects_;
   canopen::Node<CanopenObjects> node_;
   InterruptQueue<drivers::CanFrame, 64> queue_;

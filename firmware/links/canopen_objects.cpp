@@ -1,6 +1,7 @@
 #include "firmware/links/canopen_objects.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/canopen/communication_rules.hpp"
@@ -300,8 +301,12 @@ Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, Link by) {
   auto& heard_us = of_.links[by].heard_us;
   const auto before = heard_us;
   heard_us = of_.axes.now_us();
+  const bool was_over_usb = std::exchange(of_.links[by].heard_over_usb, over_usb_);
   const Abort abort = set_slot(slot, raw, by);
-  if (abort != Abort::none) heard_us = before;
+  if (abort != Abort::none) {
+    heard_us = before;
+    of_.links[by].heard_over_usb = was_over_usb;
+  }
   return abort;
 }
 

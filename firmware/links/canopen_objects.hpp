@@ -51,6 +51,8 @@ class CanopenObjects {
   canopen::Abort write(canopen::ObjectAddress address, std::span<const std::uint8_t> in, std::uint8_t server);
   std::uint32_t version(canopen::ObjectAddress address) const;
 
+  /// Until the next call: what comes, comes over USB.
+  void set_over_usb(bool over_usb) { over_usb_ = over_usb; }
   void refresh();
   std::uint32_t value(std::size_t slot) const;
   /// A value of a received PDO; false: refused.
@@ -80,6 +82,7 @@ class CanopenObjects {
   Place found_;  // the last one: a transfer asks several times for the same
   std::array<std::uint8_t, scratch_bytes> scratch_{};
   std::uint32_t scratch_size_ = 0, scratch_version_ = 0;
+  bool over_usb_ = false;
 };
 
 }  // namespace kmax::firmware

@@ -55,6 +55,9 @@ class UsbModbusEdge {
   std::span<const std::uint8_t> reply_due() { return port_.take_reply(); }
   void reply_sent() { port_.reply_sent(); }
 
+  /// A host may have another program started: no axis makes force, and the write lock is open, since that
+  /// program could write all.
+  bool may_leave_firmware() const { return !axes_.any_armed() && !parameters_.locked(); }
   /// Main loop, as often as they change.
   void set_readings(const UsbReadings& readings) { readings_ = readings; }
   /// Writes the readings counters.usb_* into `values`.

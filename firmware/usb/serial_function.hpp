@@ -122,9 +122,11 @@ class SerialFunction {
     left_.reset();
     reply_sent_.ISR_raise();
   }
+  /// Nobody gets what was for the client before: its reply in the endpoint neither.
   void ISR_begin_anew() {
     link_.ISR_restart();
-    owes_empty_ = false;
+    if (in_flight_) controller_.ISR_take_back(number_of(serial_to_host.address));
+    in_flight_ = owes_empty_ = false;
     if (left_) ISR_end_reply();
   }
   void ISR_follow_terminal(bool ready) {

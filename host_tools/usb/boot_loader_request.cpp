@@ -20,7 +20,9 @@ std::string request_failure(const UsbDevice& device, const std::filesystem::path
   };
   switch (error) {
     case EPIPE:
-      return say("it refuses, because an axis is armed or parameters are being saved; 'kmax disarm' first");
+      return say(
+          "it refuses, because an axis is armed, parameters are being saved, the write lock is closed, or it "
+          "is a board before v3.5; 'kmax disarm' and 'kmax unlock' first, or set SW1 to DFU");
     case EACCES:
     case EPERM:
       return say(fmt::format("{} may not be opened: {}", node.string(), permission_advice));

@@ -16,10 +16,11 @@ class RequestError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Sends firmware/usb's request for the boot loader. The firmware itself refuses it while any axis is armed
-/// or a save is under way. Afterwards the device leaves the bus, and comes back at the same port as one that
-/// is_dfu(); whoever calls this waits for it. No interface is claimed, so the drivers stay where they are.
-/// `nodes`: where the kernel's nodes of USB devices are. RequestError.
+/// Sends firmware/usb's request for the boot loader. The firmware itself refuses it while any axis is armed,
+/// a save is under way or the write lock is closed, and on a board where it would do harm. Afterwards the
+/// device leaves the bus, and comes back at the same port as one that is_dfu(); whoever calls this waits for
+/// it. No interface is claimed, so the drivers stay where they are. `nodes`: where the kernel's nodes of USB
+/// devices are. RequestError.
 void restart_into_boot_loader(const UsbDevice& device, const std::filesystem::path& nodes = kernel_usb_nodes);
 
 /// What RequestError says of an errno at `node`.

@@ -12,15 +12,19 @@ namespace {
 class Otp {
  public:
   Otp() { bytes_.fill(0xFF); }
-  Otp& record(std::size_t index, std::uint8_t magic, std::uint8_t major, std::uint8_t voltage) {
+  Otp& record(std::size_t index, std::uint8_t magic, std::uint8_t major, std::uint8_t voltage,
+              std::uint8_t minor = 6) {
     bytes_[16 * index] = magic;
     bytes_[16 * index + 3] = major;
-    bytes_[16 * index + 4] = 6;
+    bytes_[16 * index + 4] = minor;
     bytes_[16 * index + 5] = voltage;
     return *this;
   }
   std::optional<VoltageVariant> variant() const {
     return voltage_variant_from_otp([this](std::size_t i) { return bytes_.at(i); });
+  }
+  bool boot_loader_is_safe() const {
+    return odrive_v3::boot_loader_is_safe([this](std::size_t i) { return bytes_.at(i); });
   }
 
  private:
@@ -49,6 +53,15 @@ TEST(VoltageVariant, WhatIsNotUnderstoodIsNotGuessed) {
   EXPECT_EQ(Otp().record(0, 0xFE, 4, 24).variant(), std::nullopt);
   EXPECT_EQ(Otp().record(0, 0xFE, 3, 12).variant(), std::nullopt);
   EXPECT_EQ(Otp().record(0, 0x7E, 3, 24).variant(), std::nullopt);
+}
+
+TEST(BootLoader, IsNotEnteredBefore3Point5) {
+  for (const std::uint8_t minor : std::to_array<std::uint8_t>({0, 1, 3, 4}))
+    EXPECT_FALSE(Otp().record(0, 0xFE, 3, 24, minor).boot_loader_is_safe()) << int{minor};
+  for (const std::uint8_t minor : std::to_array<std::uint8_t>({5, 6, 7}))
+    EXPECT_TRUE(Otp().record(0, 0xFE, 3, 24, minor).boot_loader_is_safe()) << int{minor};
+  EXPECT_FALSE(Otp().record(0, 0x00, 3, 24, 6).record(1, 0xFE, 3, 24, 4).boot_loader_is_safe());
+  EXPECT_TRUE(Otp().boot_loader_is_safe()) << "blank: the v3.6 of the build";
 }
 
 TEST(VoltageVariant, BlankBoardsGetTheDividerThatReadsHigh) {

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -17,6 +16,7 @@
 #include "firmware/usb/gs_usb.hpp"
 #include "host_tools/virtual_board/run/usb_enumeration.hpp"
 #include "tests/image/image_bench.hpp"
+#include "tests/in_a_soak.hpp"
 
 namespace kmax::tests {
 
@@ -30,9 +30,9 @@ inline Bytes little_endian(std::initializer_list<std::uint32_t> words) {
   return bytes;
 }
 
-/// Of what a soak (KMAX_SOAK=1 in the environment) does many times, and each run of the tests a few.
+/// Of what a soak does many times, and each run of the tests a few.
 inline int times(int few, int many) {
-  return std::getenv("KMAX_SOAK") != nullptr ? many : few;
+  return in_a_soak() ? many : few;
 }
 
 /// ImageBench with a host at the USB connector, which speaks to the serial port like a Modbus client.
@@ -109,6 +109,13 @@ class UsbBench : public ImageBench {
     const Bytes pdu{6, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place),
                     static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value)};
     return request(pdu) == pdu;
+  }
+  bool write_long_over_usb(std::string_view name, std::uint32_t value) {
+    const std::uint16_t place = firmware::register_address(firmware::find_entry(name), 0);
+    Bytes pdu{16, static_cast<std::uint8_t>(place >> 8), static_cast<std::uint8_t>(place), 0, 2, 4};
+    for (unsigned shift = 32; shift != 0; shift -= 8)
+      pdu.push_back(static_cast<std::uint8_t>(value >> (shift - 8)));
+    return request(pdu) == Bytes(pdu.begin(), pdu.begin() + 5);
   }
   std::uint16_t read_over_usb(std::string_view name) {
     const std::uint16_t place = firmware::register_address(firmware::find_entry(name), 0);

@@ -288,6 +288,24 @@ TEST_F(UsbCanAdapter, CommandsOverUsbGoOnWhileTheBusIsOff) {
   EXPECT_FALSE(second.waits());
 }
 
+// An open channel is no commander: whoever armed the axis over the bus is not reached any more.
+TEST_F(UsbCanAdapter, ABusThatGoesOffTakesTheForceOfWhoCommandsOverIt) {
+  for (const std::uint8_t word : std::to_array<std::uint8_t>({0x06, 0x07, 0x0F})) {
+    second.send(controlword(word));
+    bench.board->run_for(0.01);
+  }
+  ASSERT_TRUE(bench.board->bridge_armed(0));
+  ASSERT_TRUE(pc.sdo_round_trip(node, upload_request(device_type))) << "the PC is there, and reads";
+  flood(bus, 0x6F0);
+  bench.board->can_bus().destroy_frames_of(&bench.board->can_node());
+  bench.board->can_bus().destroy_frames(40);
+  bench.board->run_for(0.02);
+  ASSERT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::bus_off));
+  bench.board->run_for(0.3);
+  EXPECT_FALSE(bench.board->bridge_armed(0));
+  EXPECT_EQ(bench.number("drive.error_code"), 0x8140U) << "bus_off";
+}
+
 /// Nothing that was under way for a session reaches the next one, whichever moment it is closed at.
 TEST_F(UsbCanAdapter, WhoOpensAChannelNextSeesNothingOfTheSessionBefore) {
   std::mt19937 random(5);

@@ -116,6 +116,22 @@ TEST(ImageUsb, ReachesTheNodeThroughTheCanFunction) {
   EXPECT_TRUE(answered);
 }
 
+TEST(ImageUsb, ALockedDeviceStaysInItsFirmware) {
+  constexpr std::uint32_t code = 4711;
+  UsbBench bench;
+  bench.start();
+  ASSERT_TRUE(bench.plug_in()) << bench.found().trouble();
+  bench.open_serial();
+  ASSERT_TRUE(bench.write_long_over_usb("lock.code", code));
+  while (bench.read_over_usb("store.state") == 1) bench.board->run_for(5e-3);
+  ASSERT_TRUE(bench.write_long_over_usb("lock.key", 0));
+  EXPECT_EQ(bench.control({0x40, 0xDF, 0x46, 0x44, 0, 0, 0, 0}).end, UsbTransferEnd::stalled);
+  bench.board->run_for(0.05);
+  EXPECT_EQ(bench.board->resets(), 1U);
+  ASSERT_TRUE(bench.write_long_over_usb("lock.key", code));
+  EXPECT_EQ(bench.control({0x40, 0xDF, 0x46, 0x44, 0, 0, 0, 0}).end, UsbTransferEnd::done) << "open";
+}
+
 TEST(ImageUsb, SurvivesResetsSuspensionAndTheLoaderRequestWhileArmed) {
   UsbBench bench({{"link.timeout", 1.0}}, 1.0);
   bench.start();

@@ -71,7 +71,9 @@ bool UsbipServer::others_import(const Client& client) const {
 
 void UsbipServer::serve(Client& client) {
   std::array<std::uint8_t, 16384> buffer{};
-  for (;;) {
+  // A client that sends without end must not stop the board.
+  constexpr int most_at_once = 8;
+  for (int i = 0; i < most_at_once; ++i) {
     const ssize_t count = ::recv(client.socket.number(), buffer.data(), buffer.size(), 0);
     if (count > 0) {
       client.session->receive(std::span(buffer).first(static_cast<std::size_t>(count)), others_import(client),

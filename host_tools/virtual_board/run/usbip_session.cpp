@@ -69,6 +69,7 @@ std::vector<std::uint8_t> UsbipSession::take_output() {
 }
 
 void UsbipSession::receive(std::span<const std::uint8_t> bytes, bool others_import, BoardTime now) {
+  if (ended_) return;
   input_.insert(input_.end(), bytes.begin(), bytes.end());
   look(others_import, now);
 }

@@ -361,7 +361,6 @@ void OtgFsModel::check_fifos(const Access& access) const {
 
 void OtgFsModel::write_in_control(const Access& access, unsigned endpoint, std::uint32_t value) {
   OtgFsInEndpoint& in = in_[endpoint];
-  if (diepctl::Active::of(in.control) == 0) in.enabled = false;
   check_endpoint(access, endpoint, in.control, value, in.enabled);
   const bool active = endpoint == 0 || diepctl::Active::of(value) != 0;
   refuse_if(active && diepctl::TransmitFifoNumber::of(value) != endpoint, access,
@@ -428,7 +427,6 @@ void OtgFsModel::write_in_size(const Access& access, unsigned endpoint, std::uin
 void OtgFsModel::write_out_control(const Access& access, unsigned endpoint, std::uint32_t value) {
   OtgFsOutEndpoint& out = out_[endpoint];
   if (endpoint == 0) value &= ~doepctl::MaximumPacket::mask;  // read only, DIEPCTL0's
-  if (doepctl::Active::of(out.control) == 0) out.enabled = false;
   check_endpoint(access, endpoint, out.control, value, out.enabled);
   const std::uint32_t held = endpoint == 0 ? (out.control & doepctl::Stall::mask) | doepctl::Active::mask : 0;
   out.control = (value & otg_fs_kept_out) | held;

@@ -43,9 +43,8 @@ namespace kmax::virtual_board {
 /// A new DAD counts after the status stage when it is written within a control transfer, as the manual has it
 /// done, else at once.
 ///
-/// Where the manual is silent: an endpoint that a bus reset has deactivated loses EPENA with the next store
-/// into its control register; NAKSTS stays as it is when an IN transfer ends; a fourth SETUP back to back
-/// sets B2BSTUP and leaves STUPCNT 0.
+/// Where the manual is silent: an endpoint that a bus reset has deactivated keeps EPENA; NAKSTS stays as it
+/// is when an IN transfer ends; a fourth SETUP back to back sets B2BSTUP and leaves STUPCNT 0.
 ///
 /// Refused: host mode, OTG (SRP, HNP), isochronous endpoints, low power (PCGCCTL), remote wake-up, DMA, test
 /// modes, a SOF pin, interrupts of those; any other register while CSRST is 1 and within 3 PHY clocks after;

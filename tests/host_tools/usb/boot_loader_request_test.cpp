@@ -37,7 +37,7 @@ TEST(BootLoaderRequest, AFileThatIsNoUsbDeviceIsNamed) {
 TEST(BootLoaderRequest, EachFailureSaysWhatToDo) {
   const auto failure = [](int error) { return request_failure(device, "/dev/bus/usb/003/004", error); };
   EXPECT_CONTAINS(failure(EPIPE), "it refuses, because an axis is armed");
-  EXPECT_CONTAINS(failure(EPIPE), "'kmax disarm' first. Nothing was changed");
+  EXPECT_CONTAINS(failure(EPIPE), "or set SW1 to DFU. Nothing was changed");
   for (const int error : {EACCES, EPERM}) {
     EXPECT_CONTAINS(failure(error), "/dev/bus/usb/003/004 may not be opened");
     EXPECT_CONTAINS(failure(error), "60-kmax.rules");
