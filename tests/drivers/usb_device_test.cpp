@@ -25,7 +25,7 @@ struct FakeDevice {
   struct Out {
     FakeRegister doepctl, doepint, doeptsiz;
   };
-  FakeRegister dcfg, dctl, diepmsk, doepmsk, daint, daintmsk;
+  FakeRegister dcfg, dctl, dsts, diepmsk, doepmsk, daint, daintmsk;
   In in[4];
   Out out[4];
 };
@@ -196,6 +196,31 @@ TEST(UsbDeviceController, ABusResetStopsWhatIsUnderWayAndForgetsTheAddress) {
   EXPECT_EQ(otg_fs_dcfg::Address::read(core.device.dcfg), 0U);
   EXPECT_EQ(otg_fs_diepctl::Enable::read(core.device.in[1].diepctl), 0U);
   EXPECT_EQ(core.device.daintmsk.value, otg_fs_daint::In::bits(1) | otg_fs_daint::Out::bits(1));
+}
+
+// While the core stood still, to erase flash for one, the host may have slept and come back, or the other way
+// round.
+TEST(UsbDeviceController, SuspensionIsWhatTheCoreIsInAtTheEnd) {
+  Core core;
+  ASSERT_TRUE(core.usb.start(10));
+  Handler handler;
+  core.flags = otg_fs_gint::Suspend::mask | otg_fs_gint::WakeUp::mask;
+  EXPECT_TRUE(core.usb.ISR_serve(handler));
+  core.device.dsts.value = otg_fs_dsts::Suspended::mask;
+  EXPECT_TRUE(core.usb.ISR_serve(handler));
+  EXPECT_EQ(handler.told, (Told{"resume", "suspend"}));
+}
+
+TEST(UsbDeviceController, WhatCameOnOtherEndpointsCameBeforeARequestThatEndsIt) {
+  Core core;
+  ASSERT_TRUE(core.usb.start(10));
+  core.device.daintmsk.value = 0xFFFF'FFFF;
+  core.asking = otg_fs_daint::Out::bits(1U | 1U << 3);
+  core.device.out[0].doepint.value = otg_fs_doepint::SetupDone::mask;
+  core.device.out[3].doepint.value = otg_fs_doepint::TransferComplete::mask;
+  Handler handler;
+  EXPECT_TRUE(core.usb.ISR_serve(handler));
+  EXPECT_EQ(handler.told, (Told{"received 3", "set-up"}));
 }
 
 TEST(UsbDeviceController, APacketThatIsTakenBackIsThrownAwayAndNotReportedAsSent) {
