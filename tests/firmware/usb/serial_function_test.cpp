@@ -73,8 +73,7 @@ TEST(UsbSerial, OpeningAndClosingThePortBeginsAnew) {
   EXPECT_TRUE(bench.host.write({0x21, 0x22, 1, 1, 0}));
   EXPECT_EQ(bench.fake_link.restarts, before + 1);
   EXPECT_TRUE(bench.sent()) << "nobody waits for it any more";
-  EXPECT_EQ(bench.host.take(2)->size(), full_packet) << "the packet that was under way";
-  EXPECT_FALSE(bench.host.take(2));
+  EXPECT_FALSE(bench.host.take(2)) << "nor gets the packet that was under way, whoever opens the port next";
   EXPECT_TRUE(bench.host.write({0x21, 0x22, 3, 1, 0}));
   EXPECT_EQ(bench.fake_link.restarts, before + 1) << "RTS means nothing";
   EXPECT_TRUE(bench.host.write({0x21, 0x22, 0, 1, 0}));
