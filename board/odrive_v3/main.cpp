@@ -100,10 +100,10 @@ void switch_power_stage_off() {
 }
 
 /// Of the maker's one-time-programmable area.
-std::uint8_t otp_byte(std::size_t i) {
+constexpr auto otp_byte = [](std::size_t i) -> std::uint8_t {
   // NOLINTNEXTLINE(performance-no-int-to-ptr)
   return reinterpret_cast<const volatile std::uint8_t*>(stm32::otp_base)[i];
-}
+};
 
 VoltageVariant voltage_variant() {
   return voltage_variant_from_otp(otp_byte).value_or(variant_of_blank_board);
