@@ -56,6 +56,7 @@ class CanLine {
     }
     if (!configured_) return;
     // As many as there is room for; a frame that is taken out of the link is on its way.
+    if (fed_by_adapter_) return;
     while (can_.has_room() && link.next_frame(frame_)) static_cast<void>(can_.send(frame_));
   }
 
@@ -75,9 +76,12 @@ class CanLine {
   bool has_room() const { return configured_ && can_.has_room(); }
   /// Half of the room is the node's.
   bool has_room_for_guests() const { return configured_ && can_.room() > frames_of_node; }
-  void put(const drivers::CanFrame& frame) {
-    if (has_room()) static_cast<void>(can_.send(frame));
+  /// False: it had no room.
+  bool put(const drivers::CanFrame& frame) {
+    return has_room() && can_.send(frame) == drivers::stm32f4::CanSendResult::queued;
   }
+  /// Whether put() brings the node's frames as well: then send() takes none from the link.
+  void set_fed_by_adapter(bool fed) { fed_by_adapter_ = fed; }
   /// Whether all frames of the bus are received, and not the node's alone.
   void set_listening_to_all(bool all) {
     if (all == listens_to_all_) return;
@@ -185,7 +189,7 @@ class CanLine {
   std::uint32_t looked_us_ = 0, tried_us_ = 0;
   std::uint32_t paced_us_ = 0,
                 paced_sent_ = 0;  ///< when the bus took something last, or was asked for nothing
-  bool configured_ = false, absent_ = false, listens_to_all_ = false;
+  bool configured_ = false, absent_ = false, listens_to_all_ = false, fed_by_adapter_ = false;
 };
 
 }  // namespace kmax::board::odrive_v3

@@ -219,7 +219,7 @@ void poll_power(std::uint32_t now_us) {
   cortex::unmask_interrupts();
   const std::uint32_t taken = cycles() - awake;
   if (taken > longest_tick) [[unlikely]] {
-    // With a USB interrupt in it, it was not the tick alone: the next one as long counts.
+    // With a USB interrupt in it, it was not the tick alone.
     if (!usb_interrupted) longest_tick = taken;
     usb_interrupted = false;
   }
@@ -271,6 +271,7 @@ void tick_without_power() {
 
 /// A host is at the USB connector, or just has been.
 [[gnu::cold, gnu::noinline]] void poll_usb() {
+  usb_interrupted = false;
   usb_line->poll(*application, *can_line);
   if (!usb_line->boot_loader_wanted(*application)) return;
   usb_line->disconnect();

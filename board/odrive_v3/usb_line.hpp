@@ -149,7 +149,13 @@ class UsbLine {
     const bool with_node = there && can.is_open(Channel::node), with_bus = there && can.is_open(Channel::bus);
     node.set_reached_over_usb(with_node);
     line.set_listening_to_all(with_bus);
+    // All that the node sends is shown here, also what the bus has room for at once.
+    line.set_fed_by_adapter(with_node || with_bus);
     bool moved = false;
+    if (const std::uint32_t overflows = from_bus_.overflows(); overflows != overflows_) {
+      overflows_ = overflows;
+      can.note_loss(Channel::bus);
+    }
     firmware::usb::gs::HostFrame of_bus;
     for (std::size_t i = 0; i < frames_per_poll && from_bus_.pop(of_bus); ++i) {
       can.show_of_others(of_bus);
@@ -164,7 +170,7 @@ class UsbLine {
     for (std::size_t i = 0; i < frames_per_poll; ++i) {
       const bool waits = (bus_sets_pace && !line.has_room()) || (host_sets_pace && !can.has_room());
       if (waits || !node.next_frame(frame)) break;
-      line.put(frame);
+      if (!line.put(frame)) ++frames_not_sent_;
       can.show(Channel::node, frame);
       can.show(Channel::bus, frame);
       moved = true;
@@ -209,10 +215,7 @@ class UsbLine {
       if (can.is_current(frame)) {
         const bool fits = line.has_room_for_guests();
         if ((bus_sets_pace && !fits) || !can.has_room_for_echo()) break;
-        if (fits)
-          line.put(frame.frame);
-        else
-          ++frames_not_sent_;
+        if (!fits || !line.put(frame.frame)) ++frames_not_sent_;
         node.take(frame.frame);
         can.done(frame);
       }
@@ -232,7 +235,7 @@ class UsbLine {
   std::atomic<bool> attended_{false};  ///< the interrupt writes it
   firmware::InterruptQueue<firmware::usb::gs::HostFrame, 16> from_bus_;
   Guests guests_;
-  std::uint32_t frames_not_sent_ = 0;
+  std::uint32_t frames_not_sent_ = 0, overflows_ = 0;
   std::uint32_t paced_us_ = 0, paced_fetched_ = 0;  ///< when the host fetched something last
 };
 

@@ -46,13 +46,15 @@ constexpr std::optional<VoltageVariant> voltage_variant_from_otp(ByteAt byte_at)
 }
 
 /// Boards before v3.5 have no resistors that hold the brake chopper's gates down (PB10, PB11), which the
-/// boot loader in ROM pulls up for its serial port: the maker's firmware never enters it there. A board
-/// without a record is the v3.6 of the build.
+/// boot loader in ROM pulls up for its serial port: the maker's firmware never enters it there. A blank area
+/// says nothing: then it is the v3.6 of the build. Of a record that is damaged or unknown, the worst is
+/// assumed.
 template <typename ByteAt>
 constexpr bool boot_loader_is_safe(ByteAt byte_at) {
-  constexpr std::uint8_t first_safe_minor = 5;
+  constexpr std::uint8_t first_safe_minor = 5, blank = 0xFF;
   const auto record = maker_record(byte_at);
-  return !record || byte_at(*record + drivers::stm32f4::odrive_otp::version_minor_offset) >= first_safe_minor;
+  return record ? byte_at(*record + drivers::stm32f4::odrive_otp::version_minor_offset) >= first_safe_minor
+                : byte_at(0) == blank;
 }
 
 /// For a board whose area is blank: set with -DKMAX_ODRIVE_VOLTAGE=24 or 56 when configuring. 56 is the safe

@@ -14,8 +14,9 @@ struct LinkState {
   /// When its host was last heard: over serial any valid request; over CAN a command or a watched
   /// heartbeat. Nothing: never.
   std::optional<std::uint32_t> heard_us;
-  bool is_off = false;          ///< off the bus, or never on it again after a bit rate that failed
-  bool heard_over_usb = false;  ///< of CAN: its commander's last command came by the board's CAN adapter
+  bool is_off = false;  ///< off the bus, or never on it again after a bit rate that failed
+  std::array<bool, axis_count>
+      heard_over_usb{};         ///< of CAN: the axis' last command came by the board's adapter
   bool heartbeat_lost = false;  ///< of a watched node
   bool restart_asked = false;   ///< of the whole device; nothing may be armed any more
 };

@@ -155,7 +155,7 @@ void Supervisor::watch(const Situation& now, std::size_t axis) {
     const auto silent_us = static_cast<float>(modbus::elapsed_us(now.now_us, *heard_us));
     if (silent_us > timeout * 1e6f) trip(now, axis, Fault::link_silent, silent_us * 1e-6f, timeout);
   }
-  if (is_can(commander_) && now.links[Link::can].is_off && !now.links[commander_].heard_over_usb)
+  if (is_can(commander_) && now.links[Link::can].is_off && !now.links[commander_].heard_over_usb[axis])
     trip(now, axis, Fault::bus_off, 0.0f, 0.0f);
 }
 

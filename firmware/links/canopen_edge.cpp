@@ -57,7 +57,7 @@ void CanopenEdge::set_reached_over_usb(bool reached) {
   if (reached == reached_over_usb_) return;
   reached_over_usb_ = reached;
   if (reached) return;
-  for (const Link link : can_links) links_[link].heard_over_usb = false;
+  for (const Link link : can_links) links_[link].heard_over_usb.fill(false);
 }
 
 void CanopenEdge::poll() {
@@ -94,7 +94,8 @@ void CanopenEdge::receive(std::uint32_t now_us) {
 
 void CanopenEdge::take(const drivers::CanFrame& frame) {
   node_.lss().hold(axes_.any_armed(), parameters_.locked());
-  objects_.set_over_usb(reached_over_usb_);
+  // No command is as short as a SYNC, and what a SYNC applies may have come from the bus.
+  objects_.set_over_usb(reached_over_usb_ && frame.length > 1);
   act_on(node_.receive(frame, parameters_.values(), axes_.now_us()));
   objects_.set_over_usb(false);
 }

@@ -62,6 +62,7 @@ class CanopenEdge {
   [[gnu::cold]] void take(const drivers::CanFrame& frame);
   /// Whether a host has the node for itself over USB. While it has, a bus that goes off neither stops the
   /// node nor trips an axis whose last command came that way; it trips all others that were armed over CAN.
+  /// What a SYNC applies counts as the bus's.
   void set_reached_over_usb(bool reached);
   /// After the store's step: what waits for the end of a save.
   void finish_saves();

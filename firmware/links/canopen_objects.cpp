@@ -1,7 +1,6 @@
 #include "firmware/links/canopen_objects.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "firmware/board_interface/board_identity.hpp"
 #include "firmware/canopen/communication_rules.hpp"
@@ -298,14 +297,15 @@ Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::spa
 /// needs it. A setting is none, in a PDO or not: any tool on the bus may write one.
 Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, Link by) {
   if (!acts_at_once(slot)) return set_slot(slot, raw, by);
-  auto& heard_us = of_.links[by].heard_us;
-  const auto before = heard_us;
-  heard_us = of_.axes.now_us();
-  const bool was_over_usb = std::exchange(of_.links[by].heard_over_usb, over_usb_);
+  LinkState& link = of_.links[by];
+  const LinkState before = link;
+  link.heard_us = of_.axes.now_us();
+  const auto owner = owner_of(slot);
+  if (descriptors[owner.entry].per_axis) link.heard_over_usb[owner.axis] = over_usb_;
   const Abort abort = set_slot(slot, raw, by);
   if (abort != Abort::none) {
-    heard_us = before;
-    of_.links[by].heard_over_usb = was_over_usb;
+    link.heard_us = before.heard_us;
+    link.heard_over_usb = before.heard_over_usb;
   }
   return abort;
 }

@@ -177,9 +177,8 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
     reading(
         "counters.longest_tick", group::counters, 11, Type::unsigned32, "",
         "Cycles of info.core_clock that the longest tick has taken which ended a sleep of the core, since "
-        "the "
-        "start, by its own counter, entry and return included, and whatever interrupts came with it. 0: not "
-        "measured."),
+        "the start, by its own counter, entry and return included, and whatever interrupts but USB's came "
+        "with it. 0: not measured."),
     reading("counters.interference_forgiven", group::counters, 12, Type::unsigned32, "",
             "Disturbances of the emergency stop's line and of the gate drivers' fault line that were over "
             "within microseconds, and after which force went on. Up to 5 a millisecond go on for ever; a "
@@ -202,8 +201,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
         "in the middle."),
     reading("counters.usb_frames_lost", group::counters, 18, Type::unsigned32, "",
             "CAN frames that the PC at the USB CAN adapter was too slow for."),
-    reading("counters.usb_frames_not_sent", group::counters, 19, Type::unsigned32, "",
-            "CAN frames of that PC that a bus which is off, or where nobody acknowledges, had no room for."),
+    reading(
+        "counters.usb_frames_not_sent", group::counters, 19, Type::unsigned32, "",
+        "CAN frames that a bus had no room for while that adapter is open: one which is off, where nobody "
+        "acknowledges, or which others fill."),
     reading("counters.usb_frames_refused", group::counters, 20, Type::unsigned32, "",
             "What that PC sent and was no CAN frame, or for a channel that was not open."),
 

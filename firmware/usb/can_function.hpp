@@ -78,6 +78,8 @@ class CanFunction {
   }
   /// What others say on the bus, which has waited since to_host(): it does not keep out what the node says.
   void show_of_others(const gs::HostFrame& frame) { show(frame, kept_for_echoes + kept_for_node); }
+  /// Some of those were lost before they came here: the next frame on the channel says so.
+  void note_loss(CanChannel channel) { loss_[static_cast<std::size_t>(channel)] = {true, session(channel)}; }
   /// Main loop: show() would take one of the node's, on both channels.
   bool has_room() const { return to_host_.room() > kept_for_echoes + 1; }
   /// Main loop: rises with what the host fetches; and nothing waits for it.

@@ -13,9 +13,8 @@ namespace kmax::firmware::usb {
 /// The device calls
 ///   ISR_open(endpoint)      the endpoint answers NAK from now on; its next data packet is DATA0
 ///   ISR_close(address)      it does not answer any more; a packet that waits in it is thrown away
-///   ISR_take_address(a)     called before the status stage of SET_ADDRESS, in force behind it (9.4.6); the
-///   one
-///                           in force again where that stage does not come
+///   ISR_take_address(a)     before the status stage of SET_ADDRESS, in force behind it (9.4.6); where that
+///                           stage does not come, the address in force again
 ///   ISR_send(number, data)  one packet, up to the endpoint's size, 0 bytes too; the controller has a copy
 ///                           when it returns. Not again before ISR_sent()
 ///   ISR_take_back(number)   a packet that waits in it is thrown away, and is not reported as sent; its data

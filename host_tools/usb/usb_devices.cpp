@@ -25,6 +25,19 @@ std::string first_line(const fs::path& file) {
   return line;
 }
 
+/// A device says of itself what it likes, and this is printed, and part of addresses and of other programs'
+/// arguments.
+std::string letters_and_digits(std::string text) {
+  std::erase_if(text, [](unsigned char c) {
+    return !((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'));
+  });
+  return text;
+}
+std::string printable(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return c < 0x20 || c == 0x7F; });
+  return text;
+}
+
 template <typename Number>
 std::optional<Number> number_in(const std::string& text, int base) {
   Number value = 0;
@@ -81,8 +94,8 @@ std::vector<UsbDevice> list_usb_devices(const fs::path& folder) {
     const auto vendor = number_in<std::uint16_t>(first_line(path / "idVendor"), 16);
     const auto product = number_in<std::uint16_t>(first_line(path / "idProduct"), 16);
     if (!vendor || !product) continue;
-    UsbDevice device{*vendor, *product, first_line(path / "serial")};
-    device.maker = first_line(path / "manufacturer");
+    UsbDevice device{*vendor, *product, letters_and_digits(first_line(path / "serial"))};
+    device.maker = printable(first_line(path / "manufacturer"));
     device.port = path.filename().string();
     device.bus = number_in<unsigned>(first_line(path / "busnum"), 10).value_or(0);
     device.number = number_in<unsigned>(first_line(path / "devnum"), 10).value_or(0);

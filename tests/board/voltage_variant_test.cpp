@@ -62,6 +62,8 @@ TEST(BootLoader, IsNotEnteredBefore3Point5) {
     EXPECT_TRUE(Otp().record(0, 0xFE, 3, 24, minor).boot_loader_is_safe()) << int{minor};
   EXPECT_FALSE(Otp().record(0, 0x00, 3, 24, 6).record(1, 0xFE, 3, 24, 4).boot_loader_is_safe());
   EXPECT_TRUE(Otp().boot_loader_is_safe()) << "blank: the v3.6 of the build";
+  EXPECT_FALSE(Otp().record(0, 0x7E, 3, 24).boot_loader_is_safe()) << "damaged";
+  EXPECT_FALSE(Otp().record(0, 0xFE, 4, 24).boot_loader_is_safe()) << "another board";
 }
 
 TEST(VoltageVariant, BlankBoardsGetTheDividerThatReadsHigh) {

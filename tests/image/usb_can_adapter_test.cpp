@@ -288,6 +288,38 @@ TEST_F(UsbCanAdapter, CommandsOverUsbGoOnWhileTheBusIsOff) {
   EXPECT_FALSE(second.waits());
 }
 
+// The node sends a block faster than a turn of the main loop shows it, and the bus has room for all of it.
+TEST_F(UsbCanAdapter, ABlockOfSegmentsReachesThePcWhole) {
+  constexpr std::uint8_t segments = 127;
+  constexpr unsigned size = 7U * segments;
+  const auto ask = [this](const std::array<std::uint8_t, 8>& data) {
+    forget();
+    pc.send(node, {.identifier = 0x601, .length = 8, .data = data});
+    for (int i = 0; i < 400 && seen_of(node, 0x581).empty(); ++i) bench.board->run_for(50e-6);
+    const auto answers = seen_of(node, 0x581);
+    return answers.empty() ? std::uint8_t{0xFF} : answers.front().data[0];
+  };
+  ASSERT_EQ(ask({0x21, 0x22, 0x58, 1, size & 0xFFU, size >> 8}), 0x60);
+  for (std::uint8_t i = 0; i < segments; ++i) {
+    const auto command = static_cast<std::uint8_t>((i % 2) << 4 | (i + 1 == segments ? 1 : 0));
+    ASSERT_EQ(ask({command, i, i, i, i, i, i, i}) & 0xE0, 0x20) << int{i};
+  }
+  for (int round = 0; round < 5; ++round) {
+    ASSERT_EQ(ask({0xA0, 0x22, 0x58, 1, segments}) & 0xE0, 0xC0);
+    forget();
+    pc.send(node, {.identifier = 0x601, .length = 8, .data = {0xA3}});
+    bench.board->run_for(0.05);
+    const auto block = seen_of(node, 0x581);
+    ASSERT_EQ(block.size(), segments) << round;
+    for (std::size_t i = 0; i < segments; ++i) EXPECT_EQ(block[i].data[0] & 0x7F, static_cast<int>(i) + 1);
+    EXPECT_EQ(second.heard(0x581).size(), segments) << "and the bus";
+    ASSERT_EQ(ask({0xA2, segments, segments}) & 0xE0, 0xC0);
+    pc.send(node, {.identifier = 0x601, .length = 8, .data = {0xA1}});
+    bench.board->run_for(0.002);
+  }
+  EXPECT_EQ(bench.number("counters.usb_frames_lost"), 0U);
+}
+
 // An open channel is no commander: whoever armed the axis over the bus is not reached any more.
 TEST_F(UsbCanAdapter, ABusThatGoesOffTakesTheForceOfWhoCommandsOverIt) {
   for (const std::uint8_t word : std::to_array<std::uint8_t>({0x06, 0x07, 0x0F})) {

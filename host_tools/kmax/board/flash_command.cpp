@@ -139,6 +139,7 @@ flash::FlashTarget target_of(Method method, const BoardProfile& board, const Fla
 struct WayIn {
   bool by_lines = false;
   std::optional<usb::UsbDevice> restarted{};  ///< the firmware on USB does it
+  bool must_be_named = false;  ///< it is the only one on USB, and a device of another link was named
 };
 
 /// What --usb-serial or --device says of which board on USB is meant; nothing where they say nothing.
@@ -162,7 +163,16 @@ WayIn way_in(const Context& context, const FlashOptions& options, const BoardPro
   const auto meant = meant_board(context, options);
   const usb::UsbDevice* running = meant ? link::usb_device_of(*meant, devices) : nullptr;
   if (running != nullptr) return {.restarted = *running};
-  if (std::ranges::any_of(devices, &usb::UsbDevice::is_dfu)) return {};
+  // In DFU mode a board has another serial number: which one it is, only the port says.
+  if (std::ranges::any_of(devices, &usb::UsbDevice::is_dfu)) {
+    const bool absent =
+        meant && meant->kind == Kind::usb && !meant->path.empty() && options.usb_serial.empty();
+    if (!absent) return {};
+    throw flash::MethodError(
+        fmt::format("{} is not on USB; is it the board in DFU mode? Then leave --device and KMAX_DEVICE out, "
+                    "or name that one by --usb-serial",
+                    link::text_of(*meant)));
+  }
   if (has_lines && !board.boot0_is_switch) return {.by_lines = true};
   if (std::ranges::none_of(devices, &usb::UsbDevice::is_kmax)) return {};
   // A device of another link may be the same board; one that USB does not have is another one.
@@ -173,16 +183,14 @@ WayIn way_in(const Context& context, const FlashOptions& options, const BoardPro
     throw flash::MethodError(
         fmt::format("which board? On USB there is {}; name one by --device or --usb-serial",
                     link::usb_addresses(devices)));
-  return {.restarted = *running};
+  return {.restarted = *running, .must_be_named = meant.has_value()};
 }
 
 /// An armed axis makes force with whatever half of a program is there: ask first, if there is somebody to
 /// ask. A board that is to be restarted over USB refuses that itself; that it is the one of --device is
 /// asked.
 void refuse_while_armed(Context& context, const WayIn& way) {
-  const char* variable = std::getenv("KMAX_DEVICE");
-  const bool named = !context.device_option.empty() || (variable != nullptr && *variable != '\0');
-  if (!named || context.simulated()) {
+  if (!context.named_device() || context.simulated()) {
     if (!way.restarted)
       context.note("no --device is given, so the board was not asked whether an axis is armed");
     return;
@@ -204,6 +212,12 @@ void refuse_while_armed(Context& context, const WayIn& way) {
           "meant. Nothing was changed",
           number, way.restarted->serial));
   } catch (const link::LinkError& error) {
+    if (way.must_be_named)
+      throw flash::FlashError(
+          fmt::format("the device that is named does not answer, so it may be another board than {}, the "
+                      "only one on USB: "
+                      "name that one. Nothing was changed ({})",
+                      way.restarted->address(), error.what()));
     context.note(fmt::format("the board does not answer, so it was not asked whether an axis is armed: {}",
                              error.what()));
   } catch (const device::DeviceError& error) {
@@ -327,10 +341,18 @@ bool carry_out(Context& context, const BoardServices& services, const lines::Lin
     context.note(fmt::format("start the ROM bootloader: {} restarts; keep the handles still",
                              way.restarted->address()));
     services.restart_into_boot_loader(*way.restarted, services.usb_nodes);
-    wait_for_dfu(services, way);
   }
   // After a failure the ROM bootloader goes on running: all its pins are inputs.
-  work(folder, hooks);
+  try {
+    if (way.restarted) wait_for_dfu(services, way);
+    work(folder, hooks);
+  } catch (...) {
+    if (way.restarted)
+      context.note(
+          "the board stays in its ROM bootloader: 'kmax flash' goes on from there, and switching its supply "
+          "off and on starts the firmware that is in it");
+    throw;
+  }
   if (way.restarted) return leave_dfu_mode(context, services, way, plan, folder, hooks);
   flash::start_application(plan, folder, hooks);
   if (way.by_lines) lines::pulse_reset(*gpio, config, services.sleep);
@@ -345,7 +367,13 @@ int run_flash(Context& context, const FlashOptions& options) try {
   if (!options.factory_reset) image = flash::FlashImage::load(chosen_image(options, board), *board.memory);
   const auto devices = usb::list_usb_devices(services.usb_devices);
   const auto verdicts = flash::judge_methods(board, config, devices);
-  const Method method = flash::choose_method(options.method, board, verdicts, options.dry_run);
+  // Who names a board on USB means that board, and not the one that a debug adapter happens to be at.
+  const auto meant = meant_board(context, options);
+  const bool on_usb = meant && (meant->kind == link::DeviceAddress::Kind::usb ||
+                                link::usb_device_of(*meant, devices) != nullptr);
+  const bool by_usb = on_usb && options.usb_serial.empty() && options.method == "auto";
+  const Method method =
+      flash::choose_method(by_usb ? "dfu" : options.method, board, verdicts, options.dry_run);
   for (const auto& verdict : verdicts) {
     if (verdict.method == method)
       context.note(

@@ -228,6 +228,40 @@ TEST_F(FlashOverUsb, TheBoardOfAnotherLinkMustBeTheSame) {
   EXPECT_EQ(restarted.size(), 1u);
 }
 
+TEST_F(FlashOverUsb, ABoardThatIsNamedAndSilentMayBeAnotherThanTheOnlyOneOnUsb) {
+  EXPECT_EQ(kmax({"flash", image, "--device", "serial:/dev/ttyUSB0"}), failed);
+  EXPECT_CONTAINS(said, "does not answer, so it may be another board than usb:1F2E3D4C");
+  std::filesystem::create_directory(board.folder.path() / "kmax");
+  board.folder.write("kmax/config.toml", "device = \"serial:/dev/ttyUSB0\"\n");
+  EXPECT_EQ(kmax({"flash", image}), failed) << "in the settings file as well";
+  EXPECT_CONTAINS(said, "does not answer, so it may be another board");
+  EXPECT_TRUE(restarted.empty());
+}
+
+TEST_F(FlashOverUsb, ABoardThatIsNamedAndAbsentIsNotAnyInDfuMode) {
+  usb_tree.pull_out("1-1");
+  usb_tree.plug_in("1-9", "0483", "df11");
+  EXPECT_EQ(kmax({"flash", image, "--device", "usb:1F2E3D4C"}), failed);
+  EXPECT_CONTAINS(said, "usb:1F2E3D4C is not on USB; is it the board in DFU mode?");
+  EXPECT_TRUE(board.calls().empty());
+}
+
+TEST_F(FlashOverUsb, WhoNamesABoardOnUsbDoesNotMeanTheOneAtADebugAdapter) {
+  usb_tree.plug_in("1-5", "0483", "374b");
+  for (const char* named : {"usb", "usb:1F2E3D4C", "serial:/dev/ttyACM0"}) {
+    ASSERT_EQ(kmax({"flash", image, "--device", named, "--json"}), done) << said;
+    EXPECT_EQ(document()["method"], "dfu") << named;
+  }
+  ASSERT_EQ(kmax({"flash", image, "--json"}), done) << said;
+  EXPECT_EQ(document()["method"], "openocd-stlink");
+}
+
+TEST_F(FlashOverUsb, AFailureSaysThatTheBootloaderGoesOn) {
+  board.misbehave("fail");
+  EXPECT_EQ(kmax({"flash", image}), failed);
+  EXPECT_CONTAINS(said, "the board stays in its ROM bootloader");
+}
+
 TEST_F(FlashOverUsb, WithoutDfuUtilItIsNotRestarted) {
   board.remove("dfu-util");
   board.hide_all_but_the_fakes();
