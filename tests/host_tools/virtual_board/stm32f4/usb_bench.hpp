@@ -150,8 +150,10 @@ inline void UsbBench::queue_in(unsigned endpoint, std::span<const std::uint8_t> 
 
 inline void UsbBench::arm_out(unsigned endpoint) {
   using namespace usb_registers;
-  write(doeptsiz(endpoint), (endpoint == 0 ? 3U << 29 : 0U) | 1U << 19 | 64);
-  write(doepctl(endpoint), (read(doepctl(endpoint)) & ~(3U << 30)) | enable | clear_nak);
+  // One that a bus reset has found waiting still is.
+  const bool armed = (read(doepctl(endpoint)) & enable) != 0;
+  if (!armed) write(doeptsiz(endpoint), (endpoint == 0 ? 3U << 29 : 0U) | 1U << 19 | 64);
+  write(doepctl(endpoint), (read(doepctl(endpoint)) & ~(3U << 30)) | (armed ? 0U : enable) | clear_nak);
 }
 
 inline void UsbBench::receive_packets() {
