@@ -115,7 +115,7 @@ class ReadsAndSets(AgainstAServedDevice):
         self.assertIsInstance(caught.exception, kmax.Error)
         self.assertEqual(type(caught.exception).__module__, "kmax")
         with self.assertRaisesRegex(ValueError, "allowed are sim"):
-            kmax.Device("usb:0")
+            kmax.Device("tcp:0")
         device = kmax.Device(self.served.bus)
         device.close()
         with self.assertRaisesRegex(kmax.Error, "closed"):
