@@ -76,7 +76,7 @@ class CanLine {
   bool has_room() const { return configured_ && can_.has_room(); }
   /// Half of the room is the node's.
   bool has_room_for_guests() const { return configured_ && can_.room() > frames_of_node; }
-  /// False: it had no room.
+  /// False: it had no room, or the node is not on the bus.
   bool put(const drivers::CanFrame& frame) {
     return has_room() && can_.send(frame) == drivers::stm32f4::CanSendResult::queued;
   }

@@ -10,7 +10,7 @@ struct UsbReadings {
   std::uint32_t suspensions = 0;       ///< the host was silent for 3 ms
   std::uint32_t refused_requests = 0;  ///< on endpoint 0, answered with STALL
   std::uint32_t frames_lost = 0;       ///< of the CAN adapter, to the host
-  std::uint32_t frames_not_sent = 0;   ///< of the CAN adapter, from the host to the bus
+  std::uint32_t frames_not_sent = 0;   ///< to the bus while the CAN adapter is open
   std::uint32_t frames_refused = 0;    ///< of the CAN adapter, from the host: none, or for a closed channel
 };
 

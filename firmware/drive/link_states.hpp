@@ -15,8 +15,8 @@ struct LinkState {
   /// heartbeat. Nothing: never.
   std::optional<std::uint32_t> heard_us;
   bool is_off = false;  ///< off the bus, or never on it again after a bit rate that failed
-  std::array<bool, axis_count>
-      heard_over_usb{};         ///< of CAN: the axis' last command came by the board's adapter
+  /// Of CAN, for each axis: its last command came by the board's CAN adapter on USB.
+  std::array<bool, axis_count> heard_over_usb{};
   bool heartbeat_lost = false;  ///< of a watched node
   bool restart_asked = false;   ///< of the whole device; nothing may be armed any more
 };

@@ -79,24 +79,24 @@ struct Core {
   UsbDevice<FakeGlobal, FakeDevice, FakeFifos> usb{global, device, {fifos}};
 };
 
-/// What a device is told.
+/// The calls that a device gets.
 struct Handler {
-  void ISR_reset() { told.emplace_back("reset"); }
-  void ISR_suspend() { told.emplace_back("suspend"); }
-  void ISR_resume() { told.emplace_back("resume"); }
+  void ISR_reset() { calls.emplace_back("reset"); }
+  void ISR_suspend() { calls.emplace_back("suspend"); }
+  void ISR_resume() { calls.emplace_back("resume"); }
   void ISR_set_up(std::span<const std::uint8_t, 8> bytes) {
-    told.emplace_back("set-up");
+    calls.emplace_back("set-up");
     data.assign(bytes.begin(), bytes.end());
   }
   void ISR_received(std::uint8_t number, std::span<const std::uint8_t> bytes) {
-    told.push_back("received " + std::to_string(number));
+    calls.push_back("received " + std::to_string(number));
     data.assign(bytes.begin(), bytes.end());
   }
-  void ISR_sent(std::uint8_t number) { told.push_back("sent " + std::to_string(number)); }
-  std::vector<std::string> told;
+  void ISR_sent(std::uint8_t number) { calls.push_back("sent " + std::to_string(number)); }
+  std::vector<std::string> calls;
   Bytes data;
 };
-using Told = std::vector<std::string>;
+using Calls = std::vector<std::string>;
 
 std::uint32_t status(std::uint32_t kind, std::uint32_t number, std::uint32_t bytes) {
   return otg_fs_grxsts::PacketStatus::bits(kind) | otg_fs_grxsts::Endpoint::bits(number) |
@@ -159,17 +159,17 @@ TEST(UsbDeviceController, HandsOutASetUpPacketAndAnOutPacketInTheirOrder) {
   core.asking = otg_fs_daint::Out::bits(1);
   core.device.out[0].doepint.value = otg_fs_doepint::SetupDone::mask | otg_fs_doepint::TransferComplete::mask;
   EXPECT_TRUE(core.usb.ISR_serve(handler));
-  EXPECT_EQ(handler.told, (Told{"received 0", "set-up"})) << "the status stage before the next set-up";
+  EXPECT_EQ(handler.calls, (Calls{"received 0", "set-up"})) << "the status stage before the next set-up";
   EXPECT_EQ(handler.data, (Bytes{1, 2, 3, 4, 5, 6, 7, 8}));
 
   core.usb.ISR_open(Endpoint{0x03, 2, 64});
-  handler.told.clear();
+  handler.calls.clear();
   core.statuses = {status(otg_fs_grxsts::out_data, 3, 5), status(otg_fs_grxsts::out_done, 3, 0)};
   core.words = {0x0403'0201, 0xFFFF'FF05};
   core.asking = otg_fs_daint::Out::bits(1U << 3);
   core.device.out[3].doepint.value = otg_fs_doepint::TransferComplete::mask;
   EXPECT_TRUE(core.usb.ISR_serve(handler));
-  EXPECT_EQ(handler.told, Told{"received 3"});
+  EXPECT_EQ(handler.calls, Calls{"received 3"});
   EXPECT_EQ(handler.data, (Bytes{1, 2, 3, 4, 5}));
   EXPECT_TRUE(core.words.empty());
 }
@@ -179,7 +179,7 @@ TEST(UsbDeviceController, WithoutACauseItSaysSo) {
   ASSERT_TRUE(core.usb.start(10));
   Handler handler;
   EXPECT_FALSE(core.usb.ISR_serve(handler));
-  EXPECT_TRUE(handler.told.empty());
+  EXPECT_TRUE(handler.calls.empty());
 }
 
 TEST(UsbDeviceController, ABusResetStopsWhatIsUnderWayAndForgetsTheAddress) {
@@ -192,7 +192,7 @@ TEST(UsbDeviceController, ABusResetStopsWhatIsUnderWayAndForgetsTheAddress) {
   Handler handler;
   core.flags = otg_fs_gint::Reset::mask;
   EXPECT_TRUE(core.usb.ISR_serve(handler));
-  EXPECT_EQ(handler.told, Told{"reset"});
+  EXPECT_EQ(handler.calls, Calls{"reset"});
   EXPECT_EQ(otg_fs_dcfg::Address::read(core.device.dcfg), 0U);
   EXPECT_EQ(otg_fs_diepctl::Enable::read(core.device.in[1].diepctl), 0U);
   EXPECT_EQ(core.device.daintmsk.value, otg_fs_daint::In::bits(1) | otg_fs_daint::Out::bits(1));
@@ -208,7 +208,7 @@ TEST(UsbDeviceController, SuspensionIsWhatTheCoreIsInAtTheEnd) {
   EXPECT_TRUE(core.usb.ISR_serve(handler));
   core.device.dsts.value = otg_fs_dsts::Suspended::mask;
   EXPECT_TRUE(core.usb.ISR_serve(handler));
-  EXPECT_EQ(handler.told, (Told{"resume", "suspend"}));
+  EXPECT_EQ(handler.calls, (Calls{"resume", "suspend"}));
 }
 
 TEST(UsbDeviceController, WhatCameOnOtherEndpointsCameBeforeARequestThatEndsIt) {
@@ -220,7 +220,7 @@ TEST(UsbDeviceController, WhatCameOnOtherEndpointsCameBeforeARequestThatEndsIt) 
   core.device.out[3].doepint.value = otg_fs_doepint::TransferComplete::mask;
   Handler handler;
   EXPECT_TRUE(core.usb.ISR_serve(handler));
-  EXPECT_EQ(handler.told, (Told{"received 3", "set-up"}));
+  EXPECT_EQ(handler.calls, (Calls{"received 3", "set-up"}));
 }
 
 TEST(UsbDeviceController, APacketThatIsTakenBackIsThrownAwayAndNotReportedAsSent) {

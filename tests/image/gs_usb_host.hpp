@@ -42,7 +42,7 @@ class GsUsbHost {
   GsUsbHost(const GsUsbHost&) = delete;
   GsUsbHost& operator=(const GsUsbHost&) = delete;
 
-  /// A driver's first requests. The device is configured anew.
+  /// A driver's first requests, behind SET_CONFIGURATION.
   bool bind() {
     for (std::uint8_t channel = 0; channel < channels; ++channel) forget(channel);
     const bool configured = bench_.configure();

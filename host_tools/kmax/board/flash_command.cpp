@@ -349,8 +349,8 @@ bool carry_out(Context& context, const BoardServices& services, const lines::Lin
   } catch (...) {
     if (way.restarted)
       context.note(
-          "the board stays in its ROM bootloader: 'kmax flash' goes on from there, and switching its supply "
-          "off and on starts the firmware that is in it");
+          "the board may still be in its ROM bootloader: 'kmax flash' goes on from there; if nothing was "
+          "written, switching its supply off and on starts the firmware again");
     throw;
   }
   if (way.restarted) return leave_dfu_mode(context, services, way, plan, folder, hooks);

@@ -10,6 +10,7 @@
 #include "firmware/object_dictionary/firmware_version.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/device/device_address.hpp"
+#include "host_tools/device/usb_address.hpp"
 
 namespace kmax::cli {
 
@@ -43,15 +44,6 @@ std::string state_words(std::uint8_t state) {
       return "pre-operational";
   }
   return fmt::format("state {}", state);
-}
-
-/// The Kmax device whose driver has made this terminal or interface; nullptr: none.
-const usb::UsbDevice* owner_of(std::span<const usb::UsbDevice> devices,
-                               std::vector<std::string> usb::UsbDevice::*names, const std::string& name) {
-  const auto found = std::ranges::find_if(devices, [&](const usb::UsbDevice& device) {
-    return device.is_kmax() && std::ranges::find(device.*names, name) != (device.*names).end();
-  });
-  return found == devices.end() ? nullptr : &*found;
 }
 
 bool is_kmax(const link::FoundNode& node) {
@@ -93,7 +85,8 @@ std::vector<ReachableDevice> serial_ports(const fs::path& dev, std::span<const u
   std::vector<ReachableDevice> ports;
   std::map<fs::path, bool> listed;
   const auto owner = [devices](const fs::path& port) -> std::string {
-    const auto* const device = owner_of(devices, &usb::UsbDevice::terminals, port.filename());
+    const auto* const device =
+        link::usb_device_of({.kind = link::DeviceAddress::Kind::serial, .path = port.string()}, devices);
     return device == nullptr ? "" : ", of " + device->address();
   };
   for (const fs::path& link : entries_of(dev / "serial" / "by-id")) {
@@ -119,7 +112,8 @@ std::vector<ReachableDevice> can_interfaces(const fs::path& net, std::span<const
     const std::string flags = first_word(interface / "flags");
     const bool up = !flags.empty() && (std::strtoul(flags.c_str(), nullptr, 16) & 1U) != 0;
     std::string text = "CAN interface";
-    if (const auto* const device = owner_of(devices, &usb::UsbDevice::can, name))
+    if (const auto* const device =
+            link::usb_device_of({.kind = link::DeviceAddress::Kind::can, .path = name}, devices))
       text += fmt::format(" of {}, {}", device->address(),
                           device->can.front() == name ? "the board alone" : "with the bus at its connector");
     text += up ? fmt::format(", up; 'kmax devices --can {}' looks for nodes on it", name)
