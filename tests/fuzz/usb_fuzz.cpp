@@ -80,7 +80,7 @@ class Bus {
     for (auto& byte : bytes) byte = input_.byte();
     if (how < 224) {
       bytes[0] = types[bytes[0] % types.size()];
-      bytes[1] = bytes[1] % 16 + (bytes[0] == 0x21 || bytes[0] == 0xA1 ? 0x20 : 0);
+      bytes[1] = static_cast<std::uint8_t>(bytes[1] % 16 + (bytes[0] == 0x21 || bytes[0] == 0xA1 ? 0x20 : 0));
       if (how % 2 == 0) bytes[3] %= 4, bytes[5] = 0;
       if (how % 4 == 0) bytes[7] = 0, bytes[6] %= 80;
     }

@@ -126,26 +126,25 @@ class BusBridge(unittest.TestCase):
         self.assertIn("/nowhere/bus", done.stderr)
 
 
+def run_script(test, script, argument):
+    """Runs a script of the folder to its end, and returns what it prints."""
+    node = shutil.which("node")
+    test.assertTrue(node, "node is missing: Debian package nodejs")
+    done = subprocess.run([node, str(FOLDER / script), str(argument)], capture_output=True, text=True,
+                          timeout=10 * PATIENCE, check=False)
+    test.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+    return done.stdout
+
+
 @unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_packages)")
-class NodeTest(unittest.TestCase):
-    def run_script(self, script, argument):
-        """Runs a script of the folder to its end, and returns what it prints."""
-        node = shutil.which("node")
-        self.assertTrue(node, "node is missing: Debian package nodejs")
-        done = subprocess.run([node, str(FOLDER / script), str(argument)], capture_output=True, text=True,
-                              timeout=10 * PATIENCE, check=False)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        return done.stdout
-
-
-class EdsReader(NodeTest):
+class EdsReader(unittest.TestCase):
     TYPES = {"float32": "REAL32"}  # the others have the same name in both
 
     def setUp(self):
         with tempfile.NamedTemporaryFile("w", suffix=".eds") as file:
             file.write(kmax("describe", "--format", "eds").stdout)
             file.flush()
-            self.read = json.loads(self.run_script("eds_reader.mjs", file.name))
+            self.read = json.loads(run_script(self, "eds_reader.mjs", file.name))
 
     def test_values_are_those_of_the_dictionary(self):
         objects = {(read["index"], read["subindex"]): read for read in self.read["objects"]}
@@ -171,10 +170,11 @@ class EdsReader(NodeTest):
         self.assertEqual({f"Dummy{number:04X}": "1" for number in range(1, 8)}, device["dummyUsage"])
 
 
-class Master(NodeTest):
+@unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_packages)")
+class Master(unittest.TestCase):
     def master(self, argument):
         """Every step's line is shown where one failed."""
-        printed = self.run_script("master.mjs", argument)
+        printed = run_script(self, "master.mjs", argument)
         self.assertIn(" 0 FAILED", printed)
         return printed
 

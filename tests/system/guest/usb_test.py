@@ -10,7 +10,10 @@ import time
 import unittest
 from pathlib import Path
 
-from kmax_under_test import ELF, PATIENCE, Holding, VirtualBoard, kmax, kmax_json, wait_for
+from board_on_bus import SCENE
+from can_capture import INTERFACE
+from kmax_under_test import ELF, PATIENCE, Holding, Serve, VirtualBoard, kmax, kmax_json, wait_for
+from node_canopen_test import CLIENT, Bridge, run_script
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTROLLER = Path("/sys/devices/platform/vhci_hcd.0")
@@ -43,10 +46,14 @@ def ask_for_boot_loader():
 
 
 @unittest.skipUnless(CONTROLLER.exists(), "this kernel has no virtual USB host controller")
-class OnACable(unittest.TestCase):
+class Cable(unittest.TestCase):
+    """A board whose USB connector is this kernel's."""
+
+    options = ()
+
     @classmethod
     def setUpClass(cls):
-        cls.board = cls.enterClassContext(VirtualBoard("--usbip", str(PORT)))
+        cls.board = cls.enterClassContext(VirtualBoard("--usbip", str(PORT), *cls.options))
         cls.plug_in()
 
     @classmethod
@@ -74,6 +81,8 @@ class OnACable(unittest.TestCase):
         subprocess.run(["ip", "link", "set", interface, "up", "type", "can", "bitrate", "1000000"], check=True)
         self.addCleanup(subprocess.run, ["ip", "link", "set", interface, "down"], check=False)
 
+
+class OnACable(Cable):
     def test_the_serial_port_does_what_the_serial_line_does(self):
         device = f"serial:{TERMINAL}"
         self.assertEqual(kmax_json("get", "info.serial_number", device=device),
@@ -198,6 +207,41 @@ class OnACable(unittest.TestCase):
         self.assertIn(f"start the ROM bootloader: {address} restarts", done.stderr)
         self.assertIn("has restarted, but no board in DFU mode (0483:df11) appeared at its USB port", done.stderr)
         wait_until(lambda: not TERMINAL.exists(), "it has not left the bus")
+
+
+class BehindTheBoard(Cable):
+    """The board, whose node has another number, is the adapter to a bus on which there is a second one, node 1."""
+
+    @classmethod
+    def setUpClass(cls):
+        scene = Path(cls.enterClassContext(tempfile.TemporaryDirectory())) / "scene.toml"
+        scene.write_text(SCENE.read_text().replace("[parameters]\n", "[parameters]\nnode.id = 5\n"))
+        cls.options = ("--can", INTERFACE, "--scene", str(scene))
+        cls.neighbour = cls.enterClassContext(Serve("--can", INTERFACE))
+        super().setUpClass()
+        cls.addClassCleanup(cls.pull_out)
+
+    def setUp(self):
+        self.channel = interfaces()[1]
+        # A block of 127 segments is handed over at once, and Linux' own queue has ten places.
+        subprocess.run(["ip", "link", "set", self.channel, "txqueuelen", "1000"], check=True)
+        self.bring_up(self.channel)
+
+    def test_kmax_reaches_both_nodes(self):
+        neighbour, own = f"can:{self.channel}?node=1", f"can:{self.channel}?node=5"
+        kmax("set", "wall.stiffness=1500", device=neighbour)
+        kmax("set", "wall.stiffness=2500", device=own)
+        for device, expected in (self.neighbour.device, 1500), (self.board.device, 2500):
+            self.assertEqual(kmax_json("get", "wall.stiffness", device=device)["wall.stiffness"]["value"], expected)
+
+    @unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_packages)")
+    def test_a_master_not_written_here_commands_the_neighbour_through_it(self):
+        with Bridge(self.channel) as bridge:
+            printed = run_script(self, "master.mjs", bridge.stream)
+        self.assertIn(" 0 FAILED", printed)
+        self.assertIn(" 0 left out", printed)
+        self.assertEqual(kmax_json("get", "counters.missed_ticks",
+                                   device=self.board.device)["counters.missed_ticks"]["value"], 0)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""Joins a CAN bus on a Unix SOCK_SEQPACKET socket (kmax-board, kmax serve) to programs that can only have streams.
+"""Joins a CAN bus to programs that can only have streams.
 
 usage: bus_bridge.py BUS STREAM
 
-BUS is the bus's socket; each of its messages is one `struct can_frame`, 16 bytes. STREAM is made: a Unix stream socket
+BUS is a SocketCAN interface, or, with a '/', a Unix SOCK_SEQPACKET socket (kmax-board, kmax serve); each of its messages
+is one `struct can_frame`, 16 bytes. STREAM is made: a Unix stream socket
 that carries the same frames one behind the other. Each program that connects to STREAM is a node of its own on the
 bus. Prints "ready" when it can be connected to, and runs until it is killed or the bus is gone (exit code 1).
 """
@@ -41,9 +42,13 @@ class Node:
         return bool(frame)
 
 
-def bus_at(path):
-    bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    bus.connect(path)
+def bus_at(place):
+    if "/" in place:
+        bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        bus.connect(place)
+    else:
+        bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        bus.bind((place,))
     return bus
 
 
