@@ -93,8 +93,8 @@ class CanLine {
   void ISR_serve_transmit() { can_.ISR_serve_transmit(); }
   template <typename Tap>
   void ISR_receive(unsigned fifo, firmware::CanopenEdge& link, Tap tap) {
-    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t filter) {
-      if (filter < node_filters) link.ISR_frame(frame);
+    can_.ISR_receive(fifo, [&](const drivers::CanFrame& frame, std::uint8_t) {
+      if (fifo == node_fifo) link.ISR_frame(frame);
       tap(frame);
     });
   }
@@ -113,8 +113,9 @@ class CanLine {
   static constexpr std::uint32_t retry_interval_us = 100'000;
   static constexpr std::size_t slots = 16, frames_of_node = slots / 2;
   static constexpr std::uint32_t patience_us = 10'000;  ///< a frame takes 1 ms at 125 kbit/s
-  /// Each list of two has two numbers (RM0090, filter match index).
-  static constexpr std::uint8_t node_filters = firmware::CanSettings::identifiers_max;
+  /// What the node wants and what only the others want wait in FIFOs of their own: a FIFO has three places,
+  /// and one that is full loses its newest frame. While a save erases, the core fetches nothing for 250 ms.
+  static constexpr std::uint8_t node_fifo = 0, others_fifo = 1;
 
   firmware::CanState state_of(const drivers::stm32f4::CanErrors& errors) const {
     using drivers::stm32f4::CanBusState;
@@ -143,12 +144,8 @@ class CanLine {
       filters.bank[filters.count++] =
           drivers::stm32f4::can_filter_standard_list(wanted.identifiers[i], wanted.identifiers[second]);
     }
-    // A list comes before a mask: what the node wants is still told apart, by the number of the filter.
-    if (listens_to_all_) {
-      while (filters.count < filters.bank.size() - 1)
-        filters.bank[filters.count++] = drivers::stm32f4::can_filter_standard_list(0, 0);
-      filters.bank[filters.count++] = drivers::stm32f4::CanFilter{};
-    }
+    // What a list accepts as well goes where the list says (RM0090, filter priority rules).
+    if (listens_to_all_) filters.bank[filters.count++] = drivers::stm32f4::CanFilter{.fifo = others_fifo};
     return filters;
   }
 

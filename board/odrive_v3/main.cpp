@@ -311,6 +311,12 @@ void poll() {
   }
 }
 
+void ISR_receive_can(unsigned fifo) {
+  can_line->ISR_receive(fifo, application->can(),
+                        [](const drivers::CanFrame& frame) { usb_line->ISR_bus_frame(frame); });
+  lines_due.ISR_raise();
+}
+
 }  // namespace
 
 }  // namespace kmax::board
@@ -358,10 +364,11 @@ void ISR_can1_tx() {
 }
 
 void ISR_can1_rx0() {
-  using namespace kmax::board;
-  can_line->ISR_receive(0, application->can(),
-                        [](const kmax::drivers::CanFrame& frame) { usb_line->ISR_bus_frame(frame); });
-  lines_due.ISR_raise();
+  kmax::board::ISR_receive_can(0);
+}
+
+void ISR_can1_rx1() {
+  kmax::board::ISR_receive_can(1);
 }
 
 void ISR_can1_sce() {
