@@ -43,4 +43,13 @@ ResetCause take_reset_cause(auto& rcc) {
   return cause;
 }
 
+/// The program begins behind a jump, not behind a reset: a clock is on that a reset turns off. The boot
+/// loader in ROM leaves DFU so (AN3156), with crystal, PLL and USB running, and pins of its other interfaces
+/// set up.
+bool begins_behind_a_jump(auto& rcc) {
+  constexpr std::uint32_t clocks = rcc_cr::CrystalOn::mask | rcc_cr::PllOn::mask;
+  return (static_cast<std::uint32_t>(rcc.cr) & clocks) != 0 || static_cast<std::uint32_t>(rcc.cfgr) != 0 ||
+         static_cast<std::uint32_t>(rcc.ahb2enr) != 0;
+}
+
 }  // namespace kmax::drivers::stm32f4

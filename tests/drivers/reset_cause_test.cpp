@@ -35,4 +35,22 @@ TEST(ResetCause, TakingItRemovesTheFlagsAndLeavesTheOscillatorOn) {
       << "or the flags of the next reset are removed too";
 }
 
+TEST(ResetCause, AClockThatAResetTurnsOffSaysThatTheProgramBeginsBehindAJump) {
+  struct {
+    std::uint32_t cr, cfgr, ahb2enr;
+  } rcc{.cr = 0x0000'7D83, .cfgr = 0, .ahb2enr = 0};
+  EXPECT_FALSE(begins_behind_a_jump(rcc)) << "the internal oscillator alone, RM0090, RCC_CR reset value";
+  for (const std::uint32_t on : {1U << 16, 1U << 24}) {
+    auto other = rcc;
+    other.cr |= on;
+    EXPECT_TRUE(begins_behind_a_jump(other)) << on;
+  }
+  auto other = rcc;
+  other.cfgr = 0x0000'000A;
+  EXPECT_TRUE(begins_behind_a_jump(other)) << "on the PLL";
+  other = rcc;
+  other.ahb2enr = 1U << 7;
+  EXPECT_TRUE(begins_behind_a_jump(other)) << "USB";
+}
+
 }  // namespace kmax::drivers::stm32f4::reset_cause_test

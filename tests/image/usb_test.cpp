@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <random>
 
-#include "firmware/object_dictionary/register_windows.hpp"
 #include "tests/image/usb_bench.hpp"
 
 namespace kmax::tests::usb_test {
@@ -114,6 +113,34 @@ TEST(ImageUsb, ReachesTheNodeThroughTheCanFunction) {
   }
   EXPECT_TRUE(echoed);
   EXPECT_TRUE(answered);
+}
+
+// AN3156: "leave" of the boot loader in ROM is a jump; its clocks and its USB interrupt are still on.
+TEST(ImageUsb, BehindTheBootLoadersJumpTheFirmwareBeginsWithAReset) {
+  using namespace drivers;
+  ImageBench bench;
+  virtual_board::VirtualBoard& board = *bench.board;
+  const auto left = [&](std::uint32_t address, std::uint32_t value) {
+    board.bus().write(address, 4, value, board.now());
+  };
+  constexpr auto control =
+      static_cast<std::uint32_t>(stm32f4::rcc_base + offsetof(stm32f4::RccRegisters, cr));
+  left(control, board.bus().read(control, 4, board.now()) | stm32f4::rcc_cr::CrystalOn::mask);
+  left(stm32f4::rcc_base + offsetof(stm32f4::RccRegisters, ahb2enr), stm32f4::rcc_ahb2enr::OtgFs::mask);
+  constexpr auto interrupt = static_cast<unsigned>(stm32f4::Interrupt::otg_fs);
+  const auto set_of_interrupt = [&](std::size_t registers) {
+    left(static_cast<std::uint32_t>(cortex_m::nvic_base + registers + interrupt / 32 * 4),
+         1U << interrupt % 32);
+  };
+  set_of_interrupt(offsetof(cortex_m::NvicRegisters, iser));
+  // The host goes on with its frames.
+  const std::uint32_t program = image().required_symbol("main").address & ~1U;
+  board.processor().on_block([&](std::uint32_t address, std::uint32_t) {
+    if (address == program) set_of_interrupt(offsetof(cortex_m::NvicRegisters, ispr));
+  });
+  bench.start();
+  EXPECT_EQ(board.resets(), 2U);
+  EXPECT_EQ(bench.number("info.crash_count"), 0U);
 }
 
 TEST(ImageUsb, ALockedDeviceStaysInItsFirmware) {
