@@ -14,7 +14,7 @@
 namespace kmax::drivers::stm32f4 {
 
 enum class ResetCause : std::uint8_t {
-  none,  // no flag: not a reset (a jump from a boot loader that has cleared them), or an emulator without RCC
+  none,  // no flag: not a reset (a jump that was not noticed), or an emulator without RCC
   power_on,
   pin,
   software,
