@@ -252,6 +252,7 @@ TEST_F(UsbCanAdapter, WhatOthersSayDuringAnEraseDoesNotPushOutWhatTheNodeIsAsked
     ASSERT_FALSE(second.waits()) << "at save " << saves;
   }
   EXPECT_TRUE(flash_was_erased) << "no save ever held the core up";
+  EXPECT_GT(second.worst_s(), 0.1) << "the request came during the erase";
 }
 
 TEST_F(UsbCanAdapter, ABabblingBusHoldsUpNeitherThePcNorTheNode) {
