@@ -114,7 +114,8 @@ class CanLine {
   static constexpr std::size_t slots = 16, frames_of_node = slots / 2;
   static constexpr std::uint32_t patience_us = 10'000;  ///< a frame takes 1 ms at 125 kbit/s
   /// What the node wants and what only the others want wait in FIFOs of their own: a FIFO has three places,
-  /// and one that is full loses its newest frame. While a save erases, the core fetches nothing for 250 ms.
+  /// and one that is full loses its newest frame. Across the two, order is lost. While a save erases, the
+  /// core fetches nothing for 250 ms.
   static constexpr std::uint8_t node_fifo = 0, others_fifo = 1;
 
   firmware::CanState state_of(const drivers::stm32f4::CanErrors& errors) const {

@@ -235,7 +235,7 @@ void tick_without_power() {
 [[gnu::cold]] void start() {
   enter_boot_loader_if_asked(boot_loader_asked);
   // What another program has set up is nowhere expected below.
-  if (stm32::begins_behind_a_jump(stm32::rcc())) restart();
+  if (stm32::begins_behind_a_jump(stm32::rcc()) || !cortex::takes_interrupts()) restart();
   cortex::protect_memory(cortex::mpu(), memory_rights);
   switch_power_stage_off();
   const stm32::ClockFrequencies clocks = stm32::ClockTree{stm32::rcc(), stm32::pwr(), stm32::flash()}.start();

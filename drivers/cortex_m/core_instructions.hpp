@@ -42,6 +42,18 @@ inline void unmask_interrupts() {
 #endif
 }
 
+/// In no exception's handler and with interrupts unmasked, as a reset leaves the core (PM0214, IPSR,
+/// PRIMASK).
+inline bool takes_interrupts() {
+#if defined(__arm__)
+  unsigned exception = 0, masked = 0;
+  asm volatile("mrs %0, ipsr\n\tmrs %1, primask" : "=r"(exception), "=r"(masked));
+  return (exception | masked) == 0;
+#else
+  return true;
+#endif
+}
+
 /// Sleeps until an interrupt is pending, masked or not. Returns at once when one already is.
 inline void wait_for_interrupt() {
 #if defined(__arm__)

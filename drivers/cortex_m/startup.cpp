@@ -45,9 +45,7 @@ extern "C" [[noreturn, gnu::section(".boot.reset")]] void ISR_reset() {
   data_synchronization_barrier();
   instruction_synchronization_barrier();
   // A boot loader that jumps here leaves its interrupts behind, whose handlers are not ready, and its table.
-  system_tick().ctrl = 0;
   for (auto& enabled : nvic().icer) enabled = ~0U;
-  for (auto& pending : nvic().icpr) pending = ~0U;
   scb().vtor = reinterpret_cast<std::uintptr_t>(kmax_vectors);
   data_synchronization_barrier();
   start();

@@ -43,9 +43,9 @@ ResetCause take_reset_cause(auto& rcc) {
   return cause;
 }
 
-/// The program begins behind a jump, not behind a reset: a clock is on that a reset turns off. The boot
-/// loader in ROM leaves DFU so (AN3156), with crystal, PLL and USB running, and pins of its other interfaces
-/// set up.
+/// The program begins behind another's jump and not behind a reset: a clock is on that a reset turns off
+/// (RM0090, reset values of RCC_CR, RCC_CFGR and RCC_AHB2ENR). False for a program that has turned its own
+/// off.
 bool begins_behind_a_jump(auto& rcc) {
   constexpr std::uint32_t clocks = rcc_cr::CrystalOn::mask | rcc_cr::PllOn::mask;
   return (static_cast<std::uint32_t>(rcc.cr) & clocks) != 0 || static_cast<std::uint32_t>(rcc.cfgr) != 0 ||

@@ -235,7 +235,7 @@ TEST_F(UsbCanAdapter, ThroughAFullBusBothWaysTheNodeIsNeverStarved) {
     EXPECT_EQ(bench.number(counter), 0U) << counter;
 }
 
-// A save that erases holds the core up for 250 ms, in which the three places of a FIFO are all that hears.
+// A save that erases holds the core up for 250 ms, in which a FIFO keeps three frames and no more.
 TEST_F(UsbCanAdapter, WhatOthersSayDuringAnEraseDoesNotPushOutWhatTheNodeIsAsked) {
   constexpr std::uint32_t before = 800, after = 100;
   for (unsigned saves = 0; saves < 60 && !flash_was_erased; ++saves) {

@@ -4,9 +4,9 @@
 usage: bus_bridge.py BUS STREAM
 
 BUS is a SocketCAN interface, or, with a '/', a Unix SOCK_SEQPACKET socket (kmax-board, kmax serve); each of its messages
-is one `struct can_frame`, 16 bytes. STREAM is made: a Unix stream socket
-that carries the same frames one behind the other. Each program that connects to STREAM is a node of its own on the
-bus. Prints "ready" when it can be connected to, and runs until it is killed or the bus is gone (exit code 1).
+is one `struct can_frame`, 16 bytes. STREAM is made: a Unix stream socket that carries the same frames one behind the
+other. Each program that connects to STREAM is a node of its own on the bus. Prints "ready" when it can be connected to,
+and runs until it is killed or the bus is gone (exit code 1).
 """
 
 import os
