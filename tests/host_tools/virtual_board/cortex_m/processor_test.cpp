@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <stdexcept>
 
 #include "drivers/cortex_m/registers.hpp"
@@ -257,18 +258,29 @@ TEST(Processor, KeepsTheConditionOfAnIfThenThatThePageEndCuts_IfThenBlocks) {
   }
 }
 
-// Written, run, written over and run again: stores_beside_code.hpp.
+// Written, run, written over and run again: stores_beside_code.hpp. Both engines have stored there before any
+// of them ran code in RAM.
 TEST(Processor, RunsWhatWasStoredToRamLast) {
   constexpr std::uint32_t place = 0x2000'0800;
+  const Program program{0x8016,   // strh r6, [r2]
+                        0xBF30,   // wfi
+                        0x8013,   // strh r3, [r2]
+                        0x4780,   // blx r0
+                        0x460C,   // mov r4, r1
+                        0x8015,   // strh r5, [r2]
+                        0x4780,   // blx r0
+                        0xBE01};  // bkpt 1
+  std::deque<ProgramOnCore> boards;
   for (int engine = 0; engine < 2; ++engine) {
-    ProgramOnCore board({0x8013,                                          // strh r3, [r2]
-                         0x4780,                                          // blx r0
-                         0x460C,                                          // mov r4, r1
-                         0x8015,                                          // strh r5, [r2]
-                         0x4780,                                          // blx r0
-                         0xBE01});                                        // bkpt 1
-    board.place(place, {0xBE02, 0x4770});                                 // bkpt 2, bx lr
-    board.set(0, place | 1).set(2, place).set(3, 0x2101).set(5, 0x2102);  // movs r1, #1 or #2
+    ProgramOnCore& board = boards.emplace_back(program);
+    board.place(place, {0xBE02, 0x4770});  // bkpt 2, bx lr
+    // movs r1, #1 or #2
+    board.set(0, place | 1).set(2, place).set(3, 0x2101).set(5, 0x2102).set(6, 0x2103);
+    board.run(1'000);
+    ASSERT_TRUE(board.processor.sleeping());
+  }
+  for (ProgramOnCore& board : boards) {
+    board.set(15, ProgramOnCore::program_base + 4);
     ASSERT_EQ(board.run(), RunEnd::stopped);
     ASSERT_EQ(board.processor.breakpoint(), 1);
     EXPECT_EQ(board.get(4), 1U);
