@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 #include <stdexcept>
 
 #include "tests/image/can_bench.hpp"
 #include "tests/image/gs_usb_host.hpp"
+#include "tests/soak/tick_watch.hpp"
 
 namespace kmax::soak {
 namespace {
@@ -18,44 +18,8 @@ using drivers::CanFrame;
 using tests::Bytes;
 using tests::GsUsbHost;
 using tests::UsbBench;
-using virtual_board::BoardTime;
 
 constexpr std::uint8_t node = 0;
-
-/// How far the entries of the tick's interrupt are from where they should be.
-class TickWatch {
- public:
-  explicit TickWatch(virtual_board::VirtualBoard& board) : board_(board) {
-    const std::uint32_t handler = tests::image().required_symbol("ISR_adc").address;
-    board.processor().on_block([this, handler](std::uint32_t address, std::uint32_t) {
-      if (address != handler) return;
-      const BoardTime now = board_.now();
-      if (last_) {
-        const double interval = virtual_board::seconds(now - *last_);
-        shortest_ = std::min(shortest_, interval);
-        longest_ = std::max(longest_, interval);
-        ++ticks_;
-      }
-      last_ = now;
-    });
-  }
-  void begin() {
-    last_.reset();
-    shortest_ = 1.0;
-    longest_ = 0.0;
-    ticks_ = 0;
-  }
-  void print(const char* what) const {
-    std::printf("%-44s %8llu ticks, from one to the next %.2f to %.2f us\n", what,
-                static_cast<unsigned long long>(ticks_), shortest_ * 1e6, longest_ * 1e6);
-  }
-
- private:
-  virtual_board::VirtualBoard& board_;
-  std::optional<BoardTime> last_;
-  double shortest_ = 1.0, longest_ = 0.0;
-  std::uint64_t ticks_ = 0;
-};
 
 /// Median and worst.
 class Times {
@@ -105,10 +69,6 @@ class ModbusFlood {
   bool going_ = false;
   std::uint64_t replies_ = 0;
 };
-
-void demand(bool holds, const char* what) {
-  if (!holds) throw std::runtime_error(what);
-}
 
 class Load {
  public:

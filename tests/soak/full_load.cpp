@@ -1,0 +1,163 @@
+// No tick missed: the flashed image with both axes pressed against adaptive walls, every bit of the CAN bus
+// taken, the serial line never silent, a capture running or being read, and saves, for as many ticks as are
+// wanted.
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+#include "tests/image/can_bench.hpp"
+#include "tests/soak/tick_watch.hpp"
+
+namespace kmax::soak {
+namespace {
+
+using drivers::CanFrame;
+using firmware::CaptureState;
+using firmware::StoreState;
+using virtual_board::seconds;
+
+class FullLoad {
+ public:
+  FullLoad()
+      : bench_({{"axis0.wall.law", std::string("adaptive")}, {"axis1.wall.law", std::string("adaptive")}}),
+        watch_(*bench_.board),
+        asks_(bench_.board->can_bus(), 1'000'000),
+        shouts_(bench_.board->can_bus(), 1'000'000) {
+    bench_.start();
+    bench_.ask_for_telemetry();
+    bench_.nmt(0x01);
+    // As soon as one request is answered, the next; what is left of the bus is taken by frames that the node
+    // lets through and looks at as well: the least urgent there are, LSS with a service that is not known.
+    const CanFrame request = tests::upload_request({0x2012, 2});
+    asks_.on_frame([this, request](const CanFrame& frame, BoardTime now) {
+      if (frame.identifier > 0x180 && frame.identifier < 0x581 && (frame.identifier & 0x7F) == 1)
+        ++telemetry_;
+      if (frame.identifier != 0x581) return;
+      ++answers_;
+      asks_.send(request, now);
+    });
+    asks_.send(request, bench_.board->now());
+    shouts_.babble(
+        CanFrame{.identifier = firmware::canopen::cob_id::lss_request, .length = 8, .data = {0x7F}},
+        bench_.board->now());
+    bench_.write("capture.channel_1", 0, 1);
+    bench_.write("capture.channel_2", 0, 3);
+    arm();
+  }
+
+  void run(double ticks) {
+    const double begin = seconds(bench_.board->now());
+    const double busy = seconds(bench_.board->can_bus().busy_time());
+    double next_save = begin, next_word = begin;
+    watch_.begin();
+    while (static_cast<double>(watch_.ticks()) < ticks) {
+      capture();
+      const double now = seconds(bench_.board->now());
+      if (now >= next_save) {
+        save(next_save > begin);
+        next_save = now + 20.0;
+      }
+      if (now >= next_word + 50.0) {
+        std::printf("%10.0f of %.0f ticks\n", static_cast<double>(watch_.ticks()), ticks);
+        std::fflush(stdout);
+        next_word = now;
+      }
+    }
+    const double lasted = seconds(bench_.board->now()) - begin;
+    const double load = (seconds(bench_.board->can_bus().busy_time()) - busy) / lasted;
+    watch_.print("both axes, full load");
+    std::printf("CAN bus %.1f %% busy: %.0f of four TPDOs/s, %.0f SDO answers/s; the rest for LSS\n",
+                100.0 * load, static_cast<double>(telemetry_) / lasted,
+                static_cast<double>(answers_) / lasted);
+    std::printf(
+        "captures %u, of %u values; saves: %u refused while armed, %u done while disarmed, %u of them with "
+        "an "
+        "erase\n",
+        captures_, values_, refused_, saved_, erased_);
+    std::printf("missed ticks %u\n", bench_.number("counters.missed_ticks") - missed_in_erases_);
+    demand(load > 0.99, "the bus was not full");
+    demand(static_cast<double>(telemetry_) > 3'800.0 * lasted, "telemetry was held back");
+    demand(captures_ > 0 && answers_ > 0, "no capture or no answer");
+    demand(bench_.number("counters.missed_ticks") == missed_in_erases_, "a tick was missed");
+  }
+
+ private:
+  void arm() {
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) bench_.master->arm(axis);
+    bench_.board->run_for(0.05);
+    demand(bench_.board->bridge_armed(0) && bench_.board->bridge_armed(1), "an axis cannot be armed");
+  }
+  bool armed() { return bench_.board->bridge_armed(0) && bench_.board->bridge_armed(1); }
+  CaptureState capture_state() {
+    return static_cast<CaptureState>(bench_.reading(firmware::entry_of<"capture.state">(), 0));
+  }
+  /// As many samples as fit, at every tick; then a part of them, over the serial line.
+  void capture() {
+    bench_.write("capture.command", 0, 1);
+    while (capture_state() == CaptureState::running || capture_state() == CaptureState::waiting) {
+    }
+    demand(capture_state() == CaptureState::complete, "a capture ends by itself");
+    constexpr std::uint16_t words = 124;
+    for (std::uint16_t at = 0; at < 10 * words; at = static_cast<std::uint16_t>(at + words)) {
+      values_ +=
+          static_cast<unsigned>(
+              bench_.master->read_input(static_cast<std::uint16_t>(firmware::capture_window + at), words)
+                  .size()) /
+          2;
+    }
+    ++captures_;
+    demand(armed(), "an axis has lost its force");
+  }
+  StoreState store_state() {
+    return static_cast<StoreState>(bench_.reading(firmware::entry_of<"store.state">(), 0));
+  }
+  void save(bool also_done) {
+    try {
+      bench_.write("store.command", 0, 1);
+      throw std::runtime_error("a save is not refused while armed");
+    } catch (const link::RegisterRefused&) {
+      ++refused_;
+    }
+    if (!also_done) return;
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      bench_.write("drive.controlword", axis, 0);
+    bench_.board->run_for(0.2);
+    bench_.write_real("wall.stiffness", 0, 1.0F + 0.01F * static_cast<float>(saved_ % 50));
+    const std::uint32_t erases = bench_.number("store.erases");
+    const std::uint32_t missed = bench_.number("counters.missed_ticks");
+    bench_.write("store.command", 0, 1);
+    while (store_state() == StoreState::busy) {
+    }
+    demand(store_state() == StoreState::saved, "not saved");
+    ++saved_;
+    // An erase stops the processor for as long as it takes; the power stage is off.
+    if (bench_.number("store.erases") != erases) {
+      ++erased_;
+      missed_in_erases_ += bench_.number("counters.missed_ticks") - missed;
+    }
+    arm();
+  }
+
+  tests::CanBench bench_;
+  TickWatch watch_;
+  virtual_board::CanHostNode asks_, shouts_;
+  std::uint64_t telemetry_ = 0, answers_ = 0;
+  unsigned captures_ = 0, values_ = 0, refused_ = 0, saved_ = 0, erased_ = 0, missed_in_erases_ = 0;
+};
+
+}  // namespace
+}  // namespace kmax::soak
+
+int main(int argc, char** argv) {
+  CLI::App app("Whether the flashed image misses a tick under the heaviest load.");
+  double ticks = 1e7;
+  app.add_option("--ticks", ticks, "of the interrupt, 20,000 a second of board time");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    kmax::soak::FullLoad().run(ticks);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "full_load: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
