@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
         "Speed and error",
         {introduction(), integrator_section(pictures), scene_section(), velocity_section(pictures),
          sine_section(pictures), square_root_section(pictures), field_section(pictures),
-         tick_section(pictures), image_section(pictures, budget)}};
+         tick_section(pictures), image_section(budget)}};
     const std::string folder =
         pictures.has_filename() ? pictures.filename().string() : pictures.parent_path().filename().string();
     fmt::print("{}", with_folder(report::markdown(page), page, folder));

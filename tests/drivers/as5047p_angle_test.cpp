@@ -139,7 +139,9 @@ TEST(As5047pAngle, HoldsAtMostAsLongAsItMayAndThenStaysInvalid) {
     }
     encoder.line = [](std::uint16_t word) { return word; };
     for (int i = 0; i < 100; ++i) encoder.tick(8000);
-    EXPECT_EQ(encoder.tick(8000).valid, bad <= 4) << "good frames do not bring a lost position back";
+    const As5047pSample later = encoder.tick(8000);
+    EXPECT_EQ(later.valid, bad <= 4) << "good frames do not bring a lost position back";
+    EXPECT_EQ(later.held, bad > 4);
     EXPECT_EQ(encoder.driver.fault(), bad <= 4 ? As5047pFault::none : As5047pFault::parity);
     encoder.driver.restart();
     encoder.start(8000);

@@ -233,6 +233,18 @@ class Budget(unittest.TestCase):
         means = [step["mean_instructions"] for step in self.report["steps"] if step["name"].startswith("whole tick")]
         self.assertEqual([mean <= most for mean, most in zip(means, MEAN_AT_MOST, strict=True)], [True, True], means)
 
+    def test_both_readings_of_the_flash_cache(self):
+        waits = self.report["with_waits"]
+        self.assertGreater(waits["flash_percent_if_all_kept"], 0)
+        self.assertLess(waits["flash_percent_if_all_kept"], waits["flash_percent"])
+
+    def test_the_main_loop_under_traffic(self):
+        traffic = self.report["with_traffic"]
+        self.assertGreater(traffic["sdo_answers_per_second"], 1000)
+        self.assertGreater(traffic["serial_replies_per_second"], 30)
+        idle = next(line["value"] for line in self.report["budget"] if line["name"].startswith("main loop"))
+        self.assertGreater(traffic["main_loop_instructions"], 2 * idle)
+
     def test_the_exit_code_is_the_verdict(self):
         kept = all(line["kept"] for line in self.report["budget"])
         self.assertIs(self.report["kept"], kept)

@@ -17,16 +17,19 @@
 #include "board/odrive_v3/description.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "firmware/application.hpp"
+#include "firmware/object_dictionary/cob_id.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 #include "host_tools/virtual_board/run/board_link.hpp"
 #include "host_tools/virtual_board/run/flash_accelerator.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
+#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 
 namespace kmax::virtual_board {
-
 namespace {
+
+namespace cob_id = firmware::canopen::cob_id;
 
 /// Innermost first: the first function of an instruction's frames that one of these names are part of
 /// decides.
@@ -112,7 +115,10 @@ class Recorder {
     board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
   }
 
-  void start() { recording_ = true; }
+  void start() {
+    recording_ = true;
+    main_loop_ = 0;
+  }
   /// Instructions outside all interrupts.
   std::uint64_t main_loop() const { return main_loop_; }
   std::vector<Tick> take() {
@@ -242,20 +248,74 @@ std::map<std::uint32_t, std::vector<std::string>> inline_frames(const std::strin
   return frames;
 }
 
-/// What was not measured keeps every bound. Throws std::runtime_error when an axis has ticked less often than
-/// in `seconds` it must.
-void require_all_ticks(const std::vector<Tick>& ticks, double seconds) {
-  const double due = seconds * board::odrive_v3::description.pwm_hz();
+constexpr double measured = 0.3;  // s
+
+/// All four TPDOs every millisecond, an SDO request behind each answer, and what the node lets through and
+/// looks at in what is left of the bus.
+class FullBus {
+ public:
+  explicit FullBus(VirtualBoard& board)
+      : asks_(board.can_bus(), bit_rate), shouts_(board.can_bus(), bit_rate) {
+    asks_.on_frame([this](const drivers::CanFrame& frame, BoardTime now) {
+      if (frame.identifier != cob_id::sdo_response + node) return;
+      ++answers_;
+      asks_.send(request, now);
+    });
+    asks_.send({.identifier = cob_id::nmt, .length = 2, .data = {1, node}}, board.now());
+    for (std::uint8_t tpdo = 0; tpdo < 4; ++tpdo) {
+      asks_.send({.identifier = request.identifier, .length = 8, .data = {0x2B, tpdo, 0x18, 5, 1}},
+                 board.now());
+      board.run_for(2e-3);
+    }
+    shouts_.babble(drivers::CanFrame{.identifier = cob_id::lss_request, .length = 8, .data = {0x7F}},
+                   board.now());
+  }
+  std::uint64_t answers() const { return answers_; }
+
+ private:
+  static constexpr std::uint32_t bit_rate = 1'000'000;
+  static constexpr std::uint8_t node = 1;
+  static constexpr drivers::CanFrame request{
+      .identifier = cob_id::sdo_request + node, .length = 8, .data = {0x40, 0x12, 0x20, 2}};
+
+  CanHostNode asks_, shouts_;
+  std::uint64_t answers_ = 0;
+};
+
+/// Both axes stay armed.
+TrafficReport under_traffic(VirtualBoard& board, BoardLink& link, Recorder& recorder, double round_s) {
+  FullBus bus(board);
+  recorder.start();
+  const std::uint64_t answers = bus.answers();
+  const double begin = seconds(board.now());
+  double lasted = 0.0;
+  std::uint64_t replies = 0;
+  for (; lasted < measured; lasted = seconds(board.now()) - begin) {
+    (void)link.read_input(firmware::trace_window, 124);
+    ++replies;
+  }
+  (void)recorder.take();
+  return {static_cast<double>(recorder.main_loop()) * round_s / lasted,
+          static_cast<double>(bus.answers() - answers) / lasted, static_cast<double>(replies) / lasted};
+}
+
+void require_armed(VirtualBoard& board) {
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    const auto made =
-        std::count_if(ticks.begin(), ticks.end(), [axis](const Tick& tick) { return tick.axis == axis; });
-    if (static_cast<double>(made) < due - 2.0)
-      throw std::runtime_error(
-          fmt::format("axis {} has ticked {} times in {} s instead of {:.0f}", axis, made, seconds, due));
+    if (!board.bridge_armed(axis))
+      throw std::runtime_error(fmt::format("axis {} has tripped during the measurement", axis));
   }
 }
 
 }  // namespace
+
+void require_all_ticks(const std::array<std::uint64_t, firmware::axis_count>& ticks, double seconds) {
+  const double due = seconds * board::odrive_v3::description.pwm_hz();
+  for (std::size_t axis = 0; axis < ticks.size(); ++axis) {
+    if (static_cast<double>(ticks[axis]) < due - 2.0)
+      throw std::runtime_error(fmt::format("axis {} has ticked {} times in {} s instead of {:.0f}", axis,
+                                           ticks[axis], seconds, due));
+  }
+}
 
 bool BudgetReport::kept() const {
   return std::all_of(lines.begin(), lines.end(), [](const BudgetLine& line) { return line.kept(); });
@@ -282,15 +342,20 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) link.arm(axis);
   recorder.start();
   // The approach, the contact and some of the hold.
-  constexpr double measured = 0.3;  // s
   board.run_for(measured);
-  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-    if (!board.bridge_armed(axis))
-      throw std::runtime_error(fmt::format("axis {} has tripped during the measurement", axis));
-  }
+  require_armed(board);
   std::vector<Tick> ticks = recorder.take();
+  const std::uint64_t main_loop = recorder.main_loop();
   if (!ticks.empty()) ticks.pop_back();  // not over
-  require_all_ticks(ticks, measured);
+  std::array<std::uint64_t, firmware::axis_count> ticks_of{};
+  for (const Tick& tick : ticks) ++ticks_of.at(tick.axis);
+  require_all_ticks(ticks_of, measured);
+
+  constexpr const board::BoardDescription& of_board = board::odrive_v3::description;
+  const double round_s = firmware::Application::Tick::round_ticks / of_board.pwm_hz();
+  BudgetReport report;
+  report.with_traffic = under_traffic(board, link, recorder, round_s);
+  require_armed(board);
 
   std::set<std::uint32_t> unique;
   for (const Tick& tick : ticks) unique.insert(tick.addresses.begin(), tick.addresses.end());
@@ -308,14 +373,14 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   std::map<std::string, StepSum> sums;
   std::array<StepSum, 2> totals{};
   struct Waits {
-    std::uint64_t flash = 0, buses = 0, worst = 0;
+    std::uint64_t flash = 0, flash_if_all_kept = 0, buses = 0, worst = 0;
   };
   std::array<Waits, 2> waits{};
   std::array<std::uint32_t, 2> estimate_worst{};
   for (const Tick& tick : ticks) {
     std::map<std::string, StepInTick> in_tick;
-    FlashAccelerator flash;
-    std::uint64_t flash_waits = 0, cycles_so_far = 0;
+    FlashAccelerator flash, keeps_all(FlashAccelerator::Kept::all);
+    std::uint64_t flash_waits = 0, waits_if_all_kept = 0, cycles_so_far = 0;
     for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
       const Place& place = places.at(tick.addresses[i]);
       const bool taken = i + 1 < tick.addresses.size() &&
@@ -326,10 +391,13 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
           place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
       step.cycles += its_cycles;
       const std::uint64_t waits_before = flash_waits;
-      flash_waits += flash.fetch(tick.addresses[i], place.instruction.bytes, cycles_so_far + flash_waits);
       const auto& memory = place.instruction.memory;
-      if (memory && memory->base == MemoryOperand::no_register && memory_map::flash.contains(memory->offset))
-        flash_waits += flash.load(memory->offset, cycles_so_far + flash_waits);
+      const bool literal =
+          memory && memory->base == MemoryOperand::no_register && memory_map::flash.contains(memory->offset);
+      for (const auto& [model, total] : {std::pair{&flash, &flash_waits}, {&keeps_all, &waits_if_all_kept}}) {
+        *total += model->fetch(tick.addresses[i], place.instruction.bytes, cycles_so_far + *total);
+        if (literal) *total += model->load(memory->offset, cycles_so_far + *total);
+      }
       step.waits += flash_waits - waits_before;
       cycles_so_far += its_cycles;
     }
@@ -352,6 +420,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     const std::size_t axis = tick.axis & 1U;
     estimate_worst[axis] = std::max(estimate_worst[axis], estimate);
     waits[axis].flash += flash_waits;
+    waits[axis].flash_if_all_kept += waits_if_all_kept;
     waits[axis].buses += tick.register_waits;
     waits[axis].worst = std::max(waits[axis].worst, cycles_of_tick + flash_waits + tick.register_waits);
     StepSum& total = totals[axis];
@@ -363,7 +432,6 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     total.worst_cycles = std::max(total.worst_cycles, cycles_of_tick);
   }
 
-  BudgetReport report;
   report.ticks = ticks.size();
   const auto add = [&report](const std::string& name, const StepSum& sum) {
     const auto count = static_cast<double>(std::max<std::uint64_t>(1, sum.ticks));
@@ -381,8 +449,6 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   add("whole tick, axis 1 (PMSM)", totals[1]);
 
   const auto worst = [&sums](const char* step) { return static_cast<double>(sums[step].worst); };
-  constexpr const board::BoardDescription& of_board = board::odrive_v3::description;
-  const double round_s = firmware::Application::Tick::round_ticks / of_board.pwm_hz();
   const double tick_cycles = of_board.core_clock_hz / of_board.pwm_hz();
   report.lines = {
       {"adaptive wall", worst("adaptive wall"), 90, "instructions", ""},
@@ -396,7 +462,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
        fmt::format("% of {:.0f} MHz", of_board.core_clock_hz * 1e-6),
        "moteus 1559 cycles for one axis without encoder; ours is both worst ticks together"},
       {fmt::format("main loop without traffic, {:.0f} us", round_s * 1e6),
-       static_cast<double>(recorder.main_loop()) * round_s / measured, 1200, "instructions", ""},
+       static_cast<double>(main_loop) * round_s / measured, 1200, "instructions", ""},
   };
   for (std::size_t axis = 0; axis < totals.size(); ++axis) {
     const auto share = [&](std::uint64_t of_all) {
@@ -405,6 +471,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     };
     report.with_waits.mean += share(totals[axis].cycles + waits[axis].flash + waits[axis].buses);
     report.with_waits.flash += share(waits[axis].flash);
+    report.with_waits.flash_if_all_kept += share(waits[axis].flash_if_all_kept);
     report.with_waits.buses += share(waits[axis].buses);
     report.with_waits.worst += 100.0 * static_cast<double>(waits[axis].worst) / tick_cycles;
   }
@@ -427,9 +494,17 @@ std::string budget_table(const BudgetReport& report) {
   }
   text += fmt::format(
       "\nwith the waits for flash and buses: both axes {:.1f} % of the core's time on average, of which "
-      "{:.1f} for flash "
-      "and {:.1f}\nfor register accesses; {:.1f} % with both worst ticks together\n",
-      report.with_waits.mean, report.with_waits.flash, report.with_waits.buses, report.with_waits.worst);
+      "{:.1f} for flash\n"
+      "({:.1f} if the cache keeps prefetched lines as well) and {:.1f} for register accesses; {:.1f} % with "
+      "both worst ticks\n"
+      "together\n",
+      report.with_waits.mean, report.with_waits.flash, report.with_waits.flash_if_all_kept,
+      report.with_waits.buses, report.with_waits.worst);
+  text += fmt::format(
+      "\nmain loop with the CAN bus and the serial line full: {:.0f} instructions in a round's time; {:.0f} "
+      "SDO answers and "
+      "{:.0f} serial\nreplies of 124 registers a second\n",
+      report.with_traffic.instructions, report.with_traffic.sdo_answers, report.with_traffic.serial_replies);
   text +=
       "\nInstructions are exact; one that an IT block skips counts as executed. Cycles are a model (no wait "
       "states, but where it says so) that no\n"
@@ -444,7 +519,11 @@ std::string budget_json(const BudgetReport& report) {
   document["with_waits"] = {{"mean_percent", report.with_waits.mean},
                             {"worst_percent", report.with_waits.worst},
                             {"flash_percent", report.with_waits.flash},
+                            {"flash_percent_if_all_kept", report.with_waits.flash_if_all_kept},
                             {"buses_percent", report.with_waits.buses}};
+  document["with_traffic"] = {{"main_loop_instructions", report.with_traffic.instructions},
+                              {"sdo_answers_per_second", report.with_traffic.sdo_answers},
+                              {"serial_replies_per_second", report.with_traffic.serial_replies}};
   for (const StepCost& step : report.steps) {
     document["steps"].push_back({{"name", step.name},
                                  {"ticks", step.ticks},

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/simulation/scene.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
 
@@ -36,12 +38,21 @@ struct BudgetLine {
 struct WaitReport {
   double mean = 0.0, worst = 0.0;   ///< % of the core's time; worst: both worst ticks together
   double flash = 0.0, buses = 0.0;  ///< of the mean
+  double flash_if_all_kept = 0.0;   ///< instead of `flash`, where the cache keeps prefetched lines as well
+};
+
+/// The main loop while the CAN bus has not a free bit (four TPDOs every millisecond, one SDO request behind
+/// the other, the rest frames that the node lets through) and the serial line is asked again at once.
+struct TrafficReport {
+  double instructions = 0.0;                       ///< in a round's time, interrupts not counted
+  double sdo_answers = 0.0, serial_replies = 0.0;  ///< in a second
 };
 
 struct BudgetReport {
   std::vector<StepCost> steps;
   std::vector<BudgetLine> lines;
   WaitReport with_waits;
+  TrafficReport with_traffic;
   std::uint64_t ticks = 0;
   bool kept() const;
 };
@@ -55,6 +66,10 @@ struct BudgetReport {
 /// axes cannot be armed, when an axis trips, or when one does not tick as often as it must.
 BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene,
                             const VirtualBoardConfig& config);
+
+/// What was not measured keeps every bound: throws std::runtime_error when an axis has ticked less often than
+/// in `seconds` it must.
+void require_all_ticks(const std::array<std::uint64_t, firmware::axis_count>& ticks, double seconds);
 
 std::string budget_table(const BudgetReport& report);
 std::string budget_json(const BudgetReport& report);

@@ -9,13 +9,17 @@ namespace kmax::virtual_board {
 
 /// For how many cycles the core waits for flash at 168 MHz: RM0090, Embedded Flash memory interface, Adaptive
 /// real-time memory accelerator. Five wait states; lines of 128 bits; 64 of instructions and 8 of data are
-/// kept, the least recently used goes; the line behind the present one is prefetched. Of instructions only
-/// lines that were missed are kept, not prefetched ones, as the manual says. A model that no board has
-/// confirmed.
+/// kept, the least recently used goes; the line behind the present one is prefetched. The manual can be read
+/// in two ways: of instructions only lines that were missed are kept, or prefetched ones as well. A model
+/// that no board has confirmed.
 ///
 /// A read under way is not given up for one that turns out to be needed sooner, and data go before prefetch.
 class FlashAccelerator {
  public:
+  enum class Kept : std::uint8_t { missed, all };
+
+  explicit FlashAccelerator(Kept kept = Kept::missed) : kept_(kept) {}
+
   /// The waits before an instruction of `bytes` can begin that would begin at cycle `now`.
   std::uint32_t fetch(std::uint32_t address, std::uint32_t bytes, std::uint64_t now) {
     std::uint32_t waits = line(address / line_bytes, now);
@@ -38,6 +42,7 @@ class FlashAccelerator {
     std::uint32_t waits = 0;
     if (wanted == prefetched_) {
       waits = static_cast<std::uint32_t>(std::max(prefetched_at_, now) - now);
+      if (kept_ == Kept::all) (void)hit(instructions_, wanted, instruction_lines);
     } else if (!hit(instructions_, wanted, instruction_lines)) {
       waits = read(now);
     }
@@ -62,6 +67,7 @@ class FlashAccelerator {
     return static_cast<std::uint32_t>(free_at_ - now);
   }
 
+  Kept kept_;
   std::vector<std::uint32_t> instructions_, data_;  ///< the least recently used first
   std::uint32_t present_ = 0, prefetched_ = 0;
   std::uint64_t prefetched_at_ = 0, free_at_ = 0;

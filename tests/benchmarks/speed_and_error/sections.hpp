@@ -18,6 +18,6 @@ report::Section tick_section(const std::filesystem::path& pictures);
 // ns of one HapticLoop<float>::tick() here, with the adaptive wall and FOAW, as the image's budget has them.
 double native_haptic_tick();
 // `budget`: what `kmax-board ELF --budget --json` printed. Throws std::runtime_error if it is something else.
-report::Section image_section(const std::filesystem::path& pictures, const std::filesystem::path& budget);
+report::Section image_section(const std::filesystem::path& budget);
 
 }  // namespace kmax::benchmark
