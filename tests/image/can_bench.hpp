@@ -96,9 +96,7 @@ class CanBench : public ImageBench {
     }
   }
 
-  // By way of the serial line, which has nothing to do with the bus.
-  using ImageBench::number;
-  using ImageBench::write;
+  using ImageBench::number;  // by way of the serial line, which has nothing to do with the bus
   std::uint32_t number(std::uint16_t index, std::uint8_t subindex) {
     std::uint32_t value = 0;
     const auto bytes = sdo.upload({index, subindex});

@@ -21,7 +21,7 @@ class TickWatch {
   explicit TickWatch(virtual_board::VirtualBoard& board) : board_(board) {
     const std::uint32_t handler = tests::image().required_symbol("ISR_adc").address;
     board.processor().on_block([this, handler](std::uint32_t address, std::uint32_t) {
-      if (address != handler) return;
+      if (address != handler || paused_) return;
       const BoardTime now = board_.now();
       if (last_) {
         const double interval = virtual_board::seconds(now - *last_);
@@ -38,6 +38,12 @@ class TickWatch {
     longest_ = 0.0;
     ticks_ = 0;
   }
+  /// An erase stalls the processor: no ticks are looked at meanwhile.
+  void pause() { paused_ = true; }
+  void go_on() {
+    paused_ = false;
+    last_.reset();
+  }
   std::uint64_t ticks() const { return ticks_; }
   void print(const char* what) const {
     std::printf("%-44s %8llu ticks, from one to the next %.2f to %.2f us\n", what,
@@ -49,6 +55,7 @@ class TickWatch {
   std::optional<BoardTime> last_;
   double shortest_ = 1.0, longest_ = 0.0;
   std::uint64_t ticks_ = 0;
+  bool paused_ = false;
 };
 
 }  // namespace kmax::soak

@@ -4,12 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -17,19 +12,17 @@
 #include "board/odrive_v3/description.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "firmware/application.hpp"
-#include "firmware/object_dictionary/cob_id.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 #include "host_tools/virtual_board/run/board_link.hpp"
 #include "host_tools/virtual_board/run/flash_accelerator.hpp"
+#include "host_tools/virtual_board/run/full_bus.hpp"
+#include "host_tools/virtual_board/run/inline_frames.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
-#include "host_tools/virtual_board/stm32f4/can_host_node.hpp"
 
 namespace kmax::virtual_board {
 namespace {
-
-namespace cob_id = firmware::canopen::cob_id;
 
 /// Innermost first: the first function of an instruction's frames that one of these names are part of
 /// decides.
@@ -188,99 +181,7 @@ struct StepInTick {
   std::uint64_t waits = 0;
 };
 
-/// A file that goes away with its name.
-class ScratchFile {
- public:
-  ScratchFile() : path_((std::filesystem::temp_directory_path() / "kmax_addresses_XXXXXX").string()) {
-    const int file = mkstemp(path_.data());
-    if (file < 0) throw std::runtime_error("no temporary file can be made in " + path_);
-    std::fclose(fdopen(file, "w"));
-  }
-  ~ScratchFile() { std::filesystem::remove(path_); }
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
-/// For each address the functions it belongs to, innermost first: the one whose source line it is, then those
-/// it was inlined into. Demangled names. Asks arm-none-eabi-addr2line, in one run. Throws std::runtime_error
-/// when that cannot be run.
-std::map<std::uint32_t, std::vector<std::string>> inline_frames(const std::string& elf_path,
-                                                                const std::vector<std::uint32_t>& addresses) {
-  const ScratchFile list;
-  {
-    std::ofstream out(list.path());
-    for (const std::uint32_t address : addresses) out << fmt::format("0x{:08x}\n", address);
-  }
-  const std::string command =
-      fmt::format("arm-none-eabi-addr2line -a -f -i -C -e {} < {}", quoted(elf_path), quoted(list.path()));
-  const auto close = [](FILE* pipe) { pclose(pipe); };
-  const std::unique_ptr<FILE, decltype(close)> pipe(popen(command.c_str(), "r"), close);
-  if (!pipe) throw std::runtime_error("cannot run arm-none-eabi-addr2line");
-
-  std::map<std::uint32_t, std::vector<std::string>> frames;
-  std::vector<std::string>* present = nullptr;
-  bool function_next = true;
-  std::array<char, 8192> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe.get()) != nullptr) {
-    std::string line(buffer.data());
-    while (!line.empty() && (line.back() == '\n' || line.back() == '\r')) line.pop_back();
-    if (line.starts_with("0x")) {
-      present = &frames[static_cast<std::uint32_t>(std::stoul(line, nullptr, 16))];
-      function_next = true;
-    } else if (present != nullptr) {
-      if (function_next) present->push_back(line);
-      function_next = !function_next;
-    }
-  }
-  if (frames.size() != addresses.size())
-    throw std::runtime_error(
-        "arm-none-eabi-addr2line does not know the image's addresses; is binutils-arm-none-eabi installed?");
-  return frames;
-}
-
 constexpr double measured = 0.3;  // s
-
-/// All four TPDOs every millisecond, an SDO request behind each answer, and what the node lets through and
-/// looks at in what is left of the bus.
-class FullBus {
- public:
-  explicit FullBus(VirtualBoard& board)
-      : asks_(board.can_bus(), bit_rate), shouts_(board.can_bus(), bit_rate) {
-    asks_.on_frame([this](const drivers::CanFrame& frame, BoardTime now) {
-      if (frame.identifier != cob_id::sdo_response + node) return;
-      ++answers_;
-      asks_.send(request, now);
-    });
-    asks_.send({.identifier = cob_id::nmt, .length = 2, .data = {1, node}}, board.now());
-    for (std::uint8_t tpdo = 0; tpdo < 4; ++tpdo) {
-      asks_.send({.identifier = request.identifier, .length = 8, .data = {0x2B, tpdo, 0x18, 5, 1}},
-                 board.now());
-      board.run_for(2e-3);
-    }
-    shouts_.babble(drivers::CanFrame{.identifier = cob_id::lss_request, .length = 8, .data = {0x7F}},
-                   board.now());
-  }
-  std::uint64_t answers() const { return answers_; }
-
- private:
-  static constexpr std::uint32_t bit_rate = 1'000'000;
-  static constexpr std::uint8_t node = 1;
-  static constexpr drivers::CanFrame request{
-      .identifier = cob_id::sdo_request + node, .length = 8, .data = {0x40, 0x12, 0x20, 2}};
-
-  CanHostNode asks_, shouts_;
-  std::uint64_t answers_ = 0;
-};
 
 /// Both axes stay armed.
 TrafficReport under_traffic(VirtualBoard& board, BoardLink& link, Recorder& recorder, double round_s) {
