@@ -369,7 +369,7 @@ RC_GTEST_PROP(Emergency, InTheEndTheBusKnowsTheState, ()) {
     const std::optional<CanFrame> frame = next_of(emergency, now_us, state);
     if (!frame) return false;
     RC_ASSERT(state == operational);
-    RC_ASSERT(!sent_us || now_us - *sent_us >= inhibit * 100U);
+    RC_ASSERT((!sent_us || now_us - *sent_us >= inhibit * 100U));
     if (*frame == recovered) {
       RC_ASSERT(++recoveries <= times_empty);
     }

@@ -61,7 +61,7 @@ TEST(Judgement, AMarginIsFiniteOrThereIsNone) {
 RC_GTEST_PROP(Judgement, TheSignOfTheMarginIsTheVerdict, ()) {
   const double value = *rc::gen::inRange(0, 1000) * 1e-2, bound = *rc::gen::inRange(-100, 1000) * 1e-2;
   const auto margin = margin_of(at_most(value, bound));
-  RC_ASSERT(margin.has_value() && std::isfinite(*margin));
+  RC_ASSERT((margin.has_value() && std::isfinite(*margin)));
   if (value != bound) RC_ASSERT((*margin > 0) == (value < bound));
 }
 

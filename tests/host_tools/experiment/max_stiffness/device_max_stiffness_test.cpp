@@ -381,7 +381,7 @@ RC_GTEST_PROP(StiffnessClimbProperty, FindsTheLimitWithinAStepFromAStartThatIsNo
   const double limit = *rc::gen::inRange(1, 20000) * 1.0;
   StiffnessClimb climb(first, step, 20e3);
   const std::vector<double> asked = climb_to(climb, limit);
-  RC_ASSERT(!asked.empty() && asked.front() == first);
+  RC_ASSERT((!asked.empty() && asked.front() == first));
   for (const double stiffness : asked) RC_ASSERT(stiffness > 0.0);
   RC_ASSERT(climb.result() <= limit);
   if (!climb.beyond_last()) RC_ASSERT(limit < climb.result() + step * (1.0 + 1e-9));
