@@ -72,6 +72,24 @@ RC_GTEST_PROP(StabilityCriteria, FiniteForEveryFiniteDouble, ()) {
   check_that_all_is_finite<double, std::uint64_t>();
 }
 
+TEST(StabilityCriteria, WhatDoesNotApplyPassesWithoutNumbers) {
+  auto free = desktop_case<double>();
+  free.stiffness = free.wall_damping = free.magnetic_coefficient = 0.0;
+  auto massless = desktop_case<double>();
+  massless.mass = 0.0;
+  for (const auto& c : {free, massless}) {
+    for (const CriterionResult<double>& r : judge_all(c)) {
+      if (r.criterion == Criterion::sampled_eigenvalues) {
+        EXPECT_FALSE(r.applies);
+      }
+      if (r.applies) continue;
+      EXPECT_TRUE(r.pass);
+      EXPECT_EQ(r.value, 0.0);
+      EXPECT_EQ(r.bound, 0.0);
+    }
+  }
+}
+
 TEST(StabilityCriteria, NumbersAreAContract) {
   EXPECT_EQ(static_cast<int>(Criterion::colgate), 0);
   EXPECT_EQ(static_cast<int>(Criterion::gil), 1);

@@ -98,7 +98,9 @@ TEST(As5047pAngle, FollowsThroughManyTurnsBothWaysOneTickLate) {
 
 TEST(As5047pAngle, NothingIsValidBeforeThreeFramesAgree) {
   Encoder encoder;
-  EXPECT_FALSE(encoder.tick(5000).valid) << "the first reply belongs to nobody";
+  const As5047pSample first = encoder.tick(5000);
+  EXPECT_FALSE(first.valid) << "the first reply belongs to nobody";
+  EXPECT_EQ(first.count, 0U);
   EXPECT_FALSE(encoder.tick(5000).valid);
   EXPECT_FALSE(encoder.tick(9000).valid);
   EXPECT_FALSE(encoder.tick(9000).valid) << "9000 does not agree with 5000";

@@ -161,6 +161,7 @@ TEST(Registers, FieldsOfTheChipAreThoseOfTheManual) {
     using namespace usart_cr3;
     EXPECT_EQ((bits_of<ReceiveDma, TransmitDma>()), 0x0000'00C0U);
   }
+  EXPECT_EQ(otg_fs_size, 0x5000U) << "global, host and device registers, then four FIFOs of 4 KiB";
   {
     using namespace otg_fs_gahbcfg;
     EXPECT_EQ((bits_of<InterruptEnable, EmptyLevel>()), 0x0000'0081U);

@@ -197,29 +197,34 @@ TEST_F(Transaction, ChangesOnlyWhatWasWrittenInIt) {
 
 // What was put aside and dropped before says nothing of what is refused now.
 TEST_F(Transaction, TheStabilityChecksRefusalNamesWhatWasWritten) {
-  for (const auto& [name, number] : {std::pair{"guard.mode", 2.0},
-                                     {"wall.law", 1.0},
-                                     {"wall.stiffness", 1000.0},
-                                     {"wall.stiffness_ceiling", 1e6},
-                                     {"wall.damping_ceiling", 1000.0},
-                                     {"haptic.rate", 2000.0},
-                                     {"current.bandwidth", 4000.0},
-                                     {"encoder.counts_per_turn", 1e6},
-                                     {"device.transmission", 1.5915494309189535},
-                                     {"guard.damping", 5.325},
-                                     {"guard.friction", 1.0}})
-    ASSERT_EQ(set(name, number), Refusal::none) << name;
-  EXPECT_EQ(control(1), Refusal::none);
-  for (const std::string_view name : {"wall.damping", "guard.damping", "guard.friction", "guard.delay"})
-    ASSERT_EQ(set(name, 0.5), Refusal::none) << name;
-  EXPECT_EQ(control(0), Refusal::none);
-  const auto before = registers.bits();
-  EXPECT_EQ(set("wall.stiffness", 5e5, true), Refusal::guard_refused);
-  EXPECT_EQ(registers.last_refusal().address, address_of("wall.stiffness"));
-  EXPECT_EQ(set("wall.damping", 500, true), Refusal::guard_refused);
-  EXPECT_EQ(registers.last_refusal().address, address_of("wall.damping"));
-  EXPECT_EQ(registers.bits(), before);
-  EXPECT_EQ(set("wall.stiffness", 900, true), Refusal::none);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const auto write_to = [&](std::string_view name, double number, bool armed = false) {
+      return set(name, number, armed, axis);
+    };
+    for (const auto& [name, number] : {std::pair{"guard.mode", 2.0},
+                                       {"wall.law", 1.0},
+                                       {"wall.stiffness", 1000.0},
+                                       {"wall.stiffness_ceiling", 1e6},
+                                       {"wall.damping_ceiling", 1000.0},
+                                       {"haptic.rate", 2000.0},
+                                       {"current.bandwidth", 4000.0},
+                                       {"encoder.counts_per_turn", 1e6},
+                                       {"device.transmission", 1.5915494309189535},
+                                       {"guard.damping", 5.325},
+                                       {"guard.friction", 1.0}})
+      ASSERT_EQ(write_to(name, number), Refusal::none) << name;
+    EXPECT_EQ(control(1), Refusal::none);
+    for (const std::string_view name : {"wall.damping", "guard.damping", "guard.friction", "guard.delay"})
+      ASSERT_EQ(write_to(name, 0.5), Refusal::none) << name;
+    EXPECT_EQ(control(0), Refusal::none);
+    const auto before = registers.bits();
+    EXPECT_EQ(write_to("wall.stiffness", 5e5, true), Refusal::guard_refused);
+    EXPECT_EQ(registers.last_refusal().address, address_of("wall.stiffness", axis));
+    EXPECT_EQ(write_to("wall.damping", 500, true), Refusal::guard_refused);
+    EXPECT_EQ(registers.last_refusal().address, address_of("wall.damping", axis));
+    EXPECT_EQ(registers.bits(), before);
+    EXPECT_EQ(write_to("wall.stiffness", 900, true), Refusal::none);
+  }
 }
 
 }  // namespace

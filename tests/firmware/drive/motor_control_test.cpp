@@ -135,6 +135,20 @@ TEST(MotorControl, AnOpenPhaseOfEitherMotorIsNamedAfterThePatience) {
   }
 }
 
+TEST(MotorControl, AnOpenPhaseIsNamedOnlyBelowTheVelocityWhoseBackEmfTakesTheVoltage) {
+  for (const bool synchronous : {false, true}) {
+    const auto c = MotorControl::prepare(synchronous ? pmsm() : dc());
+    for (const float velocity : {std::nextafter(c.slow_velocity, 0.0f), c.slow_velocity}) {
+      MotorControl motor;
+      Fault found = Fault::none;
+      for (int sample = 0; found == Fault::none && sample < 100; ++sample)
+        found =
+            update(motor, c, measured(0.0f, 0.0f), synchronous ? 10.0f : 6.0f, 1000, velocity, true).fault;
+      EXPECT_EQ(found, velocity < c.slow_velocity ? Fault::phase_open : Fault::none) << synchronous;
+    }
+  }
+}
+
 // A force that changes sides in step with the looks: its current goes through zero while all of it is asked
 // for.
 TEST(MotorControl, ACurrentThatAlternatesIsNoOpenPhaseWhereverItsZerosFall) {

@@ -100,10 +100,13 @@ TEST_F(ObjectsOverCan, WhatIsNotThereIsSaidSo) {
 }
 
 TEST_F(ObjectsOverCan, TheTraceIsThatOfTheSerialLine) {
+  // A negative count: bits in the upper halves of the words as well.
+  bench.device.stand_at(-1000);
   bench.set("trace.interval", 1);
   run_ms(20);
   bench.set("trace.interval", 0);
   run_ms(5);
+  EXPECT_EQ(registers(firmware::trace_window + 2, 4), (Bytes{0x18, 0xFC, 0xFF, 0xFF}));
   std::uint16_t address = firmware::trace_window;
   for (std::uint8_t subindex = 1; subindex <= firmware::trace_objects; ++subindex) {
     ASSERT_EQ(upload(0x5820, subindex), registers(address, firmware::trace_object_bytes)) << int{subindex};
