@@ -163,6 +163,82 @@ TEST(Registers, FieldsOfTheChipAreThoseOfTheManual) {
   }
   EXPECT_EQ(otg_fs_size, 0x5000U) << "global, host and device registers, then four FIFOs of 4 KiB";
   {
+    using namespace otg_fs_gotgctl;
+    EXPECT_EQ((bits_of<ConnectorId, BSessionValid>()), 0x0009'0000U);
+    EXPECT_EQ(ConnectorId::mask, 0x0001'0000U);
+  }
+  {
+    using namespace otg_fs_gotgint;
+    EXPECT_EQ((bits_of<SessionEnd>()), 0x0000'0004U);
+  }
+  {
+    using namespace otg_fs_gint;
+    EXPECT_EQ(
+        (bits_of<HostMode, ModeMismatch, Otg, StartOfFrame, ReceiveNotEmpty, NonPeriodicEmpty,
+                 GlobalInNakEffective, GlobalOutNakEffective, EarlySuspend, Suspend, Reset, EnumerationDone,
+                 IsochronousDropped, EndOfPeriodicFrame, InEndpoint, OutEndpoint, IncompleteInIsochronous,
+                 IncompleteOutIsochronous, PeriodicEmpty, ConnectorIdChange, SessionRequest, WakeUp>()),
+        0xD43C'FCFFU);
+    EXPECT_EQ(reset_value, 0x0400'0020U);
+  }
+  {
+    using namespace otg_fs_grxfsiz;
+    EXPECT_EQ((bits_of<Depth>()), 0x0000'FFFFU);
+    EXPECT_EQ(reset_value, 0x0000'0200U);
+  }
+  {
+    using namespace otg_fs_dieptxf;
+    EXPECT_EQ((bits_of<Start, Depth>()), 0xFFFF'FFFFU);
+    EXPECT_EQ(Start::mask, 0x0000'FFFFU);
+    EXPECT_EQ(reset_value_0, 0x0000'0200U);
+    EXPECT_EQ(reset_value_x, 0x0200'0400U);
+  }
+  {
+    using namespace otg_fs_dcfg;
+    EXPECT_EQ((bits_of<Speed, StallNonZeroStatus, Address, PeriodicFrameInterval>()), 0x0000'1FF7U);
+    EXPECT_EQ(full_speed, 3U);
+    EXPECT_EQ(reset_value, 0x0220'0000U);
+  }
+  {
+    using namespace otg_fs_dctl;
+    EXPECT_EQ((bits_of<RemoteWakeUp, SoftDisconnect, GlobalInNak, GlobalOutNak, SetGlobalInNak,
+                       ClearGlobalInNak, SetGlobalOutNak, ClearGlobalOutNak, PowerOnProgrammed>()),
+              0x0000'0F8FU);
+    EXPECT_EQ(SoftDisconnect::mask, 2U);
+  }
+  {
+    using namespace otg_fs_dsts;
+    EXPECT_EQ((bits_of<Suspended, EnumeratedSpeed, ErraticError, FrameNumber>()), 0x003F'FF0FU);
+    EXPECT_EQ(Suspended::mask, 1U);
+  }
+  {
+    using namespace otg_fs_daint;
+    EXPECT_EQ((bits_of<In, Out>()), 0xFFFF'FFFFU);
+    EXPECT_EQ(In::mask, 0x0000'FFFFU);
+  }
+  {
+    using namespace otg_fs_diepempmsk;
+    EXPECT_EQ((bits_of<EmptyInterrupt>()), 0x0000'FFFFU);
+  }
+  {
+    using namespace otg_fs_doepctl;
+    EXPECT_EQ((bits_of<MaximumPacket, Active, Nak, Type, Snoop, Stall, ClearNak, SetNak, SetData0, SetData1,
+                       Disable, Enable>()),
+              0xFC3E'87FFU);
+  }
+  {
+    using namespace otg_fs_dtxfsts;
+    EXPECT_EQ((bits_of<Available>()), 0x0000'FFFFU);
+  }
+  {
+    using namespace otg_fs_pcgcctl;
+    EXPECT_EQ((bits_of<StopPhyClock, GateCoreClock, PhySuspended>()), 0x0000'0013U);
+  }
+  {
+    using namespace rcc_ahb2enr;
+    EXPECT_EQ((bits_of<OtgFs>()), 0x0000'0080U);
+  }
+  {
     using namespace otg_fs_gahbcfg;
     EXPECT_EQ((bits_of<InterruptEnable, EmptyLevel>()), 0x0000'0081U);
   }

@@ -169,6 +169,8 @@ TEST(ThreePhasePwm, LegsChangeOnlyWhileDisarmed) {
   pwm.disarm();
   EXPECT_TRUE(pwm.enable_legs({}));
   EXPECT_EQ(timer.ccer, 0x555U);
+  EXPECT_TRUE(pwm.enable_legs({.a = false, .b = false, .c = false}));
+  EXPECT_EQ(timer.ccer, 0U);
 }
 
 TEST(ThreePhasePwm, DutyIsTicksAboveTheCompareValue) {
