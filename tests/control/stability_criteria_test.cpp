@@ -81,6 +81,7 @@ TEST(StabilityCriteria, WhatDoesNotApplyPassesWithoutNumbers) {
     for (const CriterionResult<double>& r : judge_all(c)) {
       if (r.criterion == Criterion::sampled_eigenvalues) {
         EXPECT_FALSE(r.applies);
+        EXPECT_FALSE(r.at_least);
       }
       if (r.applies) continue;
       EXPECT_TRUE(r.pass);
