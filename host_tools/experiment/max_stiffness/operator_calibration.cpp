@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -50,32 +48,20 @@ class Fit {
     return stiffness;
   }
 
-  /// The value in [0, most] whose stiffness comes nearest to the target: by halves until both sides of it
-  /// have been met, then by the Illinois form of false position, in half as many steps. The stiffness rises
-  /// in small steps.
+  /// The value in [0, most] whose stiffness comes nearest to the target.
   template <typename Measure>
   std::pair<double, double> search(double most, double target, const Measure& measure) {
     double low = 0.0, high = most, best = most, nearest = HUGE_VAL, stiffness = 0.0;
-    std::optional<double> below, above;  // stiffness above the target at either end, the weight of one halved
-    bool last_below = false;
     for (int step = 0; step < settings_.most_steps; ++step) {
-      double at = 0.5 * (low + high);
-      if (below && above) {
-        const double share = *below / (*below - *above);
-        at = low + std::clamp(share, 0.02, 0.98) * (high - low);
-      }
-      const double found = measure(at), over = found - target;
-      if (std::abs(over) < nearest) {
-        nearest = std::abs(over);
-        best = at;
+      const double middle = 0.5 * (low + high);
+      const double found = measure(middle);
+      if (std::abs(found - target) < nearest) {
+        nearest = std::abs(found - target);
+        best = middle;
         stiffness = found;
       }
       if (nearest <= settings_.tolerance) break;
-      const bool was_below = over < 0.0;
-      if (was_below == last_below && below && above) (was_below ? *above : *below) *= 0.5;
-      (was_below ? low : high) = at;
-      (was_below ? below : above) = over;
-      last_below = was_below;
+      (found < target ? low : high) = middle;
     }
     return {best, stiffness};
   }
