@@ -44,6 +44,7 @@ class TickWatch {
     paused_ = false;
     last_.reset();
   }
+  double longest() const { return longest_; }  ///< s
   std::uint64_t ticks() const { return ticks_; }
   void print(const char* what) const {
     std::printf("%-44s %8llu ticks, from one to the next %.2f to %.2f us\n", what,

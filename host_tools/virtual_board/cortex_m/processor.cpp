@@ -136,6 +136,7 @@ void Processor::execute() {
   if (protection_in_force() != applied_protection_) apply_protection();
   event_ = Event::none;
   attention_ = true;
+  const StoresBesideCode::Running running(stores_);
   const uc_err error = uc_emu_start(engine_.handle(), pc_ | 1U, 0, 0, 0);
   pc_ = engine_.get(UC_ARM_REG_PC);
   after_execution(error);

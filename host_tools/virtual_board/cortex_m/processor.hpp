@@ -11,6 +11,7 @@
 #include "host_tools/virtual_board/cortex_m/core_engine.hpp"
 #include "host_tools/virtual_board/cortex_m/core_peripherals.hpp"
 #include "host_tools/virtual_board/cortex_m/exception_frame.hpp"
+#include "host_tools/virtual_board/cortex_m/stores_beside_code.hpp"
 
 // The Cortex-M4F: instructions by Unicorn, exceptions, time and faults by us. PM0214, programming model.
 //
@@ -187,6 +188,7 @@ class Processor {
   const BoardClocks& clocks_;
   ProcessorConfig config_;
   CoreEngine engine_;
+  StoresBesideCode stores_;
   BlockTable blocks_;
   AccessLocator locator_;
   Schedule schedule_;

@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 
 #include "host_tools/virtual_board/cortex_m/processor.hpp"
-#include "host_tools/virtual_board/cortex_m/stores_beside_code.hpp"
 
 namespace kmax::virtual_board {
 namespace {
@@ -62,6 +61,8 @@ void Processor::map_memory() {
   uc_engine* engine = engine_.handle();
   const auto map = [&](std::span<std::uint8_t> bytes, std::uint32_t base, std::uint32_t rights) {
     CoreEngine::check(uc_mem_map_ptr(engine, base, bytes.size(), rights, bytes.data()), "mapping memory");
+    // Again: only this makes it read-only for translated code as well (stores_beside_code.hpp).
+    CoreEngine::check(uc_mem_protect(engine, base, bytes.size(), rights), "protecting memory");
   };
   using namespace memory_map;
   const std::uint32_t before = parameters.base - flash.base;
@@ -127,6 +128,8 @@ void Processor::add_hooks() {
 }
 
 void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
+  // It has been translated, whether or not it runs now.
+  if (!memory_map::flash.contains(address)) stores_.note_code_in_ram();
   // Unicorn forgets the IT state when it is stopped between the two halves of an IT block that the end of a
   // page cuts, and both ways would then be the same: interrupts wait for the block after.
   const bool inside_if_then =
@@ -145,10 +148,7 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
     return;
   }
   const Block* block = blocks_.find(address, size);
-  if (block == nullptr) {
-    if (!memory_map::flash.contains(address)) note_code_in_ram();
-    block = &blocks_.add(address, bus_.memory(address, size));
-  }
+  if (block == nullptr) block = &blocks_.add(address, bus_.memory(address, size));
   if (block->floating_point) {
     if (!core_.system_control.fpu_enabled()) {
       fail(fmt::format("floating-point instruction at {} while CPACR keeps the FPU off",

@@ -2,19 +2,12 @@
 
 #include <dlfcn.h>
 
-#include <atomic>
 #include <cstdint>
 
 namespace kmax::virtual_board {
 namespace {
 
-std::atomic<bool> code_in_ram{false};
-/// Unicorn's, of the engine that runs in this thread.
-thread_local void* executing_core = nullptr;
-
-bool only_data() {
-  return !code_in_ram.load(std::memory_order_relaxed);
-}
+thread_local StoresBesideCode* running = nullptr;
 
 /// The library's own, behind the one of this program.
 template <typename Function>
@@ -22,12 +15,27 @@ Function* of_the_library(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
 }
 
+using ForCore = void(void* core);
+using ForPage = void(void* core, std::uint32_t address);
+
+ForCore* forgets_addresses() {
+  static const auto function = of_the_library<ForCore>("tlb_flush_arm");
+  return function;
+}
+
 }  // namespace
 
-void note_code_in_ram() {
-  code_in_ram.store(true, std::memory_order_relaxed);
-  static const auto forget_addresses = of_the_library<void(void* core)>("tlb_flush_arm");
-  if (forget_addresses != nullptr && executing_core != nullptr) forget_addresses(executing_core);
+StoresBesideCode::Running::Running(StoresBesideCode& of) : before_(running) {
+  running = &of;
+}
+StoresBesideCode::Running::~Running() {
+  running = before_;
+}
+
+void StoresBesideCode::note_code_in_ram() {
+  if (code_in_ram_) return;
+  code_in_ram_ = true;
+  if (forgets_addresses() != nullptr && core_ != nullptr) forgets_addresses()(core_);
 }
 
 }  // namespace kmax::virtual_board
@@ -36,11 +44,11 @@ void note_code_in_ram() {
 #pragma GCC visibility push(default)
 extern "C" {
 
-// No engine's pages were collected while there was data only, so none have to be given back.
+// The pages of an engine that has data only were not collected, so none have to be given back.
 void* page_collection_lock_arm(void* engine, std::uintptr_t begin, std::uintptr_t end) {
-  if (kmax::virtual_board::only_data()) return nullptr;
-  static const auto lock =
-      kmax::virtual_board::of_the_library<decltype(page_collection_lock_arm)>("page_collection_lock_arm");
+  using namespace kmax::virtual_board;
+  if (running != nullptr && running->only_data()) return nullptr;
+  static const auto lock = of_the_library<decltype(page_collection_lock_arm)>("page_collection_lock_arm");
   return lock(engine, begin, end);
 }
 
@@ -62,21 +70,23 @@ void tb_invalidate_phys_page_fast_arm(void* engine, void* pages, std::uintptr_t 
 
 int cpu_exec_arm(void* engine, void* core) {
   static const auto execute = kmax::virtual_board::of_the_library<decltype(cpu_exec_arm)>("cpu_exec_arm");
-  kmax::virtual_board::executing_core = core;
+  if (kmax::virtual_board::running != nullptr) kmax::virtual_board::running->set_core(core);
   return execute(engine, core);
 }
 
 // Puts a page into the table of addresses; `attributes` is a structure of bit fields.
 void tlb_set_page_with_attrs_arm(void* core, std::uint32_t address, std::uint64_t physical,
                                  std::uint32_t attributes, int rights, int mode, std::uint32_t bytes) {
-  static const auto set_page = kmax::virtual_board::of_the_library<decltype(tlb_set_page_with_attrs_arm)>(
-      "tlb_set_page_with_attrs_arm");
-  static const auto set_dirty =
-      kmax::virtual_board::of_the_library<void(void* core, std::uint32_t address)>("tlb_set_dirty_arm");
+  using namespace kmax::virtual_board;
+  static const auto set_page =
+      of_the_library<decltype(tlb_set_page_with_attrs_arm)>("tlb_set_page_with_attrs_arm");
+  static const auto set_dirty = of_the_library<ForPage>("tlb_set_dirty_arm");
   set_page(core, address, physical, attributes, rights, mode, bytes);
-  // Only what was marked for the sake of translated code changes: registers and read-only memory are marked
-  // otherwise.
-  if (set_dirty != nullptr && kmax::virtual_board::only_data()) set_dirty(core, address);
+  // Only what was marked for the sake of translated code changes: registers, and memory that the engine knows
+  // as read-only, are marked otherwise. What could not be forgotten again is left as it is.
+  if (running != nullptr && running->only_data_for(core) && set_dirty != nullptr &&
+      forgets_addresses() != nullptr)
+    set_dirty(core, address);
 }
 }
 #pragma GCC visibility pop

@@ -41,8 +41,8 @@ struct WaitReport {
   double flash_if_all_kept = 0.0;   ///< instead of `flash`, where the cache keeps prefetched lines as well
 };
 
-/// The main loop while the CAN bus has not a free bit (four TPDOs every millisecond, one SDO request behind
-/// the other, the rest frames that the node lets through) and the serial line is asked again at once.
+/// The main loop while the CAN bus has not a free bit (FullBus) and the serial line is as busy as one Modbus
+/// master makes it.
 struct TrafficReport {
   double instructions = 0.0;                       ///< in a round's time, interrupts not counted
   double sdo_answers = 0.0, serial_replies = 0.0;  ///< in a second

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "firmware/object_dictionary/cob_id.hpp"
@@ -17,10 +18,13 @@ class FullBus {
   explicit FullBus(VirtualBoard& board)
       : asks_(board.can_bus(), bit_rate), shouts_(board.can_bus(), bit_rate) {
     asks_.on_frame([this](const drivers::CanFrame& frame, BoardTime now) {
+      namespace cob_id = firmware::canopen::cob_id;
       if ((frame.identifier & 0x7F) == node && frame.identifier > 0x180 &&
-          frame.identifier < firmware::canopen::cob_id::sdo_response)
+          frame.identifier < cob_id::sdo_response)
         ++telemetry_;
-      if (frame.identifier != firmware::canopen::cob_id::sdo_response + node) return;
+      if (frame.identifier != cob_id::sdo_response + node) return;
+      if (frame.data[0] == aborted) ++refusals_;
+      if (!std::equal(frame.data.begin() + 1, frame.data.begin() + 4, request.data.begin() + 1)) return;
       ++answers_;
       asks_.send(request, now);
     });
@@ -30,6 +34,7 @@ class FullBus {
                  board.now());
       board.run_for(2e-3);
     }
+    asks_.send(request, board.now());
     shouts_.babble(
         drivers::CanFrame{.identifier = firmware::canopen::cob_id::lss_request, .length = 8, .data = {0x7F}},
         board.now());
@@ -37,16 +42,18 @@ class FullBus {
 
   std::uint64_t answers() const { return answers_; }
   std::uint64_t telemetry() const { return telemetry_; }
+  /// Aborts among the answers: 0, or the bus is not what it is meant to be.
+  std::uint64_t refusals() const { return refusals_; }
 
  private:
   static constexpr std::uint32_t bit_rate = 1'000'000;
-  static constexpr std::uint8_t node = 1;
+  static constexpr std::uint8_t node = 1, aborted = 0x80;
   static constexpr drivers::CanFrame request{.identifier = firmware::canopen::cob_id::sdo_request + node,
                                              .length = 8,
                                              .data = {0x40, 0x12, 0x20, 2}};
 
   CanHostNode asks_, shouts_;
-  std::uint64_t answers_ = 0, telemetry_ = 0;
+  std::uint64_t answers_ = 0, telemetry_ = 0, refusals_ = 0;
 };
 
 }  // namespace kmax::virtual_board

@@ -94,6 +94,18 @@ TEST(ProcessorFault, StopsAtStoresToFlashButHandsOutThoseToTheParameterSectors) 
   refused.set(0, 0x0800'C000);
   expect_fault(refused, {"0x0800C004", "flash", "pc 0x08000202"});
 
+  // Of a page that the engine knows already: the program's own, and one that was loaded from.
+  ProgramOnCore own(store);
+  own.set(0, 0x0800'0300 - 4).set(1, 0x1234'5678);
+  expect_fault(own, {"0x08000300", "flash", "pc 0x08000202"});
+  EXPECT_NE(own.bus.load(0x0800'0300), 0x1234'5678U);
+  ProgramOnCore loaded({0x6842,    // ldr r2, [r0, #4]
+                        0x6041,    // str r1, [r0, #4]
+                        0xBE01});  // bkpt 1
+  loaded.set(0, 0x0800'C000).set(1, 0x1234'5678);
+  expect_fault(loaded, {"0x0800C004", "flash", "pc 0x08000202"});
+  EXPECT_NE(loaded.bus.load(0x0800'C004), 0x1234'5678U);
+
   ProgramOnCore without(store);
   without.set(0, 0x0800'4000);
   expect_fault(without, {"0x08004004", "parameter"});

@@ -288,4 +288,20 @@ TEST(Processor, RunsWhatWasStoredToRamLast) {
   }
 }
 
+// The branch's target is translated before the interrupt is taken.
+TEST(Processor, RunsWhatAnInterruptStoredToRamBeforeItsFirstRun) {
+  constexpr std::uint32_t place = 0x2000'0800;
+  ProgramOnCore board({0x8013,            // strh r3, [r2]
+                       0x6037,            // str r7, [r6]
+                       0x4780,            // blx r0
+                       0xBE01});          // bkpt 1
+  board.place(place, {0xBE02, 0x4770});   // bkpt 2, bx lr
+  board.handler(tim2, {0x8015, 0x4770});  // strh r5, [r2]; bx lr
+  board.core.exceptions.set_enabled(tim2, true);
+  board.set(0, place | 1).set(2, place).set(3, 0x2101).set(5, 0x2102).set(6, pend_word).set(7, tim2_bit);
+  ASSERT_EQ(board.run(), RunEnd::stopped);
+  ASSERT_EQ(board.processor.breakpoint(), 1);
+  EXPECT_EQ(board.get(1), 2U) << "movs r1, #2";
+}
+
 }  // namespace kmax::virtual_board::processor_test
