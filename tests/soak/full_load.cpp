@@ -71,10 +71,21 @@ class FullLoad {
   }
 
  private:
+  /// As soon as both handles are out of their walls: who pressed goes on with it while there is no force.
   void arm() {
-    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) bench_.master->arm(axis);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
+      for (int tries = 0;; ++tries) {
+        try {
+          bench_.master->arm(axis);
+          break;
+        } catch (const std::runtime_error&) {
+          if (tries == 300) throw;
+          bench_.board->run_for(0.1);
+        }
+      }
+    }
     bench_.board->run_for(0.05);
-    demand(bench_.board->bridge_armed(0) && bench_.board->bridge_armed(1), "an axis cannot be armed");
+    demand(armed(), "an axis cannot be armed");
   }
   bool armed() { return bench_.board->bridge_armed(0) && bench_.board->bridge_armed(1); }
   CaptureState capture_state() {
