@@ -25,6 +25,8 @@ const stateIs = (name, on = page) => on.waitForSelector(`#state[data-state=${nam
 const armed = () => page.heard.state.axes[0].armed;
 const field = (name) => page.locator(`#field-${name.replaceAll(".", "-")}`);
 const value = (name) => page.heard.parameters.values[name].value;
+/** Asked at intervals: frames, at which Playwright asks otherwise, may stand still where there is no screen and little time. */
+const eventually = (on, condition, argument) => on.waitForFunction(condition, argument, { polling: 100 });
 const set = async (name, text) => {
   await field(name).fill(text);
   await field(name).press("Tab");
@@ -34,7 +36,7 @@ let exported;  // the file
 const hold = async (name) => {
   const button = page.locator(`#start-${name}`);
   await button.scrollIntoViewIfNeeded();
-  await page.waitForFunction((id) => !document.getElementById(id).disabled, `start-${name}`);
+  await eventually(page, (id) => !document.getElementById(id).disabled, `start-${name}`);
   const box = await button.boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
@@ -50,7 +52,7 @@ const steps = {
     await stateIs("disarmed");
     assert.equal(await page.locator("#state-words").textContent(), "Disarmed");
     assert.match(await page.locator("#device").textContent(), /Kmax/);
-    await page.waitForFunction(() => document.querySelector("#criteria .verdict"));
+    await eventually(page, () => document.querySelector("#criteria .verdict"));
   },
   async "sliders set the device, and the drawn law follows"() {
     await page.click("summary");
@@ -70,11 +72,11 @@ const steps = {
     }
     console.log(`   after ${times.join(", ")} ms`);
     assert.equal(kmax(bus, "get", "wall.stiffness", "--json")["wall.stiffness"].value, 3000);
-    await page.waitForFunction(() => document.querySelector(".slider.changed"));
+    await eventually(page, () => document.querySelector(".slider.changed"));
   },
   async "what another program sets is shown"() {
     assert.ok(kmax(bus, "set", "wall.damping=0.5", "--json"));
-    await page.waitForFunction(() => document.getElementById("field-wall-damping").value === "0.5");
+    await eventually(page, () => document.getElementById("field-wall-damping").value === "0.5");
   },
   async "a press that does not last arms nothing, and one that loses the focus stops"() {
     const box = await page.locator("#arm").boundingBox();
@@ -83,7 +85,7 @@ const steps = {
     await page.mouse.up();
     await page.mouse.down();
     await page.evaluate(() => window.dispatchEvent(new Event("blur")));
-    await page.waitForFunction(() => document.getElementById("banner").textContent.includes("STOP was asked for"));
+    await eventually(page, () => document.getElementById("banner").textContent.includes("STOP was asked for"));
     await page.mouse.up();
     assert.equal(armed(), false);
   },
@@ -91,7 +93,7 @@ const steps = {
     await outside();
     await arm(page);
     assert.equal(await page.locator("#arm-words").textContent(), "Disarm");
-    await page.waitForFunction(() => Number.parseFloat(document.getElementById("loop-values").textContent.split("mm")[1].replace("−", "-")) > 0.2);
+    await eventually(page, () => Number.parseFloat(document.getElementById("loop-values").textContent.split("mm")[1].replace("−", "-")) > 0.2);
     assert.ok(await page.locator("#law").isDisabled());
   },
   async "stiffness is dragged while armed, up to its ceiling"() {
@@ -104,9 +106,9 @@ const steps = {
     });
     await until("stiffness follows the slider", () => value("wall.stiffness") === 4000);
     await set("wall.stiffness", "6");
-    await page.waitForFunction(() => document.getElementById("said").textContent.includes("wall.stiffness_ceiling"));
+    await eventually(page, () => document.getElementById("said").textContent.includes("wall.stiffness_ceiling"));
     assert.equal(value("wall.stiffness"), 4000);
-    await page.waitForFunction(() => document.getElementById("field-wall-stiffness").value === "4");
+    await eventually(page, () => document.getElementById("field-wall-stiffness").value === "4");
   },
   async "the space bar stops, with the focus anywhere"() {
     await field("wall.damping").focus();
@@ -118,12 +120,12 @@ const steps = {
   async "revert"() {
     await page.click("#revert");
     await until("stiffness is back", () => value("wall.stiffness") === 1000);
-    await page.waitForFunction(() => !document.querySelector(".slider.changed"));
+    await eventually(page, () => !document.querySelector(".slider.changed"));
   },
   async "a capture is drawn, and exported with where it is from"() {
     await page.click("[data-scope=capture]");
     await page.click("#capture");
-    await page.waitForFunction(() => document.getElementById("scope-words").textContent.includes("500 samples"));
+    await eventually(page, () => document.getElementById("scope-words").textContent.includes("500 samples"));
     const [file] = await Promise.all([page.waitForEvent("download"), page.click("#export")]);
     const lines = readFileSync(await file.path(), "utf8").trim().split("\n");
     const comments = lines.filter((line) => line.startsWith("#"));
@@ -142,14 +144,14 @@ const steps = {
     const bad = { name: "bad.csv", mimeType: "text/csv", buffer: Buffer.from("time_s,volume\n0,1\n") };
     const wrong = { name: "wrong.csv", mimeType: "text/csv", buffer: Buffer.from("time_s,position_m,force_n\n0,1,2\n1,x,2\n2,1,2\n") };
     await page.setInputFiles("#recording-files", [record, { name: "export.csv", mimeType: "text/csv", buffer: readFileSync(exported) }, bad, wrong]);
-    await page.waitForFunction(() => document.querySelectorAll("#legend li").length === 2);
+    await eventually(page, () => document.querySelectorAll("#legend li").length === 2);
     await page.click("#take");
-    await page.waitForFunction(() => document.querySelectorAll("#legend li").length === 3);
+    await eventually(page, () => document.querySelectorAll("#legend li").length === 3);
     const legend = await page.locator("#legend").textContent();
     assert.match(legend, /record\.csv2000 rows, 2 s, 0\.1 to 0\.1 N; it does not say where its wall is/);
     assert.match(legend, /export\.csv500 rows/);
     await page.setInputFiles("#recording-files", [bad, wrong]);
-    await page.waitForFunction(() => document.getElementById("recordings-said").textContent.includes("wrong.csv"));
+    await eventually(page, () => document.getElementById("recordings-said").textContent.includes("wrong.csv"));
     const said = await page.locator("#recordings-said").textContent();
     assert.match(said, /bad\.csv: there is no column position_m/);
     assert.match(said, /wrong\.csv, line 3: "x" is no number/);
@@ -160,7 +162,7 @@ const steps = {
     }));
     const withThree = await inked();
     for (let i = 0; i < 3; ++i) await page.click("#legend button");
-    await page.waitForFunction(() => !document.querySelector("#legend li"));
+    await eventually(page, () => !document.querySelector("#legend li"));
     assert.ok(withThree.every((count) => count > 1000) && (await inked()).every((count) => count === 0), `${withThree}, then ${await inked()}`);
     await page.click("nav [data-view=live]");
   },
@@ -182,26 +184,26 @@ const steps = {
     const size = await page.evaluate(() => Number.parseFloat(getComputedStyle(document.getElementById("prompt-words")).fontSize));
     assert.ok(size >= 70, `${size} px`);
     const other = await open(browser, served.address.url);
-    await other.waitForFunction(() => document.getElementById("prompt-words").textContent.includes("press it against the wall"));
+    await eventually(other, () => document.getElementById("prompt-words").textContent.includes("press it against the wall"));
     assert.ok(await other.locator("#answer").isHidden());
     await other.close();
     const prompt = page.heard.procedure.prompt;
     await page.keyboard.press("Enter");
     await page.waitForSelector("#state[data-state=armed]");
-    await page.waitForFunction(() => document.getElementById("prompt-words").textContent.includes("holding"));
+    await eventually(page, () => document.getElementById("prompt-words").textContent.includes("holding"));
     await until("the next prompt", () => page.heard.procedure.prompt > prompt);
     await page.waitForSelector("#answer:not([hidden])");
   },
   async "a procedure is cancelled, and one under way is stopped by the space bar"() {
     await page.click("#cancel");
-    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was cancelled"));
+    await eventually(page, () => document.getElementById("result").textContent.includes("was cancelled"));
     assert.equal(armed(), false);
     await hold("contact");
     await page.waitForSelector("#answer:not([hidden])");
     await page.click("#answer");
     await page.waitForSelector("#state[data-state=armed]");
     await page.keyboard.press("Space");
-    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was stopped"));
+    await eventually(page, () => document.getElementById("result").textContent.includes("was stopped"));
     await until("the axis is not armed", () => !armed());
   },
   async "a reload in the middle of a procedure ends it"() {
@@ -212,14 +214,14 @@ const steps = {
     await page.waitForSelector("#state[data-state=armed]");
     await page.reload();
     await until("it is over", () => page.heard.procedure.phase === "stopped" && !armed());
-    await page.waitForFunction(() => document.getElementById("result").textContent.includes("was stopped"));
+    await eventually(page, () => document.getElementById("result").textContent.includes("was stopped"));
   },
   async "two pages: the other one sees and stops"() {
     const other = await open(browser, served.address.url);
     await outside();
     await arm(page);
     await stateIs("armed", other);
-    await other.waitForFunction(() => document.getElementById("state-detail").textContent.includes("another page"));
+    await eventually(other, () => document.getElementById("state-detail").textContent.includes("another page"));
     await other.click("#stop");
     await stateIs("stopped");
     await other.close();
@@ -230,7 +232,7 @@ const steps = {
     await arm(page);
     await page.reload();
     // The page itself stops as it is hidden; if it cannot any more, kmax view does.
-    await page.waitForFunction(() => /Stopped: (STOP|the page that had armed)/.test(document.getElementById("banner").textContent));
+    await eventually(page, () => /Stopped: (STOP|the page that had armed)/.test(document.getElementById("banner").textContent));
     await until("the axis is not armed", () => !armed());
   },
   async "another page of the same browser can do nothing, not even with the token"() {
@@ -260,7 +262,7 @@ const steps = {
     const plain = await context.newPage();
     await plain.route("**/uplot.*", (route) => route.abort());
     await plain.goto(served.address.url);
-    await plain.waitForFunction(() => document.getElementById("plots").textContent.includes("velocity"));
+    await eventually(plain, () => document.getElementById("plots").textContent.includes("velocity"));
     await context.close();
   },
   async "a link that is lost is said, and made anew"() {
@@ -270,13 +272,13 @@ const steps = {
     rmSync(bus, { force: true });
     running = await device(command, bus);
     await stateIs("disarmed");
-    await page.waitForFunction(() => document.getElementById("scope-words").textContent.includes("rows a second"));
+    await eventually(page, () => document.getElementById("scope-words").textContent.includes("rows a second"));
   },
   async "kmax view that ends disarms, and the page finds the next one"() {
     await outside();
     await arm(page);
     await served.end("SIGINT");
-    await page.waitForFunction(() => document.getElementById("state-words").textContent.includes("cannot be reached"));
+    await eventually(page, () => document.getElementById("state-words").textContent.includes("cannot be reached"));
     assert.equal(kmax(bus, "state", "--axis", "0", "--json").axes[0].armed, false);
   },
 };
