@@ -428,10 +428,9 @@ std::string budget_table(const BudgetReport& report) {
       report.with_waits.mean, report.with_waits.flash, report.with_waits.flash_if_all_kept,
       report.with_waits.buses, report.with_waits.worst);
   text += fmt::format(
-      "\nmain loop with the CAN bus full and a Modbus master that never rests: {:.0f} instructions in a "
-      "round's time; {:.0f} "
-      "SDO answers and "
-      "{:.0f} serial\nreplies of 124 registers a second\n",
+      "\nmain loop with the CAN bus full and one Modbus master that asks: {:.0f} instructions in a round's "
+      "time; "
+      "{:.0f} SDO\nanswers and {:.0f} serial replies of 124 registers a second\n",
       report.with_traffic.instructions, report.with_traffic.sdo_answers, report.with_traffic.serial_replies);
   text +=
       "\nInstructions are exact; one that an IT block skips counts as executed. Cycles are a model (no wait "
