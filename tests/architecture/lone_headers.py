@@ -7,6 +7,9 @@ hides that one of them is missing. So is the costliest of DEAR, for a header tha
 the includes is all that this hides. A header that another one includes before any other of this repository
 has compiled by itself there, and is not compiled again. --plain has nothing precompiled, compiles each and finds that too;
 it is how the preset plain runs this. On x86 the chip's headers compile as well: they name registers but touch none.
+
+What the compiler said of a header is remembered for as long as nothing changed that the header includes; see
+scripts/compiler_checks.py.
 """
 
 import subprocess
@@ -15,15 +18,20 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from os import cpu_count
 from pathlib import Path
+from threading import RLock
 
 from source_text import includes
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from compiler_checks import forget_the_old, remembered  # noqa: E402
+
 # What takes the compiler longest, by what each includes.
 DEAR = ["firmware/parameters/parameter_values.hpp", "firmware/canopen/communication_rules.hpp", "host_tools/device/device.hpp",
         "firmware/application.hpp", "host_tools/simulation/scene.hpp"]
 FLOORS = ["control", "drivers", "firmware", "board", "host_tools"]
-CLANG = ["clang++", "-std=c++20", f"-I{ROOT}", f"-I{ROOT}/host_tools/libkmax", "-isystem", "/usr/include/eigen3", "-DKMAX_AXIS_COUNT=2",
+CLANG = ["clang++", "-std=c++20", "-I.", "-Ihost_tools/libkmax", "-isystem", "/usr/include/eigen3", "-DKMAX_AXIS_COUNT=2",
          '-DKMAX_VERSION=""', "-fconstexpr-steps=100000000", "-Wno-pragma-once-outside-header", "-x", "c++-header"]
 
 
@@ -39,7 +47,8 @@ def precompiled(listed, text, *first):
     """The compiler's options that bring what `text` includes."""
     result = listed.with_suffix(".pch")
     listed.write_text(text)
-    subprocess.run([*CLANG, *first, "-fpch-instantiate-templates", str(listed), "-o", str(result)], check=True)
+    subprocess.run([*CLANG, *first, "-fpch-instantiate-templates", str(listed), "-o", str(result)], check=True,
+                   cwd=ROOT)
     return "-include-pch", str(result)
 
 
@@ -48,11 +57,15 @@ def libraries_of(headers):
     return "".join(f"#include <{name}>\n" for name in sorted(names))
 
 
+def place_of(include):
+    return f"host_tools/libkmax/{include.target}" if include.target.startswith("kmax/") else include.target
+
+
 @cache
 def included_by(header):
     """All of this repository that a header includes, whether itself or through others."""
     path = ROOT / header
-    own = {include.target for include in includes(path.read_text()) if include.quoted} if path.is_file() else set()
+    own = {place_of(include) for include in includes(path.read_text()) if not is_library(include)} if path.is_file() else set()
     return own.union(*map(included_by, own))
 
 
@@ -68,32 +81,51 @@ def without_those_that_come_first(headers):
 
 def message_of(header, first):
     """What the compiler says of `header` alone after the options `first`; empty when nothing is missing."""
-    return subprocess.run([*CLANG, *first, "-fsyntax-only", str(header)], capture_output=True, text=True,
-                          check=False).stderr
+    return subprocess.run([*CLANG, *first, "-fsyntax-only", header], capture_output=True, text=True, check=False,
+                          cwd=ROOT).stderr
+
+
+class Check:
+    """Of headers of this repository, each by itself but for what is precompiled."""
+
+    def __init__(self, folder, headers, plain):
+        self.folder, self.plain = folder, plain
+        self.libraries = "" if plain else libraries_of(headers)
+        self.made, self.lock = {}, RLock()
+
+    def options(self, dear):
+        """Those that bring what is precompiled, which is made when it is first needed. Empty `dear`: the libraries alone."""
+        if self.plain:
+            return ()
+        with self.lock:
+            if dear not in self.made:
+                self.made[dear] = (precompiled(self.folder / Path(dear).name, f'#include "{dear}"\n', *self.options("")) if dear
+                                   else precompiled(self.folder / "libraries.hpp", self.libraries))
+            return self.made[dear]
+
+    def message(self, header):
+        name = str(header.relative_to(ROOT))
+        read = [name, *sorted(file for file in included_by(name) if (ROOT / file).is_file())]
+        dear = [dear for dear in ["", *DEAR] if not dear or dear in read[1:]][-1]
+        texts = [(ROOT / file).read_text() for file in read]
+        return remembered([Path(__file__).read_text(), self.libraries, dear, *read, *texts],
+                          lambda: message_of(name, self.options(dear)))
 
 
 def main(folder, plain):
     folder.mkdir(parents=True, exist_ok=True)
     headers = [header for floor in FLOORS for header in sorted((ROOT / floor).rglob("*.hpp"))]
-    # By how much it includes: what is to be precompiled before a header.
-    ready = [("", ())]
-    if not plain:
-        ready = [("", precompiled(folder / "libraries.hpp", libraries_of(headers)))]
-        ready += [(dear, precompiled(folder / Path(dear).name, f'#include "{dear}"\n', *ready[0][1])) for dear in DEAR]
-
-    def before(header):
-        present = included_by(str(header.relative_to(ROOT)))
-        return [first for dear, first in ready if not dear or dear in present][-1]
-
     broken = folder / "broken.hpp"
     broken.write_text('#include "control/wall_law.hpp"\ninline kmax::firmware::Axis* nothing() { return nullptr; }\n')
-    if not message_of(broken, ready[0][1]):
+    if not message_of(str(broken), ()):
         sys.exit("the check itself is broken: it does not see what a header lacks")
     compiled = headers if plain else without_those_that_come_first(headers)
+    check = Check(folder, headers, plain)
     with ThreadPoolExecutor(cpu_count()) as pool:
-        messages = list(pool.map(lambda header: message_of(header, before(header)), compiled))
+        messages = list(pool.map(check.message, compiled))
+    forget_the_old()
     print("".join(messages), end="")
-    print(f"{len(headers)} headers, {len(compiled)} of them compiled; {sum(map(bool, messages))} lack something")
+    print(f"{len(headers)} headers, {len(compiled)} of them looked at; {sum(map(bool, messages))} lack something")
     return any(messages)
 
 
