@@ -14,7 +14,13 @@ const [extent, ...command] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), "kmax-view-"));
 const bus = join(folder, "bus");
 const browser = await launch();
-let running = await device(command, bus);
+// On a busy machine kmax view may not get to run for a second, for which the device would take the force.
+const patientDevice = async () => {
+  const started = await device(command, bus);
+  assert.ok(kmax(bus, "set", "link.timeout=30", "--json"));
+  return started;
+};
+let running = await patientDevice();
 let served = await view(bus);
 let page = await open(browser, served.address.url);
 page.setDefaultTimeout(PATIENCE);
@@ -270,7 +276,7 @@ const steps = {
     await stateIs("lost");
     assert.equal(await page.locator("#state-words").textContent(), "Link lost");
     rmSync(bus, { force: true });
-    running = await device(command, bus);
+    running = await patientDevice();
     await stateIs("disarmed");
     await eventually(page, () => document.getElementById("scope-words").textContent.includes("rows a second"));
   },
@@ -291,7 +297,7 @@ for (const [name, step] of chosen) {
     console.log(`ok ${name}`);
   } catch (error) {
     ++failed;
-    console.log(`FAILED ${name}: ${error.stack}\nview: ${served.said}\ndevice: ${running.said}`);
+    console.log(`FAILED ${name}: ${error.stack}\nstate: ${JSON.stringify(page.heard.state)}\nview: ${served.said}\ndevice: ${running.said}`);
     await page.screenshot({ path: join(tmpdir(), "kmax_view_failed.png") });
     break;  // the next step begins where this one should have ended
   }
