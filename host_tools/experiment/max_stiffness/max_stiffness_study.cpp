@@ -36,6 +36,18 @@ report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condit
   return target && condition.paper == target ? report::Origin::calibrated : report::Origin::predicted;
 }
 
+MaxStiffness search_from(double taken_for_stable, const TouchSetup& setup, const StiffnessRun& run) {
+  if (taken_for_stable > run.steps.first) {
+    StiffnessSteps steps = run.steps;
+    steps.first = taken_for_stable;
+    steps.first_adaptive.reset();
+    steps.goes_down = false;
+    const MaxStiffness result = search_max_stiffness(setup, run.protocol, steps);
+    if (result.stiffness > 0.0) return result;
+  }
+  return search_max_stiffness(setup, run.protocol, run.steps);
+}
+
 }  // namespace
 
 std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jobs, const StiffnessRun& run) {
@@ -52,7 +64,7 @@ std::vector<MaxStiffness> run_stiffness_jobs(const std::vector<StiffnessJob>& jo
         }
         TouchSetup setup = job.setup;
         setup.integrator = run.integrator;
-        result = search_max_stiffness(setup, run.protocol, run.steps);
+        result = search_from(job.taken_for_stable, setup, run);
         if (run.journal != nullptr) {
           RunJournal::Json json;
           write_fields(json, result, search_fields);

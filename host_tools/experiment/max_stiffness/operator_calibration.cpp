@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "host_tools/experiment/paper_numbers.hpp"
 
@@ -40,38 +43,78 @@ class Fit {
   }
 
   double mean(double friction, double gain, bool magnetic) {
-    const MaxStiffnessStudy study =
-        run_max_stiffness_study(with(set_, friction, gain), {constant_field(magnetic ? 2.0 : 0.0)}, run_);
-    const double stiffness = study.conditions.front().mean();
-    result.simulated_time += study.simulated_time;
-    result.steps.push_back({friction, gain, magnetic, stiffness});
-    return stiffness;
+    const SubjectSet set = with(set_, friction, gain);
+    const StiffnessCondition condition = constant_field(magnetic ? 2.0 : 0.0);
+    std::vector<StiffnessJob> jobs;
+    for (std::size_t i = 0; i < set.subjects.size(); ++i) {
+      jobs.push_back({"", touch_setup(set.device, set.subjects[i].person, condition),
+                      at_low_.empty() ? 0.0 : at_low_[i].stiffness});
+      run_.changes.apply(jobs.back().setup);
+    }
+    found_ = run_stiffness_jobs(jobs, run_);
+    for (const MaxStiffness& person : found_) result.simulated_time += person.simulated_time;
+    result.steps.push_back({friction, gain, magnetic, mean_stiffness(found_)});
+    return result.steps.back().stiffness;
   }
 
-  /// The value in [0, most] whose stiffness comes nearest to the target.
+  /// The value in [0, most] whose stiffness comes nearest to the target, and that; `likely`: as in the
+  /// settings.
   template <typename Measure>
-  std::pair<double, double> search(double most, double target, const Measure& measure) {
-    double low = 0.0, high = most, best = most, nearest = HUGE_VAL, stiffness = 0.0;
-    for (int step = 0; step < settings_.most_steps; ++step) {
-      const double middle = 0.5 * (low + high);
-      const double found = measure(middle);
-      if (std::abs(found - target) < nearest) {
-        nearest = std::abs(found - target);
-        best = middle;
-        stiffness = found;
-      }
-      if (nearest <= settings_.tolerance) break;
-      (found < target ? low : high) = middle;
-    }
-    return {best, stiffness};
+  std::pair<double, double> search(double most, double likely, double target, const Measure& measure) {
+    if (!(likely > 0.0 && likely < most)) return interval_search(most, std::nullopt, target, measure);
+    const auto rough = interval_search(most, Start{likely, 1.25, true}, target, measure);
+    if (rough.first == 0.0) return rough;
+    return interval_search(most, Start{rough.first, 1.02, false}, target, measure);
   }
 
   OperatorCalibration result;
 
  private:
+  struct Start {
+    double value;
+    double factor;     ///< from there outwards, each time its square, until both ends are known
+    bool people_rise;  ///< each begins where it is at the lower end
+  };
+
+  template <typename Measure>
+  std::pair<double, double> interval_search(double most, std::optional<Start> start, double target,
+                                            const Measure& measure) {
+    double low = 0.0, high = most, best = most, nearest = HUGE_VAL, stiffness = 0.0;
+    bool low_known = !start, high_known = !start;
+    at_low_.clear();
+    for (int step = 0; step < settings_.most_steps; ++step) {
+      double value = 0.5 * (low + high);
+      if (!low_known && !high_known) {
+        value = start->value;
+      } else if (!high_known) {
+        value = std::min(start->factor * low, most);
+        start->factor *= start->factor;
+      } else if (!low_known) {
+        // Out of reach if nothing at all is too much.
+        value = step < 3 ? high / start->factor : 0.0;
+        start->factor *= start->factor;
+      }
+      const double found = measure(value);
+      if (std::abs(found - target) < nearest) {
+        nearest = std::abs(found - target);
+        best = value;
+        stiffness = found;
+      }
+      if (nearest <= settings_.tolerance || (found >= target && value == 0.0)) break;
+      (found < target ? low : high) = value;
+      (found < target ? low_known : high_known) = true;
+      if (start && start->people_rise && found < target) at_low_ = found_;
+    }
+    at_low_.clear();
+    return {best, stiffness};
+  }
+
   SubjectSet set_;
   const CalibrationSettings& settings_;
   StiffnessRun run_;
+  std::vector<MaxStiffness> found_;  ///< of the last mean, in the order of the people
+  std::vector<MaxStiffness>
+      at_low_;  ///< at the interval's lower end; empty: each is looked for from the first
 };
 
 }  // namespace
@@ -93,13 +136,14 @@ OperatorCalibration calibrate_operator(const SubjectSet& set, const CalibrationS
   double friction = set.device.friction;
   double plain = 0.0;
   if (settings.fit_friction) {
-    std::tie(friction, plain) = fit.search(settings.friction_most, settings.plain_target,
-                                           [&](double value) { return fit.mean(value, 0.0, false); });
+    std::tie(friction, plain) =
+        fit.search(settings.friction_most, settings.likely_friction, settings.plain_target,
+                   [&](double value) { return fit.mean(value, 0.0, false); });
   } else {
     plain = fit.mean(friction, 0.0, false);
   }
   const auto [gain, magnetic] =
-      fit.search(settings.gain_most, settings.magnetic_target,
+      fit.search(settings.gain_most, settings.likely_gain, settings.magnetic_target,
                  [&, force = friction](double value) { return fit.mean(force, value, true); });
   OperatorCalibration result = std::move(fit.result);
   result.friction = friction;

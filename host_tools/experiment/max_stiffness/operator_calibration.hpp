@@ -20,6 +20,11 @@ struct CalibrationSettings {
   bool fit_friction = true;
   double friction_most = 1.0;  // N; searched from 0
   double gain_most = 8.0;      // 1/N
+  // Where they are likely to be, N and 1/N: from there the interval's ends are sought in growing steps, since
+  // far above, where halving from 0 to the most begins, walls stay stable for long. It is done twice: first
+  // each person's stiffness is taken to rise as the mean does and looked for from where it is at the
+  // interval's lower end; then, from what that found, as it is. 0: not known.
+  double likely_friction = 0.0, likely_gain = 0.0;
 };
 
 CalibrationSettings paper_targets();

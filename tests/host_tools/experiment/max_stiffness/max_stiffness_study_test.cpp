@@ -117,6 +117,27 @@ TEST(MaxStiffnessStudy, KnowsHowFastTheHandleWasAtContact) {
   EXPECT_GT(speeds()[1].at_contact, usual[1].at_contact + 0.1);
 }
 
+TEST(MaxStiffnessStudy, WhatIsTakenForStableSavesTouches) {
+  const Subject person = few_people(1).subjects.front();
+  const auto found_from = [&](double taken_for_stable) {
+    const StiffnessJob job{"", touch_setup({}, person.person, stiffness_conditions()[2]), taken_for_stable};
+    return run_stiffness_jobs({job}, quick_run()).front();
+  };
+  const MaxStiffness whole = found_from(0.0);
+  ASSERT_GT(whole.stiffness, 2000.0);
+  const MaxStiffness half = found_from(std::round(whole.stiffness / 200.0) * 100.0);
+  EXPECT_EQ(half.stiffness, whole.stiffness);
+  EXPECT_EQ(half.ending_peak_to_peak, whole.ending_peak_to_peak);
+  EXPECT_LT(half.touches, whole.touches);
+  const MaxStiffness at_it = found_from(whole.stiffness);
+  EXPECT_EQ(at_it.stiffness, whole.stiffness);
+  EXPECT_LT(at_it.touches, 5U);
+  // It was not: nothing of it is left.
+  const MaxStiffness above = found_from(whole.stiffness + 100.0);
+  EXPECT_EQ(above.stiffness, whole.stiffness);
+  EXPECT_EQ(above.touches, whole.touches);
+}
+
 TEST(MaxStiffnessStudy, CountsThePeopleWhoseNumberIsABound) {
   std::vector<MaxStiffness> found(4);
   found[0].stiffness = found[1].stiffness = 40e3;

@@ -34,6 +34,44 @@ TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
   EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
 }
 
+// From values that are right, too small and too large the same targets are met in fewer touches. Values
+// beyond what is allowed are not used.
+TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
+  SubjectSet truth = few_people(3);
+  truth.device.friction = 0.14;
+  for (Subject& subject : truth.subjects) subject.person.activation_gain = 0.7;
+  const auto conditions = stiffness_conditions();
+  const auto made = run_max_stiffness_study(truth, {conditions[0], conditions[4]}, quick_run());
+  CalibrationSettings settings{};
+  settings.plain_target = made.conditions[0].mean();
+  settings.magnetic_target = made.conditions[1].mean();
+  settings.tolerance = 50.0;
+  const OperatorCalibration by_halving = calibrate_operator(few_people(3), settings, quick_run());
+  for (const auto& [friction, gain] : {std::pair{0.14, 0.7}, {0.1, 1.1}, {0.25, 0.4}, {2.0, 9.0}}) {
+    settings.likely_friction = friction;
+    settings.likely_gain = gain;
+    const OperatorCalibration fit = calibrate_operator(few_people(3), settings, quick_run());
+    EXPECT_NEAR(fit.plain, settings.plain_target, 50.0) << friction;
+    EXPECT_NEAR(fit.magnetic, settings.magnetic_target, 50.0) << gain;
+    if (friction < 1.0) {
+      EXPECT_LT(fit.simulated_time, 0.5 * by_halving.simulated_time) << friction;
+    } else {
+      EXPECT_EQ(fit.friction, by_halving.friction);
+    }
+    // What it says of itself is what its set gives, each person looked for from the first stiffness.
+    const auto again = run_max_stiffness_study(fit.set, {conditions[0], conditions[4]}, quick_run());
+    EXPECT_EQ(again.conditions[0].mean(), fit.plain);
+    EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
+  }
+  settings.magnetic_target = 100.0;
+  settings.likely_friction = 0.14;
+  settings.likely_gain = 0.7;
+  const OperatorCalibration too_stiff = calibrate_operator(few_people(3), settings, quick_run());
+  EXPECT_TRUE(too_stiff.plain_met && !too_stiff.magnetic_met);
+  EXPECT_EQ(too_stiff.activation_gain, 0.0);
+  EXPECT_LT(too_stiff.steps.size(), 8U);
+}
+
 TEST(OperatorCalibration, SaysWhenATargetIsOutOfReach) {
   CalibrationSettings settings = paper_targets();
   EXPECT_EQ(settings.plain_target, 3580.0);
