@@ -155,7 +155,8 @@ std::vector<report::Section> variation_sections(
     const std::string& heading, const std::vector<SubjectSet>& sets, const StiffnessRun& run,
     const std::function<std::vector<Variation>(const SubjectSet&)>& make) {
   experiment::CalibrationSettings calibration = experiment::paper_targets();
-  // Half of what still counts as met: nearer, the mean jumps up and down by hundreds of N/m with the value.
+  // Half of the smaller bound of what still counts as met: the mean jumps up and down by hundreds of N/m from
+  // one value to the next.
   calibration.tolerance = 0.5 * experiment::plain_tolerance;
   calibration.most_steps = 10;
   std::vector<report::Section> sections;

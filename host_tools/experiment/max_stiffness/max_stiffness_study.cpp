@@ -37,15 +37,17 @@ report::Origin origin_of(const SubjectSet& set, const StiffnessCondition& condit
 }
 
 MaxStiffness search_from(double taken_for_stable, const TouchSetup& setup, const StiffnessRun& run) {
-  if (taken_for_stable > run.steps.first) {
-    StiffnessSteps steps = run.steps;
-    steps.first = taken_for_stable;
-    steps.first_adaptive.reset();
-    steps.goes_down = false;
-    const MaxStiffness result = search_max_stiffness(setup, run.protocol, steps);
-    if (result.stiffness > 0.0) return result;
-  }
-  return search_max_stiffness(setup, run.protocol, run.steps);
+  if (!(taken_for_stable > run.steps.first)) return search_max_stiffness(setup, run.protocol, run.steps);
+  StiffnessSteps steps = run.steps;
+  steps.first = taken_for_stable;
+  steps.first_adaptive.reset();
+  steps.goes_down = false;
+  const MaxStiffness shortened = search_max_stiffness(setup, run.protocol, steps);
+  if (shortened.stiffness > 0.0) return shortened;
+  MaxStiffness whole = search_max_stiffness(setup, run.protocol, run.steps);
+  whole.touches += shortened.touches;
+  whole.simulated_time += shortened.simulated_time;
+  return whole;
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ struct StiffnessJob {
   std::string name;  // unique within a journal, which knows it by this
   TouchSetup setup;
   // N/m, a step of the run's: what lies below is taken for stable, and the search begins here. If this is not
-  // stable, it is made again from the run's first stiffness. 0: from there at once.
+  // stable, the search is made again from the run's first stiffness. 0: it begins there.
   double taken_for_stable = 0.0;
 };
 

@@ -36,8 +36,9 @@ class Fit {
     // Every step has other numbers: a journal of the run knows none of them.
     run_.journal = nullptr;
     if (run.progress) {
-      run_.progress = [this, report = run.progress](std::size_t, std::size_t) {
-        report(result.steps.size(), 2 * static_cast<std::size_t>(settings_.most_steps));
+      const std::size_t searches = settings.likely_friction > 0.0 || settings.likely_gain > 0.0 ? 4 : 2;
+      run_.progress = [this, searches, report = run.progress](std::size_t, std::size_t) {
+        report(result.steps.size(), searches * static_cast<std::size_t>(settings_.most_steps));
       };
     }
   }
@@ -72,8 +73,8 @@ class Fit {
  private:
   struct Start {
     double value;
-    double factor;     ///< from there outwards, each time its square, until both ends are known
-    bool people_rise;  ///< each begins where it is at the lower end
+    double factor;  ///< between it and the next; squared for each one after, until both ends are known
+    bool rough;     ///< each person begins where they were at the lower end
   };
 
   template <typename Measure>
@@ -90,8 +91,8 @@ class Fit {
         value = std::min(start->factor * low, most);
         start->factor *= start->factor;
       } else if (!low_known) {
-        // Out of reach if nothing at all is too much.
-        value = step < 3 ? high / start->factor : 0.0;
+        // If even 0 gives too much, the target is out of reach, which is asked after two steps.
+        value = start->rough && step > 2 ? 0.0 : high / start->factor;
         start->factor *= start->factor;
       }
       const double found = measure(value);
@@ -100,10 +101,11 @@ class Fit {
         best = value;
         stiffness = found;
       }
-      if (nearest <= settings_.tolerance || (found >= target && value == 0.0)) break;
+      const bool out_of_reach = found < target ? value == most : value == 0.0;
+      if (nearest <= settings_.tolerance || out_of_reach) break;
       (found < target ? low : high) = value;
       (found < target ? low_known : high_known) = true;
-      if (start && start->people_rise && found < target) at_low_ = found_;
+      if (start && start->rough && found < target) at_low_ = found_;
     }
     at_low_.clear();
     return {best, stiffness};

@@ -5,8 +5,9 @@
 // out at any other is prediction.
 //
 // The friction is found first: the plain wall has no field, so gamma has no part in it. Both are found by
-// halving an interval, since the mean stiffness rises with either; the mean moves in steps of 100 N/m divided
-// by the number of people, and the value nearest to the target is kept.
+// halving an interval, since the mean stiffness rises with either, if only roughly: it moves in steps of
+// 100 N/m divided by the number of people, and up and down by hundreds of N/m between values that lie close
+// together. The value nearest to the target is kept.
 
 #include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 
@@ -20,10 +21,11 @@ struct CalibrationSettings {
   bool fit_friction = true;
   double friction_most = 1.0;  // N; searched from 0
   double gain_most = 8.0;      // 1/N
-  // Where they are likely to be, N and 1/N: from there the interval's ends are sought in growing steps, since
-  // far above, where halving from 0 to the most begins, walls stay stable for long. It is done twice: first
-  // each person's stiffness is taken to rise as the mean does and looked for from where it is at the
-  // interval's lower end; then, from what that found, as it is. 0: not known.
+  // Where they are likely to be, N and 1/N; 0: not known. From there the interval's ends are sought in
+  // growing steps, since far above, where halving from 0 to the most begins, walls stay stable for long. The
+  // search is made twice, each in `most_steps` at most. The first is rough: each person's stiffness is
+  // searched from what it was at the interval's lower end. The second begins at the value found and searches
+  // each from the run's first stiffness.
   double likely_friction = 0.0, likely_gain = 0.0;
 };
 

@@ -14,7 +14,7 @@ const [extent, ...command] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), "kmax-view-"));
 const bus = join(folder, "bus");
 const browser = await launch();
-// On a busy machine kmax view may not get to run for a second, for which the device would take the force.
+// On a busy machine kmax view may not run for a whole second (link.timeout), and the device would then remove the force.
 const patientDevice = async () => {
   const started = await device(command, bus);
   assert.ok(kmax(bus, "set", "link.timeout=30", "--json"));

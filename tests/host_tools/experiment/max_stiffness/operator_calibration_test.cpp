@@ -34,8 +34,8 @@ TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
   EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
 }
 
-// From values that are right, too small and too large the same targets are met in fewer touches. Values
-// beyond what is allowed are not used.
+// From values that are right, too small and too large the same targets are met in less time. Values beyond
+// what is allowed are not used.
 TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
   SubjectSet truth = few_people(3);
   truth.device.friction = 0.14;
@@ -70,6 +70,14 @@ TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
   EXPECT_TRUE(too_stiff.plain_met && !too_stiff.magnetic_met);
   EXPECT_EQ(too_stiff.activation_gain, 0.0);
   EXPECT_LT(too_stiff.steps.size(), 8U);
+  // Nor is the other end walked along.
+  settings.magnetic_target = made.conditions[1].mean();
+  settings.gain_most = 0.2;
+  settings.likely_gain = 0.1;
+  const OperatorCalibration too_soft = calibrate_operator(few_people(3), settings, quick_run());
+  EXPECT_TRUE(too_soft.plain_met && !too_soft.magnetic_met);
+  EXPECT_NEAR(too_soft.activation_gain, 0.2, 0.01);
+  EXPECT_LT(too_soft.steps.size(), 10U);
 }
 
 TEST(OperatorCalibration, SaysWhenATargetIsOutOfReach) {
