@@ -17,31 +17,46 @@ MONTH = 30 * 24 * 3600  # s
 
 
 @cache
-def packages():
-    """All that is installed: compilers, their libraries and every header that is not of this repository."""
-    return subprocess.run(["dpkg-query", "-W"], capture_output=True, check=False).stdout
+def unchanging():
+    """All that is installed, which is compilers, their libraries and every header that is not of this repository; and how
+    it is remembered."""
+    return subprocess.run(["dpkg-query", "-W"], capture_output=True, check=True).stdout + Path(__file__).read_bytes()
+
+
+def key_of(texts):
+    seen = hashlib.sha256(unchanging())
+    for text in texts:
+        seen.update(len(text.encode()).to_bytes(8, "big"))
+        seen.update(text.encode())
+    return seen.hexdigest()
 
 
 def remembered(read, check):
-    """`check()`, which json can hold, or what it gave before for the same `read`: texts, of all that it depends on besides
-    the installed packages. KMAX_TEST_ALL=1 in the environment asks again in any case."""
-    seen = hashlib.sha256(packages())
-    for text in read:
-        seen.update(len(text).to_bytes(8, "big"))
-        seen.update(text.encode())
-    file = FOLDER / seen.hexdigest()
-    if os.environ.get("KMAX_TEST_ALL") != "1" and file.is_file():
-        file.touch()
-        return json.loads(file.read_text())
+    """`check()`, which json can hold, or what it gave before for the same `read()`: the texts of all that it depends on
+    besides the installed packages. What changes meanwhile, and what `check` raises, is not remembered. KMAX_TEST_ALL=1 in
+    the environment asks again in any case."""
+    key = key_of(read())
+    file = FOLDER / key
+    if os.environ.get("KMAX_TEST_ALL") != "1":
+        try:
+            known = json.loads(file.read_text())
+            os.utime(file)
+            return known
+        except (OSError, ValueError):
+            pass
     result = check()
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_suffix(f".{os.getpid()}.{id(result)}")
-    unfinished.write_text(json.dumps(result))
-    unfinished.replace(file)
+    if key_of(read()) == key:
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        unfinished = FOLDER / f"{key}.{os.getpid()}"
+        unfinished.write_text(json.dumps(result))
+        unfinished.replace(file)
     return result
 
 
 def forget_the_old():
     for file in FOLDER.glob("*"):
-        if time.time() - file.stat().st_mtime > MONTH:
-            file.unlink(missing_ok=True)
+        try:
+            if time.time() - file.stat().st_mtime > MONTH:
+                file.unlink()
+        except FileNotFoundError:
+            pass  # another process was first

@@ -8,8 +8,7 @@ the includes is all that this hides. A header that another one includes before a
 has compiled by itself there, and is not compiled again. --plain has nothing precompiled, compiles each and finds that too;
 it is how the preset plain runs this. On x86 the chip's headers compile as well: they name registers but touch none.
 
-What the compiler said of a header is remembered for as long as nothing changed that the header includes; see
-scripts/compiler_checks.py.
+That a header compiled is remembered for as long as nothing changed that it includes; see scripts/compiler_checks.py.
 """
 
 import subprocess
@@ -79,10 +78,17 @@ def without_those_that_come_first(headers):
     return [header for header in headers if str(header.relative_to(ROOT)) not in firsts]
 
 
-def message_of(header, first):
-    """What the compiler says of `header` alone after the options `first`; empty when nothing is missing."""
-    return subprocess.run([*CLANG, *first, "-fsyntax-only", header], capture_output=True, text=True, check=False,
-                          cwd=ROOT).stderr
+class Lacking(Exception):
+    """What the compiler says of a header."""
+
+
+def compile_alone(header, first):
+    """`header` after the options `first`. Throws Lacking, and CalledProcessError when the compiler itself fails."""
+    done = subprocess.run([*CLANG, *first, "-fsyntax-only", header], capture_output=True, text=True, check=False, cwd=ROOT)
+    if done.returncode < 0 or (done.returncode > 0 and not done.stderr):
+        done.check_returncode()
+    if done.stderr:
+        raise Lacking(done.stderr)
 
 
 class Check:
@@ -104,23 +110,32 @@ class Check:
             return self.made[dear]
 
     def message(self, header):
+        """What it lacks; empty: nothing."""
         name = str(header.relative_to(ROOT))
         read = [name, *sorted(file for file in included_by(name) if (ROOT / file).is_file())]
         dear = [dear for dear in ["", *DEAR] if not dear or dear in read[1:]][-1]
-        texts = [(ROOT / file).read_text() for file in read]
-        return remembered([Path(__file__).read_text(), self.libraries, dear, *read, *texts],
-                          lambda: message_of(name, self.options(dear)))
+        try:
+            remembered(lambda: [Path(__file__).read_text(), self.libraries, dear, *read, *((ROOT / file).read_text() for file in read)],
+                       lambda: compile_alone(name, self.options(dear)))
+        except Lacking as lacking:
+            return str(lacking)
+        return ""
 
 
 def main(folder, plain):
+    folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     headers = [header for floor in FLOORS for header in sorted((ROOT / floor).rglob("*.hpp"))]
     broken = folder / "broken.hpp"
     broken.write_text('#include "control/wall_law.hpp"\ninline kmax::firmware::Axis* nothing() { return nullptr; }\n')
-    if not message_of(str(broken), ()):
-        sys.exit("the check itself is broken: it does not see what a header lacks")
-    compiled = headers if plain else without_those_that_come_first(headers)
     check = Check(folder, headers, plain)
+    try:
+        compile_alone(str(broken), check.options(""))
+        sys.exit("the check itself is broken: it does not see what a header lacks")
+    except Lacking as lacking:
+        if "Axis" not in str(lacking):
+            sys.exit(f"the check itself is broken: {lacking}")
+    compiled = headers if plain else without_those_that_come_first(headers)
     with ThreadPoolExecutor(cpu_count()) as pool:
         messages = list(pool.map(check.message, compiled))
     forget_the_old()
