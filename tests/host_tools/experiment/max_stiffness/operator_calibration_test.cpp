@@ -6,16 +6,30 @@
 
 namespace kmax::experiment::operator_calibration_test {
 
-// A target made by known numbers is met by the numbers that are found for it.
-TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
-  SubjectSet truth = few_people(4);
+namespace {
+
+std::vector<StiffnessCondition> both_walls() {
+  const auto conditions = stiffness_conditions();
+  return {conditions[0], conditions[4]};
+}
+
+/// The means of people whose friction is 0.14 N and whose gamma is 0.7 1/N.
+CalibrationSettings known_targets(std::size_t people) {
+  SubjectSet truth = few_people(people);
   truth.device.friction = 0.14;
   for (Subject& subject : truth.subjects) subject.person.activation_gain = 0.7;
-  const auto conditions = stiffness_conditions();
-  const auto made = run_max_stiffness_study(truth, {conditions[0], conditions[4]}, quick_run());
+  const auto made = run_max_stiffness_study(truth, both_walls(), quick_run());
   CalibrationSettings settings{};
   settings.plain_target = made.conditions[0].mean();
   settings.magnetic_target = made.conditions[1].mean();
+  return settings;
+}
+
+}  // namespace
+
+// A target made by known numbers is met by the numbers that are found for it.
+TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
+  const CalibrationSettings settings = known_targets(4);
   const OperatorCalibration fit = calibrate_operator(few_people(4), settings, quick_run());
   EXPECT_NEAR(fit.plain, settings.plain_target, 50.0);
   EXPECT_NEAR(fit.magnetic, settings.magnetic_target, 75.0);
@@ -29,7 +43,7 @@ TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
   EXPECT_EQ(fit.set.fitted->magnetic_target, settings.magnetic_target);
   EXPECT_EQ(fit.set.fitted->force_limit, fit.set.device.force_limit);
   // What it says of itself is what its set gives.
-  const auto again = run_max_stiffness_study(fit.set, {conditions[0], conditions[4]}, quick_run());
+  const auto again = run_max_stiffness_study(fit.set, both_walls(), quick_run());
   EXPECT_EQ(again.conditions[0].mean(), fit.plain);
   EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
 }
@@ -37,14 +51,7 @@ TEST(OperatorCalibration, FindsNumbersThatMeetItsTargets) {
 // From values that are right, too small and too large the same targets are met in less time. Values beyond
 // what is allowed are not used.
 TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
-  SubjectSet truth = few_people(3);
-  truth.device.friction = 0.14;
-  for (Subject& subject : truth.subjects) subject.person.activation_gain = 0.7;
-  const auto conditions = stiffness_conditions();
-  const auto made = run_max_stiffness_study(truth, {conditions[0], conditions[4]}, quick_run());
-  CalibrationSettings settings{};
-  settings.plain_target = made.conditions[0].mean();
-  settings.magnetic_target = made.conditions[1].mean();
+  CalibrationSettings settings = known_targets(3);
   settings.tolerance = 50.0;
   const OperatorCalibration by_halving = calibrate_operator(few_people(3), settings, quick_run());
   for (const auto& [friction, gain] : {std::pair{0.14, 0.7}, {0.1, 1.1}, {0.25, 0.4}, {2.0, 9.0}}) {
@@ -59,7 +66,7 @@ TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
       EXPECT_EQ(fit.friction, by_halving.friction);
     }
     // What it says of itself is what its set gives, each person looked for from the first stiffness.
-    const auto again = run_max_stiffness_study(fit.set, {conditions[0], conditions[4]}, quick_run());
+    const auto again = run_max_stiffness_study(fit.set, both_walls(), quick_run());
     EXPECT_EQ(again.conditions[0].mean(), fit.plain);
     EXPECT_EQ(again.conditions[1].mean(), fit.magnetic);
   }
@@ -71,7 +78,7 @@ TEST(OperatorCalibration, LikelyValuesSaveTimeAndMeetTheSame) {
   EXPECT_EQ(too_stiff.activation_gain, 0.0);
   EXPECT_LT(too_stiff.steps.size(), 8U);
   // Nor is the other end walked along.
-  settings.magnetic_target = made.conditions[1].mean();
+  settings.magnetic_target = known_targets(3).magnetic_target;
   settings.gain_most = 0.2;
   settings.likely_gain = 0.1;
   const OperatorCalibration too_soft = calibrate_operator(few_people(3), settings, quick_run());
