@@ -82,10 +82,13 @@ class CompilerChecks(unittest.TestCase):
         self.ask("old")
         long_ago = time.time() - compiler_checks.MONTH - 60
         os.utime(next(compiler_checks.FOLDER.iterdir()), (long_ago, long_ago))
-        self.ask("new")
         compiler_checks.forget_the_old()
-        self.assertEqual(len(list(compiler_checks.FOLDER.iterdir())), 1)
-        self.ask("new")
+        self.assertEqual(list(compiler_checks.FOLDER.iterdir()), [])
+        self.ask("used")
+        os.utime(next(compiler_checks.FOLDER.iterdir()), (long_ago, long_ago))
+        self.ask("used")
+        compiler_checks.forget_the_old()
+        self.ask("used")
         self.assertEqual(self.asked, 2)
 
 

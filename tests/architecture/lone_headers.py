@@ -83,7 +83,7 @@ class Lacking(Exception):
 
 
 def compile_alone(header, first):
-    """`header` after the options `first`. Throws Lacking, and CalledProcessError when the compiler itself fails."""
+    """`header` after the options `first`. Raises Lacking, and CalledProcessError when the compiler itself fails."""
     done = subprocess.run([*CLANG, *first, "-fsyntax-only", header], capture_output=True, text=True, check=False, cwd=ROOT)
     if done.returncode < 0 or (done.returncode > 0 and not done.stderr):
         done.check_returncode()

@@ -114,9 +114,9 @@ class Fit {
   SubjectSet set_;
   const CalibrationSettings& settings_;
   StiffnessRun run_;
-  std::vector<MaxStiffness> found_;  ///< of the last mean, in the order of the people
-  std::vector<MaxStiffness>
-      at_low_;  ///< at the interval's lower end; empty: each is looked for from the first
+  // In the order of the people: of the last mean, and at the interval's lower end; empty: not begun from
+  // there.
+  std::vector<MaxStiffness> found_, at_low_;
 };
 
 }  // namespace
