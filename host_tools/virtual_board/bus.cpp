@@ -25,7 +25,7 @@ constexpr std::uint32_t waits_of(std::uint32_t address) {
       return 0;
   }
 }
-constexpr AddressRange boot_alias{0, memory_map::flash.size};
+constexpr AddressRange flash_at_zero{0, memory_map::flash.size};
 
 }  // namespace
 
@@ -108,6 +108,7 @@ void Bus::write(std::uint32_t address, unsigned bytes, std::uint32_t value, Boar
 }
 
 std::span<std::uint8_t> Bus::memory(std::uint32_t address, std::size_t size) {
+  if (sram_at_zero_ && memory_map::sram1_at_zero.contains(address)) address += memory_map::sram1.base;
   const auto within = [&](AddressRange range, std::vector<std::uint8_t>& bytes) -> std::span<std::uint8_t> {
     if (!range.contains(address) || size > range.size - (address - range.base)) return {};
     return std::span(bytes).subspan(address - range.base, size);
@@ -118,7 +119,7 @@ std::span<std::uint8_t> Bus::memory(std::uint32_t address, std::size_t size) {
 }
 
 std::optional<std::uint32_t> Bus::load(std::uint32_t address) const {
-  if (boot_alias.contains(address)) address += memory_map::flash.base;
+  if (!sram_at_zero_ && flash_at_zero.contains(address)) address += memory_map::flash.base;
   const auto bytes = const_cast<Bus*>(this)->memory(address, 4);
   if (bytes.empty()) return std::nullopt;
   std::uint32_t value = 0;
@@ -127,7 +128,7 @@ std::optional<std::uint32_t> Bus::load(std::uint32_t address) const {
 }
 
 bool Bus::store(std::uint32_t address, std::uint32_t value) {
-  if (memory_map::flash.contains(address)) return false;
+  if (memory_map::flash.contains(address) || memory_map::sram1_at_zero.contains(address)) return false;
   const auto bytes = memory(address, 4);
   if (bytes.empty()) return false;
   std::memcpy(bytes.data(), &value, sizeof value);

@@ -19,8 +19,9 @@
 // The parameter sectors 1 and 2 of flash are not plain memory: the processor reads them, but a store there is
 // a programming operation and goes to `on_parameter_store`. Stores to the rest of flash are refused.
 //
-// Bit-band aliases, the FSMC banks and the boot alias at address 0 are not mapped (the vector table at reset
-// is the exception: load() follows the alias, VTOR being 0).
+// At address 0 lies what SYSCFG_MEMRMP says: after a reset the vector table of flash, to which only load()
+// leads, VTOR being 0; or SRAM1, for code to be fetched over the instruction bus. Stores there are refused.
+// Bit-band aliases and the FSMC banks are not mapped.
 //
 // Cost: one array look-up per access (30 ns with the virtual call and the emulator's own part).
 
@@ -36,6 +37,9 @@ namespace memory_map {
 inline constexpr AddressRange flash{0x0800'0000, 1024 * 1024};
 inline constexpr AddressRange parameters{0x0800'4000, 32 * 1024};
 inline constexpr AddressRange sram{0x2000'0000, 128 * 1024};
+/// The part of SRAM that can appear at address 0, and where it does.
+inline constexpr AddressRange sram1{0x2000'0000, 112 * 1024};
+inline constexpr AddressRange sram1_at_zero{0, sram1.size};
 inline constexpr AddressRange ccm{0x1000'0000, 64 * 1024};
 /// Where register blocks may be attached: system memory (unique id, option bytes), APB1 and APB2 and AHB1,
 /// AHB2, and the core's own.
@@ -69,6 +73,10 @@ class Bus {
   /// Cycles of the core that register accesses would have waited for the bridges so far; nothing waits here.
   /// Assumed: 5 on APB2, which has half the core's clock, 10 on APB1, which has a quarter, 1 on AHB1.
   std::uint64_t register_waits() const { return register_waits_; }
+
+  /// SYSCFG_MEMRMP. The processor follows before its next block.
+  void show_sram_at_zero(bool shown) { sram_at_zero_ = shown; }
+  bool sram_at_zero() const { return sram_at_zero_; }
 
   std::span<std::uint8_t> flash() { return flash_; }
   std::span<std::uint8_t> sram() { return sram_; }
@@ -107,6 +115,7 @@ class Bus {
   std::array<std::vector<Page>, memory_map::register_areas.size()> pages_;
   ParameterStore parameter_store_;
   std::uint64_t register_waits_ = 0;
+  bool sram_at_zero_ = false;
 };
 
 }  // namespace kmax::virtual_board

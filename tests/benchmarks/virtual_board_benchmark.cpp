@@ -1,6 +1,5 @@
 // How fast the virtual board runs the image, as board time over processor time of this machine: both axes
-// armed and pressed into an adaptive wall, one of them, and none. Then what the memory protection costs,
-// switched on and off in turns within one run. No test depends on it.
+// armed and pressed into an adaptive wall, one of them, and none. No test depends on it.
 //   virtual_board_benchmark [SECONDS]      board time of each row, default 2
 
 #include <fmt/format.h>
@@ -29,25 +28,6 @@ void row(const char* name, std::size_t armed, double duration_s) {
              static_cast<double>(bench.board->processor().instructions() - instructions) * 1e-6 / duration_s);
 }
 
-void memory_protection(double duration_s) {
-  using namespace kmax;
-  tests::ImageBench bench(tests::ImageBench::Parameters{{"link.timeout", 0.0}});
-  bench.start();
-  for (const std::size_t axis : {0U, 1U}) bench.master->arm(axis);
-  using namespace drivers::cortex_m;
-  double taken[2] = {0.0, 0.0};
-  constexpr int turns = 40;
-  for (int turn = 0; turn < turns; ++turn) {
-    const auto on = static_cast<std::uint32_t>(turn % 2);
-    bench.board->core().memory_protection.write({offsetof(MpuRegisters, ctrl), 4, bench.board->now()},
-                                                mpu_ctrl::Enable::bits(on));
-    const double begin = benchmark::processor_time();
-    bench.board->run_for(duration_s / turns);
-    taken[on] += benchmark::processor_time() - begin;
-  }
-  fmt::print("with the memory protection it takes {:.3f} of the time without\n", taken[1] / taken[0]);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -59,5 +39,4 @@ int main(int argc, char** argv) {
   row("both axes armed", 2, duration_s);
   row("one axis armed", 1, duration_s);
   row("none armed", 0, duration_s);
-  memory_protection(duration_s);
 }

@@ -5,8 +5,9 @@
 
 #include "drivers/register_field.hpp"
 
-// System configuration controller, RM0090 chapter on SYSCFG: which port feeds an EXTI line. Four bits per
-// line, four lines per register, so their position is a run-time number.
+// System configuration controller, RM0090 chapter on SYSCFG: which memory appears at address 0, and which
+// port feeds an EXTI line. Four bits per line, four lines per register, so their position is a run-time
+// number.
 
 namespace kmax::drivers::stm32f4 {
 
@@ -27,6 +28,11 @@ inline constexpr std::uint32_t syscfg_base = 0x4001'3800;
 inline SyscfgRegisters& syscfg() {
   return peripheral_at<SyscfgRegisters>(syscfg_base);
 }
+
+namespace syscfg_memrmp {
+using MemoryAt0 = Field<0, 2>;
+inline constexpr std::uint32_t main_flash = 0, system_flash = 1, sram1 = 3;
+}  // namespace syscfg_memrmp
 
 namespace syscfg_exticr {
 inline constexpr std::uint32_t port_mask = 0xF;  // the port's number: A 0, B 1, C 2, D 3

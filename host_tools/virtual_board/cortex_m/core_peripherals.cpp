@@ -206,8 +206,9 @@ void MemoryProtection::refuse_fine_borders(const Access& access) const {
     constexpr std::uint32_t page = 9, page_in_eighths = 12;
     const std::uint32_t coarse =
         mpu_rasr::SubregionDisable::of(region.attributes) != 0 ? page_in_eighths : page;
-    const bool memory = memory_map::flash.contains(region.address) ||
-                        memory_map::sram.contains(region.address) || memory_map::ccm.contains(region.address);
+    const bool memory =
+        memory_map::flash.contains(region.address) || memory_map::sram.contains(region.address) ||
+        memory_map::ccm.contains(region.address) || memory_map::sram1_at_zero.contains(region.address);
     refuse_if(memory && mpu_rasr::Size::of(region.attributes) < coarse, access,
               "region at 0x{:08X}: borders in memory are modelled at multiples of 1 KiB only",
               region.address);

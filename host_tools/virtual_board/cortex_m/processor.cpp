@@ -133,7 +133,7 @@ void Processor::sleep_until(BoardTime time) {
 
 void Processor::execute() {
   started_ = true;
-  if (protection_in_force() != applied_protection_) apply_protection();
+  if (!rights_are_applied()) apply_rights();
   event_ = Event::none;
   attention_ = true;
   const StoresBesideCode::Running running(stores_);

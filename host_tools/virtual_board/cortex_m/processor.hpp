@@ -88,6 +88,10 @@ class Processor {
     on_block_ = std::move(callback);
   }
 
+  /// Called after each load and store of memory that translated code makes, registers and the frames of
+  /// exceptions left out, behind the block's begin. Before the first run; slows the engine down.
+  void on_data_access(std::function<void(std::uint32_t address)> callback);
+
   /// System reset: the core's registers and all core peripherals; PC and SP from the vector table in flash.
   /// Time and counters go on. Throws std::runtime_error when the flash holds no vector table.
   void reset(BoardTime now);
@@ -152,6 +156,7 @@ class Processor {
   void map_memory();
   void add_hooks();
   void begin_block(std::uint32_t address, std::uint32_t size);
+  void note_code_in_ram(std::uint32_t address);
   bool must_stop();
   void charge(std::uint64_t cycles);
   std::uint32_t read_register(std::uint32_t address, unsigned bytes);
@@ -160,7 +165,9 @@ class Processor {
   void end_access();
   bool ignores_accesses() const;
   std::uint32_t protection_in_force() const;
-  void apply_protection();
+  bool rights_are_applied() const;
+  void apply_rights();
+  void forget_code_at_zero();
   bool forbidden(std::uint32_t address, MemoryProtection::Use use) const {
     return applied_protection_ != 0 && !core_.memory_protection.allows(address, use);
   }
@@ -194,6 +201,7 @@ class Processor {
   Schedule schedule_;
   std::function<std::string(std::uint32_t)> function_at_;
   std::function<void(std::uint32_t, std::uint32_t)> on_block_;
+  std::function<void(std::uint32_t)> on_data_access_;
 
   BoardTime now_ = 0;
   BoardTime run_limit_ = 0;  ///< what run_until() was asked for
@@ -218,7 +226,10 @@ class Processor {
   std::atomic<bool> stop_requested_{false};
   int breakpoint_ = -1;
   std::uint32_t applied_protection_ = 0;  ///< version of it that the engine's pages follow; 0: none
-  std::uint32_t access_pc_ = 0;           ///< instruction of the latest register access
+  bool applied_sram_at_zero_ = false;
+  bool code_among_data_ = false;       ///< code was run where SRAM or CCM lie as data
+  bool code_at_zero_is_data_ = false;  ///< some of it can be stored to, where SRAM lies as data
+  std::uint32_t access_pc_ = 0;        ///< instruction of the latest register access
   BadAccess bad_access_;
   bool bad_access_pending_ = false;
   std::string fault_;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -29,6 +30,10 @@ constexpr const char* forbidden_words = "the memory protection forbids it";
 struct ProcessorHooks {
   static void block(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
     static_cast<Processor*>(self)->begin_block(static_cast<std::uint32_t>(address), size);
+  }
+  static void access(uc_engine* /*engine*/, uc_mem_type /*type*/, std::uint64_t address, int /*bytes*/,
+                     std::int64_t /*value*/, void* self) {
+    static_cast<Processor*>(self)->on_data_access_(static_cast<std::uint32_t>(address));
   }
   static void interrupt(uc_engine* /*engine*/, std::uint32_t number, void* self) {
     static_cast<Processor*>(self)->interrupted(number);
@@ -71,6 +76,7 @@ void Processor::map_memory() {
       UC_PROT_READ | UC_PROT_EXEC);
   map(bus_.sram(), sram.base, UC_PROT_ALL);
   map(bus_.ccm(), ccm.base, UC_PROT_READ | UC_PROT_WRITE);
+  map(bus_.sram().first(sram1.size), sram1_at_zero.base, UC_PROT_NONE);
   ProcessorHooks::map_registers<parameters>(engine, this);
   ProcessorHooks::map_registers<register_areas[0]>(engine, this);
   ProcessorHooks::map_registers<register_areas[1]>(engine, this);
@@ -86,14 +92,30 @@ std::uint32_t Processor::protection_in_force() const {
   return unit.enabled() && (unit.in_fault_handlers() || !in_fault_handler) ? unit.version() : 0;
 }
 
+bool Processor::rights_are_applied() const {
+  return protection_in_force() == applied_protection_ && bus_.sram_at_zero() == applied_sram_at_zero_;
+}
+
+void Processor::forget_code_at_zero() {
+  constexpr std::uint64_t begin = memory_map::sram1_at_zero.base,
+                          end = begin + memory_map::sram1_at_zero.size;
+  CoreEngine::check(uc_ctl_remove_cache(engine_.handle(), begin, end), "forgetting code");
+}
+
 /// Gives each page of memory the rights that the memory map and the protection both grant. Registers and the
 /// parameter sectors are asked for at each access.
-void Processor::apply_protection() {
+void Processor::apply_rights() {
   applied_protection_ = protection_in_force();
+  const bool shown = bus_.sram_at_zero();
+  const bool changes = shown != std::exchange(applied_sram_at_zero_, shown);
+  // What is translated runs whatever the page's rights are. Forgetting takes pages that can be fetched.
+  if (changes && !shown) forget_code_at_zero();
   using namespace memory_map;
   constexpr std::uint32_t page = 1024, behind_parameters = parameters.base + parameters.size;
-  constexpr std::array<std::pair<AddressRange, std::uint32_t>, 4> memories{
-      {{{flash.base, parameters.base - flash.base}, UC_PROT_READ | UC_PROT_EXEC},
+  const std::uint32_t at_zero = shown ? UC_PROT_READ | UC_PROT_EXEC : UC_PROT_NONE;
+  const std::array<std::pair<AddressRange, std::uint32_t>, 5> memories{
+      {{sram1_at_zero, at_zero},
+       {{flash.base, parameters.base - flash.base}, UC_PROT_READ | UC_PROT_EXEC},
        {{behind_parameters, flash.base + flash.size - behind_parameters}, UC_PROT_READ | UC_PROT_EXEC},
        {sram, UC_PROT_ALL},
        {ccm, UC_PROT_READ | UC_PROT_WRITE}}};
@@ -104,6 +126,11 @@ void Processor::apply_protection() {
     if (forbidden(address, fetch)) rights &= ~std::uint32_t{UC_PROT_EXEC};
     return rights;
   };
+  code_at_zero_is_data_ = false;
+  for (std::uint32_t offset = 0; offset < sram1.size; offset += page) {
+    code_at_zero_is_data_ |= (granted(sram1_at_zero.base + offset, at_zero) & UC_PROT_EXEC) != 0 &&
+                             (granted(sram1.base + offset, UC_PROT_ALL) & UC_PROT_WRITE) != 0;
+  }
   for (const auto& [range, rights] : memories) {
     std::uint32_t begin = 0;
     for (std::uint32_t end = page; end <= range.size; end += page) {
@@ -114,6 +141,10 @@ void Processor::apply_protection() {
       begin = end;
     }
   }
+  // As from the moment on at which a start-up that has run code there switches the protection on.
+  if (!code_at_zero_is_data_ && !code_among_data_) stores_.note_data_only();
+  // It may hold other code than when it was there before.
+  if (shown && changes) forget_code_at_zero();
 }
 
 void Processor::add_hooks() {
@@ -127,9 +158,17 @@ void Processor::add_hooks() {
   add(UC_HOOK_MEM_INVALID, &ProcessorHooks::invalid, "hooking invalid accesses");
 }
 
+void Processor::on_data_access(std::function<void(std::uint32_t address)> callback) {
+  on_data_access_ = std::move(callback);
+  uc_hook hook{};
+  CoreEngine::check(uc_hook_add(engine_.handle(), &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE,
+                                reinterpret_cast<void*>(&ProcessorHooks::access), this, 1, 0),
+                    "hooking accesses");
+}
+
 void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   // It has been translated, whether or not it runs now.
-  if (!memory_map::flash.contains(address)) stores_.note_code_in_ram();
+  if (!memory_map::flash.contains(address)) note_code_in_ram(address);
   // Unicorn forgets the IT state when it is stopped between the two halves of an IT block that the end of a
   // page cuts, and both ways would then be the same: interrupts wait for the block after.
   const bool inside_if_then =
@@ -178,13 +217,22 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   now_ += cycles * block_period_;
 }
 
+/// What nothing can store to is like flash.
+void Processor::note_code_in_ram(std::uint32_t address) {
+  if (!memory_map::sram1_at_zero.contains(address)) {
+    code_among_data_ = true;
+  } else if (!code_at_zero_is_data_) {
+    return;
+  }
+  stores_.note_code_in_ram();
+}
+
 /// Something is up: find out what. Also takes the limit again when registers were accessed.
 bool Processor::must_stop() {
   if (attention_) {
     attention_ = false;
     if (schedule_.next_event) limit_ = std::min(run_limit_, schedule_.next_event());
-    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested() ||
-        protection_in_force() != applied_protection_)
+    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested() || !rights_are_applied())
       return true;
   }
   if (stop_requested_.load(std::memory_order_relaxed) || now_ >= limit_) return true;

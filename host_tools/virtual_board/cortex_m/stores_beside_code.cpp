@@ -33,8 +33,15 @@ StoresBesideCode::Running::~Running() {
 }
 
 void StoresBesideCode::note_code_in_ram() {
-  if (code_in_ram_) return;
-  code_in_ram_ = true;
+  note(true);
+}
+void StoresBesideCode::note_data_only() {
+  note(false);
+}
+
+void StoresBesideCode::note(bool code_in_ram) {
+  if (code_in_ram_ == code_in_ram) return;
+  code_in_ram_ = code_in_ram;
   if (forgets_addresses() != nullptr && core_ != nullptr) forgets_addresses()(core_);
 }
 

@@ -34,12 +34,19 @@ class StoresBesideCode {
   /// what was translated is from then on thrown away when it is stored to.
   void note_code_in_ram();
 
+  /// Nothing that was translated can be stored to any more, as before the first note_code_in_ram(). Call
+  /// between runs.
+  void note_data_only();
+
   /// For the functions in front of the library's: the core that is executing, as the library knows it.
   void set_core(void* core) { core_ = core; }
   bool only_data_for(const void* core) const { return !code_in_ram_ && core == core_; }
   bool only_data() const { return !code_in_ram_; }
 
  private:
+  /// The engine forgets its table of addresses, whose pages are marked by it.
+  void note(bool code_in_ram);
+
   bool code_in_ram_ = false;
   void* core_ = nullptr;
 };

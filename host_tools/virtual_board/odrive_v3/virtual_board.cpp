@@ -122,6 +122,7 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
 }
 
 void VirtualBoard::wire() {
+  syscfg_.on_memory_at_zero([this](bool sram) { bus_.show_sram_at_zero(sram); });
   bus_.on_parameter_store([this](std::uint32_t address, unsigned bytes, std::uint32_t value, BoardTime now) {
     flash_.store(address, bytes, value, now);
   });

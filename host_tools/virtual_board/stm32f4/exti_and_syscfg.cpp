@@ -15,6 +15,7 @@ using drivers::stm32f4::ExtiRegisters;
 using drivers::stm32f4::Interrupt;
 using drivers::stm32f4::SyscfgRegisters;
 namespace syscfg_exticr = drivers::stm32f4::syscfg_exticr;
+namespace syscfg_memrmp = drivers::stm32f4::syscfg_memrmp;
 
 constexpr std::uint32_t port_count = 4;
 constexpr std::uint32_t pin_lines = (1U << exti_pin_lines) - 1U;
@@ -47,9 +48,23 @@ const RegisterTable<SyscfgModel>& SyscfgModel::registers() {
     return Row{offsetof(SyscfgRegisters, exticr) + 4 * index, "EXTICR", Row::shows<&Model::exticr_, index>,
                0xFFFF, Row::takes<&Model::write_exticr, index>};
   };
-  static const RegisterTable<Model> table{routing.operator()<0>(), routing.operator()<1>(),
-                                          routing.operator()<2>(), routing.operator()<3>()};
+  static const RegisterTable<Model> table{
+      {offsetof(SyscfgRegisters, memrmp), "MEMRMP", Row::shows<&Model::memrmp_>,
+       syscfg_memrmp::MemoryAt0::mask, Row::takes<&Model::write_memrmp>},
+      routing.operator()<0>(),
+      routing.operator()<1>(),
+      routing.operator()<2>(),
+      routing.operator()<3>()};
   return table;
+}
+
+void SyscfgModel::write_memrmp(const Access& access, std::uint32_t value) {
+  using namespace syscfg_memrmp;
+  const std::uint32_t memory = MemoryAt0::of(value);
+  refuse_if(memory != main_flash && memory != system_flash && memory != sram1, access,
+            "MEM_MODE = {}: the external memory at address 0 is not modelled", memory);
+  memrmp_ = value;
+  if (memory_at_zero_) memory_at_zero_(memory == sram1);
 }
 
 void SyscfgModel::write_exticr(const Access& access, unsigned index, std::uint32_t value) {
@@ -63,6 +78,8 @@ void SyscfgModel::write_exticr(const Access& access, unsigned index, std::uint32
 }
 
 void SyscfgModel::reset(BoardTime now) {
+  memrmp_ = 0;
+  if (memory_at_zero_) memory_at_zero_(false);
   exticr_ = {};
   if (routing_change_) routing_change_(now);
 }

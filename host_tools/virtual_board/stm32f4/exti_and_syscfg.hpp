@@ -11,7 +11,8 @@
 namespace kmax::virtual_board {
 
 /// SYSCFG: RM0090, chapter System configuration controller. EXTICR1 to 4 with ports A to D, the ones that
-/// have pins here; MEMRMP, PMC and CMPCR are refused.
+/// have pins here; MEMRMP but for the external memory, which the part's package has no pins for. PMC and
+/// CMPCR are refused.
 class SyscfgModel final : public RegisterBlock<SyscfgModel> {
  public:
   SyscfgModel() : RegisterBlock("SYSCFG", registers()) {}
@@ -19,14 +20,19 @@ class SyscfgModel final : public RegisterBlock<SyscfgModel> {
 
   /// Index of the port (0 = A) whose pin feeds a line (0 to 15).
   unsigned port_of(unsigned line) const;
+  /// Called when MEMRMP is written and at a reset: whether SRAM1 is at address 0.
+  void on_memory_at_zero(std::function<void(bool sram)> callback) { memory_at_zero_ = std::move(callback); }
   /// Called after EXTICR has changed. The EXTI model takes it.
   void on_routing_change(std::function<void(BoardTime)> callback) { routing_change_ = std::move(callback); }
 
  private:
   static const RegisterTable<SyscfgModel>& registers();
+  void write_memrmp(const Access& access, std::uint32_t value);
   void write_exticr(const Access& access, unsigned index, std::uint32_t value);
 
+  std::uint32_t memrmp_ = 0;
   std::array<std::uint32_t, 4> exticr_{};
+  std::function<void(bool)> memory_at_zero_;
   std::function<void(BoardTime)> routing_change_;
 };
 

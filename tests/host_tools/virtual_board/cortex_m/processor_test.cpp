@@ -288,6 +288,49 @@ TEST(Processor, RunsWhatWasStoredToRamLast) {
   }
 }
 
+// SRAM1 at address 0: RM0090, SYSCFG_MEMRMP. As data it can be stored to meanwhile, and what is fetched
+// follows; and what was stored while it was not there holds when it is again.
+TEST(Processor, FetchesAtZeroWhatWasStoredToSram) {
+  constexpr std::uint32_t place = 0x800, stored_at = 0x2000'0000 + place;
+  ProgramOnCore board({0x4780,               // blx r0
+                       0x460C,               // mov r4, r1
+                       0x8015,               // strh r5, [r2]
+                       0x4780,               // blx r0
+                       0xBE01});             // bkpt 1
+  board.place(stored_at, {0x2101, 0x4770});  // movs r1, #1; bx lr
+  const auto set_up = [&board] {
+    board.set(0, place | 1).set(2, stored_at).set(5, 0x2102).set(15, ProgramOnCore::program_base);
+  };
+  for (int round = 0; round < 2; ++round) {
+    board.place(stored_at, {static_cast<std::uint16_t>(0x2101 + 6 * round), 0x4770});
+    board.bus.show_sram_at_zero(true);
+    set_up();
+    ASSERT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+    ASSERT_EQ(board.processor.breakpoint(), 1);
+    EXPECT_EQ(board.get(4), 1U + 6U * static_cast<unsigned>(round)) << "round " << round;
+    EXPECT_EQ(board.get(1), 2U) << "round " << round;
+    board.bus.show_sram_at_zero(false);
+    board.processor.reset(board.processor.now());
+    board.set(15, ProgramOnCore::program_base + 8);
+    ASSERT_EQ(board.run(), RunEnd::stopped);
+    board.processor.reset(board.processor.now());
+  }
+  set_up();
+  ASSERT_EQ(board.run(), RunEnd::fault);
+  EXPECT_NE(board.processor.fault().find("there is nothing at this address"), std::string::npos)
+      << board.processor.fault();
+}
+
+// The manual would let it; no firmware should.
+TEST(Processor, RefusesStoresToSramAtZero) {
+  ProgramOnCore board({0x6001, 0xBE01});  // str r1, [r0]; bkpt 1
+  board.bus.show_sram_at_zero(true);
+  board.set(0, 0x800).set(1, 1);
+  EXPECT_EQ(board.run(), RunEnd::fault);
+  EXPECT_EQ(board.bus.load(0x800), board.bus.load(0x2000'0800));
+  EXPECT_NE(board.bus.load(0x800), 1U);
+}
+
 // The branch's target is translated before the interrupt is taken.
 TEST(Processor, RunsWhatAnInterruptStoredToRamBeforeItsFirstRun) {
   constexpr std::uint32_t place = 0x2000'0800;

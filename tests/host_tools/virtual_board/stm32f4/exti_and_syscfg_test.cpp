@@ -55,10 +55,25 @@ TEST(SyscfgModel, ExternalInterruptConfigurationRegisters) {
   EXPECT_EQ(board.syscfg.port_of(2), 0U);
   EXPECT_THROW(board.syscfg.write({exticr, 4, 1}, 0x4), RefusedAccess) << "port E has no pins";
   EXPECT_THROW(board.syscfg.write({exticr, 4, 1}, 0x1'0000), RefusedAccess);
-  EXPECT_THROW(board.syscfg.write({0, 4, 1}, 0), RefusedAccess) << "MEMRMP";
   EXPECT_THROW(board.syscfg.read({4, 4, 1}), RefusedAccess) << "PMC";
   EXPECT_THROW(board.syscfg.read({0x18, 4, 1}), RefusedAccess);
   EXPECT_THROW(board.syscfg.read({exticr, 2, 1}), RefusedAccess);
+}
+
+TEST(SyscfgModel, MemoryRemapRegister) {
+  Lines board;
+  std::vector<bool> shown;
+  board.syscfg.on_memory_at_zero([&shown](bool sram) { shown.push_back(sram); });
+  for (const std::uint32_t mode : {3U, 1U, 3U, 0U, 3U}) {
+    board.syscfg.write({0, 4, 1}, mode);
+    EXPECT_EQ(board.syscfg.read({0, 4, 1}), mode);
+  }
+  EXPECT_THROW(board.syscfg.write({0, 4, 1}, 2), RefusedAccess) << "external memory";
+  EXPECT_THROW(board.syscfg.write({0, 4, 1}, 7), RefusedAccess) << "a bit that the part does not have";
+  EXPECT_EQ(board.syscfg.read({0, 4, 1}), 3U);
+  board.syscfg.reset(2);
+  EXPECT_EQ(board.syscfg.read({0, 4, 1}), 0U);
+  EXPECT_EQ(shown, (std::vector{true, false, true, false, true, false}));
 }
 
 TEST(ExtiModel, TriggerSelection_OnlyTheSelectedEdgeOfTheRoutedPin) {
