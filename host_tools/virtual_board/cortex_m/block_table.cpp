@@ -24,11 +24,13 @@ const Block& BlockTable::add(std::uint32_t address, std::span<const std::uint8_t
     if (at + 2 > code.size()) return std::uint16_t{0};
     return static_cast<std::uint16_t>(code[at] | code[at + 1] << 8);
   };
+  Instruction previous;
   unsigned governed = 0;  // instructions that an IT still makes conditional
   for (std::uint32_t at = 0; at < block->size;) {
     const Instruction instruction = decode(half_word(at), half_word(at + 2), address + at);
     ++block->instructions;
-    block->cycles += instruction.cycles;
+    block->cycles += instruction.cycles - cycles_saved_behind(previous, instruction);
+    previous = instruction;
     block->cycles_if_taken = instruction.cycles_if_taken;  // only the last one can branch
     if (instruction.floating_point && !block->floating_point) {
       block->floating_point = true;

@@ -51,16 +51,19 @@ Instruction multiple(Instruction instruction, bool store, std::uint32_t base, st
   return instruction;
 }
 
-Instruction load_or_store(Instruction instruction, MemoryOperand operand) {
+/// `loaded`: of a load of one core register, which.
+Instruction load_or_store(Instruction instruction, MemoryOperand operand,
+                          std::uint32_t loaded = MemoryOperand::no_register) {
   // A store leaves through the write buffer; its address takes a cycle more when a register is added.
   const bool indexed = operand.index != MemoryOperand::no_register;
   instruction.cycles = !operand.store || indexed ? 2 : 1;
   instruction.memory = operand;
+  if (!operand.store && loaded != program_counter) instruction.loaded = static_cast<std::uint8_t>(loaded);
   return instruction;
 }
 
 Instruction decode_narrow(std::uint32_t code, std::uint32_t address) {
-  const std::uint32_t rn = bits(code, 3, 3);
+  const std::uint32_t rn = bits(code, 3, 3), rt = bits(code, 0, 3);
   const std::uint32_t imm5 = bits(code, 6, 5);
   switch (code >> 11) {
     case 0x08: {  // data processing; special data and branch exchange
@@ -70,27 +73,28 @@ Instruction decode_narrow(std::uint32_t code, std::uint32_t address) {
       return narrow(branch_exchange || writes_pc ? 1 + refill : 1);
     }
     case 0x09:
-      return load_or_store(narrow(2), literal(address, 4 * bits(code, 0, 8)));
+      return load_or_store(narrow(2), literal(address, 4 * bits(code, 0, 8)), bits(code, 8, 3));
     case 0x0A:
     case 0x0B: {  // register offset: STR STRH STRB LDRSB LDR LDRH LDRB LDRSH
       constexpr std::uint8_t spans[] = {4, 2, 1, 1, 4, 2, 1, 2};
       const std::uint32_t kind = bits(code, 9, 3);
       MemoryOperand operand = based(kind < 3, rn, 0, spans[kind]);
       operand.index = static_cast<std::uint8_t>(bits(code, 6, 3));
-      return load_or_store(narrow(2), operand);
+      return load_or_store(narrow(2), operand, rt);
     }
     case 0x0C:
     case 0x0D:
-      return load_or_store(narrow(2), based(code >> 11 == 0x0C, rn, 4 * imm5, 4));
+      return load_or_store(narrow(2), based(code >> 11 == 0x0C, rn, 4 * imm5, 4), rt);
     case 0x0E:
     case 0x0F:
-      return load_or_store(narrow(2), based(code >> 11 == 0x0E, rn, imm5, 1));
+      return load_or_store(narrow(2), based(code >> 11 == 0x0E, rn, imm5, 1), rt);
     case 0x10:
     case 0x11:
-      return load_or_store(narrow(2), based(code >> 11 == 0x10, rn, 2 * imm5, 2));
+      return load_or_store(narrow(2), based(code >> 11 == 0x10, rn, 2 * imm5, 2), rt);
     case 0x12:
     case 0x13:
-      return load_or_store(narrow(2), based(code >> 11 == 0x12, sp, 4 * bits(code, 0, 8), 4));
+      return load_or_store(narrow(2), based(code >> 11 == 0x12, sp, 4 * bits(code, 0, 8), 4),
+                           bits(code, 8, 3));
     case 0x16:
     case 0x17:
       if ((code & 0xFE00) == 0xB400)
@@ -168,7 +172,7 @@ Instruction decode_single(std::uint32_t first, std::uint32_t second, std::uint32
     operand.index = static_cast<std::uint8_t>(bits(second, 0, 4));
     operand.shift = static_cast<std::uint8_t>(bits(second, 4, 2));
   }
-  Instruction single = load_or_store(wide(2), operand);
+  Instruction single = load_or_store(wide(2), operand, rt);
   if (!store && rt == program_counter) single.cycles += refill;
   return single;
 }

@@ -9,8 +9,9 @@
 // the FPU.
 //
 // The cycles are an estimate that no board has confirmed: code and data arrive without wait states, P
-// (pipeline refill after a branch) is 2, a division takes 7 (the manual: 2 to 12), loads that could overlap
-// do not. An instruction that an IT block skips costs as if executed.
+// (pipeline refill after a branch) is 2, a division takes 7 (the manual: 2 to 12), a load directly behind
+// another takes what cycles_saved_behind() leaves. An instruction that an IT block skips costs as if
+// executed.
 
 namespace kmax::virtual_board {
 
@@ -28,11 +29,25 @@ struct MemoryOperand {
 
 struct Instruction {
   std::uint8_t bytes = 2;
-  std::uint8_t cycles = 1;
+  std::uint8_t cycles = 1;           ///< alone
   std::uint8_t cycles_if_taken = 0;  ///< more, when a conditional branch is taken
   bool floating_point = false;
   std::optional<MemoryOperand> memory{};
+  std::uint8_t loaded = MemoryOperand::no_register;  ///< by a load of one core register that is not the PC
 };
+
+/// Cycles that an instruction takes less directly behind `previous`, after which the core goes on in a
+/// straight line. The address phase of a load overlaps the data phase of the load before it, unless it needs
+/// that one's result (Cortex-M4 technical reference manual, load and store timings). Left out: FPU registers
+/// and several registers at once, of which the manual says nothing, and the store behind a load, which takes
+/// one cycle anyhow.
+constexpr std::uint8_t cycles_saved_behind(const Instruction& previous, const Instruction& instruction) {
+  constexpr std::uint8_t none = MemoryOperand::no_register;
+  if (previous.loaded == none || instruction.loaded == none) return 0;
+  const bool needs_result =
+      instruction.memory->base == previous.loaded || instruction.memory->index == previous.loaded;
+  return needs_result ? 0 : 1;
+}
 
 /// True when the half word is the first of two.
 constexpr bool is_wide(std::uint16_t first) {

@@ -168,4 +168,38 @@ TEST(Instruction, CountsLiteralsFromTheAlignedProgramCounter) {
   EXPECT_EQ(decode(0x4802, 0, 0x0800'0102).memory->offset, 0x0800'010CU);
 }
 
+struct Pair {
+  const char* text;
+  std::uint16_t first[2], second[2];
+  unsigned saved;
+};
+
+// Encodings from the assembler.
+const Pair pairs[] = {
+    {"ldr r0,[r1]; ldr r2,[r3]", {0x6808}, {0x681A}, 1},
+    {"ldr r0,[r1]; ldrb r2,[r3,#1]", {0x6808}, {0x785A}, 1},
+    {"ldr r0,[pc,#8]; ldrsh r3,[r1,r2]", {0x4802}, {0x5E8B}, 1},
+    {"ldr r9,[sp,#4]; ldr.w r8,[r10,#8]", {0xF8DD, 0x9004}, {0xF8DA, 0x8008}, 1},
+    {"ldr r0,[r1]; ldr r1,[r1,#4]", {0x6808}, {0x6849}, 1},
+    {"ldr r0,[r1]; ldr r2,[r0]", {0x6808}, {0x6802}, 0},
+    {"ldr r2,[r1]; ldrsh r3,[r1,r2]", {0x680A}, {0x5E8B}, 0},
+    {"ldr.w r8,[r10,#8]; ldr.w r9,[r8,#8]", {0xF8DA, 0x8008}, {0xF8D8, 0x9008}, 0},
+    {"ldr r0,[r1]; adds r3,r1,r2", {0x6808}, {0x188B}, 0},
+    {"adds r3,r1,r2; ldr r0,[r1]", {0x188B}, {0x6808}, 0},
+    {"ldr r0,[r1]; str r2,[r3]", {0x6808}, {0x601A}, 0},
+    {"str r0,[r1]; ldr r2,[r3]", {0x6008}, {0x681A}, 0},
+    {"ldr r0,[r1]; ldmia r3,{r4,r5}", {0x6808}, {0xCB30}, 0},
+    {"ldrd r0,r1,[r2]; ldr r3,[r4]", {0xE9D2, 0x0100}, {0x6823}, 0},
+    {"vldr s0,[r1]; ldr r2,[r3]", {0xED91, 0x0A00}, {0x681A}, 0},
+    {"ldr pc,[r1]; ldr r2,[r3]", {0xF8D1, 0xF000}, {0x681A}, 0},
+};
+
+TEST(Instruction, LoadsBehindLoadsOverlap_LoadAndStoreTimings) {
+  for (const Pair& pair : pairs) {
+    const Instruction first = decode(pair.first[0], pair.first[1], address);
+    const Instruction second = decode(pair.second[0], pair.second[1], address + first.bytes);
+    EXPECT_EQ(cycles_saved_behind(first, second), pair.saved) << pair.text;
+  }
+}
+
 }  // namespace kmax::virtual_board::instruction_test
