@@ -67,21 +67,21 @@ std::span<volatile std::uint32_t, ParameterFlash::words_per_sector> parameter_se
 }
 ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, parameter_sector(1)}}}};
 
-/// In the memory beside the buses' RAM.
 [[gnu::section(".ccm_noinit")]] firmware::FaultLogMemory log_memory;
-[[gnu::section(".ccm_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
+/// Fills what the tick's code leaves of SRAM1: see linker.ld.
+[[gnu::section(".sram_noinit")]] std::array<std::uint32_t, firmware::capture_words> capture_memory;
 
 [[gnu::section(".noinit")]] firmware::RetainedCount lock_attempts;
 [[gnu::section(".noinit")]] firmware::RetainedCount boot_loader_asked;
 
-std::optional<firmware::Application> application;
+[[gnu::section(".ccm")]] std::optional<firmware::Application> application;
 /// Raised by the lines' interrupts: they have left something for the main loop.
 firmware::InterruptSignal lines_due;
 std::optional<SerialLine> serial;
 std::optional<CanLine> can_line;
 std::optional<UsbLine> usb_line;
 ChipBus chip_bus{stm32::spi3()};
-/// Made in main, once the clocks are known; no interrupt is enabled before.
+/// Made in main, once the clocks are known; no interrupt is enabled before. DMA reads of it.
 std::optional<Power<PowerHardware>> power;
 /// Set by the clock's interrupt and never taken back: only a restart brings the ticks back.
 std::atomic<bool> ticks_have_stopped{false};

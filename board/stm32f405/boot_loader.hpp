@@ -4,6 +4,7 @@
 
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/registers.hpp"
+#include "drivers/stm32f4/registers/syscfg.hpp"
 #include "firmware/board_interface/retained_count.hpp"
 
 namespace kmax::board {
@@ -20,6 +21,9 @@ inline constexpr std::uint32_t asks_for_boot_loader = 0xB007'10AD;
   // NOLINTNEXTLINE(performance-no-int-to-ptr)
   const auto* table = reinterpret_cast<const volatile std::uint32_t*>(system_memory);
   const std::uint32_t stack = table[0], program = table[1];
+  // As if the boot pins had started it.
+  drivers::stm32f4::syscfg().memrmp =
+      drivers::stm32f4::syscfg_memrmp::MemoryAt0::bits(drivers::stm32f4::syscfg_memrmp::system_flash);
   drivers::cortex_m::scb().vtor = system_memory;
   drivers::cortex_m::data_synchronization_barrier();
   asm volatile("msr msp, %0\n\tbx %1" : : "r"(stack), "r"(program) : "memory");
@@ -27,9 +31,9 @@ inline constexpr std::uint32_t asks_for_boot_loader = 0xB007'10AD;
   __builtin_unreachable();
 }
 
-/// First of all that main does, while clocks and peripherals are as a reset leaves them, which the boot
-/// loader counts on. Returns if nobody has asked for it; another reset, or the boot loader's own "leave",
-/// comes back here and starts the firmware.
+/// First of all that main does, while clocks and peripherals but SYSCFG are as a reset leaves them, which the
+/// boot loader counts on. Returns if nobody has asked for it; another reset, or the boot loader's own
+/// "leave", comes back here and starts the firmware.
 inline void enter_boot_loader_if_asked(firmware::RetainedCount& asked) {
   if (asked.value() != asks_for_boot_loader) return;
   asked.set(0);

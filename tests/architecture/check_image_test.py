@@ -15,16 +15,17 @@ HANDLER = ".globl ISR_adc\n.type ISR_adc, %function\nISR_adc:\n"
 FLASH, PARAMETERS = 0x0800_C000, 0x0800_7000
 
 
-def said_of(code, text_at=FLASH, handlers="ISR_adc"):
+def said_of(code, text_at=FLASH, handlers="ISR_adc", in_sram="", sections=()):
     """The problems, none of a fit image; one that is refused is removed."""
     with tempfile.TemporaryDirectory() as folder:
         source, made, image = (str(Path(folder) / name) for name in ("made_up.s", "made_up.o", "made_up.elf"))
         Path(source).write_text(".syntax unified\n.thumb\n.text\n" + code)
         subprocess.run(["arm-none-eabi-as", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", source, "-o", made], check=True)
-        subprocess.run(["arm-none-eabi-ld", f"-Ttext={text_at:#x}", "-e0", made, "-o", image], check=True)
+        subprocess.run(["arm-none-eabi-ld", f"-Ttext={text_at:#x}", "-e0",
+                        *(f"--section-start={name}={at:#x}" for name, at in sections), made, "-o", image], check=True)
         tools = {name.upper(): f"arm-none-eabi-{name}" for name in ("nm", "readelf", "objdump")}
         done = subprocess.run(["cmake", *(f"-D{name}={value}" for name, value in {**tools, "ELF": image}.items()),
-                               f"-DHANDLERS={handlers}", "-P", str(CHECK)], capture_output=True, text=True, check=False)
+                               f"-DHANDLERS={handlers}", f"-DIN_SRAM={in_sram}", "-P", str(CHECK)], capture_output=True, text=True, check=False)
         assert (done.returncode != 0) == ("is not fit for the target" in done.stderr) == (not Path(image).exists()), done
         return {line.strip() for line in done.stderr.partition("target:")[2].splitlines() if line.strip()}
 
@@ -85,6 +86,18 @@ class CheckImage(unittest.TestCase):
             with self.subTest(name):
                 made = with_functions(["f", name]).replace("bx lr", "bl f", 1).replace("bx lr", f"b {name}", 1)
                 self.assertEqual({f"{name}: reached from an interrupt by way of f"}, said_of(made))
+
+    def test_code_in_flash_behind_code_in_sram(self):
+        far = ('.section .tick, "ax"\n.globl f\n.thumb_func\nf: bl g\nbx lr\n'
+               ".text\n.globl g\n.type g, %function\n.thumb_func\ng: bx lr\n")
+        near = '.section .tick, "ax"\n' + HANDLER + ".thumb_func\nbl f\nbx lr\n"
+        why = "called by what runs from SRAM, but lies in flash (add it to tick_code.ld)"
+        at = (".tick", 0x4000),
+        self.assertEqual({f"g: {why}"}, said_of(near + far, in_sram="ISR_adc", sections=at))  # by way of a veneer
+        self.assertEqual(set(), said_of(near + far.replace("f: bl g\n", "f: "), in_sram="ISR_adc", sections=at))
+        self.assertEqual({"f: runs from SRAM and calls through a pointer, which may lead to flash"},
+                         said_of(near + far.replace("f: bl g", "f: blx r3"), in_sram="ISR_adc", sections=at))
+        self.assertEqual({f"ISR_adc: {why}"}, said_of(with_functions([]), in_sram="ISR_adc"))
 
     def test_parameter_sectors(self):
         said = said_of(with_functions([]), text_at=PARAMETERS)

@@ -8,12 +8,19 @@ def output_of(*command, given=None):
     return subprocess.run(command, check=True, capture_output=True, text=True, input=given).stdout
 
 
+def as_jump(name, lines):
+    """A step that the linker puts between where a jump is too far for the instruction, as the jump that it stands for."""
+    far = re.fullmatch(r"__(.+)_veneer", name) and re.fullmatch(r"( *[0-9a-f]+:\t)ldr\.w\tpc, \[pc\].*", lines[0])
+    word = far and re.search(r"\t\.word\t(0x[0-9a-f]+)", lines[1])
+    return [f"{far[1]}b.w\t{int(word[1], 0) & ~1:x} <{name[2:-len('_veneer')]}>"] if word else lines
+
+
 def functions_in(disassembly):
     """(name, lines as objdump prints them, each with its address) of each function."""
     for part in disassembly.split("\n\n"):
         heading, *lines = part.strip("\n").split("\n")
         if name := re.fullmatch(r"[0-9a-f]+ <(.+)>:", heading):
-            yield name[1], lines
+            yield name[1], as_jump(name[1], lines)
 
 
 def disassembled(*arguments):

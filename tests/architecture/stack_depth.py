@@ -169,7 +169,9 @@ class Function:
         """Finds its depth at each instruction, the larger one where ways of different depth meet. `after`: the address
         behind its last byte, where another function begins."""
         addresses = list(self.code)
-        while self.code[addresses[-1]].base == "nop":
+        # What fills up to where the next function begins; of zeros objdump makes a move of r0 to itself.
+        while (self.code[addresses[-1]].base == "nop" or
+               (self.code[addresses[-1]].base, self.code[addresses[-1]].operands) == ("movs", "r0, r0")):
             del self.code[addresses.pop()]
         following = dict(zip(addresses, [*addresses[1:], after]))
         depth, waiting = {}, [(addresses[0], 0)]
@@ -376,7 +378,7 @@ def main(elf):
     listed = list(disassembled("-d", str(elf)))
     names = demangled([name for name, _ in listed])
     sections = dict(words_of(elf))
-    data = {word for name, words in sections.items() if name not in (".vectors", ".text", ".boot") for word in words}
+    data = {word for name, words in sections.items() if name not in (".vectors", ".text", ".boot", ".tick_code") for word in words}
     symbols = {name: int(address, 16) for address, _, name in
                map(str.split, output_of("arm-none-eabi-nm", "--defined-only", str(elf)).splitlines())}
     reserved = symbols["kmax_stack_top"] - symbols["kmax_stack_bottom"]

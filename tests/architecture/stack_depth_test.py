@@ -6,6 +6,7 @@ usage: tests/architecture/stack_depth_test.py [-v] [TEST...]          as unittes
 import re
 import unittest
 
+from machine_code import functions_in
 from stack_depth import EXCEPTION_FRAME, Stated, examined, priorities_in
 
 MINIMUM = {
@@ -69,6 +70,19 @@ class StackDepth(unittest.TestCase):
     def test_reservation(self):
         self.bytes_of(reserved=sum(MINIMUM_BYTES))
         self.fails(f"{sum(MINIMUM_BYTES)} bytes", reserved=sum(MINIMUM_BYTES) - 1)
+
+    def test_follows_a_jump_that_is_too_far_for_the_instruction(self):
+        made = "\n\n".join(["08000000 <main>:\n 8000000:\tbl\t8000010 <__leaf_veneer>\n 8000004:\tbx\tlr",
+                            "08000010 <__leaf_veneer>:\n 8000010:\tldr.w\tpc, [pc]\t@ 8000014 <__leaf_veneer+0x4>\n"
+                            " 8000014:\t.word\t0x00004bc5", "00004bc4 <leaf>:\n    4bc4:\tbx\tlr"])
+        listed = dict(functions_in(made))
+        self.assertEqual(listed["__leaf_veneer"], [" 8000010:\tb.w\t4bc4 <leaf>"])
+        self.assertEqual(listed["leaf"], ["    4bc4:\tbx\tlr"])
+
+    def test_does_not_run_on_through_what_fills_up_to_the_next_function(self):
+        for filling in (["nop"], ["movs r0, r0"], ["nop", "movs r0, r0"]):
+            with self.subTest(filling):
+                self.assertEqual(MINIMUM_BYTES, self.bytes_of({"leaf": ["bx lr", *filling]}))
 
     def test_everything_that_moves_the_stack_pointer(self):
         for instruction, size in [("push {r0-r3, sl, lr}", 24), ("stmdb sp!, {r4, r5, ip}", 12), ("vpush {s16}", 4),

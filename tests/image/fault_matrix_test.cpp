@@ -561,7 +561,7 @@ void go_on_with(Bench& bench, std::uint16_t instruction, std::uint16_t mask = 0x
 std::vector<Upset> upsets() {
   using firmware::ResetCause;
   constexpr double handler = 0.1, next_interrupt = 0.6;
-  constexpr std::uint32_t stack_pointer = 13, stack_bottom = 0x2000'0000;
+  constexpr std::uint32_t stack_pointer = 13;
   return {
       {"reset line pulled", [](Bench& b) { b.board->pull_reset(); }, handler, ResetCause::pin, ""},
       {"power off and on", [](Bench& b) { b.board->cycle_power(); }, handler, ResetCause::power_on, ""},
@@ -598,7 +598,10 @@ std::vector<Upset> upsets() {
       {"undefined instruction", [](Bench& b) { go_on_with(b, 0xDE00, 0xFF00); }, handler,
        ResetCause::software, "undefined instruction"},
       {"stack full",
-       [](Bench& b) { b.board->processor().set_core_register(stack_pointer, stack_bottom + 16); },
+       [](Bench& b) {
+         const std::uint32_t bottom = tests::image().required_symbol("kmax_stack_bottom").address;
+         b.board->processor().set_core_register(stack_pointer, bottom + 16);
+       },
        next_interrupt, ResetCause::software, "stack overflow?"},
       {"jump into RAM", [](Bench& b) { go_on_at(b, 0x2001'8000); }, handler, ResetCause::software,
        "instruction fetch from where no code may be"},

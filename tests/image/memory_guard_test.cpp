@@ -23,12 +23,16 @@ struct Mishap {
   std::uint32_t status;   ///< CFSR
   std::uint32_t address;  ///< 0: none
   const char* words;
-  /// Without the protection: the words of the BusFault, "" if nothing notices.
+  /// Without the protection: the words of the BusFault, "" if nothing notices, null if the access is done.
   const char* unguarded;
 };
 
+constexpr std::uint32_t stored = 0xC0DE;
 constexpr std::uint16_t push_r4_to_lr = 0xB570, store_r1_at_r0 = 0x6001, load_r1_from_r0 = 0x6801;
-constexpr std::uint32_t bottom = 0x2000'0000, somewhere = 0x2000'1000;
+constexpr std::uint32_t bottom = 0x1000'0000, somewhere = bottom + 0x1000;
+/// Behind the tick's code, in what is reserved for it: where it is fetched, and where the same memory lies as
+/// data.
+constexpr std::uint32_t tick_code = 0xF000, tick_code_as_data = 0x2000'F000;
 constexpr std::uint32_t data =
     cortex::scb_cfsr::DataViolation::mask | cortex::scb_cfsr::MemoryFaultAddressValid::mask;
 constexpr std::uint32_t stacking = cortex::scb_cfsr::MemoryFaultStacking::mask;
@@ -41,9 +45,13 @@ const Mishap mishaps[] = {
     {"StoreThroughNull", store_r1_at_r0, 0, 0, somewhere, data, 0,
      "data access that the memory protection forbids at address 0x00000000", "bus error"},
     {"LoadThroughNull", load_r1_from_r0, 0, 0, somewhere, data, 0,
-     "data access that the memory protection forbids at address 0x00000000", "bus error"},
+     "data access that the memory protection forbids at address 0x00000000", nullptr},
     {"StoreToCode", store_r1_at_r0, 0, 0x0800'C000, somewhere, data, 0x0800'C000,
      "data access that the memory protection forbids at address 0x0800C000", "bus error"},
+    {"StoreToTheTicksCode", store_r1_at_r0, 0, tick_code, somewhere, data, tick_code,
+     "data access that the memory protection forbids at address 0x0000F000", "bus error"},
+    {"StoreToTheTicksCodeAsData", store_r1_at_r0, 0, tick_code_as_data, somewhere, data, tick_code_as_data,
+     "data access that the memory protection forbids at address 0x2000F000", nullptr},
     {"JumpIntoRam", 0, 0x2001'8000, 0, somewhere, fetch, 0, "instruction fetch from where no code may be",
      ""},
 };
@@ -54,6 +62,7 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
       : bench({{"axis0.wall.position", -1.0}, {"axis1.wall.position", -1.0}}, 1.0, "motor_axes",
               as_on_the_chip()) {
     bench.start();
+    EXPECT_EQ(tests::image().required_symbol("kmax_stack_bottom").address, bottom);
     for (const std::size_t axis : {0U, 1U}) {
       bench.master->arm(axis);
       EXPECT_TRUE(bench.board->bridge_armed(axis));
@@ -89,6 +98,7 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
       board.run_for(1e-6);
     board.processor().set_core_register(13, mishap.stack_pointer);
     board.processor().set_core_register(0, mishap.r0);
+    board.processor().set_core_register(1, stored);
     std::uint32_t next = mishap.program_counter;
     if (mishap.instruction != 0) next = address_of(mishap.instruction);
     if (next != 0) board.processor().set_core_register(15, next);
@@ -130,6 +140,20 @@ TEST_P(MemoryGuard, IsWhatCatchesIt) {
   bench.board->core().memory_protection.write({offsetof(cortex::MpuRegisters, ctrl), 4, bench.board->now()},
                                               0);
   const double off = happen();
+  if (mishap.unguarded == nullptr) {
+    if (mishap.instruction == store_r1_at_r0) {
+      EXPECT_EQ(bench.board->bus().load(mishap.r0), stored);
+    }
+    // What runs behind the access may fail, at another address.
+    const auto of_the_core = [this](std::uint32_t offset) {
+      return bench.board->core().system_control.read({offset, 4, bench.board->now()});
+    };
+    const bool refused = (of_the_core(offsetof(cortex::ScbRegisters, cfsr)) &
+                          cortex::scb_cfsr::BusFaultAddressValid::mask) != 0 &&
+                         of_the_core(offsetof(cortex::ScbRegisters, bfar)) == mishap.r0;
+    EXPECT_FALSE(refused);
+    return;
+  }
   if (*mishap.unguarded == '\0') {
     EXPECT_LT(off, 0.0) << "nothing notices";
     return;

@@ -28,7 +28,7 @@ class PowerCutBench {
   explicit PowerCutBench(const std::vector<std::uint8_t>& parameter_sectors) {
     board_ = board_for_24_v(nullptr);
     std::copy(parameter_sectors.begin(), parameter_sectors.end(), sectors().begin());
-    board_->run_for(0.02);
+    board_->run_for(0.03);
   }
 
   std::span<std::uint8_t> sectors() {

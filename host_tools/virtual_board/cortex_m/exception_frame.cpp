@@ -68,7 +68,8 @@ std::optional<ExceptionFrame> ExceptionStack::push(unsigned exception, std::uint
                                                                 : ExceptionReturn::thread_main_stack;
   if (extended) kind &= ~ExceptionReturn::basic_frame;
   const auto bytes = bus_.memory(frame, size);
-  const bool outside = bytes.empty() || memory_map::flash.contains(frame);
+  const bool outside =
+      bytes.empty() || memory_map::flash.contains(frame) || memory_map::sram1_at_zero.contains(frame);
   constexpr auto store = MemoryProtection::Use::store;
   const bool forbidden = protection != nullptr &&
                          !(protection->allows(frame, store) && protection->allows(frame + size - 4, store));

@@ -38,9 +38,10 @@ struct Instruction {
 
 /// Cycles that an instruction takes less directly behind `previous`, after which the core goes on in a
 /// straight line. The address phase of a load overlaps the data phase of the load before it, unless it needs
-/// that one's result (Cortex-M4 technical reference manual, load and store timings). Left out: FPU registers
-/// and several registers at once, of which the manual says nothing, and the store behind a load, which takes
-/// one cycle anyhow.
+/// that one's result (Cortex-M4 technical reference manual, load and store timings). Loads and stores of two
+/// registers do not overlap; of those of the FPU the manual does not say. Left out: a store with a register
+/// as its offset behind a load, which takes one cycle less, and addresses computed by the instruction before,
+/// which may cost one more.
 constexpr std::uint8_t cycles_saved_behind(const Instruction& previous, const Instruction& instruction) {
   constexpr std::uint8_t none = MemoryOperand::no_register;
   if (previous.loaded == none || instruction.loaded == none) return 0;

@@ -89,12 +89,23 @@ std::uint16_t half_word_at(Bus& bus, std::uint32_t address) {
   return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
 }
 
+/// A load or store of the tick that its fetches may have to wait for, or that waits itself.
+struct DataAccess {
+  std::size_t at;  ///< how many instructions had begun, with all of its block
+  std::uint32_t address;
+};
+
 struct Tick {
   std::uint32_t object = UINT32_MAX;  ///< where the axis lies in the image's memory
   std::size_t axis = 0;
   std::vector<std::uint32_t> addresses;
+  std::vector<DataAccess> accesses;  ///< to flash and to SRAM1
   std::uint64_t register_waits = 0;
 };
+
+bool is_sram1(std::uint32_t address) {
+  return memory_map::sram1.contains(address) || memory_map::sram1_at_zero.contains(address);
+}
 
 /// The sequence of instructions of every run of the conversions' interrupt, without what interrupts it.
 class Recorder {
@@ -108,6 +119,7 @@ class Recorder {
                                  "7CommandEm")
                 .address) {
     board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
+    board.processor().on_data_access([this](std::uint32_t address) { note_access(address); });
   }
 
   void start() {
@@ -121,7 +133,7 @@ class Recorder {
     std::uint32_t lowest = UINT32_MAX;
     for (const Tick& tick : ticks_) lowest = std::min(lowest, tick.object);
     for (Tick& tick : ticks_) tick.axis = tick.object == lowest ? 0 : 1;
-    open_ = false;
+    open_ = in_tick_ = false;
     return std::exchange(ticks_, {});
   }
 
@@ -136,6 +148,7 @@ class Recorder {
       open_ = true;
     }
     // The first block behind the tick closes it.
+    in_tick_ = false;
     if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
     open_ = open_ && exceptions.active(conversions);
     if (ticks_.empty()) return;
@@ -145,9 +158,16 @@ class Recorder {
     if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
         exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
       return;
+    in_tick_ = true;
     Tick& tick = ticks_.back();
     if (address == axis_tick_) tick.object = board_.processor().core_register(0);
     each_instruction(address, size, [&tick](std::uint32_t at) { tick.addresses.push_back(at); });
+  }
+
+  void note_access(std::uint32_t address) {
+    if (!in_tick_) return;
+    if (memory_map::flash.contains(address) || is_sram1(address))
+      ticks_.back().accesses.push_back({ticks_.back().addresses.size(), address});
   }
 
   template <typename Use>
@@ -165,6 +185,7 @@ class Recorder {
   VirtualBoard& board_;
   std::uint32_t handler_, axis_tick_;
   bool recording_ = false, open_ = false;
+  bool in_tick_ = false;  ///< the present block is the tick's
   std::uint64_t waits_before_ = 0, main_loop_ = 0;
   std::map<std::uint32_t, std::uint64_t> lengths_;  ///< of the main loop's blocks, instructions
   std::vector<Tick> ticks_;
@@ -284,30 +305,50 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   std::map<std::string, StepSum> sums;
   std::array<StepSum, 2> totals{};
   struct Waits {
-    std::uint64_t flash = 0, flash_if_all_kept = 0, buses = 0, worst = 0;
+    std::uint64_t flash = 0, flash_if_all_kept = 0, sram = 0, buses = 0, worst = 0;
   };
   std::array<Waits, 2> waits{};
+  std::uint64_t flash_reads = 0;
   std::uint32_t estimate_worst = 0, motor_worst = 0, without_io_worst = 0;
   for (const Tick& tick : ticks) {
     std::map<std::string, StepInTick> in_tick;
     FlashAccelerator flash, keeps_all(FlashAccelerator::Kept::all);
-    std::uint64_t flash_waits = 0, waits_if_all_kept = 0, cycles_so_far = 0;
+    std::uint64_t flash_waits = 0, waits_if_all_kept = 0, sram_waits = 0, cycles_so_far = 0;
+    std::size_t next_access = 0;
+    const Place* previous = nullptr;
     for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
       const Place& place = places.at(tick.addresses[i]);
       const bool taken = i + 1 < tick.addresses.size() &&
                          tick.addresses[i + 1] != tick.addresses[i] + place.instruction.bytes;
       StepInTick& step = in_tick[place.step];
       ++step.instructions;
+      const bool in_line =
+          previous != nullptr && tick.addresses[i] == tick.addresses[i - 1] + previous->instruction.bytes;
       const std::uint32_t its_cycles =
-          place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U);
+          place.instruction.cycles + (taken ? place.instruction.cycles_if_taken : 0U) -
+          (in_line ? cycles_saved_behind(previous->instruction, place.instruction) : 0U);
+      previous = &place;
       step.cycles += its_cycles;
       const std::uint64_t waits_before = flash_waits;
-      const auto& memory = place.instruction.memory;
-      const bool literal =
-          memory && memory->base == MemoryOperand::no_register && memory_map::flash.contains(memory->offset);
-      for (const auto& [model, total] : {std::pair{&flash, &flash_waits}, {&keeps_all, &waits_if_all_kept}}) {
-        *total += model->fetch(tick.addresses[i], place.instruction.bytes, cycles_so_far + *total);
-        if (literal) *total += model->load(memory->offset, cycles_so_far + *total);
+      const std::uint32_t fetched = tick.addresses[i];
+      const auto in_flash = [&](auto wait) {
+        for (const auto& [model, total] : {std::pair{&flash, &flash_waits}, {&keeps_all, &waits_if_all_kept}})
+          *total += wait(*model, cycles_so_far + *total);
+      };
+      if (memory_map::flash.contains(fetched)) {
+        ++flash_reads;
+        in_flash([&](FlashAccelerator& model, std::uint64_t now) {
+          return model.fetch(fetched, place.instruction.bytes, now);
+        });
+      }
+      for (; next_access < tick.accesses.size() && tick.accesses[next_access].at == i + 1; ++next_access) {
+        const std::uint32_t address = tick.accesses[next_access].address;
+        if (memory_map::flash.contains(address)) {
+          ++flash_reads;
+          in_flash([&](FlashAccelerator& model, std::uint64_t now) { return model.load(address, now); });
+        } else if (is_sram1(fetched)) {
+          ++sram_waits;
+        }
       }
       step.waits += flash_waits - waits_before;
       cycles_so_far += its_cycles;
@@ -342,13 +383,15 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     }
     waits[axis].flash += flash_waits;
     waits[axis].flash_if_all_kept += waits_if_all_kept;
+    waits[axis].sram += sram_waits;
     waits[axis].buses += tick.register_waits;
-    waits[axis].worst = std::max(waits[axis].worst, cycles_of_tick + flash_waits + tick.register_waits);
+    const std::uint64_t all_waits = flash_waits + sram_waits + tick.register_waits;
+    waits[axis].worst = std::max(waits[axis].worst, cycles_of_tick + all_waits);
     StepSum& total = totals[axis];
     ++total.ticks;
     total.instructions += tick.addresses.size();
     total.cycles += cycles_of_tick;
-    total.waits += flash_waits + tick.register_waits;
+    total.waits += all_waits;
     total.worst = std::max(total.worst, static_cast<std::uint32_t>(tick.addresses.size()));
     total.worst_cycles = std::max(total.worst_cycles, cycles_of_tick);
   }
@@ -396,12 +439,17 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
       return 100.0 * static_cast<double>(of_all) /
              static_cast<double>(std::max<std::uint64_t>(1, totals[axis].ticks)) / tick_cycles;
     };
-    report.with_waits.mean += share(totals[axis].cycles + waits[axis].flash + waits[axis].buses);
+    report.with_waits.mean +=
+        share(totals[axis].cycles + waits[axis].flash + waits[axis].sram + waits[axis].buses);
     report.with_waits.flash += share(waits[axis].flash);
     report.with_waits.flash_if_all_kept += share(waits[axis].flash_if_all_kept);
+    report.with_waits.sram += share(waits[axis].sram);
     report.with_waits.buses += share(waits[axis].buses);
     report.with_waits.worst += 100.0 * static_cast<double>(waits[axis].worst) / tick_cycles;
   }
+  report.lines.push_back({"both axes with all waits, on average", report.with_waits.mean, 30,
+                          fmt::format("% of {:.0f} MHz", of_board.core_clock_hz * 1e-6), ""});
+  report.lines.push_back({"the tick reads from flash", static_cast<double>(flash_reads), 0, "times", ""});
   return report;
 }
 
@@ -422,11 +470,11 @@ std::string budget_table(const BudgetReport& report) {
   text += fmt::format(
       "\nwith the waits for flash and buses: both axes {:.1f} % of the core's time on average, of which "
       "{:.1f} for flash\n"
-      "({:.1f} if the cache keeps prefetched lines as well) and {:.1f} for register accesses; {:.1f} % with "
-      "both worst ticks\n"
-      "together\n",
+      "({:.1f} if the cache keeps prefetched lines as well), {:.1f} for data where the code is fetched from "
+      "and {:.1f} for\n"
+      "register accesses; {:.1f} % with both worst ticks together\n",
       report.with_waits.mean, report.with_waits.flash, report.with_waits.flash_if_all_kept,
-      report.with_waits.buses, report.with_waits.worst);
+      report.with_waits.sram, report.with_waits.buses, report.with_waits.worst);
   text += fmt::format(
       "\nmain loop with the CAN bus full and one Modbus master that asks: {:.0f} instructions in a round's "
       "time; "
@@ -447,6 +495,7 @@ std::string budget_json(const BudgetReport& report) {
                             {"worst_percent", report.with_waits.worst},
                             {"flash_percent", report.with_waits.flash},
                             {"flash_percent_if_all_kept", report.with_waits.flash_if_all_kept},
+                            {"sram_percent", report.with_waits.sram},
                             {"buses_percent", report.with_waits.buses}};
   document["with_traffic"] = {{"main_loop_instructions", report.with_traffic.instructions},
                               {"sdo_answers_per_second", report.with_traffic.sdo_answers},

@@ -19,7 +19,7 @@ struct StepCost {
   double mean = 0.0;               ///< instructions
   double mean_cycles = 0.0;        ///< modelled; see instruction.hpp
   std::uint32_t worst_cycles = 0;  ///< likewise
-  double mean_waits = 0.0;         ///< cycles for flash; of a whole tick for the buses as well
+  double mean_waits = 0.0;         ///< cycles for flash; of a whole tick for SRAM and the buses as well
 };
 
 /// A bound, and what is held against it.
@@ -32,13 +32,17 @@ struct BudgetLine {
   bool kept() const { return value <= bound; }
 };
 
-/// Of the whole ticks of both axes, with the waits for flash and for the buses: FlashAccelerator, which
-/// begins each tick empty because what ran before it was something else, and Bus::register_waits. Flash is
-/// read by instructions and literals alone: tables that are read through a pointer are left out.
+/// Of the whole ticks of both axes, with the waits for memories and buses. Left out is the vector, which the
+/// core reads from flash while it stacks.
+/// - flash, by instructions and by data: FlashAccelerator, which begins each tick empty because what ran
+///   before it was something else
+/// - SRAM1 while code is fetched from it: a cycle for each load and store of data there. An upper bound: the
+///   core fetches in advance, so that not each of them meets a fetch
+/// - registers: Bus::register_waits
 struct WaitReport {
-  double mean = 0.0, worst = 0.0;   ///< % of the core's time; worst: both worst ticks together
-  double flash = 0.0, buses = 0.0;  ///< of the mean
-  double flash_if_all_kept = 0.0;   ///< instead of `flash`, where the cache keeps prefetched lines as well
+  double mean = 0.0, worst = 0.0;               ///< % of the core's time; worst: both worst ticks together
+  double flash = 0.0, sram = 0.0, buses = 0.0;  ///< of the mean
+  double flash_if_all_kept = 0.0;  ///< instead of `flash`, where the cache keeps prefetched lines as well
 };
 
 /// The main loop while the CAN bus has not a free bit (FullBus) and the serial line is as busy as one Modbus

@@ -321,6 +321,24 @@ TEST(Processor, FetchesAtZeroWhatWasStoredToSram) {
       << board.processor.fault();
 }
 
+TEST(Processor, TellsOfLoadsAndStoresWhenAsked) {
+  ProgramOnCore board({0x6808,    // ldr r0, [r1]
+                       0x6053,    // str r3, [r2, #4]
+                       0x6820,    // ldr r0, [r4]
+                       0x4801,    // ldr r0, [pc, #4]
+                       0xB401,    // push {r0}
+                       0xBE01});  // bkpt 1
+  std::vector<std::uint32_t> seen;
+  board.processor.on_data_access([&seen](std::uint32_t address) { seen.push_back(address); });
+  board.set(1, 0x2000'0100).set(2, 0x1000'0200).set(4, ProgramOnCore::block_base);
+  EXPECT_EQ(board.run(), RunEnd::stopped) << board.processor.fault();
+  // The literal lies at the program's word 3, behind the bkpt.
+  const std::vector<std::uint32_t> expected{0x2000'0100, 0x1000'0204, ProgramOnCore::program_base + 12,
+                                            ProgramOnCore::initial_stack - 4};
+  std::erase(seen, ProgramOnCore::block_base);
+  EXPECT_EQ(seen, expected);
+}
+
 // The manual would let it; no firmware should.
 TEST(Processor, RefusesStoresToSramAtZero) {
   ProgramOnCore board({0x6001, 0xBE01});  // str r1, [r0]; bkpt 1
