@@ -25,7 +25,8 @@ def said_of(code, text_at=FLASH, handlers="ISR_adc", in_sram="", sections=()):
                         *(f"--section-start={name}={at:#x}" for name, at in sections), made, "-o", image], check=True)
         tools = {name.upper(): f"arm-none-eabi-{name}" for name in ("nm", "readelf", "objdump")}
         done = subprocess.run(["cmake", *(f"-D{name}={value}" for name, value in {**tools, "ELF": image}.items()),
-                               f"-DHANDLERS={handlers}", f"-DIN_SRAM={in_sram}", "-P", str(CHECK)], capture_output=True, text=True, check=False)
+                               f"-DHANDLERS={handlers}", f"-DIN_SRAM={in_sram}", "-P", str(CHECK)],
+                              capture_output=True, text=True, check=False)
         assert (done.returncode != 0) == ("is not fit for the target" in done.stderr) == (not Path(image).exists()), done
         return {line.strip() for line in done.stderr.partition("target:")[2].splitlines() if line.strip()}
 
